@@ -1,0 +1,380 @@
+//! What touches what: linked road ends and linked lanes (OpenDRIVE 1.9, 10.3, 11.6, 12.3, 12.4,
+//! 12.6, 12.7).
+
+use std::collections::BTreeSet;
+use std::sync::OnceLock;
+
+use qcbus_document::Node;
+
+use crate::junction::{Connection, Junction, JunctionLaneLink};
+use crate::lane_ref::{LaneKey, LaneRef};
+use crate::map::RoadMap;
+use crate::road::Road;
+use crate::value::{ContactPoint, LayerKind, Side};
+
+/// What is found out about links when first asked for.
+#[derive(Debug, Default)]
+pub(crate) struct Caches<'a> {
+    joints: OnceLock<Vec<LaneJoint<'a>>>,
+    pub(crate) touching: OnceLock<Vec<crate::TouchingLanes<'a>>>,
+    connections: OnceLock<Vec<(usize, Connection<'a>)>>,
+    contacts: OnceLock<Vec<RoadContact<'a>>>,
+    /// Both ends of every contact, in order, with the contact's place.
+    by_end: OnceLock<Vec<(RoadEnd, u32)>>,
+}
+
+/// An end of a road.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct RoadEnd {
+    /// The road's place in the map.
+    pub road: usize,
+    /// Which of its ends.
+    pub end: ContactPoint,
+}
+
+/// A statement of the file that two road ends touch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RoadContact<'a> {
+    /// One end: the one that bears the link, or the incoming road's.
+    pub from: RoadEnd,
+    /// The other end: the linked road's, the connecting road's.
+    pub to: RoadEnd,
+    /// The element that says so: a road's `<predecessor>` or `<successor>`, or a `<connection>`.
+    pub node: Node<'a>,
+    /// The place of the junction when a `<connection>` says so.
+    pub junction: Option<usize>,
+}
+
+/// A statement of the file that two lane ends touch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LaneJoint<'a> {
+    /// The lane that bears the link, or the one on the incoming road.
+    pub from: LaneEnd,
+    /// The linked lane.
+    pub to: LaneEnd,
+    /// The element that says so: a lane's `<predecessor>` or `<successor>`, or a `<laneLink>`.
+    pub node: Node<'a>,
+    /// The place of the junction when a `<laneLink>` says so.
+    pub junction: Option<usize>,
+}
+
+impl LaneJoint<'_> {
+    /// Whether s runs in opposite directions on both sides: end touches end or start touches
+    /// start.
+    pub fn is_reversed(&self) -> bool {
+        self.from.end == self.to.end
+    }
+
+    /// Whether both lanes belong to the same road.
+    pub fn is_within_road(&self) -> bool {
+        self.from.lane.road == self.to.lane.road && self.from.lane.section != self.to.lane.section
+    }
+}
+
+/// An end of a lane within its section.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct LaneEnd {
+    /// The lane.
+    pub lane: LaneKey,
+    /// The start or the end of its section.
+    pub end: ContactPoint,
+}
+
+impl<'a> RoadMap<'a> {
+    /// The road at a place of [`RoadMap::roads`].
+    pub fn road_at(&self, index: usize) -> Option<&Road<'a>> {
+        self.roads().get(index)
+    }
+
+    /// All connections of all junctions with their junction's place, in document order.
+    pub fn connections(&self) -> impl Iterator<Item = (&Junction<'a>, Connection<'a>)> {
+        let all = self.caches.connections.get_or_init(|| {
+            let junctions = self.junctions().iter();
+            junctions
+                .flat_map(|junction| junction.connections().map(|one| (junction.index(), one)))
+                .collect()
+        });
+        all.iter()
+            .filter_map(|(at, connection)| Some((self.junctions().get(*at)?, *connection)))
+    }
+
+    /// Every statement that two road ends touch: the links of roads to roads by `@contactPoint`,
+    /// and the connections of junctions; in document order. References to roads that do not
+    /// exist and links to places within a road (`@elementS`) are left out.
+    pub fn road_contacts(&self) -> &[RoadContact<'a>] {
+        self.caches.contacts.get_or_init(|| {
+            let links = self
+                .roads()
+                .iter()
+                .flat_map(|road| ContactPoint::BOTH.map(|end| self.linked_end(road, end)));
+            let connections = self
+                .connections()
+                .map(|(junction, connection)| self.connection_contact(junction, connection));
+            links.chain(connections).flatten().collect()
+        })
+    }
+
+    /// What a road's own link says about one of its ends.
+    pub fn linked_end(&self, road: &Road<'a>, end: ContactPoint) -> Option<RoadContact<'a>> {
+        let link = road.link(end)?;
+        let linked = self.road(link.road_id()?)?;
+        Some(RoadContact {
+            from: RoadEnd {
+                road: road.index(),
+                end,
+            },
+            to: RoadEnd {
+                road: linked.index(),
+                end: link.contact_point()?,
+            },
+            node: link.node(),
+            junction: None,
+        })
+    }
+
+    /// The road ends that a connection of a common or direct junction brings together.
+    pub fn connection_contact(
+        &self,
+        junction: &Junction<'a>,
+        connection: Connection<'a>,
+    ) -> Option<RoadContact<'a>> {
+        if connection.is_virtual() {
+            return None;
+        }
+        let target = self.road(connection.target_road()?)?;
+        let contact = connection.contact_point()?;
+        let incoming = self.road(connection.incoming_road()?)?;
+        let end = self.incoming_end(junction, incoming, target, contact)?;
+        Some(RoadContact {
+            from: RoadEnd {
+                road: incoming.index(),
+                end,
+            },
+            to: RoadEnd {
+                road: target.index(),
+                end: contact,
+            },
+            node: connection.node(),
+            junction: Some(junction.index()),
+        })
+    }
+
+    /// The end of the incoming road at which a junction lies. It follows from the incoming
+    /// road's own links; where both its ends meet the junction, from the target road's link back,
+    /// else from what lies nearer. Virtual junctions touch their main road somewhere within.
+    pub fn incoming_end(
+        &self,
+        junction: &Junction<'a>,
+        incoming: &Road<'a>,
+        target: &Road<'a>,
+        contact: ContactPoint,
+    ) -> Option<ContactPoint> {
+        let meets = |end: ContactPoint| {
+            let link = incoming.link(end);
+            link.is_some_and(|link| link.junction_id() == Some(junction.id()))
+        };
+        match ContactPoint::BOTH.map(meets) {
+            [true, false] => Some(ContactPoint::Start),
+            [false, true] => Some(ContactPoint::End),
+            [both, _] => {
+                let link = target
+                    .link(contact)
+                    .filter(|link| link.road_id() == Some(incoming.id()));
+                let named = link.and_then(|link| link.contact_point());
+                named.or_else(|| {
+                    if both {
+                        nearer_end(incoming, target, contact)
+                    } else {
+                        None
+                    }
+                })
+            }
+        }
+    }
+
+    /// The road ends that the file says touch an end of a road, without repetition, in document
+    /// order of the statements. Both directions of each statement count.
+    pub fn neighbours(&self, road: &Road<'a>, end: ContactPoint) -> Vec<RoadEnd> {
+        let own = RoadEnd {
+            road: road.index(),
+            end,
+        };
+        let mut seen = BTreeSet::new();
+        let contacts = self.contacts_of(own);
+        let others = contacts.map(|contact| {
+            if contact.from == own {
+                contact.to
+            } else {
+                contact.from
+            }
+        });
+        others.filter(|other| seen.insert(*other)).collect()
+    }
+
+    /// The statements about one road end, from either side, in document order.
+    pub fn contacts_of(&self, own: RoadEnd) -> impl Iterator<Item = &RoadContact<'a>> {
+        let contacts = self.road_contacts();
+        let by_end = self.caches.by_end.get_or_init(|| {
+            let ends = contacts
+                .iter()
+                .zip(0..)
+                .flat_map(|(one, at)| [(one.from, at), (one.to, at)]);
+            let mut ends: Vec<(RoadEnd, u32)> = ends.collect();
+            ends.sort_unstable();
+            ends.dedup();
+            ends
+        });
+        let from = by_end.partition_point(|(end, _)| *end < own);
+        let rest = by_end.get(from..).unwrap_or(&[]).iter();
+        rest.take_while(move |(end, _)| *end == own)
+            .filter_map(|(_, at)| contacts.get(*at as usize))
+    }
+
+    /// Every statement that two lane ends touch: links within a road, links across roads, lane
+    /// links of junctions; in document order, lanes first. Found once and kept.
+    ///
+    /// Left out are links to lanes that do not exist, and those whose other side is unknown
+    /// because a road link or a contact point is missing.
+    pub fn lane_joints(&self) -> &[LaneJoint<'a>] {
+        self.caches.joints.get_or_init(|| {
+            let mut joints = Vec::new();
+            for lane in self.lanes() {
+                for end in ContactPoint::BOTH {
+                    self.collect_links(lane, end, &mut joints);
+                }
+            }
+            for (junction, connection) in self.connections() {
+                self.collect_lane_links(junction, connection, &mut joints);
+            }
+            joints
+        })
+    }
+
+    fn collect_links(
+        &self,
+        lane: LaneRef<'_, 'a>,
+        end: ContactPoint,
+        joints: &mut Vec<LaneJoint<'a>>,
+    ) {
+        for link in lane.links(end) {
+            let to = link
+                .id()
+                .and_then(|id| self.linked_lane(lane, end, id, link.layer()));
+            if let Some(to) = to {
+                let from = LaneEnd {
+                    lane: lane.key(),
+                    end,
+                };
+                joints.push(LaneJoint {
+                    from,
+                    to,
+                    node: link.node(),
+                    junction: None,
+                });
+            }
+        }
+    }
+
+    /// The lane that a link of `lane` at `end` with this id and layer leads to: in the next
+    /// section of the same road, or in the road that is linked there.
+    pub fn linked_lane(
+        &self,
+        lane: LaneRef<'_, 'a>,
+        end: ContactPoint,
+        id: i64,
+        layer: LayerKind,
+    ) -> Option<LaneEnd> {
+        let side = lane.side().unwrap_or(Side::Right);
+        let same_layer = layer == lane.at.layer.kind();
+        if !same_layer {
+            return other_layer_lane(lane, end, id, layer);
+        }
+        if let Some(next) = lane.at.neighbour(side, end) {
+            let to = next.lane(id)?;
+            return Some(LaneEnd {
+                lane: to.key(),
+                end: end.other(),
+            });
+        }
+        let contact = self.linked_end(lane.at.road, end)?;
+        self.lane_at_road_end(contact.to, id, layer)
+    }
+
+    /// The lane with an id in the section at an end of a road.
+    pub fn lane_at_road_end(&self, at: RoadEnd, id: i64, layer: LayerKind) -> Option<LaneEnd> {
+        let road = self.road_at(at.road)?;
+        let side = Side::of_lane_id(id).unwrap_or(Side::Right);
+        let section = road.layer(layer)?.end_section(road, side, at.end)?;
+        Some(LaneEnd {
+            lane: section.lane(id)?.key(),
+            end: at.end,
+        })
+    }
+
+    fn collect_lane_links(
+        &self,
+        junction: &Junction<'a>,
+        connection: Connection<'a>,
+        joints: &mut Vec<LaneJoint<'a>>,
+    ) {
+        let Some(contact) = self.connection_contact(junction, connection) else {
+            return;
+        };
+        for link in connection.lane_links() {
+            if let Some((from, to)) = self.lane_link_ends(&contact, link) {
+                joints.push(LaneJoint {
+                    from,
+                    to,
+                    node: link.node(),
+                    junction: contact.junction,
+                });
+            }
+        }
+    }
+
+    fn lane_link_ends(
+        &self,
+        contact: &RoadContact<'a>,
+        link: JunctionLaneLink<'a>,
+    ) -> Option<(LaneEnd, LaneEnd)> {
+        let from = self.lane_at_road_end(contact.from, link.from()?, link.from_layer())?;
+        let to = self.lane_at_road_end(contact.to, link.to()?, link.to_layer())?;
+        Some((from, to))
+    }
+}
+
+/// A link to the other layer of the same road: to the lane of the section that touches the end.
+fn other_layer_lane(
+    lane: LaneRef<'_, '_>,
+    end: ContactPoint,
+    id: i64,
+    layer: LayerKind,
+) -> Option<LaneEnd> {
+    let road = lane.at.road;
+    let side = Side::of_lane_id(id)?;
+    let place = match end {
+        ContactPoint::Start => crate::Place::before(lane.at.s()?),
+        ContactPoint::End => crate::Place::at(lane.at.end(side)?),
+    };
+    let to = road.layer(layer)?.section_at(road, side, place)?.lane(id)?;
+    Some(LaneEnd {
+        lane: to.key(),
+        end: end.other(),
+    })
+}
+
+/// The end of the incoming road that lies nearer to the contact point of the target road.
+fn nearer_end(
+    incoming: &Road<'_>,
+    target: &Road<'_>,
+    contact: ContactPoint,
+) -> Option<ContactPoint> {
+    let place = target.end_pose(contact)?.point();
+    let distance = |end| Some(incoming.end_pose(end)?.point().distance(place));
+    let (start, end) = (distance(ContactPoint::Start)?, distance(ContactPoint::End)?);
+    Some(if start <= end {
+        ContactPoint::Start
+    } else {
+        ContactPoint::End
+    })
+}

@@ -1,0 +1,386 @@
+//! Junctions of all types (OpenDRIVE 1.9, chapter 12).
+
+use std::sync::OnceLock;
+
+use qcbus_document::Node;
+
+use crate::plan_view::PlanView;
+use crate::road::RoadLink;
+use crate::value::{ContactPoint, number, parse_number};
+use crate::view::{children, view};
+
+/// The types of junction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum JunctionType {
+    /// `default`, also what a missing `@type` means: a common junction (12.2).
+    Common,
+    /// `direct` (12.6).
+    Direct,
+    /// `virtual` (12.7).
+    Virtual,
+    /// `crossing` (12.8).
+    Crossing,
+}
+
+impl JunctionType {
+    /// The standard's word for `@type`.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            JunctionType::Common => "default",
+            JunctionType::Direct => "direct",
+            JunctionType::Virtual => "virtual",
+            JunctionType::Crossing => "crossing",
+        }
+    }
+}
+
+/// One `<junction>`.
+#[derive(Debug)]
+pub struct Junction<'a> {
+    node: Node<'a>,
+    index: u32,
+    id: &'a str,
+    kind: Option<JunctionType>,
+    plan_view: OnceLock<PlanView<'a>>,
+}
+
+impl<'a> Junction<'a> {
+    pub(crate) fn read(node: Node<'a>, index: u32) -> Junction<'a> {
+        let kind = match node.attr("type") {
+            None | Some("default") => Some(JunctionType::Common),
+            Some("direct") => Some(JunctionType::Direct),
+            Some("virtual") => Some(JunctionType::Virtual),
+            Some("crossing") => Some(JunctionType::Crossing),
+            Some(_) => None,
+        };
+        Junction {
+            node,
+            index,
+            id: node.attr("id").unwrap_or(""),
+            kind,
+            plan_view: OnceLock::new(),
+        }
+    }
+
+    /// The `<junction>` element.
+    pub fn node(&self) -> Node<'a> {
+        self.node
+    }
+
+    /// Its place among the map's junctions.
+    pub fn index(&self) -> usize {
+        self.index as usize
+    }
+
+    /// `@id`, empty when missing.
+    pub fn id(&self) -> &'a str {
+        self.id
+    }
+
+    /// `@type`; `None` when it is a word that the standard does not know.
+    pub fn kind(&self) -> Option<JunctionType> {
+        self.kind
+    }
+
+    /// `@mainRoad` of a virtual junction.
+    pub fn main_road(&self) -> Option<&'a str> {
+        self.node.attr("mainRoad")
+    }
+
+    /// `@sStart` of a virtual junction, in metres on the main road.
+    pub fn s_start(&self) -> Option<f64> {
+        number(self.node, "sStart")
+    }
+
+    /// `@sEnd` of a virtual junction, in metres on the main road.
+    pub fn s_end(&self) -> Option<f64> {
+        number(self.node, "sEnd")
+    }
+
+    /// `@orientation` of a virtual junction: `+`, `-` or `none`.
+    pub fn orientation(&self) -> Option<&'a str> {
+        self.node.attr("orientation")
+    }
+
+    /// The junction reference line (12.9), empty without `<planView>`.
+    pub fn plan_view(&self) -> &PlanView<'a> {
+        self.plan_view
+            .get_or_init(|| PlanView::read(self.node.child("planView")))
+    }
+
+    /// The `<boundary>` (12.10).
+    pub fn boundary(&self) -> Option<Boundary<'a>> {
+        self.node.child("boundary").map(Boundary::of)
+    }
+
+    /// The first `<elevationGrid>` (12.11).
+    pub fn elevation_grid(&self) -> Option<ElevationGrid<'a>> {
+        self.elevation_grids().next()
+    }
+
+    children! {
+        /// The connections.
+        connections: Connection "connection",
+        /// The `<priority>` records (12.4).
+        priorities: Priority "priority",
+        /// The `<controller>` records of the junction (12.14).
+        controllers: JunctionController "controller",
+        /// The cross paths (12.5).
+        cross_paths: CrossPath "crossPath",
+        /// The road sections of a crossing (12.8).
+        road_sections: RoadSection "roadSection",
+        /// All elevation grids; the standard allows one.
+        elevation_grids: ElevationGrid "elevationGrid",
+    }
+}
+
+view! {
+    /// A `<connection>` of a junction.
+    Connection {
+        /// `@id`.
+        id: text "id",
+        /// `@type`: `default` or `virtual`.
+        kind: text "type",
+        /// `@incomingRoad`.
+        incoming_road: text "incomingRoad",
+        /// `@connectingRoad`, in all but direct junctions.
+        connecting_road: text "connectingRoad",
+        /// `@linkedRoad`, in direct junctions.
+        linked_road: text "linkedRoad",
+        /// `@contactPoint`: the end of the connecting or linked road.
+        contact_point: contact "contactPoint",
+    }
+}
+
+impl<'a> Connection<'a> {
+    /// Whether it is a virtual connection (12.7).
+    pub fn is_virtual(&self) -> bool {
+        self.kind() == Some("virtual")
+    }
+
+    /// The road that the incoming road leads to: the connecting one, else the linked one.
+    pub fn target_road(&self) -> Option<&'a str> {
+        self.connecting_road().or(self.linked_road())
+    }
+
+    /// `<predecessor>` or `<successor>` of a virtual connection.
+    pub fn link(&self, end: ContactPoint) -> Option<RoadLink<'a>> {
+        self.node.child(end.link_name()).map(RoadLink::of)
+    }
+
+    children! {
+        /// The lane links.
+        lane_links: JunctionLaneLink "laneLink",
+    }
+}
+
+view! {
+    /// A `<laneLink>` of a connection (12.4, 12.6).
+    JunctionLaneLink {
+        /// `@from`: a lane of the incoming road.
+        from: integer "from",
+        /// `@to`: a lane of the connecting or linked road.
+        to: integer "to",
+        /// `@fromLayer`; permanent when missing.
+        from_layer: layer "fromLayer",
+        /// `@toLayer`; permanent when missing.
+        to_layer: layer "toLayer",
+        /// `@overlapZone`, in metres.
+        overlap_zone: number "overlapZone",
+    }
+}
+
+view! {
+    /// A `<priority>` of a junction (12.4).
+    Priority {
+        /// `@high`: the road with priority.
+        high: text "high",
+        /// `@low`: the road that gives way.
+        low: text "low",
+    }
+}
+
+view! {
+    /// A `<controller>` within a junction (12.14).
+    JunctionController {
+        /// `@id` of the signal controller.
+        id: text "id",
+        /// `@type`.
+        kind: text "type",
+        /// `@sequence`.
+        sequence: integer "sequence",
+    }
+}
+
+view! {
+    /// A `<crossPath>` (12.5).
+    CrossPath {
+        /// `@id`.
+        id: text "id",
+        /// `@crossingRoad`.
+        crossing_road: text "crossingRoad",
+        /// `@roadAtStart`.
+        road_at_start: text "roadAtStart",
+        /// `@roadAtEnd`.
+        road_at_end: text "roadAtEnd",
+    }
+}
+
+impl<'a> CrossPath<'a> {
+    /// `<startLaneLink>` or `<endLaneLink>`.
+    pub fn lane_link(&self, end: ContactPoint) -> Option<CrossPathLaneLink<'a>> {
+        let name = match end {
+            ContactPoint::Start => "startLaneLink",
+            ContactPoint::End => "endLaneLink",
+        };
+        self.node.child(name).map(CrossPathLaneLink::of)
+    }
+
+    /// The id of the road that is met at this end of the crossing road.
+    pub fn road_at(&self, end: ContactPoint) -> Option<&'a str> {
+        match end {
+            ContactPoint::Start => self.road_at_start(),
+            ContactPoint::End => self.road_at_end(),
+        }
+    }
+}
+
+view! {
+    /// A `<startLaneLink>` or `<endLaneLink>` of a cross path (12.5).
+    CrossPathLaneLink {
+        /// `@from`: a lane of the road that is crossed.
+        from: integer "from",
+        /// `@to`: a lane of the crossing road.
+        to: integer "to",
+        /// `@s`: the place on the road that is crossed, in metres.
+        s: number "s",
+    }
+}
+
+view! {
+    /// A `<roadSection>` of a crossing (12.8).
+    RoadSection {
+        /// `@id`.
+        id: text "id",
+        /// `@roadId`.
+        road_id: text "roadId",
+        /// `@sStart`, in metres.
+        s_start: number "sStart",
+        /// `@sEnd`, in metres.
+        s_end: number "sEnd",
+    }
+}
+
+view! {
+    /// The `<boundary>` of a junction (12.10).
+    Boundary {}
+}
+
+impl<'a> Boundary<'a> {
+    children! {
+        /// The segments in the order of the boundary.
+        segments: BoundarySegment "segment",
+    }
+}
+
+view! {
+    /// A `<segment>` of a junction boundary (12.10).
+    BoundarySegment {
+        /// `@type`: `lane` or `joint`.
+        kind: text "type",
+        /// `@roadId`.
+        road_id: text "roadId",
+        /// `@boundaryLane` of a lane segment.
+        boundary_lane: integer "boundaryLane",
+        /// `@contactPoint` of a joint segment.
+        contact_point: contact "contactPoint",
+        /// `@jointLaneStart` of a joint segment.
+        joint_lane_start: integer "jointLaneStart",
+        /// `@jointLaneEnd` of a joint segment.
+        joint_lane_end: integer "jointLaneEnd",
+        /// `@transitionLength` of a joint segment, in metres.
+        transition_length: number "transitionLength",
+    }
+}
+
+/// A place on a road given as a number or as one of the road's ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum SegmentPlace {
+    /// A number: s in metres.
+    S(f64),
+    /// An end of the road.
+    End(ContactPoint),
+}
+
+impl<'a> BoundarySegment<'a> {
+    /// `@sStart` of a lane segment; `begin` is an old word for `start`.
+    pub fn s_start(&self) -> Option<SegmentPlace> {
+        segment_place(self.node.attr("sStart")?)
+    }
+
+    /// `@sEnd` of a lane segment.
+    pub fn s_end(&self) -> Option<SegmentPlace> {
+        segment_place(self.node.attr("sEnd")?)
+    }
+}
+
+fn segment_place(text: &str) -> Option<SegmentPlace> {
+    match text {
+        "begin" => Some(SegmentPlace::End(ContactPoint::Start)),
+        _ => match ContactPoint::parse(text) {
+            Some(end) => Some(SegmentPlace::End(end)),
+            None => parse_number(text).map(SegmentPlace::S),
+        },
+    }
+}
+
+view! {
+    /// The `<elevationGrid>` of a junction (12.11).
+    ElevationGrid {
+        /// `@gridSpacing`, in metres.
+        grid_spacing: number "gridSpacing",
+        /// `@sStart`: where the first row lies on the junction reference line, in metres.
+        s_start: number "sStart",
+    }
+}
+
+impl<'a> ElevationGrid<'a> {
+    children! {
+        /// The rows, in ascending order of s.
+        rows: GridRow "elevation",
+    }
+}
+
+view! {
+    /// An `<elevation>` of an elevation grid: the heights of one row.
+    GridRow {
+        /// `@center` as written.
+        center_text: text "center",
+        /// `@left` as written, from the reference line outward.
+        left_text: text "left",
+        /// `@right` as written, from the reference line outward.
+        right_text: text "right",
+    }
+}
+
+impl GridRow<'_> {
+    /// The height on the reference line, in metres.
+    pub fn center(&self) -> Option<f64> {
+        parse_number(self.center_text()?)
+    }
+
+    /// The heights to the left, from inside to outside; `None` when one is broken.
+    pub fn left(&self) -> Option<Vec<f64>> {
+        heights(self.left_text())
+    }
+
+    /// The heights to the right, from inside to outside; `None` when one is broken.
+    pub fn right(&self) -> Option<Vec<f64>> {
+        heights(self.right_text())
+    }
+}
+
+fn heights(list: Option<&str>) -> Option<Vec<f64>> {
+    let words = list.unwrap_or("").split_ascii_whitespace();
+    words.map(parse_number).collect()
+}

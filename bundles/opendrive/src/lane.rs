@@ -1,0 +1,261 @@
+//! Lanes and their records (OpenDRIVE 1.9, 11.3, 11.6, 11.7).
+
+use std::sync::OnceLock;
+
+use qcbus_document::Node;
+
+use crate::profile::Profile;
+use crate::steps::{Place, Starts, Steps};
+use crate::value::{ContactPoint, Side, flag, known, numbers, parse_integer};
+use crate::view::view;
+
+/// The part of a lane section in which a lane is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum LaneGroup {
+    /// `<left>`
+    Left,
+    /// `<center>`
+    Center,
+    /// `<right>`
+    Right,
+}
+
+impl LaneGroup {
+    /// The group that an element stands for.
+    pub fn of(node: Node<'_>) -> Option<LaneGroup> {
+        match node.name() {
+            "left" => Some(LaneGroup::Left),
+            "center" => Some(LaneGroup::Center),
+            "right" => Some(LaneGroup::Right),
+            _ => None,
+        }
+    }
+
+    /// The side of the road; `None` for the center.
+    pub fn side(self) -> Option<Side> {
+        match self {
+            LaneGroup::Left => Some(Side::Left),
+            LaneGroup::Center => None,
+            LaneGroup::Right => Some(Side::Right),
+        }
+    }
+}
+
+/// One `<lane>`; its records are read when first asked for.
+#[derive(Debug)]
+pub struct Lane<'a> {
+    node: Node<'a>,
+    id: Option<i64>,
+    group: LaneGroup,
+    /// Its place on its side, counted from the center outward.
+    rank: u32,
+    records: OnceLock<Box<LaneRecords<'a>>>,
+}
+
+/// The records that give a lane its shape.
+#[derive(Debug)]
+struct LaneRecords<'a> {
+    widths: Profile<'a>,
+    borders: Profile<'a>,
+    heights: Steps<LaneHeight<'a>>,
+}
+
+impl<'a> Lane<'a> {
+    pub(crate) fn read(node: Node<'a>, group: LaneGroup) -> Lane<'a> {
+        Lane {
+            node,
+            id: node.attr("id").and_then(parse_integer),
+            group,
+            rank: 0,
+            records: OnceLock::new(),
+        }
+    }
+
+    /// The `<lane>` element.
+    pub fn node(&self) -> Node<'a> {
+        self.node
+    }
+
+    /// `@id`, if it is an integer.
+    pub fn id(&self) -> Option<i64> {
+        self.id
+    }
+
+    /// `@id` as written.
+    pub fn id_text(&self) -> Option<&'a str> {
+        self.node.attr("id")
+    }
+
+    /// The group in which it is written, whatever its id says.
+    pub fn group(&self) -> LaneGroup {
+        self.group
+    }
+
+    /// `@type`.
+    pub fn kind(&self) -> Option<&'a str> {
+        self.node.attr("type")
+    }
+
+    /// `@level`: whether the lane is kept out of the lateral profile; false when missing.
+    pub fn level(&self) -> Option<bool> {
+        match self.node.attr("level") {
+            None => Some(false),
+            Some(_) => flag(self.node, "level"),
+        }
+    }
+
+    /// `@direction`: `standard`, `reversed` or `both`.
+    pub fn direction(&self) -> Option<&'a str> {
+        self.node.attr("direction")
+    }
+
+    /// `@dynamicLaneDirection`.
+    pub fn dynamic_direction(&self) -> Option<bool> {
+        flag(self.node, "dynamicLaneDirection")
+    }
+
+    /// `@advisory`.
+    pub fn advisory(&self) -> Option<&'a str> {
+        self.node.attr("advisory")
+    }
+
+    /// The `<link>` element.
+    pub fn link_node(&self) -> Option<Node<'a>> {
+        self.node.child("link")
+    }
+
+    /// The linked lanes at an end: `<predecessor>` or `<successor>` elements, of any number.
+    pub fn links(&self, end: ContactPoint) -> impl Iterator<Item = LaneLink<'a>> + use<'a> {
+        let links = self.link_node().into_iter();
+        links
+            .flat_map(move |link| link.children_named(end.link_name()))
+            .map(LaneLink::of)
+    }
+
+    fn records(&self) -> &LaneRecords<'a> {
+        self.records.get_or_init(|| {
+            let nodes =
+                |name: &'static str| self.node.children().filter(move |child| child.is(name));
+            Box::new(LaneRecords {
+                widths: Profile::read(nodes("width"), "sOffset"),
+                borders: Profile::read(nodes("border"), "sOffset"),
+                heights: Steps::new(nodes("height").map(LaneHeight::read).collect()),
+            })
+        })
+    }
+
+    /// The `<width>` records (11.7.1): metres over the distance from the section's start.
+    pub fn widths(&self) -> &Profile<'a> {
+        &self.records().widths
+    }
+
+    /// The `<border>` records (11.7.2): t of the outer border.
+    pub fn borders(&self) -> &Profile<'a> {
+        &self.records().borders
+    }
+
+    /// The `<height>` records (11.7.3) in document order.
+    pub fn heights(&self) -> &[LaneHeight<'a>] {
+        self.records().heights.items()
+    }
+
+    /// Records of any name in document order: `roadMark`, `material`, `speed`, `access`, `rule`.
+    pub fn records_named<'s>(
+        &self,
+        name: &'s str,
+    ) -> impl Iterator<Item = LaneRecord<'a>> + use<'a, 's> {
+        self.node.children_named(name).map(LaneRecord::of)
+    }
+
+    /// How far the height record that is valid at `ds` lifts the lane's borders above the road
+    /// surface, inner and outer, in metres: zero without a record.
+    pub fn lift(&self, ds: impl Into<Place>) -> Option<(f64, f64)> {
+        let (heights, ds) = (&self.records().heights, ds.into());
+        if heights.silent_at(ds) {
+            return Some((0.0, 0.0));
+        }
+        let record = heights.ranked(heights.rank_at(ds)?)?;
+        Some((record.inner()?, record.outer()?))
+    }
+
+    /// The absolute value of its id; lanes without one are farthest out.
+    pub(crate) fn distance(&self) -> u64 {
+        self.id.map_or(u64::MAX, i64::unsigned_abs)
+    }
+
+    /// Its place on its side, counted from the center outward from zero.
+    pub(crate) fn rank(&self) -> u32 {
+        self.rank
+    }
+
+    pub(crate) fn set_rank(&mut self, rank: u32) {
+        self.rank = rank;
+    }
+}
+
+/// A `<height>` record of a lane.
+#[derive(Debug, Clone, Copy)]
+pub struct LaneHeight<'a> {
+    node: Node<'a>,
+    s_offset: f64,
+    inner: f64,
+    outer: f64,
+}
+
+impl<'a> LaneHeight<'a> {
+    fn read(node: Node<'a>) -> LaneHeight<'a> {
+        let [s_offset, inner, outer] = numbers(node, ["sOffset", "inner", "outer"]);
+        LaneHeight {
+            node,
+            s_offset,
+            inner,
+            outer,
+        }
+    }
+
+    /// The element.
+    pub fn node(&self) -> Node<'a> {
+        self.node
+    }
+
+    /// `@sOffset`, in metres from the section's start.
+    pub fn s_offset(&self) -> Option<f64> {
+        known(self.s_offset)
+    }
+
+    /// `@inner`: height of the inner border above the road surface, in metres.
+    pub fn inner(&self) -> Option<f64> {
+        known(self.inner)
+    }
+
+    /// `@outer`: height of the outer border above the road surface, in metres.
+    pub fn outer(&self) -> Option<f64> {
+        known(self.outer)
+    }
+}
+
+impl Starts for LaneHeight<'_> {
+    fn start(&self) -> f64 {
+        self.s_offset
+    }
+}
+
+view! {
+    /// A `<predecessor>` or `<successor>` of a lane (11.6).
+    LaneLink {
+        /// `@id`, if it is an integer.
+        id: integer "id",
+        /// `@id` as written.
+        id_text: text "id",
+        /// `@layer` of the linked lane; permanent when missing.
+        layer: layer "layer",
+    }
+}
+
+view! {
+    /// Any record of a lane that starts at an offset within the section.
+    LaneRecord {
+        /// `@sOffset`, in metres from the section's start.
+        s_offset: number "sOffset",
+    }
+}

@@ -1,0 +1,214 @@
+//! A lane within its road: its borders and widths (OpenDRIVE 1.9, 11.7).
+
+use std::ops::Deref;
+
+use crate::geometry::finite;
+use crate::lane::Lane;
+use crate::profile::Profile;
+use crate::section_ref::SectionRef;
+use crate::steps::Place;
+use crate::value::{ContactPoint, Side};
+
+/// Where a lane stands in the map: road, layer, section and lane by their places in document
+/// order. [`RoadMap::lane`](crate::RoadMap::lane) leads back to the lane.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct LaneKey {
+    /// The road's place in the map.
+    pub road: u32,
+    /// The layer's place in the road.
+    pub layer: u32,
+    /// The section's place in the layer.
+    pub section: u32,
+    /// The lane's place in the section.
+    pub lane: u32,
+}
+
+/// One of the two borders of a lane.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Edge {
+    /// The border nearer to the center lane.
+    Inner,
+    /// The border farther from the center lane.
+    Outer,
+}
+
+impl Edge {
+    /// Both borders.
+    pub const BOTH: [Edge; 2] = [Edge::Inner, Edge::Outer];
+
+    /// The word for it: `inner` or `outer`.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Edge::Inner => "inner",
+            Edge::Outer => "outer",
+        }
+    }
+}
+
+/// A lane together with the section, layer and road that it belongs to.
+#[derive(Debug, Clone, Copy)]
+pub struct LaneRef<'m, 'a> {
+    /// The section.
+    pub at: SectionRef<'m, 'a>,
+    lane: &'m Lane<'a>,
+    index: u32,
+}
+
+impl<'a> Deref for LaneRef<'_, 'a> {
+    type Target = Lane<'a>;
+
+    fn deref(&self) -> &Lane<'a> {
+        self.lane
+    }
+}
+
+impl<'m, 'a> LaneRef<'m, 'a> {
+    pub(crate) fn new(at: SectionRef<'m, 'a>, index: usize) -> Option<LaneRef<'m, 'a>> {
+        let lane = at.section().own_lanes().get(index)?;
+        let index = u32::try_from(index).ok()?;
+        Some(LaneRef { at, lane, index })
+    }
+
+    /// The lane itself.
+    pub fn lane(self) -> &'m Lane<'a> {
+        self.lane
+    }
+
+    /// Its place in the map.
+    pub fn key(self) -> LaneKey {
+        let narrow = |index: usize| u32::try_from(index).unwrap_or(u32::MAX);
+        LaneKey {
+            road: narrow(self.at.road.index()),
+            layer: narrow(self.at.layer.index()),
+            section: narrow(self.at.index()),
+            lane: self.index,
+        }
+    }
+
+    /// The side on which it is written; `None` for the center lane.
+    pub fn side(self) -> Option<Side> {
+        self.lane.group().side()
+    }
+
+    /// The length of the section for this lane's side, in metres.
+    pub fn length(self) -> Option<f64> {
+        self.at.length(self.side().unwrap_or(Side::Right))
+    }
+
+    /// The place at an end of the section: at its start, or just before its end.
+    pub fn end_place(self, end: ContactPoint) -> Option<Place> {
+        match end {
+            ContactPoint::Start => Some(Place::at(0.0)),
+            ContactPoint::End => self
+                .length()
+                .filter(|length| *length > 0.0)
+                .map(Place::before),
+        }
+    }
+
+    /// The width at `ds` metres from the section's start: from `<width>`, or between two
+    /// `<border>`s where the side has no widths. Negative in faulty files; zero for the center.
+    pub fn width(self, ds: impl Into<Place>) -> Option<f64> {
+        let ds = ds.into();
+        let Some(side) = self.side() else {
+            return Some(0.0);
+        };
+        if self.at.has_widths(side) {
+            return self.widths().at(ds);
+        }
+        finite((self.outer_t(ds)? - self.inner_t(ds)?) * side.sign())
+    }
+
+    /// The width at an end of the section.
+    pub fn width_at(self, end: ContactPoint) -> Option<f64> {
+        self.width(self.end_place(end)?)
+    }
+
+    /// t of the outer border at `ds`, given t of the inner one.
+    pub(crate) fn outer_from(self, by_width: bool, inner: f64, ds: Place) -> Option<f64> {
+        let side = self.side()?;
+        if by_width {
+            finite(inner + side.sign() * self.widths().at(ds)?)
+        } else {
+            // 11.7.2: independent of the inner border; and of the lane offset, which is not
+            // allowed beside it.
+            self.borders().at(ds)
+        }
+    }
+
+    /// t of a border at `ds` metres from the section's start; `None` when a width further in is
+    /// not defined or the ids do not tell the order of the lanes.
+    pub fn t(self, edge: Edge, ds: impl Into<Place>) -> Option<f64> {
+        self.sum(
+            edge,
+            ds.into(),
+            |profile, place| profile.at(place),
+            |section, place| section.center_t(place),
+        )
+    }
+
+    /// t of the inner border.
+    pub fn inner_t(self, ds: impl Into<Place>) -> Option<f64> {
+        self.t(Edge::Inner, ds)
+    }
+
+    /// t of the outer border.
+    pub fn outer_t(self, ds: impl Into<Place>) -> Option<f64> {
+        self.t(Edge::Outer, ds)
+    }
+
+    /// The slope dt/ds of a border.
+    pub fn t_slope(self, edge: Edge, ds: impl Into<Place>) -> Option<f64> {
+        self.sum(
+            edge,
+            ds.into(),
+            |profile, place| profile.slope_at(place),
+            |section, place| {
+                let offset = section.layer.offset();
+                offset.slope_or_zero(place.shifted(section.s()?))
+            },
+        )
+    }
+
+    /// Adds up what `part` takes from the profiles from the center to this lane's border.
+    fn sum(
+        self,
+        edge: Edge,
+        ds: Place,
+        part: impl Fn(&Profile<'a>, Place) -> Option<f64>,
+        center: impl Fn(SectionRef<'m, 'a>, Place) -> Option<f64>,
+    ) -> Option<f64> {
+        let Some(side) = self.side() else {
+            return center(self.at, ds);
+        };
+        if !self.at.is_numbered(side) {
+            return None;
+        }
+        let by_width = self.at.has_widths(side);
+        let count = self.lane.rank() as usize + usize::from(edge == Edge::Outer);
+        if count == 0 {
+            return center(self.at, ds);
+        }
+        if !by_width {
+            let lane = self.at.side(side).nth(count - 1)?;
+            return part(lane.borders(), ds);
+        }
+        let mut t = center(self.at, ds)?;
+        for lane in self.at.side(side).take(count) {
+            t += side.sign() * part(lane.widths(), ds)?;
+        }
+        finite(t)
+    }
+
+    /// The next lane towards the center on the same side; `None` for the innermost one.
+    pub fn inner_neighbour(self) -> Option<LaneRef<'m, 'a>> {
+        self.at
+            .side_lane(self.side()?, self.lane.rank().checked_sub(1)?)
+    }
+
+    /// The next lane away from the center on the same side.
+    pub fn outer_neighbour(self) -> Option<LaneRef<'m, 'a>> {
+        self.at
+            .side_lane(self.side()?, self.lane.rank().checked_add(1)?)
+    }
+}

@@ -1,0 +1,272 @@
+//! The whole map.
+
+use std::sync::OnceLock;
+
+use qcbus_document::{Document, Node};
+
+use crate::index::IdIndex;
+use crate::junction::Junction;
+use crate::lane_ref::{LaneKey, LaneRef};
+use crate::objects::{Object, listed};
+use crate::railroad::{JunctionGroup, Station};
+use crate::road::Road;
+use crate::section_ref::SectionRef;
+use crate::signals::{Controller, Signal, VmsGroup};
+use crate::value::integer;
+
+/// The version that a file says it is written for (`header@revMajor`, `@revMinor`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Version {
+    /// `@revMajor`
+    pub major: u16,
+    /// `@revMinor`
+    pub minor: u16,
+}
+
+impl Version {
+    /// The edition of the standard that files of this version follow: 1.8 stands for 1.8.1,
+    /// which has replaced 1.8.0 without a number of its own in the header.
+    pub fn edition(self) -> (u16, u16, u16) {
+        let patch = if (self.major, self.minor) == (1, 8) {
+            1
+        } else {
+            0
+        };
+        (self.major, self.minor, patch)
+    }
+}
+
+impl std::fmt::Display for Version {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}.{}", self.major, self.minor)
+    }
+}
+
+/// An OpenDRIVE file as roads and junctions, built once and shared by all rules.
+#[derive(Debug)]
+pub struct RoadMap<'a> {
+    root: Option<Node<'a>>,
+    header: Option<Node<'a>>,
+    version: Option<Version>,
+    roads: Vec<Road<'a>>,
+    junctions: Vec<Junction<'a>>,
+    road_ids: IdIndex<'a>,
+    junction_ids: IdIndex<'a>,
+    object_ids: OnceLock<IdIndex<'a>>,
+    signal_ids: OnceLock<IdIndex<'a>>,
+    controller_ids: OnceLock<IdIndex<'a>>,
+    pub(crate) caches: crate::joints::Caches<'a>,
+}
+
+impl<'a> RoadMap<'a> {
+    /// Reads the roads and junctions of a document; what is within them is read when first asked
+    /// for. Takes time proportional to the number of their direct children.
+    pub fn new(document: Document<'a>) -> RoadMap<'a> {
+        let root = document.root();
+        let mut roads = Vec::new();
+        let mut junctions = Vec::new();
+        let mut header = None;
+        for child in root.into_iter().flat_map(|root| root.children()) {
+            let place = |len: usize| u32::try_from(len).unwrap_or(u32::MAX);
+            match child.name() {
+                "road" => roads.push(Road::read(child, place(roads.len()))),
+                "junction" => junctions.push(Junction::read(child, place(junctions.len()))),
+                "header" => header = header.or(Some(child)),
+                _ => {}
+            }
+        }
+        RoadMap {
+            root,
+            header,
+            version: header.and_then(version),
+            road_ids: IdIndex::new(roads.iter().map(Road::id)),
+            junction_ids: IdIndex::new(junctions.iter().map(Junction::id)),
+            roads,
+            junctions,
+            object_ids: OnceLock::new(),
+            signal_ids: OnceLock::new(),
+            controller_ids: OnceLock::new(),
+            caches: crate::joints::Caches::default(),
+        }
+    }
+
+    /// The root element, whatever its name.
+    pub fn root(&self) -> Option<Node<'a>> {
+        self.root
+    }
+
+    /// The `<header>` element.
+    pub fn header(&self) -> Option<Node<'a>> {
+        self.header
+    }
+
+    /// The version in the header.
+    pub fn version(&self) -> Option<Version> {
+        self.version
+    }
+
+    /// All roads in document order.
+    pub fn roads(&self) -> &[Road<'a>] {
+        &self.roads
+    }
+
+    /// The first road with this id.
+    pub fn road(&self, id: &str) -> Option<&Road<'a>> {
+        self.roads_with_id(id).next()
+    }
+
+    /// All roads with this id, in document order; more than one in faulty files.
+    pub fn roads_with_id(&self, id: &str) -> impl Iterator<Item = &Road<'a>> {
+        let places = self.road_ids.places(id);
+        places.filter_map(|place| self.roads.get(place))
+    }
+
+    /// The road within which a node lies, the road's own element included.
+    pub fn road_of(&self, node: Node<'a>) -> Option<&Road<'a>> {
+        let after = self.roads.partition_point(|road| road.node() <= node);
+        let road = self.roads.get(after.checked_sub(1)?)?;
+        let inside = road.node() == node || node.ancestors().any(|above| above == road.node());
+        inside.then_some(road)
+    }
+
+    /// All junctions in document order.
+    pub fn junctions(&self) -> &[Junction<'a>] {
+        &self.junctions
+    }
+
+    /// The first junction with this id.
+    pub fn junction(&self, id: &str) -> Option<&Junction<'a>> {
+        self.junctions_with_id(id).next()
+    }
+
+    /// All junctions with this id, in document order; more than one in faulty files.
+    pub fn junctions_with_id(&self, id: &str) -> impl Iterator<Item = &Junction<'a>> {
+        let places = self.junction_ids.places(id);
+        places.filter_map(|place| self.junctions.get(place))
+    }
+
+    /// The signal controllers (14.6).
+    pub fn controllers(&self) -> impl Iterator<Item = Controller<'a>> + use<'a> {
+        listed(self.root, "controller").map(Controller::of)
+    }
+
+    /// The junction groups (12.13).
+    pub fn junction_groups(&self) -> impl Iterator<Item = JunctionGroup<'a>> + use<'a> {
+        listed(self.root, "junctionGroup").map(JunctionGroup::of)
+    }
+
+    /// The stations (15.4).
+    pub fn stations(&self) -> impl Iterator<Item = Station<'a>> + use<'a> {
+        listed(self.root, "station").map(Station::of)
+    }
+
+    /// The groups of boards with variable messages (14.7), within a road's signals or a junction.
+    pub fn vms_groups(&self) -> impl Iterator<Item = VmsGroup<'a>> + use<'a> {
+        let all = self.root.map(|root| root.descendants_named("vmsGroup"));
+        all.into_iter().flatten().map(VmsGroup::of)
+    }
+
+    /// The objects of all roads with their road, in document order.
+    pub fn objects(&self) -> impl Iterator<Item = (&Road<'a>, Object<'a>)> {
+        self.roads
+            .iter()
+            .flat_map(|road| road.objects().map(move |object| (road, object)))
+    }
+
+    /// The signals of all roads with their road, in document order.
+    pub fn signals(&self) -> impl Iterator<Item = (&Road<'a>, Signal<'a>)> {
+        self.roads
+            .iter()
+            .flat_map(|road| road.signals().map(move |signal| (road, signal)))
+    }
+
+    /// The objects with this id, on roads and junctions, in document order.
+    pub fn objects_with_id(&self, id: &str) -> impl Iterator<Item = Object<'a>> {
+        let index = self
+            .object_ids
+            .get_or_init(|| self.index_of("object", &["objects", "junction"]));
+        index
+            .places(id)
+            .filter_map(|place| self.node_at(place))
+            .map(Object::of)
+    }
+
+    /// The signals with this id, in document order.
+    pub fn signals_with_id(&self, id: &str) -> impl Iterator<Item = Signal<'a>> {
+        let index = self
+            .signal_ids
+            .get_or_init(|| self.index_of("signal", &["signals"]));
+        index
+            .places(id)
+            .filter_map(|place| self.node_at(place))
+            .map(Signal::of)
+    }
+
+    /// The controllers with this id, in document order.
+    pub fn controllers_with_id(&self, id: &str) -> impl Iterator<Item = Controller<'a>> {
+        let index = self
+            .controller_ids
+            .get_or_init(|| self.index_of("controller", &["OpenDRIVE"]));
+        index
+            .places(id)
+            .filter_map(|place| self.node_at(place))
+            .map(Controller::of)
+    }
+
+    /// The index of elements that lie directly within one of `parents`.
+    fn index_of(&self, name: &str, parents: &[&str]) -> IdIndex<'a> {
+        let elements = self
+            .root
+            .into_iter()
+            .flat_map(|root| root.descendants_named(name));
+        let placed = |node: &Node<'a>| {
+            node.parent()
+                .is_some_and(|parent| parents.contains(&parent.name()))
+        };
+        let ids = elements
+            .filter(placed)
+            .filter_map(|node| Some((node.attr("id")?, node.index())));
+        IdIndex::of(ids.collect())
+    }
+
+    fn node_at(&self, place: usize) -> Option<Node<'a>> {
+        self.root?.document().node(u32::try_from(place).ok()?)
+    }
+
+    /// The ids that several roads share, each with its roads in document order.
+    pub fn shared_road_ids(&self) -> impl Iterator<Item = (&'a str, Vec<&Road<'a>>)> {
+        self.road_ids.duplicates().map(|same| {
+            let roads = same
+                .iter()
+                .filter_map(|(_, place)| self.roads.get(*place as usize));
+            (same[0].0, roads.collect())
+        })
+    }
+
+    /// The lane sections of all roads and layers, in document order.
+    pub fn sections(&self) -> impl Iterator<Item = SectionRef<'_, 'a>> {
+        self.roads.iter().flat_map(Road::sections)
+    }
+
+    /// All lanes in document order.
+    pub fn lanes(&self) -> impl Iterator<Item = LaneRef<'_, 'a>> {
+        self.sections().flat_map(SectionRef::lanes)
+    }
+
+    /// The lane at a place in the map.
+    pub fn lane(&self, key: LaneKey) -> Option<LaneRef<'_, 'a>> {
+        let road = self.roads.get(key.road as usize)?;
+        let layer = road.layers().get(key.layer as usize)?;
+        layer
+            .section(road, key.section as usize)?
+            .lane_at(key.lane as usize)
+    }
+}
+
+fn version(header: Node<'_>) -> Option<Version> {
+    let part = |name: &str| u16::try_from(integer(header, name)?).ok();
+    Some(Version {
+        major: part("revMajor")?,
+        minor: part("revMinor")?,
+    })
+}

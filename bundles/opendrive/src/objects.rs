@@ -1,0 +1,278 @@
+//! Objects, tunnels, bridges (OpenDRIVE 1.9, chapter 13).
+
+use qcbus_document::Node;
+
+use crate::outlines::{Outline, Polyline};
+use crate::road::Road;
+use crate::view::{children, view};
+
+impl<'a> Road<'a> {
+    /// The objects of the road (13.1).
+    pub fn objects(&self) -> impl Iterator<Item = Object<'a>> + use<'a> {
+        listed(self.objects_node(), "object").map(Object::of)
+    }
+
+    /// The references to objects of other roads (13.10).
+    pub fn object_references(&self) -> impl Iterator<Item = ObjectReference<'a>> + use<'a> {
+        listed(self.objects_node(), "objectReference").map(ObjectReference::of)
+    }
+
+    /// The tunnels (13.11).
+    pub fn tunnels(&self) -> impl Iterator<Item = Structure<'a>> + use<'a> {
+        listed(self.objects_node(), "tunnel").map(Structure::of)
+    }
+
+    /// The bridges (13.12).
+    pub fn bridges(&self) -> impl Iterator<Item = Structure<'a>> + use<'a> {
+        listed(self.objects_node(), "bridge").map(Structure::of)
+    }
+}
+
+/// The children of one name of a list element that may be missing.
+pub(crate) fn listed<'a>(
+    list: Option<Node<'a>>,
+    name: &'static str,
+) -> impl Iterator<Item = Node<'a>> + use<'a> {
+    list.into_iter()
+        .flat_map(move |list| list.children_named(name))
+}
+
+view! {
+    /// An `<object>` (13.1).
+    Object {
+        /// `@id`.
+        id: text "id",
+        /// `@type`.
+        kind: text "type",
+        /// `@subtype`.
+        subtype: text "subtype",
+        /// `@s`, in metres.
+        s: number "s",
+        /// `@t`, in metres.
+        t: number "t",
+        /// `@zOffset` above the elevation at s, in metres.
+        z_offset: number "zOffset",
+        /// `@orientation`: `+`, `-` or `none`.
+        orientation: text "orientation",
+        /// `@hdg` relative to the road, in radians.
+        hdg: number "hdg",
+        /// `@pitch`, in radians.
+        pitch: number "pitch",
+        /// `@roll`, in radians.
+        roll: number "roll",
+        /// `@perpToRoad`.
+        perp_to_road: flag "perpToRoad",
+        /// `@length` of the bounding box, in metres.
+        length: number "length",
+        /// `@width` of the bounding box, in metres.
+        width: number "width",
+        /// `@radius` of the bounding cylinder, in metres.
+        radius: number "radius",
+        /// `@height` of the bounding volume, in metres.
+        height: number "height",
+        /// `@validLength` along s, in metres.
+        valid_length: number "validLength",
+        /// `@dynamic`.
+        dynamic: flag "dynamic",
+    }
+}
+
+impl<'a> Object<'a> {
+    children! {
+        /// The `<repeat>` records (13.4).
+        repeats: Repeat "repeat",
+        /// The lanes for which it is valid (13.6).
+        validities: Validity "validity",
+        /// The materials (13.5).
+        materials: ObjectMaterial "material",
+    }
+
+    /// The outlines (13.2): within `<outlines>`, or directly within the object as before 1.5.
+    pub fn outlines(&self) -> impl Iterator<Item = Outline<'a>> + use<'a> {
+        let old = self.node.children_named("outline");
+        listed(self.node.child("outlines"), "outline")
+            .chain(old)
+            .map(Outline::of)
+    }
+
+    /// The polylines of the skeleton (13.3).
+    pub fn polylines(&self) -> impl Iterator<Item = Polyline<'a>> + use<'a> {
+        listed(self.node.child("skeleton"), "polyline").map(Polyline::of)
+    }
+
+    /// The markings (13.8).
+    pub fn markings(&self) -> impl Iterator<Item = Marking<'a>> + use<'a> {
+        listed(self.node.child("markings"), "marking").map(Marking::of)
+    }
+
+    /// The borders (13.9).
+    pub fn borders(&self) -> impl Iterator<Item = ObjectBorder<'a>> + use<'a> {
+        listed(self.node.child("borders"), "border").map(ObjectBorder::of)
+    }
+
+    /// The CRG records of the object's surface (13.13).
+    pub fn crgs(&self) -> impl Iterator<Item = crate::Crg<'a>> + use<'a> {
+        listed(self.node.child("surface"), "CRG").map(crate::Crg::of)
+    }
+
+    /// The `<parkingSpace>` (13.7).
+    pub fn parking_space(&self) -> Option<Node<'a>> {
+        self.node.child("parkingSpace")
+    }
+}
+
+view! {
+    /// A `<repeat>` of an object (13.4).
+    Repeat {
+        /// `@s` where it begins, in metres.
+        s: number "s",
+        /// `@length` along the reference line, in metres.
+        length: number "length",
+        /// `@distance` between two instances, in metres; zero for a continuous object.
+        distance: number "distance",
+        /// `@tStart`, in metres.
+        t_start: number "tStart",
+        /// `@tEnd`, in metres.
+        t_end: number "tEnd",
+        /// `@bT`: linear coefficient of t (since 1.9).
+        b_t: number "bT",
+        /// `@cT`: quadratic coefficient of t (since 1.9).
+        c_t: number "cT",
+        /// `@dT`: cubic coefficient of t (since 1.9).
+        d_t: number "dT",
+        /// `@zOffsetStart`, in metres.
+        z_offset_start: number "zOffsetStart",
+        /// `@zOffsetEnd`, in metres.
+        z_offset_end: number "zOffsetEnd",
+        /// `@detachFromReferenceLine`.
+        detached: flag "detachFromReferenceLine",
+    }
+}
+
+view! {
+    /// A `<marking>` of an object (13.8).
+    Marking {
+        /// `@side` of the bounding box.
+        side: text "side",
+        /// `@color`.
+        color: text "color",
+        /// `@outlineId`.
+        outline_id: text "outlineId",
+        /// `@startOffset`, in metres.
+        start_offset: number "startOffset",
+        /// `@stopOffset`, in metres.
+        stop_offset: number "stopOffset",
+        /// `@lineLength`, in metres.
+        line_length: number "lineLength",
+        /// `@spaceLength`, in metres.
+        space_length: number "spaceLength",
+    }
+}
+
+impl<'a> Marking<'a> {
+    children! {
+        /// The outline points between which it lies.
+        corner_references: CornerReference "cornerReference",
+    }
+}
+
+view! {
+    /// A `<border>` of an object (13.9).
+    ObjectBorder {
+        /// `@outlineId`.
+        outline_id: text "outlineId",
+        /// `@type`.
+        kind: text "type",
+        /// `@useCompleteOutline`.
+        use_complete_outline: flag "useCompleteOutline",
+        /// `@width`, in metres.
+        width: number "width",
+    }
+}
+
+impl<'a> ObjectBorder<'a> {
+    children! {
+        /// The outline points between which it lies.
+        corner_references: CornerReference "cornerReference",
+    }
+}
+
+view! {
+    /// A `<cornerReference>` (13.8, 13.9).
+    CornerReference {
+        /// `@id` of an outline point.
+        id: text "id",
+    }
+}
+
+view! {
+    /// A `<material>` of an object (13.5).
+    ObjectMaterial {
+        /// `@surface`.
+        surface: text "surface",
+        /// `@friction`.
+        friction: number "friction",
+        /// `@roughness`.
+        roughness: number "roughness",
+        /// `@roadMarkColor`.
+        road_mark_color: text "roadMarkColor",
+    }
+}
+
+view! {
+    /// An `<objectReference>` (13.10).
+    ObjectReference {
+        /// `@id` of the object.
+        id: text "id",
+        /// `@s`, in metres.
+        s: number "s",
+        /// `@t`, in metres.
+        t: number "t",
+        /// `@zOffset`, in metres.
+        z_offset: number "zOffset",
+        /// `@orientation`: `+`, `-` or `none`.
+        orientation: text "orientation",
+        /// `@validLength`, in metres.
+        valid_length: number "validLength",
+    }
+}
+
+impl<'a> ObjectReference<'a> {
+    children! {
+        /// The lanes for which it is valid.
+        validities: Validity "validity",
+    }
+}
+
+view! {
+    /// A `<tunnel>` (13.11) or a `<bridge>` (13.12).
+    Structure {
+        /// `@id`.
+        id: text "id",
+        /// `@type`.
+        kind: text "type",
+        /// `@s`, in metres.
+        s: number "s",
+        /// `@length`, in metres.
+        length: number "length",
+    }
+}
+
+impl<'a> Structure<'a> {
+    children! {
+        /// The lanes for which it is valid.
+        validities: Validity "validity",
+    }
+}
+
+view! {
+    /// A `<validity>`: the lanes for which something holds (13.6, 14.2).
+    Validity {
+        /// `@fromLane`.
+        from_lane: integer "fromLane",
+        /// `@toLane`.
+        to_lane: integer "toLane",
+        /// `@layer`; permanent when missing.
+        layer: layer "layer",
+    }
+}

@@ -1,0 +1,149 @@
+//! Outlines and skeletons of objects (OpenDRIVE 1.9, 13.2, 13.3).
+
+use qcbus_document::Node;
+
+use crate::geometry::Curve;
+use crate::plan_view::{ShapeKind, read_curve};
+use crate::view::{children, view};
+
+view! {
+    /// An `<outline>` (13.2).
+    Outline {
+        /// `@id`.
+        id: text "id",
+        /// `@outer`; true when missing.
+        outer: flag "outer",
+        /// `@closed`.
+        closed: flag "closed",
+        /// `@laneType`.
+        lane_type: text "laneType",
+        /// `@fillType`.
+        fill_type: text "fillType",
+    }
+}
+
+impl<'a> Outline<'a> {
+    /// The corners and curves in document order, of whatever sort.
+    pub fn corners(&self) -> impl Iterator<Item = Corner<'a>> + use<'a> {
+        self.node.children().filter_map(Corner::read)
+    }
+
+    /// The curves (13.2, since 1.9).
+    pub fn curves(&self) -> impl Iterator<Item = CurveLocal<'a>> + use<'a> {
+        self.node.children_named("curveLocal").map(CurveLocal::of)
+    }
+}
+
+/// The sorts of point of an outline or a skeleton.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum CornerKind {
+    /// `<cornerRoad>`: in s, t and dz.
+    Road,
+    /// `<cornerLocal>`: in u, v and z of the object.
+    Local,
+    /// `<curveLocal>`: the start of a curve in u, v and z of the object.
+    Curve,
+}
+
+/// A `<cornerRoad>`, `<cornerLocal>` or `<curveLocal>` of an outline.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Corner<'a> {
+    /// Its sort.
+    pub kind: CornerKind,
+    /// Its coordinates.
+    pub point: ObjectPoint<'a>,
+}
+
+impl<'a> Corner<'a> {
+    fn read(node: Node<'a>) -> Option<Corner<'a>> {
+        let kind = match node.name() {
+            "cornerRoad" => CornerKind::Road,
+            "cornerLocal" => CornerKind::Local,
+            "curveLocal" => CornerKind::Curve,
+            _ => return None,
+        };
+        let point = ObjectPoint::of(node);
+        Some(Corner { kind, point })
+    }
+}
+
+view! {
+    /// A corner of an outline or a vertex of a skeleton; which coordinates it has follows from
+    /// the element.
+    ObjectPoint {
+        /// `@id`.
+        id: text "id",
+        /// `@s` of a road point, in metres.
+        s: number "s",
+        /// `@t` of a road point, in metres.
+        t: number "t",
+        /// `@dz` of a road point: height above the reference line, in metres.
+        dz: number "dz",
+        /// `@u` of a local point, in metres.
+        u: number "u",
+        /// `@v` of a local point, in metres.
+        v: number "v",
+        /// `@z` of a local point, in metres.
+        z: number "z",
+        /// `@height` of the object there, in metres.
+        height: number "height",
+        /// `@radius` of the object there, in metres.
+        radius: number "radius",
+        /// `@width` of the object there, in metres.
+        width: number "width",
+        /// `@length` of the object there, or of the curve, in metres.
+        length: number "length",
+        /// `@intersectionPoint`.
+        intersection_point: flag "intersectionPoint",
+    }
+}
+
+view! {
+    /// A `<curveLocal>` of an outline (13.2.3).
+    CurveLocal {
+        /// `@id`.
+        id: text "id",
+        /// `@u` of its start, in metres.
+        u: number "u",
+        /// `@v` of its start, in metres.
+        v: number "v",
+        /// `@z` of its start, in metres.
+        z: number "z",
+        /// `@hdg` of its start in the local system, in radians.
+        hdg: number "hdg",
+        /// `@length`, in metres.
+        length: number "length",
+    }
+}
+
+impl<'a> CurveLocal<'a> {
+    /// The element and kind of its shape.
+    pub fn shape(&self) -> Option<(ShapeKind, Node<'a>)> {
+        self.node
+            .children()
+            .find_map(|child| Some((ShapeKind::of(child)?, child)))
+    }
+
+    /// Its shape as a curve; `None` when a parameter is missing or broken.
+    pub fn curve(&self) -> Option<Curve> {
+        let (kind, node) = self.shape()?;
+        read_curve(kind, node, self.length().unwrap_or(f64::NAN))
+    }
+}
+
+view! {
+    /// A `<polyline>` of a skeleton (13.3).
+    Polyline {
+        /// `@id`.
+        id: text "id",
+    }
+}
+
+impl<'a> Polyline<'a> {
+    children! {
+        /// The vertices in road coordinates.
+        road_vertices: ObjectPoint "vertexRoad",
+        /// The vertices in local coordinates.
+        local_vertices: ObjectPoint "vertexLocal",
+    }
+}

@@ -1,0 +1,205 @@
+//! Piecewise cubic profiles along s, t or a section: elevation, superelevation, lane offset,
+//! width, border, the coefficients of a cross section surface.
+
+use qcbus_document::Node;
+
+use crate::geometry::{Cubic, finite};
+use crate::steps::{Place, Starts, Steps};
+use crate::value::{known, numbers};
+
+/// One record of a profile: `a + b·ds + c·ds² + d·ds³`, valid from its start to the next record.
+#[derive(Debug, Clone, Copy)]
+pub struct Record<'a> {
+    node: Node<'a>,
+    start: f64,
+    cubic: Cubic,
+}
+
+impl<'a> Record<'a> {
+    fn read(node: Node<'a>, start: &str) -> Record<'a> {
+        let [start, a, b, c, d] = numbers(node, [start, "a", "b", "c", "d"]);
+        let cubic = Cubic { a, b, c, d };
+        Record { node, start, cubic }
+    }
+
+    /// As [`Record::read`], where an absent coefficient (not a broken one) means zero.
+    fn read_sparse(node: Node<'a>, start: &str) -> Record<'a> {
+        let mut record = Record::read(node, start);
+        let Cubic { a, b, c, d } = &mut record.cubic;
+        for (name, coefficient) in [("a", a), ("b", b), ("c", c), ("d", d)] {
+            if coefficient.is_nan() && node.attr(name).is_none() {
+                *coefficient = 0.0;
+            }
+        }
+        record
+    }
+
+    /// The element.
+    pub fn node(&self) -> Node<'a> {
+        self.node
+    }
+
+    /// Where the record starts: `@s` of the road, `@sOffset` in the section.
+    pub fn start(&self) -> Option<f64> {
+        known(self.start)
+    }
+
+    /// The polynomial, if all four coefficients are there.
+    pub fn cubic(&self) -> Option<Cubic> {
+        let Cubic { a, b, c, d } = self.cubic;
+        let all = [a, b, c, d];
+        all.iter()
+            .all(|value| value.is_finite())
+            .then_some(self.cubic)
+    }
+
+    /// The value at `x`, measured like the record's start.
+    pub fn at(&self, x: f64) -> Option<f64> {
+        self.cubic()?.eval(x - self.start()?)
+    }
+}
+
+impl Starts for Record<'_> {
+    fn start(&self) -> f64 {
+        self.start
+    }
+}
+
+/// Records in document order, evaluated in order of their starts.
+#[derive(Debug, Clone, Default)]
+pub struct Profile<'a> {
+    steps: Steps<Record<'a>>,
+}
+
+/// The record that is valid at some place, and the way from its start.
+#[derive(Debug, Clone, Copy)]
+pub struct Valid<'p, 'a> {
+    /// The record.
+    pub record: &'p Record<'a>,
+    /// Distance from the record's start, never negative.
+    pub ds: f64,
+    /// Its polynomial.
+    pub cubic: Cubic,
+}
+
+impl<'a> Profile<'a> {
+    /// The profile made of these elements, whose start is in the attribute `start`.
+    pub fn read(nodes: impl Iterator<Item = Node<'a>>, start: &str) -> Profile<'a> {
+        let records = nodes.map(|node| Record::read(node, start)).collect();
+        let steps = Steps::new(records);
+        Profile { steps }
+    }
+
+    /// As [`Profile::read`], for elements whose absent coefficients are zero.
+    pub fn read_sparse(nodes: impl Iterator<Item = Node<'a>>, start: &str) -> Profile<'a> {
+        let records = nodes.map(|node| Record::read_sparse(node, start)).collect();
+        let steps = Steps::new(records);
+        Profile { steps }
+    }
+
+    /// The records in document order.
+    pub fn records(&self) -> &[Record<'a>] {
+        self.steps.items()
+    }
+
+    /// Whether there is no record.
+    pub fn is_empty(&self) -> bool {
+        self.records().is_empty()
+    }
+
+    /// The records in ascending order of start (those with equal starts as written); none when a
+    /// record's start is unknown.
+    pub fn in_order(&self) -> impl DoubleEndedIterator<Item = &Record<'a>> {
+        self.steps.in_order()
+    }
+
+    /// The first place where a value is defined.
+    pub fn begin(&self) -> Option<f64> {
+        self.in_order().next()?.start()
+    }
+
+    /// The record that is valid at a place: the last that starts at or before it. `None` before
+    /// the first record, when the valid record is incomplete, or when any start is unknown.
+    pub fn valid_at(&self, place: impl Into<Place>) -> Option<Valid<'_, 'a>> {
+        let place = place.into();
+        let record = self.steps.ranked(self.steps.rank_at(place)?)?;
+        Some(Valid {
+            record,
+            ds: (place.x() - record.start).max(0.0),
+            cubic: record.cubic()?,
+        })
+    }
+
+    /// The value at a place; see [`Profile::valid_at`].
+    pub fn at(&self, place: impl Into<Place>) -> Option<f64> {
+        let valid = self.valid_at(place)?;
+        valid.cubic.eval(valid.ds)
+    }
+
+    /// The slope at a place; see [`Profile::valid_at`].
+    pub fn slope_at(&self, place: impl Into<Place>) -> Option<f64> {
+        let valid = self.valid_at(place)?;
+        finite(valid.cubic.slope(valid.ds))
+    }
+
+    /// The value at a place, and zero where the profile does not say anything: without records
+    /// and before the first one, as for elevation, superelevation and lane offset.
+    pub fn at_or_zero(&self, place: impl Into<Place>) -> Option<f64> {
+        let place = place.into();
+        if self.steps.silent_at(place) {
+            Some(0.0)
+        } else {
+            self.at(place)
+        }
+    }
+
+    /// The slope at a place, and zero where the profile does not say anything.
+    pub fn slope_or_zero(&self, place: impl Into<Place>) -> Option<f64> {
+        let place = place.into();
+        if self.steps.silent_at(place) {
+            Some(0.0)
+        } else {
+            self.slope_at(place)
+        }
+    }
+
+    /// Each record with the stretch over which it is valid, up to `end`, in ascending order.
+    /// Records that start at or beyond `end` or that the next one replaces at once are left out,
+    /// as are incomplete ones.
+    pub fn stretches(&self, end: f64) -> impl Iterator<Item = Stretch<'_, 'a>> {
+        (0..self.steps.ranks()).filter_map(move |rank| {
+            let record = self.steps.ranked(rank)?;
+            let next = self
+                .steps
+                .ranked(rank + 1)
+                .map_or(end, |next| next.start.min(end));
+            let cubic = record.cubic()?;
+            (record.start < next).then_some(Stretch {
+                record,
+                from: record.start,
+                to: next,
+                cubic,
+            })
+        })
+    }
+}
+
+/// A record with the stretch over which it is valid.
+#[derive(Debug, Clone, Copy)]
+pub struct Stretch<'p, 'a> {
+    /// The record.
+    pub record: &'p Record<'a>,
+    /// Where it starts.
+    pub from: f64,
+    /// Where the next record or the end takes over.
+    pub to: f64,
+    /// Its polynomial, in the distance from `from`.
+    pub cubic: Cubic,
+}
+
+impl Stretch<'_, '_> {
+    /// The length of the stretch.
+    pub fn length(&self) -> f64 {
+        self.to - self.from
+    }
+}

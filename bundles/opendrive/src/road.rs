@@ -1,0 +1,296 @@
+//! Roads (OpenDRIVE 1.9, chapter 10).
+
+use std::sync::OnceLock;
+
+use qcbus_document::Node;
+
+use crate::geometry::Pose;
+use crate::lanes::LaneLayer;
+use crate::lateral::LateralProfile;
+use crate::plan_view::{END_TOLERANCE, PlanView};
+use crate::profile::Profile;
+use crate::section_ref::SectionRef;
+use crate::steps::Place;
+use crate::value::{ContactPoint, LayerKind, known, number};
+use crate::view::view;
+
+/// Which side traffic keeps to (`road@rule`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum TrafficRule {
+    /// Right-hand traffic, also what a missing `@rule` means.
+    RightHand,
+    /// Left-hand traffic.
+    LeftHand,
+}
+
+/// One `<road>`: its own attributes at once, everything within it when first asked for.
+#[derive(Debug)]
+pub struct Road<'a> {
+    node: Node<'a>,
+    index: u32,
+    id: &'a str,
+    length: f64,
+    junction: Option<&'a str>,
+    parts: Parts<'a>,
+    plan_view: OnceLock<PlanView<'a>>,
+    elevation: OnceLock<Profile<'a>>,
+    lateral: OnceLock<LateralProfile<'a>>,
+    layers: OnceLock<Vec<LaneLayer<'a>>>,
+}
+
+/// The elements directly within a road, found in one pass; of several equals the first.
+#[derive(Debug, Clone, Copy, Default)]
+struct Parts<'a> {
+    link: Option<Node<'a>>,
+    plan_view: Option<Node<'a>>,
+    elevation: Option<Node<'a>>,
+    lateral: Option<Node<'a>>,
+    objects: Option<Node<'a>>,
+    signals: Option<Node<'a>>,
+    surface: Option<Node<'a>>,
+    railroad: Option<Node<'a>>,
+}
+
+impl<'a> Parts<'a> {
+    fn of(road: Node<'a>) -> Parts<'a> {
+        let mut parts = Parts::default();
+        for child in road.children() {
+            let slot = match child.name() {
+                "link" => &mut parts.link,
+                "planView" => &mut parts.plan_view,
+                "elevationProfile" => &mut parts.elevation,
+                "lateralProfile" => &mut parts.lateral,
+                "objects" => &mut parts.objects,
+                "signals" => &mut parts.signals,
+                "surface" => &mut parts.surface,
+                "railroad" => &mut parts.railroad,
+                _ => continue,
+            };
+            slot.get_or_insert(child);
+        }
+        parts
+    }
+}
+
+impl<'a> Road<'a> {
+    pub(crate) fn read(node: Node<'a>, index: u32) -> Road<'a> {
+        Road {
+            node,
+            index,
+            id: node.attr("id").unwrap_or(""),
+            length: number(node, "length").unwrap_or(f64::NAN),
+            junction: node.attr("junction"),
+            parts: Parts::of(node),
+            plan_view: OnceLock::new(),
+            elevation: OnceLock::new(),
+            lateral: OnceLock::new(),
+            layers: OnceLock::new(),
+        }
+    }
+
+    /// The `<road>` element.
+    pub fn node(&self) -> Node<'a> {
+        self.node
+    }
+
+    /// Its place among the map's roads.
+    pub fn index(&self) -> usize {
+        self.index as usize
+    }
+
+    /// `@id`, empty when missing.
+    pub fn id(&self) -> &'a str {
+        self.id
+    }
+
+    /// `@length`, in metres.
+    pub fn length(&self) -> Option<f64> {
+        known(self.length)
+    }
+
+    /// The id of the junction that the road belongs to; `None` when it belongs to none (`-1` or
+    /// no attribute).
+    pub fn junction(&self) -> Option<&'a str> {
+        self.junction.filter(|id| *id != "-1")
+    }
+
+    /// `@rule`; `None` when it is a word that the standard does not know.
+    pub fn traffic_rule(&self) -> Option<TrafficRule> {
+        match self.node.attr("rule") {
+            None | Some("RHT") => Some(TrafficRule::RightHand),
+            Some("LHT") => Some(TrafficRule::LeftHand),
+            Some(_) => None,
+        }
+    }
+
+    /// The `<link>` element.
+    pub fn link_node(&self) -> Option<Node<'a>> {
+        self.parts.link
+    }
+
+    /// The link at an end: `<predecessor>` at the start, `<successor>` at the end.
+    pub fn link(&self, end: ContactPoint) -> Option<RoadLink<'a>> {
+        let node = self.parts.link?.child(end.link_name())?;
+        Some(RoadLink::of(node))
+    }
+
+    /// The `<planView>` element.
+    pub fn plan_view_node(&self) -> Option<Node<'a>> {
+        self.parts.plan_view
+    }
+
+    /// The `<elevationProfile>` element.
+    pub fn elevation_node(&self) -> Option<Node<'a>> {
+        self.parts.elevation
+    }
+
+    /// The `<lateralProfile>` element.
+    pub fn lateral_node(&self) -> Option<Node<'a>> {
+        self.parts.lateral
+    }
+
+    /// The `<objects>` element.
+    pub fn objects_node(&self) -> Option<Node<'a>> {
+        self.parts.objects
+    }
+
+    /// The `<signals>` element.
+    pub fn signals_node(&self) -> Option<Node<'a>> {
+        self.parts.signals
+    }
+
+    /// The `<surface>` element.
+    pub fn surface_node(&self) -> Option<Node<'a>> {
+        self.parts.surface
+    }
+
+    /// The `<railroad>` element.
+    pub fn railroad_node(&self) -> Option<Node<'a>> {
+        self.parts.railroad
+    }
+
+    /// The `<type>` records.
+    pub fn types(&self) -> impl Iterator<Item = RoadType<'a>> + use<'a> {
+        self.node.children_named("type").map(RoadType::of)
+    }
+
+    /// The reference line.
+    pub fn plan_view(&self) -> &PlanView<'a> {
+        self.plan_view
+            .get_or_init(|| PlanView::read(self.parts.plan_view))
+    }
+
+    /// The elevation profile (10.5.1): z over s.
+    pub fn elevation(&self) -> &Profile<'a> {
+        self.elevation.get_or_init(|| {
+            let node = self.parts.elevation.into_iter();
+            let records = node.flat_map(|node| node.children_named("elevation"));
+            Profile::read(records, "s")
+        })
+    }
+
+    /// Superelevation, shape and cross section surface (10.5.2 to 10.5.4).
+    pub fn lateral(&self) -> &LateralProfile<'a> {
+        self.lateral
+            .get_or_init(|| LateralProfile::read(self.parts.lateral))
+    }
+
+    /// The lane layers, one per `<lanes>` element.
+    pub fn layers(&self) -> &[LaneLayer<'a>] {
+        self.layers.get_or_init(|| {
+            let lanes = self.node.children_named("lanes").enumerate();
+            lanes
+                .map(|(index, node)| LaneLayer::read(node, index, self.length))
+                .collect()
+        })
+    }
+
+    /// The first layer of this kind.
+    pub fn layer(&self, kind: LayerKind) -> Option<&LaneLayer<'a>> {
+        self.layers().iter().find(|layer| layer.kind() == kind)
+    }
+
+    /// The permanent lanes.
+    pub fn permanent(&self) -> Option<&LaneLayer<'a>> {
+        self.layer(LayerKind::Permanent)
+    }
+
+    /// All lane sections of all layers, in document order.
+    pub fn sections(&self) -> impl Iterator<Item = SectionRef<'_, 'a>> {
+        self.layers().iter().flat_map(|layer| layer.sections(self))
+    }
+
+    /// The pose of the reference line at `s`; `None` outside of the road (more than 1 µm before
+    /// the start, or beyond both `@length` and the last geometry's end).
+    pub fn pose(&self, s: impl Into<Place>) -> Option<Pose> {
+        let place = s.into();
+        let end = match (self.length(), self.plan_view().end()) {
+            (Some(length), Some(end)) => length.max(end),
+            (one, other) => one.or(other)?,
+        };
+        let on_road = place.x() >= -END_TOLERANCE && place.x() <= end + END_TOLERANCE;
+        if !on_road {
+            return None;
+        }
+        self.plan_view().pose(place)
+    }
+
+    /// The pose of the reference line at one of its ends, in the direction of s: where the first
+    /// geometry starts, where the last one ends.
+    pub fn end_pose(&self, end: ContactPoint) -> Option<Pose> {
+        match end {
+            ContactPoint::Start => self.plan_view().first(),
+            ContactPoint::End => self.plan_view().last(),
+        }
+    }
+
+    /// The coordinate of an end: 0 or `@length`.
+    pub fn end_s(&self, end: ContactPoint) -> Option<f64> {
+        match end {
+            ContactPoint::Start => Some(0.0),
+            ContactPoint::End => self.length(),
+        }
+    }
+}
+
+view! {
+    /// A `<predecessor>` or `<successor>` of a road (10.3), also of a virtual connection (12.7).
+    RoadLink {
+        /// `@elementType`: `road` or `junction`.
+        element_type: text "elementType",
+        /// `@elementId`.
+        element_id: text "elementId",
+        /// `@contactPoint`: the end of the linked road.
+        contact_point: contact "contactPoint",
+        /// `@elementS`: a place within the linked road, in metres.
+        element_s: number "elementS",
+        /// `@elementDir`: the direction in which the linked road is entered.
+        element_dir: direction "elementDir",
+    }
+}
+
+impl<'a> RoadLink<'a> {
+    /// The linked road's id, if the link leads to a road.
+    pub fn road_id(&self) -> Option<&'a str> {
+        self.element_id()
+            .filter(|_| self.element_type() == Some("road"))
+    }
+
+    /// The linked junction's id, if the link leads to a junction.
+    pub fn junction_id(&self) -> Option<&'a str> {
+        self.element_id()
+            .filter(|_| self.element_type() == Some("junction"))
+    }
+}
+
+view! {
+    /// A `<type>` record of a road (10.4).
+    RoadType {
+        /// `@s`, in metres.
+        s: number "s",
+        /// `@type`.
+        kind: text "type",
+        /// `@country`.
+        country: text "country",
+    }
+}

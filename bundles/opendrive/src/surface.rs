@@ -1,0 +1,229 @@
+//! Places in space: the s/t/h system of a road and the surface of its lanes (OpenDRIVE 1.9, 8.3,
+//! 10.5, 11.7.3, 11.7.4).
+
+use crate::geometry::{Point, Point3, Pose, finite};
+use crate::lane_ref::{Edge, LaneRef};
+use crate::road::Road;
+use crate::steps::Place;
+use crate::value::ContactPoint;
+
+/// The cross section of a road at some s: where it lies and how it is tilted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// The reference line's pose in the plan view.
+    pub pose: Pose,
+    /// The elevation in metres.
+    pub z: f64,
+    /// The superelevation in radians, positive when the road falls to the right.
+    pub roll: f64,
+    /// The elevation's slope dz/ds.
+    pub slope: f64,
+    /// The superelevation's slope in rad/m.
+    pub roll_slope: f64,
+}
+
+impl Frame {
+    /// How far a place with these t and h lies to the left of the reference line in the plan
+    /// view, and how high above it, in metres: t and h turn with the superelevation (8.3).
+    pub fn tilted(&self, t: f64, h: f64) -> (f64, f64) {
+        let (sin, cos) = self.roll.sin_cos();
+        (t * cos - h * sin, t * sin + h * cos)
+    }
+
+    /// The point `lateral` metres to the left in the plan view and `up` metres above the
+    /// reference line.
+    pub fn place(&self, lateral: f64, up: f64) -> Option<Point3> {
+        let Point { x, y } = self.pose.beside(lateral)?;
+        Point3::finite(x, y, self.z + up)
+    }
+}
+
+impl<'a> Road<'a> {
+    /// The cross section at `s`.
+    pub fn frame(&self, s: impl Into<Place>) -> Option<Frame> {
+        let s = s.into();
+        self.frame_on(self.pose(s)?, s)
+    }
+
+    /// The cross section at one of the road's ends, where the reference line really begins or
+    /// ends.
+    pub fn end_frame(&self, end: ContactPoint) -> Option<Frame> {
+        let place = match end {
+            ContactPoint::Start => Place::at(0.0),
+            ContactPoint::End => Place::before(self.length()?),
+        };
+        self.frame_on(self.end_pose(end)?, place)
+    }
+
+    fn frame_on(&self, pose: Pose, s: Place) -> Option<Frame> {
+        let superelevation = &self.lateral().superelevation;
+        Some(Frame {
+            pose,
+            z: self.elevation().at_or_zero(s)?,
+            roll: superelevation.at_or_zero(s)?,
+            slope: self.elevation().slope_or_zero(s)?,
+            roll_slope: superelevation.slope_or_zero(s)?,
+        })
+    }
+
+    /// The point with the road coordinates (s, t, h): h is measured from the plane that
+    /// superelevation tilts, perpendicular to it. There is no pitch (8.3).
+    pub fn point(&self, s: impl Into<Place>, t: f64, h: f64) -> Option<Point3> {
+        let frame = self.frame(s)?;
+        let (lateral, up) = frame.tilted(t, h);
+        frame.place(lateral, up)
+    }
+
+    /// The point of the road's surface at (s, t): as [`point`](Road::point), on the height that
+    /// shape or cross section surface give. Lane height and `@level` are left aside.
+    pub fn surface_point(&self, s: impl Into<Place>, t: f64) -> Option<Point3> {
+        let s = s.into();
+        self.point(s, t, self.lateral().height(s, t)?)
+    }
+}
+
+/// A place on the border of a lane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BorderPoint {
+    /// t of the border in the road's coordinates, in metres.
+    pub t: f64,
+    /// The place in space, on the lane's surface.
+    pub point: Point3,
+    /// The border's heading in the plan view with ascending s, in radians, not wrapped; differs
+    /// from the reference line's where the border runs towards or away from it. `None` where the
+    /// border turns back (t reaches the center of the curve).
+    pub hdg: Option<f64>,
+    /// The border's slope dz/ds along the reference line, without what shape, cross section
+    /// surface and lane height contribute.
+    pub slope: f64,
+    /// The same slope per metre of the border itself, seen in the plan view. `None` where the
+    /// border turns back.
+    pub grade: Option<f64>,
+}
+
+/// How a lane's border lies in its cross section: to the left and up, in metres, and how both
+/// change with s.
+#[derive(Debug, Clone, Copy)]
+struct Lay {
+    lateral: f64,
+    up: f64,
+    lateral_slope: f64,
+    up_slope: f64,
+}
+
+impl<'m, 'a> LaneRef<'m, 'a> {
+    /// A border at `ds` metres from the section's start.
+    pub fn border(self, edge: Edge, ds: impl Into<Place>) -> Option<BorderPoint> {
+        let ds = ds.into();
+        let frame = self.at.road.frame(ds.shifted(self.at.s()?))?;
+        self.border_in(frame, edge, ds)
+    }
+
+    /// A border at an end of the section. At the ends of the road the reference line's own end
+    /// counts, whatever `@length` says.
+    pub fn border_at(self, edge: Edge, end: ContactPoint) -> Option<BorderPoint> {
+        let ds = self.end_place(end)?;
+        self.border_in(self.frame_at(end)?, edge, ds)
+    }
+
+    /// Both borders at an end of the section, inner and outer; see [`LaneRef::border_at`].
+    pub fn borders_at(self, end: ContactPoint) -> Option<[BorderPoint; 2]> {
+        let (ds, frame) = (self.end_place(end)?, self.frame_at(end)?);
+        Some([
+            self.border_in(frame, Edge::Inner, ds)?,
+            self.border_in(frame, Edge::Outer, ds)?,
+        ])
+    }
+
+    /// The cross section of the road at an end of the section.
+    fn frame_at(self, end: ContactPoint) -> Option<Frame> {
+        if self.is_at_road_end(end) {
+            return self.at.road.end_frame(end);
+        }
+        let ds = self.end_place(end)?;
+        self.at.road.frame(ds.shifted(self.at.s()?))
+    }
+
+    /// Whether an end of the section is an end of the road.
+    pub fn is_at_road_end(self, end: ContactPoint) -> bool {
+        let side = self.side().unwrap_or(crate::value::Side::Right);
+        let beside = self.at.neighbour(side, end).is_none();
+        let place = match end {
+            ContactPoint::Start => self.at.s().map(|s| s <= 1e-9),
+            ContactPoint::End => self
+                .at
+                .end(side)
+                .zip(self.at.road.length())
+                .map(|(one, other)| one == other),
+        };
+        beside && place == Some(true)
+    }
+
+    /// The place of the lane's surface at a share of its width, 0 at the inner and 1 at the
+    /// outer border.
+    pub fn surface_point(self, ds: impl Into<Place>, share: f64) -> Option<Point3> {
+        let ds = ds.into();
+        let frame = self.at.road.frame(ds.shifted(self.at.s()?))?;
+        let (inner, outer) = (self.inner_t(ds)?, self.outer_t(ds)?);
+        let t = inner + share * (outer - inner);
+        let lay = self.lay(frame, t, 0.0, ds)?;
+        let (low, high) = self.lift(ds)?;
+        frame.place(lay.lateral, lay.up + low + share * (high - low))
+    }
+
+    fn border_in(self, frame: Frame, edge: Edge, ds: Place) -> Option<BorderPoint> {
+        let t = self.t(edge, ds)?;
+        let lay = self.lay(frame, t, self.t_slope(edge, ds)?, ds)?;
+        let (inner, outer) = self.lift(ds)?;
+        let lift = match edge {
+            Edge::Inner => inner,
+            Edge::Outer => outer,
+        };
+        // The border is r(s) + lateral(s)·n(s); its derivative along the tangent is 1 - κ·lateral.
+        let ahead = 1.0 - frame.pose.curvature * lay.lateral;
+        let turn = (ahead > 0.0).then(|| lay.lateral_slope.atan2(ahead));
+        let slope = finite(frame.slope + lay.up_slope)?;
+        let stretch = ahead.hypot(lay.lateral_slope);
+        Some(BorderPoint {
+            t,
+            point: frame.place(lay.lateral, lay.up + lift)?,
+            hdg: turn.and_then(|turn| finite(frame.pose.hdg + turn)),
+            slope,
+            grade: turn.and_then(|_| finite(slope / stretch)),
+        })
+    }
+
+    /// Where t lies in the cross section. On a lane with `@level` the surface goes on
+    /// horizontally from the outer border of the last lane without it (11.7.4).
+    fn lay(self, frame: Frame, t: f64, t_slope: f64, ds: Place) -> Option<Lay> {
+        if !self.level()? {
+            return self.tilted_lay(frame, t, t_slope, ds);
+        }
+        let mut hinge = self;
+        while let Some(inner) = hinge
+            .inner_neighbour()
+            .filter(|lane| lane.level() == Some(true))
+        {
+            hinge = inner;
+        }
+        let (hinge_t, hinge_slope) = (hinge.inner_t(ds)?, hinge.t_slope(Edge::Inner, ds)?);
+        let lay = self.tilted_lay(frame, hinge_t, hinge_slope, ds)?;
+        Some(Lay {
+            lateral: lay.lateral + (t - hinge_t),
+            lateral_slope: lay.lateral_slope + (t_slope - hinge_slope),
+            ..lay
+        })
+    }
+
+    fn tilted_lay(self, frame: Frame, t: f64, t_slope: f64, ds: Place) -> Option<Lay> {
+        let height = self.at.road.lateral().height(ds.shifted(self.at.s()?), t)?;
+        let (lateral, up) = frame.tilted(t, height);
+        let (sin, cos) = frame.roll.sin_cos();
+        Some(Lay {
+            lateral,
+            up,
+            lateral_slope: t_slope * cos - up * frame.roll_slope,
+            up_slope: t_slope * sin + lateral * frame.roll_slope,
+        })
+    }
+}

@@ -1,0 +1,223 @@
+//! Attribute values as the model reads them: present, well-formed and finite, or `None`.
+
+use std::fmt;
+
+use qcbus_document::Node;
+
+/// White space as XML defines it.
+const XML_SPACE: [char; 4] = [' ', '\t', '\r', '\n'];
+
+/// A finite number, or `None`.
+pub(crate) fn parse_number(text: &str) -> Option<f64> {
+    let value: f64 = text.trim_matches(XML_SPACE).parse().ok()?;
+    value.is_finite().then_some(value)
+}
+
+/// An integer of at most 64 bits, or `None`.
+pub(crate) fn parse_integer(text: &str) -> Option<i64> {
+    text.trim_matches(XML_SPACE).parse().ok()
+}
+
+/// A boolean in any of the spellings that OpenDRIVE has had: `true`/`false`, `1`/`0`,
+/// `yes`/`no`.
+pub(crate) fn parse_flag(text: &str) -> Option<bool> {
+    match text.trim_matches(XML_SPACE) {
+        "true" | "1" | "yes" => Some(true),
+        "false" | "0" | "no" => Some(false),
+        _ => None,
+    }
+}
+
+/// An attribute as it is written.
+pub(crate) fn text<'a>(node: Node<'a>, name: &str) -> Option<&'a str> {
+    node.attr(name)
+}
+
+/// A finite number.
+pub(crate) fn number(node: Node<'_>, name: &str) -> Option<f64> {
+    parse_number(node.attr(name)?)
+}
+
+/// An integer.
+pub(crate) fn integer(node: Node<'_>, name: &str) -> Option<i64> {
+    parse_integer(node.attr(name)?)
+}
+
+/// A boolean.
+pub(crate) fn flag(node: Node<'_>, name: &str) -> Option<bool> {
+    parse_flag(node.attr(name)?)
+}
+
+/// Which end of a road a link touches.
+pub(crate) fn contact(node: Node<'_>, name: &str) -> Option<ContactPoint> {
+    ContactPoint::parse(node.attr(name)?)
+}
+
+/// Along or against the s-direction.
+pub(crate) fn direction(node: Node<'_>, name: &str) -> Option<Direction> {
+    match node.attr(name)? {
+        "+" => Some(Direction::Along),
+        "-" => Some(Direction::Against),
+        _ => None,
+    }
+}
+
+/// The lane layer that an element names; [`LayerKind::Permanent`] when it names none.
+pub(crate) fn layer(node: Node<'_>, name: &str) -> LayerKind {
+    LayerKind::of_text(node.attr(name))
+}
+
+/// Several numbers in one pass over the attributes; absent and broken ones are NaN.
+pub(crate) fn numbers<const N: usize>(node: Node<'_>, names: [&str; N]) -> [f64; N] {
+    let mut found = [f64::NAN; N];
+    for attribute in node.attributes() {
+        let name = attribute.name();
+        if let Some(slot) = names.iter().position(|wanted| *wanted == name) {
+            found[slot] = parse_number(attribute.value()).unwrap_or(f64::NAN);
+        }
+    }
+    found
+}
+
+/// The number, unless it stands for "absent".
+pub(crate) fn known(value: f64) -> Option<f64> {
+    (!value.is_nan()).then_some(value)
+}
+
+/// One of the two ends of a road (`e_contactPoint`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum ContactPoint {
+    /// The end at s = 0.
+    Start,
+    /// The end at s = `@length`.
+    End,
+}
+
+impl ContactPoint {
+    /// Both ends, in the direction of s.
+    pub const BOTH: [ContactPoint; 2] = [ContactPoint::Start, ContactPoint::End];
+
+    /// Reads `start` or `end`.
+    pub fn parse(text: &str) -> Option<ContactPoint> {
+        match text {
+            "start" => Some(ContactPoint::Start),
+            "end" => Some(ContactPoint::End),
+            _ => None,
+        }
+    }
+
+    /// The standard's word: `start` or `end`.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            ContactPoint::Start => "start",
+            ContactPoint::End => "end",
+        }
+    }
+
+    /// The link element for this end: `predecessor` or `successor`.
+    pub fn link_name(self) -> &'static str {
+        match self {
+            ContactPoint::Start => "predecessor",
+            ContactPoint::End => "successor",
+        }
+    }
+
+    /// The other end.
+    pub fn other(self) -> ContactPoint {
+        match self {
+            ContactPoint::Start => ContactPoint::End,
+            ContactPoint::End => ContactPoint::Start,
+        }
+    }
+}
+
+impl fmt::Display for ContactPoint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.as_str())
+    }
+}
+
+/// A direction relative to s (`e_elementDir`, `e_orientation`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Direction {
+    /// `+`: with ascending s.
+    Along,
+    /// `-`: with descending s.
+    Against,
+}
+
+/// A side of the center lane.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Side {
+    /// Positive t, positive lane ids.
+    Left,
+    /// Negative t, negative lane ids.
+    Right,
+}
+
+impl Side {
+    /// Both sides.
+    pub const BOTH: [Side; 2] = [Side::Left, Side::Right];
+
+    /// The sign of t on this side.
+    pub fn sign(self) -> f64 {
+        match self {
+            Side::Left => 1.0,
+            Side::Right => -1.0,
+        }
+    }
+
+    /// The side on which a lane of this id belongs; `None` for the center lane.
+    pub fn of_lane_id(id: i64) -> Option<Side> {
+        match id {
+            0 => None,
+            1.. => Some(Side::Left),
+            _ => Some(Side::Right),
+        }
+    }
+}
+
+/// The layer of lanes (OpenDRIVE 1.9, 11.2).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum LayerKind {
+    /// The lanes under normal conditions; also what a missing `@layer` means.
+    Permanent,
+    /// Lanes laid over them, as in roadworks.
+    Temporary,
+    /// A word that the standard does not know.
+    Unknown,
+}
+
+impl LayerKind {
+    pub(crate) fn of_text(text: Option<&str>) -> LayerKind {
+        match text {
+            None | Some("permanent") => LayerKind::Permanent,
+            Some("temporary") => LayerKind::Temporary,
+            Some(_) => LayerKind::Unknown,
+        }
+    }
+
+    /// The standard's word.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            LayerKind::Permanent => "permanent",
+            LayerKind::Temporary => "temporary",
+            LayerKind::Unknown => "unknown",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_finite_or_absent() {
+        assert_eq!(parse_number(" 1.5e2\n"), Some(150.0));
+        for text in ["", "INF", "inf", "NaN", "nan", "1e999", "1,5", "infinity"] {
+            assert_eq!(parse_number(text), None, "{text}");
+        }
+        assert_eq!(parse_integer(" -7 "), Some(-7));
+        assert_eq!(parse_integer("1.0"), None);
+    }
+}

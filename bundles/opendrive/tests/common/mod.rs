@@ -1,0 +1,27 @@
+//! Documents made of text.
+
+#![expect(clippy::expect_used, reason = "helpers of tests may fail a test")]
+
+use std::path::Path;
+
+use qcbus_document::Document;
+use qcbus_ingest::{Limits, prepare_bytes};
+use qcbus_opendrive::RoadMap;
+
+/// The image of a file with this text.
+pub fn image(xml: &str) -> Vec<u8> {
+    prepare_bytes(
+        Path::new("map.xodr"),
+        xml.as_bytes().to_vec(),
+        &Limits::default(),
+    )
+    .build()
+}
+
+/// Runs `test` on the map that `roads` make within a complete file.
+pub fn with_map<T>(roads: &str, test: impl FnOnce(&RoadMap<'_>) -> T) -> T {
+    let xml = format!("<OpenDRIVE><header revMajor=\"1\" revMinor=\"9\"/>{roads}</OpenDRIVE>");
+    let image = image(&xml);
+    let document = Document::open(&image).expect("the image is sound");
+    test(&RoadMap::new(document))
+}

@@ -1,0 +1,26 @@
+#![no_main]
+
+use std::path::Path;
+
+use qcbus_document::Document;
+use qcbus_schema::{Limits, Schema, compile};
+
+// An XSD and, behind a NUL, a document for it. Tables written and read again judge alike.
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+    let mut parts = bytes.splitn(2, |byte| *byte == 0);
+    let image = |name: &str, bytes: &[u8]| {
+        let limits = qcbus_ingest::Limits::default();
+        qcbus_ingest::prepare_bytes(Path::new(name), bytes.to_vec(), &limits).build()
+    };
+    let xsd = image("a.xsd", parts.next().unwrap_or_default());
+    let text = image("a.xodr", parts.next().unwrap_or_default());
+    let (Ok(xsd), Ok(document)) = (Document::open(&xsd), Document::open(&text)) else {
+        return;
+    };
+    let Ok(schema) = compile("fuzz", &[xsd]) else {
+        return;
+    };
+    let again = Schema::from_notation(&schema.to_notation()).expect("tables of our own");
+    let found = schema.validate(&document, Limits::default());
+    assert_eq!(found.total(), again.validate(&document, Limits::default()).total());
+});

@@ -1,0 +1,249 @@
+//! XPath text into trees.
+
+use super::lexer::{Token, tokens};
+use super::{Assertion, Expr, MAX_DEPTH, Path, PathStep, Relation, XPathProblem};
+use crate::names::Names;
+
+impl Assertion {
+    /// Reads an XPath expression, giving its names numbers.
+    pub(crate) fn from_xpath(text: &str, names: &mut Names) -> Result<Assertion, XPathProblem> {
+        let problem = |what: String| XPathProblem {
+            text: text.to_owned(),
+            what,
+        };
+        let tokens = tokens(text).map_err(problem)?;
+        let mut parser = Parser {
+            tokens: &tokens,
+            at: 0,
+            names,
+        };
+        let root = parser.expression(0).map_err(problem)?;
+        match parser.peek() {
+            None => Ok(Assertion { root }),
+            Some(token) => Err(problem(format!("{token:?} comes unexpectedly"))),
+        }
+    }
+}
+
+struct Parser<'t, 'n> {
+    tokens: &'t [Token<'t>],
+    at: usize,
+    names: &'n mut Names,
+}
+
+type Parsed<T> = Result<T, String>;
+
+impl<'t> Parser<'t, '_> {
+    fn peek(&self) -> Option<Token<'t>> {
+        self.tokens.get(self.at).copied()
+    }
+
+    fn eat(&mut self, token: Token<'_>) -> bool {
+        let found = self.peek() == Some(token);
+        self.at += usize::from(found);
+        found
+    }
+
+    fn expect(&mut self, token: Token<'_>) -> Parsed<()> {
+        if self.eat(token) {
+            Ok(())
+        } else {
+            Err(format!("{token:?} is missing"))
+        }
+    }
+
+    fn expression(&mut self, depth: usize) -> Parsed<Expr> {
+        if depth > MAX_DEPTH {
+            return Err("it is nested too deeply".into());
+        }
+        if self.peek() == Some(Token::Word("if"))
+            && self.tokens.get(self.at + 1) == Some(&Token::Sign("("))
+        {
+            return self.conditional(depth);
+        }
+        self.joined("or", depth)
+    }
+
+    fn conditional(&mut self, depth: usize) -> Parsed<Expr> {
+        self.at += 1;
+        let test = self.grouped(depth)?;
+        self.expect(Token::Word("then"))?;
+        let yes = self.expression(depth + 1)?;
+        self.expect(Token::Word("else"))?;
+        let no = self.expression(depth + 1)?;
+        Ok(Expr::If(Box::new([test, yes, no])))
+    }
+
+    fn joined(&mut self, word: &'static str, depth: usize) -> Parsed<Expr> {
+        let mut parts = vec![self.part(word, depth)?];
+        while self.eat(Token::Word(word)) {
+            parts.push(self.part(word, depth)?);
+        }
+        Ok(match parts.len() {
+            1 => parts.remove(0),
+            _ if word == "or" => Expr::Or(parts),
+            _ => Expr::And(parts),
+        })
+    }
+
+    fn part(&mut self, word: &str, depth: usize) -> Parsed<Expr> {
+        if word == "or" {
+            self.joined("and", depth)
+        } else {
+            self.comparison(depth)
+        }
+    }
+
+    fn comparison(&mut self, depth: usize) -> Parsed<Expr> {
+        let left = self.operand(depth)?;
+        let written = match self.peek() {
+            Some(Token::Sign(sign)) => sign,
+            Some(Token::Word(word)) => word,
+            _ => return Ok(left),
+        };
+        let Some(&(relation, symbol, _)) = Relation::ALL
+            .iter()
+            .find(|(_, symbol, word)| *symbol == written || *word == written)
+        else {
+            return Ok(left);
+        };
+        self.at += 1;
+        let right = self.operand(depth)?;
+        comparable(&left, &right, written == symbol)?;
+        Ok(Expr::Compare(relation, Box::new([left, right])))
+    }
+
+    fn operand(&mut self, depth: usize) -> Parsed<Expr> {
+        match self.peek() {
+            Some(Token::Sign("(")) => self.grouped(depth),
+            Some(Token::Number(text)) => {
+                self.at += 1;
+                let number = text.parse().map_err(|_| format!("`{text}` is no number"))?;
+                Ok(Expr::Number(number))
+            }
+            Some(Token::Text(text)) => {
+                self.at += 1;
+                Ok(Expr::Text(text.into()))
+            }
+            Some(Token::Word(word)) => {
+                self.at += 1;
+                if self.peek() == Some(Token::Sign("(")) {
+                    self.call(word, depth)
+                } else {
+                    self.path(word).map(Expr::Path)
+                }
+            }
+            Some(token) => Err(format!("{token:?} comes unexpectedly")),
+            None => Err("it ends too early".into()),
+        }
+    }
+
+    fn grouped(&mut self, depth: usize) -> Parsed<Expr> {
+        self.expect(Token::Sign("("))?;
+        let inner = self.expression(depth + 1)?;
+        self.expect(Token::Sign(")"))?;
+        Ok(inner)
+    }
+
+    fn call(&mut self, function: &str, depth: usize) -> Parsed<Expr> {
+        match function {
+            "not" => Ok(Expr::Not(Box::new(self.grouped(depth)?))),
+            "exists" => Ok(Expr::Path(self.path_argument()?)),
+            "count" => self.count(),
+            "true" | "false" => {
+                self.at += 1;
+                self.expect(Token::Sign(")"))?;
+                Ok(Expr::Bool(function == "true"))
+            }
+            _ => Err(format!("the function {function}() is not supported")),
+        }
+    }
+
+    fn count(&mut self) -> Parsed<Expr> {
+        if self.tokens.get(self.at + 1) != Some(&Token::Word("distinct-values")) {
+            return self.path_argument().map(Expr::Count);
+        }
+        self.at += 2;
+        let path = self.path_argument()?;
+        self.expect(Token::Sign(")"))?;
+        if path.attribute.is_none() {
+            return Err("distinct-values() is supported for attributes only".into());
+        }
+        Ok(Expr::CountDistinct(path))
+    }
+
+    fn path_argument(&mut self) -> Parsed<Path> {
+        self.expect(Token::Sign("("))?;
+        let Some(Token::Word(word)) = self.peek() else {
+            return Err("a path is missing".into());
+        };
+        self.at += 1;
+        let path = self.path(word)?;
+        self.expect(Token::Sign(")"))?;
+        Ok(path)
+    }
+
+    fn path(&mut self, text: &str) -> Parsed<Path> {
+        Path::parse(text, self.names)
+    }
+}
+
+/// Only comparisons whose meaning does not depend on the types of attributes are understood.
+fn comparable(left: &Expr, right: &Expr, general: bool) -> Parsed<()> {
+    let literal = |side: &Expr| matches!(side, Expr::Number(_) | Expr::Text(_) | Expr::Bool(_));
+    let number = |side: &Expr| {
+        matches!(
+            side,
+            Expr::Number(_) | Expr::Count(_) | Expr::CountDistinct(_)
+        )
+    };
+    let attribute = |side: &Expr| matches!(side, Expr::Path(path) if path.attribute.is_some());
+    let numbers = number(left) && number(right);
+    let mixed = attribute(left) && literal(right) || literal(left) && attribute(right);
+    if numbers || (general && mixed) {
+        return Ok(());
+    }
+    Err("only numbers with numbers, and attributes with literals (by = != < <= > >=) can be compared".into())
+}
+
+impl Path {
+    /// Reads `a`, `./a/b`, `a//b`, `@c`, `a/@c`.
+    pub(super) fn parse(text: &str, names: &mut Names) -> Parsed<Path> {
+        let unsupported = || format!("the path `{text}` is not supported");
+        let mut path = Path::default();
+        let mut deep = false;
+        let mut parts = text.split('/').enumerate().peekable();
+        while let Some((index, part)) = parts.next() {
+            let last = parts.peek().is_none();
+            match part {
+                "." if index == 0 && !last => {}
+                // With a second `//` an item could be reached twice.
+                "" if index > 0 && !last && !path.steps.iter().any(|step| step.deep) && !deep => {
+                    deep = true;
+                }
+                _ => {
+                    let (attribute, name) = part
+                        .strip_prefix('@')
+                        .map_or((false, part), |name| (true, name));
+                    if !is_plain_name(name) || (attribute && (!last || deep)) {
+                        return Err(unsupported());
+                    }
+                    let name = names.intern(name).ok_or_else(unsupported)?;
+                    if attribute {
+                        path.attribute = Some(name);
+                    } else {
+                        path.steps.push(PathStep { deep, name });
+                    }
+                    deep = false;
+                }
+            }
+        }
+        Ok(path)
+    }
+}
+
+fn is_plain_name(name: &str) -> bool {
+    let mut chars = name.chars();
+    chars.next().is_some_and(|c| c.is_alphabetic() || c == '_')
+        && chars.all(|c| c.is_alphanumeric() || matches!(c, '_' | '-' | '.'))
+}

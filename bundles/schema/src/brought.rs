@@ -1,0 +1,290 @@
+//! Schemas that a user brings: which files make one schema, and which files it is for.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use qcbus_document::{Document, FileKind};
+
+use crate::check::{Override, Source};
+use crate::compile::{CompileError, compile};
+use crate::model::Schema;
+use crate::notation::NotationError;
+use crate::versions::Version;
+
+/// A file of the user, read by whoever may read files.
+#[derive(Clone, Copy, Debug)]
+pub struct BroughtFile<'f> {
+    /// Its path, as messages name it.
+    pub path: &'f str,
+    /// Its path below the directory that the user named.
+    pub below: &'f Path,
+    /// SHA-256 of its bytes, in hexadecimal.
+    pub sha256: &'f str,
+    /// What it is.
+    pub content: BroughtContent<'f>,
+}
+
+/// An XSD or compiled tables.
+#[derive(Clone, Copy, Debug)]
+pub enum BroughtContent<'f> {
+    /// The image of an `.xsd` file.
+    Xsd(&'f [u8]),
+    /// The bytes of a `.tbl` file.
+    Tables(&'f [u8]),
+}
+
+/// Why a user's schemas cannot be used; reads well after "failed to ".
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum BroughtError {
+    /// An XSD that the compiler does not take.
+    #[error(transparent)]
+    Compile(#[from] CompileError),
+    /// Tables that cannot be read.
+    #[error("use the tables {path}: failed to {error}")]
+    Tables {
+        /// The file.
+        path: String,
+        /// Why.
+        error: NotationError,
+    },
+    /// An image of our own that cannot be opened.
+    #[error("open the image of {path}: {error}")]
+    Image {
+        /// The file.
+        path: String,
+        /// Why.
+        error: qcbus_document::ImageError,
+    },
+    /// A schema for something else.
+    #[error(
+        "use the schema {0}: it declares neither <OpenDRIVE> nor <OpenSCENARIO> as a root element; \
+         an XSD that belongs to another one is named there by xs:include and lies in the same directory"
+    )]
+    NoKnownRoot(String),
+    /// Two schemas for the same files.
+    #[error(
+        "choose a schema: {first} and {second} are both for {what}; the version is taken from the \
+         names of file and directory, such as 1.7/map.xsd"
+    )]
+    Ambiguous {
+        /// One.
+        first: String,
+        /// The other.
+        second: String,
+        /// What both are for.
+        what: String,
+    },
+}
+
+/// Makes schemas of a user's files, those for one version before those for every version.
+///
+/// Each `.tbl` is one schema. XSDs are one schema if they lie in one directory and include each
+/// other. The root element tells the kind of file that a schema is for. The version is the first
+/// number of the form `1.7` in the title of tables, else in the name of the file that declares the
+/// root (there also `_17_`, as ASAM names its files), else in those of its directories below the one
+/// that the user named, innermost first; without one it is for all versions.
+///
+/// # Errors
+/// [`BroughtError`] for the first file that is of no use: nothing is passed over in silence.
+pub fn brought(files: &[BroughtFile<'_>]) -> Result<Vec<Override>, BroughtError> {
+    let mut all: Vec<(String, Override)> = Vec::new();
+    for file in files {
+        if let BroughtContent::Tables(bytes) = file.content {
+            let schema = tables(file, bytes)?;
+            let version = version_in(&schema.title).or_else(|| version_of_path(file.below));
+            add(&mut all, schema, &[file], version)?;
+        }
+    }
+    for group in groups(files)? {
+        let documents: Vec<Document<'_>> = group.iter().map(|(_, document)| *document).collect();
+        let members: Vec<&BroughtFile<'_>> = group.iter().map(|(file, _)| *file).collect();
+        let main = group
+            .iter()
+            .find(|(_, document)| declares_root(document))
+            .map_or(members[0], |(file, _)| file);
+        let schema = compile(&main.below.display().to_string(), &documents)?;
+        add(&mut all, schema, &members, version_of_path(main.below))?;
+    }
+    let mut overrides: Vec<Override> = all.into_iter().map(|(_, one)| one).collect();
+    overrides.sort_by_key(|one| one.version.is_none());
+    Ok(overrides)
+}
+
+/// The root elements and the kinds of files they stand for.
+const ROOTS: [(&str, FileKind); 2] = [
+    ("OpenDRIVE", FileKind::Xodr),
+    ("OpenSCENARIO", FileKind::Xosc),
+];
+
+fn add(
+    all: &mut Vec<(String, Override)>,
+    schema: Schema,
+    files: &[&BroughtFile<'_>],
+    version: Option<Version>,
+) -> Result<(), BroughtError> {
+    let path = files.first().map_or("", |file| file.path).to_owned();
+    let sources: Arc<[Source]> = files
+        .iter()
+        .map(|file| Source {
+            path: file.path.to_owned(),
+            sha256: file.sha256.to_owned(),
+        })
+        .collect();
+    let schema = Arc::new(schema);
+    let mut known = false;
+    for (root, kind) in ROOTS {
+        if schema.root(root).is_none() {
+            continue;
+        }
+        known = true;
+        let taken = all
+            .iter()
+            .find(|(_, one)| one.kind == kind && one.version == version);
+        if let Some((first, _)) = taken {
+            return Err(BroughtError::Ambiguous {
+                first: first.clone(),
+                second: path,
+                what: version.map_or_else(
+                    || format!("every version of {root}"),
+                    |version| format!("{root} {version}"),
+                ),
+            });
+        }
+        all.push((
+            path.clone(),
+            Override {
+                kind,
+                version,
+                schema: schema.clone(),
+                sources: sources.clone(),
+            },
+        ));
+    }
+    if known {
+        Ok(())
+    } else {
+        Err(BroughtError::NoKnownRoot(path))
+    }
+}
+
+fn tables(file: &BroughtFile<'_>, bytes: &[u8]) -> Result<Schema, BroughtError> {
+    let broken = |error| BroughtError::Tables {
+        path: file.path.to_owned(),
+        error,
+    };
+    let text = std::str::from_utf8(bytes).map_err(|error| {
+        let before = bytes.get(..error.valid_up_to()).unwrap_or_default();
+        broken(NotationError {
+            line: before.iter().filter(|byte| **byte == b'\n').count() + 1,
+            what: "it is no UTF-8 text".to_owned(),
+        })
+    })?;
+    Schema::from_notation(text).map_err(broken)
+}
+
+type Member<'f> = (&'f BroughtFile<'f>, Document<'f>);
+
+/// XSDs by directory, those that include each other together, in the order of their paths.
+fn groups<'f>(files: &'f [BroughtFile<'f>]) -> Result<Vec<Vec<Member<'f>>>, BroughtError> {
+    let mut groups: Vec<Vec<Member<'f>>> = Vec::new();
+    for file in files {
+        let BroughtContent::Xsd(image) = file.content else {
+            continue;
+        };
+        let document = Document::open(image).map_err(|error| BroughtError::Image {
+            path: file.path.to_owned(),
+            error,
+        })?;
+        let mut joined = vec![(file, document)];
+        let (related, rest): (Vec<_>, Vec<_>) = groups.into_iter().partition(|group| {
+            group
+                .iter()
+                .any(|other| belong_together(other, &(file, document)))
+        });
+        groups = rest;
+        joined.splice(0..0, related.into_iter().flatten());
+        groups.push(joined);
+    }
+    Ok(groups)
+}
+
+fn belong_together(one: &Member<'_>, other: &Member<'_>) -> bool {
+    one.0.below.parent() == other.0.below.parent()
+        && (includes(&one.1, other.0.below) || includes(&other.1, one.0.below))
+}
+
+/// Whether a schema document includes the file of this name.
+fn includes(document: &Document<'_>, path: &Path) -> bool {
+    let name = path.file_name().and_then(|name| name.to_str());
+    document.root().is_some_and(|root| {
+        root.children_named("include")
+            .filter_map(|include| include.attr("schemaLocation"))
+            .any(|location| location.rsplit(['/', '\\']).next() == name)
+    })
+}
+
+fn declares_root(document: &Document<'_>) -> bool {
+    document.root().is_some_and(|root| {
+        root.children_named("element")
+            .filter_map(|element| element.attr("name"))
+            .any(|name| ROOTS.iter().any(|(root, _)| *root == name))
+    })
+}
+
+/// The version in the name of a file, else in those of its directories, innermost first.
+fn version_of_path(below: &Path) -> Option<Version> {
+    let stem = below.file_stem().and_then(|stem| stem.to_str());
+    let of_file = stem.and_then(|stem| version_in(stem).or_else(|| two_digits(stem)));
+    let directories = below.ancestors().skip(1);
+    let names = directories.filter_map(|path| path.file_name()?.to_str());
+    of_file.or_else(|| names.filter_map(version_in).next())
+}
+
+/// The first `1.7` in a name.
+fn version_in(name: &str) -> Option<Version> {
+    let mut numbers = name.split(|c: char| !c.is_ascii_digit() && c != '.');
+    numbers.find_map(|word| {
+        let (major, rest) = word.trim_matches('.').split_once('.')?;
+        let minor = rest.split('.').next()?;
+        Some(Version {
+            major: major.parse().ok()?,
+            minor: minor.parse().ok()?,
+        })
+    })
+}
+
+/// `_17` or `_17_` in a name, as ASAM names the files of OpenDRIVE 1.6 and 1.7.
+fn two_digits(name: &str) -> Option<Version> {
+    name.split('_').skip(1).find_map(|word| {
+        let [major @ b'1'..=b'9', minor @ b'0'..=b'9'] = word.as_bytes() else {
+            return None;
+        };
+        Some(Version {
+            major: u32::from(major - b'0'),
+            minor: u32::from(minor - b'0'),
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn versions_are_read_from_names() {
+        let of = |path: &str| version_of_path(Path::new(path)).map(|version| version.to_string());
+        for (path, version) in [
+            ("OpenDRIVE_1.4H.xsd", Some("1.4")),
+            ("opendrive_17_core.xsd", Some("1.7")),
+            ("1.8.1/OpenDRIVE_Core.xsd", Some("1.8")),
+            ("1.5/acme-1.6.xsd", Some("1.6")),
+            ("v1.6/inner/acme.xsd", Some("1.6")),
+            ("xosc-1.3.tbl", Some("1.3")),
+            ("acme.xsd", None),
+            ("acme_2024.xsd", None),
+            ("acme7.xsd", None),
+        ] {
+            assert_eq!(of(path).as_deref(), version, "{path}");
+        }
+    }
+}

@@ -1,0 +1,214 @@
+//! The bodies of the two schema rules.
+
+use std::sync::Arc;
+
+use qcbus_document::{Document, FileKind};
+
+use crate::finding::{Finding, Limits, Report, Rest};
+use crate::model::Schema;
+use crate::validate::Overlay;
+use crate::versions::{SkipReason, Version, select, version_of};
+
+/// A schema brought by the user, used instead of the shipped one.
+#[derive(Clone, Debug)]
+pub struct Override {
+    /// The kind of file it is for.
+    pub kind: FileKind,
+    /// The header version it is for; `None` is any, headers without a version included.
+    pub version: Option<Version>,
+    /// The tables.
+    pub schema: Arc<Schema>,
+    /// The files that it was made of.
+    pub sources: Arc<[Source]>,
+}
+
+/// A file that a schema was made of.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Source {
+    /// Its path.
+    pub path: String,
+    /// SHA-256 of its bytes, in hexadecimal.
+    pub sha256: String,
+}
+
+/// How to check.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// How many findings are listed.
+    pub limits: Limits,
+    /// The user's schemas; the first that fits is used.
+    pub overrides: Vec<Override>,
+}
+
+/// How much a finding weighs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    /// The file breaks its schema.
+    Error,
+    /// The file breaks its schema in a point where the schema is known to be wrong.
+    Warning,
+    /// The file claims a version that no known schema describes.
+    Information,
+}
+
+/// The outcome for one document.
+#[derive(Debug)]
+pub enum Outcome<'a> {
+    /// No schema applies.
+    Skipped(SkipReason),
+    /// The document was validated.
+    Checked(Checked<'a>),
+}
+
+/// A validated document.
+#[derive(Debug)]
+pub struct Checked<'a> {
+    /// What the schema is called, e.g. `OpenDRIVE 1.7`.
+    pub schema: String,
+    /// The files that the user brought it in; empty for a shipped one.
+    pub sources: Arc<[Source]>,
+    /// The version the header names.
+    pub version: Option<Version>,
+    /// Whether that version is newer than the newest known schema, which was used instead.
+    pub newer: bool,
+    /// Whether the tags of modular scenarios were allowed.
+    pub modular: bool,
+    /// The default namespace of the root, which was disregarded: the published schemas have none,
+    /// or one that no file uses.
+    pub namespace: Option<&'a str>,
+    /// The findings in order of discovery.
+    pub findings: Vec<Finding<'a>>,
+    /// Findings beyond the limits, counted by kind.
+    pub rest: Vec<Rest>,
+}
+
+/// Something that a result should say about the check itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fact {
+    /// Its name.
+    pub key: &'static str,
+    /// What is so.
+    pub value: String,
+    /// What it means.
+    pub description: &'static str,
+}
+
+impl Checked<'_> {
+    /// Which schema the document was compared with: a shipped one, or the user's files.
+    pub fn provenance(&self) -> Vec<Fact> {
+        let fact = |value, description| Fact {
+            key: "qcbus.schema",
+            value,
+            description,
+        };
+        if self.sources.is_empty() {
+            return vec![fact(
+                self.schema.clone(),
+                "the schema that the file was compared with; it comes with qcbus",
+            )];
+        }
+        let files = self.sources.iter();
+        files
+            .map(|file| {
+                fact(
+                    format!("{} sha256:{}", file.path, file.sha256),
+                    "a file of the schema that the file was compared with, brought by the user",
+                )
+            })
+            .collect()
+    }
+
+    /// How much the findings of a kind weigh that are only counted.
+    pub fn severity_of_rest(&self, rest: &Rest) -> Severity {
+        match rest.known_schema_defect {
+            _ if self.newer => Severity::Information,
+            true => Severity::Warning,
+            false => Severity::Error,
+        }
+    }
+
+    /// How much a finding weighs.
+    pub fn severity(&self, finding: &Finding<'_>) -> Severity {
+        match finding.known_schema_defect {
+            _ if self.newer => Severity::Information,
+            Some(_) => Severity::Warning,
+            None => Severity::Error,
+        }
+    }
+}
+
+/// Validates a document against the schema its header asks for.
+pub fn check<'a>(document: &Document<'a>, kind: FileKind, options: &Options) -> Outcome<'a> {
+    if !document.is_well_formed() {
+        return Outcome::Skipped(SkipReason::IllFormed);
+    }
+    let version = version_of(document, kind);
+    let brought = options
+        .overrides
+        .iter()
+        .find(|one| same_kind(one.kind, kind) && (one.version.is_none() || one.version == version));
+    if let Some(brought) = brought {
+        return Outcome::Checked(checked(
+            document,
+            kind,
+            options,
+            (&brought.schema, brought.sources.clone()),
+            (version, false),
+        ));
+    }
+    let Some(version) = version else {
+        return Outcome::Skipped(SkipReason::NoVersion);
+    };
+    match select(kind, version) {
+        Ok(chosen) => Outcome::Checked(checked(
+            document,
+            kind,
+            options,
+            (chosen.schema, Arc::default()),
+            (Some(version), chosen.newer),
+        )),
+        Err(reason) => Outcome::Skipped(reason),
+    }
+}
+
+/// Archives of scenarios are judged by the schema of their main file.
+fn same_kind(one: FileKind, other: FileKind) -> bool {
+    (one == FileKind::Xodr) == (other == FileKind::Xodr)
+}
+
+fn checked<'a>(
+    document: &Document<'a>,
+    kind: FileKind,
+    options: &Options,
+    (schema, sources): (&Schema, Arc<[Source]>),
+    (version, newer): (Option<Version>, bool),
+) -> Checked<'a> {
+    let modular = kind != FileKind::Xodr && is_modular(document);
+    let overlay = if modular {
+        Overlay::ModularScenario
+    } else {
+        Overlay::None
+    };
+    let Report { findings, rest } = schema.validate_with(document, options.limits, overlay);
+    let namespace = document
+        .root()
+        .and_then(|root| root.attr("xmlns"))
+        .filter(|namespace| !namespace.is_empty());
+    Checked {
+        schema: schema.title.to_string(),
+        sources,
+        version,
+        newer,
+        modular,
+        namespace,
+        findings,
+        rest,
+    }
+}
+
+/// Whether the document is a modular scenario: it refers to scenarios, or offers attributes to be
+/// replaced by those that refer to it.
+fn is_modular(document: &Document<'_>) -> bool {
+    document.elements("ScenarioReference").next().is_some()
+        || document.names().any(|name| name == "parameterAttributes")
+}

@@ -1,0 +1,179 @@
+//! What the compiler says when it does not understand a schema.
+
+use qcbus_document::{Node, Position};
+
+use crate::assertion::XPathProblem;
+use crate::regex::PatternError;
+
+/// Why a schema could not be compiled, and where.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("compile {place}: {problem}")]
+pub struct CompileError {
+    /// The place.
+    pub place: Place,
+    /// The problem.
+    pub problem: Problem,
+}
+
+/// A place in an XSD file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// The file; empty if the problem concerns the schema as a whole.
+    pub path: String,
+    /// Row from 1.
+    pub row: u32,
+    /// Column from 1.
+    pub column: u32,
+    /// The construct, e.g. `xs:element name="road"`; empty if the file is no XML.
+    pub construct: String,
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if self.path.is_empty() {
+            return f.write_str("the schema");
+        }
+        match (self.row, self.construct.as_str()) {
+            (0, _) => f.write_str(&self.path),
+            (row, "") => write!(f, "{}:{row}:{}", self.path, self.column),
+            (row, construct) => write!(f, "{}:{row}:{}: <{construct}>", self.path, self.column),
+        }
+    }
+}
+
+/// What is wrong.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Problem {
+    /// The document is not a schema.
+    #[error("the root element is not xs:schema")]
+    NotASchema,
+    /// The file is not well-formed XML.
+    #[error("the file is not well-formed: {0}")]
+    NotWellFormed(String),
+    /// No global element.
+    #[error("no global element is declared")]
+    NoRoot,
+    /// A construct outside the subset.
+    #[error("this construct is not supported here")]
+    Unsupported,
+    /// An attribute outside the subset.
+    #[error("the attribute {0} is not supported here")]
+    Attribute(String),
+    /// An attribute value outside the subset.
+    #[error("the value `{1}` of the attribute {0} is not supported")]
+    Value(&'static str, String),
+    /// An attribute that must be there.
+    #[error("the attribute {0} is missing")]
+    NoAttribute(&'static str),
+    /// A reference to nothing.
+    #[error("the {0} `{1}` is not declared")]
+    Missing(&'static str, String),
+    /// Two components with one name.
+    #[error("`{0}` is declared twice")]
+    Twice(String),
+    /// A definition that refers to itself.
+    #[error("the definition refers to itself")]
+    Circular,
+    /// A condition that would be looked at again at every depth.
+    #[error(
+        "a condition with // on the type `{0}`, whose elements can contain themselves, is not supported"
+    )]
+    EndlessCondition(String),
+    /// Nested beyond the limit.
+    #[error("definitions are nested too deeply")]
+    TooDeep,
+    /// Larger than the limit.
+    #[error("more than {1} {0}")]
+    TooLarge(&'static str, usize),
+    /// Two children of one name with different types.
+    #[error("the child `{0}` has two different types in one content model")]
+    Inconsistent(String),
+    /// A pattern.
+    #[error("failed to {0}")]
+    Pattern(#[from] PatternError),
+    /// An XPath expression.
+    #[error("failed to {0}")]
+    XPath(#[from] XPathProblem),
+    /// Something the schema says that does not make sense.
+    #[error("{0}")]
+    Invalid(&'static str),
+}
+
+impl CompileError {
+    pub(crate) fn at(node: Node<'_>, problem: impl Into<Problem>) -> Self {
+        let position = node.position();
+        let label = [
+            "name",
+            "ref",
+            "base",
+            "test",
+            "xpath",
+            "value",
+            "schemaLocation",
+        ]
+        .into_iter()
+        .find_map(|name| node.attr(name).map(|value| (name, value)));
+        let prefix = node.prefix();
+        let colon = if prefix.is_empty() { "" } else { ":" };
+        let construct = match label {
+            Some((name, value)) => format!("{prefix}{colon}{} {name}=\"{value}\"", node.name()),
+            None => format!("{prefix}{colon}{}", node.name()),
+        };
+        let place = Place {
+            path: position.path.to_owned(),
+            row: position.row,
+            column: position.column,
+            construct,
+        };
+        Self {
+            place,
+            problem: problem.into(),
+        }
+    }
+
+    /// A problem of a file that is not even XML.
+    pub(crate) fn ill_formed(position: Position<'_>, fault: &str) -> Self {
+        let place = Place {
+            path: position.path.to_owned(),
+            row: position.row,
+            column: position.column,
+            construct: String::new(),
+        };
+        let problem = Problem::NotWellFormed(fault.to_owned());
+        Self { place, problem }
+    }
+
+    /// A problem of a file as a whole.
+    pub(crate) fn somewhere_in(path: &str, problem: Problem) -> Self {
+        let place = Place {
+            path: path.to_owned(),
+            row: 0,
+            column: 0,
+            construct: String::new(),
+        };
+        Self { place, problem }
+    }
+}
+
+/// Checks that a construct has no attributes but those listed (and foreign ones with a prefix).
+pub(crate) fn only_attributes(node: Node<'_>, known: &[&str]) -> Result<(), CompileError> {
+    for attribute in node.attributes() {
+        let name = attribute.name();
+        let foreign = name.contains(':') && !name.starts_with("vc:");
+        if name != "id" && !foreign && name != "xmlns" && !known.contains(&name) {
+            return Err(CompileError::at(node, Problem::Attribute(name.to_owned())));
+        }
+    }
+    Ok(())
+}
+
+/// The children of a construct without annotations.
+pub(crate) fn parts<'d>(node: Node<'d>) -> impl Iterator<Item = Node<'d>> {
+    node.children().filter(|child| !child.is("annotation"))
+}
+
+/// An attribute that must be there.
+pub(crate) fn required<'d>(node: Node<'d>, name: &'static str) -> Result<&'d str, CompileError> {
+    node.attr(name)
+        .ok_or_else(|| CompileError::at(node, Problem::NoAttribute(name)))
+}

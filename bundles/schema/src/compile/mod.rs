@@ -1,0 +1,148 @@
+//! From XSD documents to tables.
+//!
+//! The XSD files are read through document images like every other file. The compiler knows the
+//! subset of XML Schema that the schemas of this field use; each construct lists the attributes
+//! and children it understands, and anything else is an error that names the construct, the file
+//! and the line. Nothing is skipped silently.
+
+mod attributes;
+mod complex;
+mod components;
+mod content;
+mod dfa;
+mod element;
+mod error;
+mod identity;
+mod particle;
+mod simple;
+
+use qcbus_document::{Document, Node};
+
+pub use error::{CompileError, Problem};
+
+use crate::model::{Edition, Schema, TypeRef};
+use components::{Components, Kind};
+
+/// Compiles a set of XSD documents that belong together (a schema and what it includes).
+///
+/// The result does not depend on the order of `documents`.
+///
+/// # Errors
+/// When a document is not a schema, refers to something that is missing, or uses a construct
+/// outside the supported subset.
+pub fn compile(title: &str, documents: &[Document<'_>]) -> Result<Schema, CompileError> {
+    let components = Components::collect(documents)?;
+    let mut compiler = Compiler::new(title, &components);
+    compiler.schema.namespace = components.namespace.map(Into::into);
+    for node in components.in_order() {
+        match components::kind(node) {
+            Some(Kind::Simple) => {
+                compiler.simple_of(node)?;
+            }
+            Some(Kind::Complex) => {
+                compiler.complex_of(node)?;
+            }
+            Some(Kind::Element) => {
+                let root = compiler.element(node)?;
+                compiler.schema.roots.push(root);
+            }
+            _ => {}
+        }
+    }
+    compiler.finish()
+}
+
+/// Work in progress.
+struct Compiler<'d, 'c> {
+    components: &'c Components<'d>,
+    schema: Schema,
+    simple: simple::Known<'d>,
+    complex: complex::Known<'d>,
+    /// How deep the current construct is nested, anonymous types and group references included.
+    depth: usize,
+}
+
+/// Nesting of anonymous types, base types and group references; a person stays below ten.
+const MAX_DEPTH: usize = 64;
+
+impl<'d, 'c> Compiler<'d, 'c> {
+    fn new(title: &str, components: &'c Components<'d>) -> Self {
+        Self {
+            components,
+            schema: Schema::new(title),
+            simple: simple::Known::default(),
+            complex: complex::Known::default(),
+            depth: 0,
+        }
+    }
+
+    fn finish(mut self) -> Result<Schema, CompileError> {
+        self.define_waiting()?;
+        if self.schema.roots.is_empty() {
+            return Err(CompileError::somewhere_in(
+                self.components.path,
+                Problem::NoRoot,
+            ));
+        }
+        if let Some(id) = self.schema.endless_condition() {
+            let name = self
+                .schema
+                .complex
+                .get(id as usize)
+                .and_then(|ty| ty.name.clone());
+            let name = name.unwrap_or_default();
+            let problem = Problem::EndlessCondition(name.to_string());
+            return Err(match self.components.find(Kind::Complex, &name) {
+                Some(node) => CompileError::at(node, problem),
+                None => CompileError::somewhere_in(self.components.path, problem),
+            });
+        }
+        Ok(self.schema)
+    }
+
+    /// Runs `inner` one level deeper.
+    fn deeper<T>(
+        &mut self,
+        node: Node<'d>,
+        inner: impl FnOnce(&mut Self) -> Result<T, CompileError>,
+    ) -> Result<T, CompileError> {
+        if self.depth >= MAX_DEPTH {
+            return Err(CompileError::at(node, Problem::TooDeep));
+        }
+        self.depth += 1;
+        let result = inner(self);
+        self.depth -= 1;
+        result
+    }
+
+    fn needs_1_1(&mut self) {
+        self.schema.edition = Edition::V1_1;
+    }
+
+    fn name(&mut self, node: Node<'d>, name: &str) -> Result<crate::names::NameId, CompileError> {
+        self.schema
+            .names
+            .intern(name)
+            .ok_or_else(|| CompileError::at(node, Problem::TooLarge("names", 65_534)))
+    }
+
+    /// The type a `type`, `base` or `itemType` attribute refers to.
+    fn type_ref(&mut self, node: Node<'d>, name: &str) -> Result<TypeRef, CompileError> {
+        match self.components.resolve(node, name)? {
+            components::Resolved::BuiltIn("anyType") => Ok(TypeRef::Any),
+            components::Resolved::BuiltIn(local) => self.builtin(node, local).map(TypeRef::Simple),
+            components::Resolved::Own(local) => {
+                if let Some(found) = self.components.find(Kind::Simple, local) {
+                    return self.simple_of(found).map(TypeRef::Simple);
+                }
+                let Some(found) = self.components.find(Kind::Complex, local) else {
+                    return Err(CompileError::at(
+                        node,
+                        Problem::Missing("type", local.to_owned()),
+                    ));
+                };
+                self.complex_of(found).map(TypeRef::Complex)
+            }
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! What is known about single conditions of the published schemas: explanations in words, and
+//! defects that reject what the standard allows.
+//!
+//! The compiled form of a condition is its name here, so the entries follow the tables and not a
+//! line number; a test makes sure that every entry still occurs in a shipped table.
+
+use qcbus_document::Node;
+
+pub(crate) const COMPLETE_OUTLINE: &str =
+    "(if @useCompleteOutline (not cornerReference) (> (count cornerReference) 1))";
+pub(crate) const SIDE: &str = "(if @side (not cornerReference) (> (count cornerReference) 1))";
+pub(crate) const MULTI_BOARD: &str = "(or (not (= @type \"multiBoard\")) (and (= @type \"multiBoard\") \
+     (= @dynamic (true)) (> (count vmsBoard) 0) (> (count staticBoard) 0)))";
+pub(crate) const CONNECTION_IDS: &str =
+    "(= (count connection/@id) (count-distinct connection/@id))";
+pub(crate) const BORDER_AND_OFFSET: &str =
+    "(if (> (count laneOffset) 0) (= (count laneSection//border) 0) (true))";
+pub(crate) const RADIUS: &str = "(or (not (or @radius @width @length)) (and @radius (not (or @width @length))) \
+     (and @width @length (not @radius)))";
+pub(crate) const CROSS_SECTION: &str =
+    "(or (not crossSectionSurface) (and (not superelevation) (not shape)))";
+
+/// A condition in words, for the element that breaks it.
+pub(crate) fn explanation(node: Node<'_>, condition: &str) -> Option<String> {
+    let fixed = match condition {
+        COMPLETE_OUTLINE => {
+            "with useCompleteOutline there may be no <cornerReference>, without it there must be at least two"
+        }
+        SIDE => {
+            "with the attribute side there may be no <cornerReference>, without it there must be at least two"
+        }
+        MULTI_BOARD => {
+            "a signal of type multiBoard must be dynamic and have at least one <vmsBoard> and one <staticBoard>"
+        }
+        CONNECTION_IDS => "two <connection> of this junction have the same id",
+        BORDER_AND_OFFSET => "lanes may be described by <laneOffset> or by <border>, not by both",
+        RADIUS => "an object has either radius, or both width and length, or none of them",
+        CROSS_SECTION => "<crossSectionSurface> excludes <superelevation> and <shape>",
+        _ => return by_type(node, condition),
+    };
+    Some(fixed.to_owned())
+}
+
+/// The bans of children by the type of an object.
+fn by_type(node: Node<'_>, condition: &str) -> Option<String> {
+    let ty = node.attr("type")?;
+    if !condition.starts_with(&format!("(if (= @type \"{ty}\") (and ")) {
+        return None;
+    }
+    let banned: Vec<&str> = condition
+        .split("(not ")
+        .skip(1)
+        .map(|rest| rest.split([')', ' ']).next().unwrap_or(""))
+        .filter(|name| !name.contains('/'))
+        .filter(|name| match name.strip_prefix('@') {
+            Some(attribute) => node.attribute(attribute).is_some(),
+            None => node.child(name).is_some(),
+        })
+        .collect();
+    if banned.is_empty() {
+        let distance = node
+            .child("repeat")
+            .and_then(|repeat| repeat.attr("distance"))?;
+        return Some(format!(
+            "the distance \"{distance}\" of <repeat> does not suit an object of type {ty}"
+        ));
+    }
+    Some(format!(
+        "an object of type {ty} may not have {}",
+        banned.join(", ")
+    ))
+}
+
+/// Why breaking a condition is the schema's fault, if it is.
+pub(crate) fn condition(node: Node<'_>, condition: &str) -> Option<&'static str> {
+    match condition {
+        COMPLETE_OUTLINE => {
+            let references = node.children_named("cornerReference").count();
+            match node.attr("useCompleteOutline") {
+                Some("false") if references > 1 => Some(
+                    "it asks whether useCompleteOutline is there, not whether it is true, \
+                     so \"false\" with corner references is rejected although the standard allows it",
+                ),
+                None if references == 0 => Some(
+                    "useCompleteOutline may be left out by the standard, but the schema then demands corner references",
+                ),
+                _ => None,
+            }
+        }
+        MULTI_BOARD => {
+            let complete = node.child("vmsBoard").is_some() && node.child("staticBoard").is_some();
+            (complete && node.attr("dynamic") == Some("yes")).then_some(
+                "it compares dynamic, whose values are yes and no, with the boolean true, so no such signal is valid",
+            )
+        }
+        _ => None,
+    }
+}
+
+/// Why a missing child is the schema's fault, if it is.
+pub(crate) fn missing_child(names: &[String]) -> Option<&'static str> {
+    names.iter().any(|name| name == "_OpenDriveElement").then_some(
+        "it demands a child <_OpenDriveElement>, the name of an internal base type that no file can be meant to contain",
+    )
+}
+
+/// The conditions that are explained or known to be defective, for the test that they still occur.
+#[doc(hidden)]
+pub fn known_conditions() -> [&'static str; 7] {
+    [
+        COMPLETE_OUTLINE,
+        SIDE,
+        MULTI_BOARD,
+        CONNECTION_IDS,
+        BORDER_AND_OFFSET,
+        RADIUS,
+        CROSS_SECTION,
+    ]
+}

@@ -1,0 +1,39 @@
+//! XML Schema for the bus: a compiler from XSD to compact tables, and a validator that walks a
+//! document image once.
+//!
+//! The project ships no XSD; the tables of the published OpenDRIVE and OpenSCENARIO schemas are
+//! shipped in a notation of their own, which the compiler writes (`qcbus schema compile`).
+
+mod assertion;
+mod brought;
+mod check;
+mod compile;
+mod constraint;
+mod defects;
+mod finding;
+#[doc(hidden)]
+pub mod generate;
+mod model;
+mod names;
+mod notation;
+mod recursion;
+mod regex;
+mod similar;
+mod simple;
+mod validate;
+mod versions;
+mod work;
+
+pub use assertion::XPathProblem;
+pub use brought::{BroughtContent, BroughtError, BroughtFile, brought};
+pub use check::{Checked, Fact, Options, Outcome, Override, Severity, Source, check};
+pub use compile::{CompileError, Problem, compile};
+#[doc(hidden)]
+pub use defects::known_conditions;
+pub use finding::{Code, Finding, Limits, Report, Rest};
+pub use model::{Edition, Schema};
+pub use notation::NotationError;
+pub use regex::{Pattern, PatternError};
+pub use simple::Expectation;
+pub use validate::Overlay;
+pub use versions::{SHIPPED, Shipped, SkipReason, Version, version_of};

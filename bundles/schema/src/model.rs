@@ -1,0 +1,282 @@
+//! The compiled tables: what a schema says, in the shape the walk needs it.
+//!
+//! Types refer to each other by number. Every content model is a deterministic automaton over
+//! child names (or, for `all`, a bit per child), so that the walk decides each child with one
+//! lookup and no backtracking.
+
+use crate::assertion::Assertion;
+use crate::constraint::Constraints;
+use crate::names::{NameId, Names};
+use crate::simple::SimpleType;
+
+/// Which edition of XML Schema the tables follow where the two differ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Edition {
+    /// XML Schema 1.0.
+    V1_0,
+    /// XML Schema 1.1: chosen by the compiler as soon as a 1.1 construct appears.
+    V1_1,
+}
+
+/// One compiled schema.
+#[derive(Clone, Debug)]
+pub struct Schema {
+    /// What messages call it, e.g. `OpenDRIVE 1.7`.
+    pub title: Box<str>,
+    /// XSD 1.0 or 1.1.
+    pub edition: Edition,
+    /// The target namespace of the source schema; matching ignores it, notes mention it.
+    pub namespace: Option<Box<str>>,
+    /// All element and attribute names.
+    pub names: Names,
+    /// Simple types, referred to by number.
+    pub simple: Vec<SimpleType>,
+    /// Complex types, referred to by number.
+    pub complex: Vec<ComplexType>,
+    /// Elements that may be the root of a document.
+    pub roots: Vec<ElementDecl>,
+}
+
+impl Schema {
+    /// An empty schema with a title.
+    pub(crate) fn new(title: &str) -> Self {
+        Self {
+            title: title.into(),
+            edition: Edition::V1_0,
+            namespace: None,
+            names: Names::default(),
+            simple: Vec::new(),
+            complex: Vec::new(),
+            roots: Vec::new(),
+        }
+    }
+
+    /// The declaration of a root element.
+    pub fn root(&self, name: &str) -> Option<&ElementDecl> {
+        let id = self.names.find(name)?;
+        self.roots.iter().find(|root| root.name == id)
+    }
+
+    /// Names of elements that may contain a child of this name, at most four, for messages.
+    pub(crate) fn parents_of(&self, child: NameId) -> Vec<&str> {
+        let holds = |ty: &ComplexType| ty.content.children().iter().any(|one| one.name == child);
+        let is_home = |element: &ElementDecl| {
+            let types = element
+                .alternatives
+                .iter()
+                .map(|other| other.ty)
+                .chain([element.ty]);
+            types.into_iter().any(|ty| match ty {
+                TypeRef::Complex(id) => self.complex.get(id as usize).is_some_and(holds),
+                _ => false,
+            })
+        };
+        let mut homes = Vec::new();
+        let declared = self.complex.iter().flat_map(|ty| ty.content.children());
+        for element in self
+            .roots
+            .iter()
+            .chain(declared)
+            .filter(|element| is_home(element))
+        {
+            let name = self.names.text(element.name);
+            if !homes.contains(&name) && homes.len() < 4 {
+                homes.push(name);
+            }
+        }
+        homes
+    }
+
+    /// A rough count of the bytes the tables occupy on the heap.
+    pub fn heap_bytes(&self) -> usize {
+        let complex: usize = self.complex.iter().map(ComplexType::heap_bytes).sum();
+        let simple: usize = self.simple.iter().map(SimpleType::heap_bytes).sum();
+        let roots: usize = self.roots.iter().map(ElementDecl::heap_bytes).sum();
+        complex + simple + roots + self.names.heap_bytes()
+    }
+}
+
+/// The type of an element.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum TypeRef {
+    /// Anything goes (`xs:anyType`).
+    Any,
+    /// Text of a simple type, no attributes.
+    Simple(u32),
+    /// A complex type.
+    Complex(u32),
+}
+
+/// A type with attributes, children or both.
+#[derive(Clone, Debug)]
+pub struct ComplexType {
+    /// The schema's name for it, if it has one.
+    pub name: Option<Box<str>>,
+    /// The complex type it extends or restricts.
+    pub base: Option<u32>,
+    /// Whether elements may only have a type derived from this one.
+    pub is_abstract: bool,
+    /// Whether text may stand between children.
+    pub mixed: bool,
+    /// Attributes that may (or must) appear.
+    pub attributes: Vec<AttributeUse>,
+    /// How many of `attributes` are required.
+    pub required: u16,
+    /// Text or children.
+    pub content: Content,
+    /// Conditions over the whole element (XSD 1.1).
+    pub assertions: Vec<Assertion>,
+}
+
+impl ComplexType {
+    fn heap_bytes(&self) -> usize {
+        let fixed = size_of::<Self>() + self.attributes.len() * size_of::<AttributeUse>();
+        let content = match &self.content {
+            Content::Empty | Content::Text(_) => 0,
+            Content::Children(model) => model.heap_bytes(),
+            Content::All(all) => all
+                .members
+                .iter()
+                .map(ElementDecl::heap_bytes)
+                .sum::<usize>(),
+        };
+        fixed + content + self.assertions.len() * 256
+    }
+}
+
+/// One attribute of a complex type.
+#[derive(Clone, Debug)]
+pub struct AttributeUse {
+    /// Its name.
+    pub name: NameId,
+    /// The simple type of its value.
+    pub value: u32,
+    /// Whether it must be there.
+    pub required: bool,
+    /// The only value it may have.
+    pub fixed: Option<Box<str>>,
+}
+
+/// What stands between the tags.
+#[derive(Clone, Debug)]
+pub enum Content {
+    /// Nothing (apart from white space, or text if the type is mixed).
+    Empty,
+    /// Text of a simple type.
+    Text(u32),
+    /// Children in an order given by an automaton.
+    Children(Model),
+    /// Children in any order, each at most once.
+    All(AllModel),
+}
+
+impl Content {
+    /// The declarations of all children.
+    pub(crate) fn children(&self) -> &[ElementDecl] {
+        match self {
+            Content::Empty | Content::Text(_) => &[],
+            Content::Children(model) => &model.children,
+            Content::All(all) => &all.members,
+        }
+    }
+}
+
+/// A deterministic automaton over child names; state 0 is the start.
+#[derive(Clone, Debug, Default)]
+pub struct Model {
+    /// The declarations of all children of the model, one per name.
+    pub children: Vec<ElementDecl>,
+    /// The states.
+    pub states: Vec<State>,
+    /// The edges of all states, those of one state side by side.
+    pub edges: Vec<Edge>,
+}
+
+impl Model {
+    /// The edges that leave a state.
+    pub(crate) fn edges(&self, state: u16) -> &[Edge] {
+        let Some(row) = self.states.get(usize::from(state)) else {
+            return &[];
+        };
+        let first = row.first as usize;
+        self.edges
+            .get(first..first + usize::from(row.count))
+            .unwrap_or(&[])
+    }
+
+    fn heap_bytes(&self) -> usize {
+        let tables = self.states.len() * size_of::<State>() + self.edges.len() * size_of::<Edge>();
+        tables
+            + self
+                .children
+                .iter()
+                .map(ElementDecl::heap_bytes)
+                .sum::<usize>()
+    }
+}
+
+/// One state of a [`Model`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct State {
+    /// Index of its first edge.
+    pub first: u32,
+    /// Number of its edges.
+    pub count: u16,
+    /// Whether the element may end here.
+    pub accepts: bool,
+    /// Where any other element leads (`any processContents="skip"`).
+    pub wildcard: Option<u16>,
+}
+
+/// One step of a [`Model`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Edge {
+    /// The child's name.
+    pub name: NameId,
+    /// Index into [`Model::children`].
+    pub child: u16,
+    /// The state after it.
+    pub to: u16,
+}
+
+/// An `all` group: a bit per member.
+#[derive(Clone, Debug, Default)]
+pub struct AllModel {
+    /// The members, at most 64.
+    pub members: Vec<ElementDecl>,
+    /// Bits of the members that must appear.
+    pub required: u64,
+    /// Whether the whole group may be absent.
+    pub optional: bool,
+}
+
+/// An element as declared in a content model or as a root.
+#[derive(Clone, Debug)]
+pub struct ElementDecl {
+    /// Its name.
+    pub name: NameId,
+    /// Its type, unless an alternative applies.
+    pub ty: TypeRef,
+    /// Whether `xsi:nil` is allowed.
+    pub nillable: bool,
+    /// Types chosen by an attribute's value (XSD 1.1), first match wins.
+    pub alternatives: Vec<Alternative>,
+    /// Keys and references whose scope this element is.
+    pub constraints: Option<Box<Constraints>>,
+}
+
+impl ElementDecl {
+    fn heap_bytes(&self) -> usize {
+        let extra = self.constraints.as_ref().map_or(0, |all| all.heap_bytes());
+        size_of::<Self>() + extra + self.alternatives.len() * 96
+    }
+}
+
+/// A type chosen by a test on the element's attributes.
+#[derive(Clone, Debug)]
+pub struct Alternative {
+    /// The test; `None` is the default.
+    pub test: Option<Assertion>,
+    /// The type it chooses.
+    pub ty: TypeRef,
+}

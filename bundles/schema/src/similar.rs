@@ -1,0 +1,71 @@
+//! Which of several names was probably meant.
+
+/// Names longer than this are not compared: nobody mistypes them by a letter or two.
+const LONGEST: usize = 64;
+
+/// The candidate closest to `name`, if it is close enough to be a slip: equal but for case, or one
+/// change in every three characters, at most three (insertions, deletions, replacements, swaps).
+pub(crate) fn closest<'c>(
+    name: &str,
+    candidates: impl Iterator<Item = &'c str>,
+) -> Option<&'c str> {
+    let allowed = (name.chars().count() / 3).clamp(1, 3);
+    let mut best: Option<(usize, &str)> = None;
+    for candidate in candidates.filter(|candidate| !candidate.is_empty()) {
+        if candidate.eq_ignore_ascii_case(name) {
+            return Some(candidate);
+        }
+        if candidate.len().abs_diff(name.len()) > allowed
+            || candidate.len().max(name.len()) > LONGEST
+        {
+            continue;
+        }
+        let distance = distance(name.as_bytes(), candidate.as_bytes());
+        if distance <= allowed && best.is_none_or(|(least, _)| distance < least) {
+            best = Some((distance, candidate));
+        }
+    }
+    best.filter(|(distance, candidate)| *distance < candidate.len())
+        .map(|(_, candidate)| candidate)
+}
+
+/// Damerau's distance (optimal string alignment) over bytes of texts up to `LONGEST` long.
+fn distance(left: &[u8], right: &[u8]) -> usize {
+    let mut before = [0usize; LONGEST + 1];
+    let mut above = [0usize; LONGEST + 1];
+    let mut row = [0usize; LONGEST + 1];
+    for (index, cell) in above.iter_mut().enumerate() {
+        *cell = index;
+    }
+    for (i, &a) in left.iter().enumerate() {
+        row[0] = i + 1;
+        for (j, &b) in right.iter().enumerate() {
+            let replaced = above[j] + usize::from(a != b);
+            let mut least = replaced.min(above[j + 1] + 1).min(row[j] + 1);
+            if i > 0 && j > 0 && a == right[j - 1] && left[i - 1] == b {
+                least = least.min(before[j - 1] + 1);
+            }
+            row[j + 1] = least;
+        }
+        before = above;
+        above = row;
+    }
+    above[right.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::closest;
+
+    #[test]
+    fn slips_are_recognised() {
+        let names = ["laneSection", "laneOffset", "planView", "link", "type"];
+        let meant = |name| closest(name, names.iter().copied());
+        assert_eq!(meant("lanSection"), Some("laneSection"));
+        assert_eq!(meant("LaneSection"), Some("laneSection"));
+        assert_eq!(meant("lnik"), Some("link"));
+        assert_eq!(meant("planViews"), Some("planView"));
+        assert_eq!(meant("geometry"), None);
+        assert_eq!(meant("x"), None);
+    }
+}

@@ -1,0 +1,175 @@
+//! What a simple type expects, in words.
+
+use super::{Bound, Builtin, Facets, SimpleType, Variety};
+use crate::model::Schema;
+
+/// What would have been right, as data.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Expectation {
+    /// The values allowed, if they can be listed.
+    pub values: Vec<String>,
+    /// The rest in words, e.g. `a number of at least 0`.
+    pub words: Vec<String>,
+}
+
+impl Expectation {
+    /// Both in one sentence part; long lists of values are cut.
+    pub fn sentence(&self) -> String {
+        const SHOWN: usize = 12;
+        let mut parts = self.words.clone();
+        if !self.values.is_empty() {
+            let mut list: Vec<String> = self
+                .values
+                .iter()
+                .take(SHOWN)
+                .map(|value| format!("\"{value}\""))
+                .collect();
+            if self.values.len() > SHOWN {
+                list.push(format!("{} more", self.values.len() - SHOWN));
+            }
+            let one_of = if self.values.len() == 1 {
+                ""
+            } else {
+                "one of "
+            };
+            parts.insert(0, format!("{one_of}{}", list.join(", ")));
+        }
+        parts.join(", or ")
+    }
+}
+
+impl SimpleType {
+    /// What a value of this type looks like.
+    pub fn expectation(&self, schema: &Schema) -> Expectation {
+        let mut all = Expectation::default();
+        self.collect(schema, &mut all);
+        all
+    }
+
+    fn collect(&self, schema: &Schema, all: &mut Expectation) {
+        if let Some(values) = &self.facets.enumeration {
+            for value in values {
+                if !all.values.iter().any(|have| **have == **value) {
+                    all.values.push(value.to_string());
+                }
+            }
+            return;
+        }
+        let words = match &self.variety {
+            Variety::Union(members) => {
+                let members = members
+                    .iter()
+                    .filter_map(|&id| schema.simple.get(id as usize));
+                members.for_each(|member| member.collect(schema, all));
+                return;
+            }
+            Variety::List(item) => {
+                let item = schema
+                    .simple
+                    .get(*item as usize)
+                    .map(|item| item.expectation(schema).sentence());
+                format!(
+                    "a list, separated by blanks, of: {}",
+                    item.unwrap_or_default()
+                )
+            }
+            Variety::Atomic(builtin) => self.facets.words(self.name.as_deref(), *builtin),
+        };
+        if !all.words.contains(&words) {
+            all.words.push(words);
+        }
+    }
+}
+
+impl Facets {
+    fn words(&self, name: Option<&str>, builtin: Builtin) -> String {
+        let mut words = match (name, self.patterns.is_empty()) {
+            // Named patterns speak for themselves: OpenSCENARIO's `parameter` and `expression`.
+            (Some(name @ ("parameter" | "expression")), false) => {
+                let example = if name == "parameter" {
+                    "$name"
+                } else {
+                    "${…}"
+                };
+                return format!("{} {name} ({example})", article(name));
+            }
+            _ => noun(builtin).to_owned(),
+        };
+        words += &range(self.lowest.as_ref(), self.highest.as_ref());
+        for pattern in &self.patterns {
+            words += &format!(" of the form {}", pattern.source());
+        }
+        match (self.min_length, self.max_length) {
+            (None, None) => {}
+            (Some(least), Some(most)) if least == most => words += &format!(" of length {least}"),
+            (least, most) => {
+                let most = most.map_or(String::new(), |most| format!(" to {most}"));
+                words += &format!(" of length {}{most}", least.unwrap_or(0));
+            }
+        }
+        words
+    }
+}
+
+fn article(word: &str) -> &'static str {
+    if word.starts_with(['a', 'e', 'i', 'o', 'u']) {
+        "an"
+    } else {
+        "a"
+    }
+}
+
+fn range(lowest: Option<&Bound>, highest: Option<&Bound>) -> String {
+    let low = lowest.map(|bound| {
+        let word = if bound.exclusive {
+            "greater than"
+        } else {
+            "of at least"
+        };
+        format!(" {word} {}", bound.text)
+    });
+    let high = highest.map(|bound| {
+        let word = if bound.exclusive {
+            "less than"
+        } else {
+            "at most"
+        };
+        format!(" {word} {}", bound.text)
+    });
+    match (low, high) {
+        (Some(low), Some(high)) => format!("{low} and{high}"),
+        (low, high) => low.or(high).unwrap_or_default(),
+    }
+}
+
+fn noun(builtin: Builtin) -> &'static str {
+    match builtin {
+        Builtin::AnySimple | Builtin::String | Builtin::NormalizedString | Builtin::Token => {
+            "a text"
+        }
+        Builtin::Boolean => "true or false",
+        Builtin::Decimal => "a decimal number without exponent",
+        Builtin::Float | Builtin::Double => "a number",
+        Builtin::Integer => "a whole number",
+        Builtin::NonNegative => "a whole number of at least 0",
+        Builtin::Positive => "a whole number of at least 1",
+        Builtin::NonPositive => "a whole number of at most 0",
+        Builtin::Negative => "a whole number of at most -1",
+        Builtin::Long => "a whole number of 64 bits",
+        Builtin::Int => "a whole number from -2147483648 to 2147483647",
+        Builtin::Short => "a whole number from -32768 to 32767",
+        Builtin::Byte => "a whole number from -128 to 127",
+        Builtin::UnsignedLong => "a whole number from 0 to 18446744073709551615",
+        Builtin::UnsignedInt => "a whole number from 0 to 4294967295",
+        Builtin::UnsignedShort => "a whole number from 0 to 65535",
+        Builtin::UnsignedByte => "a whole number from 0 to 255",
+        Builtin::DateTime => "a date and time such as 2024-05-31T12:00:00",
+        Builtin::Date => "a date such as 2024-05-31",
+        Builtin::Time => "a time such as 12:00:00",
+        Builtin::Language => "a language code such as en-GB",
+        Builtin::NmToken | Builtin::Name | Builtin::NcName => "an XML name",
+        Builtin::AnyUri => "a URI",
+        Builtin::HexBinary => "hexadecimal digits in pairs",
+        Builtin::Base64 => "base64 text",
+    }
+}

@@ -1,0 +1,358 @@
+//! Children of one element against its content model, and how to go on after a wrong one.
+//!
+//! A wrong child is one of these: a child that the model knows but expects only after others (those
+//! are missing), one that it knows but no longer expects (repeated or misplaced), or one that it
+//! does not know (perhaps a slip of the pen). In each case the automaton is brought into the state
+//! from which the rest of the children makes most sense, so that one cause gives one finding.
+
+use std::collections::{HashSet, VecDeque};
+
+use qcbus_document::Node;
+
+use super::frame::{Body, Frame};
+use super::memo::Meant;
+use super::{Walk, wording};
+use crate::finding::Code;
+use crate::model::{ElementDecl, Model};
+use crate::names::NameId;
+use crate::work::steps;
+
+/// States looked at when searching the way to an expected child.
+const MAX_SEARCH: usize = 256;
+
+/// Earlier siblings looked at, for all children of an element together, to tell a repeated child
+/// from a misplaced one: no more than the square of their number, so about thirty per child.
+const MAX_SIBLINGS: usize = 1_000;
+
+impl<'a, 's> Walk<'a, 's> {
+    /// The declaration of an element within its parent; `None` if its content is not checked.
+    pub(super) fn declaration_of(&mut self, node: Node<'a>) -> Option<&'s ElementDecl> {
+        let name = self.names.element(node);
+        let frame = self.stack.last_mut()?;
+        match &mut frame.body {
+            Body::Children { model, state } => {
+                let model: &'s Model = model;
+                steps(model.edges(*state).len());
+                if let Some(edge) = model.edges(*state).iter().find(|edge| edge.name == name) {
+                    *state = edge.to;
+                    return model.children.get(usize::from(edge.child));
+                }
+                if let Some(to) = model
+                    .states
+                    .get(usize::from(*state))
+                    .and_then(|row| row.wildcard)
+                {
+                    *state = to;
+                    return None;
+                }
+                let state = *state;
+                self.strange_child(node, name, model, state)
+            }
+            Body::All { model, seen } => {
+                let found = model.members.iter().position(|member| member.name == name);
+                let Some(index) = found else {
+                    return self.strange_member(node);
+                };
+                let bit = 1u64 << index.min(63);
+                let repeated = *seen & bit != 0;
+                *seen |= bit;
+                let declared = &model.members[index];
+                if repeated {
+                    let key = (std::ptr::from_ref(*model) as usize, u32::from(name.0));
+                    self.reporter
+                        .add(Code::RepeatedElement, key, node, || wording::repeated(node));
+                }
+                Some(declared)
+            }
+            Body::Nothing | Body::Text(_) => {
+                let parent = self.document.node(frame.node)?;
+                let key = (0, u32::from(node.name_number()));
+                self.reporter.add(Code::UnexpectedElement, key, node, || {
+                    wording::no_children(node, parent)
+                });
+                None
+            }
+        }
+    }
+
+    fn strange_child(
+        &mut self,
+        node: Node<'a>,
+        name: NameId,
+        model: &'s Model,
+        state: u16,
+    ) -> Option<&'s ElementDecl> {
+        let Some(index) = model.children.iter().position(|child| child.name == name) else {
+            return self.unknown_child(node, model, state);
+        };
+        let key = (std::ptr::from_ref(model) as usize, u32::from(name.0));
+        let parent = self.document.node(self.stack.last()?.node)?;
+        if let Some(way) = self.memo.way(model, state, Some(name)) {
+            let (to, skipped) = (way.0, &way.1);
+            let frame = self.stack.last_mut()?;
+            let known = frame.stranger.take() == Some(state)
+                || skipped.iter().any(|name| frame.troubles.contains(name));
+            steps(frame.troubles.len() * skipped.len());
+            for &name in skipped {
+                if !frame.troubles.contains(&name) {
+                    frame.troubles.push(name);
+                }
+            }
+            frame.body = Body::Children { model, state: to };
+            if !known {
+                self.reporter.add(Code::MissingElement, key, node, || {
+                    let mut names = needed(model, state, skipped, |edge, _| edge == Some(name));
+                    if names.is_empty() {
+                        names.clone_from(skipped);
+                    }
+                    wording::missing_before(node, parent, &names, self.schema)
+                });
+            }
+        } else if let Some(at) = self
+            .stack
+            .last()?
+            .troubles
+            .iter()
+            .position(|known| *known == name)
+        {
+            // Reported as missing before; it was only late.
+            self.stack.last_mut()?.troubles.swap_remove(at);
+        } else if self.has_twin(node, parent) {
+            self.reporter
+                .add(Code::RepeatedElement, key, node, || wording::repeated(node));
+        } else {
+            self.stack.last_mut()?.troubles.push(name);
+            self.reporter.add(Code::MisplacedElement, key, node, || {
+                wording::misplaced(node, parent, model, state, self.schema)
+            });
+        }
+        model.children.get(index)
+    }
+
+    /// Whether a child of the same name stands before. Looks at a limited number of
+    /// siblings for all wrong children of an element together.
+    fn has_twin(&mut self, node: Node<'a>, parent: Node<'a>) -> bool {
+        let Some(frame) = self.stack.last_mut() else {
+            return false;
+        };
+        let looked = &mut frame.looked;
+        for other in parent.children().take_while(|other| *other != node) {
+            steps(1);
+            *looked += 1;
+            if other.is(node.name()) {
+                return true;
+            }
+            if *looked > MAX_SIBLINGS {
+                return false;
+            }
+        }
+        false
+    }
+
+    /// A child that the model does not know at all.
+    fn unknown_child(
+        &mut self,
+        node: Node<'a>,
+        model: &'s Model,
+        state: u16,
+    ) -> Option<&'s ElementDecl> {
+        let parent = self.document.node(self.stack.last()?.node)?;
+        if self.overlay.allows_element(parent.name(), node.name()) || self.reporter.is_full() {
+            self.count_unknown(node, parent);
+            return None;
+        }
+        let here = model.edges(state);
+        let schema = self.schema;
+        let written = (node.name(), node.name_number());
+        let Meant {
+            here: meant,
+            anywhere: suggestion,
+        } = self.memo.child(written, (model, state), &schema.names);
+        steps(here.len());
+        let key = (
+            std::ptr::from_ref(model) as usize,
+            u32::from(node.name_number()) | 1 << 16,
+        );
+        self.reporter.add(Code::UnexpectedElement, key, node, || {
+            wording::unexpected_child(node, parent, model, state, suggestion, schema)
+        });
+        let frame = self.stack.last_mut()?;
+        let found = here
+            .iter()
+            .find(|edge| Some(schema.names.text(edge.name)) == meant);
+        let Some(edge) = found else {
+            frame.stranger = Some(state);
+            return None;
+        };
+        frame.body = Body::Children {
+            model,
+            state: edge.to,
+        };
+        model.children.get(usize::from(edge.child))
+    }
+
+    /// Counts an unknown child once the list is full; says nothing where the overlay allows it.
+    fn count_unknown(&mut self, node: Node<'a>, parent: Node<'a>) {
+        if !self.overlay.allows_element(parent.name(), node.name()) {
+            let key = (0, u32::from(node.name_number()));
+            self.reporter.add(Code::UnexpectedElement, key, node, || {
+                wording::no_children(node, parent)
+            });
+        }
+    }
+
+    /// A child that an `all` group does not know.
+    fn strange_member(&mut self, node: Node<'a>) -> Option<&'s ElementDecl> {
+        let frame = self.stack.last_mut()?;
+        let parent = self.document.node(frame.node)?;
+        let Body::All { model, seen } = &mut frame.body else {
+            return None;
+        };
+        if self.overlay.allows_element(parent.name(), node.name()) {
+            return None;
+        }
+        let schema = self.schema;
+        let written = (node.name(), node.name_number());
+        let meant = self.memo.member(written, model, &schema.names);
+        // One that is there already was not meant.
+        let open = |name: &&str| {
+            let index = model
+                .members
+                .iter()
+                .position(|member| schema.names.text(member.name) == *name);
+            index.is_some_and(|index| *seen & (1 << index) == 0)
+        };
+        let meant = meant.filter(open);
+        steps(2 * model.members.len());
+        let key = (
+            std::ptr::from_ref(*model) as usize,
+            u32::from(node.name_number()) | 1 << 16,
+        );
+        let members = &model.members;
+        self.reporter.add(Code::UnexpectedElement, key, node, || {
+            wording::unexpected_member(node, parent, members, meant, schema)
+        });
+        let found = model
+            .members
+            .iter()
+            .position(|member| Some(schema.names.text(member.name)) == meant);
+        let Some(index) = found else {
+            frame.strangers += 1;
+            return None;
+        };
+        *seen |= 1 << index.min(63);
+        model.members.get(index)
+    }
+
+    /// Checks, at the end of an element, that nothing is missing.
+    pub(super) fn complete(&mut self, frame: &Frame<'s>) {
+        match frame.body {
+            Body::Children { model, state } => self.complete_children(frame, model, state),
+            Body::All { model, seen } => {
+                let missing = model.required & !seen;
+                if missing == 0 || (model.optional && seen == 0) {
+                    return;
+                }
+                let Some(node) = self.document.node(frame.node) else {
+                    return;
+                };
+                // Each unknown child probably stands for one that is missing.
+                let members = model.members.iter().enumerate();
+                let absent = members.filter(|(index, _)| missing & (1 << index) != 0);
+                for (_, member) in absent.skip(frame.strangers as usize) {
+                    let name = [member.name];
+                    let key = (std::ptr::from_ref(model) as usize, u32::from(name[0].0));
+                    self.reporter.add(Code::MissingElement, key, node, || {
+                        wording::missing_children(node, &name, &name, self.schema)
+                    });
+                }
+            }
+            Body::Nothing | Body::Text(_) => {}
+        }
+    }
+
+    fn complete_children(&mut self, frame: &Frame<'s>, model: &'s Model, state: u16) {
+        if model
+            .states
+            .get(usize::from(state))
+            .is_none_or(|row| row.accepts)
+        {
+            return;
+        }
+        let Some(node) = self.document.node(frame.node) else {
+            return;
+        };
+        let way = self.memo.way(model, state, None);
+        let skipped = way.map(|way| way.1.clone()).unwrap_or_default();
+        steps(skipped.len() * frame.troubles.len());
+        if frame.stranger == Some(state) || skipped.iter().any(|name| frame.troubles.contains(name))
+        {
+            return;
+        }
+        let expected: Vec<NameId> = model.edges(state).iter().map(|edge| edge.name).collect();
+        let key = (
+            std::ptr::from_ref(model) as usize,
+            u32::from(state) | 1 << 17,
+        );
+        self.reporter.add(Code::MissingElement, key, node, || {
+            let needed = needed(model, state, &skipped, |_, accepts| accepts);
+            wording::missing_children(node, &needed, &expected, self.schema)
+        });
+    }
+}
+
+/// A way through a model: the state it leads to, and the children skipped on it.
+pub(super) type Way = (u16, Vec<NameId>);
+
+/// The shortest way from `state` to an edge that `found` recognises by the child's name, or to a
+/// state that it recognises by whether the element may end there.
+pub(super) fn way_to(
+    model: &Model,
+    state: u16,
+    found: impl Fn(Option<NameId>, bool) -> bool,
+) -> Option<Way> {
+    way_without(model, state, None, &found)
+}
+
+/// Those of the skipped children that every way contains: the ones that are surely missing.
+fn needed(
+    model: &Model,
+    state: u16,
+    skipped: &[NameId],
+    found: impl Fn(Option<NameId>, bool) -> bool,
+) -> Vec<NameId> {
+    let only_way = |name: &&NameId| way_without(model, state, Some(**name), &found).is_none();
+    skipped.iter().filter(only_way).copied().collect()
+}
+
+fn way_without(
+    model: &Model,
+    state: u16,
+    avoided: Option<NameId>,
+    found: &impl Fn(Option<NameId>, bool) -> bool,
+) -> Option<Way> {
+    let mut visited = HashSet::from([state]);
+    let mut queue = VecDeque::from([(state, Vec::new())]);
+    while let Some((at, path)) = queue.pop_front() {
+        let edges = model.edges(at);
+        steps(1 + 2 * edges.len() + path.len());
+        if let Some(edge) = edges.iter().find(|edge| found(Some(edge.name), false)) {
+            return Some((edge.to, path));
+        }
+        let accepts = model
+            .states
+            .get(usize::from(at))
+            .is_some_and(|row| row.accepts);
+        if !path.is_empty() && found(None, accepts) {
+            return Some((at, path));
+        }
+        for edge in edges.iter().filter(|edge| Some(edge.name) != avoided) {
+            if visited.len() < MAX_SEARCH && visited.insert(edge.to) {
+                let mut longer = path.clone();
+                longer.push(edge.name);
+                queue.push_back((edge.to, longer));
+            }
+        }
+    }
+    None
+}

@@ -1,0 +1,100 @@
+//! What is worked out about wrong children, kept: a document can repeat one mistake a million times.
+
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use super::children::{Way, way_to};
+use crate::model::{AllModel, Model};
+use crate::names::{NameId, Names};
+use crate::similar::closest;
+use crate::work::steps;
+
+/// Answers kept; a schema and a document together seldom have more than a few dozen.
+const MOST: usize = 65_536;
+
+/// A place (model and state) and a name.
+type Place = (usize, u16, u16);
+
+#[derive(Debug, Default)]
+pub(super) struct Memo<'s> {
+    ways: HashMap<Place, Option<Rc<Way>>>,
+    meant: HashMap<Place, Meant<'s>>,
+}
+
+/// Which child was probably meant.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Meant<'s> {
+    /// One that may stand here.
+    pub(super) here: Option<&'s str>,
+    /// One that the parent knows.
+    pub(super) anywhere: Option<&'s str>,
+}
+
+impl<'s> Memo<'s> {
+    /// The way from a state to the child of this name, or (no name) to the end.
+    pub(super) fn way(
+        &mut self,
+        model: &'s Model,
+        state: u16,
+        wanted: Option<NameId>,
+    ) -> Option<Rc<Way>> {
+        let search = || {
+            match wanted {
+                Some(_) => way_to(model, state, |edge, _| edge == wanted),
+                None => way_to(model, state, |_, accepts| accepts),
+            }
+            .map(Rc::new)
+        };
+        let name = wanted.unwrap_or(NameId::UNKNOWN).0;
+        let key = (std::ptr::from_ref(model) as usize, state, name);
+        if self.ways.len() >= MOST {
+            return self.ways.get(&key).cloned().unwrap_or_else(search);
+        }
+        self.ways.entry(key).or_insert_with(search).clone()
+    }
+
+    /// What a child unknown to a model was probably meant to be; `number` is the document's for
+    /// its name. Once too many were asked for, nothing.
+    pub(super) fn child(
+        &mut self,
+        (name, number): (&str, u16),
+        (model, state): (&'s Model, u16),
+        names: &'s Names,
+    ) -> Meant<'s> {
+        let key = (std::ptr::from_ref(model) as usize, state, number);
+        self.known(key, || {
+            let edges = model.edges(state);
+            steps(edges.len() + model.children.len());
+            let here = closest(name, edges.iter().map(|edge| names.text(edge.name)));
+            let all = model.children.iter().map(|child| names.text(child.name));
+            let anywhere = here.or_else(|| closest(name, all));
+            Meant { here, anywhere }
+        })
+    }
+
+    /// The same for a member of an `all` group.
+    pub(super) fn member(
+        &mut self,
+        (name, number): (&str, u16),
+        model: &'s AllModel,
+        names: &'s Names,
+    ) -> Option<&'s str> {
+        let key = (std::ptr::from_ref(model) as usize, 0, number);
+        let meant = self.known(key, || {
+            steps(model.members.len());
+            let all = model.members.iter().map(|member| names.text(member.name));
+            Meant {
+                here: closest(name, all),
+                anywhere: None,
+            }
+        });
+        meant.here
+    }
+
+    fn known(&mut self, key: Place, search: impl FnOnce() -> Meant<'s>) -> Meant<'s> {
+        if self.meant.len() >= MOST {
+            return self.meant.get(&key).copied().unwrap_or_default();
+        }
+        *self.meant.entry(key).or_insert_with(search)
+    }
+}

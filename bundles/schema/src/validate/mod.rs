@@ -1,0 +1,196 @@
+//! One walk over the document image.
+//!
+//! Every element is met once: its declaration follows from one lookup in its parent's automaton,
+//! its attributes from its type's table. Names are compared as numbers, which are looked up once
+//! per distinct name of the document. Memory grows with depth, keys and findings, not with size.
+
+mod attributes;
+mod children;
+mod frame;
+mod keys;
+#[cfg(test)]
+mod linear;
+mod memo;
+mod names;
+mod overlay;
+mod reporter;
+mod text;
+mod types;
+mod wording;
+
+use qcbus_document::{Document, Node};
+
+pub use overlay::Overlay;
+
+use crate::finding::{Code, Limits, Report};
+use crate::model::{ElementDecl, Schema};
+use crate::work::steps;
+use frame::{Body, Frame};
+use keys::{Keys, Opening};
+use memo::Memo;
+use names::NameMap;
+use reporter::Reporter;
+use types::Bindings;
+
+impl Schema {
+    /// Validates a document, namespaces disregarded: elements count by their local names.
+    ///
+    /// Takes time linear in the document's size.
+    pub fn validate<'a>(&self, document: &Document<'a>, limits: Limits) -> Report<'a> {
+        self.validate_with(document, limits, Overlay::None)
+    }
+
+    /// Validates a document that may contain more than the schema says.
+    pub fn validate_with<'a>(
+        &self,
+        document: &Document<'a>,
+        limits: Limits,
+        overlay: Overlay,
+    ) -> Report<'a> {
+        let Some(root) = document.root() else {
+            return Report::default();
+        };
+        let mut walk = Walk {
+            schema: self,
+            document: *document,
+            names: NameMap::new(document, self),
+            sources: sources(document),
+            stack: Vec::new(),
+            keys: Keys::default(),
+            memo: Memo::default(),
+            bindings: Bindings::default(),
+            reporter: Reporter::new(limits),
+            overlay,
+        };
+        walk.run(root);
+        walk.reporter.finish()
+    }
+}
+
+/// Start and text of each file, ascending.
+fn sources<'a>(document: &Document<'a>) -> Vec<(u32, &'a str)> {
+    let mut sources: Vec<(u32, &str)> = document
+        .sources()
+        .map(|source| (source.start, document.source_text(&source)))
+        .collect();
+    sources.sort_by_key(|(start, _)| *start);
+    sources
+}
+
+struct Walk<'a, 's> {
+    schema: &'s Schema,
+    document: Document<'a>,
+    names: NameMap,
+    /// Start and text of each file, ascending.
+    sources: Vec<(u32, &'a str)>,
+    stack: Vec<Frame<'s>>,
+    keys: Keys<'a, 's>,
+    memo: Memo<'s>,
+    /// The prefixes bound by open elements.
+    bindings: Bindings<'a>,
+    reporter: Reporter<'a>,
+    overlay: Overlay,
+}
+
+impl<'a, 's> Walk<'a, 's> {
+    fn run(&mut self, root: Node<'a>) {
+        let Some(declared) = self.schema.root(root.name()) else {
+            self.unknown_root(root);
+            return;
+        };
+        let end = root.subtree_end();
+        let mut next = self.start(root, declared);
+        while next < end {
+            self.close_until(next);
+            let Some(node) = self.document.node(next) else {
+                break;
+            };
+            next = if node.is_element() {
+                self.element(node)
+            } else {
+                self.run_of_text(node)
+            };
+        }
+        self.close_until(end);
+    }
+
+    /// Meets an element below the root; returns where the walk goes on.
+    fn element(&mut self, node: Node<'a>) -> u32 {
+        steps(1);
+        if self.is_spliced_include(node) {
+            return node.subtree_end();
+        }
+        match self.declaration_of(node) {
+            Some(declared) => self.start(node, declared),
+            None => node.subtree_end(),
+        }
+    }
+
+    /// An OpenDRIVE `include` whose file has been put in its place: what counts is what came from
+    /// there, in the order in which it stands.
+    fn is_spliced_include(&self, node: Node<'a>) -> bool {
+        self.sources.len() > 1 && node.is("include") && node.attr("file").is_some()
+    }
+
+    /// Checks an element against its declaration and opens it; returns where the walk goes on.
+    fn start(&mut self, node: Node<'a>, declared: &'s ElementDecl) -> u32 {
+        let name = self.names.element(node);
+        let end = node.subtree_end();
+        self.bind(node);
+        let nil = self.is_nil(node, declared);
+        let Some(ty) = self.type_of(node, declared) else {
+            return end;
+        };
+        self.attributes(node, ty);
+        self.conditions(node, ty);
+        let body = if nil { Body::Nothing } else { Body::of(ty) };
+        self.text_content(node, body);
+        let constraints = declared.constraints.as_deref();
+        let opening = Opening {
+            node,
+            name,
+            kind: ty,
+            constraints,
+            schema: self.schema,
+            names: &self.names,
+        };
+        let keys = self.keys.enter(&opening, &mut self.reporter);
+        let mixed = Body::is_mixed(ty);
+        self.emptiness(node, body, mixed);
+        self.stack.push(Frame {
+            node: node.index(),
+            end,
+            body,
+            mixed,
+            keys,
+            troubles: Vec::new(),
+            stranger: None,
+            strangers: 0,
+            looked: 0,
+        });
+        node.index() + 1
+    }
+
+    /// Closes the elements that end before `next`.
+    fn close_until(&mut self, next: u32) {
+        while self.stack.last().is_some_and(|frame| frame.end <= next) {
+            let Some(frame) = self.stack.pop() else {
+                return;
+            };
+            self.complete(&frame);
+            self.keys.leave(frame.keys, &mut self.reporter);
+        }
+    }
+
+    fn unknown_root(&mut self, root: Node<'a>) {
+        let known: Vec<&str> = self
+            .schema
+            .roots
+            .iter()
+            .map(|root| self.schema.names.text(root.name))
+            .collect();
+        self.reporter.add(Code::UnknownRoot, (0, 0), root, || {
+            wording::unknown_root(root, &known, &self.schema.title)
+        });
+    }
+}

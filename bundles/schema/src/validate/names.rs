@@ -1,0 +1,78 @@
+//! The document's names in the schema's numbers.
+
+use qcbus_document::{Attribute, Document, Node};
+
+use crate::model::Schema;
+use crate::names::NameId;
+
+/// What an attribute's name means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum AttributeName {
+    /// A name to look up in the type.
+    Plain(NameId),
+    /// A namespace declaration.
+    Namespace,
+    /// A name with a prefix, e.g. `xsi:type`.
+    Prefixed,
+}
+
+/// Looked up once per distinct name of the document.
+pub(super) struct NameMap {
+    ids: Vec<NameId>,
+    marks: Vec<u8>,
+    /// Whether any attribute of the document has a prefix.
+    pub(super) prefixed: bool,
+}
+
+const PLAIN: u8 = 0;
+const NAMESPACE: u8 = 1;
+const PREFIXED: u8 = 2;
+
+impl NameMap {
+    pub(super) fn new(document: &Document<'_>, schema: &Schema) -> Self {
+        let mut map = Self {
+            ids: Vec::new(),
+            marks: Vec::new(),
+            prefixed: false,
+        };
+        for name in document.names() {
+            map.ids
+                .push(schema.names.find(name).unwrap_or(NameId::UNKNOWN));
+            map.marks.push(match name {
+                "xmlns" => NAMESPACE,
+                _ if name.starts_with("xmlns:") => NAMESPACE,
+                _ if name.contains(':') => PREFIXED,
+                _ => PLAIN,
+            });
+        }
+        map.prefixed = map.marks.contains(&PREFIXED);
+        map
+    }
+
+    #[inline]
+    pub(super) fn element(&self, node: Node<'_>) -> NameId {
+        self.id(node.name_number())
+    }
+
+    #[inline]
+    pub(super) fn attribute(&self, attribute: Attribute<'_>) -> AttributeName {
+        let number = attribute.name_number();
+        match self.marks.get(usize::from(number)).copied() {
+            Some(NAMESPACE) => AttributeName::Namespace,
+            Some(PREFIXED) => AttributeName::Prefixed,
+            _ => AttributeName::Plain(self.id(number)),
+        }
+    }
+
+    #[inline]
+    fn id(&self, number: u16) -> NameId {
+        self.ids
+            .get(usize::from(number))
+            .copied()
+            .unwrap_or(NameId::UNKNOWN)
+    }
+
+    pub(super) fn ids(&self) -> &[NameId] {
+        &self.ids
+    }
+}

@@ -1,0 +1,145 @@
+//! Collects findings, so many per kind and in all; counts the rest.
+
+use std::collections::HashMap;
+
+use qcbus_document::{Attribute, Node};
+
+use super::wording::Wording;
+use crate::finding::{Code, Finding, Limits, Report, Rest};
+
+/// What makes two findings the same kind, beside their code: the type or model they are about and
+/// a name within it.
+pub(super) type KindKey = (usize, u32);
+
+/// Kinds told apart; all further ones share one count per code.
+const MAX_KINDS: usize = 4_096;
+
+#[derive(Debug)]
+struct Tally {
+    subject: String,
+    listed: u32,
+    unlisted: u64,
+    /// Whether every one so far is the schema's fault.
+    defect: bool,
+    order: usize,
+}
+
+#[derive(Debug)]
+pub(super) struct Reporter<'a> {
+    limits: Limits,
+    findings: Vec<Finding<'a>>,
+    kinds: HashMap<(Code, KindKey), Tally>,
+}
+
+impl<'a> Reporter<'a> {
+    pub(super) fn new(limits: Limits) -> Self {
+        Self {
+            limits,
+            findings: Vec::new(),
+            kinds: HashMap::new(),
+        }
+    }
+
+    /// Whether nothing more will be listed.
+    pub(super) fn is_full(&self) -> bool {
+        self.findings.len() >= self.limits.total as usize
+    }
+
+    /// Lists the finding, worded by `word`, or counts it.
+    pub(super) fn add(
+        &mut self,
+        code: Code,
+        kind: KindKey,
+        node: Node<'a>,
+        word: impl FnOnce() -> Wording,
+    ) {
+        self.add_at(code, kind, node, None, word);
+    }
+
+    /// The same for a finding about an attribute.
+    pub(super) fn add_at(
+        &mut self,
+        code: Code,
+        kind: KindKey,
+        node: Node<'a>,
+        attribute: Option<Attribute<'a>>,
+        word: impl FnOnce() -> Wording,
+    ) {
+        let full = self.is_full();
+        let order = self.kinds.len();
+        let crowded = order >= MAX_KINDS && !self.kinds.contains_key(&(code, kind));
+        let key = if crowded {
+            (code, (usize::MAX, u32::MAX))
+        } else {
+            (code, kind)
+        };
+        let tally = self.kinds.entry(key).or_insert_with(|| Tally {
+            subject: if crowded {
+                "various".to_owned()
+            } else {
+                subject(node, attribute)
+            },
+            listed: 0,
+            unlisted: 0,
+            // No other findings are ever the schema's fault, so they need not be worded to know.
+            defect: matches!(code, Code::ConditionFailed | Code::MissingElement),
+            order,
+        });
+        if full || crowded || tally.listed >= self.limits.per_kind {
+            tally.unlisted += 1;
+            tally.defect = tally.defect && word().defect.is_some();
+            return;
+        }
+        tally.listed += 1;
+        let Wording {
+            found,
+            expected,
+            suggestion,
+            defect,
+            text,
+        } = word();
+        tally.defect &= defect.is_some();
+        let finding = Finding {
+            code,
+            node,
+            attribute,
+            found,
+            expected,
+            suggestion,
+            known_schema_defect: defect,
+            text,
+        };
+        self.findings.push(finding);
+    }
+
+    pub(super) fn finish(self) -> Report<'a> {
+        let mut rest: Vec<(usize, Rest)> = self
+            .kinds
+            .into_iter()
+            .filter(|(_, tally)| tally.unlisted > 0)
+            .map(|((code, _), tally)| {
+                (
+                    tally.order,
+                    Rest {
+                        code,
+                        subject: tally.subject,
+                        count: tally.unlisted,
+                        known_schema_defect: tally.defect,
+                    },
+                )
+            })
+            .collect();
+        rest.sort_by_key(|(order, _)| *order);
+        Report {
+            findings: self.findings,
+            rest: rest.into_iter().map(|(_, rest)| rest).collect(),
+        }
+    }
+}
+
+fn subject(node: Node<'_>, attribute: Option<Attribute<'_>>) -> String {
+    match attribute {
+        Some(attribute) => format!("{}/@{}", node.name(), attribute.name()),
+        None => node.name().to_owned(),
+    }
+}

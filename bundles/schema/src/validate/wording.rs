@@ -1,0 +1,515 @@
+//! Findings in words: what was found, what was expected, what was probably meant.
+
+use qcbus_document::{Attribute, Node};
+
+use super::children::way_to;
+use crate::assertion::Assertion;
+use crate::defects;
+use crate::model::{AttributeUse, ElementDecl, Model, Schema};
+use crate::names::NameId;
+use crate::similar::closest;
+use crate::simple::SimpleType;
+use crate::work::steps;
+
+/// A finding without its place.
+#[derive(Debug, Default)]
+pub(super) struct Wording {
+    pub(super) found: String,
+    pub(super) expected: Vec<String>,
+    pub(super) suggestion: Option<String>,
+    pub(super) defect: Option<&'static str>,
+    pub(super) text: String,
+}
+
+impl Wording {
+    fn new(found: &str, text: String) -> Self {
+        Self {
+            found: found.to_owned(),
+            text,
+            ..Self::default()
+        }
+    }
+
+    fn expecting(mut self, expected: Vec<String>) -> Self {
+        self.expected = expected;
+        self
+    }
+
+    fn suggesting(mut self, suggestion: Option<&str>) -> Self {
+        if let Some(meant) = suggestion {
+            self.text += &format!("; did you mean \"{meant}\"?");
+            self.suggestion = Some(meant.to_owned());
+        }
+        self
+    }
+
+    fn excused(mut self, defect: Option<&'static str>) -> Self {
+        if let Some(defect) = defect {
+            self.text += &format!("; known defect of the published schema: {defect}");
+            self.defect = Some(defect);
+        }
+        self
+    }
+}
+
+/// Longest part of a value that is repeated in a message.
+const MAX_QUOTED: usize = 80;
+
+fn quote(text: &str) -> String {
+    let mut short: String = text.chars().take(MAX_QUOTED).collect();
+    if short.len() < text.len() {
+        short.push('…');
+    }
+    format!("\"{short}\"")
+}
+
+fn elements(names: &[String]) -> String {
+    const SHOWN: usize = 12;
+    let mut list: Vec<String> = names
+        .iter()
+        .take(SHOWN)
+        .map(|name| format!("<{name}>"))
+        .collect();
+    if names.len() > SHOWN {
+        list.push(format!("{} more", names.len() - SHOWN));
+    }
+    list.join(", ")
+}
+
+fn texts(names: impl Iterator<Item = NameId>, schema: &Schema) -> Vec<String> {
+    let mut all: Vec<String> = Vec::new();
+    for name in names {
+        let text = schema.names.text(name);
+        if !all.iter().any(|have| have == text) {
+            all.push(text.to_owned());
+        }
+    }
+    all
+}
+
+/// "expected <a> or the end of <b>".
+fn expected_here(
+    model: &Model,
+    state: u16,
+    parent: Node<'_>,
+    schema: &Schema,
+) -> (Vec<String>, String) {
+    let names = texts(model.edges(state).iter().map(|edge| edge.name), schema);
+    let may_end = model
+        .states
+        .get(usize::from(state))
+        .is_some_and(|row| row.accepts);
+    let end = format!("the end of <{}>", parent.name());
+    let words = match (names.is_empty(), may_end) {
+        (true, _) => end,
+        (false, true) => format!("{} or {end}", elements(&names)),
+        (false, false) => elements(&names),
+    };
+    (names, words)
+}
+
+pub(super) fn unknown_root(root: Node<'_>, known: &[&str], title: &str) -> Wording {
+    let names: Vec<String> = known.iter().map(|name| (*name).to_owned()).collect();
+    let text = format!(
+        "the root element <{}> is not one of {title}, which expects {}",
+        root.name(),
+        elements(&names)
+    );
+    Wording::new(root.name(), text)
+        .expecting(names)
+        .suggesting(closest(root.name(), known.iter().copied()))
+}
+
+pub(super) fn repeated(node: Node<'_>) -> Wording {
+    let parent = node.parent().map_or("", |parent| parent.name());
+    Wording::new(
+        node.name(),
+        format!("<{}> occurs more often than <{parent}> allows", node.name()),
+    )
+}
+
+pub(super) fn no_children(node: Node<'_>, parent: Node<'_>) -> Wording {
+    Wording::new(
+        node.name(),
+        format!(
+            "<{}> may not contain elements, but contains <{}>",
+            parent.name(),
+            node.name()
+        ),
+    )
+}
+
+pub(super) fn missing_before(
+    node: Node<'_>,
+    parent: Node<'_>,
+    skipped: &[NameId],
+    schema: &Schema,
+) -> Wording {
+    let names = texts(skipped.iter().copied(), schema);
+    let defect = defects::missing_child(&names);
+    let text = format!(
+        "<{}> in <{}> comes too early: {} must come before it",
+        node.name(),
+        parent.name(),
+        elements(&names)
+    );
+    Wording::new(node.name(), text)
+        .expecting(names)
+        .excused(defect)
+}
+
+/// Siblings looked at to say before which one a child belongs.
+const MAX_SIBLINGS: usize = 200;
+
+/// The name of the sibling after which a child could no longer come.
+fn comes_before<'a>(
+    node: Node<'a>,
+    parent: Node<'a>,
+    model: &Model,
+    schema: &Schema,
+) -> Option<&'a str> {
+    let name = schema.names.find(node.name())?;
+    let may_come = |state| way_to(model, state, |edge, _| edge == Some(name)).is_some();
+    let (mut state, mut open, mut closing) = (0, true, None);
+    for sibling in parent
+        .children()
+        .take(MAX_SIBLINGS)
+        .take_while(|one| *one != node)
+    {
+        let known = schema.names.find(sibling.name());
+        let Some(edge) = model
+            .edges(state)
+            .iter()
+            .find(|edge| Some(edge.name) == known)
+        else {
+            continue;
+        };
+        if edge.to != state {
+            state = edge.to;
+            let still = may_come(state);
+            if open && !still {
+                closing = Some(sibling.name());
+            }
+            open = still;
+        }
+    }
+    closing.filter(|_| !open)
+}
+
+pub(super) fn misplaced(
+    node: Node<'_>,
+    parent: Node<'_>,
+    model: &Model,
+    state: u16,
+    schema: &Schema,
+) -> Wording {
+    let (expected, words) = expected_here(model, state, parent, schema);
+    let text = match comes_before(node, parent, model, schema) {
+        Some(later) => format!(
+            "<{}> in <{}> comes too late: it must come before <{later}>",
+            node.name(),
+            parent.name()
+        ),
+        None => format!(
+            "<{}> may occur in <{}>, but not at this place: children have a fixed order, expected here: {words}",
+            node.name(),
+            parent.name()
+        ),
+    };
+    Wording::new(node.name(), text).expecting(expected)
+}
+
+pub(super) fn unexpected_child(
+    node: Node<'_>,
+    parent: Node<'_>,
+    model: &Model,
+    state: u16,
+    suggestion: Option<&str>,
+    schema: &Schema,
+) -> Wording {
+    let (expected, words) = expected_here(model, state, parent, schema);
+    let text = format!(
+        "<{}> has no child <{}>, expected here: {words}",
+        parent.name(),
+        node.name()
+    );
+    let home = if suggestion.is_none() {
+        homes(node.name(), schema)
+    } else {
+        String::new()
+    };
+    Wording::new(node.name(), text + &home)
+        .expecting(expected)
+        .suggesting(suggestion)
+}
+
+pub(super) fn unexpected_member(
+    node: Node<'_>,
+    parent: Node<'_>,
+    members: &[ElementDecl],
+    suggestion: Option<&str>,
+    schema: &Schema,
+) -> Wording {
+    let names = texts(members.iter().map(|member| member.name), schema);
+    let list = elements(&names);
+    let text = format!(
+        "<{}> has no child <{}>, expected in any order: {list}",
+        parent.name(),
+        node.name()
+    );
+    let home = if suggestion.is_none() {
+        homes(node.name(), schema)
+    } else {
+        String::new()
+    };
+    Wording::new(node.name(), text + &home)
+        .expecting(names)
+        .suggesting(suggestion)
+}
+
+/// "; it belongs in <a>" for a name that the schema knows elsewhere.
+fn homes(name: &str, schema: &Schema) -> String {
+    let Some(id) = schema.names.find(name) else {
+        return String::new();
+    };
+    let found: Vec<String> = schema
+        .parents_of(id)
+        .into_iter()
+        .map(str::to_owned)
+        .collect();
+    if found.is_empty() {
+        String::new()
+    } else {
+        format!("; it belongs in {}", elements(&found))
+    }
+}
+
+pub(super) fn missing_children(
+    node: Node<'_>,
+    skipped: &[NameId],
+    expected: &[NameId],
+    schema: &Schema,
+) -> Wording {
+    let names = texts(expected.iter().copied(), schema);
+    let needed = texts(skipped.iter().copied(), schema);
+    let defect = defects::missing_child(&needed);
+    if needed.is_empty() {
+        let list = elements(&names);
+        let text = format!("<{}> is incomplete, expected next: {list}", node.name());
+        return Wording::new("", text).expecting(names);
+    }
+    let text = format!("<{}> lacks {}", node.name(), elements(&needed));
+    Wording::new("", text).expecting(needed).excused(defect)
+}
+
+pub(super) fn invalid_value(
+    node: Node<'_>,
+    attribute: Attribute<'_>,
+    declared: &AttributeUse,
+    ty: &SimpleType,
+    schema: &Schema,
+) -> Wording {
+    let value = attribute.value();
+    let mut expectation = ty.expectation(schema);
+    if let Some(fixed) = &declared.fixed {
+        expectation.values = vec![fixed.to_string()];
+        expectation.words.clear();
+    }
+    let suggestion =
+        closest(value.trim(), expectation.values.iter().map(String::as_str)).map(str::to_owned);
+    let text = format!(
+        "{} is no value of {} in <{}>, expected: {}",
+        quote(value),
+        attribute.name(),
+        node.name(),
+        expectation.sentence()
+    );
+    let mut expected = expectation.values;
+    expected.extend(expectation.words);
+    Wording::new(value, text)
+        .expecting(expected)
+        .suggesting(suggestion.as_deref())
+}
+
+pub(super) fn invalid_text(
+    node: Node<'_>,
+    value: &str,
+    ty: &SimpleType,
+    schema: &Schema,
+) -> Wording {
+    let expectation = ty.expectation(schema);
+    let suggestion =
+        closest(value.trim(), expectation.values.iter().map(String::as_str)).map(str::to_owned);
+    let text = format!(
+        "the text {} of <{}> is no value, expected: {}",
+        quote(value),
+        node.name(),
+        expectation.sentence()
+    );
+    let mut expected = expectation.values;
+    expected.extend(expectation.words);
+    Wording::new(value, text)
+        .expecting(expected)
+        .suggesting(suggestion.as_deref())
+}
+
+/// Whether one name is the beginning of the other: `from` of `fromLane`.
+pub(super) fn is_short_for(written: &str, name: &str) -> bool {
+    written.len() >= 2 && name.starts_with(written)
+}
+
+/// Attributes of an element that are looked at to name those it does not use.
+pub(super) const MAX_ATTRIBUTES: usize = 64;
+
+pub(super) fn unexpected_attribute(
+    node: Node<'_>,
+    attribute: Attribute<'_>,
+    declared: &[AttributeUse],
+    schema: &Schema,
+) -> Wording {
+    // An element with more is no slip, and each of its attributes may come here.
+    let used = |name: &str| {
+        let mut some = node.attributes().take(MAX_ATTRIBUTES);
+        some.any(|one| {
+            steps(1);
+            one.name() == name
+        })
+    };
+    let free = declared
+        .iter()
+        .map(|one| schema.names.text(one.name))
+        .filter(|name| !used(name));
+    let free: Vec<String> = free.map(str::to_owned).collect();
+    let text = format!("<{}> has no attribute {}", node.name(), attribute.name());
+    let suggestion = closest(attribute.name(), free.iter().map(String::as_str)).map(str::to_owned);
+    let longer = || {
+        free.iter()
+            .find(|name| is_short_for(attribute.name(), name))
+            .cloned()
+    };
+    let suggestion = suggestion.or_else(longer);
+    let list = match (&suggestion, free.as_slice()) {
+        (Some(_), _) => String::new(),
+        (None, []) => " and none that is not used yet".to_owned(),
+        (None, free) => format!(", attributes not used yet: {}", free.join(", ")),
+    };
+    Wording::new(attribute.name(), text + &list)
+        .expecting(free)
+        .suggesting(suggestion.as_deref())
+}
+
+pub(super) fn missing_attribute(
+    node: Node<'_>,
+    declared: &AttributeUse,
+    schema: &Schema,
+) -> Wording {
+    let name = schema.names.text(declared.name);
+    let ty = schema.simple.get(declared.value as usize);
+    let value = ty
+        .map(|ty| ty.expectation(schema).sentence())
+        .unwrap_or_default();
+    let text = format!(
+        "<{}> lacks its attribute {name}, whose value is {value}",
+        node.name()
+    );
+    Wording::new("", text).expecting(vec![name.to_owned()])
+}
+
+pub(super) fn unexpected_text(node: Node<'_>, text: &str) -> Wording {
+    let trimmed = text.trim();
+    Wording::new(
+        trimmed,
+        format!(
+            "<{}> may not contain text, but contains {}",
+            node.name(),
+            quote(trimmed)
+        ),
+    )
+}
+
+pub(super) fn blank_text(node: Node<'_>) -> Wording {
+    Wording::new(
+        "",
+        format!(
+            "<{}> must be empty, but contains white space between its tags",
+            node.name()
+        ),
+    )
+}
+
+pub(super) fn no_type(
+    node: Node<'_>,
+    declared: &ElementDecl,
+    undecided: bool,
+    schema: &Schema,
+) -> Wording {
+    let tests = declared
+        .alternatives
+        .iter()
+        .filter_map(|one| one.test.as_ref());
+    let tests: Vec<String> = tests.map(|test| test.notation(&schema.names)).collect();
+    let text = if undecided && !tests.is_empty() {
+        format!(
+            "what <{}> may contain cannot be told: one of these must hold: {}",
+            node.name(),
+            tests.join(", ")
+        )
+    } else {
+        format!("the schema gives <{}> only an abstract type", node.name())
+    };
+    Wording::new("", text).expecting(tests)
+}
+
+pub(super) fn bad_xsi_type(node: Node<'_>, written: &str) -> Wording {
+    Wording::new(
+        written,
+        format!(
+            "xsi:type names {}, which is no type for <{}>",
+            quote(written),
+            node.name()
+        ),
+    )
+}
+
+pub(super) fn condition_failed(node: Node<'_>, assertion: &Assertion, schema: &Schema) -> Wording {
+    let condition = assertion.notation(&schema.names);
+    let known = defects::condition(node, &condition);
+    let text = match defects::explanation(node, &condition) {
+        Some(words) => format!("<{}> breaks a condition of its type: {words}", node.name()),
+        None => format!(
+            "<{}> breaks a condition of its type: {condition}",
+            node.name()
+        ),
+    };
+    Wording::new("", text)
+        .expecting(vec![condition])
+        .excused(known)
+}
+
+pub(super) fn duplicate(attribute: Attribute<'_>, key: &str) -> Wording {
+    let text = format!(
+        "{} {} of <{}> occurs twice, but must be unique (key {key})",
+        attribute.name(),
+        quote(attribute.value()),
+        attribute.node().name()
+    );
+    Wording::new(attribute.value(), text)
+}
+
+pub(super) fn missing_key(node: Node<'_>, field: &str, key: &str) -> Wording {
+    let text = format!(
+        "<{}> needs the attribute {field} to be told apart (key {key})",
+        node.name()
+    );
+    Wording::new("", text).expecting(vec![field.to_owned()])
+}
+
+pub(super) fn dangling(attribute: Attribute<'_>, key: &str) -> Wording {
+    let text = format!(
+        "{} {} of <{}> refers to nothing: no element has this value as its key ({key})",
+        attribute.name(),
+        quote(attribute.value()),
+        attribute.node().name()
+    );
+    Wording::new(attribute.value(), text)
+}

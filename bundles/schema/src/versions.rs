@@ -1,0 +1,140 @@
+//! Which schema a file is checked against: the shipped tables and how a header chooses among them.
+
+use std::sync::OnceLock;
+
+use qcbus_document::{Document, FileKind};
+
+use crate::model::Schema;
+use crate::notation::NotationError;
+
+/// `revMajor` and `revMinor` of a header.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Version {
+    /// `revMajor`
+    pub major: u32,
+    /// `revMinor`
+    pub minor: u32,
+}
+
+impl std::fmt::Display for Version {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}.{}", self.major, self.minor)
+    }
+}
+
+/// The tables of one published schema, read when first needed.
+#[derive(Debug)]
+pub struct Shipped {
+    /// The kind of file it describes.
+    pub kind: FileKind,
+    /// The header version it is for.
+    pub version: Version,
+    /// The tables in their notation.
+    pub notation: &'static str,
+    loaded: OnceLock<Result<Schema, NotationError>>,
+}
+
+macro_rules! shipped {
+    ($($kind:ident $major:literal $minor:literal $file:literal)*) => {
+        /// All shipped tables, oldest first.
+        pub static SHIPPED: [Shipped; 12] = [$(Shipped {
+            kind: FileKind::$kind,
+            version: Version { major: $major, minor: $minor },
+            notation: include_str!(concat!("../tables/", $file)),
+            loaded: OnceLock::new(),
+        },)*];
+    };
+}
+
+// OpenDRIVE 1.8 means 1.8.1, and OpenSCENARIO 1.1 means 1.1.1: headers do not tell the patch
+// releases apart, and the later ones correct the earlier.
+shipped! {
+    Xodr 1 1 "xodr-1.1.tbl"
+    Xodr 1 2 "xodr-1.2.tbl"
+    Xodr 1 3 "xodr-1.3.tbl"
+    Xodr 1 4 "xodr-1.4.tbl"
+    Xodr 1 5 "xodr-1.5.tbl"
+    Xodr 1 6 "xodr-1.6.tbl"
+    Xodr 1 7 "xodr-1.7.tbl"
+    Xodr 1 8 "xodr-1.8.tbl"
+    Xosc 1 0 "xosc-1.0.tbl"
+    Xosc 1 1 "xosc-1.1.tbl"
+    Xosc 1 2 "xosc-1.2.tbl"
+    Xosc 1 3 "xosc-1.3.tbl"
+}
+
+impl Shipped {
+    /// The tables.
+    ///
+    /// # Errors
+    /// When the shipped file is broken, which a test rules out.
+    pub fn schema(&self) -> Result<&Schema, &NotationError> {
+        self.loaded
+            .get_or_init(|| Schema::from_notation(self.notation))
+            .as_ref()
+    }
+}
+
+/// The header's version, leniently read: blanks around the numbers and leading zeros are allowed.
+pub fn version_of(document: &Document<'_>, kind: FileKind) -> Option<Version> {
+    let header = if kind == FileKind::Xodr {
+        "header"
+    } else {
+        "FileHeader"
+    };
+    let header = document.root()?.child(header)?;
+    let number = |name: &str| header.attr(name)?.trim().parse().ok();
+    Some(Version {
+        major: number("revMajor")?,
+        minor: number("revMinor")?,
+    })
+}
+
+/// Why no schema applies.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SkipReason {
+    /// The header or its version is missing or no number.
+    #[error("the file header names no version, so no schema can be chosen")]
+    NoVersion,
+    /// Versions before 1.0 have no published schema.
+    #[error("version {0} has no published schema: major version 0")]
+    MajorZero(Version),
+    /// An old version without a schema.
+    #[error("version {0} has no published schema")]
+    NoSchema(Version),
+    /// The tables are unusable.
+    #[error("the tables could not be used: failed to {0}")]
+    Tables(NotationError),
+    /// The file is not well-formed, so the tree is partial.
+    #[error("the file is not well-formed XML, so only part of it is known")]
+    IllFormed,
+}
+
+/// A schema and whether the file claims to be newer than it.
+pub(crate) struct Selection {
+    pub(crate) schema: &'static Schema,
+    pub(crate) newer: bool,
+}
+
+/// The shipped schema for a version.
+pub(crate) fn select(kind: FileKind, version: Version) -> Result<Selection, SkipReason> {
+    if version.major == 0 {
+        return Err(SkipReason::MajorZero(version));
+    }
+    let kind = if kind == FileKind::Xodr {
+        FileKind::Xodr
+    } else {
+        FileKind::Xosc
+    };
+    let of_kind = || SHIPPED.iter().filter(|one| one.kind == kind);
+    let exact = of_kind().find(|one| one.version == version);
+    let newest = of_kind()
+        .max_by_key(|one| one.version)
+        .filter(|newest| version > newest.version);
+    let newer = exact.is_none();
+    let chosen = exact.or(newest).ok_or(SkipReason::NoSchema(version))?;
+    let schema = chosen
+        .schema()
+        .map_err(|error| SkipReason::Tables(error.clone()))?;
+    Ok(Selection { schema, newer })
+}

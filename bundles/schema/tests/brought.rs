@@ -1,0 +1,167 @@
+//! Schemas that a user brings: which files make one schema, which files it is for, and what is said
+//! when they are of no use.
+
+mod support;
+
+use std::path::Path;
+
+use qcbus_document::FileKind;
+use qcbus_schema::{
+    BroughtContent, BroughtFile, Options, Outcome, Override, SHIPPED, Version, brought, check,
+};
+use support::{image, open};
+
+/// Makes schemas of files given by path below the directory and text.
+fn made(files: &[(&str, &str)]) -> Result<Vec<Override>, String> {
+    let images: Vec<Vec<u8>> = files
+        .iter()
+        .map(|(path, text)| image(&format!("dir/{path}"), text))
+        .collect();
+    let paths: Vec<String> = files
+        .iter()
+        .map(|(path, _)| format!("dir/{path}"))
+        .collect();
+    let files: Vec<BroughtFile<'_>> = files
+        .iter()
+        .zip(images.iter().zip(&paths))
+        .map(|((below, text), (image, path))| BroughtFile {
+            path,
+            below: Path::new(below),
+            sha256: "5ca1ab1e",
+            content: if below.ends_with(".tbl") {
+                BroughtContent::Tables(text.as_bytes())
+            } else {
+                BroughtContent::Xsd(image)
+            },
+        })
+        .collect();
+    brought(&files).map_err(|error| error.to_string())
+}
+
+fn xsd(body: &str) -> String {
+    format!("<xs:schema xmlns:xs=\"http://www.w3.org/2001/XMLSchema\">\n{body}\n</xs:schema>")
+}
+
+fn root(name: &str) -> String {
+    xsd(&format!("<xs:element name='{name}'/>"))
+}
+
+fn names(overrides: &[Override]) -> Vec<String> {
+    let name = |one: &Override| {
+        let version = one
+            .version
+            .map_or("*".to_owned(), |version| version.to_string());
+        let files: Vec<&str> = one.sources.iter().map(|file| file.path.as_str()).collect();
+        format!("{:?} {version}: {}", one.kind, files.join(" "))
+    };
+    overrides.iter().map(name).collect()
+}
+
+#[test]
+fn files_that_include_each_other_are_one_schema_and_the_others_are_not() {
+    let main =
+        xsd("<xs:include schemaLocation='./parts.xsd'/>\n<xs:element name='OpenDRIVE' type='t'/>");
+    let parts = xsd("<xs:complexType name='t'/>");
+    let scenario = root("OpenSCENARIO");
+    let files = [
+        ("1.7/map.xsd", main.as_str()),
+        ("1.7/parts.xsd", &parts),
+        ("map.xsd", &main),
+        ("parts.xsd", &parts),
+        ("scenario_12.xsd", &scenario),
+    ];
+    assert_eq!(
+        names(&made(&files).expect("sound schemas")),
+        [
+            "Xodr 1.7: dir/1.7/map.xsd dir/1.7/parts.xsd",
+            "Xosc 1.2: dir/scenario_12.xsd",
+            "Xodr *: dir/map.xsd dir/parts.xsd",
+        ]
+    );
+}
+
+#[test]
+fn the_title_of_tables_names_their_version() {
+    let shipped = SHIPPED
+        .iter()
+        .find(|one| one.version == Version { major: 1, minor: 4 });
+    let notation = shipped.expect("OpenDRIVE 1.4").notation;
+    let found = made(&[("own.tbl", notation)]).expect("sound tables");
+    assert_eq!(names(&found), ["Xodr 1.4: dir/own.tbl"]);
+}
+
+#[test]
+fn what_is_of_no_use_is_said_by_file_and_line() {
+    let (drive, broken) = (root("OpenDRIVE"), xsd("<xs:import namespace='x'/>"));
+    let (other, missing) = (root("otx"), xsd("<xs:include schemaLocation='gone.xsd'/>"));
+    for (files, expected) in [
+        (
+            vec![("a.xsd", drive.as_str()), ("b.xsd", &broken)],
+            "compile dir/b.xsd:2:1: <xs:import>: this construct is not supported here",
+        ),
+        (
+            vec![("a.xsd", &missing)],
+            "dir/a.xsd:2:1: <xs:include schemaLocation=\"gone.xsd\">",
+        ),
+        (vec![("a.xsd", "<xs:schema")], "dir/a.xsd:1:1"),
+        (
+            vec![("a.xsd", &other)],
+            "dir/a.xsd: it declares neither <OpenDRIVE> nor",
+        ),
+        (
+            vec![("a.xsd", &drive), ("b.xsd", &drive)],
+            "dir/a.xsd and dir/b.xsd are both for every version of OpenDRIVE",
+        ),
+        (
+            vec![("1.7/a.xsd", &drive), ("b-1.7.xsd", &drive)],
+            "are both for OpenDRIVE 1.7",
+        ),
+        (
+            vec![("a.tbl", "qcbus-schema 1\nnonsense")],
+            "dir/a.tbl: failed to",
+        ),
+        (vec![("a.tbl", "qcbus-schema 1\nnonsense")], "line 2"),
+    ] {
+        let error = made(&files).expect_err(expected);
+        assert!(error.contains(expected), "{error}");
+    }
+}
+
+#[test]
+fn the_schema_for_a_version_comes_before_the_one_for_all() {
+    let any = xsd("<xs:element name='OpenDRIVE'><xs:complexType/></xs:element>");
+    let files = [
+        ("any.xsd", any.as_str()),
+        ("1.6/map.xsd", &root("OpenDRIVE")),
+    ];
+    let options = Options {
+        overrides: made(&files).expect("sound schemas"),
+        ..Options::default()
+    };
+    let used = |minor: u32| {
+        let text = format!("<OpenDRIVE><header revMajor='1' revMinor='{minor}'/></OpenDRIVE>");
+        let image = image("a.xodr", &text);
+        match check(&open(&image), FileKind::Xodr, &options) {
+            Outcome::Checked(checked) => (
+                checked.provenance()[0].value.clone(),
+                checked.findings.len(),
+            ),
+            Outcome::Skipped(reason) => panic!("{reason}"),
+        }
+    };
+    assert_eq!(used(6), ("dir/1.6/map.xsd sha256:5ca1ab1e".to_owned(), 0));
+    assert_eq!(used(7), ("dir/any.xsd sha256:5ca1ab1e".to_owned(), 1));
+}
+
+#[test]
+fn without_a_users_schema_the_result_names_the_shipped_one() {
+    let image = image(
+        "a.xodr",
+        "<OpenDRIVE><header revMajor='1' revMinor='8'/></OpenDRIVE>",
+    );
+    let Outcome::Checked(checked) = check(&open(&image), FileKind::Xodr, &Options::default())
+    else {
+        panic!("a known version");
+    };
+    assert_eq!(checked.provenance()[0].value, "OpenDRIVE 1.8.1");
+}

@@ -1,0 +1,270 @@
+//! The compiler over small schemas: what it understands, and what it refuses by name and line.
+
+mod support;
+
+use support::{compiled, findings};
+
+fn schema(body: &str) -> String {
+    format!("<xs:schema xmlns:xs=\"http://www.w3.org/2001/XMLSchema\">\n{body}\n</xs:schema>")
+}
+
+#[test]
+fn what_is_not_understood_is_named_with_its_line() {
+    for (body, expected) in [
+        ("<xs:import namespace='x'/>", "test.xsd:2:1: <xs:import>"),
+        (
+            "<xs:redefine schemaLocation='x'/>",
+            "<xs:redefine schemaLocation=\"x\">",
+        ),
+        (
+            "<xs:element name='a' substitutionGroup='b'/>",
+            "substitutionGroup",
+        ),
+        (
+            "<xs:element name='a' type='missing'/>",
+            "`missing` is not declared",
+        ),
+        (
+            "<xs:include schemaLocation='elsewhere.xsd'/>",
+            "elsewhere.xsd",
+        ),
+        (
+            "<xs:element name='a'><xs:complexType><xs:anyAttribute/></xs:complexType></xs:element>",
+            "<xs:anyAttribute>",
+        ),
+        (
+            "<xs:element name='a'><xs:complexType><xs:openContent/></xs:complexType></xs:element>",
+            "<xs:openContent>",
+        ),
+        (
+            "<xs:element name='a'><xs:complexType><xs:assert test='matches(@b, \"x\")'/></xs:complexType></xs:element>",
+            "understand the XPath",
+        ),
+        (
+            "<xs:element name='a'><xs:simpleType><xs:restriction base='xs:string'><xs:pattern value='\\p{L}'/></xs:restriction></xs:simpleType></xs:element>",
+            "\\p{L}",
+        ),
+        ("<xs:element name='a' type='xs:ENTITY'/>", "ENTITY"),
+        ("<xs:complexType name='t'/>", "no global element"),
+        (
+            "<xs:complexType name='t'><xs:complexContent><xs:extension base='t'/></xs:complexContent></xs:complexType><xs:element name='a' type='t'/>",
+            "too deeply",
+        ),
+        (
+            "<xs:element name='a'><xs:complexType><xs:sequence><xs:element name='b' type='xs:int'/><xs:element name='b' type='xs:string'/></xs:sequence></xs:complexType></xs:element>",
+            "two different types",
+        ),
+    ] {
+        let error = compiled(&schema(body)).expect_err(body);
+        assert!(error.contains(expected), "{body}: {error}");
+        assert!(
+            error.contains("test.xsd:2") || error.contains("no global"),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn bounds_keep_a_small_schema_from_becoming_a_large_table() {
+    let doubling: String = (1..20)
+        .map(|n| format!("<xs:group name='g{n}'><xs:sequence><xs:group ref='g{0}'/><xs:group ref='g{0}'/></xs:sequence></xs:group>", n - 1))
+        .collect();
+    let body = format!(
+        "<xs:group name='g0'><xs:sequence><xs:element name='b'/></xs:sequence></xs:group>{doubling}\
+         <xs:element name='a'><xs:complexType><xs:group ref='g19'/></xs:complexType></xs:element>"
+    );
+    assert!(
+        compiled(&schema(&body))
+            .expect_err("too large")
+            .contains("more than")
+    );
+    let many = "<xs:element name='a'><xs:complexType><xs:sequence maxOccurs='2000'><xs:element name='b' maxOccurs='2000'/></xs:sequence></xs:complexType></xs:element>";
+    assert!(
+        compiled(&schema(many))
+            .expect_err("too large")
+            .contains("more than")
+    );
+}
+
+#[test]
+fn content_models_count_and_order() {
+    let schema = compiled(&schema(
+        "<xs:element name='a'><xs:complexType><xs:sequence>\
+           <xs:element name='b' minOccurs='2' maxOccurs='3' type='xs:int'/>\
+           <xs:choice minOccurs='0'><xs:element name='c'/><xs:element name='d'/></xs:choice>\
+         </xs:sequence></xs:complexType></xs:element>",
+    ))
+    .expect("a schema");
+    let codes = |text: &str| {
+        findings(&schema, "t.xml", text)
+            .into_iter()
+            .map(|one| one.0)
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(codes("<a><b>1</b><b>2</b></a>"), [""; 0]);
+    assert_eq!(codes("<a><b>1</b><b>2</b><b>3</b><d/></a>"), [""; 0]);
+    assert_eq!(codes("<a><b>1</b></a>"), ["missing-element"]);
+    assert_eq!(
+        codes("<a><b>1</b><b>2</b><b>3</b><b>4</b></a>"),
+        ["repeated-element"]
+    );
+    assert_eq!(codes("<a><b>1</b><b>x</b></a>"), ["invalid-text"]);
+    assert_eq!(
+        codes("<a><b>1</b><b>2</b><c/><d/></a>"),
+        ["misplaced-element"]
+    );
+    assert_eq!(codes("<a><b>1</b><c/></a>"), ["missing-element"]);
+}
+
+#[test]
+fn findings_teach() {
+    let table = support::table("xodr-1.7");
+    let road = |inner: &str| {
+        format!("<OpenDRIVE><header revMajor=\"1\" revMinor=\"7\"/>{inner}</OpenDRIVE>")
+    };
+    let found = findings(
+        table,
+        "t.xodr",
+        &road("<road id=\"1\" junction=\"-1\" length=\"abc\"><planVeiw/></road>"),
+    );
+    let texts: Vec<&str> = found.iter().map(|one| one.1.as_str()).collect();
+    assert!(texts.contains(&"<road> lacks <lanes>"), "{texts:?}");
+    assert!(
+        texts[0].contains(
+            "\"abc\" is no value of length in <road>, expected: a number greater than 0.0"
+        ),
+        "{texts:?}"
+    );
+    assert!(
+        texts
+            .iter()
+            .any(|text| text.contains("did you mean \"planView\"?")),
+        "{texts:?}"
+    );
+    let found = findings(table, "t.xodr", &road("<raod/>"));
+    assert!(
+        found
+            .iter()
+            .any(|one| one.1.contains("did you mean \"road\"?")),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn one_cause_gives_one_finding() {
+    let table = support::table("xosc-1.3");
+    let scenario = |bounds: &str| {
+        format!(
+            "<OpenSCENARIO><FileHeader author=\"a\" date=\"2024-05-01T00:00:00\" description=\"d\" revMajor=\"1\" revMinor=\"3\"/>\
+             <CatalogLocations/><RoadNetwork/><Entities><ScenarioObject name=\"o\"><MiscObject mass=\"1\" miscObjectCategory=\"tree\" name=\"m\">\
+             <BoundingBox>{bounds}</BoundingBox></MiscObject></ScenarioObject></Entities>\
+             <Storyboard><Init><Actions/></Init><StopTrigger/></Storyboard></OpenSCENARIO>"
+        )
+    };
+    let good =
+        "<Center x=\"0\" y=\"0\" z=\"0\"/><Dimensions width=\"1\" length=\"1\" height=\"1\"/>";
+    assert_eq!(findings(table, "t.xosc", &scenario(good)), []);
+    let renamed = good.replace("Center", "Position");
+    let found = findings(table, "t.xosc", &scenario(&renamed));
+    assert_eq!(found.len(), 1, "{found:?}");
+    let lower = good.replace("Center", "center");
+    let found = findings(table, "t.xosc", &scenario(&lower));
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert!(found[0].1.contains("did you mean \"Center\"?"), "{found:?}");
+}
+
+#[test]
+fn keys_and_references() {
+    let table = support::table("xodr-1.7");
+    let text = |second: &str| {
+        let road = |id: &str| {
+            format!(
+                "<road id=\"{id}\" junction=\"-1\" length=\"1\"><planView><geometry hdg=\"0\" length=\"1\" s=\"0\" x=\"0\" y=\"0\"><line/></geometry></planView>\
+                 <lanes><laneSection s=\"0\"><center><lane id=\"0\" type=\"none\"/></center></laneSection></lanes></road>"
+            )
+        };
+        format!(
+            "<OpenDRIVE><header revMajor=\"1\" revMinor=\"7\"/>{}{}</OpenDRIVE>",
+            road("1"),
+            road(second)
+        )
+    };
+    assert_eq!(findings(table, "t.xodr", &text("2")), []);
+    let found = findings(table, "t.xodr", &text("1"));
+    assert_eq!(
+        found.iter().map(|one| one.0).collect::<Vec<_>>(),
+        ["duplicate-key"],
+        "{found:?}"
+    );
+}
+
+#[test]
+fn known_defects_of_published_schemas_say_so() {
+    let table = support::table("xodr-1.8");
+    let notation = table.to_notation();
+    for condition in qcbus_schema::known_conditions() {
+        assert!(
+            notation.contains(condition),
+            "{condition} is in no table any more"
+        );
+    }
+    let text = "<OpenDRIVE><header revMajor=\"1\" revMinor=\"8\"/><vmsGroup id=\"1\"><vmsBoardReference/></vmsGroup></OpenDRIVE>";
+    let image = support::image("t.xodr", text);
+    let report = table.validate(&support::open(&image), qcbus_schema::Limits::default());
+    let defect = report
+        .findings
+        .iter()
+        .filter_map(|one| one.known_schema_defect)
+        .next();
+    assert!(
+        defect.is_some_and(|words| words.contains("_OpenDriveElement")),
+        "{:?}",
+        report.findings
+    );
+}
+
+/// Bounded random XSDs: an answer, never a panic.
+#[test]
+fn arbitrary_schemas_are_judged() {
+    use qcbus_schema::generate::Dice;
+    let pieces = [
+        "<xs:sequence>",
+        "</xs:sequence>",
+        "<xs:choice maxOccurs='unbounded'>",
+        "</xs:choice>",
+        "<xs:element name='a' type='t'/>",
+        "<xs:element name='b' type='xs:int' minOccurs='3' maxOccurs='9'/>",
+        "<xs:any processContents='skip'/>",
+        "<xs:group ref='g'/>",
+        "<xs:attribute name='x' type='s' use='required'/>",
+        "<xs:all>",
+        "</xs:all>",
+        "<xs:assert test='count(a) gt 1'/>",
+        "<xs:attributeGroup ref='h'/>",
+    ];
+    let mut dice = Dice::new(11);
+    let (mut good, mut bad) = (0, 0);
+    for _ in 0..600 {
+        let body: String = (0..dice.below(9))
+            .map(|_| pieces[dice.below(pieces.len())])
+            .collect();
+        let text = schema(&format!(
+            "<xs:element name='a' type='t'/><xs:complexType name='t'>{body}</xs:complexType>\
+             <xs:simpleType name='s'><xs:restriction base='xs:double'><xs:minInclusive value='{}'/></xs:restriction></xs:simpleType>\
+             <xs:group name='g'><xs:sequence>{}</xs:sequence></xs:group><xs:attributeGroup name='h'/>",
+            ["0", "x", "-1e3"][dice.below(3)],
+            pieces[dice.below(pieces.len())],
+        ));
+        match compiled(&text) {
+            Ok(schema) => {
+                good += 1;
+                findings(&schema, "t.xml", "<a x='1'><a/><b>1</b></a>");
+                let again = qcbus_schema::Schema::from_notation(&schema.to_notation())
+                    .expect("its own notation");
+                assert_eq!(again.to_notation(), schema.to_notation());
+            }
+            Err(_) => bad += 1,
+        }
+    }
+    assert!(good > 20 && bad > 20, "{good} good, {bad} bad");
+}

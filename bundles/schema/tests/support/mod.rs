@@ -1,0 +1,67 @@
+//! Shared by the tests: documents from text, tables by name.
+
+#![expect(
+    clippy::expect_used,
+    reason = "a test fails where its data is not as expected"
+)]
+
+use std::path::Path;
+
+use qcbus_document::{Document, FileKind};
+use qcbus_ingest::{Limits, prepare_bytes};
+use qcbus_schema::{SHIPPED, Schema, Shipped};
+
+/// The image of a text.
+pub fn image(name: &str, text: &str) -> Vec<u8> {
+    prepare_bytes(
+        Path::new(name),
+        text.as_bytes().to_vec(),
+        &Limits::default(),
+    )
+    .build()
+}
+
+/// The image's document.
+pub fn open(image: &[u8]) -> Document<'_> {
+    Document::open(image).expect("an image of our own")
+}
+
+#[allow(dead_code, reason = "not every test names tables")]
+/// What a shipped table's file is called.
+pub fn name_of(shipped: &Shipped) -> String {
+    let kind = if shipped.kind == FileKind::Xodr {
+        "xodr"
+    } else {
+        "xosc"
+    };
+    format!("{kind}-{}", shipped.version)
+}
+
+#[allow(dead_code, reason = "not every test names tables")]
+/// A shipped table by name, e.g. `xodr-1.7`.
+pub fn table(name: &str) -> &'static Schema {
+    let found = SHIPPED.iter().find(|one| name_of(one) == name);
+    found
+        .expect("a shipped table")
+        .schema()
+        .expect("a sound table")
+}
+
+/// Compiles the text of one XSD.
+#[allow(dead_code, reason = "not every test compiles")]
+pub fn compiled(text: &str) -> Result<Schema, String> {
+    let image = image("test.xsd", text);
+    qcbus_schema::compile("Test", &[open(&image)]).map_err(|error| error.to_string())
+}
+
+/// The codes and texts of all findings for a document.
+#[allow(dead_code, reason = "not every test asks for texts")]
+pub fn findings(schema: &Schema, name: &str, text: &str) -> Vec<(&'static str, String)> {
+    let image = image(name, text);
+    let report = schema.validate(&open(&image), qcbus_schema::Limits::default());
+    report
+        .findings
+        .iter()
+        .map(|one| (one.code.as_str(), one.text.clone()))
+        .collect()
+}

@@ -1,0 +1,87 @@
+//! Verdicts of lxml and xmlschema over mutants of our own documents, recorded by
+//! `tests/schema/differential.py`: each line names a document, a splice, and whether the other
+//! validators find the result valid.
+
+#![expect(
+    clippy::expect_used,
+    reason = "a test fails where its data is not as expected"
+)]
+
+mod support;
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use qcbus_schema::Limits;
+use support::{image, open, table};
+
+#[test]
+fn recorded_verdicts_are_ours_too() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
+    let recorded =
+        std::fs::read_to_string(folder.join("verdicts.jsonl")).expect("the recorded verdicts");
+    let mut documents: HashMap<String, String> = HashMap::new();
+    let (mut valid, mut invalid) = (0, 0);
+    for line in recorded.lines().skip(1) {
+        let verdict: serde_json::Value = serde_json::from_str(line).expect("a line of JSON");
+        let name = verdict["document"].as_str().expect("a document");
+        let base = documents.entry(name.to_owned()).or_insert_with(|| {
+            std::fs::read_to_string(folder.join("documents").join(name))
+                .expect("a document of ours")
+        });
+        let text = spliced(base, &verdict);
+        let image = image(name, &text);
+        let document = open(&image);
+        let (of_table, _) = name.rsplit_once('-').expect("a table's name");
+        let report = table(of_table).validate(&document, Limits::default());
+        let expected = verdict["valid"].as_bool().expect("a verdict");
+        assert_eq!(
+            report.is_valid(),
+            expected,
+            "{line}: {:?}",
+            report.findings.first().map(|one| &one.text)
+        );
+        if expected { valid += 1 } else { invalid += 1 }
+    }
+    assert!(
+        valid > 100 && invalid > 300,
+        "{valid} valid, {invalid} invalid"
+    );
+}
+
+/// Offsets count characters, as in Python.
+fn spliced(base: &str, verdict: &serde_json::Value) -> String {
+    let number =
+        |name: &str| usize::try_from(verdict[name].as_u64().expect("a number")).expect("small");
+    let (at, removed) = (number("at"), number("remove"));
+    let head = base.chars().take(at);
+    let tail = base.chars().skip(at + removed);
+    head.chain(verdict["insert"].as_str().expect("a text").chars())
+        .chain(tail)
+        .collect()
+}
+
+#[test]
+fn documents_of_ours_are_valid() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/documents");
+    let mut count = 0;
+    for entry in std::fs::read_dir(folder).expect("documents") {
+        let path = entry.expect("a file").path();
+        let name = path
+            .file_name()
+            .and_then(|name| name.to_str())
+            .expect("a name")
+            .to_owned();
+        let text = std::fs::read_to_string(&path).expect("text");
+        let image = image(&name, &text);
+        let (of_table, _) = name.rsplit_once('-').expect("a table's name");
+        let report = table(of_table).validate(&open(&image), Limits::default());
+        assert!(
+            report.is_valid(),
+            "{name}: {:?}",
+            report.findings.first().map(|one| &one.text)
+        );
+        count += 1;
+    }
+    assert!(count >= 24, "{count}");
+}

@@ -1,0 +1,285 @@
+//! Checks one subject: gates, preconditions, models, panics.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::{Duration, Instant};
+
+use qcbus_formats::xqar::{Issue, Level, Metadata, Param, Status};
+
+use crate::plan::{Entry, Plan};
+use crate::rule::Apply;
+use crate::{Backport, Checker, Sink, Skip, Subject, Values, Version};
+
+/// How a checker ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// Completed, skipped or error.
+    pub status: Status,
+    /// Why it was skipped or failed; empty when it completed.
+    pub reason: String,
+    /// The parameters that it used.
+    pub params: Vec<Param>,
+    /// Further facts.
+    pub metadata: Vec<Metadata>,
+    /// Time that it took. No result may depend on it.
+    pub took: Duration,
+}
+
+/// Hears how a check goes on. Checkers are named by their index in [`Plan::checkers`].
+pub trait Listener {
+    /// Asked between checkers: whether to stop.
+    fn is_cancelled(&mut self) -> bool {
+        false
+    }
+
+    /// A checker begins.
+    fn begins(&mut self, checker: usize) {
+        let _ = checker;
+    }
+
+    /// A demanded checker has ended with these findings.
+    fn ended(&mut self, checker: usize, issues: Vec<Issue>, outcome: Outcome);
+}
+
+/// Runs the plan's checkers on a subject. Returns whether it came to its end, that is, was not
+/// cancelled. A panic in a rule or a model is that checker's error and nobody else's.
+pub fn check(plan: &Plan, subject: &Subject<'_>, listener: &mut dyn Listener) -> bool {
+    let subject = &subject.clone().bringing(plan.brought.clone());
+    let mut run = Run {
+        plan,
+        subject,
+        listener,
+        endings: vec![None; plan.checkers.len()],
+        cancelled: false,
+    };
+    for group in &plan.groups {
+        let members: Vec<usize> = group
+            .iter()
+            .copied()
+            .filter(|&i| plan.entries[i].runs)
+            .collect();
+        run.group(&members);
+    }
+    !run.cancelled
+}
+
+struct Run<'r> {
+    plan: &'r Plan,
+    subject: &'r Subject<'r>,
+    listener: &'r mut dyn Listener,
+    endings: Vec<Option<Ending>>,
+    cancelled: bool,
+}
+
+/// What matters of a checker to those that come after it.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Ending {
+    Clean,
+    FoundErrors,
+    Skipped,
+    Failed,
+}
+
+/// How a checker is let through: with a note when its rule is not normative for the version.
+struct Pass {
+    values: Values,
+    not_normative: Option<String>,
+}
+
+impl<'r> Run<'r> {
+    /// Runs checkers of one model, which is built when the first of them gets through its gates.
+    fn group(&mut self, members: &[usize]) {
+        let mut rest = members.iter().copied();
+        let builder = loop {
+            let Some(index) = rest.next() else { return };
+            if self.stops() {
+                return;
+            }
+            match self.gate(index) {
+                Ok(pass) => break (index, pass),
+                Err(outcome) => self.end(index, Vec::new(), outcome),
+            }
+        };
+        let (subject, rule) = (self.subject, self.plan.checkers[builder.0].rule);
+        let mut first = Some(builder);
+        let mut open: Vec<usize> = members.to_vec();
+        let built = catch(|| {
+            rule.with_model(subject, &mut |apply| {
+                open.clear();
+                if let Some((index, pass)) = first.take() {
+                    self.one(index, pass, apply);
+                }
+                for index in rest.by_ref() {
+                    if self.stops() {
+                        return;
+                    }
+                    match self.gate(index) {
+                        Ok(pass) => self.one(index, pass, apply),
+                        Err(outcome) => self.end(index, Vec::new(), outcome),
+                    }
+                }
+            })
+        });
+        let outcome = match built {
+            Ok(Ok(())) => return,
+            Ok(Err(Skip(reason))) => Outcome::without_run(Status::Skipped, reason),
+            Err(panic) => {
+                Outcome::without_run(Status::Error, format!("its model panicked: {panic}"))
+            }
+        };
+        for index in open {
+            if self.endings[index].is_none() {
+                let outcome = self
+                    .gate(index)
+                    .map_or_else(|gated| gated, |_| outcome.clone());
+                self.end(index, Vec::new(), outcome);
+            }
+        }
+    }
+
+    fn stops(&mut self) -> bool {
+        self.cancelled = self.cancelled || self.listener.is_cancelled();
+        self.cancelled
+    }
+
+    fn one(&mut self, index: usize, pass: Pass, apply: Apply<'_, 'r>) {
+        let checker = &self.plan.checkers[index];
+        self.listener.begins(index);
+        let start = Instant::now();
+        let params = pass.values.listed();
+        let mut sink = Sink::new(self.subject, checker.facts, pass.values, pass.not_normative);
+        let ran = catch(|| apply(checker.rule, &mut sink));
+        // What was found before a panic is still true.
+        let (issues, metadata) = sink.finish();
+        let (status, reason) = match ran {
+            Ok(()) => (Status::Completed, String::new()),
+            Err(panic) => (Status::Error, format!("the rule panicked: {panic}")),
+        };
+        let took = start.elapsed();
+        self.end(
+            index,
+            issues,
+            Outcome {
+                status,
+                reason,
+                params,
+                metadata,
+                took,
+            },
+        );
+    }
+
+    fn end(&mut self, index: usize, issues: Vec<Issue>, outcome: Outcome) {
+        let found_errors = issues.iter().any(|issue| issue.level == Level::Error);
+        self.endings[index] = Some(match outcome.status {
+            Status::Completed if found_errors => Ending::FoundErrors,
+            Status::Completed => Ending::Clean,
+            Status::Skipped => Ending::Skipped,
+            Status::Error => Ending::Failed,
+        });
+        if self.plan.entries[index].demanded {
+            self.listener.ended(index, issues, outcome);
+        }
+    }
+
+    /// Parameters, preconditions, version: in this order.
+    fn gate(&self, index: usize) -> Result<Pass, Outcome> {
+        let (checker, entry) = (&self.plan.checkers[index], &self.plan.entries[index]);
+        let fails = |reason: &String| Outcome::without_run(Status::Error, reason.clone());
+        let values = entry.values.as_ref().map_err(fails)?.clone();
+        let with_params = |mut outcome: Outcome| {
+            outcome.params = values.listed();
+            outcome
+        };
+        self.preconditions(entry).map_err(with_params)?;
+        let not_normative = self.version_gate(checker).map_err(with_params)?;
+        Ok(Pass {
+            values,
+            not_normative,
+        })
+    }
+
+    fn preconditions(&self, entry: &Entry) -> Result<(), Outcome> {
+        let fails = |reason: &String| Outcome::without_run(Status::Error, reason.clone());
+        for &index in entry.after.as_ref().map_err(fails)? {
+            let what = match self.endings[index] {
+                Some(Ending::Clean) => continue,
+                Some(Ending::FoundErrors) => "found errors",
+                Some(Ending::Skipped) => "was skipped",
+                Some(Ending::Failed) => "failed",
+                None => "did not run before it",
+            };
+            let reason = format!("`{}` {what}", self.plan.checkers[index].id);
+            return Err(Outcome::without_run(Status::Skipped, reason));
+        }
+        Ok(())
+    }
+
+    /// Whether the checker applies to the document's version; with the note of a backport.
+    fn version_gate(&self, checker: &Checker) -> Result<Option<String>, Outcome> {
+        let fails = |reason: &String| Outcome::without_run(Status::Error, reason.clone());
+        let skips = |reason: String| Outcome::without_run(Status::Skipped, reason);
+        let range = checker.range.as_ref().map_err(fails)?;
+        if range.is_everything() {
+            return Ok(None);
+        }
+        let standard = self.plan.bundle.standard;
+        let Some(version) = self.subject.version() else {
+            let reason =
+                format!("the rule applies to {standard} {range}; the file names no version");
+            return Err(skips(reason));
+        };
+        let backported = range.is_before(version) && reaches_back(checker.facts.backport, version)?;
+        let separate = matches!(checker.facts.backport, Backport::Separate { .. });
+        match (checker.is_backport, range.contains(version), backported) {
+            (false, true, _) => Ok(None),
+            (true, _, true) => Ok(Some(note(standard, version, range))),
+            (false, _, true) if !separate => Ok(Some(note(standard, version, range))),
+            (true, true, _) => Err(skips(format!(
+                "the rule itself applies to {standard} {version}"
+            ))),
+            _ => Err(skips(format!(
+                "the rule applies to {standard} {range}; the file is {version}"
+            ))),
+        }
+    }
+}
+
+fn note(standard: &str, version: Version, range: &crate::VersionRange) -> String {
+    format!(" ({standard} {version} does not demand this: the rule applies to {range})")
+}
+
+fn reaches_back(backport: Backport, version: Version) -> Result<bool, Outcome> {
+    match backport {
+        Backport::None => Ok(false),
+        Backport::Lower { since: "" } | Backport::Separate { since: "" } => Ok(true),
+        Backport::Lower { since } | Backport::Separate { since } => {
+            let wrong =
+                |error: crate::VersionError| Outcome::without_run(Status::Error, error.to_string());
+            Ok(since.parse::<Version>().map_err(wrong)? <= version)
+        }
+    }
+}
+
+impl Outcome {
+    fn without_run(status: Status, reason: String) -> Outcome {
+        Outcome {
+            status,
+            reason,
+            params: Vec::new(),
+            metadata: Vec::new(),
+            took: Duration::ZERO,
+        }
+    }
+}
+
+/// Runs something that may panic; what a panic said becomes the error.
+fn catch<T>(run: impl FnOnce() -> T) -> Result<T, String> {
+    // What the closure leaves half done is either dropped or a list of finished findings.
+    catch_unwind(AssertUnwindSafe(run)).map_err(|payload| {
+        let text = payload
+            .downcast_ref::<&str>()
+            .map(|text| (*text).to_owned());
+        text.or_else(|| payload.downcast_ref::<String>().cloned())
+            .unwrap_or_else(|| "no message".to_owned())
+    })
+}

@@ -1,0 +1,36 @@
+//! What a checker bundle is made of, and how one runs.
+//!
+//! A bundle is a list of [`Rule`]s. A rule is data and one function that looks at a [`Model`] of a
+//! document and tells a [`Sink`] what it found. The same bundle runs on the bus, on a single file,
+//! and as a module of ASAM's framework; see [`run`]. `docs/writing-a-rule.md` shows the way from
+//! nothing to a tested rule.
+
+pub mod basic;
+mod bundle;
+mod check;
+pub mod corpus;
+mod load;
+pub mod pages;
+mod param;
+mod place;
+mod plan;
+mod resource;
+mod rule;
+pub mod run;
+mod sink;
+mod subject;
+mod version;
+
+pub use bundle::{BACKPORT_SUFFIX, BUILD_DATE, Bundle, Checker};
+pub use check::{Listener, Outcome, check};
+pub use load::{LoadError, Loaded};
+pub use param::{Default, MAX_ISSUES, Param, ParamError, Values};
+pub use place::Place;
+pub use plan::Plan;
+pub use qcbus_formats::xqar::{Issue, Level, Status};
+pub use resource::{Brought, Resource, ResourceError, ResourceFile, UserFiles};
+pub use rule::{AnyRule, Backport, Facts, Model, Rule, Skip};
+pub use run::{Exit, Mode, examine, main, run};
+pub use sink::{Finding, Sink};
+pub use subject::{Linked, Subject};
+pub use version::{Version, VersionError, VersionRange};

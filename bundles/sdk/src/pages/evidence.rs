@@ -1,0 +1,101 @@
+//! What the examples of the pages prove, for tables and further tests.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use qcbus_formats::xqar::Issue;
+
+use super::example::{Staged, version_of};
+use super::{Example, Page, Verdict};
+use crate::Bundle;
+use crate::check::{Listener, Outcome, check};
+use crate::plan::Plan;
+
+/// A document of a page, complete.
+#[derive(Debug, Clone)]
+pub struct Shown {
+    /// The rule whose page shows it.
+    pub rule: &'static str,
+    /// What the rule says of it.
+    pub verdict: Verdict,
+    /// The root document with what a template puts around it.
+    pub text: String,
+}
+
+/// Every single-file example of a bundle's pages that stands without parameters.
+pub fn documents(bundle: &'static Bundle) -> Vec<Shown> {
+    let mut all = Vec::new();
+    for (rule, example) in examples(bundle) {
+        let Some(staged) = stage(bundle, rule, &example) else {
+            continue;
+        };
+        if let [(_, text)] = staged.files.as_slice()
+            && example.params.is_empty()
+        {
+            let (verdict, text) = (example.verdict, text.clone());
+            all.push(Shown {
+                rule,
+                verdict,
+                text,
+            });
+        }
+    }
+    all
+}
+
+/// By rule, the UIDs under which it finds something in its own bad examples.
+pub fn fired(bundle: &'static Bundle) -> BTreeMap<&'static str, BTreeSet<String>> {
+    let plan = Plan::new(bundle, |_| true, |_, _| None);
+    let mut all: BTreeMap<&'static str, BTreeSet<String>> = BTreeMap::new();
+    for (rule, example) in examples(bundle) {
+        if example.verdict != Verdict::Bad || !example.params.is_empty() {
+            continue;
+        }
+        // The staged files must outlive what is loaded from them.
+        let Some(staged) = stage(bundle, rule, &example) else {
+            continue;
+        };
+        let Ok(loaded) = staged.load() else { continue };
+        let Ok(subject) = loaded.subject(bundle) else {
+            continue;
+        };
+        let mut heard = Heard {
+            plan: &plan,
+            rule,
+            uids: BTreeSet::new(),
+        };
+        check(&plan, &subject, &mut heard);
+        all.entry(rule).or_default().extend(heard.uids);
+    }
+    all
+}
+
+fn examples(bundle: &'static Bundle) -> Vec<(&'static str, Example)> {
+    let pages = bundle.rules.iter().filter_map(|rule| {
+        let facts = rule.facts();
+        Page::parse(facts.page).ok().map(|page| (facts.id, page))
+    });
+    pages
+        .flat_map(|(id, page)| page.examples.into_iter().map(move |example| (id, example)))
+        .collect()
+}
+
+fn stage(bundle: &'static Bundle, rule: &str, example: &Example) -> Option<Staged> {
+    let rule = bundle.rules.iter().find(|it| it.facts().id == rule)?;
+    let version = version_of(bundle, *rule, example).ok()?;
+    Staged::new(bundle, example, version).ok()
+}
+
+struct Heard<'p> {
+    plan: &'p Plan,
+    rule: &'p str,
+    uids: BTreeSet<String>,
+}
+
+impl Listener for Heard<'_> {
+    fn ended(&mut self, checker: usize, issues: Vec<Issue>, _: Outcome) {
+        if self.plan.checkers()[checker].facts.id == self.rule {
+            self.uids
+                .extend(issues.into_iter().map(|issue| issue.rule_uid));
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! From the few lines that a page shows to a document that can be checked.
+
+use std::path::Path;
+use std::str::FromStr;
+
+use super::{Example, ExampleFile};
+use crate::load::{LoadError, Loaded};
+use crate::{AnyRule, Bundle, Version, VersionRange};
+
+/// What a rule is to say about an example.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// The rule runs and finds nothing.
+    Good,
+    /// The rule finds what the `issues` block says.
+    Bad,
+    /// The rule does not apply.
+    Skipped,
+}
+
+impl FromStr for Verdict {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Verdict, String> {
+        match word {
+            "good" => Ok(Verdict::Good),
+            "bad" => Ok(Verdict::Bad),
+            "skipped" => Ok(Verdict::Skipped),
+            _ => Err(format!(
+                "`{word}` is none of `good`, `bad`, `skipped` and `also`"
+            )),
+        }
+    }
+}
+
+/// A minimal document with a hole, so that an example shows only what it is about.
+///
+/// `{major}` and `{minor}` stand for the version, `{example}`, alone on its line, for the example.
+#[derive(Debug, Clone, Copy)]
+pub struct Template {
+    /// Name, for `in=NAME`. The bundle's first template is used when an example names none.
+    pub name: &'static str,
+    /// The document.
+    pub text: &'static str,
+}
+
+/// An example as a set of files.
+pub(super) struct Staged {
+    /// Names and texts, the root first.
+    pub files: Vec<(String, String)>,
+    /// Lines of the template before the example.
+    pub hidden_rows: u64,
+    /// Lines of the example.
+    pub shown_rows: u64,
+    /// Where the files are, when there are several.
+    folder: Option<tempfile::TempDir>,
+}
+
+/// The version that an example's template names: its own, else the newest that the rule has.
+pub(super) fn version_of(
+    bundle: &Bundle,
+    rule: &dyn AnyRule,
+    example: &Example,
+) -> Result<Version, String> {
+    if let Some(version) = &example.version {
+        return version
+            .parse()
+            .map_err(|_| format!("`{version}` is no version"));
+    }
+    let range: VersionRange = rule.facts().versions.parse().unwrap_or_default();
+    let newest = bundle
+        .versions
+        .iter()
+        .rev()
+        .find(|version| range.contains(**version));
+    newest
+        .copied()
+        .ok_or_else(|| "no known version of the standard has this rule".to_owned())
+}
+
+impl Staged {
+    /// Puts an example into its template. A text that begins with `<?xml` or the first template's
+    /// root element is a whole document and goes as it is; other files always do.
+    pub fn new(bundle: &Bundle, example: &Example, version: Version) -> Result<Staged, String> {
+        let Some((ExampleFile { name, text }, others)) = example.files.split_first() else {
+            return Err("an example needs a document".to_owned());
+        };
+        let extension = bundle.kinds.first().map_or("xml", |kind| kind.as_str());
+        let name = name
+            .clone()
+            .unwrap_or_else(|| format!("example.{extension}"));
+        let shown_rows = text.lines().count() as u64;
+        let (text, hidden_rows) = if example.template.is_none() && is_whole(bundle, text) {
+            (text.clone(), 0)
+        } else {
+            fill(bundle, example.template.as_deref(), version, text)?
+        };
+        let others = others
+            .iter()
+            .map(|file| (file.name.clone().unwrap_or_default(), file.text.clone()));
+        let files: Vec<_> = std::iter::once((name, text)).chain(others).collect();
+        let folder = match files.len() {
+            1 => None,
+            _ => Some(written(&files).map_err(|error| format!("cannot write the files: {error}"))?),
+        };
+        Ok(Staged {
+            files,
+            hidden_rows,
+            shown_rows,
+            folder,
+        })
+    }
+
+    /// Builds the documents.
+    pub fn load(&self) -> Result<Loaded, LoadError> {
+        let (name, text) = self
+            .files
+            .first()
+            .map_or(("", ""), |(name, text)| (name, text));
+        match &self.folder {
+            None => Loaded::from_bytes(Path::new(name), text.as_bytes().to_vec()),
+            Some(folder) => Loaded::from_path(&folder.path().join(name), folder.path()),
+        }
+    }
+
+    /// Paths of the files' own folder, which is another one each time, cut down to their names.
+    pub fn without_folder(&self, text: &str) -> String {
+        match &self.folder {
+            None => text.to_owned(),
+            Some(folder) => text.replace(&format!("{}/", folder.path().display()), ""),
+        }
+    }
+}
+
+/// Several files need a folder of their own.
+fn written(files: &[(String, String)]) -> std::io::Result<tempfile::TempDir> {
+    let folder = tempfile::tempdir()?;
+    for (name, text) in files {
+        let path = folder.path().join(name);
+        path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
+        std::fs::write(path, text)?;
+    }
+    Ok(folder)
+}
+
+fn is_whole(bundle: &Bundle, text: &str) -> bool {
+    let root = bundle
+        .templates
+        .first()
+        .map_or("", |template| root_tag(template.text));
+    text.starts_with("<?xml") || text.trim_start().starts_with(root)
+}
+
+/// `<OpenDRIVE` of a template, whatever comes before it.
+fn root_tag(text: &str) -> &str {
+    let after = text
+        .find("?>")
+        .map_or(text, |end| &text[end + 2..])
+        .trim_start();
+    after.split([' ', '>', '\n']).next().unwrap_or("")
+}
+
+const HOLE: &str = "{example}\n";
+
+fn fill(
+    bundle: &Bundle,
+    name: Option<&str>,
+    version: Version,
+    text: &str,
+) -> Result<(String, u64), String> {
+    let mut templates = bundle.templates.iter();
+    let template = match name {
+        None => templates.next(),
+        Some(name) => templates.find(|template| template.name == name),
+    };
+    let names = || {
+        bundle
+            .templates
+            .iter()
+            .map(|template| template.name)
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    let template =
+        template.ok_or_else(|| format!("there is no such template; there are: {}", names()))?;
+    let whole = template.text.replace("{major}", &version.major.to_string());
+    let whole = whole.replace("{minor}", &version.minor.to_string());
+    let (before, after) = whole
+        .split_once(HOLE)
+        .filter(|(before, _)| before.is_empty() || before.ends_with('\n'))
+        .ok_or_else(|| format!("the template `{}` has no line `{{example}}`", template.name))?;
+    Ok((
+        format!("{before}{text}{after}"),
+        before.lines().count() as u64,
+    ))
+}

@@ -1,0 +1,248 @@
+//! Reads a page.
+
+use super::example::Verdict;
+
+/// A page, taken apart.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Page {
+    /// The first heading.
+    pub title: String,
+    /// The first paragraph, on one line.
+    pub summary: String,
+    /// The examples in order.
+    pub examples: Vec<Example>,
+}
+
+/// An example and what is expected of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Example {
+    /// What the rule is to say.
+    pub verdict: Verdict,
+    /// `in=NAME`: the template that the text is put into.
+    pub template: Option<String>,
+    /// `version=1.7`: the version that the template names.
+    pub version: Option<String>,
+    /// `set:NAME=VALUE`: parameters.
+    pub params: Vec<(String, String)>,
+    /// The root file and, from following `xml also file=…` blocks, others.
+    pub files: Vec<ExampleFile>,
+    /// The content of the `issues` block, if there is one.
+    pub expected: Option<String>,
+    /// The lines of the page, from 0, that the `issues` block takes or should be put before.
+    pub expected_lines: std::ops::Range<usize>,
+    /// The line of the opening fence, from 1.
+    pub line: usize,
+}
+
+/// One file of an example.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ExampleFile {
+    /// `file=NAME`, if given.
+    pub name: Option<String>,
+    /// What is in it.
+    pub text: String,
+}
+
+/// Why a text is no page.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("line {line}: {what}")]
+pub struct PageError {
+    /// Line, from 1.
+    pub line: usize,
+    /// What is wrong, and what would be right.
+    pub what: String,
+}
+
+impl Page {
+    /// Takes a page apart.
+    ///
+    /// # Errors
+    /// [`PageError`] when the title or the summary is missing, a block is not closed, or the words
+    /// behind the fence of an example are not known.
+    pub fn parse(text: &str) -> Result<Page, PageError> {
+        let mut page = Page::default();
+        let lines: Vec<&str> = text.lines().collect();
+        let mut at = 0;
+        while let Some(line) = lines.get(at) {
+            if let Some(info) = line.strip_prefix("```") {
+                let close = closing_fence(&lines, at)?;
+                let content = content(&lines[at + 1..close]);
+                page.block(info, content, at, close)?;
+                at = close + 1;
+            } else {
+                page.prose(line, lines.get(at.wrapping_sub(1)).copied());
+                at += 1;
+            }
+        }
+        let missing = |what: &str| {
+            Err(PageError {
+                line: 1,
+                what: what.to_owned(),
+            })
+        };
+        match (page.title.is_empty(), page.summary.is_empty()) {
+            (true, _) => missing("a page begins with a title, `# …`"),
+            (_, true) => missing("under the title, a sentence says what the rule demands"),
+            _ => Ok(page),
+        }
+    }
+
+    fn prose(&mut self, line: &str, before: Option<&str>) {
+        let line = line.trim();
+        if let Some(title) = line.strip_prefix("# ").filter(|_| self.title.is_empty()) {
+            title.trim().clone_into(&mut self.title);
+        } else if line.is_empty() || line.starts_with('#') || self.title.is_empty() {
+        } else if self.summary.is_empty() {
+            line.clone_into(&mut self.summary);
+        } else if before.is_some_and(|before| {
+            self.summary.ends_with(before.trim()) && !before.trim().is_empty()
+        }) {
+            self.summary.push(' ');
+            self.summary.push_str(line);
+        }
+    }
+
+    fn block(
+        &mut self,
+        info: &str,
+        text: String,
+        open: usize,
+        close: usize,
+    ) -> Result<(), PageError> {
+        let wrong = |what: String| {
+            Err(PageError {
+                line: open + 1,
+                what,
+            })
+        };
+        let mut words = info.split_whitespace();
+        match (words.next(), words.next()) {
+            (Some("issues"), _) => match self.examples.last_mut() {
+                Some(example) if example.expected.is_none() => {
+                    example.expected = Some(text);
+                    example.expected_lines = open..close + 1;
+                    Ok(())
+                }
+                _ => wrong("a block of issues must follow its example".to_owned()),
+            },
+            (Some("xml"), Some("also")) => {
+                let Some(example) = self.examples.last_mut() else {
+                    return wrong("`xml also` must follow an example".to_owned());
+                };
+                let name = words
+                    .find_map(|word| word.strip_prefix("file="))
+                    .map(str::to_owned);
+                if name.is_none() {
+                    return wrong("`xml also` needs `file=NAME`".to_owned());
+                }
+                example.files.push(ExampleFile { name, text });
+                example.expected_lines = close + 1..close + 1;
+                Ok(())
+            }
+            (Some("xml"), Some(verdict)) => {
+                let verdict = verdict.parse::<Verdict>();
+                let example =
+                    verdict.and_then(|verdict| Example::of(verdict, words, text, open, close));
+                match example {
+                    Ok(example) => self.examples.push(example),
+                    Err(what) => return wrong(what),
+                }
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Example {
+    fn of<'w>(
+        verdict: Verdict,
+        words: impl Iterator<Item = &'w str>,
+        text: String,
+        open: usize,
+        close: usize,
+    ) -> Result<Example, String> {
+        let mut example = Example {
+            verdict,
+            template: None,
+            version: None,
+            params: Vec::new(),
+            files: vec![ExampleFile { name: None, text }],
+            expected: None,
+            expected_lines: close + 1..close + 1,
+            line: open + 1,
+        };
+        for word in words {
+            let (key, value) = word.split_once('=').ok_or_else(|| unknown_word(word))?;
+            match key.strip_prefix("set:") {
+                Some(name) => example.params.push((name.to_owned(), value.to_owned())),
+                None => match key {
+                    "in" => example.template = Some(value.to_owned()),
+                    "version" => example.version = Some(value.to_owned()),
+                    "file" => example.files[0].name = Some(value.to_owned()),
+                    _ => return Err(unknown_word(word)),
+                },
+            }
+        }
+        Ok(example)
+    }
+}
+
+fn unknown_word(word: &str) -> String {
+    format!("`{word}` is none of `in=`, `version=`, `file=` and `set:NAME=`")
+}
+
+fn closing_fence(lines: &[&str], open: usize) -> Result<usize, PageError> {
+    let after = lines
+        .iter()
+        .skip(open + 1)
+        .position(|line| line.trim_end() == "```");
+    after
+        .map(|count| open + 1 + count)
+        .ok_or_else(|| PageError {
+            line: open + 1,
+            what: "the block is not closed".to_owned(),
+        })
+}
+
+fn content(lines: &[&str]) -> String {
+    lines.iter().flat_map(|line| [line, "\n"]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PAGE: &str = "# Title\n\nOne sentence\non two lines.\n\n## Why\n\nBecause.\n\n\
+        ```xml good\n<a/>\n```\n\n```xml bad in=road version=1.7 set:gap=2\n<b/>\n```\n\n\
+        ```xml also file=c.xodr\n<c/>\n```\n\n```issues\nerror 1:1 /b: no\n```\n";
+
+    #[test]
+    fn a_page_is_taken_apart() {
+        let page = Page::parse(PAGE).unwrap();
+        assert_eq!(
+            (page.title.as_str(), page.summary.as_str()),
+            ("Title", "One sentence on two lines.")
+        );
+        let [good, bad] = page.examples.as_slice() else {
+            panic!("{page:?}")
+        };
+        assert_eq!((good.verdict, good.line), (Verdict::Good, 10));
+        assert_eq!(good.files[0].text, "<a/>\n");
+        assert_eq!(bad.template.as_deref(), Some("road"));
+        assert_eq!(bad.params, [("gap".to_owned(), "2".to_owned())]);
+        assert_eq!(bad.files[1].name.as_deref(), Some("c.xodr"));
+        assert_eq!(bad.expected.as_deref(), Some("error 1:1 /b: no\n"));
+        assert_eq!(bad.expected_lines, 21..24);
+    }
+
+    #[test]
+    fn mistakes_are_named_with_their_line() {
+        let of = |page: &str| Page::parse(page).unwrap_err().to_string();
+        assert!(of("no title").starts_with("line 1: a page begins"));
+        assert!(of("# T\n\nS.\n\n```xml bda\n```\n").contains("line 5: `bda`"));
+        assert!(of("# T\n\nS.\n\n```xml bad color=red\n```\n").contains("`color=red`"));
+        assert!(of("# T\n\nS.\n\n```xml bad\n").contains("not closed"));
+        assert!(of("# T\n\nS.\n\n```issues\n```\n").contains("must follow"));
+    }
+}

@@ -1,0 +1,281 @@
+//! Parameters of rules: declared beside the rule, set in a configuration, shown in the result.
+
+use qcbus_formats::xqar;
+
+/// A parameter that a rule reads, with the value it has unless a configuration says otherwise.
+///
+/// ```
+/// use qcbus_sdk::Param;
+/// const TOLERANCE: Param =
+///     Param::number("tolerance", 0.01, "m", "largest gap between two geometries that is accepted");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Param {
+    /// Name, as configurations write it.
+    pub name: &'static str,
+    /// Value unless the configuration says otherwise.
+    pub default: Default,
+    /// Unit of a number; empty when it has none.
+    pub unit: &'static str,
+    /// What it decides.
+    pub description: &'static str,
+}
+
+/// The default of a [`Param`], which also fixes its type.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Default {
+    /// A finite double.
+    Number(f64),
+    /// `true` or `false`.
+    Flag(bool),
+    /// Any text.
+    Text(&'static str),
+}
+
+impl Param {
+    /// A parameter that is a finite number.
+    pub const fn number(
+        name: &'static str,
+        default: f64,
+        unit: &'static str,
+        description: &'static str,
+    ) -> Param {
+        Param {
+            name,
+            default: Default::Number(default),
+            unit,
+            description,
+        }
+    }
+
+    /// A parameter that is `true` or `false`.
+    pub const fn flag(name: &'static str, default: bool, description: &'static str) -> Param {
+        Param {
+            name,
+            default: Default::Flag(default),
+            unit: "",
+            description,
+        }
+    }
+
+    /// A parameter that is a text.
+    pub const fn text(
+        name: &'static str,
+        default: &'static str,
+        description: &'static str,
+    ) -> Param {
+        Param {
+            name,
+            default: Default::Text(default),
+            unit: "",
+            description,
+        }
+    }
+
+    /// The default as a configuration would write it.
+    pub fn default_text(&self) -> String {
+        match self.default {
+            Default::Number(number) => number.to_string(),
+            Default::Flag(flag) => flag.to_string(),
+            Default::Text(text) => text.to_owned(),
+        }
+    }
+
+    /// Meaning and unit in one sentence.
+    pub fn meaning(&self) -> String {
+        match self.unit {
+            "" => self.description.to_owned(),
+            unit => format!("{} [{unit}]", self.description),
+        }
+    }
+}
+
+/// Every checker has it: how many of its findings are listed in a result.
+pub const MAX_ISSUES: Param = Param::number(
+    "qcbus.max_issues",
+    1000.0,
+    "",
+    "how many findings of this checker are listed; the rest is counted",
+);
+
+/// A configured value that its parameter cannot have.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("the parameter `{name}` is `{value}`, but must be {expected}")]
+pub struct ParamError {
+    name: &'static str,
+    value: String,
+    expected: &'static str,
+}
+
+/// The values that one checker works with.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Values {
+    values: Vec<(Param, Value)>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Value {
+    Number(f64),
+    Flag(bool),
+    Text(String),
+}
+
+impl Values {
+    /// Takes what `configured` says about each parameter, else its default.
+    ///
+    /// # Errors
+    /// [`ParamError`] when a configured text does not fit the parameter's type.
+    pub fn resolve(
+        params: &[Param],
+        configured: impl Fn(&str) -> Option<String>,
+    ) -> Result<Values, ParamError> {
+        let values = params.iter().chain([&MAX_ISSUES]).map(|param| {
+            let value = match configured(param.name) {
+                Some(text) => Value::read(param, text)?,
+                None => Value::of_default(param),
+            };
+            Ok((*param, value))
+        });
+        Ok(Values {
+            values: values.collect::<Result<_, ParamError>>()?,
+        })
+    }
+
+    /// The values as a result file lists them: what the rule declares, and the number of listed
+    /// findings when it was changed.
+    pub fn listed(&self) -> Vec<xqar::Param> {
+        let says_something = |(param, value): &&(Param, Value)| {
+            param.name != MAX_ISSUES.name || *value != Value::of_default(param)
+        };
+        let listed = self.values.iter().filter(says_something);
+        listed
+            .map(|(param, value)| xqar::Param {
+                name: param.name.to_owned(),
+                value: value.to_text(),
+            })
+            .collect()
+    }
+
+    /// A number; the parameter's default when the rule did not declare it.
+    pub fn number(&self, param: &Param) -> f64 {
+        match (self.get(param), param.default) {
+            (Some(Value::Number(number)), _) | (_, Default::Number(number)) => number,
+            _ => f64::NAN,
+        }
+    }
+
+    /// A flag; the parameter's default when the rule did not declare it.
+    pub fn flag(&self, param: &Param) -> bool {
+        match (self.get(param), param.default) {
+            (Some(Value::Flag(flag)), _) | (_, Default::Flag(flag)) => flag,
+            _ => false,
+        }
+    }
+
+    /// A text; the parameter's default when the rule did not declare it.
+    pub fn text(&self, param: &Param) -> String {
+        self.get(param)
+            .unwrap_or_else(|| Value::of_default(param))
+            .to_text()
+    }
+
+    /// Puts a text in the place of what was configured.
+    pub(crate) fn set(&mut self, param: &Param, text: String) {
+        let known = self
+            .values
+            .iter_mut()
+            .find(|(known, _)| known.name == param.name);
+        if let Some((_, value)) = known {
+            *value = Value::Text(text);
+        }
+    }
+
+    fn get(&self, param: &Param) -> Option<Value> {
+        self.values
+            .iter()
+            .find(|(known, _)| known.name == param.name)
+            .map(|(_, value)| value.clone())
+    }
+}
+
+impl Value {
+    fn of_default(param: &Param) -> Value {
+        match param.default {
+            Default::Number(number) => Value::Number(number),
+            Default::Flag(flag) => Value::Flag(flag),
+            Default::Text(text) => Value::Text(text.to_owned()),
+        }
+    }
+
+    fn read(param: &Param, text: String) -> Result<Value, ParamError> {
+        let trimmed = text.trim();
+        let (value, expected) = match param.default {
+            Default::Number(_) => {
+                let number = trimmed
+                    .parse()
+                    .ok()
+                    .filter(|number: &f64| number.is_finite());
+                (number.map(Value::Number), "a finite number")
+            }
+            Default::Flag(_) => (read_flag(trimmed).map(Value::Flag), "`true` or `false`"),
+            Default::Text(_) => (Some(Value::Text(text.clone())), "a text"),
+        };
+        value.ok_or(ParamError {
+            name: param.name,
+            value: text,
+            expected,
+        })
+    }
+
+    fn to_text(&self) -> String {
+        match self {
+            Value::Number(number) => number.to_string(),
+            Value::Flag(flag) => flag.to_string(),
+            Value::Text(text) => text.clone(),
+        }
+    }
+}
+
+fn read_flag(text: &str) -> Option<bool> {
+    match text {
+        "true" | "1" => Some(true),
+        "false" | "0" => Some(false),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GAP: Param = Param::number("gap", 0.5, "m", "a gap");
+    const STRICT: Param = Param::flag("strict", false, "be strict");
+
+    #[test]
+    fn a_configured_value_wins_over_the_default() {
+        let of = |name: &str| (name == "gap").then(|| " 2.5 ".to_owned());
+        let values = Values::resolve(&[GAP, STRICT], of).unwrap();
+        assert_eq!(values.number(&GAP), 2.5);
+        assert!(!values.flag(&STRICT));
+        let names: Vec<_> = values
+            .listed()
+            .into_iter()
+            .map(|p| (p.name, p.value))
+            .collect();
+        assert_eq!(
+            names,
+            [
+                ("gap".into(), "2.5".into()),
+                ("strict".into(), "false".into())
+            ]
+        );
+    }
+
+    #[test]
+    fn a_value_of_the_wrong_type_is_an_error_that_names_it() {
+        for wrong in ["", "1 m", "nan", "inf"] {
+            let error = Values::resolve(&[GAP], |_| Some(wrong.to_owned())).unwrap_err();
+            assert!(error.to_string().contains("`gap`"), "{error}");
+        }
+    }
+}

@@ -1,0 +1,207 @@
+//! From an element, an attribute or an offset to the locations that a result file lists.
+
+use qcbus_document::{Attribute, Document, FaultCode, Node, Position};
+use qcbus_formats::xqar::{DomainInfo, InfoElement, Location, Locations};
+
+use crate::Subject;
+
+/// Something that an issue can point at.
+#[derive(Clone, Copy)]
+pub enum Place<'p> {
+    /// An element: its `<`.
+    Node(Node<'p>),
+    /// An attribute: the first character of its name.
+    Attribute(Attribute<'p>),
+    /// A byte of a document's text, where there may be no element.
+    Text(Document<'p>, u32),
+}
+
+impl<'p> From<Node<'p>> for Place<'p> {
+    fn from(node: Node<'p>) -> Place<'p> {
+        Place::Node(node)
+    }
+}
+
+impl<'p> From<Attribute<'p>> for Place<'p> {
+    fn from(attribute: Attribute<'p>) -> Place<'p> {
+        Place::Attribute(attribute)
+    }
+}
+
+impl<'p> From<(Document<'p>, u32)> for Place<'p> {
+    fn from((document, offset): (Document<'p>, u32)) -> Place<'p> {
+        Place::Text(document, offset)
+    }
+}
+
+impl<'p> Place<'p> {
+    /// The attribute of `node` when it is there, else the element that lacks it.
+    pub fn attribute_or_node(node: Node<'p>, attribute: &str) -> Place<'p> {
+        node.attribute(attribute)
+            .map_or(Place::Node(node), Place::Attribute)
+    }
+
+    fn document(&self) -> Document<'p> {
+        match self {
+            Place::Node(node) => node.document(),
+            Place::Attribute(attribute) => attribute.node().document(),
+            Place::Text(document, _) => *document,
+        }
+    }
+
+    pub(crate) fn offset(&self) -> u32 {
+        match self {
+            Place::Node(node) => node.offset(),
+            Place::Attribute(attribute) => attribute.offset(),
+            Place::Text(_, offset) => *offset,
+        }
+    }
+
+    fn node(&self) -> Option<Node<'p>> {
+        match self {
+            Place::Node(node) => Some(*node),
+            Place::Attribute(attribute) => Some(attribute.node()),
+            Place::Text(..) => None,
+        }
+    }
+
+    fn xpath(&self, subject: &Subject<'_>) -> Option<String> {
+        match self {
+            Place::Node(node) => Some(subject.xpath(*node)),
+            Place::Attribute(attribute) => Some(format!(
+                "{}/@{}",
+                subject.xpath(attribute.node()),
+                attribute.name()
+            )),
+            Place::Text(..) => None,
+        }
+    }
+
+    /// What is to be seen at the place, when the rule says nothing else.
+    fn label(&self) -> String {
+        match self {
+            Place::Node(node) => format!("element `{}`", node.name()),
+            Place::Attribute(a) => {
+                format!("attribute `{}` of element `{}`", a.name(), a.node().name())
+            }
+            Place::Text(..) => "here".to_owned(),
+        }
+    }
+}
+
+/// A place with everything that a result says about it.
+pub(crate) struct Spot {
+    pub locations: Locations,
+    /// Set when the place is not in the root file.
+    pub elsewhere: Option<DomainInfo>,
+    /// Document order: the root's text first, then other documents in the order of references.
+    pub order: (usize, u32),
+}
+
+/// Works out rows, columns and XPaths. A place in another file is shown at the element of the
+/// root file that leads there; where it really is, its description says.
+pub(crate) fn locate(subject: &Subject<'_>, place: &Place<'_>, description: Option<&str>) -> Spot {
+    let document = place.document();
+    let position = document.position(place.offset());
+    let description = description.map_or_else(|| place.label(), str::to_owned);
+    let linked = linked_index(subject, &document);
+    let order = (linked.map_or(0, |index| index + 1), place.offset());
+    if linked.is_none() && position.is_root_file {
+        let places = places_of(subject, &position, place.xpath(subject));
+        return Spot {
+            locations: Locations {
+                description,
+                places,
+            },
+            elsewhere: None,
+            order,
+        };
+    }
+    let path = linked
+        .and_then(|index| subject.linked().get(index))
+        .map(|linked| linked.path.as_str());
+    let path = path
+        .filter(|_| position.is_root_file)
+        .unwrap_or(position.path);
+    let (row, column) = (position.row, position.column);
+    let reference = match linked.and_then(|index| subject.linked().get(index)) {
+        Some(linked) => reference_at(subject, linked.referred_at),
+        None => including_element(place.node()).or(subject.root().root()),
+    };
+    let places = match reference {
+        Some(node) => places_of(subject, &node.position(), Some(subject.xpath(node))),
+        None => places_of(subject, &subject.root().position(0), None),
+    };
+    Spot {
+        locations: Locations {
+            description: format!("{path}:{row}:{column}: {description}"),
+            places,
+        },
+        elsewhere: Some(location_info(path, &position, place.xpath(subject))),
+        order,
+    }
+}
+
+fn places_of(
+    subject: &Subject<'_>,
+    position: &Position<'_>,
+    xpath: Option<String>,
+) -> Vec<Location> {
+    // Results count bytes on disk; those of a transcoded file are others than the image's.
+    let transcoded = subject
+        .root()
+        .faults()
+        .any(|fault| fault.code == FaultCode::EncodingTranscoded);
+    let file = Location::File {
+        row: u64::from(position.row),
+        column: u64::from(position.column),
+        offset: (!transcoded).then(|| u64::from(position.offset)),
+    };
+    std::iter::once(file)
+        .chain(xpath.map(|xpath| Location::Xml { xpath }))
+        .collect()
+}
+
+fn linked_index(subject: &Subject<'_>, document: &Document<'_>) -> Option<usize> {
+    let path = document.path();
+    if path == subject.root().path() {
+        return None;
+    }
+    subject
+        .linked()
+        .iter()
+        .position(|linked| linked.document.path() == path)
+}
+
+fn reference_at<'d>(subject: &Subject<'d>, offset: u32) -> Option<Node<'d>> {
+    let root = subject.root().root()?;
+    // Only for issues in other files, whose number is capped: a walk is cheap enough.
+    root.descendants()
+        .find(|node| node.offset() == offset)
+        .or(Some(root))
+}
+
+/// The innermost element around an included one that the root file itself contains.
+fn including_element(node: Option<Node<'_>>) -> Option<Node<'_>> {
+    node?
+        .ancestors()
+        .find(|ancestor| ancestor.position().is_root_file)
+}
+
+fn location_info(path: &str, position: &Position<'_>, xpath: Option<String>) -> DomainInfo {
+    let mut attributes = vec![
+        ("path".to_owned(), path.to_owned()),
+        ("row".to_owned(), position.row.to_string()),
+        ("column".to_owned(), position.column.to_string()),
+    ];
+    attributes.extend(xpath.map(|xpath| ("xpath".to_owned(), xpath)));
+    let element = InfoElement {
+        name: "Location".to_owned(),
+        attributes,
+        ..InfoElement::default()
+    };
+    DomainInfo {
+        name: "qcbus.location".to_owned(),
+        content: vec![element],
+    }
+}

@@ -1,0 +1,151 @@
+//! Which checkers run, and with which parameters.
+
+use std::path::Path;
+
+use crate::bundle::groups;
+use crate::resource::Resource;
+use crate::{Brought, Bundle, Checker, UserFiles, Values};
+
+/// A bundle's checkers, prepared for checking: which are demanded, and with which values.
+pub struct Plan {
+    pub(crate) bundle: &'static Bundle,
+    pub(crate) checkers: Vec<Checker>,
+    /// By model; the order of checking.
+    pub(crate) groups: Vec<Vec<usize>>,
+    /// In the order of `checkers`.
+    pub(crate) entries: Vec<Entry>,
+    /// What was made of the user's files.
+    pub(crate) brought: Vec<Brought>,
+}
+
+/// How one checker takes part.
+pub(crate) struct Entry {
+    /// Its result is asked for.
+    pub demanded: bool,
+    /// It runs: demanded, or a precondition of one that runs.
+    pub runs: bool,
+    /// Its parameters, or why they cannot be used.
+    pub values: Result<Values, String>,
+    /// Indices of its preconditions; the error names one that does not exist.
+    pub after: Result<Vec<usize>, String>,
+}
+
+impl Plan {
+    /// Demands the checkers that `demanded` names, with the parameters that `configured` gives:
+    /// both are asked with the checker's id, the latter also with the parameter's name.
+    pub fn new(
+        bundle: &'static Bundle,
+        demanded: impl Fn(&Checker) -> bool,
+        configured: impl Fn(&Checker, &str) -> Option<String>,
+    ) -> Plan {
+        let checkers = bundle.checkers();
+        let entries = checkers.iter().map(|checker| Entry {
+            demanded: demanded(checker),
+            runs: demanded(checker),
+            values: Values::resolve(checker.facts.params, |name| configured(checker, name))
+                .map_err(|error| error.to_string()),
+            after: preconditions(&checkers, checker),
+        });
+        let mut entries: Vec<Entry> = entries.collect();
+        mark_preconditions(&mut entries);
+        Plan {
+            bundle,
+            groups: groups(&checkers),
+            checkers,
+            entries,
+            brought: Vec::new(),
+        }
+    }
+
+    /// Every checker that is on by default, with the default parameters.
+    pub fn by_default(bundle: &'static Bundle) -> Plan {
+        Plan::new(bundle, |checker| checker.facts.default_on, |_, _| None)
+    }
+
+    /// Reads the files that parameters name, for the checkers that run; what the user gave on the
+    /// command line comes before what a configuration says. A checker whose files are of no use ends
+    /// with an error. A resource is read once, as the first checker demands it.
+    #[must_use]
+    pub fn with_files(mut self, given: Option<&UserFiles>) -> Plan {
+        let mut read: Vec<(&'static Resource, Result<(), String>)> = Vec::new();
+        for (checker, entry) in self.checkers.iter().zip(&mut self.entries) {
+            let (Some(resource), true, Ok(values)) =
+                (checker.facts.resource, entry.runs, &mut entry.values)
+            else {
+                continue;
+            };
+            if let Some(given) = given.filter(|given| given.of(resource).is_some()) {
+                values.set(&resource.param, given.directory());
+            }
+            let known = read
+                .iter()
+                .find(|(known, _)| std::ptr::eq(*known, resource));
+            let outcome = match known {
+                Some((_, outcome)) => outcome.clone(),
+                None => bring(resource, given, &values.text(&resource.param))
+                    .map(|brought| self.brought.extend(brought)),
+            };
+            read.push((resource, outcome.clone()));
+            if let Err(why) = outcome {
+                entry.values = Err(format!("the parameter `{}`: {why}", resource.param.name));
+            }
+        }
+        self
+    }
+
+    /// The bundle.
+    pub fn bundle(&self) -> &'static Bundle {
+        self.bundle
+    }
+
+    /// All checkers of the bundle in the order of the result, demanded or not.
+    pub fn checkers(&self) -> &[Checker] {
+        &self.checkers
+    }
+
+    /// Whether the result of the checker with this index is asked for.
+    pub fn is_demanded(&self, index: usize) -> bool {
+        self.entries.get(index).is_some_and(|entry| entry.demanded)
+    }
+}
+
+/// What a checker gets: from the command line, else from where its parameter says.
+fn bring(
+    resource: &Resource,
+    given: Option<&UserFiles>,
+    directory: &str,
+) -> Result<Option<Brought>, String> {
+    if let Some(brought) = given.and_then(|given| given.of(resource)) {
+        return Ok(Some(brought));
+    }
+    match directory.trim() {
+        "" => Ok(None),
+        path => resource
+            .read(Path::new(path))
+            .map(Some)
+            .map_err(|error| format!("failed to {error}")),
+    }
+}
+
+fn preconditions(checkers: &[Checker], checker: &Checker) -> Result<Vec<usize>, String> {
+    let index_of = |id: &&str| {
+        let position = checkers.iter().position(|other| other.id == *id);
+        position.ok_or_else(|| format!("its precondition `{id}` does not exist"))
+    };
+    checker.facts.after.iter().map(index_of).collect()
+}
+
+/// What a demanded checker depends on runs too; its findings are not reported.
+fn mark_preconditions(entries: &mut [Entry]) {
+    let mut open: Vec<usize> = (0..entries.len()).filter(|&i| entries[i].runs).collect();
+    while let Some(index) = open.pop() {
+        let Ok(after) = entries[index].after.clone() else {
+            continue;
+        };
+        for precondition in after {
+            if !std::mem::replace(&mut entries[precondition].runs, true) {
+                open.push(precondition);
+            }
+        }
+    }
+}

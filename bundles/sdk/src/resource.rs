@@ -1,0 +1,305 @@
+//! Files that a user brings for a rule, such as schemas: the host reads them before anything is
+//! checked, so that rules do no I/O.
+
+use std::any::Any;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use qcbus_ingest::{Limits, Prepared, prepare_bytes};
+use qcbus_messages::{Catalogue, Digest};
+
+use crate::{Bundle, Param};
+
+/// What a rule takes besides the documents, from a directory that the user names.
+#[derive(Debug)]
+pub struct Resource {
+    /// The parameter whose value is the directory; while it is empty, there is nothing to read.
+    /// A rule that declares the resource declares the parameter, too.
+    pub param: Param,
+    /// The endings of the files that are read, in lower case.
+    pub endings: &'static [&'static str],
+    /// Makes of the files what rules get by [`crate::Subject::brought`]. Does no I/O; an error
+    /// reads well after "failed to ".
+    pub make: fn(&[ResourceFile]) -> Result<Brought, String>,
+}
+
+/// What was made of a user's files.
+pub type Brought = Arc<dyn Any + Send + Sync>;
+
+/// One file that was read.
+pub struct ResourceFile {
+    path: PathBuf,
+    below: usize,
+    bytes: Vec<u8>,
+    prepared: Prepared,
+}
+
+/// Why a user's files cannot be used; reads well after "failed to ".
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ResourceError {
+    /// A directory or file that cannot be read.
+    #[error("read {path}: {why}")]
+    Unreadable {
+        /// What was to be read.
+        path: String,
+        /// What the system says.
+        why: String,
+    },
+    /// Nothing that could be used.
+    #[error("find a file ending in {endings} in {path}")]
+    Nothing {
+        /// Where was looked.
+        path: String,
+        /// What was looked for.
+        endings: String,
+    },
+    /// More than anybody brings on purpose.
+    #[error(
+        "read {path}: it has more than {most} files, or directories nested deeper than {deepest}; is it the right one?"
+    )]
+    TooMuch {
+        /// The directory.
+        path: String,
+        /// Most files that are read.
+        most: usize,
+        /// Deepest nesting.
+        deepest: usize,
+    },
+    /// A bundle without such rules.
+    #[error("bring files to {0}: none of its rules takes any")]
+    NotTaken(&'static str),
+    /// The files were read, but are of no use.
+    #[error("{0}")]
+    Unusable(String),
+}
+
+/// Files and directories below the one that was named.
+const MOST: usize = 1_000;
+const DEEPEST: usize = 8;
+
+impl ResourceFile {
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Where it is below the directory that the user named.
+    pub fn below(&self) -> PathBuf {
+        self.path.components().skip(self.below).collect()
+    }
+
+    /// Whether its name ends in this, whatever the case.
+    pub fn ends_in(&self, ending: &str) -> bool {
+        has_ending(&self.path, &[ending])
+    }
+
+    /// Its bytes.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// SHA-256 of its bytes.
+    pub fn digest(&self) -> Digest {
+        Digest(self.prepared.digest())
+    }
+
+    /// Its image, if it is XML.
+    pub fn image(&self) -> Vec<u8> {
+        self.prepared.build()
+    }
+}
+
+impl Resource {
+    /// Reads a directory (or one file) and makes of it what rules get.
+    ///
+    /// # Errors
+    /// [`ResourceError`] when a file cannot be read or used: nothing is passed over in silence.
+    pub fn read(&self, path: &Path) -> Result<Brought, ResourceError> {
+        let files = self.files(path)?;
+        (self.make)(&files).map_err(ResourceError::Unusable)
+    }
+
+    fn files(&self, path: &Path) -> Result<Vec<ResourceFile>, ResourceError> {
+        let mut found = Vec::new();
+        if path.is_dir() {
+            let mut budget = MOST;
+            collect(path, self.endings, (DEEPEST, &mut budget), &mut found)
+                .map_err(|error| error.of(path))?;
+        } else {
+            found.push(path.to_owned());
+        }
+        if found.is_empty() {
+            let endings: Vec<String> = self.endings.iter().map(|end| format!(".{end}")).collect();
+            return Err(ResourceError::Nothing {
+                path: path.display().to_string(),
+                endings: endings.join(" or "),
+            });
+        }
+        found.sort();
+        let whole = path.components().count();
+        let below = if path.is_dir() {
+            whole
+        } else {
+            whole.saturating_sub(1)
+        };
+        found
+            .into_iter()
+            .map(|file| read_file(file, below))
+            .collect()
+    }
+}
+
+/// What a user brings on the command line (`--schema-dir DIR`): read once, when the bundle starts.
+#[derive(Clone)]
+pub struct UserFiles {
+    directory: PathBuf,
+    fingerprint: String,
+    brought: Vec<(&'static Resource, Brought)>,
+}
+
+impl UserFiles {
+    /// Reads a directory for every rule of the bundle that takes such files.
+    ///
+    /// # Errors
+    /// [`ResourceError`] when they are of no use, or no rule takes any.
+    pub fn read(bundle: &Bundle, directory: &Path) -> Result<UserFiles, ResourceError> {
+        let directory = std::path::absolute(directory).unwrap_or_else(|_| directory.to_owned());
+        let mut read = UserFiles {
+            fingerprint: String::new(),
+            brought: Vec::new(),
+            directory,
+        };
+        for resource in resources(bundle) {
+            let files = resource.files(&read.directory)?;
+            read.fingerprint = fingerprint(&files);
+            let brought = (resource.make)(&files).map_err(ResourceError::Unusable)?;
+            read.brought.push((resource, brought));
+        }
+        if read.brought.is_empty() {
+            return Err(ResourceError::NotTaken(bundle.name));
+        }
+        Ok(read)
+    }
+
+    pub(crate) fn of(&self, resource: &Resource) -> Option<Brought> {
+        let found = self
+            .brought
+            .iter()
+            .find(|(known, _)| std::ptr::eq(*known, resource));
+        found.map(|(_, brought)| brought.clone())
+    }
+
+    /// The directory as results and plans name it.
+    pub(crate) fn directory(&self) -> String {
+        self.directory.display().to_string()
+    }
+
+    /// Says in the catalogue what the defaults are now. The digest makes a broker judge again what
+    /// was judged with other files.
+    pub(crate) fn tell(&self, catalogue: &mut Catalogue) {
+        let names: Vec<&str> = self
+            .brought
+            .iter()
+            .map(|(known, _)| known.param.name)
+            .collect();
+        let params = catalogue
+            .checkers
+            .iter_mut()
+            .flat_map(|checker| &mut checker.params);
+        for param in params.filter(|param| names.contains(&param.name.as_str())) {
+            param.default = format!("{} (sha256 {})", self.directory(), self.fingerprint);
+        }
+    }
+}
+
+/// What the rules of a bundle take, each once.
+pub(crate) fn resources(bundle: &Bundle) -> Vec<&'static Resource> {
+    let mut all: Vec<&'static Resource> = Vec::new();
+    for resource in bundle.rules.iter().filter_map(|rule| rule.facts().resource) {
+        if !all.iter().any(|known| std::ptr::eq(*known, resource)) {
+            all.push(resource);
+        }
+    }
+    all
+}
+
+enum Trouble {
+    Io(PathBuf, std::io::Error),
+    TooMuch,
+}
+
+impl Trouble {
+    fn of(self, directory: &Path) -> ResourceError {
+        match self {
+            Trouble::Io(path, error) => unreadable(&path, &error),
+            Trouble::TooMuch => ResourceError::TooMuch {
+                path: directory.display().to_string(),
+                most: MOST,
+                deepest: DEEPEST,
+            },
+        }
+    }
+}
+
+fn collect(
+    directory: &Path,
+    endings: &[&str],
+    (depth, budget): (usize, &mut usize),
+    found: &mut Vec<PathBuf>,
+) -> Result<(), Trouble> {
+    let io = |error| Trouble::Io(directory.to_owned(), error);
+    for entry in std::fs::read_dir(directory).map_err(io)? {
+        let path = entry.map_err(io)?.path();
+        *budget = budget.checked_sub(1).ok_or(Trouble::TooMuch)?;
+        if path.is_dir() {
+            let depth = depth.checked_sub(1).ok_or(Trouble::TooMuch)?;
+            collect(&path, endings, (depth, budget), found)?;
+        } else if has_ending(&path, endings) {
+            found.push(path);
+        }
+    }
+    Ok(())
+}
+
+fn read_file(path: PathBuf, below: usize) -> Result<ResourceFile, ResourceError> {
+    let limits = Limits::default();
+    let read = || {
+        let size = std::fs::metadata(&path)?.len();
+        if size > limits.max_file {
+            return Err(std::io::Error::from(std::io::ErrorKind::FileTooLarge));
+        }
+        std::fs::read(&path)
+    };
+    let bytes = read().map_err(|error| unreadable(&path, &error))?;
+    let prepared = prepare_bytes(&path, bytes.clone(), &limits);
+    Ok(ResourceFile {
+        path,
+        below,
+        bytes,
+        prepared,
+    })
+}
+
+/// A digest that changes with the files: their names below the directory and their contents.
+fn fingerprint(files: &[ResourceFile]) -> String {
+    let lines = files
+        .iter()
+        .map(|file| format!("{} {}\n", file.digest(), file.below().display()));
+    let all = lines.collect::<String>().into_bytes();
+    Digest(prepare_bytes(Path::new(""), all, &Limits::default()).digest()).to_string()
+}
+
+fn unreadable(path: &Path, error: &std::io::Error) -> ResourceError {
+    ResourceError::Unreadable {
+        path: path.display().to_string(),
+        why: error.to_string(),
+    }
+}
+
+fn has_ending(path: &Path, endings: &[&str]) -> bool {
+    path.extension().is_some_and(|have| {
+        endings
+            .iter()
+            .any(|ending| have.eq_ignore_ascii_case(ending))
+    })
+}

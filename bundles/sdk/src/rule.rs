@@ -1,0 +1,188 @@
+//! A rule: data and one function.
+
+use std::any::{Any, TypeId};
+
+use qcbus_document::Document;
+use qcbus_formats::xqar::Level;
+
+use crate::{Param, Resource, Sink, Subject};
+
+/// What a rule looks at: built once per document and shared by all rules about it.
+///
+/// The type that implements it is only a name; the value that rules get is [`Model::Of`].
+pub trait Model: 'static {
+    /// The model of a document that lives for `'d`.
+    type Of<'d>;
+
+    /// Builds the model. It should be lazy: most documents need little of it.
+    ///
+    /// # Errors
+    /// [`Skip`] when rules about this model cannot say anything about the document.
+    fn build<'d>(subject: &'d Subject<'d>) -> Result<Self::Of<'d>, Skip>;
+}
+
+/// Why checkers do not apply, as a sentence fragment: `the road network could not be loaded`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Skip(pub String);
+
+/// The document itself, for rules that need no more: `Rule<Document>`.
+impl Model for Document<'static> {
+    type Of<'d> = Document<'d>;
+
+    fn build<'d>(subject: &'d Subject<'d>) -> Result<Document<'d>, Skip> {
+        Ok(subject.root())
+    }
+}
+
+/// A rule: what it is called, when it applies, and the function that looks.
+///
+/// ```text
+/// pub static RULE: Rule<Document> = Rule {
+///     id: "check_asam_xodr_xml_fileheader_is_present",
+///     uids: &["asam.net:xodr:1.0.0:xml.fileheader_is_present"],
+///     after: &["check_asam_xodr_xml_root_tag_is_opendrive"],
+///     page: include_str!("xml_fileheader_is_present.md"),
+///     run,
+///     ..Rule::DEFAULTS
+/// };
+/// ```
+pub struct Rule<M: Model> {
+    /// Identifier of the checker, unique in the bundle; ends in the name of the rule's file.
+    pub id: &'static str,
+    /// The rules of the standard that it answers for. The first is printed on issues, unless a
+    /// finding says otherwise.
+    pub uids: &'static [&'static str],
+    /// Severity of its issues, unless a finding says otherwise. [`Level::Error`] by default.
+    pub level: Level,
+    /// The versions of the standard that it applies to; see [`crate::VersionRange`].
+    pub versions: &'static str,
+    /// Whether older documents are looked at, too.
+    pub backport: Backport,
+    /// Checkers that must have run without finding an error; else this one is skipped.
+    pub after: &'static [&'static str],
+    /// Parameters that it reads.
+    pub params: &'static [Param],
+    /// Files of the user that it takes, read before it runs.
+    pub resource: Option<&'static Resource>,
+    /// Whether it runs when no configuration asks for it. `true` by default.
+    pub default_on: bool,
+    /// Its page: `include_str!` of the Markdown file beside it.
+    pub page: &'static str,
+    /// Looks at the document and says what it found.
+    pub run: fn(&M::Of<'_>, &mut Sink<'_>),
+}
+
+/// What a rule does with documents of versions before its range.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Backport {
+    /// It is skipped.
+    None,
+    /// It runs, its issues are one severity lower and say that the rule is not normative there.
+    Lower {
+        /// First version that has the elements in question; empty for every version.
+        since: &'static str,
+    },
+    /// Like `Lower`, but as a checker of its own, `…_backport`, so that the gate of this one
+    /// stays comparable with other tools.
+    Separate {
+        /// First version that has the elements in question; empty for every version.
+        since: &'static str,
+    },
+}
+
+impl<M: Model> Rule<M> {
+    /// What most rules have in common, for the `..` of a rule. A rule that forgets its id, UIDs,
+    /// page or function fails its page test.
+    pub const DEFAULTS: Rule<M> = Rule {
+        id: "",
+        uids: &[],
+        level: Level::Error,
+        versions: "",
+        backport: Backport::None,
+        after: &[],
+        params: &[],
+        resource: None,
+        default_on: true,
+        page: "",
+        run: finds_nothing::<M>,
+    };
+}
+
+fn finds_nothing<M: Model>(_: &M::Of<'_>, _: &mut Sink<'_>) {}
+
+/// Runs a rule on the model that was built for its kind.
+#[doc(hidden)]
+pub type Apply<'a, 'd> = &'a mut dyn FnMut(&dyn AnyRule, &mut Sink<'d>);
+
+/// A rule of whatever model, as a bundle lists them.
+pub trait AnyRule: Sync {
+    /// Everything about the rule but its function.
+    fn facts(&self) -> Facts;
+    /// Tells apart the models that rules look at.
+    fn model(&self) -> TypeId;
+    /// Builds this rule's model and hands it to `each` with every rule of the same model.
+    #[doc(hidden)]
+    fn with_model<'d>(
+        &self,
+        subject: &'d Subject<'d>,
+        each: &mut dyn FnMut(Apply<'_, 'd>),
+    ) -> Result<(), Skip>;
+    /// The rule, to find out its type.
+    #[doc(hidden)]
+    fn as_any(&self) -> &dyn Any;
+}
+
+/// Everything about a rule but its function and its model; see [`Rule`] for the fields.
+#[expect(missing_docs, reason = "the fields are those of `Rule`")]
+#[derive(Debug, Clone, Copy)]
+pub struct Facts {
+    pub id: &'static str,
+    pub uids: &'static [&'static str],
+    pub level: Level,
+    pub versions: &'static str,
+    pub backport: Backport,
+    pub after: &'static [&'static str],
+    pub params: &'static [Param],
+    pub resource: Option<&'static Resource>,
+    pub default_on: bool,
+    pub page: &'static str,
+}
+
+impl<M: Model> AnyRule for Rule<M> {
+    fn facts(&self) -> Facts {
+        Facts {
+            id: self.id,
+            uids: self.uids,
+            level: self.level,
+            versions: self.versions,
+            backport: self.backport,
+            after: self.after,
+            params: self.params,
+            resource: self.resource,
+            default_on: self.default_on,
+            page: self.page,
+        }
+    }
+
+    fn model(&self) -> TypeId {
+        TypeId::of::<M>()
+    }
+
+    fn with_model<'d>(
+        &self,
+        subject: &'d Subject<'d>,
+        each: &mut dyn FnMut(Apply<'_, 'd>),
+    ) -> Result<(), Skip> {
+        let model = M::build(subject)?;
+        each(&mut |rule, found| {
+            if let Some(rule) = rule.as_any().downcast_ref::<Rule<M>>() {
+                (rule.run)(&model, found);
+            }
+        });
+        Ok(())
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+}

@@ -1,0 +1,511 @@
+//! A bundle as a daemon on the bus: one loop that talks, one thread that checks.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use qcbus_bus::{Instance, JoinError, Peer, PeerEvent, PeerOptions};
+use qcbus_formats::config::Config;
+use qcbus_formats::xqar::{Issue, Status};
+use qcbus_messages::{
+    Digest, DocId, FromPeer, Hello, Job, JobId, PROTOCOL_VERSION, Role, ToPeer, codec,
+};
+use tokio::sync::mpsc;
+
+use super::Exit;
+use super::file::complain;
+use super::module::configured;
+use super::worker::{self, LinkedHeld, Progress, Work};
+use crate::{Bundle, Outcome, Plan, UserFiles};
+
+/// How a bundle joins the bus.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BusOptions {
+    /// Name of the instance.
+    pub instance: String,
+    /// Its directory, when it is not where the name leads.
+    pub instance_dir: Option<PathBuf>,
+    /// Given by the supervisor that started this process.
+    pub launch: Option<u64>,
+    /// End when the process that started this one ends.
+    pub die_with_parent: bool,
+    /// Schemas of the user.
+    pub schema_dir: Option<PathBuf>,
+}
+
+impl Default for BusOptions {
+    fn default() -> BusOptions {
+        BusOptions {
+            instance: "default".to_owned(),
+            instance_dir: None,
+            launch: None,
+            die_with_parent: false,
+            schema_dir: None,
+        }
+    }
+}
+
+/// How many jobs the broker may send ahead: one is checked while the next ones are at hand.
+const CAPACITY: u16 = 8;
+/// How often a sign of life is given, and missing documents are asked for again.
+const HEARTBEAT: Duration = Duration::from_secs(1);
+/// Issues per message: large enough to be cheap, small enough to interleave with other traffic.
+const BATCH: usize = 64;
+
+pub(super) fn run(bundle: &'static Bundle, options: BusOptions, given: Option<UserFiles>) -> Exit {
+    if options.die_with_parent && !follow_parent() {
+        return Exit::Accepted;
+    }
+    let instance = match options.instance_dir {
+        Some(dir) => Ok(Instance::at(dir)),
+        None => Instance::named(&options.instance),
+    };
+    let instance = match instance {
+        Ok(instance) => instance,
+        Err(error) => return fail(&error.to_string(), Exit::Usage),
+    };
+    let runtime = match tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+    {
+        Ok(runtime) => runtime,
+        Err(error) => return fail(&format!("failed to start: {error}"), Exit::Internal),
+    };
+    let supervised = options.launch.is_some() || options.die_with_parent;
+    runtime.block_on(async {
+        let stops = Stops::listen(supervised);
+        serve(
+            (bundle, given),
+            &instance,
+            hello(bundle, options.launch),
+            stops,
+        )
+        .await
+    })
+}
+
+/// Asks the system to end this process with its parent. `false`: the parent has gone already.
+fn follow_parent() -> bool {
+    use rustix::process::{Signal, getppid, set_parent_process_death_signal};
+    let parent = getppid();
+    if let Err(error) = set_parent_process_death_signal(Some(Signal::TERM)) {
+        tracing::warn!(%error, "cannot follow the parent process");
+    }
+    // It may have died between the two calls: then we have another one by now.
+    parent.is_some() && getppid() == parent
+}
+
+fn hello(bundle: &Bundle, launch: Option<u64>) -> Hello {
+    Hello {
+        protocol: PROTOCOL_VERSION,
+        role: Role::Bundle,
+        name: bundle.name.to_owned(),
+        version: bundle.version.to_owned(),
+        incarnation: incarnation(),
+        pid: std::process::id(),
+        launch,
+        capacity: CAPACITY,
+    }
+}
+
+/// A number that no other process has: the hasher's keys are random.
+fn incarnation() -> u64 {
+    use std::hash::BuildHasher as _;
+    std::hash::RandomState::new().hash_one((std::process::id(), std::time::SystemTime::now()))
+}
+
+/// Signals by which a person stops a bundle that he started. One that a supervisor started is
+/// drained by the broker instead, and ends at once at a signal.
+struct Stops(Vec<tokio::signal::unix::Signal>);
+
+impl Stops {
+    fn listen(supervised: bool) -> Stops {
+        use tokio::signal::unix::{SignalKind, signal};
+        let kinds = [SignalKind::terminate(), SignalKind::interrupt()];
+        let kinds = kinds.into_iter().filter(|_| !supervised);
+        // Where the system refuses, the signal ends the process, as it does without us.
+        Stops(kinds.filter_map(|kind| signal(kind).ok()).collect())
+    }
+
+    /// Cancel-safe.
+    async fn next(&mut self) {
+        std::future::poll_fn(|context| {
+            let told = |it: &mut tokio::signal::unix::Signal| it.poll_recv(context).is_ready();
+            if self.0.iter_mut().any(told) {
+                std::task::Poll::Ready(())
+            } else {
+                std::task::Poll::Pending
+            }
+        })
+        .await;
+    }
+}
+
+async fn serve(
+    (bundle, given): (&'static Bundle, Option<UserFiles>),
+    instance: &Instance,
+    hello: Hello,
+    mut stops: Stops,
+) -> Exit {
+    let peer = match Peer::join(instance, hello, PeerOptions::default()).await {
+        Ok(peer) => peer,
+        Err(error @ JoinError::NoBroker { .. }) => return fail(&error.to_string(), Exit::NoBroker),
+        Err(error) => return fail(&error.to_string(), Exit::Internal),
+    };
+    let (sender, mut progress) = mpsc::unbounded_channel();
+    let works = match worker::start(sender) {
+        Ok(works) => works,
+        Err(error) => {
+            return fail(
+                &format!("failed to start a thread: {error}"),
+                Exit::Internal,
+            );
+        }
+    };
+    let mut daemon = Daemon {
+        bundle,
+        given,
+        peer,
+        works,
+        plans: BTreeMap::new(),
+        waiting: VecDeque::new(),
+        running: None,
+        checker: None,
+        draining: false,
+        stopped: false,
+    };
+    let mut ticks = tokio::time::interval(HEARTBEAT);
+    ticks.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+    loop {
+        let ended = tokio::select! {
+            event = daemon.peer.next() => daemon.hear(event),
+            Some(event) = progress.recv() => { daemon.progress(event); None }
+            _ = ticks.tick() => { daemon.tick(); None }
+            () = stops.next() => daemon.stop(),
+        };
+        if let Some(exit) = ended {
+            return exit;
+        }
+        daemon.start_next();
+        if daemon.draining && daemon.is_idle() {
+            daemon.peer.send(&FromPeer::Leaving);
+            daemon.peer.leave().await;
+            return Exit::Accepted;
+        }
+    }
+}
+
+struct Daemon {
+    bundle: &'static Bundle,
+    given: Option<UserFiles>,
+    peer: Peer,
+    works: std::sync::mpsc::Sender<Work>,
+    /// What each configuration demands; made once.
+    plans: BTreeMap<Digest, Arc<Plan>>,
+    waiting: VecDeque<Job>,
+    running: Option<Running>,
+    /// The checker at work.
+    checker: Option<u32>,
+    draining: bool,
+    /// Told to stop by a person.
+    stopped: bool,
+}
+
+struct Running {
+    job: Job,
+    plan: Arc<Plan>,
+    cancelled: Arc<AtomicBool>,
+}
+
+impl Daemon {
+    /// What comes from the bus. `Some`: it is over.
+    fn hear(&mut self, event: PeerEvent) -> Option<Exit> {
+        match event {
+            PeerEvent::Message(message) => self.obey(message),
+            PeerEvent::Rejoined => self.forget_everything(),
+            PeerEvent::Document(_) | PeerEvent::Config(_) => {}
+            PeerEvent::Closed { reason } => {
+                tracing::info!(reason, "the session has ended");
+                // Told to go, or no broker came back: a supervisor reads the difference.
+                return Some(if self.draining {
+                    Exit::Accepted
+                } else {
+                    Exit::NoBroker
+                });
+            }
+        }
+        None
+    }
+
+    fn obey(&mut self, message: ToPeer) {
+        match message {
+            ToPeer::Welcome { .. } => {
+                self.forget_everything();
+                let mut catalogue = self.bundle.catalogue();
+                if let Some(given) = &self.given {
+                    given.tell(&mut catalogue);
+                }
+                self.peer.send(&FromPeer::Catalogue(Box::new(catalogue)));
+            }
+            // The broker does not know yet; `Leaving` tells it that this is left undone.
+            ToPeer::Job(_) if self.stopped => {}
+            ToPeer::Job(job) => {
+                self.ask_for_documents(&job);
+                self.waiting.push_back(job);
+            }
+            ToPeer::Cancel { job } => {
+                self.waiting.retain(|waiting| waiting.job != job);
+                if let Some(running) = self
+                    .running
+                    .as_ref()
+                    .filter(|running| running.job.job == job)
+                {
+                    running.cancelled.store(true, Ordering::Relaxed);
+                }
+            }
+            ToPeer::Drain => self.draining = true,
+            // The session ends with these words; `Closed` follows. Results are for reporters.
+            ToPeer::Refused { reason } => tracing::error!(reason, "the broker refused"),
+            ToPeer::Result(_) => {}
+        }
+    }
+
+    /// A person wants it to go: what is being checked is finished, what waits is not begun.
+    /// Asked twice it goes at once.
+    fn stop(&mut self) -> Option<Exit> {
+        if self.stopped {
+            return Some(Exit::Accepted);
+        }
+        self.stopped = true;
+        self.draining = true;
+        self.waiting.clear();
+        None
+    }
+
+    /// A new session: nothing that was asked before counts any more.
+    fn forget_everything(&mut self) {
+        self.waiting.clear();
+        if let Some(running) = &self.running {
+            running.cancelled.store(true, Ordering::Relaxed);
+        }
+    }
+
+    fn tick(&mut self) {
+        let job = self.running.as_ref().map(|running| running.job.job);
+        self.peer.send(&FromPeer::Heartbeat {
+            job,
+            checker: self.checker.filter(|_| job.is_some()),
+        });
+        if let Some(job) = self.waiting.front() {
+            let missing = self.missing_documents(job);
+            self.ask_for(&missing);
+        }
+    }
+
+    fn ask_for_documents(&mut self, job: &Job) {
+        let missing = self.missing_documents(job);
+        self.ask_for(&missing);
+    }
+
+    fn missing_documents(&self, job: &Job) -> BTreeSet<DocId> {
+        let docs = job.documents.iter().map(|document| document.doc);
+        docs.filter(|&doc| self.peer.document(doc).is_none())
+            .collect()
+    }
+
+    fn ask_for(&mut self, docs: &BTreeSet<DocId>) {
+        for &doc in docs {
+            self.peer.send(&FromPeer::NeedDocument { doc });
+        }
+    }
+
+    /// Hands the first job that is complete to the thread, when it is free.
+    fn start_next(&mut self) {
+        if self.running.is_some() {
+            return;
+        }
+        for index in 0..self.waiting.len() {
+            let Some((plan, work)) = self
+                .waiting
+                .get(index)
+                .cloned()
+                .and_then(|job| self.prepare(&job))
+            else {
+                continue;
+            };
+            let Some(job) = self.waiting.remove(index) else {
+                return;
+            };
+            self.running = Some(Running {
+                job,
+                plan,
+                cancelled: work.cancelled.clone(),
+            });
+            if self.works.send(work).is_err() {
+                tracing::error!("the checking thread has ended");
+                self.draining = true;
+                self.running = None;
+            }
+            return;
+        }
+    }
+
+    /// The work of a job, once its configuration and all its documents are here.
+    fn prepare(&mut self, job: &Job) -> Option<(Arc<Plan>, Work)> {
+        let plan = self.plan(job.config)?;
+        let held = |doc| self.peer.document(doc);
+        let (root, linked) = job.documents.split_first()?;
+        let root = held(root.doc)?;
+        let linked = linked.iter().map(|document| {
+            Some(LinkedHeld {
+                role: document.role,
+                path: document.path.clone(),
+                referred_at: document.referred_at,
+                image: held(document.doc)?,
+            })
+        });
+        let work = Work {
+            job: job.job,
+            kind: job.kind,
+            plan: plan.clone(),
+            root,
+            linked: linked.collect::<Option<_>>()?,
+            missing: job.missing.clone(),
+            cancelled: Arc::default(),
+        };
+        Some((plan, work))
+    }
+
+    fn plan(&mut self, digest: Digest) -> Option<Arc<Plan>> {
+        if let Some(plan) = self.plans.get(&digest) {
+            return Some(plan.clone());
+        }
+        let (current, bytes) = self
+            .peer
+            .config()
+            .filter(|(current, _)| *current == digest)?;
+        let config = codec::decode::<Option<Config>>(&bytes);
+        let config =
+            config.inspect_err(|error| tracing::error!(%error, "cannot read the configuration"));
+        let plan = Arc::new(configured(
+            self.bundle,
+            config.ok()?.as_ref(),
+            self.given.as_ref(),
+        ));
+        self.plans.insert(current, plan.clone());
+        Some(plan)
+    }
+
+    fn progress(&mut self, event: Progress) {
+        match event {
+            Progress::Begins { checker } => self.checker = Some(checker),
+            Progress::Ended {
+                job,
+                checker,
+                issues,
+                outcome,
+            } => {
+                if self.counts(job) {
+                    self.send_outcome(job, checker, issues, outcome);
+                }
+            }
+            Progress::Finished {
+                job,
+                micros,
+                failed,
+            } => {
+                if self.counts(job) {
+                    if let Some(reason) = failed {
+                        self.send_failure(job, &reason);
+                    }
+                    self.peer.send(&FromPeer::JobDone { job, micros });
+                }
+                self.let_go();
+            }
+        }
+    }
+
+    /// Whether the broker still wants to hear about the job.
+    fn counts(&self, job: JobId) -> bool {
+        let running = self
+            .running
+            .as_ref()
+            .filter(|running| running.job.job == job);
+        running.is_some_and(|running| !running.cancelled.load(Ordering::Relaxed))
+    }
+
+    fn send_outcome(&mut self, job: JobId, checker: u32, issues: Vec<Issue>, outcome: Outcome) {
+        let mut rest = issues.into_iter().peekable();
+        while rest.peek().is_some() {
+            let issues = rest.by_ref().take(BATCH).collect();
+            self.peer.send(&FromPeer::Issues {
+                job,
+                checker,
+                issues,
+            });
+        }
+        let Outcome {
+            status,
+            reason,
+            params,
+            metadata,
+            ..
+        } = outcome;
+        self.peer.send(&FromPeer::CheckerDone {
+            job,
+            checker,
+            status,
+            reason,
+            params,
+            metadata,
+        });
+    }
+
+    /// Nothing could be checked: every demanded checker has failed.
+    fn send_failure(&mut self, job: JobId, reason: &str) {
+        let Some(plan) = self.running.as_ref().map(|running| running.plan.clone()) else {
+            return;
+        };
+        let demanded = (0..plan.checkers().len()).filter(|&index| plan.is_demanded(index));
+        for checker in demanded.filter_map(|index| u32::try_from(index).ok()) {
+            self.peer.send(&FromPeer::CheckerDone {
+                job,
+                checker,
+                status: Status::Error,
+                reason: reason.to_owned(),
+                params: Vec::new(),
+                metadata: Vec::new(),
+            });
+        }
+    }
+
+    /// The job is over: its documents may go, unless another job waits for them.
+    fn let_go(&mut self) {
+        let Some(running) = self.running.take() else {
+            return;
+        };
+        let needed: BTreeSet<DocId> = self
+            .waiting
+            .iter()
+            .flat_map(|job| &job.documents)
+            .map(|document| document.doc)
+            .collect();
+        for document in running.job.documents {
+            if !needed.contains(&document.doc) {
+                self.peer.forget(document.doc);
+            }
+        }
+        self.checker = None;
+    }
+
+    fn is_idle(&self) -> bool {
+        self.waiting.is_empty() && self.running.is_none()
+    }
+}
+
+fn fail(text: &str, exit: Exit) -> Exit {
+    complain(&format!("{text}\n"));
+    exit
+}

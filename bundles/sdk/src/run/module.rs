@@ -1,0 +1,175 @@
+//! As a module of ASAM's quality checker framework: `-c config.xml`.
+
+use std::path::{Path, PathBuf};
+
+use qcbus_formats::config::Config;
+use qcbus_formats::pool::{PoolInput, Scope, pool};
+use qcbus_formats::xqar::{self, Dialect};
+
+use super::Exit;
+use super::file::{complain, examine};
+use crate::{BUILD_DATE, Bundle, Checker, Loaded, Plan, UserFiles};
+
+/// The bundle's parameters that name its result, the framework's first.
+const RESULT_PARAMS: [&str; 2] = ["strResultFile", "resultFile"];
+
+/// Why a module run fails; reads well after "failed to ".
+#[derive(Debug, thiserror::Error)]
+enum ModuleError {
+    #[error("read the configuration {}: {source}", path.display())]
+    Unreadable {
+        path: PathBuf,
+        source: std::io::Error,
+    },
+    #[error("read the configuration: {path}:{error}")]
+    Config {
+        path: String,
+        error: qcbus_formats::config::ConfigError,
+    },
+    #[error("find the file to check: the configuration has no Param `InputFile`")]
+    NoInput,
+    #[error(transparent)]
+    Load(#[from] crate::LoadError),
+    #[error("write the result {}: {source}", path.display())]
+    Write {
+        path: PathBuf,
+        source: std::io::Error,
+    },
+}
+
+/// Exit codes are the framework's: 0 when a result was written, whatever it says.
+pub(super) fn run(bundle: &'static Bundle, config: &Path, given: Option<&UserFiles>) -> Exit {
+    match module(bundle, config, given) {
+        Ok(()) => Exit::Accepted,
+        Err(error) => {
+            complain(&format!("failed to {error}\n"));
+            Exit::Usage
+        }
+    }
+}
+
+fn module(
+    bundle: &'static Bundle,
+    path: &Path,
+    given: Option<&UserFiles>,
+) -> Result<(), ModuleError> {
+    let bytes = std::fs::read(path).map_err(|source| ModuleError::Unreadable {
+        path: path.to_owned(),
+        source,
+    })?;
+    let parsed = Config::parse(&bytes).map_err(|error| ModuleError::Config {
+        path: path.display().to_string(),
+        error,
+    })?;
+    for notice in &parsed.notices {
+        tracing::warn!(
+            "{}:{}:{}: {}",
+            path.display(),
+            notice.row,
+            notice.column,
+            notice.text
+        );
+    }
+    let config = parsed.config;
+    let input = PathBuf::from(config.input_file().ok_or(ModuleError::NoInput)?);
+    let input = std::path::absolute(&input).unwrap_or(input);
+    let loaded = Loaded::from_path(&input, input.parent().unwrap_or(Path::new("/")))?;
+    let plan = if bundle.kinds.contains(&loaded.kind()) {
+        configured(bundle, Some(&config), given)
+    } else {
+        Plan::new(bundle, |_| false, |_, _| None)
+    };
+    let outcome = examine(&plan, &loaded)?;
+    let input = input.display().to_string();
+    let mut nowhere = qcbus_formats::pool::NoPlaces;
+    let pooled = pool(
+        PoolInput {
+            input_file: &input,
+            config: Some(&config),
+            bundles: vec![outcome],
+            remarks: Vec::new(),
+            scope: Scope::Alone,
+            version: bundle.version,
+            build_date: BUILD_DATE,
+        },
+        &mut nowhere,
+    );
+    write(
+        &result_path(bundle, &config),
+        &xqar::write(&pooled.results, Dialect::Current),
+    )
+}
+
+/// What a configuration demands of a bundle; without one, whatever is on by default.
+/// Reads the files that it names for rules, unless the command line gave some.
+pub(super) fn configured(
+    bundle: &'static Bundle,
+    config: Option<&Config>,
+    given: Option<&UserFiles>,
+) -> Plan {
+    let Some(config) = config else {
+        return Plan::by_default(bundle).with_files(given);
+    };
+    let section = config.bundle(bundle.name, bundle.alias);
+    let demanded = |checker: &Checker| {
+        config
+            .selects(bundle.name, bundle.alias, &checker.id)
+            .runs(checker.facts.default_on)
+    };
+    let plan = Plan::new(bundle, demanded, |checker, name| {
+        // Asked with an empty default, an empty answer means: not configured.
+        let asked = xqar::Param {
+            name: name.to_owned(),
+            value: String::new(),
+        };
+        let params = config.effective_params(section, &checker.id, &[asked]);
+        params
+            .into_iter()
+            .find(|param| param.name == name)
+            .map(|p| p.value)
+            .filter(|v| !v.is_empty())
+    });
+    plan.with_files(given)
+}
+
+/// As ASAM's bundles: the bundle's Param, relative to the current directory; else the bundle's name.
+fn result_path(bundle: &Bundle, config: &Config) -> PathBuf {
+    let section = config.bundle(bundle.name, bundle.alias);
+    let params = section
+        .map(|section| section.params.as_slice())
+        .unwrap_or_default();
+    let named = RESULT_PARAMS.iter().find_map(|name| {
+        params
+            .iter()
+            .find(|param| param.name == *name && !param.value.is_empty())
+    });
+    named.map_or_else(
+        || PathBuf::from(format!("{}.xqar", bundle.name)),
+        |param| PathBuf::from(&param.value),
+    )
+}
+
+/// Whole or not at all: a reader never sees half a result.
+fn write(path: &Path, text: &str) -> Result<(), ModuleError> {
+    let failed = |source| ModuleError::Write {
+        path: path.to_owned(),
+        source,
+    };
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    std::fs::create_dir_all(folder).map_err(failed)?;
+    // Readable for everybody whom the umask allows, unlike other temporary files.
+    let readable = std::os::unix::fs::PermissionsExt::from_mode(0o666);
+    let temporary = tempfile::Builder::new()
+        .permissions(readable)
+        .tempfile_in(folder)
+        .map_err(failed)?;
+    std::fs::write(temporary.path(), text).map_err(failed)?;
+    temporary.as_file().sync_all().map_err(failed)?;
+    temporary
+        .persist(path)
+        .map_err(|error| failed(error.error))?;
+    Ok(())
+}

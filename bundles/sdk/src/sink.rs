@@ -1,0 +1,318 @@
+//! Where a rule puts what it found.
+
+use qcbus_formats::xqar::{DomainInfo, Issue, Level, Location, Metadata};
+
+use crate::param::MAX_ISSUES;
+use crate::place::{Place, Spot, locate};
+use crate::rule::Facts;
+use crate::{Param, Subject, Values, Version};
+
+/// Collects the findings of one checker about one subject.
+///
+/// ```text
+/// found
+///     .issue(road, format!("the road is {length} m long, but must be longer than 0 m"))
+///     .at(predecessor, "the road before it")
+///     .road(id, s, 0.0);
+/// ```
+pub struct Sink<'d> {
+    subject: &'d Subject<'d>,
+    facts: Facts,
+    values: Values,
+    /// Said on every issue of a rule that is not normative for the document's version.
+    not_normative: Option<String>,
+    kept: Vec<((usize, u32), Issue)>,
+    suppressed: Option<Suppressed>,
+    metadata: Vec<Metadata>,
+    /// Takes what is said about a finding that is not kept.
+    scratch: Issue,
+}
+
+/// The findings beyond the limit.
+struct Suppressed {
+    count: u64,
+    /// Worst of all but the last.
+    worst: Level,
+    /// The last one's, which its rule may still change.
+    last: Level,
+    first: Spot,
+}
+
+impl<'d> Sink<'d> {
+    pub(crate) fn new(
+        subject: &'d Subject<'d>,
+        facts: Facts,
+        values: Values,
+        not_normative: Option<String>,
+    ) -> Sink<'d> {
+        let scratch = issue(String::new(), facts.level, "");
+        Sink {
+            subject,
+            facts,
+            values,
+            not_normative,
+            kept: Vec::new(),
+            suppressed: None,
+            metadata: Vec::new(),
+            scratch,
+        }
+    }
+
+    /// Says that something is wrong at a place. The text names what was found and what is
+    /// allowed. Further facts can be added to what is returned.
+    pub fn issue<'p>(
+        &mut self,
+        at: impl Into<Place<'p>>,
+        text: impl Into<String>,
+    ) -> Finding<'_, 'd> {
+        let place = at.into();
+        let lowered = self.not_normative.is_some();
+        let level = if lowered {
+            lower(self.facts.level)
+        } else {
+            self.facts.level
+        };
+        let full = self.kept.len() >= self.limit();
+        let issue = if full {
+            self.suppress(&place, level);
+            &mut self.scratch
+        } else {
+            let issue = self.complete(&place, text.into(), level);
+            self.kept.push(issue);
+            match self.kept.last_mut() {
+                Some((_, issue)) => issue,
+                None => &mut self.scratch,
+            }
+        };
+        let unlisted = self
+            .suppressed
+            .as_mut()
+            .filter(|_| full)
+            .map(|suppressed| &mut suppressed.last);
+        Finding {
+            issue,
+            subject: self.subject,
+            facts: &self.facts,
+            lowered,
+            unlisted,
+        }
+    }
+
+    /// Adds a fact about the check itself, such as what the document was measured by.
+    pub fn fact(&mut self, key: &str, value: impl Into<String>, description: &str) {
+        self.metadata.push(Metadata {
+            key: key.to_owned(),
+            value: value.into(),
+            description: description.to_owned(),
+        });
+    }
+
+    /// What is checked, with everything that the root refers to.
+    pub fn subject(&self) -> &'d Subject<'d> {
+        self.subject
+    }
+
+    /// The version of the standard that the document names.
+    pub fn version(&self) -> Option<Version> {
+        self.subject.version()
+    }
+
+    /// The value of a number that the rule declares.
+    pub fn number(&self, param: &Param) -> f64 {
+        self.values.number(param)
+    }
+
+    /// The value of a flag that the rule declares.
+    pub fn flag(&self, param: &Param) -> bool {
+        self.values.flag(param)
+    }
+
+    /// The value of a text that the rule declares.
+    pub fn text(&self, param: &Param) -> String {
+        self.values.text(param)
+    }
+
+    /// How many findings there are, listed or not.
+    pub fn count(&self) -> u64 {
+        self.kept.len() as u64
+            + self
+                .suppressed
+                .as_ref()
+                .map_or(0, |suppressed| suppressed.count)
+    }
+
+    /// The findings in document order, and facts about those that are not listed.
+    pub(crate) fn finish(mut self) -> (Vec<Issue>, Vec<Metadata>) {
+        self.kept.sort_by_key(|(order, _)| *order);
+        let limit = self.limit();
+        let mut issues: Vec<Issue> = self.kept.into_iter().map(|(_, issue)| issue).collect();
+        let Some(suppressed) = self.suppressed else {
+            return (issues, self.metadata);
+        };
+        let count = suppressed.count;
+        let text = format!(
+            "{count} further findings of this checker are not listed, because it lists {limit} \
+             (parameter `{}`)",
+            MAX_ISSUES.name
+        );
+        // As severe as the worst of them, so that a verdict cannot depend on the limit.
+        let worst = suppressed.worst.min(suppressed.last);
+        let mut rest = issue(text, worst, first(self.facts.uids));
+        rest.locations.push(suppressed.first.locations);
+        rest.domain_info.extend(suppressed.first.elsewhere);
+        issues.push(rest);
+        let metadata = Metadata {
+            key: "qcbus.not_listed".to_owned(),
+            value: count.to_string(),
+            description: "findings beyond the number that this checker lists".to_owned(),
+        };
+        self.metadata.push(metadata);
+        (issues, self.metadata)
+    }
+
+    fn limit(&self) -> usize {
+        // At least one, so that something is always shown; the cast saturates.
+        self.values.number(&MAX_ISSUES).max(1.0) as usize
+    }
+
+    fn suppress(&mut self, place: &Place<'_>, level: Level) {
+        let subject = self.subject;
+        let suppressed = self.suppressed.get_or_insert_with(|| Suppressed {
+            count: 0,
+            worst: Level::Information,
+            last: Level::Information,
+            first: locate(subject, place, Some("the first that is not listed")),
+        });
+        suppressed.count += 1;
+        suppressed.worst = suppressed.worst.min(suppressed.last);
+        suppressed.last = level;
+        self.scratch.locations.clear();
+        self.scratch.domain_info.clear();
+    }
+
+    fn complete(&self, place: &Place<'_>, mut text: String, level: Level) -> ((usize, u32), Issue) {
+        if let Some(note) = &self.not_normative {
+            text.push_str(note);
+        }
+        let spot = locate(self.subject, place, None);
+        let mut issue = issue(text, level, first(self.facts.uids));
+        issue.locations.push(spot.locations);
+        issue.domain_info.extend(spot.elsewhere);
+        (spot.order, issue)
+    }
+}
+
+/// One finding that has been put into the [`Sink`], to be completed.
+pub struct Finding<'s, 'd> {
+    issue: &'s mut Issue,
+    subject: &'d Subject<'d>,
+    facts: &'s Facts,
+    lowered: bool,
+    /// Set when the finding is only counted: where its level is kept.
+    unlisted: Option<&'s mut Level>,
+}
+
+impl Finding<'_, '_> {
+    /// Describes the place itself, instead of "element `road`".
+    pub fn here(self, description: &str) -> Self {
+        let elsewhere = !self.issue.domain_info.is_empty();
+        if let Some(locations) = self.issue.locations.first_mut() {
+            let place = locations
+                .description
+                .rsplit_once(": ")
+                .filter(|_| elsewhere);
+            let prefix = place
+                .map(|(place, _)| format!("{place}: "))
+                .unwrap_or_default();
+            locations.description = format!("{prefix}{description}");
+        }
+        self
+    }
+
+    /// Adds a further place and what is to be seen there.
+    pub fn at<'p>(self, place: impl Into<Place<'p>>, description: impl AsRef<str>) -> Self {
+        if !self.is_listed() {
+            return self;
+        }
+        let spot = locate(self.subject, &place.into(), Some(description.as_ref()));
+        self.issue.locations.push(spot.locations);
+        self.issue.domain_info.extend(spot.elsewhere);
+        self
+    }
+
+    /// Adds the point in the inertial coordinate system, in metres, to the place named last.
+    pub fn point(self, x: f64, y: f64, z: f64) -> Self {
+        self.also(Location::Inertial { x, y, z })
+    }
+
+    /// Adds the position on a road, in metres, to the place named last.
+    pub fn road(self, road_id: &str, s: f64, t: f64) -> Self {
+        self.also(Location::Road {
+            road_id: road_id.to_owned(),
+            s,
+            t,
+        })
+    }
+
+    /// Adds facts that the result format has no element for.
+    pub fn info(self, info: DomainInfo) -> Self {
+        if self.is_listed() {
+            self.issue.domain_info.push(info);
+        }
+        self
+    }
+
+    /// Another severity than the rule's. It is lowered as the rule's would be.
+    pub fn level(mut self, level: Level) -> Self {
+        self.issue.level = if self.lowered { lower(level) } else { level };
+        if let Some(level) = &mut self.unlisted {
+            **level = self.issue.level;
+        }
+        self
+    }
+
+    /// Another UID of the rule than its first.
+    pub fn uid(self, uid: &str) -> Self {
+        debug_assert!(
+            self.facts.uids.contains(&uid),
+            "{uid} is no UID of {}",
+            self.facts.id
+        );
+        uid.clone_into(&mut self.issue.rule_uid);
+        self
+    }
+
+    fn also(self, location: Location) -> Self {
+        if let Some(locations) = self.issue.locations.last_mut() {
+            locations.places.push(location);
+        }
+        self
+    }
+
+    fn is_listed(&self) -> bool {
+        self.unlisted.is_none()
+    }
+}
+
+/// One severity less; information stays information.
+fn lower(level: Level) -> Level {
+    match level {
+        Level::Error => Level::Warning,
+        Level::Warning | Level::Information => Level::Information,
+    }
+}
+
+fn first(uids: &[&'static str]) -> &'static str {
+    uids.first().copied().unwrap_or("")
+}
+
+fn issue(description: String, level: Level, uid: &str) -> Issue {
+    Issue {
+        id: 0,
+        description,
+        level,
+        rule_uid: uid.to_owned(),
+        locations: Vec::new(),
+        domain_info: Vec::new(),
+    }
+}

@@ -1,0 +1,104 @@
+//! What is checked: a root document and the documents that it refers to.
+
+use std::cell::RefCell;
+
+use qcbus_document::{Document, FileKind, Node, XPaths};
+use qcbus_messages::{DocumentRole, MissingDocument};
+
+use crate::{Brought, Version};
+
+/// The documents of one check.
+#[derive(Debug, Clone)]
+pub struct Subject<'d> {
+    root: Document<'d>,
+    kind: FileKind,
+    version: Option<Version>,
+    linked: Vec<Linked<'d>>,
+    missing: Vec<MissingDocument>,
+    brought: Vec<Brought>,
+    paths: RefCell<XPaths>,
+}
+
+/// A document that the root refers to.
+#[derive(Debug, Clone)]
+pub struct Linked<'d> {
+    /// The document.
+    pub document: Document<'d>,
+    /// What it is to the root.
+    pub role: DocumentRole,
+    /// Absolute path; for a member of an archive, the archive's path, `!` and the member's name.
+    pub path: String,
+    /// Byte offset of the referring element in the root's image.
+    pub referred_at: u32,
+}
+
+impl<'d> Subject<'d> {
+    /// A root document on its own. `version` is what the document says about itself.
+    pub fn new(root: Document<'d>, kind: FileKind, version: Option<Version>) -> Subject<'d> {
+        Subject {
+            root,
+            kind,
+            version,
+            linked: Vec::new(),
+            missing: Vec::new(),
+            brought: Vec::new(),
+            paths: RefCell::new(XPaths::new(root)),
+        }
+    }
+
+    /// Adds the documents that the root refers to, and those that could not be had.
+    #[must_use]
+    pub fn with(mut self, linked: Vec<Linked<'d>>, missing: Vec<MissingDocument>) -> Subject<'d> {
+        self.linked = linked;
+        self.missing = missing;
+        self
+    }
+
+    /// The same subject with what was made of the user's files; see [`crate::Resource`].
+    #[must_use]
+    pub fn bringing(mut self, brought: Vec<Brought>) -> Subject<'d> {
+        self.brought = brought;
+        self
+    }
+
+    /// What was made of the user's files, if the user brought any for this bundle.
+    pub fn brought<T: 'static>(&self) -> Option<&T> {
+        self.brought.iter().find_map(|one| one.downcast_ref())
+    }
+
+    /// The document that is checked.
+    pub fn root(&self) -> Document<'d> {
+        self.root
+    }
+
+    /// What the root file's name promises.
+    pub fn kind(&self) -> FileKind {
+        self.kind
+    }
+
+    /// The version of its standard that the root names, if it names one.
+    pub fn version(&self) -> Option<Version> {
+        self.version
+    }
+
+    /// The documents that the root refers to, in the order of the references.
+    pub fn linked(&self) -> &[Linked<'d>] {
+        &self.linked
+    }
+
+    /// The documents of one role, in the order of the references.
+    pub fn with_role(&self, role: DocumentRole) -> impl Iterator<Item = &Linked<'d>> {
+        self.linked.iter().filter(move |linked| linked.role == role)
+    }
+
+    /// The XPath of an element. Many findings within one large parent cost no more than few: what
+    /// tells the root document's elements from their siblings is remembered.
+    pub(crate) fn xpath(&self, node: Node<'_>) -> String {
+        self.paths.borrow_mut().xpath(node)
+    }
+
+    /// What the root refers to and could not be had.
+    pub fn missing(&self) -> &[MissingDocument] {
+        &self.missing
+    }
+}

@@ -1,0 +1,274 @@
+//! Gates, preconditions, panics, backports and limits, with rules made for it.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "tests fail by panicking, their helpers too"
+)]
+
+use std::path::Path;
+
+use qcbus_document::{Document, FileKind};
+use qcbus_formats::pool::CheckerOutcome;
+use qcbus_formats::xqar::Status;
+use qcbus_sdk::{
+    AnyRule, Backport, Bundle, Checker, Level, Loaded, Model, Param, Plan, Rule, Sink, Skip,
+    Subject, Version, basic, examine,
+};
+
+const LIMIT: Param = Param::number("limit", 0.0, "m", "a limit");
+
+static FINDS_ERRORS: Rule<Document> = Rule {
+    id: "finds_errors",
+    uids: &["x:xodr:1.0.0:a.b"],
+    run: every_road,
+    ..Rule::DEFAULTS
+};
+static PANICS: Rule<Document> = Rule {
+    id: "panics",
+    uids: &["x:xodr:1.0.0:a.c"],
+    run: |document, found| {
+        every_road(document, found);
+        panic!("on purpose");
+    },
+    ..Rule::DEFAULTS
+};
+static AFTER_ERRORS: Rule<Document> = Rule {
+    id: "after_errors",
+    uids: &["x:xodr:1.0.0:a.d"],
+    after: &["finds_errors"],
+    run: every_road,
+    ..Rule::DEFAULTS
+};
+static AFTER_SKIPPED: Rule<Document> = Rule {
+    id: "after_skipped",
+    uids: &["x:xodr:1.0.0:a.e"],
+    after: &["after_errors"],
+    run: every_road,
+    ..Rule::DEFAULTS
+};
+static NEWER: Rule<Document> = Rule {
+    id: "newer",
+    uids: &["x:xodr:1.8.0:a.f"],
+    versions: "1.8.0..",
+    run: every_road,
+    ..Rule::DEFAULTS
+};
+static LOWERED: Rule<Document> = Rule {
+    id: "lowered",
+    uids: &["x:xodr:1.8.0:a.g"],
+    versions: "1.8.0..",
+    backport: Backport::Lower { since: "1.4.0" },
+    run: every_road,
+    ..Rule::DEFAULTS
+};
+static SEPARATE: Rule<Document> = Rule {
+    id: "separate",
+    uids: &["x:xodr:1.8.0:a.h"],
+    versions: "1.8.0..",
+    backport: Backport::Separate { since: "" },
+    run: every_road,
+    ..Rule::DEFAULTS
+};
+static WITH_PARAM: Rule<Document> = Rule {
+    id: "with_param",
+    uids: &["x:xodr:1.0.0:a.i"],
+    params: &[LIMIT],
+    run: |_, found| assert_eq!(found.number(&LIMIT), 2.5),
+    ..Rule::DEFAULTS
+};
+static ON_NO_MODEL: Rule<Unavailable> = Rule {
+    id: "on_no_model",
+    uids: &["x:xodr:1.0.0:a.j"],
+    run: |_, _| unreachable!(),
+    ..Rule::DEFAULTS
+};
+
+struct Unavailable;
+
+impl Model for Unavailable {
+    type Of<'d> = ();
+
+    fn build<'d>(_: &'d Subject<'d>) -> Result<(), Skip> {
+        Err(Skip("there is nothing to look at".to_owned()))
+    }
+}
+
+static RULES: &[&dyn AnyRule] = &[
+    &FINDS_ERRORS,
+    &PANICS,
+    &AFTER_ERRORS,
+    &AFTER_SKIPPED,
+    &NEWER,
+    &LOWERED,
+    &SEPARATE,
+    &WITH_PARAM,
+    &ON_NO_MODEL,
+];
+
+static BUNDLE: Bundle = Bundle {
+    name: "testBundle",
+    alias: "test",
+    version: "0",
+    description: "rules for tests",
+    standard: "OpenDRIVE",
+    kinds: &[FileKind::Xodr],
+    versions: &[Version::new(1, 4)],
+    version_of: |document| basic::version_of(document, "header"),
+    rules: RULES,
+    templates: &[],
+};
+
+fn every_road(document: &Document<'_>, found: &mut Sink<'_>) {
+    for road in document.elements("road") {
+        found.issue(road, "a road").at(road, "the same road");
+    }
+}
+
+const MAP: &str = "<OpenDRIVE>\n<header revMajor='1' revMinor='4'/>\n<road id='1'/>\n<road id='2'/>\n</OpenDRIVE>\n";
+
+fn checked(
+    demanded: impl Fn(&Checker) -> bool,
+    configured: impl Fn(&Checker, &str) -> Option<String>,
+) -> Vec<CheckerOutcome> {
+    let loaded = Loaded::from_bytes(Path::new("a.xodr"), MAP.as_bytes().to_vec()).unwrap();
+    examine(&Plan::new(&BUNDLE, demanded, configured), &loaded)
+        .unwrap()
+        .checkers
+}
+
+fn of(id: &str) -> CheckerOutcome {
+    let mut all = checked(
+        |checker| checker.id == id,
+        |_, name| (name == "limit").then(|| "2.5".to_owned()),
+    );
+    assert_eq!(all.len(), 1, "only what is demanded is reported");
+    all.remove(0)
+}
+
+#[test]
+fn findings_are_located_and_in_document_order() {
+    let outcome = of("finds_errors");
+    assert_eq!(outcome.status, Some(Status::Completed));
+    let places: Vec<_> = outcome
+        .issues
+        .iter()
+        .map(|issue| format!("{:?}", issue.locations[0].places))
+        .collect();
+    assert!(
+        places[0].contains("row: 3") && places[0].contains("/OpenDRIVE/road[@id='1']"),
+        "{places:?}"
+    );
+    assert!(places[1].contains("row: 4"), "{places:?}");
+    assert_eq!(outcome.issues[0].locations.len(), 2);
+}
+
+#[test]
+fn a_panic_is_that_checkers_error_and_keeps_what_was_found() {
+    let outcome = of("panics");
+    assert_eq!(
+        (outcome.status, outcome.issues.len()),
+        (Some(Status::Error), 2)
+    );
+    assert!(outcome.reason.contains("on purpose"), "{}", outcome.reason);
+    assert_eq!(
+        checked(|_| true, |_, _| None).len(),
+        RULES.len() + 1,
+        "the others go on"
+    );
+}
+
+#[test]
+fn preconditions_hold_transitively_even_when_not_demanded() {
+    let reasons = [of("after_errors"), of("after_skipped")].map(|outcome| {
+        assert_eq!(
+            (outcome.status, outcome.issues.len()),
+            (Some(Status::Skipped), 0)
+        );
+        outcome.reason
+    });
+    assert_eq!(
+        reasons,
+        ["`finds_errors` found errors", "`after_errors` was skipped"]
+    );
+}
+
+#[test]
+fn versions_gate_and_backports_lower() {
+    assert_eq!(
+        of("newer").reason,
+        "the rule applies to OpenDRIVE 1.8 and later; the file is 1.4"
+    );
+    let lowered = of("lowered");
+    assert_eq!(lowered.issues[0].level, Level::Warning);
+    assert!(
+        lowered.issues[0]
+            .description
+            .contains("1.4 does not demand this"),
+        "{lowered:?}"
+    );
+    assert_eq!(of("separate").status, Some(Status::Skipped));
+    let backport = of("separate_backport");
+    assert_eq!(
+        (backport.status, backport.issues[0].level),
+        (Some(Status::Completed), Level::Warning)
+    );
+}
+
+#[test]
+fn parameters_reach_the_rule_and_the_result() {
+    let outcome = of("with_param");
+    assert_eq!(
+        (outcome.status, outcome.params[0].value.as_str()),
+        (Some(Status::Completed), "2.5")
+    );
+    let wrong = checked(
+        |checker| checker.id == "with_param",
+        |_, _| Some("much".to_owned()),
+    );
+    assert_eq!(wrong[0].status, Some(Status::Error));
+    assert!(wrong[0].reason.contains("`much`"), "{}", wrong[0].reason);
+}
+
+#[test]
+fn a_model_that_cannot_be_built_skips_its_rules() {
+    let outcome = of("on_no_model");
+    assert_eq!(
+        (outcome.status, outcome.reason.as_str()),
+        (Some(Status::Skipped), "there is nothing to look at")
+    );
+}
+
+#[test]
+fn beyond_the_limit_findings_are_counted_and_keep_their_level() {
+    let limited = checked(
+        |checker| checker.id == "finds_errors",
+        |_, name| (name == "qcbus.max_issues").then(|| "1".to_owned()),
+    );
+    let [listed, rest] = limited[0].issues.as_slice() else {
+        panic!("{limited:?}")
+    };
+    assert_eq!((listed.level, rest.level), (Level::Error, Level::Error));
+    assert!(
+        rest.description.starts_with("1 further finding"),
+        "{}",
+        rest.description
+    );
+    assert_eq!(limited[0].metadata[0].value, "1");
+}
+
+#[test]
+fn rules_are_found_by_id_uid_and_their_ends() {
+    let ids = |name: &str| {
+        BUNDLE
+            .find(name)
+            .iter()
+            .map(|rule| rule.facts().id)
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(ids("finds_errors"), ["finds_errors"]);
+    assert_eq!(ids("x:xodr:1.8.0:a.h"), ["separate"]);
+    assert_eq!(ids("separate_backport"), ["separate"]);
+    assert_eq!(ids("errors"), ["finds_errors", "after_errors"]);
+    assert!(ids("nothing").is_empty() && ids("").is_empty());
+}

@@ -1,0 +1,18 @@
+//! The center lane: what it must not have.
+
+use qcbus_opendrive::{LaneGroup, RoadMap};
+use qcbus_sdk::Sink;
+
+/// Reports children of this name of center lanes. `why` completes "the center lane has an
+/// element `width`, but ".
+pub(crate) fn has_no(map: &RoadMap<'_>, element: &str, why: &str, found: &mut Sink<'_>) {
+    for lane in map.lanes().filter(|lane| lane.group() == LaneGroup::Center) {
+        for child in lane.node().children_named(element) {
+            let text = format!("the center lane has an element `{element}`, but {why}");
+            let finding = found.issue(child, text);
+            if let Some(s) = lane.at.s() {
+                finding.road(lane.at.road.id(), s, 0.0);
+            }
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! Markings of objects and the outline points that they refer to.
+
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+
+use crate::families::object_parts::{corners, objects, outlines};
+
+/// A `<marking>` where it stands.
+#[derive(Clone, Copy)]
+pub(crate) struct Marking<'a> {
+    /// The element.
+    pub node: Node<'a>,
+    /// The object that is marked.
+    pub object: Node<'a>,
+    /// The outline in which it stands; `None` for one of the object.
+    pub outline: Option<Node<'a>>,
+}
+
+/// The markings of objects and of their outlines.
+pub(crate) fn markings<'a>(map: &RoadMap<'a>) -> impl Iterator<Item = Marking<'a>> + use<'a> {
+    objects(map).flat_map(|object| {
+        let of_outlines = outlines(object).flat_map(move |outline| {
+            within(outline).map(move |node| Marking {
+                node,
+                object,
+                outline: Some(outline),
+            })
+        });
+        let of_object = within(object).map(move |node| Marking {
+            node,
+            object,
+            outline: None,
+        });
+        of_object.chain(of_outlines)
+    })
+}
+
+fn within(parent: Node<'_>) -> impl Iterator<Item = Node<'_>> {
+    parent
+        .children_named("markings")
+        .flat_map(|markings| markings.children_named("marking"))
+}
+
+impl<'a> Marking<'a> {
+    /// The corner references in document order.
+    pub fn references(self) -> impl Iterator<Item = Node<'a>> {
+        self.node.children_named("cornerReference")
+    }
+
+    /// Its references as positions in its outline, with the outline's points; `None` unless it
+    /// stands in an outline, or in the only outline's object as before 1.9, and all of its
+    /// references can be resolved.
+    pub fn path(self) -> Option<Path<'a>> {
+        let outline = match self.outline {
+            Some(outline) => outline,
+            None => only(outlines(self.object))?,
+        };
+        let points: Vec<Node<'a>> = corners(outline).collect();
+        let steps = self.references().map(|reference| {
+            let id = reference.attr("id")?;
+            let index = points
+                .iter()
+                .position(|point| point.attr("id") == Some(id))?;
+            Some((reference, index))
+        });
+        let steps = steps.collect::<Option<Vec<_>>>()?;
+        Some(Path {
+            outline,
+            points,
+            steps,
+        })
+    }
+}
+
+/// What a marking follows on its outline.
+pub(crate) struct Path<'a> {
+    /// The outline.
+    pub outline: Node<'a>,
+    /// Its points.
+    pub points: Vec<Node<'a>>,
+    /// Each reference with the position of its point.
+    pub steps: Vec<(Node<'a>, usize)>,
+}
+
+impl Path<'_> {
+    /// Whether the outline says that it is closed; `None` when that follows from the object's
+    /// type.
+    pub fn is_closed(&self) -> Option<bool> {
+        match self.outline.attr("closed")?.trim() {
+            "true" | "1" => Some(true),
+            "false" | "0" => Some(false),
+            _ => None,
+        }
+    }
+}
+
+fn only<'a>(mut nodes: impl Iterator<Item = Node<'a>>) -> Option<Node<'a>> {
+    let first = nodes.next()?;
+    nodes.next().is_none().then_some(first)
+}

@@ -1,0 +1,115 @@
+//! Parametric curves whose length is not the one that their geometry says (OpenDRIVE 1.9, 9.6).
+
+use qcbus_opendrive::geometry::{ParamPoly3, ParamRange};
+use qcbus_opendrive::{Geometry, Road, RoadMap};
+use qcbus_sdk::{Param, Place, Sink};
+
+use super::on_road::OnRoad;
+
+/// How far both lengths may differ.
+pub(crate) const LENGTH_TOLERANCE: Param = Param::number(
+    "length_tolerance",
+    0.001,
+    "m",
+    "largest difference between the curve's length and `@length` that is accepted",
+);
+
+/// Reports curves of this range whose parameter does not run as far as `@pRange` says: integrated
+/// over the range, the curve is not `@length` long.
+pub(crate) fn range_fits(map: &RoadMap<'_>, range: ParamRange, found: &mut Sink<'_>) {
+    for_each_mismatch(map, found, |curve, mismatch, found| {
+        if curve.range != range
+            || mismatch
+                .geometry
+                .shape_node()
+                .is_none_or(|node| node.attribute("pRange").is_none())
+        {
+            return;
+        }
+        let (word, interval) = match range {
+            ParamRange::ArcLength => ("arcLength", format!("0 to {}", mismatch.length)),
+            ParamRange::Normalized => ("normalized", "0 to 1".to_owned()),
+        };
+        let hint = match other_range(&curve, &mismatch, found.number(&LENGTH_TOLERANCE)) {
+            Some(other) => format!("; with `{other}` it would be that long"),
+            None => String::new(),
+        };
+        let text = format!(
+            "with `pRange=\"{word}\"` the parameter runs from {interval}, over which the curve is {:.6} m \
+             long, not {} m as `length` says{hint}",
+            mismatch.found, mismatch.length
+        );
+        report(&mismatch, text, found);
+    });
+}
+
+/// Reports curves with a normalized parameter, said or by default, whose length is not `@length`.
+/// Those with `arcLength` are said to have the wrong range instead.
+pub(crate) fn length_matches(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for_each_mismatch(map, found, |curve, mismatch, found| {
+        if curve.range == ParamRange::Normalized {
+            let text = format!(
+                "the curve is {:.6} m long, but `length` says {} m; they should agree within {} m",
+                mismatch.found,
+                mismatch.length,
+                found.number(&LENGTH_TOLERANCE)
+            );
+            report(&mismatch, text, found);
+        }
+    });
+}
+
+struct Mismatch<'m, 'a> {
+    road: &'m Road<'a>,
+    geometry: &'m Geometry<'a>,
+    length: f64,
+    found: f64,
+}
+
+fn for_each_mismatch<'d>(
+    map: &RoadMap<'_>,
+    found: &mut Sink<'d>,
+    mut report: impl FnMut(ParamPoly3, Mismatch<'_, '_>, &mut Sink<'d>),
+) {
+    let tolerance = found.number(&LENGTH_TOLERANCE);
+    for road in map.roads() {
+        for geometry in road.plan_view().geometries() {
+            let lengths = geometry.length().zip(geometry.true_length());
+            let (Some(curve), Some((length, true_length))) = (geometry.param_poly3(), lengths)
+            else {
+                continue;
+            };
+            if (true_length - length).abs() > tolerance {
+                let mismatch = Mismatch {
+                    road,
+                    geometry,
+                    length,
+                    found: true_length,
+                };
+                report(curve, mismatch, found);
+            }
+        }
+    }
+}
+
+/// The other range's name, if the curve has the right length over that one.
+fn other_range(
+    curve: &ParamPoly3,
+    mismatch: &Mismatch<'_, '_>,
+    tolerance: f64,
+) -> Option<&'static str> {
+    let (word, end) = match curve.range {
+        ParamRange::ArcLength => ("normalized", 1.0),
+        ParamRange::Normalized => ("arcLength", mismatch.length),
+    };
+    let length = curve.arc_length(0.0, end)?;
+    ((length - mismatch.length).abs() <= tolerance).then_some(word)
+}
+
+fn report(mismatch: &Mismatch<'_, '_>, text: String, found: &mut Sink<'_>) {
+    let geometry = mismatch.geometry;
+    let middle = geometry.s().unwrap_or(0.0) + 0.5 * mismatch.length;
+    found
+        .issue(Place::attribute_or_node(geometry.node(), "length"), text)
+        .on(mismatch.road, middle, 0.0);
+}

@@ -1,0 +1,222 @@
+//! What has an id, and what refers to it.
+
+use qcbus_document::{Document, Node};
+
+/// A kind of element that carries an id.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) enum Class {
+    Road,
+    Junction,
+    JunctionGroup,
+    Controller,
+    Object,
+    Bridge,
+    Tunnel,
+    Signal,
+    Switch,
+    Station,
+    Platform,
+    VmsGroup,
+    Connection,
+    CrossPath,
+    RoadSection,
+    Outline,
+    Corner,
+    Vertex,
+}
+
+/// Where the ids of a class must be unique.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Scope {
+    /// In the whole file.
+    File,
+    /// Within the nearest ancestor of this name.
+    Within(&'static str),
+}
+
+/// How elements of a class are recognised: elements of these names below one of these parents.
+pub(crate) struct Kind {
+    pub class: Class,
+    /// For texts: `road`, `signal`.
+    pub name: &'static str,
+    pub elements: &'static [&'static str],
+    /// Elements of the same name elsewhere are references or something else. Empty: anywhere.
+    pub parents: &'static [&'static str],
+    pub scope: Scope,
+}
+
+const fn kind(
+    class: Class,
+    name: &'static str,
+    elements: &'static [&'static str],
+    parents: &'static [&'static str],
+    scope: Scope,
+) -> Kind {
+    Kind {
+        class,
+        name,
+        elements,
+        parents,
+        scope,
+    }
+}
+
+/// Every class. Lanes are not among them: their numbers have rules of their own.
+pub(crate) const KINDS: &[Kind] = &[
+    kind(Class::Road, "road", &["road"], &["OpenDRIVE"], Scope::File),
+    kind(
+        Class::Junction,
+        "junction",
+        &["junction"],
+        &["OpenDRIVE"],
+        Scope::File,
+    ),
+    kind(
+        Class::JunctionGroup,
+        "junction group",
+        &["junctionGroup"],
+        &["OpenDRIVE"],
+        Scope::File,
+    ),
+    // A `controller` of a junction refers to one.
+    kind(
+        Class::Controller,
+        "controller",
+        &["controller"],
+        &["OpenDRIVE"],
+        Scope::File,
+    ),
+    kind(
+        Class::Object,
+        "object",
+        &["object"],
+        &["objects"],
+        Scope::File,
+    ),
+    kind(
+        Class::Bridge,
+        "bridge",
+        &["bridge"],
+        &["objects"],
+        Scope::File,
+    ),
+    kind(
+        Class::Tunnel,
+        "tunnel",
+        &["tunnel"],
+        &["objects"],
+        Scope::File,
+    ),
+    kind(
+        Class::Signal,
+        "signal",
+        &["signal", "sign"],
+        &["signals", "staticBoard"],
+        Scope::File,
+    ),
+    kind(
+        Class::Switch,
+        "switch",
+        &["switch"],
+        &["railroad"],
+        Scope::File,
+    ),
+    kind(
+        Class::Station,
+        "station",
+        &["station"],
+        &["OpenDRIVE"],
+        Scope::File,
+    ),
+    kind(
+        Class::Platform,
+        "platform",
+        &["platform"],
+        &["station"],
+        Scope::File,
+    ),
+    kind(
+        Class::VmsGroup,
+        "group of message signs",
+        &["vmsGroup"],
+        &[],
+        Scope::File,
+    ),
+    kind(
+        Class::Connection,
+        "connection",
+        &["connection"],
+        &["junction"],
+        Scope::Within("junction"),
+    ),
+    kind(
+        Class::CrossPath,
+        "cross path",
+        &["crossPath"],
+        &["junction"],
+        Scope::Within("junction"),
+    ),
+    kind(
+        Class::RoadSection,
+        "road section",
+        &["roadSection"],
+        &[],
+        Scope::Within("junction"),
+    ),
+    kind(
+        Class::Outline,
+        "outline",
+        &["outline"],
+        &["outlines", "object"],
+        Scope::Within("object"),
+    ),
+    kind(
+        Class::Corner,
+        "corner",
+        &["cornerRoad", "cornerLocal"],
+        &["outline"],
+        Scope::Within("outline"),
+    ),
+    kind(
+        Class::Vertex,
+        "vertex",
+        &["vertexRoad", "vertexLocal"],
+        &["polyline"],
+        Scope::Within("polyline"),
+    ),
+];
+
+impl Kind {
+    /// The kind of a class.
+    pub fn of(class: Class) -> &'static Kind {
+        KINDS
+            .iter()
+            .find(|kind| kind.class == class)
+            .unwrap_or(&KINDS[0])
+    }
+
+    /// The elements of this kind in document order, those without an id included.
+    pub fn nodes<'d>(&self, document: &Document<'d>) -> Vec<Node<'d>> {
+        let mut nodes: Vec<Node<'d>> = self
+            .elements
+            .iter()
+            .flat_map(|name| document.elements(name))
+            .filter(|node| {
+                let parent = node.parent().map_or("", |parent| parent.name());
+                self.parents.is_empty() || self.parents.contains(&parent)
+            })
+            .collect();
+        if self.elements.len() > 1 {
+            nodes.sort();
+        }
+        nodes
+    }
+
+    /// The element within which a node's id must be unique; `None` for the whole file.
+    pub fn home<'d>(&self, node: Node<'d>) -> Option<Node<'d>> {
+        match self.scope {
+            Scope::File => None,
+            Scope::Within(name) => node.ancestors().find(|ancestor| ancestor.is(name)),
+        }
+    }
+}

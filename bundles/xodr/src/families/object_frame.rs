@@ -1,0 +1,183 @@
+//! Objects in their own coordinates: u, v and z from the origin (OpenDRIVE 1.9, 13.1 to 13.3).
+
+use qcbus_document::Node;
+use qcbus_opendrive::{Corner, CornerKind, Object, ObjectPoint, Outline, Polyline, Road};
+use qcbus_sdk::{Param, Sink};
+
+use super::on_road::OnRoad;
+
+pub(crate) const TOLERANCE: Param = Param::number(
+    "tolerance",
+    0.05,
+    "m",
+    "how much larger than the bounding volume the object may be",
+);
+
+/// A point of an object in u, v and z of the object, in metres.
+#[derive(Clone, Copy)]
+pub(crate) struct LocalPoint<'a> {
+    pub node: Node<'a>,
+    pub at: [f64; 3],
+    /// How far what the point stands for reaches around it, in metres.
+    pub reach: f64,
+}
+
+/// Turns points in road coordinates into those of an object.
+pub(crate) struct ObjectFrame<'m, 'a> {
+    road: &'m Road<'a>,
+    x: f64,
+    y: f64,
+    z: f64,
+    sin: f64,
+    cos: f64,
+    upright: bool,
+}
+
+impl<'m, 'a> ObjectFrame<'m, 'a> {
+    pub fn of(road: &'m Road<'a>, object: &Object<'a>) -> Option<ObjectFrame<'m, 'a>> {
+        let (s, t) = (object.s()?, object.t()?);
+        let pose = road.pose(s)?;
+        let origin = pose.beside(t)?;
+        let (sin, cos) = (pose.hdg + object.hdg().unwrap_or(0.0)).sin_cos();
+        let level = |angle: Option<f64>| angle.unwrap_or(0.0).abs() < 1e-6;
+        Some(ObjectFrame {
+            road,
+            x: origin.x,
+            y: origin.y,
+            z: road.elevation().at_or_zero(s)? + object.z_offset().unwrap_or(0.0),
+            sin,
+            cos,
+            upright: level(object.pitch())
+                && level(object.roll())
+                && object.perp_to_road() != Some(true),
+        })
+    }
+
+    /// A point in s, t and dz; `None` when the object is tilted.
+    fn of_road(&self, point: &ObjectPoint<'a>) -> Option<[f64; 3]> {
+        let s = point.s().filter(|_| self.upright)?;
+        let place = self.road.pose(s)?.beside(point.t()?)?;
+        let (dx, dy) = (place.x - self.x, place.y - self.y);
+        let z = self.road.elevation().at_or_zero(s)? + point.dz().unwrap_or(0.0) - self.z;
+        Some([
+            dx * self.cos + dy * self.sin,
+            dy * self.cos - dx * self.sin,
+            z,
+        ])
+    }
+
+    /// A corner of an outline.
+    pub fn corner(&self, corner: &Corner<'a>) -> Option<[f64; 3]> {
+        match corner.kind {
+            CornerKind::Road => self.of_road(&corner.point),
+            CornerKind::Local | CornerKind::Curve => local(&corner.point),
+        }
+    }
+
+    /// The corners of an outline, at the bottom and at the top.
+    pub fn corners(&self, outline: &Outline<'a>) -> Vec<LocalPoint<'a>> {
+        let bottoms = outline.corners().filter_map(|corner| {
+            let height = corner.point.height().unwrap_or(0.0);
+            Some((corner.point.node(), self.corner(&corner)?, height))
+        });
+        let both = bottoms.flat_map(|(node, at, height)| {
+            let top = [at[0], at[1], at[2] + height];
+            [at, top].map(|at| LocalPoint {
+                node,
+                at,
+                reach: 0.0,
+            })
+        });
+        both.collect()
+    }
+
+    /// The vertices of a skeleton's polyline; with what they stand for when `around` is set.
+    pub fn vertices(&self, polyline: &Polyline<'a>, around: bool) -> Vec<LocalPoint<'a>> {
+        let of_road = polyline
+            .road_vertices()
+            .map(|one| (self.of_road(&one), one));
+        let locals = polyline.local_vertices().map(|one| (local(&one), one));
+        let points = of_road.chain(locals).filter_map(|(at, one)| {
+            let half = one
+                .width()
+                .unwrap_or(0.0)
+                .hypot(one.length().unwrap_or(0.0))
+                / 2.0;
+            let reach = one.radius().unwrap_or(half);
+            Some(LocalPoint {
+                node: one.node(),
+                at: at?,
+                reach: if around { reach.max(0.0) } else { 0.0 },
+            })
+        });
+        points.collect()
+    }
+}
+
+fn local(point: &ObjectPoint<'_>) -> Option<[f64; 3]> {
+    Some([point.u()?, point.v()?, point.z()?])
+}
+
+/// Reports an object whose points need more room than its bounding volume has. Where in the volume
+/// the origin lies is not said in the standard, whose own examples put it in the middle or at a
+/// corner; so what is compared are extents, wherever the volume may be.
+pub(crate) fn report_too_large(
+    road: &Road<'_>,
+    object: &Object<'_>,
+    points: &[LocalPoint<'_>],
+    what: &str,
+    found: &mut Sink<'_>,
+) {
+    let tolerance = found.number(&TOLERANCE);
+    let worst = AXES
+        .iter()
+        .enumerate()
+        .filter_map(|(axis, (name, attribute))| {
+            let (size, attribute) = size_of(object, axis, attribute)?;
+            let low = points.iter().map(|point| point.at[axis] + point.reach);
+            let low = low.reduce(f64::min)?;
+            let farthest = |one: &&LocalPoint<'_>| one.at[axis] - one.reach;
+            let far = points
+                .iter()
+                .max_by(|one, other| farthest(one).total_cmp(&farthest(other)))?;
+            let extent = farthest(&far) - low;
+            (extent > size + tolerance).then_some((
+                extent - size,
+                extent,
+                size,
+                *name,
+                attribute,
+                far.node,
+            ))
+        });
+    let worst = worst.max_by(|one, other| one.0.total_cmp(&other.0));
+    if let Some((_, extent, size, axis, attribute, node)) = worst {
+        let text = format!(
+            "{what} of object `{}` extends over {extent:.3} m along {axis}, but its bounding volume only over \
+             {size:.3} m (`{attribute}`); all of it must lie inside",
+            object.id().unwrap_or_default()
+        );
+        found
+            .issue(node, text)
+            .on(road, object.s().unwrap_or(0.0), object.t().unwrap_or(0.0))
+            .at(object.node(), "the object");
+    }
+}
+
+/// The axes with the attribute that gives the size along each.
+const AXES: [(&str, &str); 3] = [("u", "length"), ("v", "width"), ("z", "height")];
+
+fn size_of(
+    object: &Object<'_>,
+    axis: usize,
+    attribute: &'static str,
+) -> Option<(f64, &'static str)> {
+    let positive = |size: &f64| *size > 0.0;
+    let round = object.radius().filter(positive);
+    match (axis, round) {
+        (2, _) => Some((object.height().filter(positive)?, attribute)),
+        (_, Some(radius)) => Some((2.0 * radius, "radius")),
+        (0, None) => Some((object.length().filter(positive)?, attribute)),
+        (_, None) => Some((object.width().filter(positive)?, attribute)),
+    }
+}

@@ -1,0 +1,123 @@
+//! Objects of roads and junctions, and what they are made of (OpenDRIVE 1.9, chapter 13).
+
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::Finding;
+
+/// The points of an outline.
+pub(crate) const CORNERS: [&str; 3] = ["cornerRoad", "cornerLocal", "curveLocal"];
+
+/// The objects of all roads and junctions in document order.
+pub(crate) fn objects<'a>(map: &RoadMap<'a>) -> impl Iterator<Item = Node<'a>> + use<'a> {
+    below(map, "object", "objects")
+}
+
+/// The elements of one name that lie directly within elements of another.
+pub(crate) fn below<'a>(
+    map: &RoadMap<'a>,
+    name: &'static str,
+    parent: &'static str,
+) -> impl Iterator<Item = Node<'a>> + use<'a> {
+    let all = map.root().map(|root| root.document().elements(name));
+    all.into_iter()
+        .flatten()
+        .filter(move |node| node.parent().is_some_and(|above| above.is(parent)))
+}
+
+/// The outlines of an object: within `<outlines>`, or directly within it as before 1.5.
+pub(crate) fn outlines(object: Node<'_>) -> impl Iterator<Item = Node<'_>> {
+    object
+        .children_named("outlines")
+        .flat_map(|list| list.children_named("outline"))
+        .chain(object.children_named("outline"))
+}
+
+/// Whether an object has an outline.
+pub(crate) fn has_outline(object: Node<'_>) -> bool {
+    outlines(object).next().is_some()
+}
+
+/// The corners and curves of an outline in document order.
+pub(crate) fn corners(outline: Node<'_>) -> impl Iterator<Item = Node<'_>> {
+    outline
+        .children()
+        .filter(|child| CORNERS.contains(&child.name()))
+}
+
+/// The polylines of all skeletons.
+pub(crate) fn polylines<'a>(map: &RoadMap<'a>) -> impl Iterator<Item = Node<'a>> + use<'a> {
+    objects(map)
+        .flat_map(|object| object.children_named("skeleton"))
+        .flat_map(|skeleton| skeleton.children_named("polyline"))
+}
+
+/// A finite number.
+pub(crate) fn number(node: Node<'_>, attribute: &str) -> Option<f64> {
+    node.f64(attribute).ok().filter(|value| value.is_finite())
+}
+
+/// Whether a text attribute is missing or blank.
+pub(crate) fn is_blank(node: Node<'_>, attribute: &str) -> bool {
+    node.attr(attribute)
+        .is_none_or(|text| text.trim().is_empty())
+}
+
+/// An element by name and id: ``object `7` ``.
+pub(crate) fn named(node: Node<'_>) -> String {
+    match node.attr("id") {
+        Some(id) => format!("{} `{id}`", node.name()),
+        None => node.name().to_owned(),
+    }
+}
+
+/// Names in backticks, as a list in a sentence.
+pub(crate) fn listed(names: &[&str]) -> String {
+    let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+    match quoted.as_slice() {
+        [] => String::new(),
+        [only] => only.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+/// Adds where on its road an element stands.
+pub(crate) trait Stands {
+    /// At the element's own `@s` and `@t`, raised by `@zOffset`, a bridge or tunnel where it
+    /// begins; says nothing where one of them is missing or the element belongs to no road.
+    fn stands<'a>(self, map: &RoadMap<'a>, node: Node<'a>) -> Self;
+}
+
+impl Stands for Finding<'_, '_> {
+    fn stands<'a>(self, map: &RoadMap<'a>, node: Node<'a>) -> Self {
+        let t = match node.name() {
+            "bridge" | "tunnel" => Some(0.0),
+            _ => number(node, "t"),
+        };
+        let place = number(node, "s").zip(t);
+        let (Some(road), Some((s, t))) = (map.road_of(node), place) else {
+            return self;
+        };
+        let finding = self.road(road.id(), s, t);
+        let up = number(node, "zOffset").unwrap_or(0.0);
+        match road.point(s, t, up) {
+            Some(point) => finding.point(point.x, point.y, point.z),
+            None => finding,
+        }
+    }
+}
+
+/// The object, structure, signal or reference that an element is part of.
+pub(crate) fn owner(node: Node<'_>) -> Node<'_> {
+    const OWNERS: [&str; 6] = [
+        "object",
+        "objectReference",
+        "bridge",
+        "tunnel",
+        "signal",
+        "signalReference",
+    ];
+    std::iter::once(node)
+        .chain(node.ancestors())
+        .find(|above| OWNERS.contains(&above.name()))
+        .unwrap_or(node)
+}

@@ -1,0 +1,79 @@
+//! Where a finding lies on its road, and how texts name roads and lanes.
+
+use qcbus_opendrive::{ContactPoint, LaneRef, Place, Road};
+use qcbus_sdk::Finding;
+
+/// How many further places of one kind a finding names at most; more help nobody, and a hostile file
+/// could make them cost a lot.
+pub(crate) const MAX_PLACES: usize = 16;
+
+/// Adds road coordinates and, where the map can be evaluated there, the point in space.
+pub(crate) trait OnRoad {
+    /// At (s, t) of a road, in metres.
+    fn on(self, road: &Road<'_>, s: f64, t: f64) -> Self;
+    /// At an end of a road's reference line.
+    fn at_end(self, road: &Road<'_>, end: ContactPoint) -> Self;
+    /// In the middle of a lane, `ds` metres from the start of its section.
+    fn in_lane(self, lane: LaneRef<'_, '_>, ds: impl Into<Place>) -> Self;
+    /// In the middle of a lane, at an end of its section.
+    fn at_lane_end(self, lane: LaneRef<'_, '_>, end: ContactPoint) -> Self;
+}
+
+impl OnRoad for Finding<'_, '_> {
+    fn on(self, road: &Road<'_>, s: f64, t: f64) -> Self {
+        let finding = self.road(road.id(), s, t);
+        match road.surface_point(s, t) {
+            Some(point) => finding.point(point.x, point.y, point.z),
+            None => finding,
+        }
+    }
+
+    fn at_end(self, road: &Road<'_>, end: ContactPoint) -> Self {
+        let finding = match road.end_s(end) {
+            Some(s) => self.road(road.id(), s, 0.0),
+            None => self,
+        };
+        match road.end_frame(end) {
+            Some(frame) => finding.point(frame.pose.x, frame.pose.y, frame.z),
+            None => finding,
+        }
+    }
+
+    fn in_lane(self, lane: LaneRef<'_, '_>, ds: impl Into<Place>) -> Self {
+        let ds = ds.into();
+        let Some(s) = lane.at.s().map(|start| start + ds.x()) else {
+            return self;
+        };
+        let middle = lane.inner_t(ds).zip(lane.outer_t(ds));
+        let finding = self.road(
+            lane.at.road.id(),
+            s,
+            middle.map_or(0.0, |(inner, outer)| 0.5 * (inner + outer)),
+        );
+        match lane.surface_point(ds, 0.5) {
+            Some(point) => finding.point(point.x, point.y, point.z),
+            None => finding,
+        }
+    }
+
+    fn at_lane_end(self, lane: LaneRef<'_, '_>, end: ContactPoint) -> Self {
+        match lane.end_place(end) {
+            Some(place) => self.in_lane(lane, place),
+            None => self,
+        }
+    }
+}
+
+/// ``lane `-1` of road `5` ``, with the section where the road has several.
+pub(crate) fn lane_name(lane: LaneRef<'_, '_>) -> String {
+    let section = if lane.at.layer.section_count() > 1 {
+        format!(" in lane section {} of", lane.at.index() + 1)
+    } else {
+        " of".to_owned()
+    };
+    format!(
+        "lane `{}`{section} road `{}`",
+        lane.id_text().unwrap_or_default(),
+        lane.at.road.id()
+    )
+}

@@ -1,0 +1,127 @@
+//! Outlines made of curves (OpenDRIVE 1.9, 13.2.3).
+
+use qcbus_opendrive::geometry::{Curve, ParamPoly3, ParamRange, Placed, Point};
+use qcbus_opendrive::{CurveLocal, Object, Outline, Road, RoadMap};
+use qcbus_sdk::{Param, Place, Sink};
+
+use super::on_road::OnRoad;
+
+pub(crate) const LENGTH_TOLERANCE: Param = Param::number(
+    "length_tolerance",
+    0.001,
+    "m",
+    "largest difference between the curve's length and `length` that is accepted",
+);
+
+/// Every outline that is made of curves.
+pub(crate) fn curved_outlines<'m, 'a>(
+    map: &'m RoadMap<'a>,
+) -> impl Iterator<Item = (&'m Road<'a>, Object<'a>, Outline<'a>)> {
+    map.objects().flat_map(|(road, object)| {
+        let outlines = object
+            .outlines()
+            .filter(|outline| outline.curves().next().is_some());
+        outlines.map(move |outline| (road, object, outline))
+    })
+}
+
+/// Where a curve starts, in u and v.
+pub(crate) fn start(curve: &CurveLocal<'_>) -> Option<Point> {
+    Point::finite(curve.u()?, curve.v()?)
+}
+
+/// How far a curve's end lies from its start, in metres: it does not depend on `@hdg`.
+pub(crate) fn chord(curve: &CurveLocal<'_>) -> Option<f64> {
+    let length = curve.length();
+    match curve.curve()? {
+        Curve::ParamPoly3(poly) => {
+            let end = poly.point(last_parameter(&poly, length)?)?;
+            Some(end.distance(poly.point(0.0)?))
+        }
+        other => {
+            let end = other.point(length?, length?)?;
+            Some(end.x.hypot(end.y))
+        }
+    }
+}
+
+/// Where a curve ends, by its heading.
+pub(crate) fn end(curve: &CurveLocal<'_>) -> Option<Point> {
+    let shape = curve.curve()?;
+    let length = match &shape {
+        Curve::ParamPoly3(poly) => curve.length().or(Some(last_parameter(poly, None)?))?,
+        _ => curve.length()?,
+    };
+    Placed {
+        origin: start(curve)?,
+        hdg: curve.hdg()?,
+        length,
+        curve: shape,
+    }
+    .point(length)
+}
+
+fn last_parameter(poly: &ParamPoly3, length: Option<f64>) -> Option<f64> {
+    match poly.range {
+        ParamRange::Normalized => Some(1.0),
+        ParamRange::ArcLength => length,
+    }
+}
+
+/// Calls `each` with every parametric curve that has a length.
+pub(crate) fn for_each_poly<'d>(
+    map: &RoadMap<'_>,
+    found: &mut Sink<'d>,
+    each: impl Fn(&Road<'_>, &Object<'_>, &CurveLocal<'_>, ParamPoly3, &mut Sink<'d>),
+) {
+    for (road, object, outline) in curved_outlines(map) {
+        for curve in outline.curves() {
+            if let Some(Curve::ParamPoly3(poly)) = curve.curve() {
+                each(road, &object, &curve, poly, found);
+            }
+        }
+    }
+}
+
+/// Reports curves of this range that only have the length they claim when the parameter runs over
+/// the other one.
+pub(crate) fn range_fits(map: &RoadMap<'_>, range: ParamRange, found: &mut Sink<'_>) {
+    for_each_poly(map, found, |road, object, curve, poly, found| {
+        let (Some((_, node)), true) = (curve.shape(), poly.range == range) else {
+            return;
+        };
+        let Some(length) = curve.length() else {
+            if range == ParamRange::ArcLength {
+                let text = "with `pRange=\"arcLength\"` the parameter runs from 0 to the `length` of the \
+                            `curveLocal`, which has none";
+                found.issue(curve.node(), text).on(
+                    road,
+                    object.s().unwrap_or(0.0),
+                    object.t().unwrap_or(0.0),
+                );
+            }
+            return;
+        };
+        let (word, said, other) = match range {
+            ParamRange::ArcLength => ("arcLength", length, ("normalized", 1.0)),
+            ParamRange::Normalized => ("normalized", 1.0, ("arcLength", length)),
+        };
+        let tolerance = found.number(&LENGTH_TOLERANCE);
+        let lengths = poly
+            .arc_length(0.0, said)
+            .zip(poly.arc_length(0.0, other.1));
+        let Some((claimed, alternative)) = lengths else {
+            return;
+        };
+        if (claimed - length).abs() > tolerance && (alternative - length).abs() <= tolerance {
+            let text = format!(
+                "with `pRange=\"{word}\"` the parameter runs from 0 to {said}, over which the curve is {claimed:.3} m \
+                 long, not {length} m as `length` says; with `{}` it would be",
+                other.0
+            );
+            found
+                .issue(Place::attribute_or_node(node, "pRange"), text)
+                .on(road, object.s().unwrap_or(0.0), object.t().unwrap_or(0.0));
+        }
+    });
+}

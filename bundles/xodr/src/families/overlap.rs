@@ -1,0 +1,240 @@
+//! Which roads cover the same ground (OpenDRIVE 1.9, 10.1).
+//!
+//! Roads are cut into pieces a few metres long: quadrangles as wide as the lanes for vehicles.
+//! A grid tells which pieces may overlap; the work is bounded, whatever the map says.
+
+use std::collections::{HashMap, HashSet};
+
+use qcbus_opendrive::geometry::Point;
+use qcbus_opendrive::{LaneRef, Place, Road, RoadMap, Side};
+
+use super::driving::is_drivable;
+
+/// Length of a piece, in metres; more on maps with more than [`MOST_PIECES`] of them.
+const STEP: f64 = 5.0;
+const MOST_PIECES: f64 = 400_000.0;
+
+/// Size of a cell of the grid, in metres, and the greatest number of cells that a piece may touch.
+const CELL: f64 = 10.0;
+const MOST_CELLS: f64 = 400.0;
+
+/// A piece of a road.
+pub(crate) struct Slice {
+    pub road: usize,
+    /// Where it begins and ends, in metres.
+    pub from: f64,
+    pub to: f64,
+    pub width: f64,
+    z: f64,
+    corners: [Point; 4],
+}
+
+/// Two pieces that cover the same ground.
+pub(crate) struct Overlap<'p> {
+    pub one: &'p Slice,
+    pub other: &'p Slice,
+    /// In square metres.
+    pub area: f64,
+    /// A point that both cover.
+    pub point: Point,
+    pub z: f64,
+}
+
+/// What counts as an overlap.
+pub(crate) struct Limits {
+    /// Least area, in square metres.
+    pub area: f64,
+    /// By how much either edge is moved inward, in metres.
+    pub shrink: f64,
+    /// Roads that are farther apart in height, in metres, lie over each other.
+    pub clearance: f64,
+}
+
+/// The pieces of all roads.
+pub(crate) fn slices(map: &RoadMap<'_>, limits: &Limits) -> Vec<Slice> {
+    let lengths = map.roads().iter().filter_map(Road::length);
+    let total: f64 = lengths.filter(|length| *length > 0.0).sum();
+    let step = STEP.max(total / MOST_PIECES);
+    let mut slices = Vec::new();
+    for road in map.roads() {
+        let Some(length) = road.length().filter(|length| *length > 0.0) else {
+            continue;
+        };
+        let count = (length / step).ceil().clamp(1.0, MOST_PIECES) as usize;
+        let at = |index: usize| length * index as f64 / count as f64;
+        let mut before = edge(road, Place::at(0.0), limits);
+        for index in 0..count {
+            let after = edge(road, Place::before(at(index + 1)), limits);
+            if let (Some(start), Some(end)) = (before, after) {
+                slices.extend(slice(road, [at(index), at(index + 1)], start, end));
+            }
+            before = after;
+        }
+    }
+    slices
+}
+
+/// Whether vehicles travel along a lane: on those of annex D but hard shoulders, edges and the like,
+/// which neighbouring roads share at times.
+fn is_travelled(lane: LaneRef<'_, '_>) -> bool {
+    let aside = matches!(lane.kind(), Some("border" | "stop" | "restricted"));
+    is_drivable(lane) && !aside
+}
+
+/// The left and the right end of the lanes for vehicles at s, and the elevation.
+fn edge(road: &Road<'_>, s: Place, limits: &Limits) -> Option<(Point, Point, f64)> {
+    let mut extent: Option<(f64, f64)> = None;
+    for side in Side::BOTH {
+        let Some(section) = road.permanent()?.section_at(road, side, s) else {
+            continue;
+        };
+        for span in section.spans(side, s.shifted(-section.s()?)) {
+            if is_travelled(span.lane) {
+                let (low, high) = extent.unwrap_or((f64::INFINITY, f64::NEG_INFINITY));
+                let (one, other) = (span.inner.min(span.outer), span.inner.max(span.outer));
+                extent = Some((low.min(one), high.max(other)));
+            }
+        }
+    }
+    let (right, left) = extent.map(|(low, high)| (low + limits.shrink, high - limits.shrink))?;
+    let pose = road.pose(s)?;
+    let proper = left - right > 0.1;
+    proper.then_some((
+        pose.beside(left)?,
+        pose.beside(right)?,
+        road.elevation().at_or_zero(s)?,
+    ))
+}
+
+fn slice(
+    road: &Road<'_>,
+    [from, to]: [f64; 2],
+    start: (Point, Point, f64),
+    end: (Point, Point, f64),
+) -> Option<Slice> {
+    let corners = [start.1, end.1, end.0, start.0];
+    let slice = Slice {
+        road: road.index(),
+        from,
+        to,
+        width: start.0.distance(start.1).max(end.0.distance(end.1)),
+        z: 0.5 * (start.2 + end.2),
+        corners,
+    };
+    // Where a border turns back the corners are not in order, and nothing can be said.
+    let convex = (0..4).all(|at| {
+        let [a, b, c] = [0, 1, 2].map(|next| corners[(at + next) % 4]);
+        turn(a, b, c) > 0.0
+    });
+    convex.then_some(slice)
+}
+
+/// Twice the signed area of a triangle.
+fn turn(a: Point, b: Point, c: Point) -> f64 {
+    (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y)
+}
+
+/// Calls `found` with overlapping pieces, at most once for each pair of roads that `wanted`
+/// accepts for a pair of pieces.
+pub(crate) fn overlaps<'p>(
+    slices: &'p [Slice],
+    limits: &Limits,
+    wanted: impl Fn(&Slice, &Slice) -> bool,
+    mut found: impl FnMut(Overlap<'p>),
+) {
+    let mut cells: HashMap<(i64, i64), Vec<u32>> = HashMap::new();
+    let mut reported: HashSet<(usize, usize)> = HashSet::new();
+    // Enough for every map that is one; pieces heaped up at one place are not compared for ever.
+    let mut budget = 10_000_000 + 100 * slices.len();
+    for (one, at) in slices.iter().zip(0_u32..) {
+        for cell in cells_of(one) {
+            let here = cells.entry(cell).or_default();
+            for other in here.iter().filter_map(|other| slices.get(*other as usize)) {
+                budget = budget.saturating_sub(1);
+                if budget == 0 {
+                    return;
+                }
+                let pair = (other.road.min(one.road), other.road.max(one.road));
+                let level = (one.z - other.z).abs() <= limits.clearance;
+                if !level || !wanted(other, one) || reported.contains(&pair) {
+                    continue;
+                }
+                if let Some((area, point)) =
+                    common(one, other).filter(|(area, _)| *area > limits.area)
+                {
+                    reported.insert(pair);
+                    let z = one.z;
+                    found(Overlap {
+                        one: other,
+                        other: one,
+                        area,
+                        point,
+                        z,
+                    });
+                }
+            }
+            here.push(at);
+        }
+    }
+}
+
+/// The cells that a piece touches; none when it is too large to be a piece of a road.
+fn cells_of(slice: &Slice) -> impl Iterator<Item = (i64, i64)> + use<> {
+    let range = |part: fn(&Point) -> f64| {
+        let values = slice.corners.iter().map(part);
+        let low = values.clone().fold(f64::INFINITY, f64::min) / CELL;
+        let high = values.fold(f64::NEG_INFINITY, f64::max) / CELL;
+        (low.floor(), high.floor())
+    };
+    let ((left, right), (bottom, top)) = (range(|point| point.x), range(|point| point.y));
+    let fits = (right - left + 1.0) * (top - bottom + 1.0) <= MOST_CELLS
+        && [left, right, bottom, top]
+            .iter()
+            .all(|place| place.abs() < 1e12);
+    let rows = fits.then_some(bottom as i64..=top as i64);
+    let columns = left as i64..=right as i64;
+    let cells = move |y: i64| columns.clone().map(move |x| (x, y));
+    rows.into_iter().flatten().flat_map(cells)
+}
+
+/// The area that two pieces have in common, and its middle.
+fn common(one: &Slice, other: &Slice) -> Option<(f64, Point)> {
+    let mut shape = one.corners.to_vec();
+    for at in 0..4 {
+        let (a, b) = (other.corners[at], other.corners[(at + 1) % 4]);
+        shape = cut(&shape, a, b);
+        if shape.len() < 3 {
+            return None;
+        }
+    }
+    let first = *shape.first()?;
+    let area: f64 = shape
+        .windows(2)
+        .map(|pair| 0.5 * turn(first, pair[0], pair[1]))
+        .sum();
+    let count = shape.len() as f64;
+    let sum = |part: fn(&Point) -> f64| shape.iter().map(part).sum::<f64>() / count;
+    Some((
+        area,
+        Point::finite(sum(|point| point.x), sum(|point| point.y))?,
+    ))
+}
+
+/// What of a convex polygon lies to the left of a line.
+fn cut(shape: &[Point], a: Point, b: Point) -> Vec<Point> {
+    let mut kept = Vec::with_capacity(shape.len() + 2);
+    for (one, next) in super::polygons::sides(shape) {
+        let (here, there) = (turn(a, b, one), turn(a, b, next));
+        if here >= 0.0 {
+            kept.push(one);
+        }
+        if (here > 0.0 && there < 0.0) || (here < 0.0 && there > 0.0) {
+            let share = here / (here - there);
+            kept.push(Point {
+                x: one.x + share * (next.x - one.x),
+                y: one.y + share * (next.y - one.y),
+            });
+        }
+    }
+    kept
+}

@@ -1,0 +1,73 @@
+//! Records that say what already holds (OpenDRIVE 1.9, annex D.2).
+
+use qcbus_opendrive::geometry::{Cubic, heading_difference};
+use qcbus_opendrive::{Geometry, PlanView, Profile, Record, ShapeKind};
+
+/// A record with the one before it, which says the same.
+pub(crate) struct Repeated<'p, 'a> {
+    pub first: &'p Record<'a>,
+    pub second: &'p Record<'a>,
+    /// Where the second one holds.
+    pub from: f64,
+    pub to: f64,
+}
+
+/// Pairs of neighbouring records of which the second changes nothing: continued, the first one stays
+/// within `tolerance` of it until it ends. `end` is where the profile ends.
+pub(crate) fn in_profile<'p, 'a>(
+    profile: &'p Profile<'a>,
+    end: f64,
+    tolerance: f64,
+) -> Vec<Repeated<'p, 'a>> {
+    let records: Vec<&Record<'a>> = profile.in_order().collect();
+    let pairs = (1..records.len()).filter_map(|index| {
+        let (first, second) = (records[index - 1], records[index]);
+        let next = records.get(index + 1).and_then(|next| next.start());
+        let from = second.start()?;
+        let to = next.map_or(end, |next| next.min(end)).max(from);
+        let shift = from - first.start()?;
+        let difference = first.cubic()?.shifted(shift).minus(&second.cubic()?);
+        let repeated = Repeated {
+            first,
+            second,
+            from,
+            to,
+        };
+        is_nothing(&difference, to - from, tolerance).then_some(repeated)
+    });
+    pairs.collect()
+}
+
+/// Whether a difference stays within `tolerance` over a length. A record that never holds, because
+/// the profile ends or the next one starts there, says the same if its polynomial is the same.
+fn is_nothing(difference: &Cubic, length: f64, tolerance: f64) -> bool {
+    if length <= 0.0 {
+        let Cubic { a, b, c, d } = difference;
+        return [a, b, c, d].iter().all(|value| value.abs() <= tolerance);
+    }
+    let extremes = difference
+        .minimum(0.0, length)
+        .zip(difference.maximum(0.0, length));
+    extremes.is_some_and(|(least, most)| least.value >= -tolerance && most.value <= tolerance)
+}
+
+/// Pairs of neighbouring lines that are one line: they touch within `gap` metres and their headings
+/// differ by `turn` radians at most.
+pub(crate) fn in_lines<'p, 'a>(
+    plan_view: &'p PlanView<'a>,
+    gap: f64,
+    turn: f64,
+) -> Vec<[&'p Geometry<'a>; 2]> {
+    let lines: Vec<&Geometry<'a>> = plan_view.in_order().collect();
+    let one_line = |one: &Geometry<'_>, next: &Geometry<'_>| {
+        let both = one.kind() == Some(ShapeKind::Line) && next.kind() == Some(ShapeKind::Line);
+        let distance = one.end_point().zip(next.start_point());
+        let bend = one.hdg().zip(next.hdg());
+        both && distance.is_some_and(|(end, start)| end.distance(start) <= gap)
+            && bend
+                .and_then(|(one, next)| heading_difference(one, next))
+                .is_some_and(|bend| bend <= turn)
+    };
+    let pairs = lines.windows(2).filter(|pair| one_line(pair[0], pair[1]));
+    pairs.map(|pair| [pair[0], pair[1]]).collect()
+}

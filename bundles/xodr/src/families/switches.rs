@@ -1,0 +1,18 @@
+//! Switches of railroads (OpenDRIVE 1.9, 15.3).
+
+use std::collections::HashMap;
+
+use qcbus_opendrive::{Road, RoadMap, Switch};
+
+/// All switches with the road on which they are defined, by id; the first of those that share one.
+pub(crate) fn by_id<'m, 'a>(map: &'m RoadMap<'a>) -> HashMap<&'a str, (&'m Road<'a>, Switch<'a>)> {
+    let mut all = HashMap::new();
+    for road in map.roads() {
+        for switch in road.switches() {
+            if let Some(id) = switch.id() {
+                all.entry(id).or_insert((road, switch));
+            }
+        }
+    }
+    all
+}

@@ -1,0 +1,284 @@
+//! How well linked lanes continue each other (OpenDRIVE 1.9, annex D.1).
+
+use std::f64::consts::PI;
+
+use qcbus_opendrive::geometry::heading_difference;
+use qcbus_opendrive::{BorderPoint, JunctionType, LaneJoint, LaneRef, RoadMap, TouchingLanes};
+use qcbus_sdk::{Finding, Param, Sink};
+
+use super::driving::is_drivable;
+use super::lane_gaps::lane_gaps;
+use super::on_road::{OnRoad, lane_name};
+
+pub(crate) const GAP: Param = Param::number(
+    "gap",
+    0.01,
+    "m",
+    "largest distance in the plan view at which two edges still match",
+);
+pub(crate) const KINK: Param = Param::number(
+    "kink",
+    0.01,
+    "rad",
+    "largest difference between two headings that is accepted",
+);
+pub(crate) const STEP: Param = Param::number(
+    "step",
+    0.01,
+    "m",
+    "largest difference in height that is accepted",
+);
+
+/// Up to which width, in metres, a lane has none where it touches another. Edges of such lanes
+/// have no direction that anybody drives in.
+const NO_WIDTH: f64 = 0.001;
+
+/// Heights are compared where edges are not farther apart than this in the plan view, in metres:
+/// a gap does not hide a step.
+const NEAR: f64 = 0.1;
+
+/// Where two lanes touch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Where {
+    /// Within a road, or between two roads that are linked without a junction.
+    Roads,
+    /// Between an incoming and a connecting road; whether the junction has heights of its own.
+    Connection { elevation_grid: bool },
+    /// Between two roads of a direct junction.
+    Direct,
+}
+
+/// Two drivable lanes with width that touch.
+pub(crate) struct Pair<'m, 'a> {
+    pub touching: &'m TouchingLanes<'a>,
+    pub from: LaneRef<'m, 'a>,
+    pub to: LaneRef<'m, 'a>,
+    pub at: Where,
+}
+
+/// The drivable lanes that touch, once per pair.
+pub(crate) fn pairs<'m, 'a>(map: &'m RoadMap<'a>) -> impl Iterator<Item = Pair<'m, 'a>> {
+    map.touching_lanes().iter().filter_map(|touching| {
+        let from = map.lane(touching.joint.from.lane)?;
+        let to = map.lane(touching.joint.to.lane)?;
+        let wide = touching.narrower() > NO_WIDTH;
+        (wide && is_drivable(from) && is_drivable(to)).then(|| Pair {
+            touching,
+            from,
+            to,
+            at: place_of(map, &touching.joint, from, to),
+        })
+    })
+}
+
+fn place_of(
+    map: &RoadMap<'_>,
+    joint: &LaneJoint<'_>,
+    from: LaneRef<'_, '_>,
+    to: LaneRef<'_, '_>,
+) -> Where {
+    let named = joint.junction.and_then(|at| map.junctions().get(at));
+    let crosses = from.at.road.index() != to.at.road.index();
+    let of_roads = [from.at.road.junction(), to.at.road.junction()];
+    let of_roads = of_roads.into_iter().flatten().filter(|_| crosses);
+    let junction = named.or_else(|| of_roads.into_iter().find_map(|id| map.junction(id)));
+    match junction {
+        None => Where::Roads,
+        Some(junction) if junction.kind() == Some(JunctionType::Direct) => Where::Direct,
+        Some(junction) => Where::Connection {
+            elevation_grid: junction.elevation_grid().is_some(),
+        },
+    }
+}
+
+/// What is wrong with one edge.
+pub(crate) struct EdgeFault {
+    /// `left` or `right`, as seen along s of the first road.
+    pub side: &'static str,
+    pub amount: f64,
+    /// Where, on the first lane.
+    pub point: BorderPoint,
+}
+
+impl Pair<'_, '_> {
+    fn worst(&self, fault: impl Fn([BorderPoint; 2]) -> Option<f64>) -> Option<EdgeFault> {
+        let sides = ["left", "right"].into_iter().zip(self.touching.edges());
+        let faults = sides.filter_map(|(side, edge)| {
+            Some(EdgeFault {
+                side,
+                amount: fault(edge)?,
+                point: edge[0],
+            })
+        });
+        faults.max_by(|one, other| one.amount.total_cmp(&other.amount))
+    }
+
+    /// The edge that bends most, among those that meet within `gap` metres; in radians.
+    pub fn kink(&self, gap: f64) -> Option<EdgeFault> {
+        let turn = if self.touching.joint.is_reversed() {
+            PI
+        } else {
+            0.0
+        };
+        self.worst(|[here, there]| {
+            let meets = distance(here, there) <= gap;
+            let difference = heading_difference(here.hdg?, there.hdg? + turn)?;
+            meets.then_some(difference)
+        })
+    }
+
+    /// The edge with the highest step, among those that meet; in metres. What a slope alone makes
+    /// of a gap in the plan view is not counted.
+    pub fn step(&self) -> Option<EdgeFault> {
+        self.worst(|[here, there]| {
+            let apart = distance(here, there);
+            let slope = here.slope.abs().max(there.slope.abs());
+            let step = (here.point.z - there.point.z).abs() - slope * apart;
+            (apart <= NEAR).then_some(step)
+        })
+    }
+
+    /// How far the lanes are tilted against each other, in radians, when both are at least
+    /// `width` metres wide.
+    pub fn roll(&self, width: f64) -> Option<f64> {
+        let roll = |at: usize| {
+            let (left, right) = (self.touching.left[at].point, self.touching.right[at].point);
+            let across = left.plan().distance(right.plan());
+            (across >= width).then(|| (left.z - right.z).atan2(across))
+        };
+        Some((roll(0)? - roll(1)?).abs())
+    }
+
+    /// The edge with the greatest change of slope, among those that meet, where nothing but
+    /// elevation and superelevation gives the roads their slope.
+    pub fn pitch(&self, gap: f64, step: f64) -> Option<EdgeFault> {
+        let flat = |lane: LaneRef<'_, '_>| lane.at.road.lateral().is_flat();
+        if !flat(self.from) || !flat(self.to) {
+            return None;
+        }
+        let sign = if self.touching.joint.is_reversed() {
+            -1.0
+        } else {
+            1.0
+        };
+        self.worst(|[here, there]| {
+            let meets =
+                distance(here, there) <= gap && (here.point.z - there.point.z).abs() <= step;
+            let difference = (here.grade? - sign * there.grade?).abs();
+            meets.then_some(difference)
+        })
+    }
+
+    /// Reports something about the pair, at the statement that links them.
+    pub fn report<'s, 'd>(
+        &self,
+        text: &str,
+        point: BorderPoint,
+        found: &'s mut Sink<'d>,
+    ) -> Finding<'s, 'd> {
+        let joint = &self.touching.joint;
+        let text = format!(
+            "{} and {} are linked, but {text}",
+            lane_name(self.from),
+            lane_name(self.to)
+        );
+        let end = self.from.end_place(joint.from.end);
+        let s = self.from.at.s().zip(end).map_or(0.0, |(s, ds)| s + ds.x());
+        found
+            .issue(joint.node, text)
+            .road(self.from.at.road.id(), s, point.t)
+            .point(point.point.x, point.point.y, point.point.z)
+            .at(self.from.node(), "the one lane")
+            .at(self.to.node(), "the other lane")
+    }
+}
+
+fn distance(here: BorderPoint, there: BorderPoint) -> f64 {
+    here.point.plan().distance(there.point.plan())
+}
+
+/// Reports edges that bend where linked lanes touch.
+pub(crate) fn report_kink(pair: &Pair<'_, '_>, found: &mut Sink<'_>) {
+    let limit = found.number(&KINK);
+    if let Some(edge) = pair
+        .kink(found.number(&GAP))
+        .filter(|edge| edge.amount > limit)
+    {
+        let text = format!(
+            "their {} edges point in directions that differ by {:.4} rad ({:.2}°) where they touch; at most \
+             {limit} rad is allowed",
+            edge.side,
+            edge.amount,
+            edge.amount.to_degrees()
+        );
+        pair.report(&text, edge.point, found);
+    }
+}
+
+/// Reports steps in height where linked lanes touch; returns whether there was one.
+pub(crate) fn report_step(pair: &Pair<'_, '_>, found: &mut Sink<'_>) -> bool {
+    let limit = found.number(&STEP);
+    let Some(edge) = pair.step().filter(|edge| edge.amount > limit) else {
+        return false;
+    };
+    let text = format!(
+        "their {} edges differ by {:.3} m in height where they touch; at most {limit} m is allowed",
+        edge.side, edge.amount
+    );
+    pair.report(&text, edge.point, found);
+    true
+}
+
+/// Reports gaps, kinks and steps between linked lanes at places of one sort: what `smooth` means
+/// for junctions.
+pub(crate) fn report_misfits(
+    map: &RoadMap<'_>,
+    mine: impl Fn(Where) -> bool,
+    found: &mut Sink<'_>,
+) {
+    let gap = found.number(&GAP);
+    let mut apart = false;
+    for pair in pairs(map).filter(|pair| mine(pair.at)) {
+        let edges = pair.touching.edges().into_iter();
+        apart |= edges
+            .map(|[here, there]| distance(here, there))
+            .any(|one| one > gap);
+        report_kink(&pair, found);
+        let has_grid = pair.at
+            == Where::Connection {
+                elevation_grid: true,
+            };
+        if !has_grid {
+            report_step(&pair, found);
+        }
+    }
+    if apart {
+        report_gaps(map, &mine, found);
+    }
+}
+
+/// Gaps are a matter of all lanes that are linked at one place: one may split into two.
+fn report_gaps(map: &RoadMap<'_>, mine: &impl Fn(Where) -> bool, found: &mut Sink<'_>) {
+    let limit = found.number(&GAP);
+    for gap in lane_gaps(map, limit, NO_WIDTH) {
+        if !mine(place_of(map, &gap.joint, gap.from, gap.to)) {
+            continue;
+        }
+        let widest = gap
+            .edges
+            .iter()
+            .map(|(apart, _)| *apart)
+            .fold(0.0, f64::max);
+        let text = format!(
+            "{} and {} are linked, but their edges lie up to {widest:.3} m apart where they should touch; at \
+             most {limit} m is allowed",
+            lane_name(gap.from),
+            lane_name(gap.to)
+        );
+        found
+            .issue(gap.joint.node, text)
+            .at_lane_end(gap.from, gap.joint.from.end)
+            .at(gap.from.node(), "the one lane")
+            .at(gap.to.node(), "the other lane");
+    }
+}

@@ -1,0 +1,21 @@
+//! Vertices of skeletons (OpenDRIVE 1.9, 13.3).
+
+use qcbus_document::Node;
+
+/// The vertices of a polyline by sort.
+pub(crate) struct Vertices<'a> {
+    /// Those in road coordinates.
+    pub road: Vec<Node<'a>>,
+    /// Those in the object's coordinates.
+    pub local: Vec<Node<'a>>,
+}
+
+impl<'a> Vertices<'a> {
+    /// Those of a polyline.
+    pub fn of(polyline: Node<'a>) -> Vertices<'a> {
+        Vertices {
+            road: polyline.children_named("vertexRoad").collect(),
+            local: polyline.children_named("vertexLocal").collect(),
+        }
+    }
+}

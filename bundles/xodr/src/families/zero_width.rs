@@ -1,0 +1,111 @@
+//! Lanes that have no width where they are linked (OpenDRIVE 1.9, 11.6).
+
+use std::collections::BTreeMap;
+
+use qcbus_document::Node;
+use qcbus_opendrive::{ContactPoint, LaneEnd, LaneJoint, LaneRef, RoadMap};
+use qcbus_sdk::{Param, Sink};
+
+use super::on_road::{MAX_PLACES, OnRoad, lane_name};
+
+/// Up to which width a lane has none.
+pub(crate) const ZERO_WIDTH: Param = Param::number(
+    "zero_width",
+    0.001,
+    "m",
+    "lanes that are not wider than this have a width of zero",
+);
+
+/// Whether a lane has no width at an end of its section. Negative widths have rules of their own.
+pub(crate) fn is_zero_at(lane: LaneRef<'_, '_>, end: ContactPoint, zero: f64) -> bool {
+    lane.side().is_some() && lane.width_at(end).is_some_and(|width| width.abs() <= zero)
+}
+
+/// Whether a lane has some width somewhere in its section: at the other end, or where one of its
+/// records starts or is halfway.
+pub(crate) fn opens(lane: LaneRef<'_, '_>, zero: f64) -> bool {
+    let wide = |ds: f64| lane.width(ds).is_some_and(|width| width > zero);
+    let Some(length) = lane.length() else {
+        return false;
+    };
+    let profiles = [lane.widths(), lane.borders()];
+    let mut stretches = profiles
+        .into_iter()
+        .flat_map(|profile| profile.stretches(length));
+    ContactPoint::BOTH
+        .iter()
+        .filter_map(|end| lane.width_at(*end))
+        .any(|width| width > zero)
+        || stretches.any(|stretch| wide(stretch.from) || wide(0.5 * (stretch.from + stretch.to)))
+}
+
+/// Reports lanes without width at `end` that are linked there: by links of their own, by lane links
+/// of a junction that start at them, by lane links that lead to them.
+pub(crate) fn has_no_links(map: &RoadMap<'_>, end: ContactPoint, found: &mut Sink<'_>) {
+    let zero = found.number(&ZERO_WIDTH);
+    let junctions = LaneLinks::of(map, end);
+    for lane in map.lanes().filter(|lane| is_zero_at(*lane, end, zero)) {
+        let at = LaneEnd {
+            lane: lane.key(),
+            end,
+        };
+        let own: Vec<Node<'_>> = lane.links(end).map(|link| link.node()).collect();
+        let own_text = format!("it must have no `{}`", end.link_name());
+        report(lane, end, &own, &own_text, found);
+        let text = "no lane link of a junction may start there";
+        report(lane, end, junctions.from(at), text, found);
+        let text = "no lane link of a junction may lead there";
+        report(lane, end, junctions.to(at), text, found);
+    }
+}
+
+fn report(
+    lane: LaneRef<'_, '_>,
+    end: ContactPoint,
+    links: &[Node<'_>],
+    demand: &str,
+    found: &mut Sink<'_>,
+) {
+    if links.is_empty() {
+        return;
+    }
+    let text = format!(
+        "{} has no width at the {end} of its lane section ({:.4} m); {demand}",
+        lane_name(lane),
+        lane.width_at(end).map_or(0.0, f64::abs)
+    );
+    let mut finding = found.issue(lane.node(), text).at_lane_end(lane, end);
+    for link in links.iter().take(MAX_PLACES) {
+        finding = finding.at(*link, "the link");
+    }
+}
+
+/// The lane links of junctions by the lane ends that they join.
+#[derive(Default)]
+struct LaneLinks<'a> {
+    from: BTreeMap<LaneEnd, Vec<Node<'a>>>,
+    to: BTreeMap<LaneEnd, Vec<Node<'a>>>,
+}
+
+impl<'a> LaneLinks<'a> {
+    fn of(map: &RoadMap<'a>, end: ContactPoint) -> LaneLinks<'a> {
+        let mut links = LaneLinks::default();
+        let of_junctions = |joint: &&LaneJoint<'_>| joint.junction.is_some();
+        for joint in map.lane_joints().iter().filter(of_junctions) {
+            for (side, at) in [(&mut links.from, joint.from), (&mut links.to, joint.to)] {
+                if at.end == end {
+                    side.entry(at).or_default().push(joint.node);
+                }
+            }
+        }
+        links
+    }
+
+    fn from(&self, at: LaneEnd) -> &[Node<'a>] {
+        self.from.get(&at).map_or(&[], Vec::as_slice)
+    }
+
+    fn to(&self, at: LaneEnd) -> &[Node<'a>] {
+        self.to.get(&at).map_or(&[], Vec::as_slice)
+    }
+}

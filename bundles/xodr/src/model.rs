@@ -1,0 +1,15 @@
+//! What rules about roads, lanes and junctions look at: `Rule<Roads>` gets a `&RoadMap<'_>`.
+
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Model, Skip, Subject};
+
+/// The road network, read once per document and shared by all rules about it.
+pub enum Roads {}
+
+impl Model for Roads {
+    type Of<'d> = RoadMap<'d>;
+
+    fn build<'d>(subject: &'d Subject<'d>) -> Result<RoadMap<'d>, Skip> {
+        Ok(RoadMap::new(subject.root()))
+    }
+}

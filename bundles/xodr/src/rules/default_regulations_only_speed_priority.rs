@@ -1,0 +1,34 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_default_regulations_only_speed_priority",
+    uids: &["asam.net:xodr:1.8.0:defaultRegulations.only_speed_priority"],
+    versions: "1.8.0..",
+    after: super::READABLE,
+    page: include_str!("default_regulations_only_speed_priority.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// What may stand in any element.
+const ANYWHERE: [&str; 3] = ["userData", "include", "dataQuality"];
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let header = map.header().into_iter();
+    let defaults = header.flat_map(|header| header.children_named("defaultRegulations"));
+    let regulations = defaults.flat_map(|defaults| defaults.children());
+    let semantics = regulations.flat_map(|regulation| regulation.children_named("semantics"));
+    for element in semantics.flat_map(|semantics| semantics.children()) {
+        let name = element.name();
+        if matches!(name, "speed" | "priority") || ANYWHERE.contains(&name) {
+            continue;
+        }
+        let text = format!(
+            "`{name}` is used in the default regulations; only `speed` and `priority` may be used there"
+        );
+        found.issue(element, text);
+    }
+}

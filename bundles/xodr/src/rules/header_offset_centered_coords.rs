@@ -1,0 +1,62 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_opendrive::geometry::Point;
+use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_header_offset_centered_coords",
+    uids: &["asam.net:xodr:1.7.0:header.offset.centered_coords"],
+    level: Level::Warning,
+    versions: "1.7.0..",
+    backport: Backport::Lower { since: "1.6.0" },
+    after: super::READABLE,
+    params: &[LIMIT],
+    page: include_str!("header_offset_centered_coords.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const LIMIT: Param = Param::number("limit", 1e5, "m", "largest coordinate that is accepted");
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let limit = found.number(&LIMIT);
+    let geometries = map
+        .roads()
+        .iter()
+        .flat_map(|road| road.plan_view().geometries());
+    let points: Vec<_> = geometries
+        .filter_map(|geometry| geometry.origin())
+        .collect();
+    let (Some(header), Some(first)) = (map.header(), points.first()) else {
+        return;
+    };
+    let (mut low, mut high) = (*first, *first);
+    for point in &points {
+        (low.x, low.y) = (low.x.min(point.x), low.y.min(point.y));
+        (high.x, high.y) = (high.x.max(point.x), high.y.max(point.y));
+    }
+    let largest = |point: &Point| point.x.abs().max(point.y.abs());
+    let Some(farthest) = points
+        .iter()
+        .max_by(|a, b| largest(a).total_cmp(&largest(b)))
+    else {
+        return;
+    };
+    let (x, y) = ((low.x + high.x) / 2.0, (low.y + high.y) / 2.0);
+    let extent = (high.x - low.x).max(high.y - low.y) / 2.0;
+    // A map that is large by itself cannot be centered any better.
+    if largest(farthest) <= limit || extent > largest(farthest) / 2.0 {
+        return;
+    }
+    let place = header.child("offset").unwrap_or(header);
+    let text = format!(
+        "the roads lie around x = {x:.0}, y = {y:.0}, with coordinates up to {:.0} m; they should lie around \
+         (0, 0), with the distance in `offset` (accepted: {limit} m)",
+        largest(farthest)
+    );
+    found
+        .issue(place, text)
+        .point(farthest.x, farthest.y, 0.0)
+        .here("where the distance belongs");
+}

@@ -1,0 +1,47 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_header_proj_max_one_proj",
+    uids: &["asam.net:xodr:1.9.0:header.proj.max_one_proj"],
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "1.4.0" },
+    after: super::READABLE,
+    page: include_str!("header_proj_max_one_proj.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let header = map.header().into_iter();
+    let mut references = header.flat_map(|header| header.children_named("geoReference"));
+    let Some(first) = references.next() else {
+        return;
+    };
+    check_text(first, found);
+    for further in references {
+        let text = "there is a second `geoReference`; a file must have no more than one projection";
+        found.issue(further, text).at(first, "the first one");
+        check_text(further, found);
+    }
+}
+
+/// Counts projections in a PROJ string. A pipeline is one projection made of several steps.
+fn check_text(reference: Node<'_>, found: &mut Sink<'_>) {
+    let text = reference.text();
+    let names: Vec<&str> = text
+        .split_whitespace()
+        .filter_map(|word| word.strip_prefix("+proj="))
+        .collect();
+    if names.len() > 1 && !names.contains(&"pipeline") {
+        let text = format!(
+            "`geoReference` names {} projections (`{}`); a file must have no more than one",
+            names.len(),
+            names.join("`, `")
+        );
+        found.issue(reference, text);
+    }
+}

@@ -1,0 +1,61 @@
+use std::collections::HashMap;
+
+use qcbus_document::{Document, Node};
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::families::ids::{KINDS, Kind, Scope};
+
+pub static RULE: Rule<Document> = Rule {
+    id: "check_asam_xodr_ids_id_unique_in_class",
+    uids: &["asam.net:xodr:1.4.0:ids.id_unique_in_class"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("ids_id_unique_in_class.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(document: &Document<'_>, found: &mut Sink<'_>) {
+    for kind in KINDS {
+        check(kind, document, found);
+    }
+}
+
+fn check<'d>(kind: &Kind, document: &Document<'d>, found: &mut Sink<'_>) {
+    let mut exact: HashMap<(Option<Node<'d>>, &str), Node<'d>> = HashMap::new();
+    let mut numeric: HashMap<u64, Node<'d>> = HashMap::new();
+    for node in kind.nodes(document) {
+        let Some(id) = node.attr("id") else { continue };
+        let place = Place::attribute_or_node(node, "id");
+        let home = kind.home(node);
+        if let Some(first) = exact.get(&(home, id)) {
+            let whole = home.map_or("this file", |_| "the same parent");
+            let text = format!(
+                "the id `{id}` belongs to another {} of {whole} already; each needs an id of its own",
+                kind.name
+            );
+            found
+                .issue(node, text)
+                .at(*first, format!("the first {} with this id", kind.name));
+            continue;
+        }
+        exact.insert((home, id), node);
+        if let (Scope::File, Ok(number)) = (kind.scope, id.parse()) {
+            match numeric.get(&number) {
+                Some(like) => {
+                    let other = like.attr("id").unwrap_or_default();
+                    let text = format!(
+                        "the {name} ids `{id}` and `{other}` differ as text but are the same number; \
+                         readers that take ids for numbers mix them up",
+                        name = kind.name
+                    );
+                    found
+                        .issue(place, text)
+                        .level(Level::Information)
+                        .at(*like, "the other one");
+                }
+                None => _ = numeric.insert(number, node),
+            }
+        }
+    }
+}

@@ -1,0 +1,222 @@
+use std::collections::{HashMap, HashSet};
+
+use qcbus_document::{Document, Node};
+use qcbus_sdk::{Place, Rule, Sink};
+
+use crate::families::ids::{Class, KINDS, Kind};
+use crate::families::lane_references;
+
+pub static RULE: Rule<Document> = Rule {
+    id: "check_asam_xodr_ids_only_ref_defined_ids",
+    uids: &["asam.net:xodr:1.4.0:ids.only_ref_defined_ids"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("ids_only_ref_defined_ids.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// An attribute that names another element.
+struct Reference {
+    element: &'static str,
+    parent: &'static str,
+    attribute: &'static str,
+    target: Target,
+    /// What means "none" here.
+    none: &'static [&'static str],
+}
+
+enum Target {
+    /// An element of the class, anywhere in the file.
+    Any(Class),
+    /// The class depends on another attribute of the same element.
+    By(&'static str, &'static [(&'static str, Class)]),
+    /// An element of the class within the same object.
+    InObject(Class),
+}
+
+const fn to(
+    parent: &'static str,
+    element: &'static str,
+    attribute: &'static str,
+    target: Target,
+    none: &'static [&'static str],
+) -> Reference {
+    Reference {
+        element,
+        parent,
+        attribute,
+        target,
+        none,
+    }
+}
+
+const LINKED: Target = Target::By(
+    "elementType",
+    &[("road", Class::Road), ("junction", Class::Junction)],
+);
+const ELEMENT: Target = Target::By(
+    "elementType",
+    &[("object", Class::Object), ("signal", Class::Signal)],
+);
+const ROAD: Target = Target::Any(Class::Road);
+const SIGNAL: Target = Target::Any(Class::Signal);
+
+/// Parent, element, attribute, what it names, what means none. The parents tell namesakes apart.
+const REFERENCES: &[Reference] = &[
+    to(
+        "OpenDRIVE",
+        "road",
+        "junction",
+        Target::Any(Class::Junction),
+        &["-1", ""],
+    ),
+    to("link", "predecessor", "elementId", LINKED, &[]),
+    to("link", "successor", "elementId", LINKED, &[]),
+    to("OpenDRIVE", "junction", "mainRoad", ROAD, &[]),
+    to("junction", "connection", "incomingRoad", ROAD, &["-1"]),
+    to("junction", "connection", "connectingRoad", ROAD, &[]),
+    to("junction", "connection", "linkedRoad", ROAD, &[]),
+    to("junction", "priority", "high", ROAD, &[]),
+    to("junction", "priority", "low", ROAD, &[]),
+    to(
+        "junction",
+        "controller",
+        "id",
+        Target::Any(Class::Controller),
+        &[],
+    ),
+    to("junction", "crossPath", "crossingRoad", ROAD, &[]),
+    to("junction", "crossPath", "roadAtStart", ROAD, &[]),
+    to("junction", "crossPath", "roadAtEnd", ROAD, &[]),
+    to("", "roadSection", "roadId", ROAD, &[]),
+    to("boundary", "segment", "roadId", ROAD, &[]),
+    to(
+        "junctionGroup",
+        "junctionReference",
+        "junction",
+        Target::Any(Class::Junction),
+        &[],
+    ),
+    to("controller", "control", "signalId", SIGNAL, &[]),
+    to("signal", "dependency", "id", SIGNAL, &[]),
+    to("signal", "reference", "elementId", ELEMENT, &[]),
+    to("signals", "signalReference", "id", SIGNAL, &[]),
+    to(
+        "objects",
+        "objectReference",
+        "id",
+        Target::Any(Class::Object),
+        &[],
+    ),
+    to("signal", "positionRoad", "roadId", ROAD, &[]),
+    to("vmsGroup", "vmsBoardReference", "signalId", SIGNAL, &[]),
+    to("platform", "segment", "roadId", ROAD, &[]),
+    to("switch", "mainTrack", "id", ROAD, &[]),
+    to("switch", "sideTrack", "id", ROAD, &[]),
+    to("switch", "partner", "id", Target::Any(Class::Switch), &[]),
+    to(
+        "borders",
+        "border",
+        "outlineId",
+        Target::InObject(Class::Outline),
+        &[],
+    ),
+    to(
+        "",
+        "cornerReference",
+        "id",
+        Target::InObject(Class::Corner),
+        &[],
+    ),
+];
+
+/// The ids that are defined: in the file by class, and in each object by class.
+struct Defined<'d> {
+    anywhere: HashMap<Class, HashSet<&'d str>>,
+    in_object: HashMap<(Node<'d>, Class), HashSet<&'d str>>,
+}
+
+fn run(document: &Document<'_>, found: &mut Sink<'_>) {
+    let defined = Defined::of(document);
+    for reference in REFERENCES {
+        for node in document.elements(reference.element) {
+            let parent = node.parent().map_or("", |parent| parent.name());
+            if reference.parent.is_empty() || reference.parent == parent {
+                check(reference, node, &defined, found);
+            }
+        }
+    }
+    lane_references::check(document, found);
+}
+
+fn check(reference: &Reference, node: Node<'_>, defined: &Defined<'_>, found: &mut Sink<'_>) {
+    let Some(id) = node
+        .attr(reference.attribute)
+        .filter(|id| !reference.none.contains(id))
+    else {
+        return;
+    };
+    let (class, exists, within) = match reference.target {
+        Target::Any(class) => (class, defined.anywhere(class, id), ""),
+        Target::By(attribute, classes) => {
+            let kind = node.attr(attribute);
+            // A type that does not exist is the schema's business.
+            let Some((_, class)) = classes.iter().find(|(name, _)| Some(*name) == kind) else {
+                return;
+            };
+            (*class, defined.anywhere(*class, id), "")
+        }
+        Target::InObject(class) => {
+            let Some(object) = node.ancestors().find(|ancestor| ancestor.is("object")) else {
+                return;
+            };
+            let ids = defined.in_object.get(&(object, class));
+            (
+                class,
+                ids.is_some_and(|ids| ids.contains(id)),
+                " in this object",
+            )
+        }
+    };
+    if !exists {
+        let text = format!(
+            "`{}=\"{id}\"` of `{}` refers to an undefined {}{within}; a reference must name one that exists",
+            reference.attribute,
+            reference.element,
+            Kind::of(class).name
+        );
+        found.issue(Place::attribute_or_node(node, reference.attribute), text);
+    }
+}
+
+impl<'d> Defined<'d> {
+    fn of(document: &Document<'d>) -> Defined<'d> {
+        let mut defined = Defined {
+            anywhere: HashMap::new(),
+            in_object: HashMap::new(),
+        };
+        for kind in KINDS {
+            for node in kind.nodes(document) {
+                let Some(id) = node.attr("id") else { continue };
+                defined.anywhere.entry(kind.class).or_default().insert(id);
+                if matches!(kind.class, Class::Outline | Class::Corner)
+                    && let Some(object) = node.ancestors().find(|ancestor| ancestor.is("object"))
+                {
+                    defined
+                        .in_object
+                        .entry((object, kind.class))
+                        .or_default()
+                        .insert(id);
+                }
+            }
+        }
+        defined
+    }
+
+    fn anywhere(&self, class: Class, id: &str) -> bool {
+        self.anywhere
+            .get(&class)
+            .is_some_and(|ids| ids.contains(id))
+    }
+}

@@ -1,0 +1,54 @@
+use qcbus_opendrive::{Junction, RoadMap};
+use qcbus_sdk::{Param, Rule, Sink};
+
+use crate::families::junction_area::{Stretch, boundary};
+use crate::model::Roads;
+
+const GAP: Param = Param::number(
+    "gap",
+    0.05,
+    "m",
+    "largest distance between the end of a segment and the start of the next one",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_junctions_boundary_segments_close_boundry",
+    uids: &["asam.net:xodr:1.8.0:junctions.boundary.segments_close_boundry"],
+    versions: "1.8.0..",
+    after: super::READABLE,
+    params: &[GAP],
+    page: include_str!("junctions_boundary_segments_close_boundry.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for junction in map.junctions() {
+        if let Some(stretches) = boundary(map, junction) {
+            check(junction, &stretches, found);
+        }
+    }
+}
+
+fn check(junction: &Junction<'_>, stretches: &[Stretch<'_>], found: &mut Sink<'_>) {
+    let limit = found.number(&GAP);
+    let next = stretches.iter().cycle().skip(1);
+    for (stretch, next) in stretches.iter().zip(next) {
+        let (Some(end), Some(start)) = (stretch.last(), next.first()) else {
+            continue;
+        };
+        let gap = end.distance(start);
+        if gap > limit {
+            let text = format!(
+                "this segment of the boundary of junction `{}` ends {gap:.3} m away from the start of the next one; \
+                 at most {limit} m is allowed for the boundary to be closed",
+                junction.id()
+            );
+            found
+                .issue(stretch.segment.node(), text)
+                .point(end.x, end.y, 0.0)
+                .at(next.segment.node(), "the next segment")
+                .point(start.x, start.y, 0.0);
+        }
+    }
+}

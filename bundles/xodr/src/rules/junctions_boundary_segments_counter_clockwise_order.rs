@@ -1,0 +1,40 @@
+use qcbus_opendrive::{Junction, RoadMap};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::junction_area::{Stretch, boundary, doubled_area, ring};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_junctions_boundary_segments_counter_clockwise_order",
+    uids: &["asam.net:xodr:1.8.0:junctions.boundary.segments_counter_clockwise_order"],
+    versions: "1.8.0..",
+    after: super::READABLE,
+    page: include_str!("junctions_boundary_segments_counter_clockwise_order.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for junction in map.junctions() {
+        if let Some(stretches) = boundary(map, junction) {
+            check(junction, &stretches, found);
+        }
+    }
+}
+
+fn check(junction: &Junction<'_>, stretches: &[Stretch<'_>], found: &mut Sink<'_>) {
+    let ring = ring(stretches);
+    let area = 0.5 * doubled_area(&ring);
+    let (Some(node), Some(first)) = (junction.node().child("boundary"), ring.first()) else {
+        return;
+    };
+    if area < 0.0 {
+        let text = format!(
+            "the boundary of junction `{}` runs clockwise around {:.1} m²; its segments must be in counter-clockwise \
+             order",
+            junction.id(),
+            -area
+        );
+        found.issue(node, text).point(first.x, first.y, 0.0);
+    }
+}

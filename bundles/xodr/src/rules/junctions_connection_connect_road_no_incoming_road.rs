@@ -1,0 +1,55 @@
+use std::collections::BTreeSet;
+
+use qcbus_opendrive::{JunctionType, RoadMap};
+use qcbus_sdk::{Place, Rule, Sink};
+
+use crate::families::on_road::OnRoad;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_junctions_connection_connect_road_no_incoming_road",
+    uids: &["asam.net:xodr:1.4.0:junctions.connection.connect_road_no_incoming_road"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("junctions_connection_connect_road_no_incoming_road.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for junction in map.junctions() {
+        // The main road of a virtual junction goes through it and comes in at the same time.
+        if junction.kind() == Some(JunctionType::Virtual) {
+            continue;
+        }
+        let paths: BTreeSet<&str> = junction
+            .connections()
+            .filter_map(|connection| connection.connecting_road())
+            .collect();
+        for connection in junction.connections() {
+            let incoming = connection.incoming_road().and_then(|id| map.road(id));
+            let Some(road) = incoming.filter(|_| !connection.is_virtual()) else {
+                continue;
+            };
+            let belongs = match road.junction() {
+                Some(id) => format!("belongs to junction `{id}`"),
+                None if paths.contains(road.id()) => {
+                    format!("is a connecting road of junction `{}`", junction.id())
+                }
+                None => continue,
+            };
+            let text = format!(
+                "the incoming road `{}` {belongs}; connecting roads must not be incoming roads",
+                road.id()
+            );
+            let middle = road.length().unwrap_or(0.0) / 2.0;
+            found
+                .issue(
+                    Place::attribute_or_node(connection.node(), "incomingRoad"),
+                    text,
+                )
+                .on(road, middle, 0.0)
+                .at(road.node(), "the connecting road");
+        }
+    }
+}

@@ -1,0 +1,68 @@
+use qcbus_opendrive::{LaneJoint, RoadMap};
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::families::connections::{repeated, report_repeated};
+use crate::families::driving::Traffic;
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_junctions_connection_one_link_to_incoming",
+    uids: &["asam.net:xodr:1.8.0:junctions.connection.one_link_to_incoming"],
+    versions: "1.8.0..",
+    backport: Backport::Separate { since: "" },
+    after: super::READABLE,
+    page: include_str!("junctions_connection_one_link_to_incoming.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for junction in map.junctions() {
+        let pairs = repeated(junction, |one| one.incoming_road().zip(one.target_road()));
+        for ((incoming, target), connections) in pairs {
+            let text = format!(
+                "{} connections lead from road `{incoming}` to road `{target}`; junction `{}` may have \
+                 only one for them, with all lane links",
+                connections.len(),
+                junction.id()
+            );
+            report_repeated(map, text, &connections, found);
+        }
+    }
+    for joint in map
+        .lane_joints()
+        .iter()
+        .filter(|joint| joint.junction.is_some())
+    {
+        against_traffic(map, joint, found);
+    }
+}
+
+/// A lane link must begin on a lane that leads into the junction, and go on in one that leads away
+/// from there.
+fn against_traffic(map: &RoadMap<'_>, joint: &LaneJoint<'_>, found: &mut Sink<'_>) {
+    let (Some(from), Some(to)) = (map.lane(joint.from.lane), map.lane(joint.to.lane)) else {
+        return;
+    };
+    let leaves = |lane, end| !Traffic::of(lane).may_run_towards(end);
+    let (lane, end, fault) = if leaves(from, joint.from.end) {
+        let fault = "traffic on the former leads out of the junction";
+        (from, joint.from.end, fault)
+    } else if leaves(to, joint.to.end.other()) {
+        let fault = "traffic on the latter leads back to where it came from";
+        (to, joint.to.end, fault)
+    } else {
+        return;
+    };
+    let text = format!(
+        "the lane link leads from {} to {}, but {fault}; only lanes that lead into the junction may \
+         be linked, in the direction of traffic",
+        lane_name(from),
+        lane_name(to)
+    );
+    found
+        .issue(joint.node, text)
+        .at_lane_end(lane, end)
+        .at(lane.node(), "the lane in question");
+}

@@ -1,0 +1,58 @@
+use std::collections::HashSet;
+
+use qcbus_opendrive::{Junction, JunctionType, RoadMap};
+use qcbus_sdk::{Backport, Place, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_junctions_cross_path_correct_junction_id",
+    uids: &["asam.net:xodr:1.8.0:junctions.cross_path.correct_junction_id"],
+    versions: "1.8.0..",
+    backport: Backport::Lower { since: "1.4.0" },
+    after: super::READABLE,
+    page: include_str!("junctions_cross_path_correct_junction_id.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let mut told = HashSet::new();
+    let identified = |junction: &&Junction<'_>| !junction.id().is_empty();
+    for junction in map.junctions().iter().filter(identified) {
+        let paths = junction.cross_paths();
+        let paths = paths.map(|path| (path.crossing_road(), path.node(), "crossing"));
+        // Direct junctions and crossings have no roads of their own.
+        let connects = matches!(
+            junction.kind(),
+            Some(JunctionType::Common | JunctionType::Virtual)
+        );
+        let connections = junction
+            .connections()
+            .filter(|connection| connects && !connection.is_virtual());
+        let connections = connections.map(|one| (one.connecting_road(), one.node(), "connecting"));
+        for (id, user, role) in connections.chain(paths) {
+            let Some(road) = id.and_then(|id| map.road(id)) else {
+                continue;
+            };
+            let mut namesakes = map.roads_with_id(road.id());
+            let belongs = namesakes.any(|road| road.junction() == Some(junction.id()));
+            if belongs || !told.insert((junction.index(), road.index())) {
+                continue;
+            }
+            let belonging = match road.junction() {
+                Some(other) => format!("names junction `{other}`"),
+                None => "names no junction".to_owned(),
+            };
+            let text = format!(
+                "road `{}` is a {role} road of junction `{}`, but {belonging} as its own; `junction` must contain \
+                 the id of the junction to which the road belongs",
+                road.id(),
+                junction.id()
+            );
+            found
+                .issue(Place::attribute_or_node(road.node(), "junction"), text)
+                .at(user, "where the junction uses it");
+        }
+    }
+}

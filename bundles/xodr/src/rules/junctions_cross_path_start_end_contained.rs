@@ -1,0 +1,53 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Param, Rule, Sink};
+
+use crate::families::cross_paths::crossings;
+use crate::model::Roads;
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    0.05,
+    "m",
+    "how far a corner of the crossing road may lie outside of the linked lane",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_junctions_cross_path_start_end_contained",
+    uids: &["asam.net:xodr:1.8.0:junctions.cross_path.start_end_contained"],
+    versions: "1.8.0..",
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("junctions_cross_path_start_end_contained.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for crossing in crossings(map) {
+        for landing in crossing.landings(map) {
+            let corners = crossing.corners(landing.end).into_iter().flatten();
+            let outside = corners.filter_map(|corner| {
+                let (s, t) = landing.project(corner)?;
+                let [low, high] = landing.span(s)?;
+                Some(((low - t).max(t - high), corner))
+            });
+            let worst = outside.max_by(|one, other| one.0.total_cmp(&other.0));
+            let limit = found.number(&TOLERANCE);
+            let Some((outside, corner)) = worst.filter(|(outside, _)| *outside > limit) else {
+                continue;
+            };
+            let text = format!(
+                "a corner of crossing road `{}` at its {} lies {outside:.2} m outside of lane `{}` of road `{}`; the ends \
+                 of a crossing road must lie within the linked lanes with all of its lanes",
+                crossing.road.id(),
+                landing.end,
+                landing.lane,
+                landing.other.id()
+            );
+            found
+                .issue(crossing.path.node(), text)
+                .point(corner.x, corner.y, 0.0)
+                .at(landing.link.node(), "the link");
+        }
+    }
+}

@@ -1,0 +1,44 @@
+use qcbus_opendrive::{JunctionType, RoadMap};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_junctions_crossing_only_road_sections",
+    uids: &["asam.net:xodr:1.8.0:junctions.crossing.only_road_sections"],
+    versions: "1.8.0..",
+    after: super::READABLE,
+    page: include_str!("junctions_crossing_only_road_sections.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// What describes connections or areas, which crossings do not have.
+const FOREIGN: [&str; 4] = ["connection", "crossPath", "boundary", "elevationGrid"];
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for junction in map.junctions() {
+        if junction.kind() != Some(JunctionType::Crossing) {
+            continue;
+        }
+        let id = junction.id();
+        for child in junction
+            .node()
+            .children()
+            .filter(|child| FOREIGN.contains(&child.name()))
+        {
+            let text = format!(
+                "crossing `{id}` has an element `{}`; crossings must be described by `roadSection` elements \
+                 alone",
+                child.name()
+            );
+            found.issue(child, text);
+        }
+        if junction.road_sections().next().is_none() {
+            let text = format!(
+                "crossing `{id}` has no `roadSection`, and so says nothing about what crosses"
+            );
+            found.issue(junction.node(), text);
+        }
+    }
+}

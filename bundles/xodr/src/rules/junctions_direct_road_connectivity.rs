@@ -1,0 +1,50 @@
+use qcbus_opendrive::{JunctionType, RoadEnd, RoadMap};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::junction_ends::{Meeting, name};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_junctions_direct_road_connectivity",
+    uids: &["asam.net:xodr:1.8.0:junctions.direct.road_connectivity"],
+    versions: "1.8.0..",
+    after: super::READABLE,
+    page: include_str!("junctions_direct_road_connectivity.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for junction in map.junctions() {
+        if junction.kind() != Some(JunctionType::Direct) {
+            continue;
+        }
+        let Some(meeting) = Meeting::of(map, junction) else {
+            continue;
+        };
+        let pairs: Vec<_> = meeting.pairs().collect();
+        let Some((one, other)) = pairs.first() else {
+            continue;
+        };
+        let in_all = |end: &RoadEnd| pairs.iter().all(|pair| pair.0 == *end || pair.1 == *end);
+        if pairs.len() > 1 && (in_all(one) || in_all(other)) {
+            continue;
+        }
+        let named = pairs
+            .iter()
+            .map(|(one, other)| format!("{} with {}", name(map, *one), name(map, *other)));
+        let text = format!(
+            "direct junction `{}` connects {}; it must connect one road on one side with several roads on the \
+             other side",
+            junction.id(),
+            named.collect::<Vec<_>>().join(", ")
+        );
+        // A single pair does no harm; it could be a link between the roads.
+        let level = if pairs.len() == 1 {
+            Level::Warning
+        } else {
+            Level::Error
+        };
+        found.issue(junction.node(), text).level(level);
+    }
+}

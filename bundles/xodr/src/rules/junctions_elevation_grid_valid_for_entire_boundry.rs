@@ -1,0 +1,94 @@
+use qcbus_opendrive::geometry::{Placed, Point};
+use qcbus_opendrive::{ElevationGrid, Junction, RoadMap};
+use qcbus_sdk::{Param, Rule, Sink};
+
+use crate::families::junction_area::{beside, boundary, reference_line, ring};
+use crate::model::Roads;
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    0.01,
+    "m",
+    "how far the junction may reach beyond the grid",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_junctions_elevation_grid_valid_for_entire_boundry",
+    uids: &["asam.net:xodr:1.8.0:junctions.elevation_grid.valid_for_entire_boundry"],
+    versions: "1.8.0..",
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("junctions_elevation_grid_valid_for_entire_boundry.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for junction in map.junctions() {
+        let line = reference_line(junction);
+        if let (Some(grid), Some(line)) = (junction.elevation_grid(), line)
+            && let Some(stretches) = boundary(map, junction)
+        {
+            check(junction, grid, &line, &ring(&stretches), found);
+        }
+    }
+}
+
+fn check(
+    junction: &Junction<'_>,
+    grid: ElevationGrid<'_>,
+    line: &Placed,
+    ring: &[Point],
+    found: &mut Sink<'_>,
+) {
+    let Some(area) = Area::of(grid) else { return };
+    let beyond = ring.iter().map(|point| {
+        let (s, t) = beside(line, *point);
+        (area.beyond(s, t), *point)
+    });
+    let worst = beyond.max_by(|one, other| one.0.total_cmp(&other.0));
+    if let Some((beyond, point)) = worst.filter(|(beyond, _)| *beyond > found.number(&TOLERANCE)) {
+        let text = format!(
+            "the boundary of junction `{}` reaches {beyond:.2} m beyond its elevation grid; the grid must cover all of it",
+            junction.id()
+        );
+        found.issue(grid.node(), text).point(point.x, point.y, 0.0);
+    }
+}
+
+/// How far the rows of a grid reach.
+struct Area {
+    start: f64,
+    spacing: f64,
+    /// To the left and to the right, in metres.
+    rows: Vec<(f64, f64)>,
+}
+
+impl Area {
+    fn of(grid: ElevationGrid<'_>) -> Option<Area> {
+        let spacing = grid.grid_spacing().filter(|spacing| *spacing > 0.0)?;
+        let rows = grid.rows().map(|row| {
+            let reach = |heights: Vec<f64>| heights.len() as f64 * spacing;
+            Some((reach(row.left()?), reach(row.right()?)))
+        });
+        let rows = rows.collect::<Option<Vec<_>>>()?;
+        let start = grid.s_start()?;
+        (!rows.is_empty()).then_some(Area {
+            start,
+            spacing,
+            rows,
+        })
+    }
+
+    /// How far a place lies outside of the grid, negative inside.
+    fn beyond(&self, s: f64, t: f64) -> f64 {
+        let along = (s - self.start) / self.spacing;
+        let last = (self.rows.len() - 1) as f64;
+        let outside = (-along).max(along - last) * self.spacing;
+        // The two rows between which the place lies; both must reach it.
+        let around =
+            [along.floor(), along.ceil()].map(|row| self.rows[row.clamp(0.0, last) as usize]);
+        let aside = around.map(|(left, right)| (t - left).max(-t - right));
+        outside.max(aside[0]).max(aside[1])
+    }
+}

@@ -1,0 +1,55 @@
+use qcbus_opendrive::geometry::{Placed, Point};
+use qcbus_opendrive::{Junction, RoadMap};
+use qcbus_sdk::{Param, Rule, Sink};
+
+use crate::families::junction_area::{beside, boundary, reference_line, ring};
+use crate::model::Roads;
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    0.05,
+    "m",
+    "how far the junction may reach beyond the ends of the line",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_junctions_geometry_ref_line_definition",
+    uids: &["asam.net:xodr:1.8.0:junctions.geometry.ref_line_definition"],
+    versions: "1.8.0..",
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("junctions_geometry_ref_line_definition.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for junction in map.junctions() {
+        let line = reference_line(junction);
+        if let (Some(line), Some(stretches)) = (line, boundary(map, junction)) {
+            check(junction, &line, &ring(&stretches), found);
+        }
+    }
+}
+
+fn check(junction: &Junction<'_>, line: &Placed, ring: &[Point], found: &mut Sink<'_>) {
+    let limit = found.number(&TOLERANCE);
+    let beyond = ring.iter().map(|point| {
+        let (s, _) = beside(line, *point);
+        ((-s).max(s - line.length), *point)
+    });
+    let worst = beyond.max_by(|one, other| one.0.total_cmp(&other.0));
+    if let Some((beyond, point)) = worst.filter(|(beyond, _)| *beyond > limit) {
+        let text = format!(
+            "the junction `{}` reaches {beyond:.2} m beyond the end of its reference line; every point of it must lie \
+             at a right angle beside the line",
+            junction.id()
+        );
+        let node = junction
+            .plan_view()
+            .geometries()
+            .first()
+            .map_or(junction.node(), |one| one.node());
+        found.issue(node, text).point(point.x, point.y, 0.0);
+    }
+}

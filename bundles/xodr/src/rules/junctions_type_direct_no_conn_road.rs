@@ -1,0 +1,35 @@
+use qcbus_opendrive::{JunctionType, RoadMap};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_junctions_type_direct_no_conn_road",
+    uids: &[
+        "asam.net:xodr:1.7.0:junctions.type_direct_no_conn_road",
+        "asam.net:xodr:1.7.0:junctions.direct.connecting_road_attribute_usage",
+        "asam.net:xodr:1.9.0:junctions.connection.no_connecting_road_direct",
+    ],
+    versions: "1.7.0..",
+    after: super::READABLE,
+    page: include_str!("junctions_type_direct_no_conn_road.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for (junction, connection) in map.connections() {
+        if junction.kind() != Some(JunctionType::Direct) {
+            continue;
+        }
+        if let Some(connecting) = connection.node().attribute("connectingRoad") {
+            let text = format!(
+                "a connection of the direct junction `{}` has connectingRoad = `{}`; direct junctions have no \
+                 connecting roads, `linkedRoad` must be used",
+                junction.id(),
+                connecting.value()
+            );
+            found.issue(connecting, text);
+        }
+    }
+}

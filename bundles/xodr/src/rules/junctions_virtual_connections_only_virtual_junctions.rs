@@ -1,0 +1,34 @@
+use qcbus_opendrive::{JunctionType, RoadMap};
+use qcbus_sdk::{Backport, Place, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_junctions_virtual_connections_only_virtual_junctions",
+    uids: &["asam.net:xodr:1.9.0:junctions.virtual.connections.only_virtual_junctions"],
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "1.5.0" },
+    after: super::READABLE,
+    page: include_str!("junctions_virtual_connections_only_virtual_junctions.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for (junction, connection) in map.connections() {
+        let kind = match junction.kind() {
+            None | Some(JunctionType::Virtual) => continue,
+            Some(kind) => kind,
+        };
+        if connection.is_virtual() {
+            let text = format!(
+                "connection `{}` of junction `{}` is virtual, but the junction is of type `{}`; virtual \
+                 connections must only be defined in virtual junctions",
+                connection.id().unwrap_or_default(),
+                junction.id(),
+                kind.as_str()
+            );
+            found.issue(Place::attribute_or_node(connection.node(), "type"), text);
+        }
+    }
+}

@@ -1,0 +1,68 @@
+use qcbus_opendrive::{JunctionType, RoadMap, Side};
+use qcbus_sdk::{Param, Rule, Sink};
+
+use crate::families::cross_paths::{Crossing, Landing, crossings};
+use crate::families::virtual_junctions::seen_from;
+use crate::model::Roads;
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    0.05,
+    "m",
+    "how far the crossing road may reach beyond the other road",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_junctions_virtual_cross_path_cross_road_check_s_t",
+    uids: &["asam.net:xodr:1.8.0:junctions.virtual.crossPath.cross_road_check_s_t"],
+    versions: "1.8.0..",
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("junctions_virtual_cross_path_cross_road_check_s_t.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let of_virtual = |one: &Crossing<'_, '_>| one.junction.kind() == Some(JunctionType::Virtual);
+    for crossing in crossings(map).filter(of_virtual) {
+        for landing in crossing.landings(map) {
+            check(&crossing, &landing, found);
+        }
+    }
+}
+
+fn check(crossing: &Crossing<'_, '_>, landing: &Landing<'_, '_>, found: &mut Sink<'_>) {
+    let limit = found.number(&TOLERANCE);
+    let worst = crossing
+        .corners(landing.end)
+        .into_iter()
+        .flatten()
+        .filter_map(|corner| {
+            let (s, t) = landing.project(corner)?;
+            let pose = landing.other.pose(s)?;
+            // Beyond the ends of the road the foot stays at the end.
+            let (ahead, _) = seen_from(pose, corner);
+            let edge = |side: Side| {
+                let section = landing
+                    .other
+                    .permanent()?
+                    .section_at(landing.other, side, s)?;
+                section.edge_t(side, s - section.s()?)
+            };
+            let aside = (t - edge(Side::Left)?).max(edge(Side::Right)? - t);
+            Some((aside.max(ahead.abs()), corner))
+        });
+    let worst = worst.max_by(|one, other| one.0.total_cmp(&other.0));
+    if let Some((beyond, corner)) = worst.filter(|(beyond, _)| *beyond > limit) {
+        let text = format!(
+            "crossing road `{}` reaches {beyond:.2} m beyond road `{}` at its {}; it must stay within its length and width",
+            crossing.road.id(),
+            landing.other.id(),
+            landing.end
+        );
+        found
+            .issue(crossing.path.node(), text)
+            .point(corner.x, corner.y, 0.0);
+    }
+}

@@ -1,0 +1,54 @@
+use std::f64::consts::PI;
+
+use qcbus_opendrive::RoadMap;
+use qcbus_opendrive::geometry::heading_difference;
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::families::on_road::OnRoad;
+use crate::families::touching::KINK;
+use crate::families::virtual_junctions::all_branches;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_junctions_virtual_heading_equal_mainroad",
+    uids: &["asam.net:xodr:1.9.0:junctions.virtual.heading_equal_mainroad"],
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "1.6.0" },
+    after: super::READABLE,
+    params: &[KINK],
+    page: include_str!("junctions_virtual_heading_equal_mainroad.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let limit = found.number(&KINK);
+    for branch in all_branches(map) {
+        let poses = branch
+            .main
+            .pose(branch.s)
+            .zip(branch.road.end_pose(branch.end));
+        let kink = poses.and_then(|(main, road)| heading_difference(main.hdg, road.hdg));
+        // Along the main road or against it.
+        let Some(kink) = kink
+            .map(|kink| kink.min(PI - kink))
+            .filter(|kink| *kink > limit)
+        else {
+            continue;
+        };
+        let text = format!(
+            "the {} of road `{}` does not run along main road `{}`: their headings differ by {kink:.4} rad \
+             ({:.2}°) at s = {}; at most {limit} rad is allowed",
+            branch.end,
+            branch.road.id(),
+            branch.main.id(),
+            kink.to_degrees(),
+            branch.s
+        );
+        found
+            .issue(branch.road.node(), text)
+            .at_end(branch.road, branch.end)
+            .at(branch.link.node(), "the link to the main road")
+            .on(branch.main, branch.s, 0.0);
+    }
+}

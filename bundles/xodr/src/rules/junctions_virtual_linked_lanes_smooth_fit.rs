@@ -1,0 +1,134 @@
+use std::f64::consts::PI;
+
+use qcbus_opendrive::geometry::heading_difference;
+use qcbus_opendrive::{BorderPoint, Edge, LaneLink, LaneRef, RoadMap, Side};
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::families::driving::is_drivable;
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::families::touching::{GAP, KINK, STEP};
+use crate::families::virtual_junctions::{Branch, all_branches};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_junctions_virtual_linked_lanes_smooth_fit",
+    uids: &["asam.net:xodr:1.9.0:junctions.virtual.linked_lanes_smooth_fit"],
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "1.6.0" },
+    after: super::READABLE,
+    params: &[GAP, KINK, STEP],
+    page: include_str!("junctions_virtual_linked_lanes_smooth_fit.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for branch in all_branches(map) {
+        let section = branch.road.permanent().and_then(|layer| {
+            let side = Side::Right;
+            layer.end_section(branch.road, side, branch.end)
+        });
+        let Some(section) = section else { continue };
+        for lane in section.lanes() {
+            for link in lane.links(branch.end) {
+                check(&branch, lane, link, found);
+            }
+        }
+    }
+}
+
+fn check(branch: &Branch<'_, '_>, lane: LaneRef<'_, '_>, link: LaneLink<'_>, found: &mut Sink<'_>) {
+    let Some(main) = link.id().and_then(|id| main_lane(branch, id)) else {
+        return;
+    };
+    let Some(start) = main
+        .at
+        .s()
+        .filter(|_| is_drivable(lane) && is_drivable(main))
+    else {
+        return;
+    };
+    let ds = branch.s - start;
+    let borders = |edge| main.border(edge, ds);
+    let (Some(own), Some(inner), Some(outer)) = (
+        lane.borders_at(branch.end),
+        borders(Edge::Inner),
+        borders(Edge::Outer),
+    ) else {
+        return;
+    };
+    // Which edge meets which is a matter of place, not of names: the lanes may run in opposite
+    // directions, on either side of the center.
+    let apart = |[one, other]: [BorderPoint; 2]| {
+        let distance = |a: BorderPoint, b: BorderPoint| a.point.plan().distance(b.point.plan());
+        distance(own[0], one).max(distance(own[1], other))
+    };
+    let there = if apart([inner, outer]) <= apart([outer, inner]) {
+        [inner, outer]
+    } else {
+        [outer, inner]
+    };
+    let faults = faults(own, there, found);
+    if faults.is_empty() {
+        return;
+    }
+    let text = format!(
+        "{} is linked to {} at s = {}, but {}",
+        lane_name(lane),
+        lane_name(main),
+        branch.s,
+        faults.join(" and ")
+    );
+    found
+        .issue(link.node(), text)
+        .at_lane_end(lane, branch.end)
+        .at(main.node(), "the lane of the main road")
+        .in_lane(main, ds);
+}
+
+fn main_lane<'m, 'a>(branch: &Branch<'m, 'a>, id: i64) -> Option<LaneRef<'m, 'a>> {
+    let layer = branch.main.permanent()?;
+    layer
+        .section_at(branch.main, Side::of_lane_id(id)?, branch.s)?
+        .lane(id)
+}
+
+fn faults(own: [BorderPoint; 2], there: [BorderPoint; 2], found: &Sink<'_>) -> Vec<String> {
+    let [gap, kink, step] = [GAP, KINK, STEP].map(|param| found.number(&param));
+    let mut worst = [0.0_f64; 3];
+    for (one, other) in own.into_iter().zip(there) {
+        let turn = one
+            .hdg
+            .zip(other.hdg)
+            .and_then(|(a, b)| heading_difference(a, b));
+        // A connecting road may run against the main road.
+        let turn = turn.map_or(0.0, |turn| turn.min(PI - turn));
+        let apart = one.point.plan().distance(other.point.plan());
+        let met = [
+            apart,
+            if apart <= gap { turn } else { 0.0 },
+            (one.point.z - other.point.z).abs(),
+        ];
+        for (most, this) in worst.iter_mut().zip(met) {
+            *most = most.max(this);
+        }
+    }
+    let [apart, turn, high] = worst;
+    let mut faults = Vec::new();
+    if apart > gap {
+        faults.push(format!(
+            "their edges lie {apart:.3} m apart (at most {gap} m is allowed)"
+        ));
+    }
+    if turn > kink {
+        faults.push(format!(
+            "their edges differ by {turn:.4} rad in heading (at most {kink} rad is allowed)"
+        ));
+    }
+    if high > step {
+        faults.push(format!(
+            "their edges differ by {high:.3} m in height (at most {step} m is allowed)"
+        ));
+    }
+    faults
+}

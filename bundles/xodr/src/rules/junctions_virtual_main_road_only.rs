@@ -1,0 +1,44 @@
+use qcbus_opendrive::{ContactPoint, JunctionType, RoadMap};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_junctions_virtual_main_road_only",
+    uids: &["asam.net:xodr:1.9.0:junctions.virtual.main_road_only"],
+    versions: "1.9.0..",
+    after: super::READABLE,
+    page: include_str!("junctions_virtual_main_road_only.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for (junction, connection) in map.connections() {
+        if junction.kind() != Some(JunctionType::Virtual) || connection.is_virtual() {
+            continue;
+        }
+        let Some(main) = junction.main_road() else {
+            continue;
+        };
+        let connecting = connection.connecting_road().and_then(|id| map.road(id));
+        let Some(road) = connecting.filter(|_| connection.incoming_road() != Some(main)) else {
+            continue;
+        };
+        // A road that is not linked at both ends may be incomplete.
+        let ends = ContactPoint::BOTH.map(|end| road.link(end).and_then(|link| link.road_id()));
+        if let [Some(start), Some(end)] = ends
+            && ![start, end].contains(&main)
+        {
+            let text = format!(
+                "connecting road `{}` of virtual junction `{}` leads from road `{start}` to road `{end}`; virtual \
+                 junctions must be used for branches off the main road `{main}` only",
+                road.id(),
+                junction.id()
+            );
+            found
+                .issue(connection.node(), text)
+                .at(road.node(), "the connecting road");
+        }
+    }
+}

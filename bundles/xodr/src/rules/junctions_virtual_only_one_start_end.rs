@@ -1,0 +1,66 @@
+use qcbus_opendrive::{JunctionType, Road, RoadMap};
+use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_junctions_virtual_only_one_start_end",
+    uids: &["asam.net:xodr:1.9.0:junctions.virtual.only_one_start_end"],
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "1.5.0" },
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("junctions_virtual_only_one_start_end.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    1e-3,
+    "m",
+    "how far beyond the ends of the main road is accepted",
+);
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let tolerance = found.number(&TOLERANCE);
+    for junction in map.junctions() {
+        if junction.kind() != Some(JunctionType::Virtual) {
+            continue;
+        }
+        let node = junction.node();
+        let main = junction.main_road().and_then(|id| map.road(id));
+        for (name, s) in [("sStart", junction.s_start()), ("sEnd", junction.s_end())] {
+            let Some(attribute) = node.attribute(name) else {
+                let text = format!(
+                    "virtual junction `{}` has no `{name}`; it must have one `sStart` and one `sEnd`",
+                    junction.id()
+                );
+                found.issue(node, text);
+                continue;
+            };
+            let (Some(s), Some(road), Some(length)) = (s, main, main.and_then(Road::length)) else {
+                continue;
+            };
+            if s < -tolerance || s > length + tolerance {
+                let text = format!(
+                    "`{name}` is {s}, but the main road `{}` goes from s = 0 to s = {length}; the junction must \
+                     lie on it",
+                    road.id()
+                );
+                found.issue(attribute, text).road(road.id(), s, 0.0);
+            }
+        }
+        if let (Some(start), Some(end)) = (junction.s_start(), junction.s_end())
+            && start > end
+        {
+            let text = format!(
+                "the virtual junction ends at s = {end}, before it starts at s = {start}; `sStart` must not be \
+                 greater than `sEnd`"
+            );
+            found
+                .issue(Place::attribute_or_node(node, "sEnd"), text)
+                .level(Level::Warning);
+        }
+    }
+}

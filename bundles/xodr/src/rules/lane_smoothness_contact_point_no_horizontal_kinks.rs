@@ -1,0 +1,24 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::families::touching::{GAP, KINK, Where, pairs, report_kink};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_lane_smoothness_contact_point_no_horizontal_kinks",
+    uids: &["qcbus.dev:xodr:1.8.0:lane_smoothness.contact_point_no_horizontal_kinks"],
+    versions: "1.8.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    params: &[GAP, KINK],
+    page: include_str!("lane_smoothness_contact_point_no_horizontal_kinks.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    // In junctions it is a rule of its own: `junctions.connection.smooth_fit` and the like.
+    for pair in pairs(map).filter(|pair| pair.at == Where::Roads) {
+        report_kink(&pair, found);
+    }
+}

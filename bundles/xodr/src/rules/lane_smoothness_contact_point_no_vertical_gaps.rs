@@ -1,0 +1,48 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Param, Rule, Sink};
+
+use crate::families::touching::{Pair, STEP, Where, pairs, report_step};
+use crate::model::Roads;
+
+const ROLL: Param = Param::number(
+    "roll",
+    0.01,
+    "rad",
+    "largest difference between the crossfalls of two lanes that is accepted",
+);
+
+/// Narrower lanes have no crossfall worth the name: rounding of heights would tilt them, in metres.
+const TOO_NARROW: f64 = 2.0;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_lane_smoothness_contact_point_no_vertical_gaps",
+    uids: &["qcbus.dev:xodr:1.8.0:lane_smoothness.contact_point_no_vertical_gaps"],
+    versions: "1.8.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    params: &[STEP, ROLL],
+    page: include_str!("lane_smoothness_contact_point_no_vertical_gaps.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    // In junctions it is a rule of its own: `junctions.connection.smooth_fit` and the like.
+    for pair in pairs(map).filter(|pair| pair.at == Where::Roads) {
+        if !report_step(&pair, found) {
+            report_roll(&pair, found);
+        }
+    }
+}
+
+/// Lanes that meet at one edge only, as where one splits into two, may be tilted against each other.
+fn report_roll(pair: &Pair<'_, '_>, found: &mut Sink<'_>) {
+    let limit = found.number(&ROLL);
+    if let Some(roll) = pair.roll(TOO_NARROW).filter(|roll| *roll > limit) {
+        let text = format!(
+            "their crossfalls differ by {roll:.4} rad ({:.2}°) where they touch; at most {limit} rad is allowed",
+            roll.to_degrees()
+        );
+        pair.report(&text, pair.touching.left[0], found);
+    }
+}

@@ -1,0 +1,80 @@
+use qcbus_opendrive::{Place, Road, RoadMap};
+use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
+
+use crate::families::on_road::OnRoad;
+use crate::families::touching::{GAP, STEP, Where, pairs};
+use crate::model::Roads;
+
+const PITCH: Param = Param::number(
+    "pitch",
+    0.02,
+    "",
+    "largest difference between two slopes (height over distance) that is accepted",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_lane_smoothness_contact_point_no_vertical_kinks",
+    uids: &["qcbus.dev:xodr:1.8.0:lane_smoothness.contact_point_no_vertical_kinks"],
+    level: Level::Warning,
+    versions: "1.8.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    params: &[PITCH, GAP, STEP],
+    page: include_str!("lane_smoothness_contact_point_no_vertical_kinks.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let limit = found.number(&PITCH);
+    for pair in pairs(map) {
+        if pair.at
+            == (Where::Connection {
+                elevation_grid: true,
+            })
+        {
+            continue;
+        }
+        let edge = pair.pitch(found.number(&GAP), found.number(&STEP));
+        if let Some(edge) = edge.filter(|edge| edge.amount > limit) {
+            let text = format!(
+                "the slopes of their {} edges differ by {:.2} % where they touch; they should not by more than \
+                 {:.2} %",
+                edge.side,
+                100.0 * edge.amount,
+                100.0 * limit
+            );
+            pair.report(&text, edge.point, found);
+        }
+    }
+    for road in map.roads() {
+        within(road, found);
+    }
+}
+
+/// Kinks of the elevation itself: there the lanes go on without a link.
+fn within(road: &Road<'_>, found: &mut Sink<'_>) {
+    let limit = found.number(&PITCH);
+    let profile = road.elevation();
+    for record in profile.in_order().skip(1) {
+        let Some(s) = record.start() else { continue };
+        let before = Place::before(s);
+        let slopes = profile.slope_at(before).zip(profile.slope_at(s));
+        let heights = profile.at(before).zip(profile.at(s));
+        let (Some((before, after)), Some((low, high))) = (slopes, heights) else {
+            continue;
+        };
+        let is_step = (high - low).abs() > found.number(&STEP);
+        if (after - before).abs() > limit && !is_step {
+            let text = format!(
+                "the slope of road `{}` changes from {:.2} % to {:.2} % at s = {s}; it should not change by more \
+                 than {:.2} % at once",
+                road.id(),
+                100.0 * before,
+                100.0 * after,
+                100.0 * limit
+            );
+            found.issue(record.node(), text).on(road, s, 0.0);
+        }
+    }
+}

@@ -1,0 +1,25 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::families::profile_steps::{elevation, lateral};
+use crate::families::touching::STEP;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_lane_smoothness_profile_no_vertical_gaps",
+    uids: &["qcbus.dev:xodr:1.8.0:lane_smoothness.profile_no_vertical_gaps"],
+    versions: "1.8.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    params: &[STEP],
+    page: include_str!("lane_smoothness_profile_no_vertical_gaps.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        elevation(road, found);
+        lateral(road, found);
+    }
+}

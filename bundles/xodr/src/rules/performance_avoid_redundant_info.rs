@@ -1,0 +1,99 @@
+use qcbus_opendrive::{LaneRef, Profile, Road, RoadMap};
+use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
+
+use crate::families::on_road::OnRoad;
+use crate::families::redundancy::{Repeated, in_lines, in_profile};
+use crate::model::Roads;
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    1e-6,
+    "m or rad",
+    "how far apart two curves may lie and still be the same",
+);
+const TURN: Param = Param::number(
+    "turn",
+    1e-6,
+    "rad",
+    "how far two lines may differ in heading and still be one",
+);
+const GAP: Param = Param::number(
+    "gap",
+    0.01,
+    "m",
+    "how far apart two lines may lie and still be one",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_performance_avoid_redundant_info",
+    uids: &[
+        // What ASAM's checker prints; annex F has the rule since 1.8.1.
+        "asam.net:xodr:1.7.0:performance.avoid_redundant_info",
+        "asam.net:xodr:1.8.1:performance.avoid_redundant_info",
+    ],
+    level: Level::Warning,
+    versions: "1.7.0..",
+    backport: Backport::Separate { since: "" },
+    after: super::READABLE,
+    params: &[TOLERANCE, TURN, GAP],
+    page: include_str!("performance_avoid_redundant_info.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        of_lines(road, found);
+        let Some(length) = road.length() else {
+            continue;
+        };
+        of_road(road, road.elevation(), length, found);
+        of_road(road, &road.lateral().superelevation, length, found);
+        for layer in road.layers() {
+            of_road(road, layer.offset(), length, found);
+        }
+    }
+    for lane in map.lanes() {
+        of_lane(lane, found);
+    }
+}
+
+fn of_lines(road: &Road<'_>, found: &mut Sink<'_>) {
+    let (gap, turn) = (found.number(&GAP), found.number(&TURN));
+    for [one, next] in in_lines(road.plan_view(), gap, turn) {
+        let text =
+            "this line goes on in the direction of the line before it; one `geometry` would do";
+        found
+            .issue(next.node(), text)
+            .on(road, next.s().unwrap_or(0.0), 0.0)
+            .at(one.node(), "the line before it");
+    }
+}
+
+fn of_road(road: &Road<'_>, profile: &Profile<'_>, end: f64, found: &mut Sink<'_>) {
+    for repeated in in_profile(profile, end, found.number(&TOLERANCE)) {
+        let finding = found.issue(repeated.second.node(), text(&repeated));
+        let finding = finding.on(road, repeated.from, 0.0);
+        finding.at(repeated.first.node(), "the record before it");
+    }
+}
+
+fn of_lane(lane: LaneRef<'_, '_>, found: &mut Sink<'_>) {
+    let Some(length) = lane.length() else { return };
+    for profile in [lane.widths(), lane.borders()] {
+        for repeated in in_profile(profile, length, found.number(&TOLERANCE)) {
+            let finding = found.issue(repeated.second.node(), text(&repeated));
+            let finding = finding.in_lane(lane, repeated.from);
+            finding.at(repeated.first.node(), "the record before it");
+        }
+    }
+}
+
+fn text(repeated: &Repeated<'_, '_>) -> String {
+    format!(
+        "this `{}` says the same as the one before it, from {} to {} m; it should be left out",
+        repeated.second.node().name(),
+        repeated.from,
+        repeated.to
+    )
+}

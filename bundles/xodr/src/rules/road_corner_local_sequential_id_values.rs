@@ -1,0 +1,21 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Level, Rule, Sink};
+
+use crate::families::corner_ids;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_corner_local_sequential_id_values",
+    uids: &["asam.net:xodr:1.9.0:road.corner_local.sequential_id_values"],
+    level: Level::Warning,
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    page: include_str!("road_corner_local_sequential_id_values.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    corner_ids::are_sequential(map, "cornerLocal", found);
+}

@@ -1,0 +1,40 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::families::object_parts::{CORNERS, Stands, listed, objects, outlines};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_corner_road_corner_road_local_exclusivity",
+    uids: &["asam.net:xodr:1.9.0:road.corner_road.corner_road_local_exclusivity"],
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    page: include_str!("road_corner_road_corner_road_local_exclusivity.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for object in objects(map) {
+        for outline in outlines(object) {
+            let present = CORNERS.map(|sort| outline.child(sort));
+            let mut sorts: Vec<Node<'_>> = present.into_iter().flatten().collect();
+            sorts.sort();
+            let [first, other, ..] = sorts.as_slice() else {
+                continue;
+            };
+            let names: Vec<&str> = sorts.iter().map(Node::name).collect();
+            let text = format!(
+                "the outline mixes {}; all of its points must be of one sort",
+                listed(&names)
+            );
+            found
+                .issue(outline, text)
+                .stands(map, object)
+                .at(*first, "the first of one sort")
+                .at(*other, "the first of another");
+        }
+    }
+}

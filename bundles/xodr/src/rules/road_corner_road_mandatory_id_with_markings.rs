@@ -1,0 +1,20 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::families::corner_ids;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_corner_road_mandatory_id_with_markings",
+    uids: &["asam.net:xodr:1.9.0:road.corner_road.mandatory_id_with_markings"],
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    page: include_str!("road_corner_road_mandatory_id_with_markings.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    corner_ids::are_mandatory(map, "cornerRoad", found);
+}

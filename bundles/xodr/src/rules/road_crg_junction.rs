@@ -1,0 +1,46 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::model::Roads;
+use std::collections::HashMap;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_crg_junction",
+    uids: &["asam.net:xodr:1.7.0:road.crg.junction"],
+    versions: "1.7.0..",
+    after: super::READABLE,
+    page: include_str!("road_crg_junction.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let mut surfaces: HashMap<&str, Node<'_>> = HashMap::new();
+    for junction in map.junctions() {
+        let mut records = junction
+            .node()
+            .children_named("surface")
+            .flat_map(|surface| surface.child("CRG"));
+        if let Some(own) = records.next() {
+            surfaces.entry(junction.id()).or_insert(own);
+        }
+    }
+    if surfaces.is_empty() {
+        return;
+    }
+    for road in map.roads() {
+        let own = road.junction().and_then(|id| Some((id, surfaces.get(id)?)));
+        let (Some((id, own)), Some(record)) = (own, road.crgs().next()) else {
+            continue;
+        };
+        let text = format!(
+            "road `{}` has a CRG surface, but junction `{id}`, to which it belongs, has one of its own; \
+             only one of them may",
+            road.id()
+        );
+        found
+            .issue(record.node(), text)
+            .at(*own, "the surface of the junction");
+    }
+}

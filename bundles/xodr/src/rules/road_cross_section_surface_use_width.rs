@@ -1,0 +1,69 @@
+use qcbus_opendrive::{Road, RoadMap, Strip};
+use qcbus_sdk::{Param, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_cross_section_surface_use_width",
+    uids: &["asam.net:xodr:1.8.0:road.cross_section_surface.use_width"],
+    versions: "1.8.0..",
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("road_cross_section_surface_use_width.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    1e-6,
+    "m",
+    "how far below zero a width is accepted",
+);
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        let Some(surface) = &road.lateral().cross_section_surface else {
+            continue;
+        };
+        for inner in [1, -1] {
+            let (Some(strip), Some(outer)) = (surface.strip(inner), surface.strip(2 * inner))
+            else {
+                continue;
+            };
+            if strip.width.is_empty() {
+                let text = format!(
+                    "strip {inner} has no width, although there is strip {} beyond it; the inner one of two \
+                     strips must have a width",
+                    2 * inner
+                );
+                found
+                    .issue(strip.node(), text)
+                    .at(outer.node(), "the outer strip");
+            } else {
+                check_width(strip, road, found);
+            }
+        }
+    }
+}
+
+/// A width must not be negative anywhere.
+fn check_width(strip: &Strip<'_>, road: &Road<'_>, found: &mut Sink<'_>) {
+    let Some(length) = road.length() else { return };
+    let tolerance = found.number(&TOLERANCE);
+    for stretch in strip.width.stretches(length) {
+        let Some(least) = stretch.cubic.minimum(0.0, stretch.length()) else {
+            continue;
+        };
+        if least.value < -tolerance {
+            let s = stretch.from + least.at;
+            let text = format!(
+                "the width of the strip at s = {s} is {} m, but must not be negative",
+                least.value
+            );
+            found
+                .issue(stretch.record.node(), text)
+                .road(road.id(), s, 0.0);
+        }
+    }
+}

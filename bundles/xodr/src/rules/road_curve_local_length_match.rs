@@ -1,0 +1,36 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::families::on_road::OnRoad;
+use crate::families::outline_curves::{LENGTH_TOLERANCE, for_each_poly};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_curve_local_length_match",
+    uids: &["asam.net:xodr:1.9.0:road.curve_local.length_match"],
+    level: Level::Warning,
+    versions: "1.9.0..",
+    after: super::READABLE,
+    params: &[LENGTH_TOLERANCE],
+    page: include_str!("road_curve_local_length_match.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for_each_poly(map, found, |road, object, curve, poly, found| {
+        let Some(length) = curve.length() else { return };
+        let tolerance = found.number(&LENGTH_TOLERANCE);
+        let Some(real) = poly.arc_length(0.0, poly.last_parameter(length)) else {
+            return;
+        };
+        if (real - length).abs() > tolerance {
+            let text = format!(
+                "the curve is {real:.4} m long, but `length` says {length} m; they should agree within {tolerance} m"
+            );
+            found
+                .issue(Place::attribute_or_node(curve.node(), "length"), text)
+                .on(road, object.s().unwrap_or(0.0), object.t().unwrap_or(0.0));
+        }
+    });
+}

@@ -1,0 +1,46 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_geometry_arc_no_zero_curvature",
+    uids: &["asam.net:xodr:1.9.0:road.geometry.arc.no_zero_curvature"],
+    level: Level::Warning,
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "1.4.0" },
+    after: super::READABLE,
+    params: &[LEAST],
+    page: include_str!("road_geometry_arc_no_zero_curvature.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const LEAST: Param = Param::number(
+    "least",
+    1e-12,
+    "1/m",
+    "a curvature up to this counts as zero",
+);
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let least = found.number(&LEAST);
+    for road in map.roads() {
+        for geometry in road.plan_view().geometries() {
+            for arc in geometry.shapes().filter(|shape| shape.is("arc")) {
+                let curvature = arc.f64("curvature").ok();
+                let Some(curvature) = curvature.filter(|curvature| curvature.abs() <= least) else {
+                    continue;
+                };
+                let text = format!(
+                    "the curvature of the arc is {curvature}; an arc should have a curvature other than zero, \
+                     a straight piece is a `line`"
+                );
+                let finding = found.issue(Place::attribute_or_node(arc, "curvature"), text);
+                if let Some(s) = geometry.s() {
+                    finding.road(road.id(), s, 0.0);
+                }
+            }
+        }
+    }
+}

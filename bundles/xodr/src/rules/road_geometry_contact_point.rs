@@ -1,0 +1,77 @@
+use qcbus_opendrive::geometry::Point3;
+use qcbus_opendrive::{ContactPoint, Road, RoadEnd, RoadMap};
+use qcbus_sdk::{Backport, Param, Rule, Sink};
+
+use crate::families::on_road::OnRoad;
+use crate::model::Roads;
+
+const GAP: Param = Param::number(
+    "gap",
+    0.01,
+    "m",
+    "largest distance that is accepted, in the plan view and in height",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_geometry_contact_point",
+    uids: &["asam.net:xodr:1.7.0:road.geometry.contact_point"],
+    versions: "1.7.0..",
+    backport: Backport::Separate { since: "" },
+    after: super::READABLE,
+    params: &[GAP],
+    page: include_str!("road_geometry_contact_point.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        for end in ContactPoint::BOTH {
+            check(map, road, end, found);
+        }
+    }
+}
+
+fn check<'a>(map: &RoadMap<'a>, road: &Road<'a>, end: ContactPoint, found: &mut Sink<'_>) {
+    let Some(contact) = map.linked_end(road, end) else {
+        return;
+    };
+    let Some(linked) = map.road_at(contact.to.road) else {
+        return;
+    };
+    // The rule is about roads that are connected without a junction.
+    if road.junction().is_some() || linked.junction().is_some() {
+        return;
+    }
+    let (Some(here), Some(there)) = (place(road, end), place(linked, contact.to.end)) else {
+        return;
+    };
+    let (gap, step) = (here.plan().distance(there.plan()), (here.z - there.z).abs());
+    let limit = found.number(&GAP);
+    if gap <= limit && step <= limit {
+        return;
+    }
+    let RoadEnd { end: other, .. } = contact.to;
+    let distance = match (gap > limit, step > limit) {
+        (true, false) => format!("{gap:.3} m away from"),
+        (false, _) => format!("{step:.3} m above or below"),
+        (true, true) => format!("{gap:.3} m away from, and {step:.3} m above or below,"),
+    };
+    let text = format!(
+        "the {end} of road `{}` lies {distance} the {other} of road `{}`, its {}; reference lines of \
+         linked roads must meet within {limit} m",
+        road.id(),
+        linked.id(),
+        end.link_name()
+    );
+    found
+        .issue(road.node(), text)
+        .at_end(road, end)
+        .at(contact.node, "the link")
+        .at_end(linked, other);
+}
+
+fn place(road: &Road<'_>, end: ContactPoint) -> Option<Point3> {
+    let frame = road.end_frame(end)?;
+    Point3::finite(frame.pose.x, frame.pose.y, frame.z)
+}

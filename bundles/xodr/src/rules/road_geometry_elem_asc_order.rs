@@ -1,0 +1,62 @@
+use qcbus_opendrive::{Road, RoadMap};
+use qcbus_sdk::{Level, Param, Place, Rule, Sink};
+
+use crate::families::on_road::OnRoad;
+use crate::model::Roads;
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    1e-6,
+    "m",
+    "values of s that differ by less are equal",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_geometry_elem_asc_order",
+    uids: &["asam.net:xodr:1.4.0:road.geometry.elem_asc_order"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("road_geometry_elem_asc_order.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        check(road, found);
+    }
+}
+
+fn check(road: &Road<'_>, found: &mut Sink<'_>) {
+    let tolerance = found.number(&TOLERANCE);
+    let mut farthest = None;
+    for geometry in road.plan_view().geometries() {
+        let Some(s) = geometry.s() else { continue };
+        let Some((before, most)) = farthest else {
+            farthest = Some((geometry, s));
+            continue;
+        };
+        let (level, text) = if s < most - tolerance {
+            let text = format!(
+                "this geometry starts at s = {s} m and comes after one that starts at s = {most} m; \
+                 geometries must be listed in ascending order of s"
+            );
+            (Level::Error, text)
+        } else if s <= most + tolerance {
+            let text = format!(
+                "this geometry starts at s = {s} m like one before it, which therefore never \
+                 applies; each should start further along the road"
+            );
+            (Level::Warning, text)
+        } else {
+            farthest = Some((geometry, s));
+            continue;
+        };
+        found
+            .issue(Place::attribute_or_node(geometry.node(), "s"), text)
+            .level(level)
+            .on(road, s, 0.0)
+            .at(before.node(), "the geometry before it");
+    }
+}

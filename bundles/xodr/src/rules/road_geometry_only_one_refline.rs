@@ -1,0 +1,28 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_geometry_only_one_refline",
+    uids: &["asam.net:xodr:1.4.0:road.geometry.only_one_refline"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("road_geometry_only_one_refline.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        let mut lines = road.node().children_named("planView");
+        let Some(first) = lines.next() else { continue };
+        for further in lines {
+            let text = format!(
+                "road `{}` has a second `planView`; a road has exactly one reference line",
+                road.id()
+            );
+            found.issue(further, text).at(first, "the first one");
+        }
+    }
+}

@@ -1,0 +1,26 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_opendrive::geometry::ParamRange;
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::families::curve_length::{self, LENGTH_TOLERANCE};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_geometry_parampoly3_arclength_range",
+    uids: &[
+        // ASAM's checker and annex F spell it differently.
+        "asam.net:xodr:1.7.0:road.geometry.parampoly3.arclength_range",
+        "asam.net:xodr:1.7.0:road.geometry.paramPoly3.arcLength_range",
+    ],
+    versions: "1.7.0..",
+    backport: Backport::Separate { since: "" },
+    after: super::READABLE,
+    params: &[LENGTH_TOLERANCE],
+    page: include_str!("road_geometry_parampoly3_arclength_range.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    curve_length::range_fits(map, ParamRange::ArcLength, found);
+}

@@ -1,0 +1,26 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Level, Rule, Sink};
+
+use crate::families::curve_length::{self, LENGTH_TOLERANCE};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_geometry_parampoly3_length_match",
+    uids: &[
+        // ASAM's checker and annex F spell it differently.
+        "asam.net:xodr:1.7.0:road.geometry.parampoly3.length_match",
+        "asam.net:xodr:1.7.0:road.geometry.paramPoly3.length_match",
+    ],
+    level: Level::Warning,
+    versions: "1.7.0..",
+    backport: Backport::Separate { since: "" },
+    after: super::READABLE,
+    params: &[LENGTH_TOLERANCE],
+    page: include_str!("road_geometry_parampoly3_length_match.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    curve_length::length_matches(map, found);
+}

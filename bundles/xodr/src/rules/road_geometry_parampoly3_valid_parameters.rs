@@ -1,0 +1,64 @@
+use qcbus_opendrive::geometry::ParamPoly3;
+use qcbus_opendrive::{Geometry, Road, RoadMap};
+use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
+
+use crate::families::on_road::OnRoad;
+use crate::model::Roads;
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    1e-6,
+    "m and rad",
+    "largest shift and rotation of the curve's start that is accepted",
+);
+const HARMFUL: Param = Param::number(
+    "harmful",
+    0.01,
+    "m and rad",
+    "shift or rotation beyond which it is an error",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_geometry_parampoly3_valid_parameters",
+    uids: &["asam.net:xodr:1.7.0:road.geometry.paramPoly3.valid_parameters"],
+    versions: "1.7.0..",
+    backport: Backport::Separate { since: "" },
+    after: super::READABLE,
+    params: &[TOLERANCE, HARMFUL],
+    page: include_str!("road_geometry_parampoly3_valid_parameters.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        for geometry in road.plan_view().geometries() {
+            if let Some(curve) = geometry.param_poly3() {
+                check(road, geometry, &curve, found);
+            }
+        }
+    }
+}
+
+/// With aU = aV = bV = 0 and bU > 0 the curve starts at `@x`, `@y` in the direction of `@hdg`.
+fn check(road: &Road<'_>, geometry: &Geometry<'_>, curve: &ParamPoly3, found: &mut Sink<'_>) {
+    let (tolerance, harmful) = (found.number(&TOLERANCE), found.number(&HARMFUL));
+    let shift = curve.u.a.hypot(curve.v.a);
+    let turn = curve.v.b.atan2(curve.u.b).abs();
+    let forward = curve.u.b > 0.0;
+    if forward && shift <= tolerance && turn <= tolerance {
+        return;
+    }
+    let text = format!(
+        "aU = {}, bU = {}, aV = {}, bV = {}: the curve starts {shift:.6} m away from the geometry's x \
+         and y, turned by {turn:.6} rad against its hdg; it should have aU = aV = bV = 0 and bU > 0",
+        curve.u.a, curve.u.b, curve.v.a, curve.v.b
+    );
+    let harms = !forward || shift > harmful || turn > harmful;
+    let level = if harms { Level::Error } else { Level::Warning };
+    let place = geometry.shape_node().unwrap_or(geometry.node());
+    found
+        .issue(place, text)
+        .level(level)
+        .on(road, geometry.s().unwrap_or(0.0), 0.0);
+}

@@ -1,0 +1,72 @@
+use qcbus_opendrive::geometry::heading_difference;
+use qcbus_opendrive::{Geometry, Road, RoadMap};
+use qcbus_sdk::{Level, Param, Rule, Sink};
+
+use crate::families::on_road::OnRoad;
+use crate::families::refline::{joints, shape_name, standstill};
+use crate::model::Roads;
+
+const KINK: Param = Param::number(
+    "kink",
+    0.01,
+    "rad",
+    "largest difference between two headings that is accepted",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_geometry_refline_no_kinks",
+    uids: &[
+        "asam.net:xodr:1.4.0:road.geometry.refline_no_kinks",
+        "qcbus.dev:xodr:1.8.0:lane_smoothness.refline_no_horizontal_kinks",
+    ],
+    level: Level::Warning,
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[KINK],
+    page: include_str!("road_geometry_refline_no_kinks.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        for (one, next) in joints(road) {
+            check(road, one, next, found);
+        }
+        for geometry in road.plan_view().geometries() {
+            if let Some(at) = standstill(geometry) {
+                let text = format!(
+                    "the {} has no direction at parameter {at}: both of its coordinates stand still there; a \
+                     reference line should have no kinks",
+                    shape_name(geometry)
+                );
+                found
+                    .issue(geometry.shape_node().unwrap_or(geometry.node()), text)
+                    .road(road.id(), geometry.s().unwrap_or(0.0), 0.0);
+            }
+        }
+    }
+}
+
+fn check(road: &Road<'_>, one: &Geometry<'_>, next: &Geometry<'_>, found: &mut Sink<'_>) {
+    let limit = found.number(&KINK);
+    let (Some(end), Some(start)) = (one.end(), next.start()) else {
+        return;
+    };
+    let Some(kink) = heading_difference(end.hdg, start.hdg).filter(|kink| *kink > limit) else {
+        return;
+    };
+    let text = format!(
+        "the geometry before it ({}) ends with a heading of {:.4} rad, this one ({}) starts with {:.4} rad; \
+         they should not differ by more than {limit} rad, but do so by {kink:.4} rad ({:.2}°)",
+        shape_name(one),
+        end.hdg,
+        shape_name(next),
+        start.hdg,
+        kink.to_degrees()
+    );
+    found
+        .issue(next.node(), text)
+        .on(road, next.s().unwrap_or(0.0), 0.0)
+        .at(one.node(), "the geometry before it");
+}

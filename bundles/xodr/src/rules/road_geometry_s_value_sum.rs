@@ -1,0 +1,67 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Param, Place, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_geometry_s_value_sum",
+    uids: &["asam.net:xodr:1.9.0:road.geometry.s-value_sum"],
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "1.4.0" },
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("road_geometry_s_value_sum.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    1e-3,
+    "m",
+    "largest deviation that is accepted, on long roads a millionth of the sum",
+);
+/// What a sum of lengths written with few digits may be off, as a share of it.
+const RELATIVE: f64 = 1e-6;
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let tolerance = found.number(&TOLERANCE);
+    for road in map.roads() {
+        let mut sum = 0.0;
+        let mut first = None;
+        let mut further = 0;
+        for geometry in road.plan_view().geometries() {
+            let (Some(s), Some(length)) = (geometry.s(), geometry.length()) else {
+                break;
+            };
+            if (s - sum).abs() > tolerance.max(RELATIVE * sum) {
+                match first {
+                    None => first = Some((geometry, s, sum)),
+                    Some(_) => further += 1,
+                }
+            }
+            sum += length;
+        }
+        let Some((geometry, s, sum)) = first else {
+            continue;
+        };
+        let more = match further {
+            0 => String::new(),
+            1 => "; a further `geometry` of this road deviates, too".to_owned(),
+            many => format!("; {many} further `geometry` elements of this road deviate, too"),
+        };
+        let demand = match sum {
+            0.0 => "the reference line starts at s = 0".to_owned(),
+            sum => format!("the geometries before this one are {sum} m long together"),
+        };
+        let text = format!(
+            "s is {s}, but {demand}; s must be the sum of all lengths before (accepted: {tolerance} m){more}"
+        );
+        let finding = found
+            .issue(Place::attribute_or_node(geometry.node(), "s"), text)
+            .road(road.id(), s, 0.0);
+        if let Some(at) = geometry.origin() {
+            finding.point(at.x, at.y, 0.0);
+        }
+    }
+}

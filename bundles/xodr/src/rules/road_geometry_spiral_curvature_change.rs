@@ -1,0 +1,50 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_geometry_spiral_curvature_change",
+    uids: &["asam.net:xodr:1.9.0:road.geometry.spiral.curvature_change"],
+    level: Level::Warning,
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "1.4.0" },
+    after: super::READABLE,
+    params: &[LEAST],
+    page: include_str!("road_geometry_spiral_curvature_change.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const LEAST: Param = Param::number(
+    "least",
+    1e-12,
+    "1/m",
+    "a difference of curvatures up to this counts as none",
+);
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let least = found.number(&LEAST);
+    for road in map.roads() {
+        for geometry in road.plan_view().geometries() {
+            for spiral in geometry.shapes().filter(|shape| shape.is("spiral")) {
+                let (Ok(start), Ok(end)) = (spiral.f64("curvStart"), spiral.f64("curvEnd")) else {
+                    continue;
+                };
+                let change = (end - start).abs();
+                if change.is_nan() || change > least {
+                    continue;
+                }
+                let instead = if start.abs() <= least { "line" } else { "arc" };
+                let text = format!(
+                    "the spiral starts with curvature {start} and ends with {end}; they should differ; a \
+                     piece of constant curvature is written as `{instead}`"
+                );
+                let finding = found.issue(spiral, text);
+                if let Some(s) = geometry.s() {
+                    finding.road(road.id(), s, 0.0);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,24 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::center_lane;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_access_center_lane_no_acc_rule",
+    uids: &["asam.net:xodr:1.4.0:road.lane.access.center_lane_no_acc_rule"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("road_lane_access_center_lane_no_acc_rule.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    center_lane::has_no(
+        map,
+        "access",
+        "nobody drives on it; access rules belong to the lanes beside it",
+        found,
+    );
+}

@@ -1,0 +1,37 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Rule, Sink, Version};
+
+use crate::families::ascending;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_access_elem_asc_order",
+    uids: &["asam.net:xodr:1.4.0:road.lane.access.elem_asc_order"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[ascending::TOLERANCE],
+    page: include_str!("road_lane_access_elem_asc_order.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// The first version in which one element holds all restrictions of a place.
+const RESTRICTION_ELEMENTS: Version = Version::new(1, 8);
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let lists_are_legal = found
+        .version()
+        .is_none_or(|version| version < RESTRICTION_ELEMENTS);
+    let equal: ascending::Equal = if lists_are_legal {
+        |_, _| None
+    } else {
+        replaced
+    };
+    ascending::lane_records(map, "access", equal, found);
+}
+
+fn replaced(before: Node<'_>, node: Node<'_>) -> Option<Level> {
+    let names_its_vehicle = |node: Node<'_>| node.attribute("restriction").is_some();
+    (!(names_its_vehicle(before) && names_its_vehicle(node))).then_some(Level::Warning)
+}

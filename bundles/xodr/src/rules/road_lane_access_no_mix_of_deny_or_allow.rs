@@ -1,0 +1,63 @@
+use qcbus_opendrive::{LaneRecord, LaneRef, RoadMap};
+use qcbus_sdk::{Backport, Param, Place, Rule, Sink};
+
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::model::Roads;
+
+const SAME_PLACE: Param = Param::number(
+    "same_place",
+    1e-6,
+    "m",
+    "records that start closer together than this start at the same place",
+);
+
+/// With how many records before it a record is compared: bounds the work on hostile files.
+const LOOK_BACK: usize = 64;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_access_no_mix_of_deny_or_allow",
+    uids: &["asam.net:xodr:1.7.0:road.lane.access.no_mix_of_deny_or_allow"],
+    versions: "1.7.0..",
+    backport: Backport::Separate { since: "" },
+    after: super::READABLE,
+    params: &[SAME_PLACE],
+    page: include_str!("road_lane_access_no_mix_of_deny_or_allow.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for lane in map.lanes() {
+        let records: Vec<LaneRecord<'_>> = lane.records_named("access").collect();
+        for (index, record) in records.iter().enumerate() {
+            for before in &records[index.saturating_sub(LOOK_BACK)..index] {
+                compare(lane, before, record, found);
+            }
+        }
+    }
+}
+
+fn compare(
+    lane: LaneRef<'_, '_>,
+    before: &LaneRecord<'_>,
+    record: &LaneRecord<'_>,
+    found: &mut Sink<'_>,
+) {
+    let rules = before.node().attr("rule").zip(record.node().attr("rule"));
+    let starts = before.s_offset().zip(record.s_offset());
+    let (Some((earlier, later)), Some((start, own))) = (rules, starts) else {
+        return;
+    };
+    if earlier == later || (start - own).abs() > found.number(&SAME_PLACE) {
+        return;
+    }
+    let text = format!(
+        "the rule is `{later}` at s = {own} m of the lane section, where another record says \
+         `{earlier}`, on {}; at one place either only `allow` or only `deny` may be used",
+        lane_name(lane)
+    );
+    found
+        .issue(Place::attribute_or_node(record.node(), "rule"), text)
+        .in_lane(lane, own)
+        .at(before.node(), "the other record");
+}

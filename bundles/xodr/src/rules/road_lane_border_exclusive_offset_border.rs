@@ -1,0 +1,48 @@
+use qcbus_opendrive::geometry::Cubic;
+use qcbus_opendrive::{Record, RoadMap, SectionRef};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_border_exclusive_offset_border",
+    uids: &[
+        "asam.net:xodr:1.4.0:road.lane.border.exclusive_offset_border",
+        "asam.net:xodr:1.4.0:road.lanes.lane_offset.no_offset_if_border_defined",
+    ],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("road_lane_border_exclusive_offset_border.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        for layer in road.layers() {
+            let mut lanes = layer.sections(road).flat_map(SectionRef::lanes);
+            let border = lanes.find_map(|lane| lane.node().child("border"));
+            let offsets = layer.offset().records();
+            let (Some(border), Some(offset)) = (border, offsets.first()) else {
+                continue;
+            };
+            let shifting = offsets.iter().find(|offset| !is_zero(offset));
+            let text = "a lane has a `border` while the road has a `laneOffset`; borders count from the \
+                        reference line and must not be used together with an offset";
+            let (level, offset) = match shifting {
+                Some(shifting) => (Level::Error, shifting),
+                None => (Level::Information, offset),
+            };
+            found
+                .issue(border, text)
+                .level(level)
+                .at(offset.node(), "the lane offset");
+        }
+    }
+}
+
+/// Whether the offset moves nothing. One that cannot be read may move something.
+fn is_zero(offset: &Record<'_>) -> bool {
+    let zero = |cubic: Cubic| [cubic.a, cubic.b, cubic.c, cubic.d] == [0.0; 4];
+    offset.cubic().is_some_and(zero)
+}

@@ -1,0 +1,39 @@
+use qcbus_opendrive::{RoadMap, Side};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::lane_numbers::word;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_border_exclusive_width_border",
+    uids: &[
+        "asam.net:xodr:1.4.0:road.lane.border.exclusive_width_border",
+        "asam.net:xodr:1.9.0:road.lane.width.no_width_with_border",
+    ],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("road_lane_border_exclusive_width_border.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for section in map.sections() {
+        for side in Side::BOTH {
+            let first = |name: &str| section.side(side).find_map(|lane| lane.node().child(name));
+            let (Some(width), Some(border)) = (first("width"), first("border")) else {
+                continue;
+            };
+            let text = format!(
+                "the {} lanes of this section use both `width` and `border`; a lane group must use \
+                 one of them alone",
+                word(side)
+            );
+            let group = border.ancestors().nth(1).unwrap_or(border);
+            found
+                .issue(group, text)
+                .at(width, "a width")
+                .at(border, "a border");
+        }
+    }
+}

@@ -1,0 +1,30 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Place, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_center_lane_id",
+    uids: &["asam.net:xodr:1.4.0:road.lane.center_lane_id"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("road_lane_center_lane_id.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for lane in map.lanes() {
+        let Some(id) = lane.id() else { continue };
+        let text = match lane.side() {
+            None if id != 0 => format!("the center lane has id {id}; it must have id 0"),
+            Some(_) if id == 0 => {
+                "this lane beside the center lane has id 0, which belongs to the center \
+                 lane alone"
+                    .to_owned()
+            }
+            _ => continue,
+        };
+        found.issue(Place::attribute_or_node(lane.node(), "id"), text);
+    }
+}

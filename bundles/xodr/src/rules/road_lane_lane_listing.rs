@@ -1,0 +1,33 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_lane_listing",
+    uids: &["asam.net:xodr:1.4.0:road.lane.lane_listing"],
+    level: Level::Warning,
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("road_lane_lane_listing.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for section in map.sections() {
+        let numbered = section.lanes().filter_map(|lane| Some((lane.id()?, lane)));
+        let lanes: Vec<_> = numbered.collect();
+        let rising = lanes.windows(2).find(|pair| pair[1].0 > pair[0].0);
+        let Some([(left, before), (right, lane)]) = rising else {
+            continue;
+        };
+        let text = format!(
+            "lane {right} is listed after lane {left}; lanes should be listed from left to right, \
+             with descending ids"
+        );
+        found
+            .issue(lane.node(), text)
+            .at(before.node(), "the lane listed before it");
+    }
+}

@@ -1,0 +1,41 @@
+use qcbus_opendrive::{RoadMap, Side};
+use qcbus_sdk::{Place, Rule, Sink};
+
+use crate::families::lane_numbers::{number, outward};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_lane_order_no_gaps",
+    uids: &["asam.net:xodr:1.4.0:road.lane.lane_order_no_gaps"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("road_lane_lane_order_no_gaps.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for section in map.sections() {
+        for side in Side::BOTH {
+            for pair in outward(section, side).windows(2) {
+                let ((inner, inner_lane), (outer, lane)) = (pair[0], pair[1]);
+                if outer - inner <= 1 {
+                    continue;
+                }
+                let missing = match (inner + 1, outer - 1) {
+                    (one, last) if one == last => format!("{} is", number(side, one)),
+                    (one, last) => format!("{} to {} are", number(side, one), number(side, last)),
+                };
+                let text = format!(
+                    "lane {} is followed by lane {} on the way outward; {missing} missing, but ids must \
+                     be consecutive",
+                    number(side, inner),
+                    number(side, outer)
+                );
+                found
+                    .issue(Place::attribute_or_node(lane.node(), "id"), text)
+                    .at(inner_lane.node(), "the last lane before the gap");
+            }
+        }
+    }
+}

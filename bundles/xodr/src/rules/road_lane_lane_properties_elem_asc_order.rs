@@ -1,0 +1,40 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::ascending;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_lane_properties_elem_asc_order",
+    uids: &[
+        "asam.net:xodr:1.4.0:road.lane.lane_properties.elem_asc_order",
+        "asam.net:xodr:1.4.0:road.lane.width.elem_asc_order",
+        "asam.net:xodr:1.4.0:road.lane.border.elem_asc_order",
+        "asam.net:xodr:1.4.0:road.lane.height.elem_asc_order",
+    ],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[ascending::TOLERANCE],
+    page: include_str!("road_lane_lane_properties_elem_asc_order.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for (element, uid) in [
+        (
+            "width",
+            "asam.net:xodr:1.4.0:road.lane.width.elem_asc_order",
+        ),
+        (
+            "border",
+            "asam.net:xodr:1.4.0:road.lane.border.elem_asc_order",
+        ),
+        (
+            "height",
+            "asam.net:xodr:1.4.0:road.lane.height.elem_asc_order",
+        ),
+    ] {
+        ascending::lane_records_under(map, element, Some(uid), ascending::VOID, found);
+    }
+}

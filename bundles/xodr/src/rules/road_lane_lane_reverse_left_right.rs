@@ -1,0 +1,55 @@
+use qcbus_opendrive::{LaneRef, RoadMap, Side};
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::families::on_road::OnRoad;
+use crate::model::Roads;
+
+/// Types of lane on which traffic runs in one direction.
+const DIRECTED: &[&str] = &[
+    "driving",
+    "entry",
+    "exit",
+    "onRamp",
+    "offRamp",
+    "connectingRamp",
+    "slipLane",
+    "bus",
+    "taxi",
+    "HOV",
+];
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_lane_reverse_left_right",
+    uids: &["asam.net:xodr:1.4.0:road.lane.lane_reverse_left_right"],
+    level: Level::Warning,
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("road_lane_lane_reverse_left_right.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for section in map.sections() {
+        let directed =
+            |lane: &LaneRef<'_, '_>| lane.kind().is_some_and(|kind| DIRECTED.contains(&kind));
+        let mut lanes = section.lanes().filter(directed);
+        let all_reversed = lanes.all(|lane| lane.direction() == Some("reversed"));
+        let on_both = Side::BOTH.map(|side| section.side(side).find(directed));
+        let ([Some(left), Some(right)], true) = (on_both, all_reversed) else {
+            continue;
+        };
+        let text = format!(
+            "all lanes for traffic in this lane section of road `{}` have `direction=\"reversed\"`, on both sides; \
+             to change between right-hand and left-hand traffic, `rule` of the road must be used",
+            section.road.id()
+        );
+        found
+            .issue(Place::attribute_or_node(left.node(), "direction"), text)
+            .in_lane(left, 0.0)
+            .at(
+                Place::attribute_or_node(right.node(), "direction"),
+                "on the other side",
+            );
+    }
+}

@@ -1,0 +1,45 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Param, Place, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_lane_sect_first",
+    uids: &["asam.net:xodr:1.9.0:road.lane.lane_sect_first"],
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "1.4.0" },
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("road_lane_lane_sect_first.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    1e-6,
+    "m",
+    "largest distance from 0 that is accepted",
+);
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let tolerance = found.number(&TOLERANCE);
+    for road in map.roads() {
+        let first = road
+            .permanent()
+            .and_then(|layer| layer.in_order(road).next());
+        let Some((section, s)) = first.and_then(|section| Some((section, section.s()?))) else {
+            continue;
+        };
+        if s.abs() > tolerance {
+            let text = format!(
+                "the first lane section of road `{}` starts at s = {s}; it must start at s = 0, so that \
+                 the road has lanes from its beginning",
+                road.id()
+            );
+            found
+                .issue(Place::attribute_or_node(section.node(), "s"), text)
+                .road(road.id(), s, 0.0);
+        }
+    }
+}

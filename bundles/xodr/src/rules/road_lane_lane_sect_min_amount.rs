@@ -1,0 +1,42 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_lane_sect_min_amount",
+    uids: &[
+        "asam.net:xodr:1.4.0:road.lane.lane_sect_min_amount",
+        "asam.net:xodr:1.4.0:road.lane_section.lane_sect_req",
+    ],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("road_lane_lane_sect_min_amount.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const PER_ROAD: &str = "asam.net:xodr:1.4.0:road.lane_section.lane_sect_req";
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        if road.layers().is_empty() {
+            let text = format!(
+                "road `{}` has no `lanes`; each road must have at least one lane section",
+                road.id()
+            );
+            found.issue(road.node(), text).uid(PER_ROAD);
+        }
+        for layer in road
+            .layers()
+            .iter()
+            .filter(|layer| layer.section_count() == 0)
+        {
+            let text = format!(
+                "these `lanes` of road `{}` hold no `laneSection`; there must be at least one",
+                road.id()
+            );
+            found.issue(layer.node(), text);
+        }
+    }
+}

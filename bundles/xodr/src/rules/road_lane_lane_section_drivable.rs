@@ -1,0 +1,68 @@
+use std::collections::BTreeSet;
+
+use qcbus_opendrive::{Junction, LaneRef, Profile, RoadMap};
+use qcbus_sdk::{Backport, Level, Rule, Sink};
+
+use crate::families::on_road::OnRoad;
+use crate::families::zero_stretches::zero_stretches;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_lane_section_drivable",
+    uids: &["asam.net:xodr:1.9.0:road.lane.lane_section_drivable"],
+    level: Level::Warning,
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    page: include_str!("road_lane_lane_section_drivable.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let boundaries = map.junctions().iter().filter_map(Junction::boundary);
+    let segments = boundaries.flat_map(|boundary| boundary.segments());
+    let edges: BTreeSet<&str> = segments.filter_map(|segment| segment.road_id()).collect();
+    let connecting: BTreeSet<&str> = map
+        .connections()
+        .filter_map(|(_, connection)| connection.connecting_road())
+        .collect();
+    for road in map.roads() {
+        // Roads that only close the boundary of a junction need no lanes (12.10).
+        let within = road.junction().is_some() && !connecting.contains(road.id());
+        let Some(layer) = road
+            .permanent()
+            .filter(|_| !within && !edges.contains(road.id()))
+        else {
+            continue;
+        };
+        for section in layer.sections(road) {
+            if !section.lanes().any(is_there) {
+                let text = format!(
+                    "this lane section of road `{}` has no lane beside the center that is defined from its start \
+                     and has width; without one nobody can drive there",
+                    road.id()
+                );
+                found
+                    .issue(section.node(), text)
+                    .on(road, section.s().unwrap_or(0.0), 0.0);
+            }
+        }
+    }
+}
+
+fn is_there(lane: LaneRef<'_, '_>) -> bool {
+    let from_start = |profile: &Profile<'_>| profile.begin().is_some_and(|begin| begin <= 1e-3);
+    let any = [lane.widths(), lane.borders()].into_iter().any(from_start);
+    lane.side().is_some() && any && opens(lane)
+}
+
+/// Whether the lane has width anywhere. What cannot be evaluated is taken to have some.
+fn opens(lane: LaneRef<'_, '_>) -> bool {
+    match zero_stretches(lane).zip(lane.length()) {
+        Some((zero, length)) => {
+            !matches!(zero.as_slice(), [(from, to)] if *from <= 1e-3 && *to >= length - 1e-3)
+        }
+        None => true,
+    }
+}

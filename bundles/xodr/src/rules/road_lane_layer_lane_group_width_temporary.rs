@@ -1,0 +1,81 @@
+use qcbus_opendrive::geometry::Cubic;
+use qcbus_opendrive::{LayerKind, RoadMap, SectionRef, Side};
+use qcbus_sdk::{Param, Rule, Sink};
+
+use crate::families::edges::{Piece, border, combine, sum};
+use crate::families::on_road::OnRoad;
+use crate::model::Roads;
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    0.01,
+    "m",
+    "how far temporary lanes may reach beyond permanent ones",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_layer_lane_group_width_temporary",
+    uids: &["asam.net:xodr:1.9.0:road.lane.layer.lane_group_width_temporary"],
+    versions: "1.9.0..",
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("road_lane_layer_lane_group_width_temporary.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        let layers = road.layer(LayerKind::Temporary).zip(road.permanent());
+        let Some((temporary, permanent)) = layers else {
+            continue;
+        };
+        for side in Side::BOTH {
+            let below: Vec<Piece> = permanent
+                .in_order(road)
+                .filter(|section| section.covers(side))
+                .flat_map(|section| edge(section, side))
+                .collect();
+            for section in temporary
+                .in_order(road)
+                .filter(|section| section.covers(side))
+            {
+                if section.side(side).next().is_some() {
+                    check(section, side, &below, found);
+                }
+            }
+        }
+    }
+}
+
+fn edge(section: SectionRef<'_, '_>, side: Side) -> Vec<Piece> {
+    border(section, side, section.side(side).count())
+}
+
+fn check(section: SectionRef<'_, '_>, side: Side, below: &[Piece], found: &mut Sink<'_>) {
+    let Some(start) = section.s() else { return };
+    let from = below.partition_point(|piece| piece.to <= start);
+    let outward = |one: Cubic, other: Cubic| sum(one, other.scaled(-1.0)).scaled(side.sign());
+    let beyond = combine(&edge(section, side), &below[from..], outward);
+    let worst = beyond.iter().filter_map(Piece::maximum);
+    let Some(worst) = worst.max_by(|one, other| one.value.total_cmp(&other.value)) else {
+        return;
+    };
+    let limit = found.number(&TOLERANCE);
+    if worst.value > limit {
+        let road = section.road;
+        let name = match side {
+            Side::Left => "left",
+            Side::Right => "right",
+        };
+        let text = format!(
+            "the temporary lanes of road `{}` reach {:.3} m beyond its permanent lanes on the {name} at s = {:.2}; \
+             they must lie on them",
+            road.id(),
+            worst.value,
+            worst.at
+        );
+        let t = section.edge_t(side, worst.at - start).unwrap_or(0.0);
+        found.issue(section.node(), text).on(road, worst.at, t);
+    }
+}

@@ -1,0 +1,31 @@
+use qcbus_opendrive::{LayerKind, RoadMap};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_layer_lane_phys_attr_temporary",
+    uids: &["asam.net:xodr:1.9.0:road.lane.layer.lane_phys_attr_temporary"],
+    versions: "1.9.0..",
+    after: super::READABLE,
+    page: include_str!("road_lane_layer_lane_phys_attr_temporary.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for lane in map.lanes() {
+        if lane.at.layer.kind() != LayerKind::Temporary {
+            continue;
+        }
+        for element in ["height", "material"] {
+            for child in lane.node().children_named(element) {
+                let text = format!(
+                    "a lane of the temporary layer has a `{element}`; height and material of the surface \
+                     are given by the permanent layer alone"
+                );
+                found.issue(child, text);
+            }
+        }
+    }
+}

@@ -1,0 +1,50 @@
+use qcbus_opendrive::{LayerKind, RoadMap};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_layer_layer_limits",
+    uids: &["asam.net:xodr:1.9.0:road.lane.layer.layer_limits"],
+    versions: "1.9.0..",
+    after: super::READABLE,
+    page: include_str!("road_lane_layer_layer_limits.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        let of = |kind| {
+            road.layers()
+                .iter()
+                .filter(move |layer| layer.kind() == kind)
+        };
+        for kind in [LayerKind::Permanent, LayerKind::Temporary] {
+            let mut layers = of(kind);
+            let Some(first) = layers.next() else { continue };
+            for further in layers {
+                let text = format!(
+                    "road `{}` has a second {} lane layer; it must have exactly one permanent and at most \
+                     one temporary layer (without `layer`, `lanes` are permanent)",
+                    road.id(),
+                    kind.as_str()
+                );
+                found
+                    .issue(further.node(), text)
+                    .at(first.node(), "the first one");
+            }
+        }
+        let only = of(LayerKind::Temporary).next();
+        let others = of(LayerKind::Permanent)
+            .chain(of(LayerKind::Unknown))
+            .count();
+        if let Some(layer) = only.filter(|_| others == 0) {
+            let text = format!(
+                "road `{}` has a temporary lane layer, but no permanent one; it must have exactly one",
+                road.id()
+            );
+            found.issue(layer.node(), text);
+        }
+    }
+}

@@ -1,0 +1,56 @@
+use qcbus_opendrive::{RoadMap, SectionRef};
+use qcbus_sdk::{Param, Place, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_layer_layer_mandatory_permanent",
+    uids: &["asam.net:xodr:1.9.0:road.lane.layer.layer_mandatory_permanent"],
+    versions: "1.9.0..",
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("road_lane_layer_layer_mandatory_permanent.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const TOLERANCE: Param = Param::number("tolerance", 1e-6, "m", "largest gap that is accepted");
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let tolerance = found.number(&TOLERANCE);
+    for road in map.roads() {
+        let Some(layer) = road.permanent() else {
+            continue;
+        };
+        for section in layer.sections(road) {
+            if section.lanes().next().is_none() {
+                let text = "the lane section of the permanent layer holds no lane at all; there must be at \
+                            least one at every s of the road";
+                found.issue(section.node(), text);
+            }
+        }
+        let sections: Vec<SectionRef<'_, '_>> = layer.in_order(road).collect();
+        for (index, section) in sections.iter().enumerate() {
+            let next = match sections.get(index + 1) {
+                Some(next) => next.s(),
+                None => road.length(),
+            };
+            let length = section.node().f64("length").ok();
+            let (Some(s), Some(length), Some(next)) = (section.s(), length, next) else {
+                continue;
+            };
+            let end = s + length;
+            // Sections for one side may lie beside another one that goes on.
+            if end < next - tolerance && section.single_side() != Some(true) {
+                let text = format!(
+                    "this section of the permanent layer ends at s = {end} (s = {s} and length = {length}), \
+                     which leaves the road without permanent lanes up to s = {next}; there must be at least \
+                     one lane at every s"
+                );
+                found
+                    .issue(Place::attribute_or_node(section.node(), "length"), text)
+                    .road(road.id(), end, 0.0);
+            }
+        }
+    }
+}

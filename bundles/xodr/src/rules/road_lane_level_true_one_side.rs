@@ -1,0 +1,75 @@
+use qcbus_opendrive::{LaneJoint, LaneRef, RoadMap, SectionRef, Side};
+use qcbus_sdk::{Backport, Level, Place, Rule, Sink};
+
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_level_true_one_side",
+    uids: &["asam.net:xodr:1.7.0:road.lane.level_true_one_side"],
+    versions: "1.7.0..",
+    backport: Backport::Separate { since: "" },
+    after: super::READABLE,
+    page: include_str!("road_lane_level_true_one_side.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for section in map.sections() {
+        for side in Side::BOTH {
+            outward(section, side, found);
+        }
+    }
+    for joint in map.lane_joints() {
+        along(map, joint, found);
+    }
+}
+
+/// From the first lane with `@level="true"` to the edge of the road all lanes must have it.
+fn outward(section: SectionRef<'_, '_>, side: Side, found: &mut Sink<'_>) {
+    let mut level: Option<LaneRef<'_, '_>> = None;
+    for lane in section.side(side).filter(|lane| lane.id().is_some()) {
+        match (lane.level(), level) {
+            (Some(true), None) => level = Some(lane),
+            (Some(false), Some(inner)) => {
+                let text = format!(
+                    "{} follows the lateral profile, but lane `{}` further in has `level=\"true\"`; \
+                     from there to the edge of the road every lane must have it",
+                    lane_name(lane),
+                    inner.id_text().unwrap_or_default()
+                );
+                let middle = lane.length().unwrap_or(0.0) / 2.0;
+                found
+                    .issue(Place::attribute_or_node(lane.node(), "level"), text)
+                    .in_lane(lane, middle)
+                    .at(inner.node(), "the lane further in");
+            }
+            _ => {}
+        }
+    }
+}
+
+/// A change of `@level` where one lane goes on in another is not recommended (11.7.4).
+fn along(map: &RoadMap<'_>, joint: &LaneJoint<'_>, found: &mut Sink<'_>) {
+    let (Some(from), Some(to)) = (map.lane(joint.from.lane), map.lane(joint.to.lane)) else {
+        return;
+    };
+    let (Some(here), Some(there)) = (from.level(), to.level()) else {
+        return;
+    };
+    if here != there {
+        let text = format!(
+            "`level` changes from {here} in {} to {there} in {}, which is linked to it; it should stay \
+             the same",
+            lane_name(from),
+            lane_name(to)
+        );
+        found
+            .issue(from.node(), text)
+            .level(Level::Warning)
+            .at_lane_end(from, joint.from.end)
+            .at(to.node(), "the linked lane")
+            .at(joint.node, "the link");
+    }
+}

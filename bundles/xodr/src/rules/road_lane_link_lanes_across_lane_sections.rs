@@ -1,0 +1,161 @@
+use qcbus_opendrive::{
+    ContactPoint, LaneJoint, LaneRef, LaneSpan, Place, RoadMap, SectionRef, Side,
+};
+use qcbus_sdk::{Level, Param, Rule, Sink};
+
+use crate::families::driving::is_drivable;
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::model::Roads;
+
+const OVERLAP: Param = Param::number(
+    "overlap",
+    0.5,
+    "",
+    "share of the narrower lane's width that two lanes must have in common to be one lane",
+);
+
+/// The rule as annex F spells it; on findings that ASAM's checker has nothing like.
+const ANNEX_F: &str = "asam.net:xodr:1.4.0:road.lane.link.lanes_across_laneSections";
+
+/// Lanes that are narrower, in metres, do not count as going on.
+const NARROW: f64 = 0.1;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_link_lanes_across_lane_sections",
+    uids: &[
+        // As ASAM's checker prints it.
+        "asam.net:xodr:1.4.0:road.lane.link.lanes_across_lane_sections",
+        ANNEX_F,
+    ],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[OVERLAP],
+    page: include_str!("road_lane_link_lanes_across_lane_sections.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    not_returned(map, found);
+    for section in map.sections() {
+        for side in Side::BOTH {
+            not_linked_at_all(section, side, found);
+        }
+    }
+}
+
+/// Lanes that go on in the next section by place, width and type, and of which neither is linked
+/// across the boundary.
+fn not_linked_at_all(section: SectionRef<'_, '_>, side: Side, found: &mut Sink<'_>) {
+    let Some((next, length)) = section.next(side).zip(section.length(side)) else {
+        return;
+    };
+    let (end, start) = (ContactPoint::End, ContactPoint::Start);
+    let open = |lane: LaneRef<'_, '_>, end| is_drivable(lane) && lane.links(end).next().is_none();
+    let mut ends = section.spans(side, Place::before(length));
+    let mut starts = next.spans(side, 0.0);
+    ends.retain(|span| open(span.lane, end));
+    starts.retain(|span| open(span.lane, start));
+    for from in &ends {
+        let goes_on = |to: &&LaneSpan<'_, '_>| {
+            from.lane.kind() == to.lane.kind() && overlap(from, to) >= found.number(&OVERLAP)
+        };
+        let Some(to) = starts.iter().find(goes_on) else {
+            continue;
+        };
+        let text = format!(
+            "{} goes on as {}, but neither names the other; lanes that continue must be linked in \
+             both directions",
+            lane_name(from.lane),
+            lane_name(to.lane)
+        );
+        found
+            .issue(from.lane.node(), text)
+            .level(Level::Warning)
+            .uid(ANNEX_F)
+            .at_lane_end(from.lane, end)
+            .at(to.lane.node(), "the lane that it goes on as");
+    }
+}
+
+/// The share of the narrower lane's width that both have in common; none for lanes of no width.
+fn overlap(one: &LaneSpan<'_, '_>, other: &LaneSpan<'_, '_>) -> f64 {
+    let range = |span: &LaneSpan<'_, '_>| (span.inner.min(span.outer), span.inner.max(span.outer));
+    let ((low, high), (from, to)) = (range(one), range(other));
+    let narrower = (high - low).min(to - from);
+    if narrower < NARROW {
+        return 0.0;
+    }
+    (high.min(to) - low.max(from)) / narrower
+}
+
+fn not_returned(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for joint in map
+        .lane_joints()
+        .iter()
+        .filter(|joint| joint.junction.is_none())
+    {
+        let (Some(from), Some(to)) = (map.lane(joint.from.lane), map.lane(joint.to.lane)) else {
+            continue;
+        };
+        if !demands_link_back(map, joint, from, to) || links_back(map, joint, from, to) {
+            continue;
+        }
+        let back = joint.to.end.link_name();
+        let text = format!(
+            "{} names {} as its {}, which does not name it as its {back}; lanes that continue must \
+             be linked in both directions",
+            lane_name(from),
+            lane_name(to),
+            joint.from.end.link_name()
+        );
+        found
+            .issue(to.node(), text)
+            .here(&format!(
+                "has no `{back}` with the id `{}`",
+                from.id_text().unwrap_or_default()
+            ))
+            .at_lane_end(to, joint.to.end)
+            .at(joint.node, "the link that is not returned");
+    }
+}
+
+/// Lanes of connecting roads are linked from one side only: the roads around a junction name the
+/// junction. The same goes for whatever end is linked to a junction.
+fn demands_link_back<'a>(
+    map: &RoadMap<'a>,
+    joint: &LaneJoint<'a>,
+    from: LaneRef<'_, 'a>,
+    to: LaneRef<'_, 'a>,
+) -> bool {
+    if joint.is_within_road() {
+        return true;
+    }
+    let roads = [from.at.road, to.at.road];
+    let link = to.at.road.link(joint.to.end);
+    roads.iter().all(|road| road.junction().is_none())
+        && link.is_none_or(|link| {
+            link.road_id()
+                .and_then(|id| map.road(id))
+                .map(|road| road.index())
+                == Some(from.at.road.index())
+        })
+}
+
+fn links_back<'a>(
+    map: &RoadMap<'a>,
+    joint: &LaneJoint<'a>,
+    from: LaneRef<'_, 'a>,
+    to: LaneRef<'_, 'a>,
+) -> bool {
+    to.links(joint.to.end).any(|link| {
+        let target = link
+            .id()
+            .and_then(|id| map.linked_lane(to, joint.to.end, id, link.layer()));
+        match target {
+            Some(target) => target.lane == from.key(),
+            // The road does not say where its lanes lead, or not to which end: the number has to do.
+            None => link.id() == from.id() && map.linked_end(to.at.road, joint.to.end).is_none(),
+        }
+    })
+}

@@ -1,0 +1,41 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::families::zero_width::{ZERO_WIDTH, is_zero_at, opens};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_link_new_lane_appear",
+    uids: &["asam.net:xodr:1.4.0:road.lane.link.new_lane_appear"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[ZERO_WIDTH],
+    page: include_str!("road_lane_link_new_lane_appear.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let zero = found.number(&ZERO_WIDTH);
+    for joint in map.lane_joints() {
+        let (Some(from), Some(to)) = (map.lane(joint.from.lane), map.lane(joint.to.lane)) else {
+            continue;
+        };
+        if !is_zero_at(to, joint.to.end, zero) || !opens(to, zero) {
+            continue;
+        }
+        let text = format!(
+            "{} is linked to {}, whose width is zero where they meet; a lane that opens beside \
+             another must not be linked to it",
+            lane_name(from),
+            lane_name(to)
+        );
+        found
+            .issue(from.node(), text)
+            .here("the lane that goes on")
+            .at(to.node(), "the lane that has no width here")
+            .at_lane_end(to, joint.to.end)
+            .at(joint.node, "the link");
+    }
+}

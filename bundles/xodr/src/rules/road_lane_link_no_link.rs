@@ -1,0 +1,78 @@
+use qcbus_opendrive::{ContactPoint, Junction, JunctionType, Road, RoadEnd, RoadMap, Side};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_link_no_link",
+    uids: &["asam.net:xodr:1.4.0:road.lane.link.no_link"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("road_lane_link_no_link.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        for end in ContactPoint::BOTH {
+            if let Some(why) = nothing_to_link(map, road, end) {
+                check(road, end, &why, found);
+            }
+        }
+    }
+}
+
+/// Why lanes have nothing to be linked to at an end of a road, if that is so.
+fn nothing_to_link(map: &RoadMap<'_>, road: &Road<'_>, end: ContactPoint) -> Option<String> {
+    let Some(link) = road.link(end) else {
+        let here = RoadEnd {
+            road: road.index(),
+            end,
+        };
+        // Where others say that they touch this end, the link of the road is what is missing.
+        let is_touched = map.contacts_of(here).next().is_some();
+        return (!is_touched).then(|| {
+            format!(
+                "the road has no {}, so that it leads nowhere",
+                end.link_name()
+            )
+        });
+    };
+    let id = link.junction_id()?;
+    let is_virtual = |junction: &Junction<'_>| junction.kind() == Some(JunctionType::Virtual);
+    let is_cut = !map.junction(id).is_some_and(is_virtual);
+    is_cut.then(|| format!("junction `{id}` lies there, whose connections say which lanes follow"))
+}
+
+fn check(road: &Road<'_>, end: ContactPoint, why: &str, found: &mut Sink<'_>) {
+    let Some(layer) = road.permanent() else {
+        return;
+    };
+    let sections = Side::BOTH.into_iter().filter_map(|side| {
+        let section = layer.end_section(road, side, end)?;
+        Some(section.side(side))
+    });
+    let links = sections
+        .flatten()
+        .filter_map(|lane| Some((lane, lane.links(end).next()?)));
+    let links: Vec<_> = links.collect();
+    let Some((_, first)) = links.first() else {
+        return;
+    };
+    let lanes: Vec<&str> = links
+        .iter()
+        .filter_map(|(lane, _)| lane.id_text())
+        .collect();
+    let text = format!(
+        "lanes of road `{}` have a {} at the {end} of the road ({}), but {why}; such links must be \
+         omitted",
+        road.id(),
+        end.link_name(),
+        lanes.join(", ")
+    );
+    let finding = found.issue(first.node(), text);
+    if let Some(s) = road.end_s(end) {
+        finding.road(road.id(), s, 0.0);
+    }
+}

@@ -1,0 +1,81 @@
+use qcbus_opendrive::{ContactPoint, LaneRef, LayerKind, RoadMap};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::driving::is_drivable;
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::families::zero_stretches::NO_WIDTH;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_link_temporary_layer_section_link_permanent",
+    uids: &["asam.net:xodr:1.9.0:road.lane.link.temporary_layer_section_link_permanent"],
+    versions: "1.9.0..",
+    after: super::READABLE,
+    page: include_str!("road_lane_link_temporary_layer_section_link_permanent.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        let Some(layer) = road.layer(LayerKind::Temporary) else {
+            continue;
+        };
+        for lane in layer.in_order(road).flat_map(|section| section.lanes()) {
+            for end in ContactPoint::BOTH {
+                if begins_or_ends(lane, end) {
+                    check(lane, end, found);
+                }
+            }
+        }
+    }
+}
+
+/// Whether the temporary lanes begin or end here: no other temporary section touches this end,
+/// and the road goes on.
+fn begins_or_ends(lane: LaneRef<'_, '_>, end: ContactPoint) -> bool {
+    let (Some(side), Some(start)) = (lane.side(), lane.at.s()) else {
+        return false;
+    };
+    let Some(stop) = lane.at.end(side) else {
+        return false;
+    };
+    let near = |a: f64, b: f64| (a - b).abs() < 1e-3;
+    let (inside, touches) = match end {
+        ContactPoint::Start => {
+            let before = lane.at.previous(side).and_then(|one| one.end(side));
+            (
+                start > 1e-3,
+                before.is_some_and(|before| near(before, start)),
+            )
+        }
+        ContactPoint::End => {
+            let after = lane.at.next(side).and_then(|one| one.s());
+            let length = lane.at.road.length();
+            (
+                length.is_some_and(|length| stop < length - 1e-3),
+                after.is_some_and(|after| near(after, stop)),
+            )
+        }
+    };
+    inside && !touches
+}
+
+fn check(lane: LaneRef<'_, '_>, end: ContactPoint, found: &mut Sink<'_>) {
+    let wide = lane.width_at(end).is_some_and(|width| width > NO_WIDTH);
+    let mut links = lane.links(end);
+    if !wide || !is_drivable(lane) || links.any(|link| link.layer() == LayerKind::Permanent) {
+        return;
+    }
+    let text = format!(
+        "the temporary {} has no `{}` on the permanent layer at the {end} of the temporary lanes; without one \
+         nobody can {} it",
+        lane_name(lane),
+        end.link_name(),
+        match end {
+            ContactPoint::Start => "get onto",
+            ContactPoint::End => "leave",
+        }
+    );
+    found.issue(lane.node(), text).at_lane_end(lane, end);
+}

@@ -1,0 +1,63 @@
+use std::collections::BTreeMap;
+
+use qcbus_opendrive::{LaneEnd, LaneJoint, LaneRef, RoadMap};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_link_use_junctions",
+    uids: &["asam.net:xodr:1.4.0:road.lane.link.use_junctions"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("road_lane_link_use_junctions.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    // Who is linked to which lane end, across roads that belong to no junction.
+    let mut named: BTreeMap<LaneEnd, Vec<(LaneRef<'_, '_>, &LaneJoint<'_>)>> = BTreeMap::new();
+    for joint in map
+        .lane_joints()
+        .iter()
+        .filter(|joint| joint.junction.is_none())
+    {
+        let lanes = map.lane(joint.from.lane).zip(map.lane(joint.to.lane));
+        let Some((from, to)) = lanes else { continue };
+        let across = from.at.road.index() != to.at.road.index();
+        let free = from.at.road.junction().is_none() && to.at.road.junction().is_none();
+        if across && free {
+            named.entry(joint.to).or_default().push((from, joint));
+        }
+    }
+    for (end, links) in named {
+        let [(first, joint), rest @ ..] = links.as_slice() else {
+            continue;
+        };
+        let other = rest.iter().find(|(lane, _)| !together(*first, *lane));
+        let (Some((other, second)), Some(lane)) = (other, map.lane(end.lane)) else {
+            continue;
+        };
+        let text = format!(
+            "{} and {} are both linked to the {} of {}; where it is not clear which lane goes on there, a junction \
+             must be used",
+            lane_name(*first),
+            lane_name(*other),
+            end.end,
+            lane_name(lane)
+        );
+        found
+            .issue(joint.node, text)
+            .at_lane_end(*first, joint.from.end)
+            .at(second.node, "the other link")
+            .at_lane_end(*other, second.from.end);
+    }
+}
+
+/// Whether two lanes may merge: they lie in one lane section on one side.
+fn together(one: LaneRef<'_, '_>, other: LaneRef<'_, '_>) -> bool {
+    let (one_road, other_road) = (one.at.road.index(), other.at.road.index());
+    one_road == other_road && one.at.index() == other.at.index() && one.side() == other.side()
+}

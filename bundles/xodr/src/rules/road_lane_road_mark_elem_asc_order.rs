@@ -1,0 +1,20 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::ascending;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_road_mark_elem_asc_order",
+    uids: &["asam.net:xodr:1.4.0:road.lane.road_mark.elem_asc_order"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[ascending::TOLERANCE],
+    page: include_str!("road_lane_road_mark_elem_asc_order.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    ascending::lane_records(map, "roadMark", ascending::PARALLEL, found);
+}

@@ -1,0 +1,57 @@
+use qcbus_opendrive::{LaneRecord, LaneRef, RoadMap};
+use qcbus_sdk::{Backport, Level, Rule, Sink};
+
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_road_mark_only_outer",
+    uids: &["asam.net:xodr:1.9.0:road.lane.road_mark.only_outer"],
+    level: Level::Information,
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    page: include_str!("road_lane_road_mark_only_outer.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for lane in map.lanes().filter(|lane| lane.side().is_some()) {
+        for mark in lane.records_named("roadMark") {
+            check(lane, &mark, found);
+        }
+    }
+}
+
+fn check(lane: LaneRef<'_, '_>, mark: &LaneRecord<'_>, found: &mut Sink<'_>) {
+    let ds = mark.s_offset().unwrap_or(0.0);
+    let Some(half) = lane
+        .width(ds)
+        .map(|width| 0.5 * width)
+        .filter(|half| *half > 0.0)
+    else {
+        return;
+    };
+    let kinds = mark
+        .node()
+        .children()
+        .filter(|child| child.is("type") || child.is("explicit"));
+    let lines = kinds.flat_map(|kind| kind.children().filter(|child| child.is("line")));
+    let offsets: Option<Vec<f64>> = lines.map(|line| line.f64("tOffset").ok()).collect();
+    let Some(nearest) = offsets.and_then(|all| all.into_iter().map(f64::abs).reduce(f64::min))
+    else {
+        return;
+    };
+    if nearest > half {
+        let text = format!(
+            "every line of this road mark lies at least {nearest:.2} m away from the outer border of {}, more than \
+             half its width of {:.2} m; a road mark describes the marking at the outer border",
+            lane_name(lane),
+            2.0 * half
+        );
+        let s = lane.at.s().unwrap_or(0.0) + ds;
+        let t = lane.outer_t(ds).unwrap_or(0.0);
+        found.issue(mark.node(), text).on(lane.at.road, s, t);
+    }
+}

@@ -1,0 +1,31 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Place, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_s_attr_value",
+    uids: &["asam.net:xodr:1.4.0:road.lane.s_attr_value"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("road_lane_s_attr_value.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for section in map.sections() {
+        let node = section.node();
+        let text = match (section.s(), node.attr("s")) {
+            (Some(s), _) if s < 0.0 => format!(
+                "the lane section starts at s = {s}; `s` must not be negative, roads start at s = 0"
+            ),
+            (Some(_), _) => continue,
+            (None, Some(text)) => {
+                format!("`s` of the lane section is `{text}`; it must be a finite number [m]")
+            }
+            (None, None) => "the lane section has no `s`; it must say where it starts".to_owned(),
+        };
+        found.issue(Place::attribute_or_node(node, "s"), text);
+    }
+}

@@ -1,0 +1,28 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::ascending::{TOLERANCE, along_road};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_section_elem_asc_order",
+    uids: &["asam.net:xodr:1.4.0:road.lane_section.elem_asc_order"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("road_lane_section_elem_asc_order.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        for layer in road.layers() {
+            along_road(road.id()).check(
+                layer.node().children_named("laneSection"),
+                |_, _| None,
+                found,
+            );
+        }
+    }
+}

@@ -1,0 +1,43 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Param, Place, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_section_lanesec_length_limit_road",
+    uids: &["asam.net:xodr:1.9.0:road.lane_section.lanesec_length_limit_road"],
+    versions: "1.9.0..",
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("road_lane_section_lanesec_length_limit_road.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    1e-3,
+    "m",
+    "how far beyond the end of the road is accepted",
+);
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let tolerance = found.number(&TOLERANCE);
+    for section in map.sections() {
+        let length = section.node().f64("length").ok();
+        let (Some(s), Some(length)) = (section.s(), length.filter(|length| length.is_finite()))
+        else {
+            continue;
+        };
+        let end = s + length;
+        if let Some(road_end) = section.road.length().filter(|road| end > road + tolerance) {
+            let text = format!(
+                "the lane section ends at s = {end} (s = {s} and length = {length}); it must not extend \
+                 beyond the end of the road at s = {road_end}"
+            );
+            found
+                .issue(Place::attribute_or_node(section.node(), "length"), text)
+                .road(section.road.id(), road_end, 0.0);
+        }
+    }
+}

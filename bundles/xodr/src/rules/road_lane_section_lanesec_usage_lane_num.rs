@@ -1,0 +1,43 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::families::zero_stretches::zero_stretches;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_section_lanesec_usage_lane_num",
+    uids: &["asam.net:xodr:1.4.0:road.lane_section.lanesec_usage_lane_num"],
+    level: Level::Information,
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("road_lane_section_lanesec_usage_lane_num.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for lane in map.lanes() {
+        let Some((zero, length)) = zero_stretches(lane).zip(lane.length()) else {
+            continue;
+        };
+        for (from, to) in zero {
+            // From nothing to something, or the other way round, within the section.
+            let place = if to < length - 1e-3 {
+                Some((to, "opens"))
+            } else if from > 1e-3 {
+                Some((from, "closes"))
+            } else {
+                None
+            };
+            let Some((ds, what)) = place else { continue };
+            let s = lane.at.s().unwrap_or(0.0) + ds;
+            let text = format!(
+                "{} {what} at s = {s:.2}, in the middle of its lane section; where the number of lanes changes, a new \
+                 lane section must be defined",
+                lane_name(lane)
+            );
+            found.issue(lane.node(), text).in_lane(lane, ds);
+        }
+    }
+}

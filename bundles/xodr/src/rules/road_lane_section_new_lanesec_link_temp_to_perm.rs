@@ -1,0 +1,73 @@
+use qcbus_opendrive::{ContactPoint, LayerKind, RoadMap, SectionRef, Side};
+use qcbus_sdk::{Param, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_section_new_lanesec_link_temp_to_perm",
+    uids: &["asam.net:xodr:1.9.0:road.lane_section.new_lanesec_link_temp_to_perm"],
+    versions: "1.9.0..",
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("road_lane_section_new_lanesec_link_temp_to_perm.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    1e-3,
+    "m",
+    "largest distance between link and start of a section",
+);
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        let Some(permanent) = road.permanent() else {
+            continue;
+        };
+        let mut starts: Vec<f64> = permanent
+            .sections(road)
+            .filter_map(|section| section.s())
+            .collect();
+        starts.sort_by(f64::total_cmp);
+        let temporary = road.layer(LayerKind::Temporary).into_iter();
+        for section in temporary.flat_map(|layer| layer.sections(road)) {
+            for end in ContactPoint::BOTH {
+                check(section, end, &starts, found);
+            }
+        }
+    }
+}
+
+/// Looks at one end of a section of the temporary layer: where one of its lanes is linked to the
+/// permanent layer, a section of that layer must begin. `starts` are ascending.
+fn check(section: SectionRef<'_, '_>, end: ContactPoint, starts: &[f64], found: &mut Sink<'_>) {
+    let tolerance = found.number(&TOLERANCE);
+    let mut links = section
+        .lanes()
+        .flat_map(|lane| lane.links(end).map(move |link| (lane, link)));
+    let Some((lane, link)) = links.find(|(_, link)| link.layer() == LayerKind::Permanent) else {
+        return;
+    };
+    let s = match end {
+        ContactPoint::Start => section.s(),
+        ContactPoint::End => section.end(lane.side().unwrap_or(Side::Right)),
+    };
+    let (Some(s), Some(length)) = (s, section.road.length()) else {
+        return;
+    };
+    let is_near = |place: f64| (place - s).abs() <= tolerance;
+    let after = starts.partition_point(|start| *start < s - tolerance);
+    let begins = starts.get(after).is_some_and(|start| is_near(*start));
+    if is_near(0.0) || is_near(length) || begins {
+        return;
+    }
+    let text = format!(
+        "a temporary lane is linked to the permanent layer at s = {s}, but no section of the permanent layer \
+         starts there; a new one must be defined where the layers are linked"
+    );
+    found
+        .issue(link.node(), text)
+        .road(section.road.id(), s, 0.0);
+}

@@ -1,0 +1,78 @@
+use qcbus_opendrive::{RoadMap, SectionRef, Side};
+use qcbus_sdk::{Level, Param, Place, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_section_valid_length",
+    uids: &["asam.net:xodr:1.4.0:road.lane_section.valid_length"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[LEAST, SHORT],
+    page: include_str!("road_lane_section_valid_length.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const LEAST: Param = Param::number("least", 1e-6, "m", "a length up to this counts as none");
+const SHORT: Param = Param::number("short", 0.01, "m", "a length up to this is a warning");
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let least = found.number(&LEAST);
+    let short = found.number(&SHORT);
+    for section in map.sections() {
+        // One finding per section, although both sides may say the same.
+        let mut sides = Side::BOTH.into_iter().filter(|side| section.covers(*side));
+        let bad = sides.find_map(|side| {
+            let length = section.length(side).filter(|length| *length <= short)?;
+            Some((side, length))
+        });
+        if let Some((side, length)) = bad {
+            report(section, side, (length, length <= least), found);
+        }
+    }
+}
+
+fn report(
+    section: SectionRef<'_, '_>,
+    side: Side,
+    (length, is_empty): (f64, bool),
+    found: &mut Sink<'_>,
+) {
+    let (Some(s), Some(end)) = (section.s(), section.end(side)) else {
+        return;
+    };
+    // A temporary section may end before the next one starts.
+    let next = section.next(side).filter(|next| next.s() == Some(end));
+    let what = match next {
+        Some(_) => "the next one starts",
+        None if section.node().attribute("length").is_some() => "it ends",
+        None => "the road ends",
+    };
+    let (level, allowed) = if is_empty {
+        (Level::Error, "it must be longer than 0 m")
+    } else {
+        (
+            Level::Warning,
+            "so short a section is fragile in calculations",
+        )
+    };
+    let text = format!(
+        "the lane section starts at s = {s} and {what} at s = {end}, which makes it {length} m long; {allowed}"
+    );
+    let finding = found
+        .issue(Place::attribute_or_node(section.node(), "s"), text)
+        .level(level)
+        .road(section.road.id(), s, 0.0);
+    match next {
+        Some(next) => finding.at(next.node(), "the next one"),
+        None => {
+            let own = section.node().attribute("length").map(|_| section.node());
+            let node = own.unwrap_or(section.road.node());
+            finding.at(
+                Place::attribute_or_node(node, "length"),
+                "where its end comes from",
+            )
+        }
+    };
+}

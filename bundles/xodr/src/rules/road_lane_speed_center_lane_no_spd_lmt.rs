@@ -1,0 +1,24 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::center_lane;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_speed_center_lane_no_spd_lmt",
+    uids: &["asam.net:xodr:1.4.0:road.lane.speed.center_lane_no_spd_lmt"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("road_lane_speed_center_lane_no_spd_lmt.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    center_lane::has_no(
+        map,
+        "speed",
+        "nobody drives on it; speed limits belong to the lanes beside it",
+        found,
+    );
+}

@@ -1,0 +1,58 @@
+use qcbus_opendrive::{LaneRef, RoadMap, Stretch};
+use qcbus_sdk::{Level, Param, Rule, Sink};
+
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::model::Roads;
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    0.001,
+    "m",
+    "how far below zero a width is no more than a matter of rounding",
+);
+
+/// Below zero by less than this, in metres, a width is zero.
+const NOTHING: f64 = 1e-9;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_width_lane_width_validity",
+    uids: &["asam.net:xodr:1.4.0:road.lane.width.lane_width_validity"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("road_lane_width_lane_width_validity.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for lane in map.lanes() {
+        let Some(length) = lane.length() else {
+            continue;
+        };
+        for stretch in lane.widths().stretches(length) {
+            check(lane, &stretch, found);
+        }
+    }
+}
+
+fn check(lane: LaneRef<'_, '_>, stretch: &Stretch<'_, '_>, found: &mut Sink<'_>) {
+    let Some(lowest) = stretch.cubic.minimum(0.0, stretch.length()) else {
+        return;
+    };
+    if lowest.value >= -NOTHING {
+        return;
+    }
+    let ds = stretch.from + lowest.at;
+    let s = lane.at.s().unwrap_or(0.0) + ds;
+    let text = format!(
+        "the width of {} falls to {:.6} m at s = {s:.3}; it must not be negative",
+        lane_name(lane),
+        lowest.value
+    );
+    let is_rounding = lowest.value >= -found.number(&TOLERANCE);
+    let finding = found.issue(stretch.record.node(), text).in_lane(lane, ds);
+    if is_rounding {
+        finding.level(Level::Information);
+    }
+}

@@ -1,0 +1,59 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Param, Place, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_lane_width_width_defined_whole_section",
+    uids: &["asam.net:xodr:1.7.0:road.lane.width.width_defined_whole_section"],
+    versions: "1.7.0..",
+    backport: Backport::Lower { since: "1.4.0" },
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("road_lane_width_width_defined_whole_section.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    1e-6,
+    "m",
+    "largest sOffset of the first record that is accepted",
+);
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let tolerance = found.number(&TOLERANCE);
+    for lane in map.lanes() {
+        let (Some(_), Some(id)) = (lane.side(), lane.id_text()) else {
+            continue;
+        };
+        let (profile, name) = match (lane.widths(), lane.borders()) {
+            (widths, borders) if widths.is_empty() && borders.is_empty() => {
+                let text = format!(
+                    "lane {id} has neither `width` nor `border`; its width must be defined for the whole \
+                     lane section"
+                );
+                let finding = found.issue(lane.node(), text);
+                if let Some(s) = lane.at.s() {
+                    finding.road(lane.at.road.id(), s, 0.0);
+                }
+                continue;
+            }
+            (widths, _) if !widths.is_empty() => (widths, "width"),
+            (_, borders) => (borders, "border"),
+        };
+        let (Some(first), Some(s)) = (profile.in_order().next(), lane.at.s()) else {
+            continue;
+        };
+        if let Some(begin) = first.start().filter(|begin| begin.abs() > tolerance) {
+            let text = format!(
+                "the first `{name}` of lane {id} has sOffset = {begin}; there must be one with sOffset = 0, \
+                 so that it is defined for the whole lane section"
+            );
+            found
+                .issue(Place::attribute_or_node(first.node(), "sOffset"), text)
+                .road(lane.at.road.id(), s, 0.0);
+        }
+    }
+}

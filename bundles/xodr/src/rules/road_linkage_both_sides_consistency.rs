@@ -1,0 +1,113 @@
+use std::collections::BTreeSet;
+
+use qcbus_opendrive::{ContactPoint, Junction, Road, RoadLink, RoadMap};
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::families::link_sides::{Known, agrees, in_virtual_junction};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_linkage_both_sides_consistency",
+    uids: &["asam.net:xodr:1.9.0:road.linkage.both_sides_consistency"],
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "1.4.0" },
+    after: super::READABLE,
+    page: include_str!("road_linkage_both_sides_consistency.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let known = Known::by(map);
+    let mut told = BTreeSet::new();
+    for road in map.roads() {
+        for end in ContactPoint::BOTH {
+            let Some(link) = road.link(end) else { continue };
+            if let Some(id) = link.junction_id() {
+                to_junction(map, (road, end), link, (id, &known), found);
+            } else if let Some(id) = link.road_id() {
+                let contact = link.contact_point().filter(|_| link.element_s().is_none());
+                let Some(contact) = contact else { continue };
+                to_road(map, (road, end), link, (id, contact), &mut told, found);
+            }
+        }
+    }
+}
+
+fn to_road(
+    map: &RoadMap<'_>,
+    (road, end): (&Road<'_>, ContactPoint),
+    link: RoadLink<'_>,
+    (id, contact): (&str, ContactPoint),
+    told: &mut BTreeSet<(usize, usize)>,
+    found: &mut Sink<'_>,
+) {
+    let Some(other) = map.road(id) else { return };
+    let mut namesakes = map.roads_with_id(id);
+    if in_virtual_junction(map, road)
+        || namesakes.any(|other| agrees(map, (road, end), (other, contact)))
+    {
+        return;
+    }
+    let pair = (
+        road.index().min(other.index()),
+        road.index().max(other.index()),
+    );
+    if !told.insert(pair) {
+        return;
+    }
+    let (mine, its) = (end.link_name(), contact.link_name());
+    let (place, but) = match other.link(contact) {
+        None => (other.node(), format!("road `{id}` has no {its}")),
+        Some(back) => (
+            back.node(),
+            format!("the {its} of road `{id}` is {}", target(back)),
+        ),
+    };
+    let expected = match road.junction() {
+        Some(junction) => format!("junction `{junction}`"),
+        None => format!("road `{}` ({end})", road.id()),
+    };
+    let text = format!(
+        "the {mine} of road `{}` is road `{id}` ({contact}), but {but}; both sides must agree, so that it has to \
+         be {expected}",
+        road.id()
+    );
+    found.issue(link.node(), text).at(place, "the other side");
+}
+
+fn target(link: RoadLink<'_>) -> String {
+    let id = link.element_id().unwrap_or_default();
+    match (link.element_type(), link.contact_point()) {
+        (Some("junction"), _) => format!("junction `{id}`"),
+        (_, Some(contact)) => format!("road `{id}` ({contact})"),
+        _ => format!("road `{id}`"),
+    }
+}
+
+fn to_junction<'a>(
+    map: &RoadMap<'a>,
+    (road, end): (&Road<'a>, ContactPoint),
+    link: RoadLink<'a>,
+    (id, known): (&str, &Known<'a>),
+    found: &mut Sink<'_>,
+) {
+    let mut junctions = map.junctions_with_id(id).peekable();
+    if junctions.peek().is_none() || road.junction() == Some(id) {
+        return;
+    }
+    if junctions.any(|junction| known.contains(junction, road, end)) {
+        return;
+    }
+    let text = format!(
+        "the {} of road `{}` is junction `{id}`, but the junction has no connection from or to this road; the link \
+         must be defined on both sides",
+        end.link_name(),
+        road.id()
+    );
+    let place = map.junction(id).map(Junction::node);
+    let finding = found.issue(link.node(), text);
+    if let Some(place) = place {
+        finding.at(place, "the junction");
+    }
+}

@@ -1,0 +1,58 @@
+use std::collections::BTreeMap;
+
+use qcbus_document::Node;
+use qcbus_opendrive::{ContactPoint, RoadEnd, RoadMap};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::on_road::{MAX_PLACES, OnRoad};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_linkage_is_junction_needed",
+    uids: &["asam.net:xodr:1.4.0:road.linkage.is_junction_needed"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("road_linkage_is_junction_needed.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    // Who names which end of a road, among roads outside of junctions.
+    let mut named: BTreeMap<RoadEnd, Vec<(&str, Node<'_>)>> = BTreeMap::new();
+    for road in map.roads().iter().filter(|road| road.junction().is_none()) {
+        for contact in ContactPoint::BOTH
+            .iter()
+            .filter_map(|end| map.linked_end(road, *end))
+        {
+            named
+                .entry(contact.to)
+                .or_default()
+                .push((road.id(), contact.node));
+        }
+    }
+    for (end, links) in named {
+        let [(_, first), rest @ ..] = links.as_slice() else {
+            continue;
+        };
+        let Some(road) = map.road_at(end.road).filter(|_| !rest.is_empty()) else {
+            continue;
+        };
+        let named = links.iter().take(MAX_PLACES);
+        let mut ids: Vec<String> = named.map(|(id, _)| format!("`{id}`")).collect();
+        if links.len() > MAX_PLACES {
+            ids.push(format!("and {} more", links.len() - MAX_PLACES));
+        }
+        let text = format!(
+            "the roads {} are all linked to the {} of road `{}`; only one may be linked to an end \
+             directly, more than one need a junction",
+            ids.join(", "),
+            end.end,
+            road.id()
+        );
+        let mut finding = found.issue(*first, text).at_end(road, end.end);
+        for (id, link) in rest.iter().take(MAX_PLACES) {
+            finding = finding.at(*link, format!("the link of road `{id}`"));
+        }
+    }
+}

@@ -1,0 +1,51 @@
+use qcbus_opendrive::{ContactPoint, Junction, JunctionType, RoadLink, RoadMap};
+use qcbus_sdk::{Backport, Level, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_linkage_junc_link_attribute_usage",
+    uids: &["asam.net:xodr:1.7.0:road.linkage.junc_link_attribute_usage"],
+    versions: "1.7.0..",
+    backport: Backport::Lower { since: "1.4.0" },
+    after: super::READABLE,
+    page: include_str!("road_linkage_junc_link_attribute_usage.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        for link in ContactPoint::BOTH
+            .into_iter()
+            .filter_map(|end| road.link(end))
+        {
+            if link.element_type() == Some("junction") {
+                check(map, link, found);
+            }
+        }
+    }
+}
+
+fn check(map: &RoadMap<'_>, link: RoadLink<'_>, found: &mut Sink<'_>) {
+    let Some(id) = link.element_id() else {
+        let text = "the link leads to a junction, but has no `elementId` that says to which one; links to \
+                    junctions must have `elementType` and `elementId`";
+        found.issue(link.node(), text);
+        return;
+    };
+    // Links to virtual junctions have a rule of their own.
+    let is_virtual = |junction: &Junction<'_>| junction.kind() == Some(JunctionType::Virtual);
+    if map.junction(id).is_some_and(is_virtual) {
+        return;
+    }
+    for name in ["contactPoint", "elementS", "elementDir"] {
+        if let Some(attribute) = link.node().attribute(name) {
+            let text = format!(
+                "the link to junction `{id}` has the attribute `{name}`, which belongs to links to roads; links \
+                 to junctions have `elementType` and `elementId`"
+            );
+            found.issue(attribute, text).level(Level::Warning);
+        }
+    }
+}

@@ -1,0 +1,51 @@
+use qcbus_opendrive::{ContactPoint, RoadLink, RoadMap};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::virtual_links;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_linkage_road_link_attribute_usage",
+    uids: &["asam.net:xodr:1.4.0:road.linkage.road_link_attribute_usage"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("road_linkage_road_link_attribute_usage.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        for end in ContactPoint::BOTH {
+            let Some(link) = road.link(end) else { continue };
+            let missing = missing(link);
+            if missing.is_empty() || virtual_links::leads_to_main_road(map, road, link) {
+                continue;
+            }
+            let text = format!(
+                "the {} of road `{}` has no {}; a link to a road must have `elementType`, `elementId` and \
+                 `contactPoint`",
+                end.link_name(),
+                road.id(),
+                missing.join(" and no ")
+            );
+            found.issue(link.node(), text);
+        }
+    }
+}
+
+/// The attributes that a link to a road lacks; without a type, it may lead to a junction.
+fn missing(link: RoadLink<'_>) -> Vec<&'static str> {
+    let has = |name: &str| link.node().attribute(name).is_some();
+    let wanted: &[(&str, &'static str)] = match link.element_type() {
+        Some("road") if has("elementS") || has("elementDir") => &[("elementId", "`elementId`")],
+        Some("road") => &[
+            ("elementId", "`elementId`"),
+            ("contactPoint", "`contactPoint`"),
+        ],
+        None => &[("elementType", "`elementType`")],
+        Some(_) => &[],
+    };
+    let lacking = wanted.iter().filter(|(name, _)| !has(name));
+    lacking.map(|(_, quoted)| *quoted).collect()
+}

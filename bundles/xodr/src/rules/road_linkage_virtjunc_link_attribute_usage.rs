@@ -1,0 +1,109 @@
+use qcbus_opendrive::{ContactPoint, JunctionType, Road, RoadLink, RoadMap};
+use qcbus_sdk::{Backport, Param, Place, Rule, Sink};
+
+use crate::families::virtual_links;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_linkage_virtjunc_link_attribute_usage",
+    uids: &["asam.net:xodr:1.7.0:road.linkage.virtjunc_link_attribute_usage"],
+    versions: "1.7.0..",
+    backport: Backport::Lower { since: "1.5.0" },
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("road_linkage_virtjunc_link_attribute_usage.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    1e-3,
+    "m",
+    "largest distance from the ends of the main road that is accepted",
+);
+
+const DEMAND: &str = "a link into the middle of a main road must have `elementType`, `elementId`, `elementS` and \
+                      `elementDir`";
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        for link in ContactPoint::BOTH
+            .into_iter()
+            .filter_map(|end| road.link(end))
+        {
+            if has(link, "elementS") || has(link, "elementDir") {
+                within(map, link, found);
+            } else if virtual_links::leads_to_main_road(map, road, link) {
+                at_an_end(map, road, link, found);
+            }
+        }
+    }
+}
+
+fn has(link: RoadLink<'_>, name: &str) -> bool {
+    link.node().attribute(name).is_some()
+}
+
+/// A link with `elementS` or `elementDir`.
+fn within(map: &RoadMap<'_>, link: RoadLink<'_>, found: &mut Sink<'_>) {
+    // Beside a common junction, both attributes are wrong: another rule's business.
+    let junction = link.junction_id().and_then(|id| map.junction(id));
+    if junction.is_some_and(|junction| junction.kind() != Some(JunctionType::Virtual)) {
+        return;
+    }
+    for name in ["elementS", "elementDir", "elementId"] {
+        if !has(link, name) {
+            found.issue(link.node(), format!("the link has no `{name}`; {DEMAND}"));
+        }
+    }
+    if let Some(contact) = link.node().attribute("contactPoint") {
+        let text = format!(
+            "the link has `contactPoint` besides `elementS` or `elementDir`; it must touch an end of the road \
+             or a place within it, {DEMAND}"
+        );
+        found.issue(contact, text);
+    }
+    beyond(map, link, found);
+}
+
+fn beyond(map: &RoadMap<'_>, link: RoadLink<'_>, found: &mut Sink<'_>) {
+    let tolerance = found.number(&TOLERANCE);
+    let Some(road) = link.road_id().and_then(|id| map.road(id)) else {
+        return;
+    };
+    let (Some(s), Some(length)) = (link.element_s(), road.length()) else {
+        return;
+    };
+    if s < -tolerance || s > length + tolerance {
+        let text = format!(
+            "elementS is {s}, but road `{}` goes from s = 0 to s = {length}; the link must lead to a place on it",
+            road.id()
+        );
+        found
+            .issue(Place::attribute_or_node(link.node(), "elementS"), text)
+            .road(road.id(), s, 0.0);
+    }
+}
+
+/// A link of a road in a virtual junction to an end of the main road: legal where the junction
+/// itself lies there.
+fn at_an_end(map: &RoadMap<'_>, road: &Road<'_>, link: RoadLink<'_>, found: &mut Sink<'_>) {
+    let tolerance = found.number(&TOLERANCE);
+    let junction = road.junction().and_then(|id| map.junction(id));
+    let main = link.road_id().and_then(|id| map.road(id));
+    if let (Some(junction), Some(main), Some(end)) = (junction, main, link.contact_point()) {
+        let touches = |s: Option<f64>| {
+            let place = main.end_s(end).zip(s);
+            place.is_none_or(|(end, s)| (end - s).abs() <= tolerance)
+        };
+        if touches(junction.s_start()) || touches(junction.s_end()) {
+            return;
+        }
+    }
+    let text = format!(
+        "road `{}` of a virtual junction is linked to its main road without saying where; {DEMAND}",
+        road.id()
+    );
+    found.issue(link.node(), text);
+}

@@ -1,0 +1,236 @@
+use std::collections::{BTreeSet, HashSet};
+
+use qcbus_opendrive::{ContactPoint, Junction, JunctionType, Road, RoadEnd, RoadMap};
+use qcbus_sdk::{Param, Rule, Sink};
+
+use crate::families::overlap::{Limits, Overlap, Slice, overlaps, slices};
+use crate::model::Roads;
+
+const AREA: Param = Param::number(
+    "area",
+    1.0,
+    "m²",
+    "largest common area of two pieces that is accepted",
+);
+const SHRINK: Param = Param::number(
+    "shrink",
+    0.05,
+    "m",
+    "how far the edges of roads are moved inward first",
+);
+const CLEARANCE: Param = Param::number(
+    "clearance",
+    3.0,
+    "m",
+    "roads that are farther apart in height lie over each other",
+);
+
+const INSIDE: &str = "asam.net:xodr:1.4.0:road.overlap_inside_junction";
+const SELF: &str = "asam.net:xodr:1.4.0:road.no_overlap_self";
+
+/// Up to this distance from a common contact, in metres, linked roads may overlap: their ends are
+/// cut off at right angles, whatever the roads do.
+const NEAR_CONTACT: f64 = 10.0;
+
+/// More roads than this do not share one place in a map that is one.
+const MOST: usize = 64;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_no_overlap_outside_junction",
+    uids: &[
+        "asam.net:xodr:1.4.0:road.no_overlap_outside_junction",
+        "asam.net:xodr:1.4.0:road.overlap_inside_junction",
+        "asam.net:xodr:1.4.0:road.no_overlap_self",
+    ],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[AREA, SHRINK, CLEARANCE],
+    page: include_str!("road_no_overlap_outside_junction.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let limits = Limits {
+        area: found.number(&AREA),
+        shrink: found.number(&SHRINK),
+        clearance: found.number(&CLEARANCE),
+    };
+    let friends = friends(map);
+    let slices = slices(map, &limits);
+    let wanted = |one: &Slice, other: &Slice| {
+        if one.road == other.road {
+            return is_far(map, one, other);
+        }
+        let (Some(a), Some(b)) = (map.road_at(one.road), map.road_at(other.road)) else {
+            return false;
+        };
+        let same_junction = a.junction().is_some() && a.junction() == b.junction();
+        !same_junction
+            && !friends.contains(&(one.road.min(other.road), one.road.max(other.road)))
+            && !meet(map, one, other)
+    };
+    overlaps(&slices, &limits, wanted, |overlap| {
+        report(map, &overlap, found);
+    });
+}
+
+/// Roads that may overlap by the kind of junction that they share: direct junctions, crossings,
+/// and whatever has to do with virtual junctions.
+fn friends(map: &RoadMap<'_>) -> HashSet<(usize, usize)> {
+    let mut friends = HashSet::new();
+    let mut add = |one: Option<&str>, other: Option<&str>| {
+        if let (Some(a), Some(b)) = (
+            one.and_then(|id| map.road(id)),
+            other.and_then(|id| map.road(id)),
+        ) {
+            friends.insert((a.index().min(b.index()), a.index().max(b.index())));
+        }
+    };
+    for junction in map.junctions() {
+        let sections: Vec<_> = junction.road_sections().take(MOST).collect();
+        for (at, one) in sections.iter().enumerate() {
+            for other in &sections[at + 1..] {
+                add(one.road_id(), other.road_id());
+            }
+        }
+        for path in junction.cross_paths() {
+            add(path.crossing_road(), path.road_at_start());
+            add(path.crossing_road(), path.road_at_end());
+        }
+        if junction.kind() == Some(JunctionType::Direct) {
+            let linked: BTreeSet<&str> = junction
+                .connections()
+                .flat_map(|one| [one.incoming_road(), one.linked_road()])
+                .flatten()
+                .take(MOST)
+                .collect();
+            let linked: Vec<&str> = linked.into_iter().collect();
+            for (at, one) in linked.iter().enumerate() {
+                for other in &linked[at + 1..] {
+                    add(Some(one), Some(other));
+                }
+            }
+        }
+    }
+    for road in map.roads() {
+        let junction = road.junction().and_then(|id| map.junction(id));
+        let is_virtual = |one: &&Junction<'_>| one.kind() == Some(JunctionType::Virtual);
+        if let Some(junction) = junction.filter(is_virtual) {
+            add(Some(road.id()), junction.main_road());
+        }
+    }
+    friends
+}
+
+/// Whether two pieces of one road are so far apart along it that they should not touch.
+fn is_far(map: &RoadMap<'_>, one: &Slice, other: &Slice) -> bool {
+    let (first, second) = if one.from <= other.from {
+        (one, other)
+    } else {
+        (other, one)
+    };
+    let gap = second.from - first.to;
+    let length = map
+        .road_at(one.road)
+        .and_then(Road::length)
+        .unwrap_or(f64::INFINITY);
+    // A ring's last piece touches its first one.
+    let around = first.from + length - second.to;
+    gap.min(around) > NEAR_CONTACT.max(2.0 * one.width.max(other.width))
+}
+
+/// Whether both pieces lie at an end where the file says that their roads touch.
+fn meet(map: &RoadMap<'_>, one: &Slice, other: &Slice) -> bool {
+    let near = |slice: &Slice, end: ContactPoint| {
+        let length = map
+            .road_at(slice.road)
+            .and_then(Road::length)
+            .unwrap_or(0.0);
+        let reach = NEAR_CONTACT.max(slice.width);
+        match end {
+            ContactPoint::Start => slice.from <= reach,
+            ContactPoint::End => slice.to >= length - reach,
+        }
+    };
+    let touches = |end: ContactPoint| {
+        let own = RoadEnd {
+            road: one.road,
+            end,
+        };
+        let mut contacts = map.contacts_of(own).take(MOST);
+        near(one, end)
+            && contacts.any(|contact| {
+                let there = if contact.from == own {
+                    contact.to
+                } else {
+                    contact.from
+                };
+                there.road == other.road && near(other, there.end)
+            })
+    };
+    // Roads that lie side by side at the mouth of one junction share its corners.
+    let junction_near = |slice: &Slice| {
+        let road = map.road_at(slice.road)?;
+        let end = ContactPoint::BOTH
+            .into_iter()
+            .find(|end| near(slice, *end))?;
+        let linked = road.link(end).and_then(|link| link.junction_id());
+        linked.or(road.junction())
+    };
+    let at_junction = junction_near(one).is_some() && junction_near(one) == junction_near(other);
+    at_junction || ContactPoint::BOTH.into_iter().any(touches)
+}
+
+fn report(map: &RoadMap<'_>, overlap: &Overlap<'_>, found: &mut Sink<'_>) {
+    let (one, other) = (overlap.one, overlap.other);
+    let (Some(a), Some(b)) = (map.road_at(one.road), map.road_at(other.road)) else {
+        return;
+    };
+    let [x, y, z] = [overlap.point.x, overlap.point.y, overlap.z];
+    if one.road == other.road {
+        let text = format!(
+            "road `{}` runs over itself: its lanes around s = {:.1} and s = {:.1} cover the same ground ({:.1} m²)",
+            a.id(),
+            one.from,
+            other.from,
+            overlap.area
+        );
+        found
+            .issue(a.node(), text)
+            .uid(SELF)
+            .road(a.id(), one.from, 0.0)
+            .point(x, y, z);
+        return;
+    }
+    let belongs = |road: &Road<'_>| match road.junction() {
+        Some(id) => format!(" of junction `{id}`"),
+        None => String::new(),
+    };
+    let within = a.junction().is_some() || b.junction().is_some();
+    let rule = if within {
+        "only roads of the same junction may overlap"
+    } else {
+        "roads outside of junctions must not overlap"
+    };
+    let text = format!(
+        "the lanes of road `{}`{} around s = {:.1} and of road `{}`{} around s = {:.1} cover the same ground ({:.1} m²); \
+         {rule}",
+        a.id(),
+        belongs(a),
+        one.from,
+        b.id(),
+        belongs(b),
+        other.from,
+        overlap.area
+    );
+    let mut finding = found.issue(a.node(), text);
+    if within {
+        finding = finding.uid(INSIDE);
+    }
+    finding
+        .road(a.id(), one.from, 0.0)
+        .point(x, y, z)
+        .at(b.node(), "the other road")
+        .road(b.id(), other.from, 0.0);
+}

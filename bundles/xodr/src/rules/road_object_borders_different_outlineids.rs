@@ -1,0 +1,63 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Level, Place, Rule, Sink};
+
+use crate::families::object_parts::{Stands, below, owner};
+use crate::model::Roads;
+use std::collections::HashMap;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_borders_different_outlineids",
+    uids: &["asam.net:xodr:1.9.0:road.object.borders.different_outlineids"],
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    page: include_str!("road_object_borders_different_outlineids.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for list in below(map, "outlines", "object") {
+        let mut seen: HashMap<&str, Node<'_>> = HashMap::new();
+        for outline in list.children_named("outline") {
+            let Some(id) = outline.attr("id") else {
+                continue;
+            };
+            let Some(first) = seen.get(id) else {
+                seen.insert(id, outline);
+                continue;
+            };
+            let text = format!(
+                "the outline id `{id}` occurs twice in this object; a border that names it cannot tell them apart"
+            );
+            found
+                .issue(Place::attribute_or_node(outline, "id"), text)
+                .stands(map, owner(list))
+                .at(*first, "the first outline with this id");
+        }
+        borders_need_ids(map, list, found);
+    }
+}
+
+/// Which of several outlines a border follows cannot be said without ids.
+fn borders_need_ids<'a>(map: &RoadMap<'a>, list: Node<'a>, found: &mut Sink<'_>) {
+    let object = owner(list);
+    let Some(borders) = object.child("borders") else {
+        return;
+    };
+    if list.children_named("outline").nth(1).is_none() {
+        return;
+    }
+    let nameless = list
+        .children_named("outline")
+        .filter(|outline| outline.attr("id").is_none());
+    for outline in nameless {
+        let text = "the outline has no `id`, but each of several outlines needs its own, so that borders can name it";
+        found
+            .issue(outline, text)
+            .level(Level::Warning)
+            .stands(map, object)
+            .at(borders, "the borders");
+    }
+}

@@ -1,0 +1,55 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Level, Place, Rule, Sink};
+
+use crate::families::object_parts::{Stands, below, owner};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_borders_use_complete_outline_true",
+    uids: &[COMPLETE, PARTIAL],
+    versions: "1.7.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    page: include_str!("road_object_borders_use_complete_outline_true.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const COMPLETE: &str = "asam.net:xodr:1.7.0:road.object.borders.useCompleteOutline_true";
+/// The counterpart, for which the standard gives no identifier.
+const PARTIAL: &str = "qcbus.dev:xodr:1.7.0:road.object.borders.partial_outline";
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for border in below(map, "border", "borders") {
+        let references = border.children_named("cornerReference").count();
+        let said = border.attr("useCompleteOutline").map(str::trim);
+        let (uid, text) = match said {
+            Some("false" | "0") if references < 2 => (
+                PARTIAL,
+                format!(
+                    "the border does not use the complete outline and names {references} corners; \
+                     it must have at least 2 `cornerReference`"
+                ),
+            ),
+            None | Some("true" | "1") if references > 0 => {
+                let missing = if said.is_none() {
+                    " (as it does when `useCompleteOutline` is missing)"
+                } else {
+                    ""
+                };
+                let text = format!(
+                    "the border uses the complete outline{missing}, but names {references} corners; \
+                     it must have no `cornerReference`, or `useCompleteOutline` must be `false`"
+                );
+                (COMPLETE, text)
+            }
+            _ => continue,
+        };
+        let place = Place::attribute_or_node(border, "useCompleteOutline");
+        let finding = found.issue(place, text).stands(map, owner(border)).uid(uid);
+        if said.is_none() {
+            // Plainly, a part of the outline was meant.
+            finding.level(Level::Warning);
+        }
+    }
+}

@@ -1,0 +1,65 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Level, Place, Rule, Sink};
+
+use crate::families::object_parts::{Stands, listed, named, number, objects};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_circular_vs_angular",
+    uids: &["asam.net:xodr:1.7.0:road.object.circular_vs_angular"],
+    versions: "1.7.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    page: include_str!("road_object_circular_vs_angular.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for object in objects(map) {
+        let [radius, length, width] = ["radius", "length", "width"].map(|name| object.attr(name));
+        let sides: Vec<&str> = [("length", length), ("width", width)]
+            .into_iter()
+            .filter_map(|(name, value)| value.map(|_| name))
+            .collect();
+        match (radius, sides.as_slice()) {
+            (Some(_), [_, ..]) => both(map, object, &sides, found),
+            (None, [only]) if !is_completed(object) => {
+                let other = if *only == "length" { "width" } else { "length" };
+                let text = format!(
+                    "{} has a `{only}`, but no `{other}`; a box needs both, a cylinder has a `radius`",
+                    named(object)
+                );
+                found
+                    .issue(Place::attribute_or_node(object, only), text)
+                    .level(Level::Warning)
+                    .stands(map, object);
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Repeats and shapes can give what the object leaves open.
+fn is_completed(object: Node<'_>) -> bool {
+    ["repeat", "outlines", "outline", "skeleton"]
+        .into_iter()
+        .any(|part| object.child(part).is_some())
+}
+
+/// A size of zero stands for "none" in many files.
+fn both<'a>(map: &RoadMap<'a>, object: Node<'a>, sides: &[&str], found: &mut Sink<'_>) {
+    let is_zero = |name: &&str| number(object, name) == Some(0.0);
+    let says_none = is_zero(&"radius") || sides.iter().all(is_zero);
+    let text = format!(
+        "{} has a `radius` as well as {}; its bounding volume must be either a cylinder or a box",
+        named(object),
+        listed(sides)
+    );
+    let place = Place::attribute_or_node(object, "radius");
+    let finding = found.issue(place, text).stands(map, object);
+    if says_none {
+        finding.level(Level::Warning);
+    }
+}

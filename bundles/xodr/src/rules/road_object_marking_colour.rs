@@ -1,0 +1,32 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Place, Rule, Sink};
+
+use crate::families::corner_references::markings;
+use crate::families::object_parts::{Stands, is_blank};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_marking_colour",
+    uids: &[MARKING, IN_OUTLINE],
+    versions: "1.7.0..",
+    after: super::READABLE,
+    page: include_str!("road_object_marking_colour.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const MARKING: &str = "asam.net:xodr:1.7.0:road.object.marking.colour";
+const IN_OUTLINE: &str = "asam.net:xodr:1.9.0:road.object.object_marking.colour";
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for marking in markings(map) {
+        if is_blank(marking.node, "color") {
+            let uid = marking.outline.map_or(MARKING, |_| IN_OUTLINE);
+            let text = "the marking has no `color`, but must have one";
+            found
+                .issue(Place::attribute_or_node(marking.node, "color"), text)
+                .stands(map, marking.object)
+                .uid(uid);
+        }
+    }
+}

@@ -1,0 +1,49 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Place, Rule, Sink};
+
+use crate::families::corner_references::markings;
+use crate::families::object_parts::{Stands, corners, named, outlines};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_marking_complete_or_partial_on_outline",
+    uids: &["asam.net:xodr:1.9.0:road.object.marking.complete_or_partial_on_outline"],
+    versions: "1.9.0..",
+    after: super::READABLE,
+    page: include_str!("road_object_marking_complete_or_partial_on_outline.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for marking in markings(map) {
+        let Some(own) = marking.outline else {
+            continue;
+        };
+        for reference in marking.references() {
+            let Some(id) = reference.attr("id") else {
+                continue;
+            };
+            if point(own, id).is_some() {
+                continue;
+            }
+            let foreign = outlines(marking.object).find_map(|outline| point(outline, id));
+            if let Some(foreign) = foreign {
+                let text = format!(
+                    "the marking refers to the point `{id}`, which belongs to another outline of {}; \
+                     it must lie on the outline in which it is defined",
+                    named(marking.object)
+                );
+                found
+                    .issue(Place::attribute_or_node(reference, "id"), text)
+                    .stands(map, marking.object)
+                    .at(foreign, "the point of the other outline");
+            }
+        }
+    }
+}
+
+fn point<'a>(outline: Node<'a>, id: &str) -> Option<Node<'a>> {
+    corners(outline).find(|point| point.attr("id") == Some(id))
+}

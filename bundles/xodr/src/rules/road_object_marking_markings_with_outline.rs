@@ -1,0 +1,40 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::object_parts::{Stands, named, objects, outlines};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_marking_markings_with_outline",
+    uids: &["asam.net:xodr:1.9.0:road.object.marking.markings_with_outline"],
+    versions: "1.9.0..",
+    after: super::READABLE,
+    page: include_str!("road_object_marking_markings_with_outline.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for object in objects(map) {
+        let Some(outline) = outlines(object).next() else {
+            continue;
+        };
+        let outside = object.children_named("markings").chain(
+            object
+                .children_named("outlines")
+                .flat_map(|list| list.children_named("markings")),
+        );
+        for markings in outside {
+            let text = format!(
+                "the markings stand in `{}`, but {} has an outline; since 1.9 they must stand in the outline on \
+                 which they lie (1.8 knew no other place than the object)",
+                markings.parent().map_or("", |parent| parent.name()),
+                named(object)
+            );
+            found
+                .issue(markings, text)
+                .stands(map, object)
+                .at(outline, "the first outline");
+        }
+    }
+}

@@ -1,0 +1,33 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::families::object_parts::{Stands, has_outline, named, objects};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_marking_no_cornerreference_if_no_outline",
+    uids: &["asam.net:xodr:1.7.0:road.object.marking.no_cornerreference_if_no_outline"],
+    versions: "1.7.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    page: include_str!("road_object_marking_no_cornerreference_if_no_outline.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for object in objects(map).filter(|object| !has_outline(*object)) {
+        for (list, part) in [("markings", "marking"), ("borders", "border")] {
+            let parts = object
+                .children_named(list)
+                .flat_map(|list| list.children_named(part));
+            for reference in parts.filter_map(|part| part.child("cornerReference")) {
+                let text = format!(
+                    "the {part} refers to a corner, but {} has no outline; without one there must be no `cornerReference`",
+                    named(object)
+                );
+                found.issue(reference, text).stands(map, object);
+            }
+        }
+    }
+}

@@ -1,0 +1,48 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::corner_references::markings;
+use crate::families::object_parts::Stands;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_object_marking_include_points_between_corner_references",
+    uids: &[
+        "asam.net:xodr:1.9.0:road.object.object_marking.include_points_between_cornerReferences",
+    ],
+    level: Level::Information,
+    versions: "1.9.0..",
+    after: super::READABLE,
+    page: include_str!("road_object_object_marking_include_points_between_corner_references.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for marking in markings(map).filter(|marking| marking.outline.is_some()) {
+        let Some(path) = marking.path() else { continue };
+        for pair in path.steps.windows(2) {
+            let ([(from, start), (to, end)], all) = (pair, path.points.len()) else {
+                continue;
+            };
+            // Points passed on the way, over the closing side where the numbers fall.
+            let between = (end + all - start + all - 1) % all;
+            let falls = end <= start;
+            if between == 0 || (falls && path.is_closed() == Some(false)) {
+                continue;
+            }
+            let (a, b) = (
+                from.attr("id").unwrap_or_default(),
+                to.attr("id").unwrap_or_default(),
+            );
+            let text = format!(
+                "the marking leads from point `{a}` to point `{b}`, which are not neighbours on the outline; \
+                 it includes what lies between ({between} more of its points), although readers of 1.8 draw a straight line"
+            );
+            found
+                .issue(*to, text)
+                .stands(map, marking.object)
+                .at(*from, "the reference before it");
+        }
+    }
+}

@@ -1,0 +1,32 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::families::object_parts::{Stands, is_blank, named, objects};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_orientation",
+    uids: &["asam.net:xodr:1.7.0:road.object.orientation"],
+    level: Level::Warning,
+    versions: "1.7.0..",
+    after: super::READABLE,
+    page: include_str!("road_object_orientation.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for object in objects(map).filter(|object| is_blank(*object, "orientation")) {
+        let text = format!(
+            "{} has no `orientation`, but must say whether it is valid along the road (`+`), against it (`-`) or both (`none`)",
+            named(object)
+        );
+        let place = Place::attribute_or_node(object, "orientation");
+        let finding = found.issue(place, text).stands(map, object);
+        if let Some(validity) = object.child("validity") {
+            finding
+                .level(Level::Error)
+                .at(validity, "the lanes for which it is valid");
+        }
+    }
+}

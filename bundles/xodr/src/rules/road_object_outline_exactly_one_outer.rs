@@ -1,0 +1,40 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::families::object_parts::{Stands, below, owner};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_outline_exactly_one_outer",
+    uids: &["asam.net:xodr:1.9.0:road.object.outline.exactly_one_outer"],
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    page: include_str!("road_object_outline_exactly_one_outer.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for list in below(map, "outlines", "object") {
+        let all: Vec<Node<'_>> = list.children_named("outline").collect();
+        let outer: Vec<Node<'_>> = all.iter().copied().filter(|node| is_outer(*node)).collect();
+        if all.is_empty() || outer.len() == 1 {
+            continue;
+        }
+        let text = format!(
+            "{} of {} outlines are outer ones (those without `outer` count); exactly one must be",
+            outer.len(),
+            all.len()
+        );
+        let finding = found.issue(list, text).stands(map, owner(list));
+        if let Some(second) = outer.get(1) {
+            finding.at(*second, "the second outer outline");
+        }
+    }
+}
+
+fn is_outer(outline: Node<'_>) -> bool {
+    !matches!(outline.attr("outer").map(str::trim), Some("false" | "0"))
+}

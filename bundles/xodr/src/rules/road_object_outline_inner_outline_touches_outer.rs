@@ -1,0 +1,101 @@
+use qcbus_opendrive::geometry::Point;
+use qcbus_opendrive::{Corner, CornerKind, Object, Outline, Road, RoadMap};
+use qcbus_sdk::{Backport, Param, Rule, Sink};
+
+use crate::families::object_frame::ObjectFrame;
+use crate::families::on_road::OnRoad;
+use crate::families::polygons::{contains, distance_to_boundary};
+use crate::model::Roads;
+
+const TOUCH: Param = Param::number(
+    "touch",
+    0.01,
+    "m",
+    "how near a corner must be to touch the other outline",
+);
+
+/// Corners that are not farther apart than this, in metres, are the same point.
+const SAME: f64 = 0.001;
+
+/// More comparisons than this are not made for one object: hostile files only.
+const MOST: usize = 5_000_000;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_outline_inner_outline_touches_outer",
+    uids: &["asam.net:xodr:1.9.0:road.object.outline.inner_outline_touches_outer"],
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "1.5.0" },
+    after: super::READABLE,
+    params: &[TOUCH],
+    page: include_str!("road_object_outline_inner_outline_touches_outer.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for (road, object) in map.objects() {
+        let (inner, outer): (Vec<_>, Vec<_>) = object
+            .outlines()
+            .partition(|outline| outline.outer() == Some(false));
+        // With another number of outer outlines nobody knows which one is meant.
+        let ([outer], Some(frame)) = (outer.as_slice(), ObjectFrame::of(road, &object)) else {
+            continue;
+        };
+        let Some(shape) = polygon(&frame, outer).filter(|shape| shape.len() > 2) else {
+            continue;
+        };
+        let corners = || inner.iter().flat_map(|outline| outline.corners());
+        if shape.len().saturating_mul(corners().count()) <= MOST {
+            for corner in corners() {
+                check(road, &object, &frame, &corner, &shape, found);
+            }
+        }
+    }
+}
+
+/// The corners in u and v; `None` with curves or when a corner cannot be evaluated.
+fn polygon<'a>(frame: &ObjectFrame<'_, 'a>, outline: &Outline<'a>) -> Option<Vec<Point>> {
+    let corners = outline.corners().map(|corner| place(frame, &corner));
+    corners.collect()
+}
+
+fn place<'a>(frame: &ObjectFrame<'_, 'a>, corner: &Corner<'a>) -> Option<Point> {
+    let [u, v, _] = frame
+        .corner(corner)
+        .filter(|_| corner.kind != CornerKind::Curve)?;
+    Point::finite(u, v)
+}
+
+fn check<'a>(
+    road: &Road<'a>,
+    object: &Object<'a>,
+    frame: &ObjectFrame<'_, 'a>,
+    corner: &Corner<'a>,
+    shape: &[Point],
+    found: &mut Sink<'_>,
+) {
+    let Some(point) = place(frame, corner) else {
+        return;
+    };
+    let distance = distance_to_boundary(point, shape);
+    let touches = distance <= found.number(&TOUCH);
+    let shared = shape.iter().any(|other| other.distance(point) <= SAME);
+    let what = if touches && !shared {
+        "touches the outer outline between its corners; where they touch, both must have a corner at that point"
+    } else if !touches && !contains(shape, point) {
+        "lies outside of the outer outline; inner outlines must lie inside"
+    } else {
+        return;
+    };
+    let text = format!(
+        "a corner of an inner outline of object `{}` at u = {:.3}, v = {:.3} {what}",
+        object.id().unwrap_or_default(),
+        point.x,
+        point.y
+    );
+    found.issue(corner.point.node(), text).on(
+        road,
+        object.s().unwrap_or(0.0),
+        object.t().unwrap_or(0.0),
+    );
+}

@@ -1,0 +1,20 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::families::lane_ranges;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_reference_from_lower_equal_to",
+    uids: &["asam.net:xodr:1.7.0:road.object.reference.from_lower_equal_to"],
+    versions: "1.7.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    page: include_str!("road_object_reference_from_lower_equal_to.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    lane_ranges::lower_comes_first(map, &["objectReference"], found);
+}

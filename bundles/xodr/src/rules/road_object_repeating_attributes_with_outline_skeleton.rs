@@ -1,0 +1,54 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Place, Rule, Sink, Version};
+
+use crate::families::object_parts::{Stands, listed, named, objects, outlines};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_repeating_attributes_with_outline_skeleton",
+    uids: &["asam.net:xodr:1.9.0:road.object.repeating.attributes_with_outline_skeleton"],
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    page: include_str!("road_object_repeating_attributes_with_outline_skeleton.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const SIZES: [&str; 6] = [
+    "lengthStart",
+    "lengthEnd",
+    "widthStart",
+    "widthEnd",
+    "heightStart",
+    "heightEnd",
+];
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    // Until 1.8 the schema demands the two heights of every repeat.
+    let heights_demanded = found
+        .version()
+        .is_some_and(|version| version < Version::new(1, 9));
+    for object in objects(map) {
+        let shape = outlines(object).next().or(object.child("skeleton"));
+        let Some(shape) = shape else { continue };
+        for repeat in object.children_named("repeat") {
+            let given: Vec<&str> = SIZES
+                .into_iter()
+                .filter(|name| !(heights_demanded && name.starts_with("height")))
+                .filter(|name| repeat.attr(name).is_some())
+                .collect();
+            let Some(first) = given.first() else { continue };
+            let text = format!(
+                "the repeat changes {}, but {} has a shape of its own, `{}`, whose size cannot change",
+                listed(&given),
+                named(object),
+                shape.name()
+            );
+            found
+                .issue(Place::attribute_or_node(repeat, first), text)
+                .stands(map, object)
+                .at(shape, "the shape");
+        }
+    }
+}

@@ -1,0 +1,50 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Place, Rule, Sink};
+
+use crate::families::object_parts::{Stands, listed, named, number, objects};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_repeating_no_widthstart_end_with_radius",
+    uids: &["asam.net:xodr:1.9.0:road.object.repeating.no_widthstart_end_with_radius"],
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    page: include_str!("road_object_repeating_no_widthstart_end_with_radius.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for object in objects(map) {
+        for repeat in object.children_named("repeat") {
+            // A radius of zero stands for "none" in many files.
+            let radius = object
+                .attribute("radius")
+                .filter(|_| number(object, "radius") != Some(0.0));
+            let radius = radius.or_else(|| {
+                ["radiusStart", "radiusEnd"]
+                    .into_iter()
+                    .find_map(|name| repeat.attribute(name))
+            });
+            let given: Vec<&str> = ["widthStart", "widthEnd"]
+                .into_iter()
+                .filter(|name| repeat.attr(name).is_some())
+                .collect();
+            let (Some(radius), Some(first)) = (radius, given.first()) else {
+                continue;
+            };
+            let text = format!(
+                "the repeat gives {}, but {} is round (`{}=\"{}\"`); round objects have no width",
+                listed(&given),
+                named(object),
+                radius.name(),
+                radius.value()
+            );
+            found
+                .issue(Place::attribute_or_node(repeat, first), text)
+                .stands(map, object)
+                .at(radius, "the radius");
+        }
+    }
+}

@@ -1,0 +1,107 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink};
+
+use crate::families::object_parts::{number, objects};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_repeating_valid_s_length",
+    uids: &[VALID, LATERAL],
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("road_object_repeating_valid_s_length.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const VALID: &str = "asam.net:xodr:1.9.0:road.object.repeating.valid_s_length";
+/// Said in the same list, without an identifier.
+const LATERAL: &str = "qcbus.dev:xodr:1.9.0:road.object.repeating.t_end";
+const TOLERANCE: Param = Param::number(
+    "s_tolerance",
+    1e-3,
+    "m",
+    "how far beyond the ends of the road a repetition may reach, and how far the cubic for t may miss `tEnd`",
+);
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let tolerance = found.number(&TOLERANCE);
+    for object in objects(map) {
+        for repeat in object.children_named("repeat") {
+            along(map, repeat, tolerance, found);
+            across(repeat, tolerance, found);
+        }
+    }
+}
+
+/// The section of repetition must be on the road.
+fn along<'a>(map: &RoadMap<'a>, repeat: Node<'a>, tolerance: f64, found: &mut Sink<'_>) {
+    let (Some(s), Some(length)) = (number(repeat, "s"), number(repeat, "length")) else {
+        return;
+    };
+    if length < 0.0 {
+        let text =
+            format!("the repetition is {length} m long, but its length must not be negative");
+        found.issue(Place::attribute_or_node(repeat, "length"), text);
+    } else if length == 0.0 && number(repeat, "distance") == Some(0.0) {
+        let text = "the repetition is a continuous one of length 0 m, of which nothing remains";
+        found
+            .issue(Place::attribute_or_node(repeat, "length"), text)
+            .level(Level::Warning);
+    }
+    let Some(road) = map.road_of(repeat) else {
+        return;
+    };
+    let Some(end) = road.length() else { return };
+    let (attribute, text) = if s < -tolerance || s > end + tolerance {
+        ("s", format!("the repetition starts at s = {s} m"))
+    } else if s + length > end + tolerance {
+        (
+            "length",
+            format!(
+                "the repetition ends at s = {} m ({s} + {length})",
+                s + length
+            ),
+        )
+    } else {
+        return;
+    };
+    let text = format!("{text}, but road `{}` reaches from 0 to {end} m", road.id());
+    found
+        .issue(Place::attribute_or_node(repeat, attribute), text)
+        .road(road.id(), s, number(repeat, "tStart").unwrap_or(0.0));
+}
+
+/// A cubic for t must arrive at `tEnd`.
+fn across(repeat: Node<'_>, tolerance: f64, found: &mut Sink<'_>) {
+    if !["bT", "cT", "dT"]
+        .iter()
+        .any(|name| repeat.attr(name).is_some())
+    {
+        return;
+    }
+    let given = |name: &str| number(repeat, name);
+    let (Some(length), Some(start), Some(end)) = (given("length"), given("tStart"), given("tEnd"))
+    else {
+        return;
+    };
+    let or_zero = |name: &str| match repeat.attr(name) {
+        None => Some(0.0),
+        Some(_) => given(name),
+    };
+    let (Some(b), Some(c), Some(d)) = (or_zero("bT"), or_zero("cT"), or_zero("dT")) else {
+        return;
+    };
+    let t = start + length * (b + length * (c + length * d));
+    if (t - end).abs() > tolerance {
+        let text = format!(
+            "the cubic for t arrives at {t} m at the end of the repetition, but `tEnd` is {end} m; they must be equal"
+        );
+        found
+            .issue(Place::attribute_or_node(repeat, "tEnd"), text)
+            .uid(LATERAL);
+    }
+}

@@ -1,0 +1,79 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink};
+
+use crate::families::object_parts::{Stands, listed, named, number, objects};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_s_t_coords",
+    uids: &["asam.net:xodr:1.7.0:road.object.s_t_coords"],
+    versions: "1.7.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    params: &[TOLERANCE, FAR],
+    page: include_str!("road_object_s_t_coords.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const TOLERANCE: Param = Param::number(
+    "s_tolerance",
+    1e-3,
+    "m",
+    "how far beyond the ends of the road `s` may lie",
+);
+const FAR: Param = Param::number(
+    "far",
+    200.0,
+    "m",
+    "lateral distance from which an object is called far",
+);
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let (tolerance, far) = (found.number(&TOLERANCE), found.number(&FAR));
+    for object in objects(map) {
+        let missing: Vec<&str> = ["s", "t"]
+            .into_iter()
+            .filter(|name| object.attr(name).is_none())
+            .collect();
+        if !missing.is_empty() {
+            let text = format!(
+                "{} has no {}; its origin must be given by `s` and `t`",
+                named(object),
+                listed(&missing)
+            );
+            found.issue(object, text);
+        }
+        on_road(map, object, tolerance, found);
+        if let Some(t) = number(object, "t").filter(|t| t.abs() > far) {
+            let text = format!(
+                "{} stands {} m beside the reference line, which is unusually far (more than {far} m)",
+                named(object),
+                t.abs()
+            );
+            found
+                .issue(Place::attribute_or_node(object, "t"), text)
+                .level(Level::Information)
+                .stands(map, object);
+        }
+    }
+}
+
+/// The origin must be on the road, from its start to its end.
+fn on_road<'a>(map: &RoadMap<'a>, object: Node<'a>, tolerance: f64, found: &mut Sink<'_>) {
+    let (Some(s), Some(road)) = (number(object, "s"), map.road_of(object)) else {
+        return;
+    };
+    let Some(length) = road.length() else { return };
+    if s < -tolerance || s > length + tolerance {
+        let text = format!(
+            "{} stands at s = {s} m, but road `{}` reaches from 0 to {length} m",
+            named(object),
+            road.id()
+        );
+        found
+            .issue(Place::attribute_or_node(object, "s"), text)
+            .road(road.id(), s, number(object, "t").unwrap_or(0.0));
+    }
+}

@@ -1,0 +1,29 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::object_frame::{ObjectFrame, TOLERANCE, report_too_large};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_skeleton_points_inside_box",
+    uids: &["asam.net:xodr:1.8.0:road.object.skeleton.points_inside_box"],
+    versions: "1.8.0..",
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("road_object_skeleton_points_inside_box.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for (road, object) in map.objects() {
+        let Some(frame) = ObjectFrame::of(road, &object) else {
+            continue;
+        };
+        let points: Vec<_> = object
+            .polylines()
+            .flat_map(|line| frame.vertices(&line, false))
+            .collect();
+        report_too_large(road, &object, &points, "the skeleton", found);
+    }
+}

@@ -1,0 +1,48 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::object_parts::{Stands, owner, polylines};
+use crate::families::vertices::Vertices;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_skeleton_polyline_followed_by_vertex",
+    uids: &[POLYLINE, ROAD, LOCAL],
+    versions: "1.8.0..",
+    after: super::READABLE,
+    page: include_str!("road_object_skeleton_polyline_followed_by_vertex.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const POLYLINE: &str = "asam.net:xodr:1.8.0:road.object.skeleton.polyline_followed_by_vertex";
+const ROAD: &str = "asam.net:xodr:1.8.0:road.object.skeleton.vertex_road.element_min_amount";
+const LOCAL: &str = "asam.net:xodr:1.8.0:road.object.skeleton.vertex_local.element_min_amount";
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for polyline in polylines(map) {
+        let vertices = Vertices::of(polyline);
+        let (road, local) = (vertices.road.len(), vertices.local.len());
+        let (uid, text) = match (road, local) {
+            (1, 0) => (
+                ROAD,
+                "the polyline has 1 `vertexRoad`, but needs at least 2".to_owned(),
+            ),
+            (0, 1) => (
+                LOCAL,
+                "the polyline has 1 `vertexLocal`, but needs at least 2".to_owned(),
+            ),
+            (0 | 1, 0 | 1) => {
+                let text = format!(
+                    "the polyline has {road} `vertexRoad` and {local} `vertexLocal`; it needs at least 2 of one sort"
+                );
+                (POLYLINE, text)
+            }
+            _ => continue,
+        };
+        found
+            .issue(polyline, text)
+            .stands(map, owner(polyline))
+            .uid(uid);
+    }
+}

@@ -1,0 +1,59 @@
+use qcbus_opendrive::{Road, RoadMap};
+use qcbus_sdk::{Backport, Level, Place, Rule, Sink};
+
+use crate::families::on_road::OnRoad;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_surface_avoid_skewed_crg_surfacees",
+    uids: &["asam.net:xodr:1.9.0:road.object.surface.avoid_skewed_crg_surfacees"],
+    level: Level::Warning,
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "1.7.0" },
+    after: super::READABLE,
+    page: include_str!("road_object_surface_avoid_skewed_crg_surfacees.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for (road, object) in map.objects() {
+        let has_surface = object.crgs().next().is_some();
+        let sizes = object.length().zip(object.width());
+        let (Some((length, width)), Some(s)) = (sizes, object.s()) else {
+            continue;
+        };
+        if object.perp_to_road() != Some(true) || !has_surface {
+            continue;
+        }
+        let size = length.max(width);
+        let curvature = sharpest(road, s - 0.5 * length, s + 0.5 * length);
+        if curvature > 0.0 && size * curvature >= 1.0 {
+            let text = format!(
+                "object `{}` is {size:.2} m large, but the elevation below it has a radius of {:.2} m; `perpToRoad` should \
+                 only be used for objects that are smaller, or their surfaces are skewed",
+                object.id().unwrap_or_default(),
+                1.0 / curvature
+            );
+            found
+                .issue(Place::attribute_or_node(object.node(), "perpToRoad"), text)
+                .on(road, s, object.t().unwrap_or(0.0));
+        }
+    }
+}
+
+/// The greatest curvature of the elevation between two places, in 1/m. The second derivative of a
+/// cubic is greatest at an end of its stretch.
+fn sharpest(road: &Road<'_>, from: f64, to: f64) -> f64 {
+    let mut sharpest = 0.0_f64;
+    for stretch in road.elevation().stretches(road.length().unwrap_or(to)) {
+        let (low, high) = (from.max(stretch.from), to.min(stretch.to));
+        for s in [low, high].into_iter().filter(|_| low <= high) {
+            let ds = s - stretch.from;
+            let slope = stretch.cubic.slope(ds);
+            let curvature = stretch.cubic.bend(ds).abs() / (1.0 + slope * slope).powf(1.5);
+            sharpest = sharpest.max(curvature);
+        }
+    }
+    sharpest
+}

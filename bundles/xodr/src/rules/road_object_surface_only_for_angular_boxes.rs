@@ -1,0 +1,41 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::object_parts::{Stands, has_outline, named, number, objects};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_surface_only_for_angular_boxes",
+    uids: &["asam.net:xodr:1.7.0:road.object.surface.only_for_angular_boxes"],
+    versions: "1.7.0..",
+    after: super::READABLE,
+    page: include_str!("road_object_surface_only_for_angular_boxes.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for object in objects(map) {
+        let Some(surface) = object.child("surface") else {
+            continue;
+        };
+        let lacks_side = ["length", "width"]
+            .into_iter()
+            .find(|name| object.attr(name).is_none());
+        let is_round = object.attr("radius").is_some() && number(object, "radius") != Some(0.0);
+        let why = if is_round {
+            "is round (it has a `radius`)".to_owned()
+        } else if has_outline(object) {
+            "has an outline".to_owned()
+        } else if let Some(side) = lacks_side {
+            format!("has no `{side}`")
+        } else {
+            continue;
+        };
+        let text = format!(
+            "{} has a surface, but {why}; only objects with `length` and `width` and without outline may have one",
+            named(object)
+        );
+        found.issue(surface, text).stands(map, object);
+    }
+}

@@ -1,0 +1,37 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::object_parts::{Stands, named, objects};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_surface_only_one_crg_file",
+    uids: &["asam.net:xodr:1.7.0:road.object.surface.only_one_crg_file"],
+    versions: "1.7.0..",
+    after: super::READABLE,
+    page: include_str!("road_object_surface_only_one_crg_file.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for object in objects(map) {
+        let mut records = object
+            .children_named("surface")
+            .flat_map(|surface| surface.children_named("CRG"));
+        let Some(first) = records.next() else {
+            continue;
+        };
+        for (index, record) in records.enumerate() {
+            let text = format!(
+                "this is CRG record {} of {}; an object may have one only",
+                index + 2,
+                named(object)
+            );
+            found
+                .issue(record, text)
+                .stands(map, object)
+                .at(first, "the first record");
+        }
+    }
+}

@@ -1,0 +1,60 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Place, Rule, Sink, Version};
+
+use crate::families::object_parts::{Stands, is_blank, named, objects};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_object_type_attr",
+    uids: &["asam.net:xodr:1.7.0:road.object.type_attr"],
+    level: Level::Warning,
+    versions: "1.7.0..",
+    after: super::READABLE,
+    page: include_str!("road_object_type_attr.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// Types that are no longer to be used, since when, and what replaces them.
+const DEPRECATED: [(&str, Version, &str); 13] = [
+    ("bike", Version::new(1, 5), ""),
+    ("bus", Version::new(1, 5), ""),
+    ("car", Version::new(1, 5), ""),
+    ("motorbike", Version::new(1, 5), ""),
+    ("pedestrian", Version::new(1, 5), ""),
+    ("trailer", Version::new(1, 5), ""),
+    ("train", Version::new(1, 5), ""),
+    ("tram", Version::new(1, 5), ""),
+    ("wind", Version::new(1, 5), "pole"),
+    ("patch", Version::new(1, 8), "roadSurface"),
+    ("railing", Version::new(1, 8), "barrier"),
+    ("soundBarrier", Version::new(1, 8), "barrier"),
+    ("streetLamp", Version::new(1, 8), "pole"),
+];
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for object in objects(map) {
+        let place = Place::attribute_or_node(object, "type");
+        if is_blank(object, "type") {
+            let text = format!("{} has no `type`, but must have one", named(object));
+            found.issue(place, text).stands(map, object);
+            continue;
+        }
+        let kind = object.attr("type").unwrap_or_default();
+        let version = found.version();
+        let known = DEPRECATED
+            .iter()
+            .find(|(name, since, _)| *name == kind && version.is_some_and(|v| v >= *since));
+        if let Some((_, since, instead)) = known {
+            let advice = match *instead {
+                "" => "such things are no objects of a road".to_owned(),
+                instead => format!("`{instead}` is to be used instead"),
+            };
+            let text = format!("the object type `{kind}` is deprecated since {since}; {advice}");
+            found
+                .issue(place, text)
+                .level(Level::Information)
+                .stands(map, object);
+        }
+    }
+}

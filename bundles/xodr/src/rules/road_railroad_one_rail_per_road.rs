@@ -1,0 +1,38 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Place, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_railroad_one_rail_per_road",
+    uids: &["asam.net:xodr:1.7.0:road.railroad.one_rail_per_road"],
+    versions: "1.7.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    page: include_str!("road_railroad_one_rail_per_road.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for section in map.sections() {
+        let mut rails = section
+            .lanes()
+            .filter(|lane| matches!(lane.kind(), Some("tram" | "rail")));
+        let Some(first) = rails.next() else { continue };
+        for lane in rails {
+            let text = format!(
+                "lane `{}` of road `{}` is a `{}` lane beside lane `{}`, which is a `{}` lane already; \
+                 a road may have one tram or rail lane only",
+                lane.id_text().unwrap_or_default(),
+                section.road.id(),
+                lane.kind().unwrap_or_default(),
+                first.id_text().unwrap_or_default(),
+                first.kind().unwrap_or_default()
+            );
+            found
+                .issue(Place::attribute_or_node(lane.node(), "type"), text)
+                .at(first.node(), "the first of them");
+        }
+    }
+}

@@ -1,0 +1,50 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
+
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::families::rails::rail_lanes;
+use crate::model::Roads;
+
+const TRAM: Param = Param::number("tram", 2.2, "m", "least width of a lane for trams");
+const RAIL: Param = Param::number("rail", 2.6, "m", "least width of a lane for trains");
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_railroad_rail_lane_width_validity",
+    uids: &["asam.net:xodr:1.7.0:road.railroad.rail_lane_width_validity"],
+    level: Level::Warning,
+    versions: "1.7.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    params: &[TRAM, RAIL],
+    page: include_str!("road_railroad_rail_lane_width_validity.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for (lane, kind) in rail_lanes(map) {
+        let limit = found.number(if kind == "tram" { &TRAM } else { &RAIL });
+        let Some(length) = lane.length() else {
+            continue;
+        };
+        let lowest = lane.widths().stretches(length).filter_map(|stretch| {
+            let lowest = stretch.cubic.minimum(0.0, stretch.length())?;
+            Some((
+                lowest.value,
+                stretch.from + lowest.at,
+                stretch.record.node(),
+            ))
+        });
+        let lowest = lowest.min_by(|one, other| one.0.total_cmp(&other.0));
+        let Some((width, ds, record)) = lowest.filter(|(width, ..)| *width < limit) else {
+            continue;
+        };
+        let text = format!(
+            "{} is for type `{kind}`, but only {width:.2} m wide at s = {:.2}; it must be as wide as the vehicles on \
+             it, taken to be {limit} m",
+            lane_name(lane),
+            lane.at.s().unwrap_or(0.0) + ds
+        );
+        found.issue(record, text).in_lane(lane, ds);
+    }
+}

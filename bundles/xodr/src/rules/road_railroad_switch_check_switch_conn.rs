@@ -1,0 +1,76 @@
+use qcbus_opendrive::{Road, RoadMap, Switch};
+use qcbus_sdk::{Backport, Place, Rule, Sink};
+
+use crate::families::object_parts::named;
+use crate::families::switches::by_id;
+use crate::model::Roads;
+use std::collections::HashMap;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_railroad_switch_check_switch_conn",
+    uids: &[CONNECTION, PARENT],
+    versions: "1.7.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    page: include_str!("road_railroad_switch_check_switch_conn.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const CONNECTION: &str = "asam.net:xodr:1.7.0:road.railroad.switch.check_switch_conn";
+/// Said in the table of `mainTrack`, without an identifier.
+const PARENT: &str = "qcbus.dev:xodr:1.7.0:road.railroad.switch.main_track_is_parent";
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let all: HashMap<&str, (&Road<'_>, Switch<'_>)> = by_id(map);
+    for road in map.roads() {
+        for switch in road.switches() {
+            main_track(road, switch, found);
+            if let Some((_, partner)) = switch.partner_id().and_then(|id| all.get(id)) {
+                connection(switch, *partner, found);
+            }
+        }
+    }
+}
+
+/// The switch lies on its main track and leads off it.
+fn main_track(road: &Road<'_>, switch: Switch<'_>, found: &mut Sink<'_>) {
+    let Some(main) = switch.main_track() else {
+        return;
+    };
+    let Some(id) = main.id() else { return };
+    let place = Place::attribute_or_node(main.node(), "id");
+    if id != road.id() {
+        let text = format!(
+            "the main track of {} is road `{id}`, but the switch is defined on road `{}`; both must be the same",
+            named(switch.node()),
+            road.id()
+        );
+        found.issue(place, text).uid(PARENT);
+    } else if switch.side_track().and_then(|side| side.id()) == Some(id) {
+        let text = format!(
+            "road `{id}` is both the main and the side track of {}; a switch must lead to another road",
+            named(switch.node())
+        );
+        found.issue(place, text);
+    }
+}
+
+/// Partners are joined by a road that is the side track of both.
+fn connection(switch: Switch<'_>, partner: Switch<'_>, found: &mut Sink<'_>) {
+    let (Some(side), Some(main)) = (switch.side_track(), partner.main_track()) else {
+        return;
+    };
+    if switch.node() != partner.node() && side.id().is_some() && side.id() == main.id() {
+        let text = format!(
+            "the side track of {} leads to road `{}`, which is the main track of its partner {}; \
+             two switches must be joined by a side track of both",
+            named(switch.node()),
+            side.id().unwrap_or_default(),
+            named(partner.node())
+        );
+        found
+            .issue(Place::attribute_or_node(side.node(), "id"), text)
+            .at(main.node(), "the partner's main track");
+    }
+}

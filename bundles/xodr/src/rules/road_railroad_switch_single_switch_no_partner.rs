@@ -1,0 +1,59 @@
+use qcbus_opendrive::{Road, RoadMap, Switch};
+use qcbus_sdk::{Backport, Place, Rule, Sink};
+
+use crate::families::object_parts::named;
+use crate::families::switches::by_id;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_railroad_switch_single_switch_no_partner",
+    uids: &["asam.net:xodr:1.7.0:road.railroad.switch.single_switch_no_partner"],
+    versions: "1.7.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    page: include_str!("road_railroad_switch_single_switch_no_partner.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let all = by_id(map);
+    for switch in map.roads().iter().flat_map(Road::switches) {
+        let Some(node) = switch.node().child("partner") else {
+            continue;
+        };
+        // A partner that does not exist is a dangling reference.
+        let Some((_, partner)) = node.attr("id").and_then(|id| all.get(id)) else {
+            continue;
+        };
+        let side = |switch: Switch<'_>| {
+            switch
+                .side_track()
+                .and_then(|track| track.id().map(str::to_owned))
+        };
+        let (here, there) = (side(switch), side(*partner));
+        let (this, other) = (named(switch.node()), named(partner.node()));
+        let text = if switch.node() == partner.node() {
+            format!("{this} is its own partner; a switch that stands alone must have none")
+        } else if let (Some(here), Some(there)) = (&here, &there)
+            && here != there
+        {
+            format!(
+                "the side track of {this} is road `{here}`, that of its partner {other} is road `{there}`; \
+                 only switches that are joined by one side track may be partners"
+            )
+        } else if partner.partner_id() != switch.id() {
+            let has = partner
+                .partner_id()
+                .map_or("none".to_owned(), |id| format!("switch `{id}`"));
+            format!(
+                "the partner of {this} is {other}, but the partner of that is {has}; partners must name each other"
+            )
+        } else {
+            continue;
+        };
+        found
+            .issue(Place::attribute_or_node(node, "id"), text)
+            .at(partner.node(), "the other switch");
+    }
+}

@@ -1,0 +1,106 @@
+use qcbus_document::Node;
+use qcbus_opendrive::{RoadMap, SectionRef};
+use qcbus_sdk::{Level, Param, Place, Rule, Sink};
+
+use crate::families::ascending;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_records_within_extent",
+    uids: &["qcbus.dev:xodr:1.0.0:road.records_within_extent"],
+    level: Level::Warning,
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("road_records_within_extent.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const TOLERANCE: Param =
+    Param::number("tolerance", 1e-3, "m", "how far beyond the end is accepted");
+
+/// The records of a lane that start at `sOffset`.
+const LANE_RECORDS: [&str; 8] = [
+    "width", "border", "height", "roadMark", "material", "speed", "access", "rule",
+];
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        let Some(length) = road.length() else {
+            continue;
+        };
+        let whole = Extent {
+            start: "s",
+            length,
+            what: "the road",
+            from: 0.0,
+            road: road.id(),
+        };
+        let lists = [
+            (Some(road.node()), "type"),
+            (road.elevation_node(), "elevation"),
+            (road.lateral_node(), "superelevation"),
+            (road.lateral_node(), "shape"),
+        ];
+        let layers = road
+            .layers()
+            .iter()
+            .map(|layer| (Some(layer.node()), "laneOffset"));
+        for (parent, name) in lists.into_iter().chain(layers) {
+            whole.check(parent, name, found);
+        }
+        for lane in road.sections().flat_map(SectionRef::lanes) {
+            // A section without length has a rule of its own.
+            let length = lane.length().filter(|length| *length > 0.0);
+            let Some((length, from)) = length.zip(lane.at.s()) else {
+                continue;
+            };
+            let section = Extent {
+                start: "sOffset",
+                length,
+                what: "its lane section",
+                from,
+                road: road.id(),
+            };
+            for name in LANE_RECORDS {
+                section.check(Some(lane.node()), name, found);
+            }
+        }
+    }
+}
+
+/// What records lie in.
+struct Extent<'m> {
+    /// The attribute that says where a record starts.
+    start: &'static str,
+    /// In metres, counted like the records' starts.
+    length: f64,
+    what: &'static str,
+    /// Where it starts on the road, in metres.
+    from: f64,
+    road: &'m str,
+}
+
+impl Extent<'_> {
+    /// Reports the first record of this name that starts beyond the end.
+    fn check(&self, parent: Option<Node<'_>>, name: &'static str, found: &mut Sink<'_>) {
+        let limit = self.length + found.number(&TOLERANCE);
+        let (by, what, length) = (self.start, self.what, self.length);
+        let beyond = |node: Node<'_>| node.f64(self.start).is_ok_and(|start| start > limit);
+        let Some(node) = ascending::children(parent, name).find(|node| beyond(*node)) else {
+            return;
+        };
+        let Ok(start) = node.f64(self.start) else {
+            return;
+        };
+        let text = format!(
+            "this `{name}` starts at {by} = {start}, but {what} is {length} m long; it should start before the \
+             end, as it never applies otherwise"
+        );
+        found.issue(Place::attribute_or_node(node, by), text).road(
+            self.road,
+            self.from + start,
+            0.0,
+        );
+    }
+}

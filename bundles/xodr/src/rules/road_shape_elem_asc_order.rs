@@ -1,0 +1,60 @@
+use qcbus_document::Node;
+use qcbus_opendrive::{Road, RoadMap};
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::families::ascending::TOLERANCE;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_shape_elem_asc_order",
+    uids: &["asam.net:xodr:1.4.0:road.shape.elem_asc_order"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("road_shape_elem_asc_order.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        if let Some(lateral) = road.lateral_node() {
+            check(road, lateral, found);
+        }
+    }
+}
+
+fn check(road: &Road<'_>, lateral: Node<'_>, found: &mut Sink<'_>) {
+    let tolerance = found.number(&TOLERANCE);
+    let mut last: Option<(Node<'_>, f64, f64)> = None;
+    for shape in lateral.children_named("shape") {
+        let (Ok(s), Ok(t)) = (shape.f64("s"), shape.f64("t")) else {
+            continue;
+        };
+        let Some((before, last_s, last_t)) = last.replace((shape, s, t)) else {
+            continue;
+        };
+        let ahead = format!("the one listed before it has s = {last_s}, t = {last_t}");
+        if s < last_s - tolerance || (s <= last_s + tolerance && t < last_t - tolerance) {
+            let by = if s < last_s - tolerance { "s" } else { "t" };
+            let text = format!(
+                "this `shape` has s = {s}, t = {t}, but {ahead}; `shape` elements must be listed in \
+                 ascending order of `s`, those with the same `s` in ascending order of `t`"
+            );
+            found
+                .issue(Place::attribute_or_node(shape, by), text)
+                .road(road.id(), s, t)
+                .at(before, "the one listed before it");
+        } else if s <= last_s + tolerance && t <= last_t + tolerance {
+            let text = format!(
+                "this `shape` has s = {s}, t = {t} like the one listed before it, which therefore never \
+                 applies; each must have a place of its own"
+            );
+            found
+                .issue(Place::attribute_or_node(shape, "t"), text)
+                .level(Level::Warning)
+                .road(road.id(), s, t)
+                .at(before, "the one that never applies");
+        }
+    }
+}

@@ -1,0 +1,82 @@
+use qcbus_opendrive::geometry::Minimum;
+use qcbus_opendrive::{LaneRef, Road, RoadMap, Side};
+use qcbus_sdk::{Param, Place, Rule, Sink, Version};
+
+use crate::families::edges::border;
+use crate::families::on_road::OnRoad;
+use crate::model::Roads;
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    0.001,
+    "m",
+    "how much of the road's right edge a shape may leave out",
+);
+
+const STARTS_RIGHT: &str = "asam.net:xodr:1.9.0:road.use_cases.shape_elements_start_right";
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_shape_t_definition_coverage",
+    uids: &[
+        "asam.net:xodr:1.4.0:road.shape.t_definition_coverage",
+        "asam.net:xodr:1.9.0:road.use_cases.shape_elements_start_right",
+    ],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("road_shape_t_definition_coverage.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map
+        .roads()
+        .iter()
+        .filter(|road| !road.lateral().shape.is_empty())
+    {
+        if let Some(edge) = right_edge(road) {
+            check(road, edge, found);
+        }
+    }
+}
+
+/// The rightmost place of all lanes that follow the lateral profile.
+fn right_edge(road: &Road<'_>) -> Option<Minimum> {
+    let sections = road.permanent()?.sections(road);
+    let lowest = sections.flat_map(|section| {
+        let follows = |lane: &LaneRef<'_, '_>| lane.level() != Some(true);
+        let count = section.side(Side::Right).take_while(follows).count();
+        border(section, Side::Right, count)
+    });
+    let lowest = lowest.filter_map(|piece| piece.minimum());
+    lowest.min_by(|one, other| one.value.total_cmp(&other.value))
+}
+
+fn check(road: &Road<'_>, edge: Minimum, found: &mut Sink<'_>) {
+    for row in road.lateral().shape.rows() {
+        let Some(first) = row.profile.in_order().next() else {
+            continue;
+        };
+        let Some(begin) = first
+            .start()
+            .filter(|t| *t > edge.value + found.number(&TOLERANCE))
+        else {
+            continue;
+        };
+        let text = format!(
+            "the shapes at s = {} begin at t = {begin}, but the lanes of road `{}` reach to t = {:.3} on the right \
+             (at s = {:.2}); shapes must cover the whole width of the road",
+            row.s,
+            road.id(),
+            edge.value,
+            edge.at
+        );
+        let newer = found.version() >= Some(Version::new(1, 9));
+        let place = Place::attribute_or_node(first.node(), "t");
+        let finding = found.issue(place, text).on(road, row.s, edge.value);
+        if begin >= 0.0 && newer {
+            finding.uid(STARTS_RIGHT);
+        }
+    }
+}

@@ -1,0 +1,32 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::boards::carriers;
+use crate::families::object_parts::{Stands, named};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_signal_boards_multi_board_have_sub_boards",
+    uids: &["asam.net:xodr:1.8.0:road.signal.boards.multi_board_have_sub_boards"],
+    versions: "1.8.0..",
+    after: super::READABLE,
+    page: include_str!("road_signal_boards_multi_board_have_sub_boards.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for carrier in carriers(map).filter(|carrier| carrier.is_called("multiBoard")) {
+        let missing = match (carrier.fixed, carrier.variable) {
+            (Some(_), Some(_)) => continue,
+            (Some(_), None) => "no `vmsBoard`",
+            (None, Some(_)) => "no `staticBoard`",
+            (None, None) => "neither a `staticBoard` nor a `vmsBoard`",
+        };
+        let text = format!(
+            "{} is a `multiBoard`, but has {missing}; it must have at least one of each",
+            named(carrier.node)
+        );
+        found.issue(carrier.node, text).stands(map, carrier.node);
+    }
+}

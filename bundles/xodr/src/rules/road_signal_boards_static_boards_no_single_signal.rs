@@ -1,0 +1,45 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Level, Rule, Sink};
+
+use crate::families::boards::carriers;
+use crate::families::object_parts::Stands;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_signal_boards_static_boards_no_single_signal",
+    uids: &["asam.net:xodr:1.9.0:road.signal.boards.static_boards_no_single_signal"],
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "1.8.0" },
+    after: super::READABLE,
+    page: include_str!("road_signal_boards_static_boards_no_single_signal.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    // Where there is a display, a single sign is not alone.
+    for carrier in carriers(map).filter(|carrier| carrier.variable.is_none()) {
+        let boards: Vec<Node<'_>> = carrier.node.children_named("staticBoard").collect();
+        let signs: usize = boards
+            .iter()
+            .map(|board| board.children_named("sign").count())
+            .sum();
+        let Some(first) = boards.first() else {
+            continue;
+        };
+        let (level, text) = match signs {
+            0 => (Level::Warning, "there is no `sign` on the static board"),
+            1 => (
+                Level::Error,
+                "there is a single `sign` on the static board; it must be a `signal` of its own, \
+                 boards are for several",
+            ),
+            _ => continue,
+        };
+        found
+            .issue(*first, text)
+            .level(level)
+            .stands(map, carrier.node);
+    }
+}

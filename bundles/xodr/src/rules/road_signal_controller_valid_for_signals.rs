@@ -1,0 +1,49 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::families::ids::{Class, Kind};
+use crate::families::object_parts::named;
+use crate::model::Roads;
+use qcbus_opendrive::Control;
+use std::collections::HashSet;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_signal_controller_valid_for_signals",
+    uids: &["asam.net:xodr:1.7.0:road.signal.controller.valid_for_signals"],
+    versions: "1.7.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    page: include_str!("road_signal_controller_valid_for_signals.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let mut signals: Option<HashSet<&str>> = None;
+    for controller in map.controllers() {
+        let node = controller.node();
+        if controller.controls().next().is_none() {
+            let text = format!(
+                "{} has no `control`, but must control at least one signal",
+                named(node)
+            );
+            found.issue(node, text);
+            continue;
+        }
+        let known = signals.get_or_insert_with(|| {
+            let all = Kind::of(Class::Signal).nodes(&node.document());
+            all.into_iter()
+                .filter_map(|signal| signal.attr("id"))
+                .collect()
+        });
+        let names = |control: Control<'_>| control.signal_id().is_none_or(|id| known.contains(id));
+        if !controller.controls().any(names) {
+            let text = format!(
+                "none of the {} signals that {} controls exists; it must control at least one that does",
+                controller.controls().count(),
+                named(node)
+            );
+            found.issue(node, text);
+        }
+    }
+}

@@ -1,0 +1,41 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::families::gantries::gantry_of;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_signal_gantry_all_variable_boards_same_gantry",
+    uids: &["asam.net:xodr:1.9.0:road.signal.gantry.all_variable_boards_same_gantry"],
+    versions: "1.9.0..",
+    backport: Backport::Lower { since: "1.8.0" },
+    after: super::READABLE,
+    page: include_str!("road_signal_gantry_all_variable_boards_same_gantry.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for group in map.vms_groups() {
+        let boards = group.references().filter_map(|reference| {
+            let signal = map.signals_with_id(reference.signal_id()?).next()?;
+            Some((reference, gantry_of(map, &signal)?))
+        });
+        let boards: Vec<_> = boards.collect();
+        let Some((first, gantry)) = boards.first() else {
+            continue;
+        };
+        if let Some((odd, other)) = boards.iter().find(|(_, other)| other != gantry) {
+            let text = format!(
+                "signal `{}` of message sign group `{}` belongs to gantry `{other}`, but signal `{}` to gantry \
+                 `{gantry}`; all boards of a group must be on the same gantry",
+                odd.signal_id().unwrap_or_default(),
+                group.id().unwrap_or_default(),
+                first.signal_id().unwrap_or_default()
+            );
+            found
+                .issue(odd.node(), text)
+                .at(first.node(), "the first board of the group");
+        }
+    }
+}

@@ -1,0 +1,60 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Place, Rule, Sink};
+
+use crate::families::ids::{Class, Kind};
+use crate::families::object_parts::{Stands, below};
+use crate::model::Roads;
+use std::collections::HashMap;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_signal_reference_used_for_signals_only",
+    uids: &["asam.net:xodr:1.7.0:road.signal.reference.used_for_signals_only"],
+    versions: "1.7.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    page: include_str!("road_signal_reference_used_for_signals_only.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// What is taken for a signal by mistake. An id of these may well be that of a signal, too.
+const OTHERS: [Class; 4] = [
+    Class::Object,
+    Class::Tunnel,
+    Class::Bridge,
+    Class::Controller,
+];
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let Some(root) = map.root() else { return };
+    let references: Vec<Node<'_>> = below(map, "signalReference", "signals").collect();
+    if references.is_empty() {
+        return;
+    }
+    let ids = |class| {
+        let nodes = Kind::of(class).nodes(&root.document()).into_iter();
+        nodes
+            .filter_map(|node| Some((node.attr("id")?, node)))
+            .collect::<HashMap<_, _>>()
+    };
+    let signals = ids(Class::Signal);
+    let others = OTHERS.map(ids);
+    for reference in references {
+        let Some(id) = reference.attr("id").filter(|id| !signals.contains_key(id)) else {
+            continue;
+        };
+        // An id of nothing is a dangling reference.
+        let Some(target) = others.iter().find_map(|known| known.get(id)) else {
+            continue;
+        };
+        let text = format!(
+            "the signal reference names `{id}`, which is no signal, but an element `{}`; it must name a signal",
+            target.name()
+        );
+        found
+            .issue(Place::attribute_or_node(reference, "id"), text)
+            .stands(map, reference)
+            .at(*target, "what it names");
+    }
+}

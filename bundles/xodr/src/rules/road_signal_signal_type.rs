@@ -1,0 +1,38 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::families::object_parts::{Stands, below, is_blank, listed, named, owner};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_signal_signal_type",
+    uids: &["asam.net:xodr:1.7.0:road.signal.signal_type"],
+    versions: "1.7.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    page: include_str!("road_signal_signal_type.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let signs = below(map, "sign", "staticBoard");
+    for node in below(map, "signal", "signals").chain(signs) {
+        let missing: Vec<&str> = ["type", "subtype"]
+            .into_iter()
+            .filter(|name| is_blank(node, name))
+            .collect();
+        if missing.is_empty() {
+            continue;
+        }
+        let text = format!(
+            "{}: {} missing or empty; it must have a specific type and subtype (`-1` where there is none)",
+            named(node),
+            match missing.as_slice() {
+                [one] => format!("`{one}` is"),
+                both => format!("{} are", listed(both)),
+            }
+        );
+        found.issue(node, text).stands(map, owner(node));
+    }
+}

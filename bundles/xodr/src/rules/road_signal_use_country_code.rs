@@ -1,0 +1,63 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::families::object_parts::{Stands, below, is_blank, named, owner};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_signal_use_country_code",
+    uids: &["asam.net:xodr:1.7.0:road.signal.use_country_code"],
+    level: Level::Warning,
+    versions: "1.7.0..",
+    after: super::READABLE,
+    page: include_str!("road_signal_use_country_code.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        let signals: Vec<Node<'_>> = road.signals().map(|signal| signal.node()).collect();
+        let lacking: Vec<Node<'_>> = signals
+            .iter()
+            .copied()
+            .filter(|node| lacks(*node))
+            .collect();
+        if let (Some(list), true) = (road.signals_node(), lacking.len() > 1)
+            && lacking.len() == signals.len()
+        {
+            let text = format!(
+                "none of the {} signals of road `{}` has a `country`, but each must say whose rules its type refers to",
+                signals.len(),
+                road.id()
+            );
+            found.issue(list, text).at(lacking[0], "the first of them");
+            continue;
+        }
+        for node in lacking {
+            report(map, node, found);
+        }
+    }
+    for sign in below(map, "sign", "staticBoard").filter(|sign| lacks(*sign)) {
+        report(map, sign, found);
+    }
+}
+
+fn report<'a>(map: &RoadMap<'a>, node: Node<'a>, found: &mut Sink<'_>) {
+    let text = format!(
+        "{} of type `{}` has no `country`, but must say whose rules the type refers to (`OpenDRIVE` for the \
+         types of the standard's own catalog)",
+        named(node),
+        node.attr("type").unwrap_or_default()
+    );
+    found
+        .issue(Place::attribute_or_node(node, "country"), text)
+        .stands(map, owner(node));
+}
+
+/// What has no type refers to no rules.
+fn lacks(node: Node<'_>) -> bool {
+    let has_type = !is_blank(node, "type") && !matches!(node.attr("type"), Some("-1" | "none"));
+    has_type && is_blank(node, "country")
+}

@@ -1,0 +1,22 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::ascending::{TOLERANCE, VOID, along_road};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_road_type_elem_asc_order",
+    uids: &["asam.net:xodr:1.4.0:road.type.elem_asc_order"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("road_type_elem_asc_order.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for road in map.roads() {
+        along_road(road.id()).check(road.node().children_named("type"), VOID, found);
+    }
+}

@@ -1,0 +1,67 @@
+//! The result of validating the root against its schema, as a model: rules about it are skipped
+//! when no schema applies.
+
+use std::sync::Arc;
+
+use qcbus_schema::{BroughtContent, BroughtFile, Checked, Options, Outcome, Override};
+use qcbus_sdk::{Brought, Model, Param, Resource, ResourceFile, Skip, Subject};
+
+/// Marks rules about the validated document.
+pub(crate) struct Validated;
+
+impl Model for Validated {
+    type Of<'d> = Checked<'d>;
+
+    fn build<'d>(subject: &'d Subject<'d>) -> Result<Checked<'d>, Skip> {
+        let brought = subject.brought::<Overrides>();
+        let options = Options {
+            overrides: brought.map(|it| it.0.clone()).unwrap_or_default(),
+            ..Options::default()
+        };
+        match qcbus_schema::check(&subject.root(), subject.kind(), &options) {
+            Outcome::Checked(checked) => Ok(checked),
+            Outcome::Skipped(reason) => Err(Skip(reason.to_string())),
+        }
+    }
+}
+
+/// Where the user's schemas are.
+pub(crate) const SCHEMA_DIR: Param = Param::text(
+    "schemaDir",
+    "",
+    "directory of schemas (.xsd, .tbl) that are used instead of those that come with qcbus",
+);
+
+/// The user's schemas: read and compiled before anything is checked.
+pub(crate) static SCHEMAS: Resource = Resource {
+    param: SCHEMA_DIR,
+    endings: &["xsd", "tbl"],
+    make: compiled,
+};
+
+/// The schemas of the user, those for one version first.
+struct Overrides(Vec<Override>);
+
+fn compiled(files: &[ResourceFile]) -> Result<Brought, String> {
+    let read = |file: &ResourceFile| {
+        let image = (!file.ends_in("tbl")).then(|| file.image());
+        let path = file.path().display().to_string();
+        (path, file.below(), file.digest().to_string(), image)
+    };
+    let read: Vec<_> = files.iter().map(read).collect();
+    let brought: Vec<BroughtFile<'_>> = read
+        .iter()
+        .zip(files)
+        .map(|((path, below, sha256, image), file)| BroughtFile {
+            path,
+            below,
+            sha256,
+            content: match image {
+                Some(image) => BroughtContent::Xsd(image),
+                None => BroughtContent::Tables(file.bytes()),
+            },
+        })
+        .collect();
+    let overrides = qcbus_schema::brought(&brought).map_err(|error| error.to_string())?;
+    Ok(Arc::new(Overrides(overrides)))
+}

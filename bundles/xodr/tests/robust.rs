@@ -1,0 +1,210 @@
+//! No file, however broken, makes a rule panic: truncations and seeded random mutations of every
+//! example of the pages, and of real maps where they are at hand. `QCBUS_FUZZ_ROUNDS` sets the
+//! number of mutations (10,000), `QCBUS_FUZZ_SEED` another beginning.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "in a test both are findings"
+)]
+
+use std::path::{Path, PathBuf};
+
+use qcbus_sdk::pages::evidence;
+use qcbus_sdk::{Listener, Loaded, Outcome, Plan, check};
+use qcbus_xodr::BUNDLE;
+
+/// Notes checkers that did not come to their end: a caught panic is one.
+#[derive(Default)]
+struct Broken(Vec<(usize, String)>);
+
+impl Listener for Broken {
+    fn ended(&mut self, checker: usize, _: Vec<qcbus_sdk::Issue>, outcome: Outcome) {
+        if outcome.status == qcbus_sdk::Status::Error {
+            self.0.push((checker, outcome.reason));
+        }
+    }
+}
+
+fn assert_unbroken(plan: &Plan, bytes: &[u8], what: &str) {
+    let loaded = Loaded::from_bytes(Path::new("fuzz.xodr"), bytes.to_vec()).unwrap();
+    let Ok(subject) = loaded.subject(&BUNDLE) else {
+        return;
+    };
+    let mut broken = Broken::default();
+    check(plan, &subject, &mut broken);
+    if let Some((checker, reason)) = broken.0.first() {
+        panic!(
+            "{}: {reason}\non {what}:\n{}",
+            plan.checkers()[*checker].id,
+            String::from_utf8_lossy(bytes)
+        );
+    }
+}
+
+fn truncations(plan: &Plan, bytes: &[u8], places: usize, what: &str) {
+    for place in 1..=places {
+        let end = bytes.len() * place / (places + 1);
+        assert_unbroken(plan, &bytes[..end], what);
+    }
+}
+
+/// Numbers at which arithmetic goes wrong, and things that are no numbers.
+const HOSTILE: [&str; 16] = [
+    "0",
+    "-0",
+    "-1",
+    "1e308",
+    "-1e308",
+    "1e-320",
+    "NaN",
+    "INF",
+    "-INF",
+    "",
+    " ",
+    "x",
+    "99999999999999999999",
+    "-9223372036854775808",
+    "0.0000001",
+    "1e5",
+];
+
+/// A small generator, so that a seed gives the same mutations for ever.
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, end: usize) -> usize {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        usize::try_from(self.0 >> 11).unwrap() % end.max(1)
+    }
+}
+
+/// One random edit of the kinds that authoring tools and editors produce.
+fn mutate(text: &mut Vec<u8>, dice: &mut Dice) {
+    let values: Vec<(usize, usize)> = attribute_values(text);
+    let at = dice.below(text.len());
+    match dice.below(6) {
+        0 | 1 if !values.is_empty() => {
+            let (start, end) = values[dice.below(values.len())];
+            let hostile = HOSTILE[dice.below(HOSTILE.len())];
+            text.splice(start..end, hostile.bytes());
+        }
+        2 if values.len() > 1 => {
+            let (from, to) = (
+                values[dice.below(values.len())],
+                values[dice.below(values.len())],
+            );
+            let value = text[from.0..from.1].to_vec();
+            text.splice(to.0..to.1, value);
+        }
+        3 | 4 => {
+            let elements = empty_elements(text);
+            if elements.is_empty() {
+                return;
+            }
+            let (start, end) = elements[dice.below(elements.len())];
+            let element = text[start..end].to_vec();
+            if dice.below(2) == 0 {
+                text.drain(start..end);
+            } else {
+                let (place, _) = elements[dice.below(elements.len())];
+                text.splice(place..place, element);
+            }
+        }
+        _ => text[at] = b" <>\"=/a9&-"[dice.below(10)],
+    }
+}
+
+fn attribute_values(text: &[u8]) -> Vec<(usize, usize)> {
+    let mut values = Vec::new();
+    let mut at = 0;
+    while let Some(start) = text[at..].windows(2).position(|pair| pair == b"=\"") {
+        let start = at + start + 2;
+        let Some(len) = text[start..].iter().position(|byte| *byte == b'"') else {
+            break;
+        };
+        values.push((start, start + len));
+        at = start + len + 1;
+    }
+    values
+}
+
+fn empty_elements(text: &[u8]) -> Vec<(usize, usize)> {
+    let mut elements = Vec::new();
+    let mut open = None;
+    for (at, byte) in text.iter().enumerate() {
+        match byte {
+            b'<' => open = Some(at),
+            b'>' if at > 0 && text[at - 1] == b'/' => {
+                elements.extend(open.take().map(|start| (start, at + 1)));
+            }
+            _ => {}
+        }
+    }
+    elements
+}
+
+fn setting(name: &str, default: usize) -> usize {
+    std::env::var(name)
+        .ok()
+        .and_then(|text| text.parse().ok())
+        .unwrap_or(default)
+}
+
+#[test]
+fn truncated_examples_break_no_rule() {
+    let plan = Plan::by_default(&BUNDLE);
+    for shown in evidence::documents(&BUNDLE) {
+        truncations(&plan, shown.text.as_bytes(), 10, shown.rule);
+    }
+}
+
+#[test]
+fn mutated_examples_break_no_rule() {
+    let plan = Plan::by_default(&BUNDLE);
+    let documents = evidence::documents(&BUNDLE);
+    let rounds = setting("QCBUS_FUZZ_ROUNDS", 10_000);
+    let mut dice = Dice(setting("QCBUS_FUZZ_SEED", 0x9E37_79B9) as u64 | 1);
+    for round in 0..rounds {
+        let shown = &documents[round % documents.len()];
+        let mut text = shown.text.clone().into_bytes();
+        for _ in 0..=dice.below(3) {
+            mutate(&mut text, &mut dice);
+        }
+        assert_unbroken(&plan, &text, shown.rule);
+    }
+}
+
+fn xodr_files(directory: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(directory).into_iter().flatten().flatten() {
+        let path = entry.path();
+        if path.is_dir() {
+            xodr_files(&path, found);
+        } else if path.extension().is_some_and(|it| it == "xodr") {
+            found.push(path);
+        }
+    }
+}
+
+#[test]
+fn real_maps_whole_and_truncated_break_no_rule() {
+    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/cases");
+    let mut files = Vec::new();
+    xodr_files(&cases, &mut files);
+    if files.is_empty() {
+        println!("skipped: {} is not there", cases.display());
+        return;
+    }
+    files.sort();
+    let plan = Plan::by_default(&BUNDLE);
+    // A hundred places take an hour without optimisation: QCBUS_FUZZ_PLACES=100 in a release build.
+    let places = setting("QCBUS_FUZZ_PLACES", 2);
+    for file in files {
+        let bytes = std::fs::read(&file).unwrap();
+        let what = file.display().to_string();
+        assert_unbroken(&plan, &bytes, &what);
+        truncations(&plan, &bytes, places, &what);
+    }
+}

@@ -1,0 +1,3 @@
+//! Algorithms that several rules share.
+
+pub(crate) mod names;

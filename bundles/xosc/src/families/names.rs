@@ -1,0 +1,42 @@
+//! Names within one element.
+
+use std::collections::HashMap;
+
+use qcbus_document::{Document, Node};
+use qcbus_sdk::{Place, Sink};
+
+/// Demands that no two children of one element have the same `name`, whatever they are.
+///
+/// Properties are left out: their names are keys of values, and nobody refers to them.
+pub(crate) fn unique_among_siblings(document: &Document<'_>, found: &mut Sink<'_>) {
+    let Some(root) = document.root() else { return };
+    for parent in std::iter::once(root).chain(root.descendants()) {
+        let named = || {
+            parent
+                .children()
+                .filter(|child| !child.is("Property") && child.attribute("name").is_some())
+        };
+        if named().nth(1).is_none() {
+            continue;
+        }
+        let mut first: HashMap<&str, Node<'_>> = HashMap::new();
+        for child in named() {
+            let Some(name) = child.attr("name") else {
+                continue;
+            };
+            if let Some(known) = first.get(name) {
+                let text = format!(
+                    "the name `{name}` is already taken by a child `{}` of this `{}`; names on one \
+                     level must differ",
+                    known.name(),
+                    parent.name()
+                );
+                found
+                    .issue(child, text)
+                    .at(Place::Node(*known), "the first element of this name");
+            } else {
+                first.insert(name, child);
+            }
+        }
+    }
+}

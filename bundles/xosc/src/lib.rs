@@ -1,0 +1,33 @@
+//! The checker bundle for ASAM OpenSCENARIO XML.
+//!
+//! One rule is one file in `rules/` with its page beside it; `rules/mod.rs` is the list; an
+//! algorithm that several rules share is in `families/`. `docs/writing-a-rule.md` shows how to add
+//! a rule.
+
+mod examples;
+mod families;
+mod rules;
+mod schema;
+
+use qcbus_document::FileKind;
+use qcbus_sdk::{Bundle, Version, basic};
+
+/// The bundle.
+pub static BUNDLE: Bundle = Bundle {
+    name: "xoscBundle",
+    alias: "xosc",
+    version: env!("CARGO_PKG_VERSION"),
+    description: "ASAM OpenSCENARIO XML: scenarios, catalogs and parameter distributions",
+    standard: "OpenSCENARIO",
+    kinds: &[FileKind::Xosc, FileKind::Mosc],
+    versions: &[
+        Version::new(1, 0),
+        Version::new(1, 1),
+        Version::new(1, 2),
+        Version::new(1, 3),
+        Version::new(1, 4),
+    ],
+    version_of: |document| basic::version_of(document, "FileHeader"),
+    rules: rules::RULES,
+    templates: examples::TEMPLATES,
+};

@@ -1,0 +1,18 @@
+use qcbus_document::Document;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::names;
+
+pub static RULE: Rule<Document> = Rule {
+    id: "check_asam_xosc_naming_unique_element_names_on_same_level",
+    uids: &["asam.net:xosc:1.0.0:naming.unique_element_names_on_same_level"],
+    versions: "1.0.0..1.2.0",
+    after: super::READABLE,
+    page: include_str!("naming_unique_element_names_on_same_level.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(document: &Document<'_>, found: &mut Sink<'_>) {
+    names::unique_among_siblings(document, found);
+}

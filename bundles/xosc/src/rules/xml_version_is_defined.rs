@@ -1,0 +1,15 @@
+use qcbus_document::Document;
+use qcbus_sdk::{Rule, Sink, basic};
+
+pub static RULE: Rule<Document> = Rule {
+    id: "check_asam_xosc_xml_version_is_defined",
+    uids: &["asam.net:xosc:1.0.0:xml.version_is_defined"],
+    after: &["check_asam_xosc_xml_fileheader_is_present"],
+    page: include_str!("xml_version_is_defined.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(document: &Document<'_>, found: &mut Sink<'_>) {
+    basic::version_is_defined(document, "FileHeader", found);
+}

@@ -1,0 +1,318 @@
+//! Writes an image into a buffer that somebody else owns, in one pass over the events of a parser.
+//!
+//! The caller counts an upper bound first ([`Capacities`]), loans that many bytes and feeds the
+//! events. Each section grows at the place that it would have in an image of full capacity;
+//! [`ImageBuilder::finish`] then moves the sections together, each at most once and only
+//! downwards, and the text not at all.
+
+mod capacities;
+mod finish;
+mod grow;
+mod names;
+
+use thiserror::Error;
+
+use crate::fault::FaultCode;
+use crate::layout::{
+    AttributeRecord, ELEMENT, FaultRecord, NodeRecord, RESOLVED_TEXT, SECTIONS, Section,
+    SourceRecord, TEXT, U16, U32,
+};
+pub use capacities::Capacities;
+use names::Names;
+
+/// Why an image could not be built.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum BuildError {
+    /// More of something than its capacity.
+    #[error("build the document image: no room for more {what} than {capacity}")]
+    NoRoom {
+        /// What there is too much of.
+        what: &'static str,
+        /// How many (or how many bytes) there is room for.
+        capacity: usize,
+    },
+    /// The buffer is smaller than [`Capacities::image_len`].
+    #[error("build the document image: the buffer has {found} bytes, {needed} are needed")]
+    SmallBuffer {
+        /// Its length.
+        found: usize,
+        /// What the capacities need.
+        needed: usize,
+    },
+    /// More than 4 GiB of text or nodes.
+    #[error("build the document image: {what} do not fit into 32 bits")]
+    TooLarge {
+        /// What there is too much of.
+        what: &'static str,
+    },
+    /// More distinct names than [`Capacities::MAX_NAMES`].
+    #[error(
+        "build the document image: more than {} distinct names",
+        Capacities::MAX_NAMES
+    )]
+    TooManyNames,
+    /// A range that is not within the text so far.
+    #[error("build the document image: {offset} + {len} lies outside of the text")]
+    OutsideText {
+        /// Its offset.
+        offset: u32,
+        /// Its length.
+        len: u32,
+    },
+    /// An event that cannot come here, such as an end without a start or a second root.
+    #[error("build the document image: {event} cannot come here")]
+    Misplaced {
+        /// The event.
+        event: &'static str,
+    },
+}
+
+/// Builds an image; see the methods for the events it takes.
+pub struct ImageBuilder<'out> {
+    out: &'out mut [u8],
+    /// Where each section of a full image lies, and how long it may become.
+    places: [usize; SECTIONS],
+    limits: [usize; SECTIONS],
+    /// Bytes used of each section.
+    used: [usize; SECTIONS],
+    names: Names,
+    /// Elements not yet closed, outermost first.
+    open: Vec<u32>,
+    /// The element that attributes belong to right now.
+    taking_attributes: bool,
+}
+
+impl<'out> ImageBuilder<'out> {
+    /// Starts an image in `out`, whose present content does not matter.
+    ///
+    /// # Errors
+    /// When `out` is shorter than [`Capacities::image_len`].
+    pub fn new(out: &'out mut [u8], capacities: &Capacities) -> Result<Self, BuildError> {
+        let needed = capacities.image_len();
+        let found = out.len();
+        let out = out
+            .get_mut(..needed)
+            .ok_or(BuildError::SmallBuffer { found, needed })?;
+        let (places, limits) = capacities.places();
+        Ok(ImageBuilder {
+            out,
+            places,
+            limits,
+            used: [0; SECTIONS],
+            names: Names::new(capacities.names),
+            open: Vec::new(),
+            taking_attributes: false,
+        })
+    }
+
+    /// Appends a file's whole text and returns the offset of its first byte. The first file is the
+    /// one that the document is named after; the text of an include comes before its first node.
+    ///
+    /// # Errors
+    /// When the capacity of text, sources or heap is exceeded.
+    pub fn source(&mut self, path: &str, text: &str) -> Result<u32, BuildError> {
+        // So that "just past the end" of a file is no place of the next one.
+        let gap: &[u8] = if self.used[Section::Sources as usize] > 0 {
+            b"\n"
+        } else {
+            b""
+        };
+        // All or nothing: half a source would be text that belongs to no file.
+        self.room(Section::Text, gap.len() + text.len())?;
+        self.room(Section::Heap, path.len())?;
+        self.room(Section::Sources, size_of::<SourceRecord>())?;
+        length(path, "a path")?;
+        narrow(
+            self.used[Section::Text as usize] + gap.len() + text.len(),
+            "bytes of text",
+        )?;
+        self.append(Section::Text, gap)?;
+        let start = self.append(Section::Text, text.as_bytes())?;
+        let path_offset = self.append(Section::Heap, path.as_bytes())?;
+        let record = SourceRecord {
+            path_offset: U32::new(path_offset),
+            path_len: U32::new(length(path, "a path")?),
+            start: U32::new(start),
+            len: U32::new(length(text, "bytes of text")?),
+        };
+        self.append(Section::Sources, bytemuck::bytes_of(&record))?;
+        Ok(start)
+    }
+
+    /// An element starts; `name` as written with its prefix, `offset` of its `<`.
+    ///
+    /// # Errors
+    /// When a capacity is exceeded, or the root element has been closed already.
+    pub fn open_element(&mut self, name: &str, offset: u32) -> Result<(), BuildError> {
+        if self.open.is_empty() && self.used[Section::Nodes as usize] > 0 {
+            return Err(BuildError::Misplaced {
+                event: "a second root element",
+            });
+        }
+        let local = local_name(name);
+        let written_at = offset
+            .saturating_add(1)
+            .saturating_add(length(name, "a name")? - length(local, "a name")?);
+        let id = self.name(local, written_at)?;
+        let index = self.push_node(offset, offset, id, ELEMENT)?;
+        self.names.count_element(id);
+        self.open.push(index);
+        self.taking_attributes = true;
+        Ok(())
+    }
+
+    /// An attribute of the element just opened; `name` as written. `value` is what the parser
+    /// resolved, or `None` when it is literally the `value_len` bytes at `value_offset`.
+    ///
+    /// # Errors
+    /// When a capacity is exceeded, the range is outside of the text, or a child came already.
+    pub fn attribute(
+        &mut self,
+        name: &str,
+        name_offset: u32,
+        value_offset: u32,
+        value_len: u32,
+        value: Option<&str>,
+    ) -> Result<(), BuildError> {
+        if !self.taking_attributes {
+            return Err(BuildError::Misplaced {
+                event: "an attribute",
+            });
+        }
+        self.check_range(name_offset, 0)?;
+        self.check_range(value_offset, value_len)?;
+        let id = self.name(name, name_offset)?;
+        let delta = value_offset
+            .checked_sub(name_offset)
+            .and_then(|delta| u16::try_from(delta).ok());
+        let (delta, len) = match (value, delta) {
+            (None, Some(delta)) if delta > 0 => (delta, value_len),
+            (value, _) => (0, self.push_resolved(value_offset, value_len, value)?),
+        };
+        let record = AttributeRecord {
+            offset: U32::new(name_offset),
+            name: U16::new(id),
+            value_delta: U16::new(delta),
+            value_len: U32::new(len),
+        };
+        self.append(Section::Attributes, bytemuck::bytes_of(&record))
+            .map(drop)
+    }
+
+    /// Character data from `start` to `stop`; `value` is what the parser resolved, or `None` when
+    /// it is literally those bytes. White space alone is left out.
+    ///
+    /// # Errors
+    /// When a capacity is exceeded, the range is outside of the text, or no element is open.
+    pub fn text(&mut self, start: u32, stop: u32, value: Option<&str>) -> Result<(), BuildError> {
+        let len = stop.checked_sub(start).ok_or(BuildError::OutsideText {
+            offset: start,
+            len: 0,
+        })?;
+        self.check_range(start, len)?;
+        let blank = |text: &[u8]| {
+            text.iter()
+                .all(|byte| matches!(byte, b' ' | b'\t' | b'\n' | b'\r'))
+        };
+        let literal = self.text_bytes(start, len);
+        // `&#32;` is white space that somebody wanted.
+        if blank(literal) {
+            return Ok(());
+        }
+        self.character_data(start, len, value)
+    }
+
+    /// The content of a CDATA section, which lies from `start` to `stop`; `value` as for
+    /// [`text`](ImageBuilder::text). White space is kept.
+    ///
+    /// # Errors
+    /// As for [`text`](ImageBuilder::text).
+    pub fn cdata(&mut self, start: u32, stop: u32, value: Option<&str>) -> Result<(), BuildError> {
+        let len = stop.checked_sub(start).ok_or(BuildError::OutsideText {
+            offset: start,
+            len: 0,
+        })?;
+        self.check_range(start, len)?;
+        self.character_data(start, len, value)
+    }
+
+    fn character_data(
+        &mut self,
+        start: u32,
+        len: u32,
+        value: Option<&str>,
+    ) -> Result<(), BuildError> {
+        if self.open.is_empty() {
+            return Err(BuildError::Misplaced {
+                event: "character data",
+            });
+        }
+        let (stop, kind) = match value {
+            None => (start + len, TEXT),
+            Some(value) => (self.push_resolved(start, len, Some(value))?, RESOLVED_TEXT),
+        };
+        self.push_node(start, stop, 0, kind)?;
+        self.taking_attributes = false;
+        Ok(())
+    }
+
+    /// The innermost open element ends; `end` is one past the `>` that ends it.
+    ///
+    /// # Errors
+    /// When no element is open, or `end` lies outside of the text.
+    pub fn close_element(&mut self, end: u32) -> Result<(), BuildError> {
+        self.check_range(end, 0)?;
+        let index = self.open.pop().ok_or(BuildError::Misplaced {
+            event: "the end of an element",
+        })?;
+        self.taking_attributes = false;
+        let behind = self.nodes();
+        let node: &mut NodeRecord = self.record_mut(Section::Nodes, index)?;
+        node.stop = U32::new(end);
+        node.end = U32::new(behind);
+        Ok(())
+    }
+
+    /// Something is wrong with the file at `offset` of the text (beyond the end means the end).
+    ///
+    /// # Errors
+    /// When the capacity of faults or heap is exceeded.
+    pub fn fault(&mut self, code: FaultCode, offset: u32, text: &str) -> Result<(), BuildError> {
+        self.room(Section::Faults, size_of::<FaultRecord>())?;
+        let text_offset = self.append(Section::Heap, text.as_bytes())?;
+        let record = FaultRecord {
+            code: U32::new(code.number()),
+            offset: U32::new(offset.min(self.text_len())),
+            text_offset: U32::new(text_offset),
+            text_len: U32::new(length(text, "a fault's text")?),
+        };
+        self.append(Section::Faults, bytemuck::bytes_of(&record))
+            .map(drop)
+    }
+
+    /// How many elements are open.
+    pub fn depth(&self) -> usize {
+        self.open.len()
+    }
+
+    /// Whether there has been a root element already.
+    pub fn has_root(&self) -> bool {
+        self.used[Section::Nodes as usize] > 0
+    }
+}
+
+/// What follows the first colon of a name that has a prefix.
+pub(crate) fn local_name(name: &str) -> &str {
+    match name.split_once(':') {
+        Some((prefix, local)) if !prefix.is_empty() && !local.is_empty() => local,
+        _ => name,
+    }
+}
+
+fn length(text: &str, what: &'static str) -> Result<u32, BuildError> {
+    narrow(text.len(), what)
+}
+
+fn narrow(number: usize, what: &'static str) -> Result<u32, BuildError> {
+    u32::try_from(number).map_err(|_| BuildError::TooLarge { what })
+}

@@ -1,0 +1,329 @@
+//! The view over a finished image.
+
+use bytemuck::Pod;
+use thiserror::Error;
+
+use crate::fault::{Fault, FaultCode};
+use crate::layout::{
+    ALIGNMENT, FaultRecord, Header, HeapRecord, MAGIC, NAME_IN_HEAP, NameRecord, NodeRecord,
+    Section, U16, U32, VERSION,
+};
+use crate::node::Node;
+
+/// A parsed file, read in place.
+///
+/// Two words to copy; hand it around by value.
+#[derive(Clone, Copy)]
+pub struct Document<'a> {
+    header: &'a Header,
+    bytes: &'a [u8],
+}
+
+/// Why bytes are no document image.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum ImageError {
+    /// Fewer bytes than the image says it has, or than a header has.
+    #[error("read the document image: it ends after {found} of {needed} bytes")]
+    Truncated {
+        /// Bytes at hand.
+        found: u64,
+        /// Bytes needed.
+        needed: u64,
+    },
+    /// The magic number is missing.
+    #[error("read the document image: these bytes are something else")]
+    NotAnImage,
+    /// Written by another version of qcbus.
+    #[error(
+        "read the document image: its layout has version {found}, this program reads version {expected}"
+    )]
+    Version {
+        /// Version in the header.
+        found: u32,
+        /// Version of this program.
+        expected: u32,
+    },
+    /// A section lies outside of the image, is misaligned, or is no whole number of records.
+    #[error("read the document image: the section of {section} is out of place")]
+    Section {
+        /// Which one.
+        section: &'static str,
+    },
+    /// A record contradicts another one.
+    #[error("trust the document image: {what} (record {index} of {section})")]
+    Contradiction {
+        /// The section of the record.
+        section: &'static str,
+        /// Its index.
+        index: u64,
+        /// What is wrong.
+        what: &'static str,
+    },
+}
+
+impl<'a> Document<'a> {
+    /// Reads the header and checks that every section lies within `bytes`; O(1). The slice may be
+    /// longer than the image and may start at any address.
+    ///
+    /// # Errors
+    /// When the bytes are no image of this version, or end before the image does.
+    pub fn open(bytes: &'a [u8]) -> Result<Document<'a>, ImageError> {
+        let truncated = |needed: u64| ImageError::Truncated {
+            found: bytes.len() as u64,
+            needed,
+        };
+        let head = bytes
+            .get(..size_of::<Header>())
+            .ok_or(truncated(size_of::<Header>() as u64))?;
+        let header: &Header = bytemuck::try_from_bytes(head).map_err(|_| ImageError::NotAnImage)?;
+        if header.magic != MAGIC {
+            return Err(ImageError::NotAnImage);
+        }
+        if header.version.get() != VERSION {
+            return Err(ImageError::Version {
+                found: header.version.get(),
+                expected: VERSION,
+            });
+        }
+        let total = header.total.get();
+        let image = usize::try_from(total)
+            .ok()
+            .and_then(|total| bytes.get(..total));
+        let document = Document {
+            header,
+            bytes: image.ok_or(truncated(total))?,
+        };
+        match Section::ALL
+            .iter()
+            .find(|&&(section, record)| !document.is_in_place(section, record))
+        {
+            Some((section, _)) => Err(ImageError::Section {
+                section: section.name(),
+            }),
+            None => Ok(document),
+        }
+    }
+
+    fn is_in_place(&self, section: Section, record: usize) -> bool {
+        let extent = self.header.extents[section as usize];
+        let (offset, len) = (extent.offset.get(), extent.len.get());
+        let behind_header = offset >= size_of::<Header>() as u64;
+        let within = offset
+            .checked_add(len)
+            .is_some_and(|end| end <= self.bytes.len() as u64);
+        let whole = len % record as u64 == 0 && len / record as u64 <= u64::from(u32::MAX);
+        behind_header && within && whole && offset % ALIGNMENT as u64 == 0
+    }
+
+    /// The root element; `None` when the file has none.
+    pub fn root(&self) -> Option<Node<'a>> {
+        self.node(0).filter(Node::is_element)
+    }
+
+    /// The node at `index` in document order, which may be character data.
+    pub fn node(&self, index: u32) -> Option<Node<'a>> {
+        (index < self.len()).then(|| Node::new(*self, index))
+    }
+
+    /// How many nodes there are: elements and runs of character data.
+    #[expect(
+        clippy::len_without_is_empty,
+        reason = "a document without nodes is asked for its root"
+    )]
+    pub fn len(&self) -> u32 {
+        let bytes = self.header.extents[Section::Nodes as usize].len.get();
+        u32::try_from(bytes / size_of::<NodeRecord>() as u64).unwrap_or(0)
+    }
+
+    /// The distinct names of the document in the order of their numbers: local names of elements,
+    /// names as written of attributes.
+    pub fn names(&self) -> impl Iterator<Item = &'a str> + use<'a> {
+        let document = *self;
+        let records: &'a [NameRecord] = document.records(Section::Names);
+        records
+            .iter()
+            .map(move |record| document.name_of(record).unwrap_or(""))
+    }
+
+    /// The elements with this local name, in document order; costs nothing per other element.
+    pub fn elements(&self, name: &str) -> Elements<'a> {
+        let postings = self.name_id(name).map_or(&[][..], |id| self.postings(id));
+        Elements {
+            document: *self,
+            postings: postings.iter(),
+        }
+    }
+
+    /// SHA-256 of the source bytes on disk, as ingest computed it.
+    pub fn content_hash(&self) -> [u8; 32] {
+        self.header.content_hash
+    }
+
+    /// What ingest found wrong, in the order in which it found it.
+    pub fn faults(&self) -> impl Iterator<Item = Fault<'a>> + use<'a> {
+        let document = *self;
+        let records: &'a [FaultRecord] = self.records(Section::Faults);
+        records.iter().map(move |record| Fault {
+            code: FaultCode::of_record(record).unwrap_or(FaultCode::Syntax),
+            offset: record.offset.get(),
+            text: document
+                .heap_at(record.text_offset.get(), record.text_len.get())
+                .unwrap_or(""),
+        })
+    }
+
+    /// Whether the tree is the whole file: no fault [makes it partial](FaultCode::makes_partial).
+    pub fn is_well_formed(&self) -> bool {
+        !self.faults().any(|fault| fault.code.makes_partial())
+    }
+
+    /// Bytes of the image, its header included.
+    pub fn size(&self) -> usize {
+        self.bytes.len()
+    }
+
+    /// Bytes of text of all sources together.
+    pub fn text_len(&self) -> u32 {
+        u32::try_from(self.section(Section::Text).len()).unwrap_or(u32::MAX)
+    }
+}
+
+/// Reading records; nothing here panics, whatever the bytes are.
+impl<'a> Document<'a> {
+    #[inline]
+    pub(crate) fn section(&self, section: Section) -> &'a [u8] {
+        let extent = &self.header.extents[section as usize];
+        let (offset, len) = (extent.offset.get() as usize, extent.len.get() as usize);
+        self.bytes
+            .get(offset..)
+            .and_then(|rest| rest.get(..len))
+            .unwrap_or(&[])
+    }
+
+    pub(crate) fn records<T: Pod>(&self, section: Section) -> &'a [T] {
+        bytemuck::try_cast_slice(self.section(section)).unwrap_or(&[])
+    }
+
+    #[inline]
+    pub(crate) fn record<T: Pod>(&self, section: Section, index: usize) -> Option<&'a T> {
+        let at = index.checked_mul(size_of::<T>())?;
+        let bytes = self.section(section).get(at..)?.get(..size_of::<T>())?;
+        bytemuck::try_from_bytes(bytes).ok()
+    }
+
+    #[inline]
+    pub(crate) fn node_record(&self, index: u32) -> Option<&'a NodeRecord> {
+        self.record(Section::Nodes, index as usize)
+    }
+
+    pub(crate) fn text_at(&self, offset: u32, len: u32) -> Option<&'a str> {
+        str_at(self.section(Section::Text), offset, len)
+    }
+
+    pub(crate) fn heap_at(&self, offset: u32, len: u32) -> Option<&'a str> {
+        str_at(self.section(Section::Heap), offset, len)
+    }
+
+    /// A resolved value, and where the text has it unresolved (offset, bytes).
+    pub(crate) fn heap_value(&self, place: u32) -> Option<(&'a str, u32, u32)> {
+        let rest = self.section(Section::Heap).get(place as usize..)?;
+        let (head, rest) = rest.split_at_checked(size_of::<HeapRecord>())?;
+        let record: &HeapRecord = bytemuck::try_from_bytes(head).ok()?;
+        let value = str_at(rest, 0, record.len.get())?;
+        Some((value, record.offset.get(), record.raw_len.get()))
+    }
+
+    #[inline]
+    pub(crate) fn name(&self, id: u16) -> &'a str {
+        self.record(Section::Names, usize::from(id))
+            .and_then(|record| self.name_of(record))
+            .unwrap_or("")
+    }
+
+    pub(crate) fn name_of(&self, record: &NameRecord) -> Option<&'a str> {
+        let (offset, len) = (record.offset.get(), record.len.get());
+        if len & NAME_IN_HEAP == 0 {
+            self.text_at(offset, len)
+        } else {
+            self.heap_at(offset, len & !NAME_IN_HEAP)
+        }
+    }
+
+    /// The bytes of a name, without the price of looking whether they are UTF-8: for comparing.
+    #[inline]
+    pub(crate) fn name_bytes(&self, id: u16) -> &'a [u8] {
+        let Some(record) = self.record::<NameRecord>(Section::Names, usize::from(id)) else {
+            return &[];
+        };
+        let (offset, len) = (record.offset.get(), record.len.get());
+        let section = if len & NAME_IN_HEAP == 0 {
+            Section::Text
+        } else {
+            Section::Heap
+        };
+        let rest = self.section(section).get(offset as usize..);
+        rest.and_then(|rest| rest.get(..(len & !NAME_IN_HEAP) as usize))
+            .unwrap_or(&[])
+    }
+
+    /// The id of a name by binary search over the sorted ids.
+    pub(crate) fn name_id(&self, name: &str) -> Option<u16> {
+        let order: &[U16] = self.records(Section::NameOrder);
+        let found = order
+            .binary_search_by(|id| self.name(id.get()).cmp(name))
+            .ok()?;
+        Some(order[found].get())
+    }
+
+    /// The elements of a name, as node indices in document order.
+    pub(crate) fn postings(&self, id: u16) -> &'a [U32] {
+        let postings: &'a [U32] = self.records(Section::Postings);
+        self.record::<NameRecord>(Section::Names, usize::from(id))
+            .and_then(|name| {
+                let rest = postings.get(name.first_posting.get() as usize..)?;
+                rest.get(..name.postings.get() as usize)
+            })
+            .unwrap_or(&[])
+    }
+
+    pub(crate) fn address(&self) -> *const u8 {
+        self.bytes.as_ptr()
+    }
+
+    pub(crate) fn header(&self) -> &'a Header {
+        self.header
+    }
+}
+
+impl std::fmt::Debug for Document<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Document({:?}, {} nodes)", self.path(), self.len())
+    }
+}
+
+fn str_at(bytes: &[u8], offset: u32, len: u32) -> Option<&str> {
+    let bytes = bytes.get(offset as usize..)?.get(..len as usize)?;
+    std::str::from_utf8(bytes).ok()
+}
+
+/// The elements of one name in document order; made by [`Document::elements`].
+#[derive(Clone, Debug)]
+pub struct Elements<'a> {
+    document: Document<'a>,
+    postings: std::slice::Iter<'a, U32>,
+}
+
+impl<'a> Iterator for Elements<'a> {
+    type Item = Node<'a>;
+
+    fn next(&mut self) -> Option<Node<'a>> {
+        let document = self.document;
+        self.postings
+            .by_ref()
+            .find_map(|index| document.node(index.get()).filter(Node::is_element))
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        (0, Some(self.postings.len()))
+    }
+}

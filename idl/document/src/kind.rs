@@ -1,0 +1,64 @@
+//! What sort of file a document is, told from its name alone.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+/// The kinds of file that qcbus checks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FileKind {
+    /// ASAM OpenDRIVE: `.xodr`, and gzipped `.xodrz` and `.xodr.gz`.
+    Xodr,
+    /// ASAM OpenSCENARIO XML: `.xosc`.
+    Xosc,
+    /// A modular scenario, a zip archive around `main.xosc`: `.mosc`.
+    Mosc,
+}
+
+impl FileKind {
+    /// Every kind, in a fixed order.
+    pub const ALL: [FileKind; 3] = [FileKind::Xodr, FileKind::Xosc, FileKind::Mosc];
+
+    /// The kind that a file's name promises (suffixes are compared without regard to case), or
+    /// `None` when qcbus does not check such files.
+    pub fn of_path(path: &Path) -> Option<FileKind> {
+        let name = path.file_name()?.to_str()?.to_ascii_lowercase();
+        let ends = |suffix: &str| name.len() > suffix.len() && name.ends_with(suffix);
+        if ends(".xodr") || ends(".xodrz") || ends(".xodr.gz") {
+            Some(FileKind::Xodr)
+        } else if ends(".xosc") {
+            Some(FileKind::Xosc)
+        } else if ends(".mosc") {
+            Some(FileKind::Mosc)
+        } else {
+            None
+        }
+    }
+
+    /// The kind's short name, `xodr`, `xosc` or `mosc`.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            FileKind::Xodr => "xodr",
+            FileKind::Xosc => "xosc",
+            FileKind::Mosc => "mosc",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kinds_follow_the_suffix() {
+        let of = |name: &str| FileKind::of_path(Path::new(name));
+        assert_eq!(of("a/b.xodr"), Some(FileKind::Xodr));
+        assert_eq!(of("b.XODR.GZ"), Some(FileKind::Xodr));
+        assert_eq!(of("b.xodrz"), Some(FileKind::Xodr));
+        assert_eq!(of("b.xosc"), Some(FileKind::Xosc));
+        assert_eq!(of("b.mosc"), Some(FileKind::Mosc));
+        assert_eq!(of("b.xml"), None);
+        assert_eq!(of(".xodr"), None);
+    }
+}

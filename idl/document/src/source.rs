@@ -1,0 +1,122 @@
+//! From an offset of the text back to a file, a row and a column.
+
+use crate::document::Document;
+use crate::layout::{LINE_STRIDE, LineRecord, Section, SourceRecord};
+use crate::lines::Tally;
+
+/// A file whose bytes are part of the image's text: the root file, or one that it includes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Source<'a> {
+    /// Its path, as ingest named it.
+    pub path: &'a str,
+    /// Offset of its first byte in the image's text.
+    pub start: u32,
+    /// Its length in bytes (of the UTF-8 text, when it was transcoded).
+    pub len: u32,
+}
+
+/// A place in a file, as people and editors name it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Position<'a> {
+    /// The file.
+    pub path: &'a str,
+    /// The line, counted from 1 by line feeds.
+    pub row: u32,
+    /// The character within the line, counted from 1; a byte order mark does not count.
+    pub column: u32,
+    /// Bytes from the start of that file (of its UTF-8 text, when it was transcoded).
+    pub offset: u32,
+    /// Whether the file is the root file and not an included one.
+    pub is_root_file: bool,
+}
+
+impl std::fmt::Display for Position<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}:{}:{}", self.path, self.row, self.column)
+    }
+}
+
+impl<'a> Document<'a> {
+    /// The file that the image is named after; empty when the image carries no text at all.
+    pub fn path(&self) -> &'a str {
+        self.sources().next().map_or("", |source| source.path)
+    }
+
+    /// The files whose bytes make up the text, the root file first.
+    pub fn sources(&self) -> impl Iterator<Item = Source<'a>> + use<'a> {
+        let document = *self;
+        let records: &'a [SourceRecord] = self.records(Section::Sources);
+        records.iter().map(move |record| document.source(record))
+    }
+
+    /// The text of all sources, one after the other with a line feed between them.
+    pub fn source_text(&self, source: &Source<'a>) -> &'a str {
+        self.text_at(source.start, source.len).unwrap_or("")
+    }
+
+    /// Leads an offset of the text to its file, row and column. An offset just past the end of a
+    /// file belongs to that file; one past the end of the text is taken for the end.
+    pub fn position(&self, offset: u32) -> Position<'a> {
+        let text: &'a [u8] = self.section(Section::Text);
+        let offset = offset.min(u32::try_from(text.len()).unwrap_or(u32::MAX));
+        let records: &'a [SourceRecord] = self.records(Section::Sources);
+        let number = records
+            .partition_point(|record| record.start.get() <= offset)
+            .saturating_sub(1);
+        let Some(record) = records.get(number) else {
+            return Position {
+                path: "",
+                row: 1,
+                column: 1,
+                offset,
+                is_root_file: true,
+            };
+        };
+        let start = record.start.get().min(offset);
+        let tally = self.tally(text, start as usize, offset as usize);
+        let marked = tally.feeds == 0
+            && offset > start
+            && text
+                .get(start as usize..)
+                .is_some_and(|file| file.starts_with(BYTE_ORDER_MARK));
+        Position {
+            path: self.source(record).path,
+            row: tally.feeds.saturating_add(1),
+            column: tally.characters.saturating_add(1 - u32::from(marked)),
+            offset: offset - start,
+            is_root_file: number == 0,
+        }
+    }
+
+    /// Counts from the nearest checkpoint at or before `offset`, or from the file's start when
+    /// that is nearer.
+    fn tally(&self, text: &[u8], start: usize, offset: usize) -> Tally {
+        let checkpoints = self.records::<LineRecord>(Section::Lines).len();
+        let checkpoint = (offset / LINE_STRIDE).min(checkpoints.saturating_sub(1));
+        let (mut tally, from) = match self.record::<LineRecord>(Section::Lines, checkpoint) {
+            Some(line) if checkpoint * LINE_STRIDE > start => {
+                (Tally::of(line), checkpoint * LINE_STRIDE)
+            }
+            // Without a checkpoint the image is corrupt; counting one stride bounds the cost.
+            _ => (
+                Tally::default(),
+                start.max(offset.saturating_sub(LINE_STRIDE)),
+            ),
+        };
+        tally.count(text.get(from..offset).unwrap_or(&[]));
+        tally
+    }
+
+    fn source(&self, record: &SourceRecord) -> Source<'a> {
+        Source {
+            path: self
+                .heap_at(record.path_offset.get(), record.path_len.get())
+                .unwrap_or(""),
+            start: record.start.get(),
+            len: record.len.get(),
+        }
+    }
+}
+
+/// UTF-8's spelling of U+FEFF, which some editors put first.
+const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";

@@ -1,0 +1,227 @@
+//! Comparing a configuration with what is really there.
+
+use std::collections::HashSet;
+
+use super::lookup::{canonical_bundle, reporter_names};
+use super::{
+    BundleConfig, CheckerConfig, Config, ConfigParam, INPUT_PARAMS, LEVEL_PARAM, Notice, Place,
+    ReportConfig, reporter_for, same_bundle,
+};
+use crate::distance::did_you_mean;
+
+/// What is there: the catalogues of the bundles and the names of the reporters.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Known {
+    /// The bundles.
+    pub bundles: Vec<KnownBundle>,
+    /// Reporters besides the two that qcbus brings along.
+    pub reporters: Vec<String>,
+}
+
+/// What is known about a bundle.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct KnownBundle {
+    /// Its name, such as `xodrBundle`.
+    pub name: String,
+    /// Its short name, such as `xodr`.
+    pub alias: String,
+    /// Its checkers.
+    pub checkers: Vec<KnownChecker>,
+}
+
+/// What is known about a checker.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct KnownChecker {
+    /// Its identifier.
+    pub id: String,
+    /// The names of its parameters.
+    pub params: Vec<String>,
+}
+
+/// Parameters of bundles that ASAM's framework reads, and those that reports read.
+const FRAMEWORK_PARAMS: [&str; 4] = ["resultFile", "strResultFile", "InputFile", LEVEL_PARAM];
+const REPORT_PARAMS: [&str; 8] = [
+    "InputFile",
+    "OutputFile",
+    "LineWidth",
+    "Indent",
+    "strInputFile",
+    "strReportFile",
+    "strResultFile",
+    "resultFile",
+];
+
+impl Config {
+    /// What the configuration names and nobody knows: bundles, checkers, parameters, reports;
+    /// in the order of the file.
+    pub fn check(&self, known: &Known) -> Vec<Notice> {
+        let mut notices = Vec::new();
+        self.check_global_params(known, &mut notices);
+        for (i, bundle) in self.bundles.iter().enumerate() {
+            check_bundle(bundle, known, &mut notices);
+            notices.extend(named_before(bundle, &self.bundles[..i], known));
+        }
+        for report in &self.reports {
+            notices.extend(check_report(report, known));
+        }
+        notices.sort_by_key(|notice| (notice.row, notice.column));
+        notices
+    }
+
+    /// A global parameter may be meant for any bundle or report.
+    fn check_global_params(&self, known: &Known, notices: &mut Vec<Notice>) {
+        let mut names: HashSet<&str> = FRAMEWORK_PARAMS
+            .into_iter()
+            .chain(INPUT_PARAMS)
+            .chain(REPORT_PARAMS)
+            .collect();
+        names.extend(known.bundles.iter().flat_map(KnownBundle::param_names));
+        names.remove(LEVEL_PARAM);
+        let what = "no bundle or report reads a global parameter";
+        check_params(&self.params, &names, what, notices);
+    }
+}
+
+impl KnownBundle {
+    fn param_names(&self) -> impl Iterator<Item = &str> {
+        self.checkers
+            .iter()
+            .flat_map(|checker| checker.params.iter().map(String::as_str))
+    }
+}
+
+fn check_bundle(bundle: &BundleConfig, known: &Known, notices: &mut Vec<Notice>) {
+    let application = &bundle.application;
+    let found = known
+        .bundles
+        .iter()
+        .find(|b| same_bundle(application, &b.name, &b.alias));
+    let Some(found) = found else {
+        notices.push(unknown_bundle(application, bundle.place, known));
+        return;
+    };
+    let mut names: HashSet<&str> = FRAMEWORK_PARAMS.into_iter().chain(INPUT_PARAMS).collect();
+    names.extend(found.param_names());
+    names.remove(LEVEL_PARAM);
+    let what = format!("no checker of bundle `{}` reads a parameter", found.name);
+    check_params(&bundle.params, &names, &what, notices);
+    for checker in &bundle.checkers {
+        check_checker(checker, found, known, notices);
+    }
+}
+
+/// Two names of one bundle that only its catalogue tells to be the same.
+fn named_before(bundle: &BundleConfig, before: &[BundleConfig], known: &Known) -> Option<Notice> {
+    let found = known
+        .bundles
+        .iter()
+        .find(|b| same_bundle(&bundle.application, &b.name, &b.alias))?;
+    let first = before
+        .iter()
+        .find(|b| same_bundle(&b.application, &found.name, &found.alias))?;
+    let text = format!(
+        "`{}` in row {} is the same bundle as `{}`; put everything into the first one, only that \
+         counts",
+        first.application, first.place.row, bundle.application
+    );
+    Some(Notice::warning(bundle.place, text))
+}
+
+fn unknown_bundle(application: &str, place: Place, known: &Known) -> Notice {
+    let names = known
+        .bundles
+        .iter()
+        .flat_map(|b| [b.name.as_str(), b.alias.as_str()]);
+    let mut there: Vec<&str> = known.bundles.iter().map(|b| b.name.as_str()).collect();
+    there.sort_unstable();
+    let hint = did_you_mean(application, names);
+    let there = if !hint.is_empty() {
+        hint
+    } else if there.is_empty() {
+        String::from("; there is no bundle at all")
+    } else {
+        format!("; there are: {}", there.join(", "))
+    };
+    let meant = match canonical_bundle(application) {
+        Some((name, _)) if name != application => format!(" (ASAM's `{name}`)"),
+        _ => String::new(),
+    };
+    Notice::warning(
+        place,
+        format!("no bundle is called `{application}`{meant}{there}"),
+    )
+}
+
+fn check_checker(
+    checker: &CheckerConfig,
+    bundle: &KnownBundle,
+    known: &Known,
+    notices: &mut Vec<Notice>,
+) {
+    let Some(found) = bundle.checkers.iter().find(|c| c.id == checker.id) else {
+        notices.push(unknown_checker(checker, bundle, known));
+        return;
+    };
+    let mut names: HashSet<&str> = found.params.iter().map(String::as_str).collect();
+    names.insert(LEVEL_PARAM);
+    let what = format!("checker `{}` reads no parameter", found.id);
+    check_params(&checker.params, &names, &what, notices);
+}
+
+fn unknown_checker(checker: &CheckerConfig, bundle: &KnownBundle, known: &Known) -> Notice {
+    let elsewhere = known
+        .bundles
+        .iter()
+        .find(|b| b.checkers.iter().any(|c| c.id == checker.id));
+    let hint = match elsewhere {
+        Some(other) => format!("; bundle `{}` has it", other.name),
+        None => did_you_mean(&checker.id, bundle.checkers.iter().map(|c| c.id.as_str())),
+    };
+    let text = format!(
+        "bundle `{}` has no checker `{}`{hint}",
+        bundle.name, checker.id
+    );
+    Notice::warning(checker.place, text)
+}
+
+fn check_params(
+    params: &[ConfigParam],
+    names: &HashSet<&str>,
+    what: &str,
+    notices: &mut Vec<Notice>,
+) {
+    for param in params
+        .iter()
+        .filter(|param| !names.contains(param.name.as_str()))
+    {
+        // Sorted, so that of several equally near names always the same one is offered.
+        let mut near: Vec<&str> = names.iter().copied().collect();
+        near.sort_unstable();
+        let hint = did_you_mean(&param.name, near);
+        notices.push(Notice::warning(
+            param.place,
+            format!("{what} `{}`{hint}", param.name),
+        ));
+    }
+}
+
+fn check_report(report: &ReportConfig, known: &Known) -> Option<Notice> {
+    let name = report.application.as_str();
+    if reporter_for(name).is_some() || known.reporters.iter().any(|known| known == name) {
+        return None;
+    }
+    let ours: Vec<&str> = reporter_names().collect();
+    let names = ours
+        .into_iter()
+        .chain(known.reporters.iter().map(String::as_str));
+    let hint = match did_you_mean(name, names) {
+        hint if hint.is_empty() => {
+            String::from("; there are qc-report-text (TextReport) and qc-report-json")
+        }
+        hint => hint,
+    };
+    Some(Notice::warning(
+        report.place,
+        format!("no reporter is called `{name}`{hint}"),
+    ))
+}

@@ -1,0 +1,175 @@
+//! Configuration files (`.xml`): which bundles, which checkers, at which levels, with which
+//! parameters, and which reports.
+//!
+//! [`Config::parse`] reads a file and says what is odd about it; [`Config::check`] compares it
+//! with what is really there. The lookups ([`Config::selects`], [`Config::effective_params`])
+//! answer the questions that a broker or a bundle asks while it works.
+
+mod check;
+mod levels;
+mod lookup;
+mod parse;
+
+use serde::{Deserialize, Serialize};
+
+use crate::xqar::{Level, Param};
+
+pub use check::{Known, KnownBundle, KnownChecker};
+pub use levels::Levels;
+pub use lookup::{Selected, Selection, published_name, reporter_for, same_bundle};
+
+/// The name of the checker parameter that gives a checker's issues another level.
+pub const LEVEL_PARAM: &str = "qcbus.level";
+
+/// The names under which a configuration gives the file to check, the current one first.
+pub const INPUT_PARAMS: [&str; 3] = ["InputFile", "XodrFile", "XoscFile"];
+
+/// A configuration. Serialises, so that it can be published in its parsed form.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Config {
+    /// Global parameters.
+    pub params: Vec<ConfigParam>,
+    /// Configured bundles, in order, each `application` once.
+    pub bundles: Vec<BundleConfig>,
+    /// Configured reports, in order.
+    pub reports: Vec<ReportConfig>,
+}
+
+/// A configured checker bundle.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct BundleConfig {
+    /// The bundle's name or alias, as written.
+    pub application: String,
+    /// Its parameters.
+    pub params: Vec<ConfigParam>,
+    /// Its checkers, in order, each id once; empty means: whatever the bundle runs by default.
+    pub checkers: Vec<CheckerConfig>,
+    /// Where it stands in the file.
+    pub place: Place,
+}
+
+/// A configured checker.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct CheckerConfig {
+    /// Its identifier.
+    pub id: String,
+    /// The levels whose issues are kept.
+    pub levels: Levels,
+    /// `minLevel` and `maxLevel` are written in the order of 2023, the smaller number first.
+    pub old_order: bool,
+    /// The level that all issues get, from the parameter `qcbus.level`.
+    pub relevel: Option<Level>,
+    /// Its parameters.
+    pub params: Vec<ConfigParam>,
+    /// Where it stands in the file.
+    pub place: Place,
+}
+
+/// A configured report.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct ReportConfig {
+    /// As written, such as `TextReport`.
+    pub application: String,
+    /// The reporter that is meant, such as `qc-report-text`; as written when it is none of ours.
+    pub reporter: String,
+    /// Its parameters.
+    pub params: Vec<ConfigParam>,
+    /// Where it stands in the file.
+    pub place: Place,
+}
+
+/// A parameter and where it stands.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct ConfigParam {
+    /// Name; never empty.
+    pub name: String,
+    /// Value; empty when the file gives none.
+    pub value: String,
+    /// Where it stands in the file.
+    pub place: Place,
+}
+
+/// A place in a configuration file, both from 1; columns in characters.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize,
+)]
+pub struct Place {
+    /// Line.
+    pub row: u64,
+    /// Column.
+    pub column: u64,
+}
+
+/// What [`Config::parse`] gives.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Parsed {
+    /// The configuration.
+    pub config: Config,
+    /// What is odd about the file, in the order of the file.
+    pub notices: Vec<Notice>,
+}
+
+/// Something odd about a configuration that does not keep it from being used.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Notice {
+    /// [`Level::Warning`], or [`Level::Information`] for older ways to write things.
+    pub level: Level,
+    /// Line, from 1.
+    pub row: u64,
+    /// Column in characters, from 1.
+    pub column: u64,
+    /// What was found, what it means, and what may have been meant.
+    pub text: String,
+}
+
+/// A configuration that cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{row}:{column}: {text}{}", hint_line(.hint))]
+pub struct ConfigError {
+    /// Line, from 1.
+    pub row: u64,
+    /// Column in characters, from 1.
+    pub column: u64,
+    /// What is wrong.
+    pub text: String,
+    /// What to do about it; may be empty.
+    pub hint: String,
+}
+
+fn hint_line(hint: &str) -> String {
+    if hint.is_empty() {
+        String::new()
+    } else {
+        format!("\n  hint: {hint}")
+    }
+}
+
+impl ConfigParam {
+    /// The parameter without its place.
+    pub fn to_param(&self) -> Param {
+        Param {
+            name: self.name.clone(),
+            value: self.value.clone(),
+        }
+    }
+}
+
+impl Notice {
+    pub(crate) fn warning(place: Place, text: String) -> Notice {
+        Notice {
+            level: Level::Warning,
+            row: place.row,
+            column: place.column,
+            text,
+        }
+    }
+
+    pub(crate) fn information(place: Place, text: String) -> Notice {
+        Notice {
+            level: Level::Information,
+            row: place.row,
+            column: place.column,
+            text,
+        }
+    }
+}

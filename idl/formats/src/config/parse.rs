@@ -1,0 +1,340 @@
+//! From bytes to a configuration, with notices for what is odd.
+
+use super::lookup::canonical_bundle;
+use super::{
+    BundleConfig, CheckerConfig, Config, ConfigError, ConfigParam, LEVEL_PARAM, Levels, Notice,
+    Parsed, Place, ReportConfig, reporter_for,
+};
+use crate::distance::did_you_mean;
+use crate::xml::{self, Document, Element, Node};
+use crate::xqar::Level;
+
+impl Config {
+    /// Reads a configuration file: children in any order, levels in either order or missing.
+    ///
+    /// # Errors
+    /// The file is not well-formed XML, its root is not `Config`, or a bundle, checker, report or
+    /// parameter has no name. Everything else that is odd becomes a notice.
+    pub fn parse(bytes: &[u8]) -> Result<Parsed, ConfigError> {
+        let document = xml::parse(bytes).map_err(|error| ConfigError {
+            row: error.row,
+            column: error.column,
+            text: error.text,
+            hint: error.hint.to_owned(),
+        })?;
+        let mut parser = Parser {
+            document: &document,
+            notices: Vec::new(),
+        };
+        let config = parser.config(&document.root)?;
+        let mut notices = parser.notices;
+        notices.sort_by_key(|notice| (notice.row, notice.column));
+        Ok(Parsed { config, notices })
+    }
+}
+
+struct Parser<'d> {
+    document: &'d Document,
+    notices: Vec<Notice>,
+}
+
+impl Parser<'_> {
+    fn config(&mut self, root: &Element) -> Result<Config, ConfigError> {
+        if root.local_name() != "Config" {
+            let text = format!("the root element is `{}`, not `Config`", root.name);
+            return Err(self.error(root.offset, text, "is this a configuration file?"));
+        }
+        self.attributes(root, &[]);
+        self.stray_text(root);
+        let mut config = Config::default();
+        for child in root.children() {
+            match child.local_name() {
+                "Param" => self.param(child, &mut config.params)?,
+                "CheckerBundle" => {
+                    let bundle = self.bundle(child)?;
+                    self.add_bundle(&mut config, bundle);
+                }
+                "ReportModule" => config.reports.push(self.report(child)?),
+                _ => self.unknown(child, root, &["Param", "CheckerBundle", "ReportModule"]),
+            }
+        }
+        if root.children().next().is_none() {
+            self.warn(root.offset, "the configuration is empty".to_owned());
+        }
+        Ok(config)
+    }
+
+    fn bundle(&mut self, element: &Element) -> Result<BundleConfig, ConfigError> {
+        self.attributes(element, &["application"]);
+        self.stray_text(element);
+        let application = self.required(element, "application")?;
+        let place = self.place(element.offset);
+        let mut bundle = BundleConfig {
+            application,
+            place,
+            ..BundleConfig::default()
+        };
+        for child in element.children() {
+            match child.local_name() {
+                "Param" => self.param(child, &mut bundle.params)?,
+                "Checker" => {
+                    let checker = self.checker(child)?;
+                    self.add_checker(&mut bundle, checker);
+                }
+                _ => self.unknown(child, element, &["Param", "Checker"]),
+            }
+        }
+        self.misplaced_level(&bundle.params, "bundle");
+        Ok(bundle)
+    }
+
+    fn checker(&mut self, element: &Element) -> Result<CheckerConfig, ConfigError> {
+        self.attributes(element, &["checkerId", "minLevel", "maxLevel"]);
+        self.stray_text(element);
+        let id = self.required(element, "checkerId")?;
+        let mildest = self
+            .level(element, "minLevel")
+            .unwrap_or(Level::Information);
+        let worst = self.level(element, "maxLevel").unwrap_or(Level::Error);
+        let mut params = Vec::new();
+        for child in element.children() {
+            match child.local_name() {
+                "Param" => self.param(child, &mut params)?,
+                _ => self.unknown(child, element, &["Param"]),
+            }
+        }
+        let checker = CheckerConfig {
+            id,
+            levels: Levels::between(worst, mildest),
+            old_order: mildest < worst,
+            relevel: self.relevel(&params),
+            params,
+            place: self.place(element.offset),
+        };
+        if checker.old_order {
+            self.notices.push(checker.old_order_notice());
+        }
+        Ok(checker)
+    }
+
+    fn report(&mut self, element: &Element) -> Result<ReportConfig, ConfigError> {
+        self.attributes(element, &["application"]);
+        self.stray_text(element);
+        let application = self.required(element, "application")?;
+        let mut params = Vec::new();
+        for child in element.children() {
+            match child.local_name() {
+                "Param" => self.param(child, &mut params)?,
+                _ => self.unknown(child, element, &["Param"]),
+            }
+        }
+        self.misplaced_level(&params, "report");
+        let reporter = reporter_for(&application)
+            .unwrap_or(&application)
+            .to_owned();
+        let place = self.place(element.offset);
+        Ok(ReportConfig {
+            application,
+            reporter,
+            params,
+            place,
+        })
+    }
+
+    fn param(
+        &mut self,
+        element: &Element,
+        params: &mut Vec<ConfigParam>,
+    ) -> Result<(), ConfigError> {
+        self.attributes(element, &["name", "value"]);
+        self.stray_text(element);
+        for child in element.children() {
+            self.unknown(child, element, &[]);
+        }
+        let name = self.required(element, "name")?;
+        if params.iter().any(|earlier| earlier.name == name) {
+            let text = format!("the parameter `{name}` is given twice here; the first one counts");
+            self.warn(element.offset, text);
+            return Ok(());
+        }
+        let value = element.value("value").unwrap_or_default().to_owned();
+        params.push(ConfigParam {
+            name,
+            value,
+            place: self.place(element.offset),
+        });
+        Ok(())
+    }
+
+    /// A level by number. What is no level is told and then as if it were missing.
+    fn level(&mut self, element: &Element, name: &str) -> Option<Level> {
+        let attribute = element.attribute(name)?;
+        let text = attribute.value.trim();
+        let level = text.parse::<i64>().ok().and_then(|n| u8::try_from(n).ok());
+        let level = level.and_then(Level::from_number);
+        if level.is_none() {
+            let value = if name == "minLevel" { 3 } else { 1 };
+            let notice = format!(
+                "{name}=\"{text}\" is no level (1 error, 2 warning, 3 information); {value} is used"
+            );
+            self.warn(attribute.offset, notice);
+        }
+        level
+    }
+
+    fn relevel(&mut self, params: &[ConfigParam]) -> Option<Level> {
+        let param = params.iter().find(|param| param.name == LEVEL_PARAM)?;
+        let level = Level::from_word(&param.value);
+        if level.is_none() {
+            let value = &param.value;
+            let hint = did_you_mean(value, ["error", "warning", "information"]);
+            let text = format!(
+                "`{LEVEL_PARAM}` is `{value}`, which is no level (error, warning, information) \
+                 and has no effect{hint}"
+            );
+            self.notices.push(Notice::warning(param.place, text));
+        }
+        level
+    }
+
+    /// `qcbus.level` has a meaning for a checker only.
+    fn misplaced_level(&mut self, params: &[ConfigParam], what: &str) {
+        for param in params.iter().filter(|param| param.name == LEVEL_PARAM) {
+            let text =
+                format!("`{LEVEL_PARAM}` has no effect on a {what}: it belongs to a checker");
+            self.notices.push(Notice::warning(param.place, text));
+        }
+    }
+
+    fn add_checker(&mut self, bundle: &mut BundleConfig, checker: CheckerConfig) {
+        if let Some(first) = bundle.checker(&checker.id) {
+            let text = format!(
+                "checker `{}` is configured twice in this bundle; the first one, in row {}, counts",
+                checker.id, first.place.row
+            );
+            self.notices.push(Notice::warning(checker.place, text));
+            return;
+        }
+        bundle.checkers.push(checker);
+    }
+
+    /// A bundle that is configured a second time adds its checkers to the first: dropping them
+    /// would accept what somebody wanted to have checked.
+    fn add_bundle(&mut self, config: &mut Config, bundle: BundleConfig) {
+        let names = |application: &str| canonical_bundle(application).map(|(name, _)| name);
+        let meant = names(&bundle.application);
+        let Some(first) = config.bundles.iter_mut().find(|first| {
+            first.application == bundle.application
+                || (meant.is_some() && names(&first.application) == meant)
+        }) else {
+            config.bundles.push(bundle);
+            return;
+        };
+        let text = format!(
+            "bundle `{}` is configured twice; what is new here is added to the first one, in row {}",
+            bundle.application, first.place.row
+        );
+        self.notices.push(Notice::warning(bundle.place, text));
+        merge(first, bundle, self);
+    }
+
+    fn attributes(&mut self, element: &Element, known: &[&str]) {
+        for attribute in &element.attributes {
+            let name = attribute.name.as_str();
+            let namespace = name == "xmlns" || name.contains(':');
+            if !namespace && !known.contains(&name) {
+                let hint = did_you_mean(name, known.iter().copied());
+                let text = format!("`{}` has no attribute `{name}`{hint}", element.name);
+                self.warn(attribute.offset, text);
+            }
+        }
+    }
+
+    fn unknown(&mut self, element: &Element, parent: &Element, known: &[&str]) {
+        let hint = did_you_mean(element.local_name(), known.iter().copied());
+        let text = format!("`{}` is not known in `{}`{hint}", element.name, parent.name);
+        self.warn(element.offset, text);
+    }
+
+    fn stray_text(&mut self, element: &Element) {
+        let text = element.content.iter().find_map(|node| match node {
+            Node::Text(text) if !text.trim().is_empty() => Some(text.trim()),
+            _ => None,
+        });
+        if let Some(text) = text {
+            let shown: String = text.chars().take(30).collect();
+            self.warn(
+                element.offset,
+                format!("text in `{}` has no effect: `{shown}`", element.name),
+            );
+        }
+    }
+
+    fn required(&self, element: &Element, name: &str) -> Result<String, ConfigError> {
+        match element.value(name).map(str::trim) {
+            Some(value) if !value.is_empty() => Ok(value.to_owned()),
+            found => {
+                let state = if found.is_some() {
+                    "is empty"
+                } else {
+                    "is missing"
+                };
+                let text = format!("the attribute `{name}` of `{}` {state}", element.name);
+                let written = element.attributes.iter().map(|a| a.name.as_str());
+                let hint = match crate::distance::closest(name, written) {
+                    Some(near) if near != name => format!("`{near}` should be `{name}`"),
+                    _ => String::new(),
+                };
+                Err(self.error(element.offset, text, &hint))
+            }
+        }
+    }
+
+    fn place(&self, offset: usize) -> Place {
+        let (row, column) = self.document.place(offset);
+        Place { row, column }
+    }
+
+    fn warn(&mut self, offset: usize, text: String) {
+        self.notices.push(Notice::warning(self.place(offset), text));
+    }
+
+    fn error(&self, offset: usize, text: String, hint: &str) -> ConfigError {
+        let Place { row, column } = self.place(offset);
+        ConfigError {
+            row,
+            column,
+            text,
+            hint: hint.to_owned(),
+        }
+    }
+}
+
+/// Adds a bundle's second entry to its first. An entry without checkers asks for all that run by
+/// default, so the whole asks for all.
+fn merge(first: &mut BundleConfig, second: BundleConfig, parser: &mut Parser<'_>) {
+    if first.checkers.is_empty() || second.checkers.is_empty() {
+        // One of the two leaves the choice to the bundle; a list would narrow it.
+        first.checkers.clear();
+    }
+    let all = first.checkers.is_empty();
+    for mut checker in second.checkers {
+        if all {
+            break;
+        }
+        // The second entry's own parameters keep their reach: its checkers.
+        for param in &second.params {
+            if !checker.params.iter().any(|own| own.name == param.name) {
+                checker.params.push(param.clone());
+            }
+        }
+        parser.add_checker(first, checker);
+    }
+    if all {
+        for param in second.params {
+            if !first.params.iter().any(|own| own.name == param.name) {
+                first.params.push(param);
+            }
+        }
+    }
+}

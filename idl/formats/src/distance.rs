@@ -1,0 +1,80 @@
+//! "Did you mean": the nearest known word to an unknown one.
+
+/// How many letters to insert, remove, replace or swap with their neighbour to get from one word
+/// to the other (optimal string alignment). Letter case counts as equal.
+pub fn distance(a: &str, b: &str) -> usize {
+    let a: Vec<char> = a.chars().flat_map(char::to_lowercase).collect();
+    let b: Vec<char> = b.chars().flat_map(char::to_lowercase).collect();
+    let mut before: Vec<usize> = Vec::new();
+    let mut last: Vec<usize> = (0..=b.len()).collect();
+    for (i, &from) in a.iter().enumerate() {
+        let mut row = Vec::with_capacity(b.len() + 1);
+        row.push(i + 1);
+        for (j, &to) in b.iter().enumerate() {
+            let replaced = last[j] + usize::from(from != to);
+            let mut best = replaced.min(last[j + 1] + 1).min(row[j] + 1);
+            if i > 0 && j > 0 && from == b[j - 1] && a[i - 1] == to {
+                best = best.min(before[j - 1] + 1);
+            }
+            row.push(best);
+        }
+        before = std::mem::replace(&mut last, row);
+    }
+    last[b.len()]
+}
+
+/// Words longer than this are compared by their beginning: nobody mistypes a page of text, and
+/// the cost grows with the square.
+const LONGEST: usize = 128;
+
+/// The candidate nearest to `word`, if one is near enough to have been meant: at most a third of
+/// its letters differ. The first of several equally near ones.
+pub fn closest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
+    let word: String = word.chars().take(LONGEST).collect();
+    let allowed = (word.chars().count() / 3).max(1);
+    let mut best: Option<(usize, &str)> = None;
+    for candidate in candidates {
+        if candidate.chars().count().abs_diff(word.chars().count()) > allowed {
+            continue;
+        }
+        let found = distance(&word, candidate);
+        if found <= allowed && best.is_none_or(|(least, _)| found < least) {
+            best = Some((found, candidate));
+        }
+    }
+    best.map(|(_, candidate)| candidate)
+}
+
+/// ``; did you mean `x`?`` to be put behind a message, or nothing when no candidate is near.
+pub fn did_you_mean<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> String {
+    match closest(word, candidates) {
+        Some(candidate) => format!("; did you mean `{candidate}`?"),
+        None => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_edits() {
+        assert_eq!(distance("", "abc"), 3);
+        assert_eq!(distance("kitten", "sitting"), 3);
+        assert_eq!(distance("checkreId", "checkerId"), 1, "a swap is one edit");
+        assert_eq!(distance("MINLEVEL", "minLevel"), 0, "case does not count");
+        assert_eq!(distance("straße", "strasse"), 2);
+    }
+
+    #[test]
+    fn offers_what_was_meant_and_nothing_else() {
+        let names = ["CheckerBundle", "ReportModule", "Param"];
+        assert_eq!(closest("CheckerBundel", names), Some("CheckerBundle"));
+        assert_eq!(closest("param", names), Some("Param"));
+        assert_eq!(closest("Road", names), None);
+        assert_eq!(closest("", names), None);
+        assert_eq!(did_you_mean("Parm", names), "; did you mean `Param`?");
+        assert_eq!(did_you_mean("Widget", names), "");
+        assert_eq!(closest(&"x".repeat(1_000_000), names), None);
+    }
+}

@@ -1,0 +1,47 @@
+//! Bodies of fuzz targets: they take any bytes and panic when a promise is broken. Seeded tests
+//! run them on stable; the wrappers for cargo-fuzz call them.
+
+use crate::config::Config;
+use crate::xqar::{self, Dialect};
+
+/// A configuration: reading never panics, and what was read answers every question.
+pub fn config(bytes: &[u8]) {
+    let Ok(parsed) = Config::parse(bytes) else {
+        return;
+    };
+    let config = parsed.config;
+    assert!(
+        parsed
+            .notices
+            .iter()
+            .all(|notice| notice.row > 0 && notice.column > 0)
+    );
+    let _ = config.check(&crate::config::Known::default());
+    let _ = config.input_file();
+    for bundle in &config.bundles {
+        assert!(config.bundle(&bundle.application, "").is_some());
+        for checker in &bundle.checkers {
+            assert!(bundle.selects(&checker.id).runs(false));
+            let _ = config.effective_params(Some(bundle), &checker.id, &[]);
+        }
+    }
+}
+
+/// A result file: reading never panics, what was read can be written in both forms and read
+/// again, and writing it again gives the same bytes.
+pub fn xqar(bytes: &[u8]) {
+    let Ok(results) = xqar::read(bytes) else {
+        return;
+    };
+    for dialect in [Dialect::Current, Dialect::Qc4Openx] {
+        let first = xqar::write(&results, dialect);
+        let again = xqar::read(first.as_bytes());
+        assert!(
+            again.is_ok(),
+            "cannot read what was written: {again:?}\n{first}"
+        );
+        if let Ok(again) = again {
+            assert_eq!(xqar::write(&again, dialect), first);
+        }
+    }
+}

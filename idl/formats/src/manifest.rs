@@ -1,0 +1,385 @@
+//! Manifests (`.json`): which modules there are and how each is started.
+//!
+//! A framework manifest lists module manifests; a module manifest lists modules. Files are read by
+//! a function that the caller gives, environment variables by another.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Map, Value};
+
+use crate::distance::{closest, did_you_mean};
+
+/// A module that can be started.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Module {
+    /// Its name; `application` of a configuration. Unique for each type.
+    pub name: String,
+    /// What it is.
+    pub module_type: ModuleType,
+    /// The command, for a shell.
+    pub exec_command: String,
+    /// How it takes part.
+    pub mode: Mode,
+    /// Keys that begin with `qcbus`, for whoever knows them; texts, numbers and truth values as
+    /// text, in the order of their names.
+    pub extra: Vec<(String, String)>,
+    /// The manifest that it comes from.
+    pub manifest: PathBuf,
+}
+
+/// What a module is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ModuleType {
+    /// It checks.
+    CheckerBundle,
+    /// It reports.
+    ReportModule,
+    /// It pools; qcbus pools itself and starts none.
+    ResultPooling,
+}
+
+/// How a module takes part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Mode {
+    /// Started once for a file, as ASAM's framework does.
+    #[default]
+    Once,
+    /// A daemon that joins the bus: `"mode": "bus"`.
+    Bus,
+}
+
+/// A manifest that cannot be used. The text names the file and the key.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ManifestError {
+    /// The file could not be read.
+    #[error("{}: {reason}{}", .path.display(), named_by(.listed_in))]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+        /// The framework manifest that names it.
+        listed_in: Option<PathBuf>,
+    },
+    /// The file is not JSON.
+    #[error("{}:{row}:{column}: not JSON: {reason}", .path.display())]
+    Syntax {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        row: usize,
+        /// Column, from 1.
+        column: usize,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A key is missing or has a wrong value.
+    #[error("{}: `{key}` {reason}", .path.display())]
+    Key {
+        /// The file.
+        path: PathBuf,
+        /// Which key, such as `module[2].exec_command`.
+        key: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+}
+
+fn named_by(listed_in: &Option<PathBuf>) -> String {
+    match listed_in {
+        Some(path) => format!(" (named by `manifest_file_path` in {})", path.display()),
+        None => String::new(),
+    }
+}
+
+/// What manifests are read with.
+pub struct Sources<'f> {
+    /// Reads a file; the error says why it could not be.
+    pub read: &'f dyn Fn(&Path) -> Result<Vec<u8>, String>,
+    /// The value of an environment variable.
+    pub variable: &'f dyn Fn(&str) -> Option<String>,
+}
+
+impl std::fmt::Debug for Sources<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Sources")
+    }
+}
+
+/// Reads a framework manifest and all that it lists, or a single module manifest. Relative paths
+/// in a framework manifest are handed on as they are: relative to the current directory, as in
+/// ASAM's framework.
+///
+/// # Errors
+/// A file cannot be read or is not JSON, a key is missing or wrong, a name is used twice.
+pub fn load(path: &Path, sources: &Sources<'_>) -> Result<Vec<Module>, ManifestError> {
+    let bytes = read(path, None, sources)?;
+    let object = object(path, &bytes)?;
+    let modules = if object.contains_key("manifest_file_path") {
+        let mut modules = Vec::new();
+        for listed in listed_files(path, &object, sources)? {
+            let bytes = read(&listed, Some(path), sources)?;
+            modules.extend(parse_modules(&listed, &bytes)?);
+        }
+        modules
+    } else {
+        modules_of(path, &object)?
+    };
+    unique(modules)
+}
+
+/// The paths that a framework manifest lists, environment variables expanded.
+///
+/// # Errors
+/// The file is not JSON, or `manifest_file_path` is not a list of texts.
+pub fn parse_framework(
+    path: &Path,
+    bytes: &[u8],
+    variable: &dyn Fn(&str) -> Option<String>,
+) -> Result<Vec<PathBuf>, ManifestError> {
+    let read = |_: &Path| Err(String::from("not read"));
+    listed_files(
+        path,
+        &object(path, bytes)?,
+        &Sources {
+            read: &read,
+            variable,
+        },
+    )
+}
+
+/// The modules of a module manifest.
+///
+/// # Errors
+/// The file is not JSON, or a key is missing or wrong.
+pub fn parse_modules(path: &Path, bytes: &[u8]) -> Result<Vec<Module>, ManifestError> {
+    modules_of(path, &object(path, bytes)?)
+}
+
+/// Expands `$NAME` and `${NAME}`; what is not set stays as it is, and so does a lone `$`.
+pub fn expand(text: &str, variable: &dyn Fn(&str) -> Option<String>) -> String {
+    let mut expanded = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(at) = rest.find('$') {
+        expanded.push_str(&rest[..at]);
+        let behind = &rest[at + 1..];
+        let (name, length) = match behind.strip_prefix('{').and_then(|b| b.split_once('}')) {
+            Some((name, _)) => (name, name.len() + 2),
+            None => {
+                let end = behind.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
+                let name = &behind[..end.unwrap_or(behind.len())];
+                (name, name.len())
+            }
+        };
+        match variable(name).filter(|_| !name.is_empty()) {
+            Some(value) => expanded.push_str(&value),
+            None => expanded.push_str(&rest[at..at + 1 + length]),
+        }
+        rest = &behind[length..];
+    }
+    expanded.push_str(rest);
+    expanded
+}
+
+fn read(
+    path: &Path,
+    listed_in: Option<&Path>,
+    sources: &Sources<'_>,
+) -> Result<Vec<u8>, ManifestError> {
+    (sources.read)(path).map_err(|reason| ManifestError::Unreadable {
+        path: path.to_owned(),
+        reason,
+        listed_in: listed_in.map(Path::to_owned),
+    })
+}
+
+fn object(path: &Path, bytes: &[u8]) -> Result<Map<String, Value>, ManifestError> {
+    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+    match serde_json::from_slice(bytes) {
+        Ok(Value::Object(object)) => Ok(object),
+        Ok(_) => Err(ManifestError::Syntax {
+            path: path.to_owned(),
+            row: 1,
+            column: 1,
+            reason: String::from("a manifest is an object"),
+        }),
+        Err(error) => {
+            let reason = error.to_string();
+            let reason = reason
+                .split(" at line ")
+                .next()
+                .unwrap_or_default()
+                .to_owned();
+            let (row, column) = (error.line().max(1), error.column().max(1));
+            Err(ManifestError::Syntax {
+                path: path.to_owned(),
+                row,
+                column,
+                reason,
+            })
+        }
+    }
+}
+
+fn listed_files(
+    path: &Path,
+    object: &Map<String, Value>,
+    sources: &Sources<'_>,
+) -> Result<Vec<PathBuf>, ManifestError> {
+    let key = |key: String, reason: &str| wrong(path, key, reason);
+    let list = match object.get("manifest_file_path") {
+        Some(Value::Array(list)) => list,
+        Some(_) => return Err(key("manifest_file_path".into(), "is not a list of paths")),
+        None => return Err(key("manifest_file_path".into(), "is missing")),
+    };
+    let paths = list.iter().enumerate().map(|(i, value)| match value {
+        Value::String(text) if !text.is_empty() => {
+            Ok(PathBuf::from(expand(text, sources.variable)))
+        }
+        _ => Err(key(format!("manifest_file_path[{i}]"), "is not a path")),
+    });
+    paths.collect()
+}
+
+fn modules_of(path: &Path, object: &Map<String, Value>) -> Result<Vec<Module>, ManifestError> {
+    let modules = match object.get("module") {
+        Some(Value::Array(modules)) => modules,
+        Some(_) => return Err(wrong(path, "module".into(), "is not a list of modules")),
+        None => {
+            let hint = misspelt("module", object.keys().map(String::as_str));
+            let reason = format!("is missing, and so is `manifest_file_path`{hint}");
+            return Err(wrong(path, "module".into(), &reason));
+        }
+    };
+    modules
+        .iter()
+        .enumerate()
+        .map(|(i, value)| module(path, i, value))
+        .collect()
+}
+
+fn module(path: &Path, index: usize, value: &Value) -> Result<Module, ManifestError> {
+    let Value::Object(object) = value else {
+        return Err(wrong(path, format!("module[{index}]"), "is not an object"));
+    };
+    let keys = Keys {
+        path,
+        index,
+        object,
+    };
+    keys.choice("exec_type", &[("executable", ())])?;
+    let types = [
+        ("checker_bundle", ModuleType::CheckerBundle),
+        ("report_module", ModuleType::ReportModule),
+        ("result_pooling", ModuleType::ResultPooling),
+    ];
+    let module_type = keys.choice("module_type", &types)?;
+    let mode = match object.get("mode") {
+        None => Mode::Once,
+        Some(_) => keys.choice("mode", &[("bus", Mode::Bus), ("once", Mode::Once)])?,
+    };
+    Ok(Module {
+        name: keys.text("name")?,
+        module_type,
+        exec_command: keys.text("exec_command")?,
+        mode,
+        extra: extra(object),
+        manifest: path.to_owned(),
+    })
+}
+
+/// The keys of one module, with errors that name them.
+struct Keys<'m> {
+    path: &'m Path,
+    index: usize,
+    object: &'m Map<String, Value>,
+}
+
+impl Keys<'_> {
+    fn text(&self, name: &str) -> Result<String, ManifestError> {
+        let reason = match self.object.get(name) {
+            Some(Value::String(text)) if !text.trim().is_empty() => return Ok(text.clone()),
+            Some(Value::String(_)) => String::from("is empty"),
+            Some(_) => String::from("is not a text"),
+            None => format!("is missing{}", misspelt(name, others(self.object))),
+        };
+        Err(self.wrong(name, &reason))
+    }
+
+    fn choice<T: Copy>(&self, name: &str, known: &[(&str, T)]) -> Result<T, ManifestError> {
+        let value = self.text(name)?;
+        if let Some((_, meaning)) = known.iter().find(|(word, _)| *word == value) {
+            return Ok(*meaning);
+        }
+        let words: Vec<&str> = known.iter().map(|(word, _)| *word).collect();
+        let hint = did_you_mean(&value, words.iter().copied());
+        Err(self.wrong(
+            name,
+            &format!("is `{value}`, not {}{hint}", words.join(" or ")),
+        ))
+    }
+
+    fn wrong(&self, name: &str, reason: &str) -> ManifestError {
+        wrong(self.path, format!("module[{}].{name}", self.index), reason)
+    }
+}
+
+/// The key that is written in place of a missing one.
+fn misspelt<'k>(name: &str, written: impl Iterator<Item = &'k str>) -> String {
+    match closest(name, written) {
+        Some(near) => format!("; `{near}` is no key, should it be `{name}`?"),
+        None => String::new(),
+    }
+}
+
+/// Keys of ours beside `mode`, handed on as they are.
+const OWN_KEYS: [&str; 2] = ["version", "restart"];
+
+const MODULE_KEYS: [&str; 5] = ["name", "exec_type", "module_type", "exec_command", "mode"];
+
+/// The keys of an object that have no meaning here: candidates for a mistyped one.
+fn others(object: &Map<String, Value>) -> impl Iterator<Item = &str> {
+    object
+        .keys()
+        .map(String::as_str)
+        .filter(|key| !MODULE_KEYS.contains(key))
+}
+
+fn extra(object: &Map<String, Value>) -> Vec<(String, String)> {
+    let own = object
+        .iter()
+        .filter(|(key, _)| key.starts_with("qcbus") || OWN_KEYS.contains(&key.as_str()));
+    let mut extra: Vec<(String, String)> = own
+        .map(|(key, value)| match value {
+            Value::String(text) => (key.clone(), text.clone()),
+            other => (key.clone(), other.to_string()),
+        })
+        .collect();
+    extra.sort();
+    extra
+}
+
+fn unique(modules: Vec<Module>) -> Result<Vec<Module>, ManifestError> {
+    let mut seen: HashMap<(&str, ModuleType), &Path> = HashMap::new();
+    for module in &modules {
+        let key = (module.name.as_str(), module.module_type);
+        if let Some(first) = seen.insert(key, &module.manifest) {
+            let reason = format!(
+                "`{}` is given twice, first in {}",
+                module.name,
+                first.display()
+            );
+            return Err(wrong(&module.manifest, "name".into(), &reason));
+        }
+    }
+    Ok(modules)
+}
+
+fn wrong(path: &Path, key: String, reason: &str) -> ManifestError {
+    ManifestError::Key {
+        path: path.to_owned(),
+        key,
+        reason: reason.to_owned(),
+    }
+}

@@ -1,0 +1,333 @@
+//! The steps of pooling, in order.
+
+mod checker;
+mod summary;
+
+use super::places::Completer;
+use super::remarks::{self, Removal, Why};
+use super::{
+    BundleOutcome, CheckerOutcome, Counts, FailedChecker, OWN_BUNDLE, PoolInput, Pooled, Remark,
+    Resolver, Scope, absent,
+};
+use crate::config::{BundleConfig, Config, INPUT_PARAMS, Selection, same_bundle};
+use crate::xqar::{Checker, CheckerBundle, FORMAT_VERSION, Level, Param, Status};
+
+pub(super) fn pool(input: PoolInput<'_>, resolver: &mut dyn Resolver) -> Pooled {
+    let PoolInput {
+        input_file,
+        config,
+        bundles,
+        remarks,
+        scope,
+        version,
+        build_date,
+    } = input;
+    let mut pool = Pool {
+        input_file,
+        config,
+        places: Completer::new(resolver),
+        removals: Vec::new(),
+        pooled: Pooled::default(),
+    };
+    pool.pooled.results.version = FORMAT_VERSION.to_owned();
+    for (entry, outcome) in in_order(config, with_own_names(bundles), scope) {
+        pool.add(entry, outcome);
+    }
+    let own = BundleOutcome {
+        name: OWN_BUNDLE.to_owned(),
+        version: version.to_owned(),
+        build_date: build_date.to_owned(),
+        description: String::from("What qcbus itself has to say about this check."),
+        ..BundleOutcome::default()
+    };
+    pool.add_own(own, remarks);
+    pool.finish()
+}
+
+/// Bundles of one name are told apart by a number, as ASAM's pooling does.
+fn with_own_names(mut bundles: Vec<BundleOutcome>) -> Vec<(BundleOutcome, String)> {
+    let mut taken: Vec<String> = vec![OWN_BUNDLE.to_owned()];
+    let mut named = Vec::with_capacity(bundles.len());
+    for outcome in bundles.drain(..) {
+        let wanted = remarks::guest_name(&outcome.name);
+        let mut name = wanted.to_owned();
+        let mut number = 0;
+        while taken.contains(&name) {
+            number += 1;
+            name = format!("{wanted}{number}");
+        }
+        taken.push(name.clone());
+        named.push((outcome, name));
+    }
+    named
+}
+
+/// What becomes of an outcome.
+#[derive(Clone, Copy)]
+enum Entry<'c> {
+    /// There is no configuration, or none that concerns a bundle by itself.
+    Free,
+    /// The configuration names the bundle.
+    Configured(&'c BundleConfig),
+    /// The configuration does not name the bundle.
+    Unwanted,
+}
+
+/// Outcomes in the order of the result, with the configuration's entry for each.
+fn in_order<'c>(
+    config: Option<&'c Config>,
+    outcomes: Vec<(BundleOutcome, String)>,
+    scope: Scope,
+) -> Vec<(Entry<'c>, (BundleOutcome, String))> {
+    let Some(config) = config else {
+        return outcomes
+            .into_iter()
+            .map(|outcome| (Entry::Free, outcome))
+            .collect();
+    };
+    let mut left: Vec<Option<(BundleOutcome, String)>> = outcomes.into_iter().map(Some).collect();
+    let mut ordered = Vec::with_capacity(left.len());
+    for bundle in &config.bundles {
+        let mut found = false;
+        for slot in &mut left {
+            let matches = |(outcome, _): &mut (BundleOutcome, String)| {
+                same_bundle(&bundle.application, &outcome.name, &outcome.alias)
+            };
+            if let Some(outcome) = slot.take_if(matches) {
+                ordered.push((Entry::Configured(bundle), outcome));
+                found = true;
+            }
+        }
+        if !found && scope == Scope::Whole {
+            let outcome = absent::bundle(bundle);
+            let name = outcome.name.clone();
+            ordered.push((Entry::Configured(bundle), (outcome, name)));
+        }
+    }
+    for outcome in left.into_iter().flatten() {
+        let entry = match scope {
+            Scope::Whole => Entry::Unwanted,
+            Scope::Alone => Entry::Free,
+        };
+        ordered.push((entry, outcome));
+    }
+    ordered
+}
+
+struct Pool<'a, 'r> {
+    input_file: &'a str,
+    config: Option<&'a Config>,
+    places: Completer<'r>,
+    removals: Vec<Removal>,
+    pooled: Pooled,
+}
+
+impl<'a> Pool<'a, '_> {
+    fn add(&mut self, entry: Entry<'a>, (outcome, name): (BundleOutcome, String)) {
+        let entry = match entry {
+            Entry::Unwanted => return self.remove_all(&name, &outcome.checkers, Why::Bundle),
+            Entry::Free => None,
+            Entry::Configured(bundle) => Some(bundle),
+        };
+        let BundleOutcome {
+            version,
+            build_date,
+            description,
+            params,
+            checkers,
+            ..
+        } = outcome;
+        let checkers = merged(checkers);
+        let checkers = match entry {
+            Some(bundle) if !bundle.checkers.is_empty() => self.configured(bundle, &name, checkers),
+            _ => checkers,
+        };
+        let checkers: Vec<Checker> = checkers
+            .into_iter()
+            .map(|outcome| self.checker(entry, &name, outcome))
+            .collect();
+        self.pooled.results.bundles.push(CheckerBundle {
+            summary: summary::of_bundle(&checkers),
+            params: self.params(entry, params),
+            name,
+            version,
+            build_date,
+            description,
+            checkers,
+        });
+    }
+
+    /// The checkers that the configuration names, in its order; the others' issues are removed.
+    fn configured(
+        &mut self,
+        config: &BundleConfig,
+        name: &str,
+        outcomes: Vec<CheckerOutcome>,
+    ) -> Vec<CheckerOutcome> {
+        let there: Vec<String> = outcomes.iter().map(|outcome| outcome.id.clone()).collect();
+        let wanted = |outcome: &CheckerOutcome| config.checker(&outcome.id).is_some();
+        let (mut wanted, others): (Vec<_>, Vec<_>) = outcomes.into_iter().partition(wanted);
+        let mut ordered = Vec::with_capacity(config.checkers.len());
+        for checker in &config.checkers {
+            match wanted.iter().position(|outcome| outcome.id == checker.id) {
+                Some(at) => ordered.push(wanted.swap_remove(at)),
+                None => ordered.push(absent::checker(&checker.id, name, &there)),
+            }
+        }
+        self.remove_all(name, &others, Why::Checker);
+        ordered
+    }
+
+    fn remove_all(&mut self, bundle: &str, checkers: &[CheckerOutcome], why: Why) {
+        for checker in checkers {
+            let mut counts = Counts::default();
+            checker
+                .issues
+                .iter()
+                .for_each(|issue| counts.add(issue.level));
+            self.removed(bundle, &checker.id, counts, why);
+        }
+    }
+
+    fn removed(&mut self, bundle: &str, checker: &str, counts: Counts, why: Why) {
+        if counts.total() > 0 {
+            self.pooled.removed.extend(counts);
+            let (bundle, checker) = (bundle.to_owned(), checker.to_owned());
+            self.removals.push(Removal {
+                bundle,
+                checker,
+                counts,
+                why,
+            });
+        }
+    }
+
+    /// One checker: levels, rules, places, summary.
+    fn checker(
+        &mut self,
+        entry: Option<&BundleConfig>,
+        bundle: &str,
+        mut outcome: CheckerOutcome,
+    ) -> Checker {
+        checker::settle_status(&mut outcome);
+        let configured = self
+            .config
+            .map(|config| config.effective_params(entry, &outcome.id, &[]))
+            .unwrap_or_default();
+        let mut removed = Counts::default();
+        if let Some(Selection::Selected(selected)) = entry.map(|e| e.selects(&outcome.id)) {
+            removed = checker::select(&mut outcome.issues, selected);
+            self.removed(bundle, &outcome.id, removed, Why::Levels(selected.levels));
+        }
+        for issue in &mut outcome.issues {
+            self.places.complete(issue);
+        }
+        if outcome.status == Some(Status::Error) {
+            self.pooled.failed.push(FailedChecker {
+                bundle: bundle.to_owned(),
+                checker: outcome.id.clone(),
+                reason: outcome.reason.clone(),
+            });
+        }
+        checker::finish(outcome, configured, removed)
+    }
+
+    /// `InputFile` first, then the configured parameters, then the bundle's own.
+    fn params(&self, entry: Option<&BundleConfig>, own: Vec<Param>) -> Vec<Param> {
+        let mut params = vec![Param {
+            name: INPUT_PARAMS[0].to_owned(),
+            value: self.input_file.to_owned(),
+        }];
+        let configured = self
+            .config
+            .map(|config| config.bundle_params(entry))
+            .unwrap_or_default();
+        let own = own
+            .into_iter()
+            .filter(|param| !INPUT_PARAMS.contains(&param.name.as_str()));
+        for param in configured.into_iter().chain(own) {
+            if !params.iter().any(|earlier| earlier.name == param.name) {
+                params.push(param);
+            }
+        }
+        params
+    }
+
+    /// The bundle `qcbus`, when it has something to say.
+    fn add_own(&mut self, own: BundleOutcome, remarks: Vec<Remark>) {
+        let mut all: Vec<Remark> = self
+            .config
+            .and_then(remarks::level_order)
+            .into_iter()
+            .collect();
+        all.extend(self.removals.drain(..).map(|removal| removal.to_remark()));
+        all.extend(remarks);
+        if all.is_empty() {
+            return;
+        }
+        let outcome = BundleOutcome {
+            checkers: remarks::to_checkers(all),
+            ..own
+        };
+        let name = outcome.name.clone();
+        // Never filtered: as if there were no configuration.
+        let config = self.config.take();
+        self.add(Entry::Free, (outcome, name));
+        self.config = config;
+    }
+
+    /// Numbers and counts the issues.
+    fn finish(mut self) -> Pooled {
+        let mut next = 0;
+        for bundle in &mut self.pooled.results.bundles {
+            for issue in bundle
+                .checkers
+                .iter_mut()
+                .flat_map(|checker| &mut checker.issues)
+            {
+                issue.id = next;
+                next += 1;
+                self.pooled.counts.add(issue.level);
+            }
+        }
+        self.pooled
+    }
+}
+
+/// Checkers of one id become one: ids are unique in a result, and no issue is dropped for it.
+fn merged(outcomes: Vec<CheckerOutcome>) -> Vec<CheckerOutcome> {
+    let mut all: Vec<CheckerOutcome> = Vec::with_capacity(outcomes.len());
+    let mut seen: std::collections::HashMap<String, usize> = std::collections::HashMap::new();
+    for outcome in outcomes {
+        match seen.get(&outcome.id) {
+            None => {
+                seen.insert(outcome.id.clone(), all.len());
+                all.push(outcome);
+            }
+            Some(&at) => checker::merge(&mut all[at], outcome),
+        }
+    }
+    all
+}
+
+impl Counts {
+    /// All levels together.
+    pub fn total(self) -> u64 {
+        self.errors + self.warnings + self.information
+    }
+
+    /// Counts one issue more.
+    pub fn add(&mut self, level: Level) {
+        match level {
+            Level::Error => self.errors += 1,
+            Level::Warning => self.warnings += 1,
+            Level::Information => self.information += 1,
+        }
+    }
+
+    fn extend(&mut self, other: Counts) {
+        self.errors += other.errors;
+        self.warnings += other.warnings;
+        self.information += other.information;
+    }
+}

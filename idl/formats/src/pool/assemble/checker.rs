@@ -1,0 +1,118 @@
+//! What becomes of one checker.
+
+use super::super::{CheckerOutcome, Counts, is_rule_uid};
+use super::summary;
+use crate::config::Selected;
+use crate::xqar::{Checker, Issue, Metadata, Param, Status};
+
+/// The rule of issues whose bundle named none that can be written.
+const UNNAMED: &str = "qcbus.dev:qcbus:1.0.0:pooling.rule_named";
+
+/// Key of the metadata that keep a rule UID which no reader would accept.
+const UNREADABLE: &str = "qcbus.unreadableRuleUID";
+
+/// A checker that never said how it ended, or says what cannot be, is in error.
+pub(super) fn settle_status(outcome: &mut CheckerOutcome) {
+    let wrong = match outcome.status {
+        None => "the bundle never said how it ended",
+        Some(Status::Skipped) if !outcome.issues.is_empty() => {
+            "the bundle said that it was skipped, and yet reported issues"
+        }
+        Some(_) => return,
+    };
+    outcome.status = Some(Status::Error);
+    outcome.reason = match outcome.reason.as_str() {
+        "" => wrong.to_owned(),
+        reason => format!("{wrong} ({reason})"),
+    };
+}
+
+/// Gives issues their configured level and keeps those that are wanted; returns what was removed.
+pub(super) fn select(issues: &mut Vec<Issue>, selected: Selected) -> Counts {
+    let mut removed = Counts::default();
+    issues.retain_mut(|issue| {
+        issue.level = selected.relevel.unwrap_or(issue.level);
+        let wanted = selected.levels.contains(issue.level);
+        if !wanted {
+            removed.add(issue.level);
+        }
+        wanted
+    });
+    removed
+}
+
+/// The checker as it is written.
+pub(super) fn finish(
+    mut outcome: CheckerOutcome,
+    configured: Vec<Param>,
+    removed: Counts,
+) -> Checker {
+    let summary = summary::of_checker(&outcome, removed);
+    let addressed_rules = rules(&mut outcome);
+    let mut params = outcome.params;
+    for param in configured {
+        if !params.iter().any(|used| used.name == param.name) {
+            params.push(param);
+        }
+    }
+    Checker {
+        id: outcome.id,
+        description: outcome.description,
+        summary,
+        status: outcome.status,
+        params,
+        issues: outcome.issues,
+        addressed_rules,
+        metadata: outcome.metadata,
+    }
+}
+
+/// The rules of a checker, with those that its issues name besides. UIDs that make readers refuse
+/// the whole file are kept where they do no harm.
+fn rules(outcome: &mut CheckerOutcome) -> Vec<String> {
+    let mut rules: Vec<String> = Vec::with_capacity(outcome.rule_uids.len());
+    for uid in std::mem::take(&mut outcome.rule_uids) {
+        if !is_rule_uid(&uid) {
+            outcome.metadata.push(unreadable(uid));
+        } else if !rules.contains(&uid) {
+            rules.push(uid);
+        }
+    }
+    for issue in &mut outcome.issues {
+        if !is_rule_uid(&issue.rule_uid) {
+            let given = std::mem::replace(&mut issue.rule_uid, UNNAMED.to_owned());
+            if !given.is_empty() {
+                issue.description = format!("{} (rule as given: `{given}`)", issue.description);
+            }
+        }
+        if !rules.contains(&issue.rule_uid) {
+            rules.push(issue.rule_uid.clone());
+        }
+    }
+    rules
+}
+
+fn unreadable(uid: String) -> Metadata {
+    Metadata {
+        key: UNREADABLE.to_owned(),
+        value: uid,
+        description: String::from("The bundle gave this rule UID, which is no rule UID."),
+    }
+}
+
+/// Adds a second outcome of the same checker to the first.
+pub(super) fn merge(first: &mut CheckerOutcome, second: CheckerOutcome) {
+    let worst = |status: Option<Status>| match status {
+        Some(Status::Skipped) => 0,
+        Some(Status::Completed) => 1,
+        None => 2,
+        Some(Status::Error) => 3,
+    };
+    if worst(second.status) > worst(first.status) {
+        first.status = second.status;
+        first.reason = second.reason;
+    }
+    first.rule_uids.extend(second.rule_uids);
+    first.issues.extend(second.issues);
+    first.metadata.extend(second.metadata);
+}

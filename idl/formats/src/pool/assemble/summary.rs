@@ -1,0 +1,69 @@
+//! Summaries, computed from what is really in the result.
+
+use std::fmt;
+
+use super::super::{CheckerOutcome, Counts};
+use crate::xqar::{Checker, Status};
+
+/// `23 checkers: 20 completed, 2 skipped, 1 error; 5 issues.`
+pub(super) fn of_bundle(checkers: &[Checker]) -> String {
+    let count = |status| checkers.iter().filter(|c| c.status == Some(status)).count();
+    let issues: usize = checkers.iter().map(|checker| checker.issues.len()).sum();
+    format!(
+        "{}: {} completed, {} skipped, {} error; {}.",
+        number(checkers.len(), "checker"),
+        count(Status::Completed),
+        count(Status::Skipped),
+        count(Status::Error),
+        number(issues, "issue"),
+    )
+}
+
+/// `Skipped: the file is OpenDRIVE 1.4. 0 issues.`
+pub(super) fn of_checker(outcome: &CheckerOutcome, removed: Counts) -> String {
+    let word = match outcome.status {
+        Some(Status::Completed) => "Completed",
+        Some(Status::Skipped) => "Skipped",
+        Some(Status::Error) | None => "Error",
+    };
+    let reason = outcome.reason.trim();
+    let head = match reason {
+        "" if outcome.status == Some(Status::Completed) => String::new(),
+        "" => format!("{word}. "),
+        reason if reason.ends_with(['.', '?', '!']) => format!("{word}: {reason} "),
+        reason => format!("{word}: {reason}. "),
+    };
+    let removed = match removed.total() {
+        0 => String::new(),
+        n => format!(", {n} more removed by the configuration"),
+    };
+    format!("{head}{}{removed}.", number(outcome.issues.len(), "issue"))
+}
+
+/// `1 issue`, `2 issues`.
+fn number(count: usize, what: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {what}{plural}")
+}
+
+impl fmt::Display for Counts {
+    /// `2 errors and 1 warning`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let plural = |count: u64, word: &str| match count {
+            0 => None,
+            1 => Some(format!("1 {word}")),
+            n => Some(format!("{n} {word}s")),
+        };
+        let parts = [
+            plural(self.errors, "error"),
+            plural(self.warnings, "warning"),
+            plural(self.information, "information issue"),
+        ];
+        let parts: Vec<String> = parts.into_iter().flatten().collect();
+        match &parts[..] {
+            [] => f.write_str("no issues"),
+            [one] => f.write_str(one),
+            [front @ .., last] => write!(f, "{} and {last}", front.join(", ")),
+        }
+    }
+}

@@ -1,0 +1,268 @@
+//! The content of a result file (`.xqar`), as ASAM's quality checker framework models it.
+
+use serde::{Deserialize, Serialize};
+
+/// How severe an issue is. The number is the one written to files; a smaller number is worse.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Level {
+    /// Level 1: the file breaks a rule that it must keep.
+    Error = 1,
+    /// Level 2: the file breaks a recommendation, or something looks wrong.
+    Warning = 2,
+    /// Level 3: something worth knowing.
+    Information = 3,
+}
+
+impl Level {
+    /// The level of a number as written to files.
+    pub fn from_number(number: u8) -> Option<Level> {
+        match number {
+            1 => Some(Level::Error),
+            2 => Some(Level::Warning),
+            3 => Some(Level::Information),
+            _ => None,
+        }
+    }
+
+    /// The level of a word, in any letter case, or of a number.
+    pub fn from_word(text: &str) -> Option<Level> {
+        match text.trim().to_ascii_lowercase().as_str() {
+            "error" | "1" => Some(Level::Error),
+            "warning" | "warn" | "2" => Some(Level::Warning),
+            "information" | "info" | "3" => Some(Level::Information),
+            _ => None,
+        }
+    }
+
+    /// The word for it.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Level::Error => "error",
+            Level::Warning => "warning",
+            Level::Information => "information",
+        }
+    }
+}
+
+impl Status {
+    /// The word for it, as written to files.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Status::Completed => "completed",
+            Status::Skipped => "skipped",
+            Status::Error => "error",
+        }
+    }
+}
+
+/// How a checker ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Status {
+    /// It ran to its end.
+    Completed,
+    /// It did not apply: version, kind of file or a precondition.
+    Skipped,
+    /// It should have run and did not: crash, deadline, panic, absent.
+    Error,
+}
+
+/// A whole result file: `CheckerResults`.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Results {
+    /// Version of the result format.
+    pub version: String,
+    /// Results by bundle, in configuration order.
+    pub bundles: Vec<CheckerBundle>,
+}
+
+/// What one bundle found.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct CheckerBundle {
+    /// Name, such as `xodrBundle`.
+    pub name: String,
+    /// Version of the bundle.
+    pub version: String,
+    /// Date of the build, `YYYY-MM-DD`.
+    pub build_date: String,
+    /// What the bundle checks.
+    pub description: String,
+    /// Counts of its checkers by status.
+    pub summary: String,
+    /// Effective parameters, `InputFile` among them.
+    pub params: Vec<Param>,
+    /// Its checkers, in order.
+    pub checkers: Vec<Checker>,
+}
+
+/// A named value.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Param {
+    /// Name; never empty.
+    pub name: String,
+    /// Value, as text.
+    pub value: String,
+}
+
+/// What one checker found.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Checker {
+    /// Identifier, such as `check_asam_xodr_xml_root_tag_is_opendrive`.
+    pub id: String,
+    /// What it checks.
+    pub description: String,
+    /// Why it was skipped or failed, and how many issues it found.
+    pub summary: String,
+    /// How it ended; files written by others may leave it out.
+    pub status: Option<Status>,
+    /// Effective parameters.
+    pub params: Vec<Param>,
+    /// Its findings.
+    pub issues: Vec<Issue>,
+    /// The rule UIDs that it answers for.
+    pub addressed_rules: Vec<String>,
+    /// Further facts, such as the time it took.
+    pub metadata: Vec<Metadata>,
+}
+
+/// A further fact about a checker's run.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Metadata {
+    /// Name of the fact.
+    pub key: String,
+    /// Its value.
+    pub value: String,
+    /// What it means.
+    pub description: String,
+}
+
+/// One finding.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Issue {
+    /// Running number over a whole result; given by pooling, 0 before.
+    pub id: u64,
+    /// What was found and what is allowed.
+    pub description: String,
+    /// Severity.
+    pub level: Level,
+    /// The violated rule.
+    pub rule_uid: String,
+    /// Where; every place with its own description.
+    pub locations: Vec<Locations>,
+    /// Facts that the format has no element for, such as road positions.
+    pub domain_info: Vec<DomainInfo>,
+}
+
+/// One place, described in one or several ways.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Locations {
+    /// What is to be seen here.
+    pub description: String,
+    /// The ways to find it, in the order in which they are written.
+    pub places: Vec<Location>,
+}
+
+/// One way to say where.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Location {
+    /// A place in the text of the checked file.
+    File {
+        /// Line, from 1.
+        row: u64,
+        /// Column in characters, from 1.
+        column: u64,
+        /// Offset in bytes from the start of the file as stored on disk, if known.
+        offset: Option<u64>,
+    },
+    /// An element or attribute of the checked file.
+    Xml {
+        /// An XPath 1.0 expression that selects it.
+        xpath: String,
+    },
+    /// A point in the inertial coordinate system, in metres.
+    Inertial {
+        /// East.
+        x: f64,
+        /// North.
+        y: f64,
+        /// Up.
+        z: f64,
+    },
+    /// A point in a road's coordinates, in metres.
+    Road {
+        /// `@id` of the road.
+        road_id: String,
+        /// Along the reference line.
+        s: f64,
+        /// Across it, left positive.
+        t: f64,
+    },
+    /// A point in time, in seconds.
+    Time {
+        /// Seconds from the start.
+        time: f64,
+    },
+    /// A message of a trace.
+    Message {
+        /// Number of the message.
+        index: u64,
+        /// Channel, if known.
+        channel: Option<String>,
+        /// Field of the message, if known.
+        field: Option<String>,
+        /// Time of the message in seconds, if known.
+        time: Option<f64>,
+    },
+}
+
+/// A `DomainSpecificInfo`: a name and a tree of elements.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct DomainInfo {
+    /// Name, such as `qcbus.location`.
+    pub name: String,
+    /// The elements inside.
+    pub content: Vec<InfoElement>,
+}
+
+/// One element inside a [`DomainInfo`].
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct InfoElement {
+    /// Tag.
+    pub name: String,
+    /// Attributes in order.
+    pub attributes: Vec<(String, String)>,
+    /// Text before the first child.
+    pub text: String,
+    /// Elements inside.
+    #[serde(deserialize_with = "bounded_children")]
+    pub children: Vec<InfoElement>,
+}
+
+/// Trees deeper than this are refused when they are read or decoded: every later step recurses.
+/// As JSON a whole result then stays within the 128 levels that serde_json allows.
+pub(crate) const MAX_INFO_DEPTH: usize = 48;
+
+/// Decodes the children of an [`InfoElement`]. Messages come from processes that nobody trusts,
+/// and a tree of a hundred thousand levels would overflow the stack of the one who decodes it.
+fn bounded_children<'de, D>(deserializer: D) -> Result<Vec<InfoElement>, D::Error>
+where
+    D: serde::Deserializer<'de>,
+{
+    thread_local! {
+        static DEPTH: std::cell::Cell<usize> = const { std::cell::Cell::new(0) };
+    }
+    struct Level;
+    impl Drop for Level {
+        fn drop(&mut self) {
+            DEPTH.with(|depth| depth.set(depth.get().saturating_sub(1)));
+        }
+    }
+    let depth = DEPTH.with(|depth| depth.replace(depth.get() + 1));
+    let _level = Level;
+    if depth >= MAX_INFO_DEPTH {
+        let text = format!("domain specific elements are nested deeper than {MAX_INFO_DEPTH}");
+        return Err(serde::de::Error::custom(text));
+    }
+    Vec::deserialize(deserializer)
+}

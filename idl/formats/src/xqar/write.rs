@@ -1,0 +1,288 @@
+//! Writing result files: ASAM's current form, and the form of 2023.
+
+mod info;
+mod markup;
+
+use super::{
+    Checker, CheckerBundle, Issue, Level, Location, Locations, Metadata, Param, Results, numbers,
+    road,
+};
+use markup::Markup;
+
+/// The version of the result format that is written when a result names none.
+pub const FORMAT_VERSION: &str = "1.0.0";
+
+/// Which form of the file is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Dialect {
+    /// What ASAM's framework reads today.
+    #[default]
+    Current,
+    /// The form of 2023 (QC4OpenX 1.0.0): `fileType`, `RoadLocation`, angles at
+    /// `InertialLocation`; without status, rules, metadata and domain specific facts. An issue's
+    /// rule is written in brackets behind its description.
+    Qc4Openx,
+}
+
+/// A result as text: elements in the order of ASAM's schema (Param, Issue, AddressedRule,
+/// Metadata), the same bytes for the same result. Characters that XML does not allow become
+/// U+FFFD, and names that are no names are mended, so that every result can be read again.
+///
+/// In the current form an issue's rule that its checker does not list is added to the list,
+/// because ASAM's readers refuse the whole file otherwise, and an issue's place without any
+/// location that the form knows is written as row 1, column 1.
+pub fn write(results: &Results, dialect: Dialect) -> String {
+    let mut writer = Writer {
+        out: Markup::new(),
+        dialect,
+        file_type: "1",
+    };
+    writer.results(results);
+    writer.out.finish()
+}
+
+struct Writer {
+    out: Markup,
+    dialect: Dialect,
+    /// In the form of 2023: 1 for OpenDRIVE, 2 for OpenSCENARIO.
+    file_type: &'static str,
+}
+
+impl Writer {
+    fn results(&mut self, results: &Results) {
+        let version = if results.version.is_empty() {
+            FORMAT_VERSION
+        } else {
+            &results.version
+        };
+        self.out.open("CheckerResults", &[("version", version)]);
+        for bundle in &results.bundles {
+            self.bundle(bundle);
+        }
+        self.out.close("CheckerResults");
+    }
+
+    fn bundle(&mut self, bundle: &CheckerBundle) {
+        self.file_type = file_type(bundle);
+        self.out.open(
+            "CheckerBundle",
+            &[
+                ("build_date", &bundle.build_date),
+                ("description", &bundle.description),
+                ("name", &bundle.name),
+                ("summary", &bundle.summary),
+                ("version", &bundle.version),
+            ],
+        );
+        self.params(&bundle.params);
+        if self.dialect == Dialect::Qc4Openx {
+            self.input_file_of_2023(&bundle.params);
+        }
+        for checker in &bundle.checkers {
+            self.checker(checker);
+        }
+        self.out.close("CheckerBundle");
+    }
+
+    fn checker(&mut self, checker: &Checker) {
+        let mut attributes = vec![
+            ("checkerId", checker.id.as_str()),
+            ("description", &checker.description),
+            ("summary", &checker.summary),
+        ];
+        if let (Some(status), Dialect::Current) = (checker.status, self.dialect) {
+            attributes.insert(2, ("status", status.as_str()));
+        }
+        self.out.open("Checker", &attributes);
+        self.params(&checker.params);
+        for issue in &checker.issues {
+            self.issue(issue);
+        }
+        if self.dialect == Dialect::Current {
+            self.rules(checker);
+            for Metadata {
+                key,
+                value,
+                description,
+            } in &checker.metadata
+            {
+                let attributes = [
+                    ("key", key.as_str()),
+                    ("value", value),
+                    ("description", description),
+                ];
+                self.out.empty("Metadata", &attributes);
+            }
+        }
+        self.out.close("Checker");
+    }
+
+    fn rules(&mut self, checker: &Checker) {
+        let mut written: Vec<&str> = Vec::with_capacity(checker.addressed_rules.len());
+        let listed = checker.addressed_rules.iter().map(String::as_str);
+        let broken = checker.issues.iter().map(|issue| issue.rule_uid.as_str());
+        for uid in listed.chain(broken.filter(|uid| !uid.is_empty())) {
+            if !written.contains(&uid) {
+                self.out.empty("AddressedRule", &[("ruleUID", uid)]);
+                written.push(uid);
+            }
+        }
+    }
+
+    fn params(&mut self, params: &[Param]) {
+        // A reader refuses a parameter without a name.
+        for Param { name, value } in params.iter().filter(|param| !param.name.is_empty()) {
+            self.out.empty("Param", &[("name", name), ("value", value)]);
+        }
+    }
+
+    /// In 2023 the checked file was the parameter `XodrFile` or `XoscFile`.
+    fn input_file_of_2023(&mut self, params: &[Param]) {
+        let value = |name: &str| params.iter().find(|param| param.name == name);
+        let name = if self.file_type == "2" {
+            "XoscFile"
+        } else {
+            "XodrFile"
+        };
+        if let (Some(input), None) = (value("InputFile"), value(name)) {
+            self.out
+                .empty("Param", &[("name", name), ("value", &input.value)]);
+        }
+    }
+
+    fn issue(&mut self, issue: &Issue) {
+        let id = issue.id.to_string();
+        let level = match issue.level {
+            Level::Error => "1",
+            Level::Warning => "2",
+            Level::Information => "3",
+        };
+        let mut description = issue.description.clone();
+        let old = self.dialect == Dialect::Qc4Openx;
+        if old && !issue.rule_uid.is_empty() {
+            description = format!("{description} [{}]", issue.rule_uid);
+        }
+        let mut attributes = vec![
+            ("issueId", id.as_str()),
+            ("description", &description),
+            ("level", level),
+        ];
+        if !old {
+            attributes.push(("ruleUID", &issue.rule_uid));
+        }
+        self.out.open("Issue", &attributes);
+        for place in issue
+            .locations
+            .iter()
+            .filter(|place| old || !road::only_roads(place))
+        {
+            self.locations(place);
+        }
+        if !old {
+            for info in issue
+                .domain_info
+                .iter()
+                .chain(road::to_info(issue).as_ref())
+            {
+                info::write(&mut self.out, info);
+            }
+        }
+        self.out.close("Issue");
+    }
+
+    fn locations(&mut self, place: &Locations) {
+        self.out
+            .open("Locations", &[("description", &place.description)]);
+        let mut written = false;
+        for location in &place.places {
+            written |= self.location(location);
+        }
+        if !written {
+            self.file_location(1, 1, None);
+        }
+        self.out.close("Locations");
+    }
+
+    /// Writes one location; `false` when the form has no element for it.
+    fn location(&mut self, location: &Location) -> bool {
+        let current = self.dialect == Dialect::Current;
+        match location {
+            Location::File {
+                row,
+                column,
+                offset,
+            } => self.file_location(*row, *column, *offset),
+            Location::Xml { xpath } => self.out.empty("XMLLocation", &[("xpath", xpath)]),
+            Location::Inertial { x, y, z } => self.inertial([*x, *y, *z]),
+            Location::Road { road_id, s, t } if !current => {
+                let (s, t) = (numbers::write(*s), numbers::write(*t));
+                self.out
+                    .empty("RoadLocation", &[("roadId", road_id), ("s", &s), ("t", &t)]);
+            }
+            Location::Time { time } if current => {
+                self.out
+                    .empty("TimeLocation", &[("time", &numbers::write(*time))]);
+            }
+            Location::Message {
+                index,
+                channel,
+                field,
+                time,
+            } if current => {
+                let (index, time) = (index.to_string(), time.map(numbers::write));
+                let mut attributes = vec![("index", index.as_str())];
+                attributes.extend(channel.as_ref().map(|text| ("channel", text.as_str())));
+                attributes.extend(field.as_ref().map(|text| ("field", text.as_str())));
+                attributes.extend(time.as_ref().map(|text| ("time", text.as_str())));
+                self.out.empty("MessageLocation", &attributes);
+            }
+            Location::Road { .. } | Location::Time { .. } | Location::Message { .. } => {
+                return false;
+            }
+        }
+        true
+    }
+
+    fn inertial(&mut self, [x, y, z]: [f64; 3]) {
+        let (x, y, z) = (numbers::write(x), numbers::write(y), numbers::write(z));
+        let mut attributes = vec![("x", x.as_str()), ("y", &y), ("z", &z)];
+        if self.dialect == Dialect::Qc4Openx {
+            attributes.extend([("h", "0"), ("p", "0"), ("r", "0")]);
+        }
+        self.out.empty("InertialLocation", &attributes);
+    }
+
+    fn file_location(&mut self, row: u64, column: u64, offset: Option<u64>) {
+        let (row_text, column_text) = (row.to_string(), column.to_string());
+        let place = [("row", row_text.as_str()), ("column", column_text.as_str())];
+        if self.dialect == Dialect::Qc4Openx {
+            let [row, column] = place;
+            self.out
+                .empty("FileLocation", &[("fileType", self.file_type), row, column]);
+            return;
+        }
+        let offset_text = offset.map(|offset| offset.to_string());
+        let offset = offset_text.as_ref().map(|text| ("offset", text.as_str()));
+        // Row 0 says that only the offset is known.
+        let place = if (row, column) == (0, 0) && offset.is_some() {
+            &[][..]
+        } else {
+            &place
+        };
+        let attributes: Vec<_> = place.iter().copied().chain(offset).collect();
+        self.out.empty("FileLocation", &attributes);
+    }
+}
+
+/// 2 when the bundle's input file is a scenario, else 1.
+fn file_type(bundle: &CheckerBundle) -> &'static str {
+    let value = |name: &str| bundle.params.iter().find(|param| param.name == name);
+    let scenario = match value("InputFile") {
+        Some(input) => {
+            let path = input.value.to_lowercase();
+            path.ends_with(".xosc") || path.ends_with(".mosc")
+        }
+        None => value("XoscFile").is_some() || bundle.name.contains("xosc"),
+    };
+    if scenario { "2" } else { "1" }
+}

@@ -1,0 +1,107 @@
+//! Tags, indentation and escaping.
+
+use std::fmt::Write as _;
+
+use crate::xml::is_xml_char;
+
+/// Text that grows by elements, two spaces deeper with every level.
+pub(super) struct Markup {
+    text: String,
+    depth: usize,
+}
+
+impl Markup {
+    pub fn new() -> Markup {
+        let text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\" standalone=\"no\"?>\n");
+        Markup { text, depth: 0 }
+    }
+
+    pub fn finish(self) -> String {
+        self.text
+    }
+
+    pub fn open(&mut self, name: &str, attributes: &[(&str, &str)]) {
+        self.indent();
+        self.tag(name, attributes);
+        self.text.push_str(">\n");
+        self.depth += 1;
+    }
+
+    pub fn close(&mut self, name: &str) {
+        self.depth -= 1;
+        self.indent();
+        self.end_tag(name);
+        self.text.push('\n');
+    }
+
+    pub fn empty(&mut self, name: &str, attributes: &[(&str, &str)]) {
+        self.indent();
+        self.tag(name, attributes);
+        self.text.push_str("/>\n");
+    }
+
+    pub fn indent(&mut self) {
+        for _ in 0..self.depth {
+            self.text.push_str("  ");
+        }
+    }
+
+    /// Bytes written as they are.
+    pub fn raw(&mut self, text: &str) {
+        self.text.push_str(text);
+    }
+
+    /// `<name a="…"`, without the end.
+    pub fn tag(&mut self, name: &str, attributes: &[(&str, &str)]) {
+        self.text.push('<');
+        self.text.push_str(name);
+        for (name, value) in attributes {
+            self.text.push(' ');
+            self.text.push_str(name);
+            self.text.push_str("=\"");
+            self.escape(value, true);
+            self.text.push('"');
+        }
+    }
+
+    pub fn end_tag(&mut self, name: &str) {
+        self.text.push_str("</");
+        self.text.push_str(name);
+        self.text.push('>');
+    }
+
+    pub fn characters(&mut self, text: &str) {
+        self.escape(text, false);
+    }
+
+    /// Escapes what has a meaning in markup. White space in attributes is written by number,
+    /// because readers turn it into spaces otherwise; so is a carriage return in text.
+    fn escape(&mut self, value: &str, attribute: bool) {
+        let special =
+            |c: char| c < ' ' || matches!(c, '<' | '>' | '&' | '"' | '\u{FFFE}'..='\u{FFFF}');
+        let mut rest = value;
+        while let Some(at) = rest.find(special) {
+            self.text.push_str(&rest[..at]);
+            let Some(c) = rest[at..].chars().next() else {
+                break;
+            };
+            match c {
+                '<' => self.text.push_str("&lt;"),
+                '>' => self.text.push_str("&gt;"),
+                '&' => self.text.push_str("&amp;"),
+                '"' if attribute => self.text.push_str("&quot;"),
+                '\r' => self.number(c),
+                '\t' | '\n' if attribute => self.number(c),
+                c if is_xml_char(c) => self.text.push(c),
+                _ => self.text.push('\u{FFFD}'),
+            }
+            rest = &rest[at + c.len_utf8()..];
+        }
+        self.text.push_str(rest);
+    }
+
+    fn number(&mut self, c: char) {
+        // Writing to a string cannot fail.
+        let _ = write!(self.text, "&#{};", u32::from(c));
+    }
+}

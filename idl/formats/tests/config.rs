@@ -1,0 +1,336 @@
+//! Configurations: what is understood, what is told, what is refused.
+
+#![expect(
+    clippy::unwrap_used,
+    reason = "a test fails by panicking, in its helpers too"
+)]
+
+mod common;
+
+use common::param;
+use qcbus_formats::config::{
+    Config, Known, KnownBundle, KnownChecker, Levels, Notice, Parsed, Selected, Selection,
+    reporter_for, same_bundle,
+};
+use qcbus_formats::xqar::Level;
+
+const GOOD: &str = r#"<?xml version="1.0" encoding="UTF-8" standalone="no"?>
+<Config xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance">
+  <ReportModule application="TextReport">
+    <Param name="strReportFile" value="Report.txt"/>
+  </ReportModule>
+  <CheckerBundle application="xodr">
+    <Checker checkerId="lanes" minLevel="2" maxLevel="1"/>
+    <Param name="tolerance" value="0.1"/>
+    <Checker minLevel="3" maxLevel="1" checkerId="length">
+      <Param name="tolerance" value="0.5"/>
+      <Param name="qcbus.level" value="Warning"/>
+      <Param name="own"/>
+    </Checker>
+    <Checker checkerId="free"/>
+  </CheckerBundle>
+  <Param name="XodrFile" value="myTrack.xodr"/>
+  <Param name="tolerance" value="1"/>
+  <Param name="unit" value="m"/>
+  <CheckerBundle application="mine"/>
+</Config>
+"#;
+
+fn parse(text: &str) -> Parsed {
+    Config::parse(text.as_bytes()).unwrap()
+}
+
+fn told(notices: &[Notice]) -> String {
+    let line = |n: &Notice| format!("{}:{}: {}: {}", n.row, n.column, n.level.as_str(), n.text);
+    notices.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn children_in_any_order_and_levels_by_number_or_missing() {
+    let Parsed { config, notices } = parse(GOOD);
+    assert_eq!(told(&notices), "");
+    assert_eq!(config.input_file(), Some("myTrack.xodr"));
+    let bundle = config.bundle("xodrBundle", "xodr").unwrap();
+    let ids: Vec<&str> = bundle
+        .checkers
+        .iter()
+        .map(|checker| checker.id.as_str())
+        .collect();
+    assert_eq!(ids, ["lanes", "length", "free"]);
+    assert_eq!(
+        bundle.checkers[0].levels,
+        Levels::between(Level::Warning, Level::Error)
+    );
+    assert_eq!(bundle.checkers[2].levels, Levels::ALL);
+    assert_eq!(config.reports[0].reporter, "qc-report-text");
+}
+
+#[test]
+fn selections_answer_every_case() {
+    let config = parse(GOOD).config;
+    let levels = Levels::ALL;
+    let relevelled = Selected {
+        levels,
+        relevel: Some(Level::Warning),
+    };
+    assert_eq!(
+        config.selects("xodrBundle", "xodr", "length"),
+        Selection::Selected(relevelled)
+    );
+    assert_eq!(
+        config.selects("xodrBundle", "xodr", "x"),
+        Selection::CheckerNotConfigured
+    );
+    assert_eq!(
+        config.selects("xoscBundle", "xosc", "x"),
+        Selection::BundleNotConfigured
+    );
+    assert_eq!(config.selects("mine", "m", "x"), Selection::ByDefault);
+    assert!(Selection::ByDefault.runs(true) && !Selection::ByDefault.runs(false));
+}
+
+#[test]
+fn parameters_are_inherited_checker_bundle_global_default() {
+    let config = parse(GOOD).config;
+    let bundle = config.bundle("xodrBundle", "xodr");
+    let defaults = [
+        param("tolerance", "9"),
+        param("unit", "cm"),
+        param("count", "3"),
+    ];
+    let effective = |id: &str| {
+        let params = config.effective_params(bundle, id, &defaults);
+        params
+            .iter()
+            .map(|p| format!("{}={}", p.name, p.value))
+            .collect::<Vec<_>>()
+            .join(" ")
+    };
+    assert_eq!(
+        effective("length"),
+        "tolerance=0.5 unit=m count=3 qcbus.level=Warning own="
+    );
+    assert_eq!(effective("lanes"), "tolerance=0.1 unit=m count=3");
+    let global = config.effective_params(None, "lanes", &defaults);
+    assert_eq!(global[0], param("tolerance", "1"));
+    let shared = config.bundle_params(bundle);
+    assert_eq!(shared, [param("tolerance", "0.1"), param("unit", "m")]);
+    let report = config.report_params(&config.reports[0]);
+    assert_eq!(report[0], param("strReportFile", "Report.txt"));
+    assert_eq!(report.len(), 4);
+}
+
+#[test]
+fn both_orders_of_levels_mean_the_interval() {
+    let text = |min, max| {
+        format!(
+            "<Config><CheckerBundle application='b'><Checker checkerId='c' minLevel='{min}' \
+             maxLevel='{max}'/></CheckerBundle></Config>"
+        )
+    };
+    for (min, max, levels) in [
+        (1, 3, "123"),
+        (3, 1, "123"),
+        (1, 2, "12"),
+        (2, 1, "12"),
+        (2, 2, "2"),
+    ] {
+        let Parsed { config, notices } = parse(&text(min, max));
+        let kept = config.bundles[0].checkers[0].levels;
+        let all = [Level::Error, Level::Warning, Level::Information];
+        let numbers = all
+            .iter()
+            .filter(|l| kept.contains(**l))
+            .map(|l| (*l as u8).to_string());
+        assert_eq!(numbers.collect::<String>(), levels, "{min} {max}");
+        assert_eq!(notices.len(), usize::from(min < max));
+        assert_eq!(config.old_order_notices(), notices);
+    }
+    insta::assert_snapshot!(told(&parse(&text(1, 3)).notices));
+}
+
+#[test]
+fn the_example_of_2023_is_refused_at_its_stray_quotation_mark() {
+    let broken = "<Config>\n  <Param name=\"XodrFile\" value=\"e\"myTrack.xodr\">\n  \
+                  <CheckerBundle application=\"DemoCheckerBundle\">\n    <Checker \
+                  checkerId=\"exampleChecker\" maxLevel=\"3\" minLevel=\"1\"/>\n  \
+                  </CheckerBundle>\n</Config>\n";
+    insta::assert_snapshot!(Config::parse(broken.as_bytes()).unwrap_err().to_string());
+    let repaired = broken.replace("\"e\"myTrack.xodr\">", "\"myTrack.xodr\"/>");
+    let Parsed { config, notices } = parse(&repaired);
+    assert_eq!(config.input_file(), Some("myTrack.xodr"));
+    assert_eq!(notices.len(), 1, "the old order of levels");
+}
+
+#[test]
+fn odd_things_are_told_with_their_place() {
+    let text = r#"<Config version="1" >
+  stray
+  <CheckerBundel application="x"/>
+  <CheckerBundle application="xodrBundle" aplication="y">
+    <Checker checkerId="a" minlevel="2" maxLevel="error" minLevel="7"/>
+    <Checker checkerId="a"/>
+    <Checker checkerId="b"><Param name="qcbus.level" value="eror"/><Parm/></Checker>
+    <Param name="qcbus.level" value="error"/>
+  </CheckerBundle>
+  <CheckerBundle application="xodr"><Param name="p" value="1"/>
+    <Checker checkerId="a"/><Checker checkerId="c"/>
+  </CheckerBundle>
+  <Param name="InputFile" value="a"/><Param name="InputFile" value="b"/>
+</Config>"#;
+    let Parsed { config, notices } = parse(text);
+    insta::assert_snapshot!(told(&notices));
+    let ids: Vec<&str> = config.bundles[0]
+        .checkers
+        .iter()
+        .map(|c| c.id.as_str())
+        .collect();
+    assert_eq!(ids, ["a", "b", "c"]);
+    let bundle = config.bundle("xodrBundle", "xodr");
+    assert_eq!(config.effective_params(bundle, "c", &[]), [param("p", "1")]);
+    assert_eq!(config.effective_params(bundle, "a", &[]), []);
+}
+
+#[test]
+fn what_cannot_be_used_is_refused_with_place_and_hint() {
+    let cases = [
+        "",
+        "just text",
+        "<Conf/>",
+        "<Config>\n<CheckerBundle/>\n</Config>",
+        "<Config><CheckerBundle application=' '/></Config>",
+        "<Config><CheckerBundle application='a'><Checker checkerID='c'/></CheckerBundle></Config>",
+        "<Config><Param value='1'/></Config>",
+        "<Config>\n  <Param name='a' value='1>\n  <Param name='b' value='2'/>\n</Config>",
+        "<Config><Param name=a value='1'/></Config>",
+        "<Config><Param name/></Config>",
+        "<Config><Param name='a' name='b'/></Config>",
+        "<Config><Param name='a' value='R&D'/></Config>",
+        "<Config>\n <CheckerBundle application='a'>\n</Config>",
+        "<Config>\n <Param name='ä' value='1'/></Param></Config>",
+        "<Config></Config></Config>",
+        "<Config",
+        "<Config><!-- open </Config>",
+        "<Config>&unknown;</Config>",
+        "\u{FEFF}<Config/><?xml version='1.0'?>",
+        "<?xml version='1.0' encoding='klingon'?><Config/>",
+    ];
+    let lines = cases
+        .iter()
+        .map(|case| match Config::parse(case.as_bytes()) {
+            Ok(parsed) => format!("{case:?}\n  accepted: {:?}", parsed.notices),
+            Err(error) => format!("{case:?}\n  {error}"),
+        });
+    let mut lines: Vec<String> = lines.collect();
+    let error = Config::parse(b"<Config>\n <Param name='a' value='\xFC'/></Config>").unwrap_err();
+    lines.push(format!("a Latin-1 byte\n  {error}"));
+    insta::assert_snapshot!(lines.join("\n"));
+}
+
+#[test]
+fn applications_mean_bundles_by_name_alias_and_published_name() {
+    for (application, name, alias, same) in [
+        ("xodrBundle", "xodrBundle", "xodr", true),
+        ("xodr", "xodrBundle", "xodr", true),
+        ("qc_opendrive", "xodrBundle", "xodr", true),
+        ("qc-openscenarioxml", "xoscBundle", "xosc", true),
+        ("xodrBundle", "xoscBundle", "xosc", false),
+        ("mine", "mineBundle", "mine", true),
+        ("qc_opendrive", "mine", "m", false),
+        ("", "", "", false),
+    ] {
+        assert_eq!(
+            same_bundle(application, name, alias),
+            same,
+            "{application} {name}"
+        );
+    }
+    assert_eq!(reporter_for("TextReport"), Some("qc-report-text"));
+    assert_eq!(reporter_for("qc-report-json"), Some("qc-report-json"));
+    assert_eq!(reporter_for("GithubCIReport"), None);
+}
+
+#[test]
+fn what_nobody_knows_is_told() {
+    let checker = |id: &str, params: &[&str]| KnownChecker {
+        id: id.into(),
+        params: params.iter().map(|name| (*name).into()).collect(),
+    };
+    let known = Known {
+        bundles: vec![
+            KnownBundle {
+                name: "xodrBundle".into(),
+                alias: "xodr".into(),
+                checkers: vec![
+                    checker("check_lanes", &["tolerance"]),
+                    checker("check_ids", &[]),
+                ],
+            },
+            KnownBundle {
+                name: "xoscBundle".into(),
+                alias: "xosc".into(),
+                checkers: vec![checker("check_actors", &[])],
+            },
+        ],
+        reporters: vec!["mail".into()],
+    };
+    let text = r#"<Config>
+  <Param name="InputFile" value="a"/><Param name="tolerence" value="1"/>
+  <CheckerBundle application="xodr">
+    <Param name="resultFile" value="r.xqar"/><Param name="tolerance" value="1"/>
+    <Checker checkerId="check_lane"><Param name="x"/></Checker>
+    <Checker checkerId="check_actors"/>
+    <Checker checkerId="check_lanes"><Param name="Tolerances"/><Param name="qcbus.level" value="1"/></Checker>
+  </CheckerBundle>
+  <CheckerBundle application="xodrbundel"/>
+  <CheckerBundle application="DemoCheckerBundle"/>
+  <ReportModule application="TextReprt"/>
+  <ReportModule application="GithubCIReport"/>
+  <ReportModule application="mail"/>
+  <ReportModule application="qc-report-json"/>
+</Config>"#;
+    let parsed = parse(text);
+    assert_eq!(parsed.notices, []);
+    insta::assert_snapshot!(told(&parsed.config.check(&known)));
+    let none = parse("<Config><CheckerBundle application='qc_opendrive'/></Config>").config;
+    insta::assert_snapshot!(told(&none.check(&Known::default())));
+}
+
+#[test]
+fn deep_nesting_overflows_nothing() {
+    for levels in [200, 100_000] {
+        let text = format!("<Config>{}", "<Param name='a'>".repeat(levels));
+        assert!(
+            Config::parse(text.as_bytes())
+                .unwrap_err()
+                .text
+                .contains("nested deeper")
+        );
+    }
+}
+
+#[test]
+fn a_configuration_travels_encoded() {
+    let config = parse(GOOD).config;
+    let json = serde_json::to_string(&config).unwrap();
+    assert_eq!(serde_json::from_str::<Config>(&json).unwrap(), config);
+}
+
+#[test]
+fn two_names_of_one_bundle_are_told() {
+    let known = Known {
+        bundles: vec![KnownBundle {
+            name: "mineBundle".into(),
+            alias: "mine".into(),
+            checkers: vec![],
+        }],
+        reporters: vec![],
+    };
+    let text = "<Config><CheckerBundle application='mine'/>\n<CheckerBundle application='mineBundle'/></Config>";
+    let notices = parse(text).config.check(&known);
+    assert_eq!(notices.len(), 1);
+    assert!(
+        notices[0].row == 2 && notices[0].text.contains("the same bundle"),
+        "{notices:?}"
+    );
+}

@@ -1,0 +1,123 @@
+//! Manifests: what they give, and how they say what is wrong with them.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use qcbus_formats::manifest::{Mode, Module, ModuleType, Sources, expand, load, parse_modules};
+
+const MODULE: &str = r#"{ "module": [
+  { "name": "mine", "exec_type": "executable", "module_type": "checker_bundle",
+    "exec_command": "mine -c $ASAM_QC_FRAMEWORK_CONFIG_FILE", "mode": "bus",
+    "qcbus.memory_mb": 512, "qcbus.kinds": "xodr", "else": [] },
+  { "name": "mine", "exec_type": "executable", "module_type": "report_module",
+    "exec_command": "report" } ] }"#;
+
+fn variable(name: &str) -> Option<String> {
+    (name == "HERE").then(|| String::from("/etc/qc"))
+}
+
+fn load_from(files: &[(&str, &str)], path: &str) -> Result<Vec<Module>, String> {
+    let files: HashMap<PathBuf, Vec<u8>> = files
+        .iter()
+        .map(|(path, text)| (path.into(), text.as_bytes().to_vec()))
+        .collect();
+    let read = |path: &Path| {
+        files
+            .get(path)
+            .cloned()
+            .ok_or_else(|| String::from("no such file"))
+    };
+    load(
+        Path::new(path),
+        &Sources {
+            read: &read,
+            variable: &variable,
+        },
+    )
+    .map_err(|error| error.to_string())
+}
+
+#[test]
+fn a_framework_manifest_leads_to_its_modules() {
+    let framework = r#"{"manifest_file_path": ["$HERE/a.json", "${HERE}/b.json"]}"#;
+    let empty = r#"{"module": []}"#;
+    let files = [
+        ("f.json", framework),
+        ("/etc/qc/a.json", MODULE),
+        ("/etc/qc/b.json", empty),
+    ];
+    let modules = load_from(&files, "f.json").unwrap();
+    assert_eq!(
+        modules.len(),
+        2,
+        "one name for a bundle and for a report is no clash"
+    );
+    assert_eq!(modules[0].mode, Mode::Bus);
+    assert_eq!(modules[0].module_type, ModuleType::CheckerBundle);
+    assert_eq!(modules[0].manifest, Path::new("/etc/qc/a.json"));
+    let extra = [
+        ("qcbus.kinds".into(), "xodr".into()),
+        ("qcbus.memory_mb".into(), "512".into()),
+    ];
+    assert_eq!(modules[0].extra, extra);
+    assert_eq!(modules[1].mode, Mode::Once);
+    assert_eq!(load_from(&files, "/etc/qc/a.json").unwrap(), modules);
+}
+
+#[test]
+fn variables_are_expanded_and_unknown_ones_left() {
+    for (text, expanded) in [
+        ("$HERE/x", "/etc/qc/x"),
+        ("a${HERE}b", "a/etc/qcb"),
+        ("$HEREx", "$HEREx"),
+        ("${HERE", "${HERE"),
+        ("cost: 5$", "cost: 5$"),
+        ("$$HERE", "$/etc/qc"),
+        ("${NOPE}/ä$", "${NOPE}/ä$"),
+    ] {
+        assert_eq!(expand(text, &variable), expanded);
+    }
+}
+
+#[test]
+fn errors_name_file_and_key() {
+    let module = |keys: &str| format!(r#"{{"module": [{{{keys}}}]}}"#);
+    let bundle = r#""name": "a", "exec_type": "executable", "module_type": "checker_bundle""#;
+    let cases = [
+        String::from("{ \"module\": [ }"),
+        String::from("[]"),
+        String::from("{}"),
+        String::from(r#"{"modules": []}"#),
+        String::from(r#"{"module": {}}"#),
+        String::from(r#"{"module": [1]}"#),
+        String::from(r#"{"manifest_file_path": "a.json"}"#),
+        String::from(r#"{"manifest_file_path": [1]}"#),
+        String::from(r#"{"manifest_file_path": ["$HERE/gone.json"]}"#),
+        module(bundle),
+        module(&format!(r#"{bundle}, "exec_comand": "x""#)),
+        module(&format!(r#"{bundle}, "exec_command": """#)),
+        module(&format!(r#"{bundle}, "exec_command": "x", "mode": "buss""#)),
+        module(r#""name": "a", "exec_type": "library""#),
+        module(r#""name": "a", "exec_type": "executable", "module_type": "checker-bundle""#),
+        format!(
+            r#"{{"module": [{{{bundle}, "exec_command": "x"}}, {{{bundle}, "exec_command": "y"}}]}}"#
+        ),
+    ];
+    let told = cases
+        .iter()
+        .map(|text| load_from(&[("m.json", text)], "m.json").unwrap_err());
+    let mut told: Vec<String> = told.collect();
+    told.push(load_from(&[], "none.json").unwrap_err());
+    insta::assert_snapshot!(told.join("\n"));
+}
+
+#[test]
+fn a_byte_order_mark_does_no_harm() {
+    let text = format!("\u{FEFF}{MODULE}");
+    assert_eq!(
+        parse_modules(Path::new("m.json"), text.as_bytes())
+            .unwrap()
+            .len(),
+        2
+    );
+}

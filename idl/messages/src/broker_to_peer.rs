@@ -1,0 +1,118 @@
+//! What the broker says to one bundle or reporter.
+
+use std::collections::BTreeMap;
+
+use qcbus_document::FileKind;
+use qcbus_formats::xqar::{Param, Results};
+use serde::{Deserialize, Serialize};
+
+use crate::{Digest, DocId, DocumentRole, JobId, Verdict};
+
+/// Broker → bundle or reporter.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum ToPeer {
+    /// The session is open. A bundle answers with its catalogue, a reporter with nothing.
+    Welcome {
+        /// Broker generation that this session belongs to.
+        generation: u64,
+        /// Digest of the configuration in force.
+        config: Digest,
+    },
+    /// The peer may not take part; the text says why. The session ends.
+    Refused {
+        /// For a person: what does not fit, and what to do.
+        reason: String,
+    },
+    /// Check this.
+    Job(Job),
+    /// Stop checking this; nothing sent for it counts any more. Unknown jobs are ignored.
+    Cancel {
+        /// The job.
+        job: JobId,
+    },
+    /// Report this.
+    Result(Box<ResultMessage>),
+    /// No further jobs: finish what is there, say `Leaving`, and go.
+    Drain,
+}
+
+/// One file to check.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Job {
+    /// Its number.
+    pub job: JobId,
+    /// The configuration to check under. A bundle that has not seen it yet waits for it.
+    pub config: Digest,
+    /// What the root's name promises.
+    pub kind: FileKind,
+    /// The documents, the root first.
+    pub documents: Vec<JobDocument>,
+    /// What the root refers to and could not be had.
+    pub missing: Vec<MissingDocument>,
+}
+
+/// A document of a job.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct JobDocument {
+    /// Under which it was or will be published.
+    pub doc: DocId,
+    /// What it is to the job.
+    pub role: DocumentRole,
+    /// Absolute path; for a member of an archive, the archive's path, `!` and the member's name.
+    pub path: String,
+    /// Digest of the bytes on disk; for an image of several files, see the image's sources.
+    pub digest: Digest,
+    /// Byte offset of the referring element in the root's image; 0 for the root.
+    pub referred_at: u32,
+}
+
+/// A file that the root refers to and that could not be had.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MissingDocument {
+    /// What it would have been.
+    pub role: DocumentRole,
+    /// The reference as written.
+    pub reference: String,
+    /// Where it was looked for.
+    pub path: String,
+    /// Why it could not be had, for a person.
+    pub why: String,
+    /// Byte offset of the referring element in the root's image.
+    pub referred_at: u32,
+}
+
+/// A finished job, for reporters.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ResultMessage {
+    /// The job: the same job may be sent again after a crash, so writing must be idempotent.
+    pub job: JobId,
+    /// Absolute path of the checked file.
+    pub input: String,
+    /// Path for people, relative to the directory given or watched.
+    pub display_path: String,
+    /// Absolute path of the `.xqar`.
+    pub xqar: String,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Digest of the checked file's bytes.
+    pub digest: Digest,
+    /// Digest of the configuration.
+    pub config: Digest,
+    /// Root document, readable as long as it stays on the bus.
+    pub document: Option<DocId>,
+    /// The pooled result.
+    pub results: Results,
+    /// What the rules that were broken are about, by rule UID, from the bundles' pages.
+    pub rules: BTreeMap<String, String>,
+    /// Parameters for this reporter from the configuration.
+    pub params: Vec<Param>,
+}
+
+/// What a reporter did with a result.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub enum PeerReport {
+    /// Written and safe.
+    Written,
+    /// Not written, with the reason; not tried again.
+    Failed(String),
+}

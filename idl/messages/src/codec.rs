@@ -1,0 +1,108 @@
+//! How messages become bytes. The only file that names bincode.
+
+use bincode::config::{Configuration, Fixint, Limit, LittleEndian};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+/// Largest encoded message, in bytes. A result with its issues is the largest thing said.
+pub const MAX_MESSAGE: usize = 64 << 20;
+
+/// Why bytes could not be read as a message, or a message not be written.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum CodecError {
+    /// The bytes are not such a message.
+    #[error("not a valid message: {0}")]
+    Malformed(String),
+    /// Bytes were left over after the message.
+    #[error("{0} bytes were left over after the message")]
+    TrailingBytes(usize),
+    /// The message is larger than [`MAX_MESSAGE`].
+    #[error("the message has {0} bytes, more than the {MAX_MESSAGE} allowed")]
+    TooLarge(usize),
+    /// The message cannot be written.
+    #[error("cannot encode the message: {0}")]
+    Unencodable(String),
+}
+
+type Config = Configuration<LittleEndian, Fixint, Limit<MAX_MESSAGE>>;
+
+/// The limit also bounds what a hostile length prefix can make the decoder reserve.
+const CONFIG: Config = bincode::config::legacy().with_limit::<MAX_MESSAGE>();
+
+/// Encodes a message.
+///
+/// # Errors
+/// [`CodecError::TooLarge`] above [`MAX_MESSAGE`], [`CodecError::Unencodable`] when serde refuses.
+pub fn encode<T: Serialize>(message: &T) -> Result<Vec<u8>, CodecError> {
+    let bytes = bincode::serde::encode_to_vec(message, CONFIG)
+        .map_err(|error| CodecError::Unencodable(error.to_string()))?;
+    if bytes.len() > MAX_MESSAGE {
+        return Err(CodecError::TooLarge(bytes.len()));
+    }
+    Ok(bytes)
+}
+
+/// Decodes one message that fills `bytes` entirely.
+///
+/// # Errors
+/// [`CodecError::Malformed`] or [`CodecError::TrailingBytes`]; never panics, never reserves more
+/// than the limit.
+pub fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, CodecError> {
+    if bytes.len() > MAX_MESSAGE {
+        return Err(CodecError::TooLarge(bytes.len()));
+    }
+    let (message, used) = bincode::serde::decode_from_slice(bytes, CONFIG)
+        .map_err(|error| CodecError::Malformed(error.to_string()))?;
+    if used != bytes.len() {
+        return Err(CodecError::TrailingBytes(bytes.len() - used));
+    }
+    Ok(message)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::{DocId, FromPeer, JobId, ToPeer};
+
+    #[test]
+    fn a_message_comes_back_as_it_went() {
+        let message = FromPeer::Heartbeat {
+            job: Some(JobId(7)),
+            checker: None,
+        };
+        let bytes = encode(&message).unwrap();
+        assert_eq!(decode::<FromPeer>(&bytes), Ok(message));
+    }
+
+    #[test]
+    fn trailing_bytes_are_refused() {
+        let mut bytes = encode(&FromPeer::NeedDocument { doc: DocId(1) }).unwrap();
+        bytes.push(0);
+        assert_eq!(
+            decode::<FromPeer>(&bytes),
+            Err(CodecError::TrailingBytes(1))
+        );
+    }
+
+    #[test]
+    fn a_hostile_length_is_refused_before_memory_is_reserved() {
+        // Variant 3 is `Job`; what follows claims 2^60 documents.
+        let mut bytes = vec![2, 0, 0, 0];
+        bytes.extend([0; 8 + 8 + 32 + 4]);
+        bytes.extend((1_u64 << 60).to_le_bytes());
+        assert!(matches!(
+            decode::<ToPeer>(&bytes),
+            Err(CodecError::Malformed(_))
+        ));
+    }
+
+    proptest! {
+        #[test]
+        fn arbitrary_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..512)) {
+            let _ = decode::<FromPeer>(&bytes);
+            let _ = decode::<ToPeer>(&bytes);
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! What short-lived commands say to the broker over `control.sock`: one JSON object per line.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use crate::Verdict;
+
+/// A command's request.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "request", rename_all = "kebab-case")]
+pub enum Request {
+    /// How are things?
+    Status,
+    /// Answer when the file's present bytes have a verdict.
+    Wait {
+        /// Absolute path of the file.
+        file: PathBuf,
+        /// Give up after this many milliseconds; never, when absent.
+        timeout_ms: Option<u64>,
+    },
+    /// Drain and stop.
+    Down,
+    /// Read the configuration and the bundle manifests again.
+    Reload,
+}
+
+/// The broker's answer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "response", rename_all = "kebab-case")]
+pub enum Response {
+    /// Answer to `Status`.
+    Status(Box<Status>),
+    /// Answer to `Wait`.
+    Verdict(FileVerdict),
+    /// Answer to `Wait`: the time is over.
+    TimedOut,
+    /// Answer to `Wait`: nobody watches this file, and why.
+    Unwatched {
+        /// For a person.
+        reason: String,
+    },
+    /// Answer to `Down`, sent when everything has been drained.
+    Stopped,
+    /// Answer to `Reload`: what changed, line by line; nothing when nothing did.
+    Reloaded {
+        /// For a person.
+        changes: Vec<String>,
+    },
+    /// The request could not be carried out, and what stays in force.
+    Failed {
+        /// For a person.
+        reason: String,
+    },
+}
+
+/// The verdict on one file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FileVerdict {
+    /// Absolute path.
+    pub file: PathBuf,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// SHA-256 of the bytes that it is about.
+    pub digest: String,
+    /// Where the result lies.
+    pub xqar: PathBuf,
+    /// Issues of level error.
+    pub errors: u64,
+    /// Issues of level warning.
+    pub warnings: u64,
+    /// Issues of level information.
+    pub information: u64,
+    /// For undetermined: the checkers that did not end well and why. Otherwise empty.
+    pub why: Vec<String>,
+}
+
+/// The state of a broker, as `qcbus status --json` prints it.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Status {
+    /// Name of the instance.
+    pub instance: String,
+    /// Version of the broker.
+    pub version: String,
+    /// Process id.
+    pub pid: u32,
+    /// Number of this start.
+    pub generation: u64,
+    /// Seconds since the start.
+    pub uptime_s: u64,
+    /// Watched directories.
+    pub watching: Vec<PathBuf>,
+    /// `notify` or `poll`, and why when it is not what was asked for.
+    pub watch_mode: String,
+    /// Where results go.
+    pub out: PathBuf,
+    /// Digest of the configuration in force.
+    pub config: String,
+    /// Files by state.
+    pub files: FileCounts,
+    /// The queue.
+    pub queue: QueueStatus,
+    /// Bundles and reporters.
+    pub peers: Vec<PeerStatus>,
+    /// Things a person should look at, newest last.
+    pub notices: Vec<String>,
+}
+
+/// How many files are in which state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct FileCounts {
+    /// Known and present.
+    pub total: u64,
+    /// With a verdict for their present bytes.
+    pub judged: u64,
+    /// Verdict accepted.
+    pub accepted: u64,
+    /// Verdict rejected.
+    pub rejected: u64,
+    /// Verdict undetermined.
+    pub undetermined: u64,
+}
+
+/// How much waits and how fast it goes.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct QueueStatus {
+    /// Files that wait to be checked.
+    pub waiting: u64,
+    /// Files that wait to be checked again in the background, because a bundle joined or the
+    /// configuration changed.
+    pub background: u64,
+    /// Files that are being checked.
+    pub active: u64,
+    /// Seconds that the oldest has waited.
+    pub oldest_waiting_s: f64,
+    /// Verdicts per second over the last ten seconds.
+    pub rate: f64,
+    /// Seconds until the queue is empty at this rate.
+    pub estimated_s: Option<f64>,
+}
+
+/// One bundle or reporter.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct PeerStatus {
+    /// Name.
+    pub name: String,
+    /// `bundle` or `reporter`.
+    pub role: String,
+    /// Version.
+    pub version: String,
+    /// Process id.
+    pub pid: u32,
+    /// `starting`, `ready`, `busy`, `silent`, `draining`, `down` or `gave up`.
+    pub state: String,
+    /// Checkers that it offers.
+    pub checkers: u64,
+    /// Jobs that it is working on.
+    pub active: u64,
+    /// Jobs or results done since it joined.
+    pub done: u64,
+    /// Times that it was started again.
+    pub restarts: u64,
+    /// Remarks: why it is down, that it is slow.
+    pub note: String,
+}

@@ -1,0 +1,65 @@
+//! What a bundle or reporter says to the broker.
+
+use qcbus_formats::xqar::{Issue, Metadata, Param, Status};
+use serde::{Deserialize, Serialize};
+
+use crate::{Catalogue, DocId, JobId, PeerReport};
+
+/// Bundle or reporter → broker. Nothing said for a job counts before its `JobDone`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum FromPeer {
+    /// What the bundle can do; the answer to the welcome.
+    Catalogue(Box<Catalogue>),
+    /// A document that a job needs has not arrived or was let go; please publish it again.
+    NeedDocument {
+        /// Its number.
+        doc: DocId,
+    },
+    /// Findings of one checker; any number of batches.
+    Issues {
+        /// The job.
+        job: JobId,
+        /// Index into the catalogue.
+        checker: u32,
+        /// The findings, ids still 0.
+        issues: Vec<Issue>,
+    },
+    /// One checker has ended.
+    CheckerDone {
+        /// The job.
+        job: JobId,
+        /// Index into the catalogue.
+        checker: u32,
+        /// How.
+        status: Status,
+        /// Why it was skipped or failed; empty when completed.
+        reason: String,
+        /// The parameters that it used.
+        params: Vec<Param>,
+        /// Further facts.
+        metadata: Vec<Metadata>,
+    },
+    /// All demanded checkers of the bundle have ended.
+    JobDone {
+        /// The job.
+        job: JobId,
+        /// Time spent checking, in microseconds.
+        micros: u64,
+    },
+    /// A reporter is through with a result.
+    ResultDone {
+        /// The job.
+        job: JobId,
+        /// What came of it.
+        report: PeerReport,
+    },
+    /// Still alive.
+    Heartbeat {
+        /// What it is working on.
+        job: Option<JobId>,
+        /// The checker that is running, by index into the catalogue.
+        checker: Option<u32>,
+    },
+    /// Going, all work done: the answer to `Drain`, or of its own will.
+    Leaving,
+}

@@ -1,0 +1,37 @@
+# What people type. Each recipe is one command that can be typed without `just` as well.
+
+# List the recipes.
+default:
+    @just --list
+
+# Everything that must hold before a change is merged: what CI runs.
+ready:
+    .ci/run
+
+# Format all code.
+fmt:
+    cargo fmt --all
+
+# Check with clippy, warnings denied.
+lint:
+    cargo clippy --workspace --all-targets -- -D warnings
+
+# Run all tests.
+test *ARGS:
+    cargo test --workspace {{ARGS}}
+
+# Rewrite snapshots and the expected issues of rule pages; review the difference before committing.
+bless:
+    INSTA_UPDATE=always QCBUS_BLESS=1 cargo test --workspace
+
+# Check the sample farm; ends with exit code 1, because of its faulty files.
+farm:
+    cargo run --release -- check tests/farm
+
+# Advisories, licences and bans of dependencies; needs cargo-deny.
+deny:
+    cargo deny --all-features check
+
+# Documentation of all our crates.
+doc:
+    cargo doc --workspace --no-deps --open

@@ -1,0 +1,116 @@
+//! A reporter on the bus.
+
+use std::time::Duration;
+
+use qcbus_bus::{Instance, JoinError, Peer, PeerEvent, PeerOptions};
+use qcbus_messages::{FromPeer, Hello, PROTOCOL_VERSION, ResultMessage, Role, ToPeer};
+
+use crate::{BothSources, FileSources, ImageSources, Reporter, Session, Sources};
+
+/// How often a reporter says that it lives.
+const HEARTBEAT: Duration = Duration::from_secs(1);
+
+/// Results that the broker may have under way to one reporter.
+const CAPACITY: u16 = 32;
+
+/// Who joins.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Identity {
+    /// Name, such as `qc-report-text`.
+    pub name: String,
+    /// Version of the reporter.
+    pub version: String,
+    /// The number that a supervisor gave to this start of the process.
+    pub launch: Option<u64>,
+}
+
+/// Why a reporter could not go on.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// There is no broker, or it does not take this reporter.
+    #[error("join the bus: {0}")]
+    Join(#[from] JoinError),
+    /// The session was closed for good.
+    #[error("stay on the bus: {0}")]
+    Closed(String),
+}
+
+/// Runs a reporter on the bus of `instance` until it is drained.
+///
+/// A result is acknowledged only after it was written. When the broker is lost, the bus waits for
+/// the next one and rejoins; the new broker sends again what was not acknowledged.
+///
+/// # Errors
+/// [`RunError`] when no broker takes the reporter, or none came back.
+pub async fn run(
+    instance: &Instance,
+    identity: &Identity,
+    reporter: &mut dyn Reporter,
+) -> Result<(), RunError> {
+    let mut peer = Peer::join(instance, hello(identity), PeerOptions::default()).await?;
+    let mut session = Session::new(reporter);
+    let mut beat = tokio::time::interval(HEARTBEAT);
+    while !session.has_left() {
+        let event = tokio::select! {
+            event = peer.next() => event,
+            _ = beat.tick() => {
+                peer.send(&FromPeer::Heartbeat { job: None, checker: None });
+                continue;
+            }
+        };
+        match event {
+            PeerEvent::Message(message) => answer(&mut peer, &mut session, message),
+            PeerEvent::Rejoined => session.rejoined(),
+            PeerEvent::Closed { reason } => {
+                session.finish();
+                return Err(RunError::Closed(reason));
+            }
+            // Documents are looked up when a result needs one; reporters read no configuration.
+            PeerEvent::Document(_) | PeerEvent::Config(_) => {}
+        }
+    }
+    peer.leave().await;
+    Ok(())
+}
+
+fn answer(peer: &mut Peer, session: &mut Session<'_>, message: ToPeer) {
+    let document = match &message {
+        ToPeer::Result(result) => result.document,
+        _ => None,
+    };
+    let answers = session.handle(message, |result| sources_of(peer, result));
+    if let Some(document) = document {
+        peer.forget(document);
+    }
+    for answer in answers {
+        peer.send(&answer);
+    }
+}
+
+/// The image on the bus when it is still held, the files on disk otherwise.
+fn sources_of(peer: &Peer, result: &ResultMessage) -> Box<dyn Sources> {
+    let held = result.document.and_then(|doc| peer.document(doc));
+    Box::new(BothSources {
+        image: held.map(|held| ImageSources::new(held, &result.input)),
+        files: FileSources::new(result),
+    })
+}
+
+fn hello(identity: &Identity) -> Hello {
+    Hello {
+        protocol: PROTOCOL_VERSION,
+        role: Role::Reporter,
+        name: identity.name.clone(),
+        version: identity.version.clone(),
+        incarnation: incarnation(),
+        pid: std::process::id(),
+        launch: identity.launch,
+        capacity: CAPACITY,
+    }
+}
+
+/// A number that no other process has: the standard library seeds its hashers at random.
+fn incarnation() -> u64 {
+    use std::hash::{BuildHasher as _, RandomState};
+    RandomState::new().hash_one(std::process::id())
+}

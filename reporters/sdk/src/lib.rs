@@ -1,0 +1,80 @@
+//! How a reporter runs: what it implements, and everything around it.
+//!
+//! A reporter is a value with one method, [`Reporter::report`], that writes one result. [`run`]
+//! puts it on the bus as a daemon: it joins, acknowledges each result after it was written, lives
+//! through the loss of the broker, and goes when it is drained. [`report_once`] runs the same
+//! reporter on an `.xqar` that exists already, as ASAM's report modules do.
+//!
+//! What reporters have in common lies here too: the lines of the checked files ([`Sources`]), the
+//! places of an issue with those in other files ([`places`]), and where reports go ([`Output`],
+//! [`Shelf`]).
+
+mod clean;
+mod daemon;
+mod loaded;
+mod once;
+mod output;
+mod place;
+mod session;
+mod shelf;
+mod sources;
+
+pub use clean::{one_line, printable};
+pub use daemon::{Identity, RunError, run};
+pub use loaded::{LoadError, load, verdict_of};
+pub use once::{OnceError, OneShot, report_once};
+pub use output::{Output, param, replace_file};
+pub use place::{Place, places};
+pub use session::Session;
+pub use shelf::{Format, Shelf};
+pub use sources::{Answer, BothSources, FileSources, ImageSources, Line, NoSources, Sources};
+
+use std::path::PathBuf;
+
+use qcbus_messages::ResultMessage;
+
+/// Something that writes results.
+///
+/// Writing is idempotent: the same result may be given again after a crash, and the newer result
+/// of a file takes the place of the older one.
+pub trait Reporter {
+    /// Writes one result. When this returns `Ok`, the report is where it belongs.
+    ///
+    /// # Errors
+    /// [`ReportError`] when it could not be written; it is told to the broker and not tried again.
+    fn report(&mut self, result: &ResultMessage, sources: &dyn Sources) -> Result<(), ReportError>;
+
+    /// All results have been given; brings what was collected into its final order.
+    ///
+    /// # Errors
+    /// [`ReportError`] when that could not be written.
+    fn finish(&mut self) -> Result<(), ReportError> {
+        Ok(())
+    }
+}
+
+/// Why a report could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// The file system or the stream refused.
+    #[error("write {}: {source}", path.display())]
+    Write {
+        /// The file, or `__stdout__` and `__stderr__`.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A parameter of the configuration makes no sense.
+    #[error("use the parameter {name}=\"{value}\": {why}")]
+    Param {
+        /// Its name.
+        name: String,
+        /// Its value.
+        value: String,
+        /// What is allowed.
+        why: String,
+    },
+    /// The result cannot be put in the report's form.
+    #[error("put the result in its form: {0}")]
+    Form(String),
+}

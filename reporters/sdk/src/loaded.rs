@@ -1,0 +1,159 @@
+//! A result from an `.xqar` on disk, as if it had come from the broker.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use qcbus_formats::xqar::{self, Level, Results, Status};
+use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
+
+/// Why an `.xqar` could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum LoadError {
+    /// The file system refused.
+    #[error("read {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// It is no result file.
+    #[error("read {} as a result: {why}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it, and where.
+        why: String,
+    },
+}
+
+/// Reads an `.xqar`, ours or another tool's. A result file carries no digest of the checked file
+/// and no texts of rules: `digest` is all zero and `rules` empty.
+///
+/// # Errors
+/// [`LoadError`] when it cannot be read or is no result file.
+pub fn load(path: &Path) -> Result<ResultMessage, LoadError> {
+    let bytes = std::fs::read(path).map_err(|source| LoadError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    let results = xqar::read(&bytes).map_err(|error| LoadError::Content {
+        path: path.to_owned(),
+        why: error.to_string(),
+    })?;
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let input = input_of(&results, &absolute);
+    Ok(ResultMessage {
+        job: JobId(0),
+        display_path: displayed(&input),
+        input,
+        xqar: absolute.to_string_lossy().into_owned(),
+        verdict: verdict_of(&results),
+        digest: Digest::default(),
+        config: Digest::default(),
+        document: None,
+        results,
+        rules: BTreeMap::new(),
+        params: Vec::new(),
+    })
+}
+
+/// The verdict that a pooled result stands for: rejected by an error, undetermined by a checker
+/// that should have run and did not. A checker without status, as other tools write it, is taken
+/// at its issues.
+pub fn verdict_of(results: &Results) -> Verdict {
+    let mut checkers = results.bundles.iter().flat_map(|bundle| &bundle.checkers);
+    let mut issues = checkers.clone().flat_map(|checker| &checker.issues);
+    if issues.any(|issue| issue.level == Level::Error) {
+        Verdict::Rejected
+    } else if checkers.any(|checker| checker.status == Some(Status::Error)) {
+        Verdict::Undetermined
+    } else {
+        Verdict::Accepted
+    }
+}
+
+/// The checked file: the first bundle's `InputFile` (or its older names). A relative one is meant
+/// from the directory of the result, unless it is there from the current directory.
+fn input_of(results: &Results, xqar: &Path) -> String {
+    let params = results.bundles.iter().flat_map(|bundle| &bundle.params);
+    let named = params
+        .filter(|param| qcbus_formats::config::INPUT_PARAMS.contains(&param.name.as_str()))
+        .map(|param| param.value.as_str())
+        .find(|value| !value.is_empty());
+    let Some(named) = named else {
+        return String::new();
+    };
+    let here = std::path::absolute(named).unwrap_or_else(|_| PathBuf::from(named));
+    let beside = xqar.with_file_name(named);
+    let path = if !here.exists() && beside.exists() {
+        beside
+    } else {
+        here
+    };
+    path.to_string_lossy().into_owned()
+}
+
+/// The path as a person in the current directory would write it.
+fn displayed(input: &str) -> String {
+    let current = std::env::current_dir().unwrap_or_default();
+    let path = Path::new(input);
+    let short = path.strip_prefix(&current).unwrap_or(path);
+    short.to_string_lossy().into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use qcbus_formats::xqar::{Checker, CheckerBundle, Issue};
+
+    use super::*;
+
+    fn results(status: Option<Status>, level: Option<Level>) -> Results {
+        let issue = |level| Issue {
+            id: 0,
+            description: String::new(),
+            level,
+            rule_uid: String::new(),
+            locations: Vec::new(),
+            domain_info: Vec::new(),
+        };
+        let checker = Checker {
+            status,
+            issues: level.map(issue).into_iter().collect(),
+            ..Checker::default()
+        };
+        let bundle = CheckerBundle {
+            checkers: vec![checker],
+            ..CheckerBundle::default()
+        };
+        Results {
+            version: "1.0.0".into(),
+            bundles: vec![bundle],
+        }
+    }
+
+    #[test]
+    fn the_verdict_follows_from_issues_and_statuses() {
+        let of = |status, level| verdict_of(&results(status, level));
+        assert_eq!(of(Some(Status::Completed), None), Verdict::Accepted);
+        assert_eq!(of(Some(Status::Skipped), None), Verdict::Accepted);
+        assert_eq!(of(None, None), Verdict::Accepted);
+        assert_eq!(of(Some(Status::Error), None), Verdict::Undetermined);
+        assert_eq!(of(None, Some(Level::Warning)), Verdict::Accepted);
+        assert_eq!(
+            of(Some(Status::Error), Some(Level::Error)),
+            Verdict::Rejected
+        );
+    }
+
+    #[test]
+    fn what_is_no_result_says_which_file_and_why() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.xqar");
+        let missing = load(&path).unwrap_err().to_string();
+        assert!(missing.contains("a.xqar"), "{missing}");
+        std::fs::write(&path, "<CheckerResults").unwrap();
+        let broken = load(&path).unwrap_err().to_string();
+        assert!(broken.contains("as a result"), "{broken}");
+    }
+}

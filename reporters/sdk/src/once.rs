@@ -1,0 +1,100 @@
+//! A reporter on a result file that exists already, as ASAM's report modules run.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use qcbus_formats::config::Config;
+use qcbus_formats::xqar::Param;
+
+use crate::loaded::{LoadError, load};
+use crate::{FileSources, ReportError, Reporter, param};
+
+/// The result file that ASAM's runtime writes, meant when a configuration names none.
+const DEFAULT_RESULT: &str = "Result.xqar";
+
+/// What to report on.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct OneShot {
+    /// The result file (`-x`). It wins over the configuration's.
+    pub xqar: Option<PathBuf>,
+    /// A configuration (`-c`): the parameters of this reporter's `ReportModule`. Its `InputFile`
+    /// names the result file.
+    pub config: Option<PathBuf>,
+    /// Parameters that win over the configuration's.
+    pub params: Vec<Param>,
+    /// What rules are about, by UID; a result file does not say it.
+    pub rules: BTreeMap<String, String>,
+}
+
+/// Why there is no report.
+#[derive(Debug, thiserror::Error)]
+pub enum OnceError {
+    /// The configuration cannot be used.
+    #[error("read the configuration {}: {why}", path.display())]
+    Config {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it, and where.
+        why: String,
+    },
+    /// The result file cannot be used.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// The report cannot be written.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+}
+
+/// Reports on one result file. `name` is the reporter's, such as `qc-report-text`.
+///
+/// # Errors
+/// [`OnceError`]
+pub fn report_once(
+    reporter: &mut dyn Reporter,
+    name: &str,
+    what: &OneShot,
+) -> Result<(), OnceError> {
+    let mut params = match &what.config {
+        Some(path) => configured(path, name)?,
+        None => Vec::new(),
+    };
+    params.extend(what.params.iter().cloned());
+    let named = param(&params, "InputFile").map(PathBuf::from);
+    let xqar = what.xqar.clone().or(named);
+    let mut result = load(&xqar.unwrap_or_else(|| PathBuf::from(DEFAULT_RESULT)))?;
+    // Who asks for one report wants to see it.
+    if param(&params, "OutputFile").is_none() {
+        params.push(Param {
+            name: "OutputFile".into(),
+            value: "__stdout__".into(),
+        });
+    }
+    result.params = params;
+    result.rules.clone_from(&what.rules);
+    reporter.report(&result, &FileSources::new(&result))?;
+    reporter.finish()?;
+    Ok(())
+}
+
+/// The global parameters, then those of this reporter's module. The global `InputFile` is the
+/// checked file and means nothing to a report.
+fn configured(path: &Path, name: &str) -> Result<Vec<Param>, OnceError> {
+    let wrong = |why: String| OnceError::Config {
+        path: path.to_owned(),
+        why,
+    };
+    let bytes = std::fs::read(path).map_err(|error| wrong(error.to_string()))?;
+    let parsed = Config::parse(&bytes).map_err(|error| wrong(error.to_string()))?;
+    for notice in &parsed.notices {
+        let (row, column) = (notice.row, notice.column);
+        tracing::warn!("{}:{row}:{column}: {}", path.display(), notice.text);
+    }
+    let config = parsed.config;
+    let global = config
+        .params
+        .iter()
+        .filter(|param| !qcbus_formats::config::INPUT_PARAMS.contains(&param.name.as_str()));
+    let module = config.reports.iter().find(|report| report.reporter == name);
+    let own = module.iter().flat_map(|report| &report.params);
+    Ok(global.chain(own).map(|param| param.to_param()).collect())
+}

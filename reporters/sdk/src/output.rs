@@ -1,0 +1,174 @@
+//! Where reports go, and how a file is replaced so that nobody sees half of it.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use qcbus_formats::xqar::Param;
+use qcbus_messages::ResultMessage;
+
+use crate::ReportError;
+
+/// Where reports go: the parameter `OutputFile`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Output {
+    /// No parameter: one report per result, beside it. `a.xodr.xqar` gets `a.xodr.txt`.
+    BesideResult,
+    /// The name of a directory that exists, or any name that ends in `/`: one report per result,
+    /// under its path for people.
+    Directory(PathBuf),
+    /// Any other name: one file that holds the newest report of every checked file.
+    File(PathBuf),
+    /// `__stdout__`, ASAM's name for it.
+    Stdout,
+    /// `__stderr__`, likewise.
+    Stderr,
+}
+
+impl Output {
+    /// What `OutputFile` asks for. Relative names are meant from the current directory.
+    pub fn of(params: &[Param]) -> Output {
+        match param(params, "OutputFile") {
+            None | Some("") => Output::BesideResult,
+            Some("__stdout__") => Output::Stdout,
+            Some("__stderr__") => Output::Stderr,
+            Some(name) if name.ends_with('/') || Path::new(name).is_dir() => {
+                Output::Directory(PathBuf::from(name))
+            }
+            Some(name) => Output::File(PathBuf::from(name)),
+        }
+    }
+
+    /// The file that a result's own report goes to; `None` for streams and the one file for all.
+    /// `suffix` is without a dot.
+    pub fn own_file(&self, result: &ResultMessage, suffix: &str) -> Option<PathBuf> {
+        match self {
+            Output::BesideResult => {
+                let stem = result.xqar.strip_suffix(".xqar").unwrap_or(&result.xqar);
+                Some(PathBuf::from(format!("{stem}.{suffix}")))
+            }
+            Output::Directory(directory) => {
+                let path = format!("{}.{suffix}", result.display_path);
+                Some(directory.join(inside(Path::new(&path))))
+            }
+            Output::File(_) | Output::Stdout | Output::Stderr => None,
+        }
+    }
+}
+
+/// The value of a parameter; the last one wins, as the more specific are written later.
+pub fn param<'p>(params: &'p [Param], name: &str) -> Option<&'p str> {
+    let mut named = params.iter().rev().filter(|param| param.name == name);
+    named.next().map(|param| param.value.as_str())
+}
+
+/// Replaces a file in one step: a temporary file in the same directory is written, synced and
+/// renamed. Missing directories are made.
+///
+/// # Errors
+/// [`ReportError::Write`] with the name of the file.
+pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
+    replace(path, bytes).map_err(|source| ReportError::Write {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let directory = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    std::fs::create_dir_all(directory)?;
+    // The name says who writes, so that a broker can sweep what a killed process has left.
+    let mut file = tempfile::Builder::new()
+        .prefix(&format!(".qcbus-{}-", std::process::id()))
+        .suffix(".tmp")
+        .permissions(open_to_readers())
+        .tempfile_in(directory)?;
+    file.write_all(bytes)?;
+    file.as_file().sync_data()?;
+    file.persist(path)?;
+    Ok(())
+}
+
+/// Temporary files are private by default; a report is for whoever the umask lets read it.
+fn open_to_readers() -> std::fs::Permissions {
+    use std::os::unix::fs::PermissionsExt as _;
+    std::fs::Permissions::from_mode(0o666)
+}
+
+/// The path without what would lead out of the directory that it is joined to.
+fn inside(path: &Path) -> PathBuf {
+    use std::path::Component;
+    path.components()
+        .filter(|part| matches!(part, Component::Normal(_)))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::session::samples::result;
+
+    fn params(value: &str) -> Vec<Param> {
+        vec![Param {
+            name: "OutputFile".into(),
+            value: value.into(),
+        }]
+    }
+
+    #[test]
+    fn the_parameter_decides_where_reports_go() {
+        let result = result(1, "maps/a.xodr");
+        assert_eq!(Output::of(&[]), Output::BesideResult);
+        assert_eq!(
+            Output::of(&[]).own_file(&result, "txt"),
+            Some(PathBuf::from("/out/maps/a.xodr.txt"))
+        );
+        assert_eq!(
+            Output::of(&params("r/")).own_file(&result, "json"),
+            Some(PathBuf::from("r/maps/a.xodr.json"))
+        );
+        assert_eq!(
+            Output::of(&params("all.txt")),
+            Output::File("all.txt".into())
+        );
+        assert_eq!(Output::of(&params("__stdout__")), Output::Stdout);
+    }
+
+    #[test]
+    fn a_path_for_people_cannot_lead_out_of_the_directory() {
+        let result = result(1, "../../etc/a.xodr");
+        assert_eq!(
+            Output::of(&params("r/")).own_file(&result, "txt"),
+            Some(PathBuf::from("r/etc/a.xodr.txt"))
+        );
+    }
+
+    #[test]
+    fn the_more_specific_parameter_wins() {
+        let mut both = params("global.txt");
+        both.extend(params("own.txt"));
+        assert_eq!(param(&both, "OutputFile"), Some("own.txt"));
+        assert_eq!(param(&both, "Indent"), None);
+    }
+
+    #[test]
+    fn a_file_is_replaced_and_nothing_is_left_beside_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("new/report.txt");
+        replace_file(&path, b"one").unwrap();
+        replace_file(&path, b"two").unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"two");
+        let entries = std::fs::read_dir(path.parent().unwrap()).unwrap().count();
+        assert_eq!(entries, 1);
+    }
+
+    #[test]
+    fn a_refusal_names_the_file() {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join("file"), "").unwrap();
+        let error = replace_file(&dir.path().join("file/report.txt"), b"x").unwrap_err();
+        assert!(error.to_string().contains("file/report.txt"), "{error}");
+    }
+}

@@ -1,0 +1,219 @@
+//! The places of an issue, with those that lie in other files.
+
+use qcbus_formats::location::OtherPlace;
+use qcbus_formats::xqar::{Issue, Location, Locations};
+
+/// One place of an issue, put together from the several ways in which a result says where.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Place {
+    /// The file; `None` is the checked file itself.
+    pub path: Option<String>,
+    /// Line, from 1. Other tools' 0 for "unknown" has become `None`.
+    pub row: Option<u64>,
+    /// Column in characters, from 1. Other tools' 0 for "unknown" has become `None`.
+    pub column: Option<u64>,
+    /// Bytes from the start of the file, if known.
+    pub offset: Option<u64>,
+    /// The element or attribute.
+    pub xpath: Option<String>,
+    /// The road's id, `s` and `t` in metres.
+    pub road: Option<(String, f64, f64)>,
+    /// `x`, `y` and `z` in metres.
+    pub inertial: Option<(f64, f64, f64)>,
+    /// Seconds from the start.
+    pub time: Option<f64>,
+    /// Number of a trace's message, and its channel.
+    pub message: Option<(u64, String)>,
+    /// What is to be seen there.
+    pub description: String,
+    /// Row and column in the checked file from where another file is referred to.
+    pub referred_at: Option<(u64, u64)>,
+    /// Further rows and columns under the same description.
+    pub also: Vec<(u64, u64)>,
+}
+
+/// The places of an issue in their order; the first is the main one.
+pub fn places(issue: &Issue) -> Vec<Place> {
+    let elsewhere = OtherPlace::of_issue(issue);
+    if let ([], [place]) = (issue.locations.as_slice(), elsewhere.as_slice()) {
+        return vec![moved(place, Place::default(), "")];
+    }
+    let place_of = |locations: &Locations| {
+        let gathered = gather(locations);
+        let Some((named, text)) = OtherPlace::from_description(&locations.description) else {
+            return gathered;
+        };
+        // Only what the issue also carries as a place is one; a text may look like it by chance.
+        let same = |other: &&OtherPlace| {
+            (&other.path, other.row, other.column) == (&named.path, named.row, named.column)
+        };
+        match elsewhere.iter().find(same) {
+            Some(other) => moved(other, gathered, text),
+            None => gathered,
+        }
+    };
+    issue.locations.iter().map(place_of).collect()
+}
+
+/// Everything that one `Locations` says.
+fn gather(locations: &Locations) -> Place {
+    let mut place = Place {
+        description: locations.description.trim().to_owned(),
+        ..Place::default()
+    };
+    let mut seen_file = false;
+    for location in &locations.places {
+        match location {
+            Location::File {
+                row,
+                column,
+                offset,
+            } if !seen_file => {
+                seen_file = true;
+                (place.row, place.column) = (from_one(*row), from_one(*column));
+                place.offset = *offset;
+            }
+            Location::File { row, column, .. } => place.also.push((*row, *column)),
+            other => gather_one(&mut place, other),
+        }
+    }
+    let main = (place.row.unwrap_or(0), place.column.unwrap_or(0));
+    place.also.retain(|&other| other != main && other.0 > 0);
+    place
+}
+
+fn gather_one(place: &mut Place, location: &Location) {
+    match location {
+        Location::File { .. } => {}
+        Location::Xml { xpath } => {
+            place.xpath.get_or_insert_with(|| xpath.clone());
+        }
+        Location::Inertial { x, y, z } => {
+            place.inertial.get_or_insert((*x, *y, *z));
+        }
+        Location::Road { road_id, s, t } => {
+            place.road.get_or_insert_with(|| (road_id.clone(), *s, *t));
+        }
+        Location::Time { time } => {
+            place.time.get_or_insert(*time);
+        }
+        Location::Message { index, channel, .. } => {
+            let channel = channel.clone().unwrap_or_default();
+            place.message.get_or_insert((*index, channel));
+        }
+    }
+}
+
+/// What was gathered is the reference in the checked file; the place itself is in the other file.
+fn moved(other: &OtherPlace, gathered: Place, description: &str) -> Place {
+    let referred_at = gathered
+        .row
+        .map(|row| (row, gathered.column.unwrap_or_default()));
+    Place {
+        description: description.trim().to_owned(),
+        referred_at,
+        offset: None,
+        path: Some(other.path.clone()),
+        row: from_one(other.row),
+        column: from_one(other.column),
+        xpath: other.xpath.clone(),
+        also: Vec::new(),
+        ..gathered
+    }
+}
+
+fn from_one(number: u64) -> Option<u64> {
+    (number > 0).then_some(number)
+}
+
+#[cfg(test)]
+mod tests {
+    use qcbus_formats::xqar::{DomainInfo, Level};
+
+    use super::*;
+
+    fn issue(locations: Vec<Locations>, domain_info: Vec<DomainInfo>) -> Issue {
+        Issue {
+            id: 1,
+            description: "text".into(),
+            level: Level::Error,
+            rule_uid: "a:b:1.0.0:c.d".into(),
+            locations,
+            domain_info,
+        }
+    }
+
+    fn at(description: &str, row: u64, column: u64) -> Locations {
+        Locations {
+            description: description.into(),
+            places: vec![
+                Location::File {
+                    row,
+                    column,
+                    offset: None,
+                },
+                Location::Xml { xpath: "/a".into() },
+            ],
+        }
+    }
+
+    fn elsewhere(path: &str, row: u64, column: u64) -> OtherPlace {
+        OtherPlace {
+            path: path.into(),
+            row,
+            column,
+            xpath: Some("/map/road[2]".into()),
+        }
+    }
+
+    #[test]
+    fn a_place_in_another_file_keeps_where_it_is_referred_to() {
+        let found = places(&issue(
+            vec![at("here", 3, 4), at("/m/t.xodr:12:5: the road", 7, 9)],
+            vec![elsewhere("/m/t.xodr", 12, 5).to_info()],
+        ));
+        assert_eq!(found[0].path, None);
+        assert_eq!(found[1].path.as_deref(), Some("/m/t.xodr"));
+        assert_eq!((found[1].row, found[1].column), (Some(12), Some(5)));
+        assert_eq!(found[1].xpath.as_deref(), Some("/map/road[2]"));
+        assert_eq!(found[1].referred_at, Some((7, 9)));
+        assert_eq!(found[1].description, "the road");
+    }
+
+    #[test]
+    fn a_longer_number_is_another_place() {
+        let found = places(&issue(
+            vec![at("/m/t.xodr:12:51: x", 7, 9), at("y", 1, 1)],
+            vec![elsewhere("/m/t.xodr", 12, 5).to_info()],
+        ));
+        assert_eq!(found[0].path, None);
+    }
+
+    #[test]
+    fn zeros_mean_unknown_and_repeats_are_dropped() {
+        let mut locations = at("x", 0, 0);
+        for row in [0, 8] {
+            locations.places.push(Location::File {
+                row,
+                column: 0,
+                offset: None,
+            });
+        }
+        let found = places(&issue(vec![locations], Vec::new()));
+        assert_eq!((found[0].row, found[0].column), (None, None));
+        assert_eq!(found[0].also, [(8, 0)]);
+    }
+
+    #[test]
+    fn without_locations_the_other_file_is_the_place() {
+        let found = places(&issue(
+            Vec::new(),
+            vec![elsewhere("/c.xosc", 0, 4).to_info()],
+        ));
+        assert_eq!(found.len(), 1);
+        assert_eq!(
+            (found[0].path.as_deref(), found[0].row),
+            (Some("/c.xosc"), None)
+        );
+    }
+}

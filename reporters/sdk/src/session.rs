@@ -1,0 +1,208 @@
+//! What a reporter answers to the broker, without the bus.
+
+use std::collections::VecDeque;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use qcbus_messages::{FromPeer, JobId, PeerReport, ResultMessage, ToPeer};
+
+use crate::{Reporter, Sources};
+
+/// How many results are remembered as written. More than any broker has under way.
+const REMEMBERED: usize = 4096;
+
+/// One reporter's side of the conversation with a broker: messages in, answers out.
+pub struct Session<'r> {
+    reporter: &'r mut dyn Reporter,
+    written: VecDeque<(JobId, String)>,
+    left: bool,
+}
+
+impl<'r> Session<'r> {
+    /// A conversation that has not begun.
+    pub fn new(reporter: &'r mut dyn Reporter) -> Session<'r> {
+        Session {
+            reporter,
+            written: VecDeque::new(),
+            left: false,
+        }
+    }
+
+    /// What to say to `message`. `sources` gives the lines of a result's files and is asked only
+    /// when the result is written.
+    pub fn handle<'s>(
+        &mut self,
+        message: ToPeer,
+        sources: impl FnOnce(&ResultMessage) -> Box<dyn Sources + 's>,
+    ) -> Vec<FromPeer> {
+        match message {
+            ToPeer::Result(result) => vec![FromPeer::ResultDone {
+                job: result.job,
+                report: self.write(&result, sources),
+            }],
+            ToPeer::Drain => {
+                self.finish();
+                vec![FromPeer::Leaving]
+            }
+            // The bus answers the first two; jobs are for bundles.
+            ToPeer::Welcome { .. }
+            | ToPeer::Refused { .. }
+            | ToPeer::Job(_)
+            | ToPeer::Cancel { .. } => Vec::new(),
+        }
+    }
+
+    /// Whether the reporter has said that it leaves.
+    pub fn has_left(&self) -> bool {
+        self.left
+    }
+
+    /// A new broker: its job numbers have nothing to do with the old one's.
+    pub fn rejoined(&mut self) {
+        self.written.clear();
+    }
+
+    /// No more results will come; what the reporter cannot bring to its end is logged.
+    pub fn finish(&mut self) {
+        if self.left {
+            return;
+        }
+        self.left = true;
+        if let Err(error) = self.reporter.finish() {
+            tracing::error!("failed to {error}");
+        }
+    }
+
+    fn write<'s>(
+        &mut self,
+        result: &ResultMessage,
+        sources: impl FnOnce(&ResultMessage) -> Box<dyn Sources + 's>,
+    ) -> PeerReport {
+        let key = (result.job, result.input.clone());
+        if self.written.contains(&key) {
+            return PeerReport::Written;
+        }
+        let sources = sources(result);
+        let report = AssertUnwindSafe(|| self.reporter.report(result, sources.as_ref()));
+        // A result that makes a reporter panic must not come back after each restart.
+        match catch_unwind(report) {
+            Ok(Ok(())) => {
+                self.remember(key);
+                PeerReport::Written
+            }
+            Ok(Err(error)) => PeerReport::Failed(format!("failed to {error}")),
+            Err(_) => PeerReport::Failed("the reporter panicked over this result".into()),
+        }
+    }
+
+    fn remember(&mut self, key: (JobId, String)) {
+        if self.written.len() == REMEMBERED {
+            self.written.pop_front();
+        }
+        self.written.push_back(key);
+    }
+}
+
+/// Results for the tests of this crate.
+#[cfg(test)]
+pub(crate) mod samples {
+    use std::collections::BTreeMap;
+
+    use qcbus_formats::xqar::Results;
+    use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
+
+    /// An accepted result without checkers.
+    pub(crate) fn result(job: u64, display_path: &str) -> ResultMessage {
+        ResultMessage {
+            job: JobId(job),
+            input: format!("/in/{display_path}"),
+            display_path: display_path.into(),
+            xqar: format!("/out/{display_path}.xqar"),
+            verdict: Verdict::Accepted,
+            digest: Digest::default(),
+            config: Digest::default(),
+            document: None,
+            results: Results::default(),
+            rules: BTreeMap::new(),
+            params: Vec::new(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::samples::result;
+    use super::*;
+    use crate::{NoSources, ReportError};
+
+    #[derive(Default)]
+    struct Notebook {
+        written: Vec<String>,
+        finished: usize,
+    }
+
+    impl Reporter for Notebook {
+        fn report(&mut self, result: &ResultMessage, _: &dyn Sources) -> Result<(), ReportError> {
+            assert!(result.display_path != "panics.xodr", "asked to");
+            if result.display_path == "fails.xodr" {
+                return Err(ReportError::Form("it is full".into()));
+            }
+            self.written.push(result.display_path.clone());
+            Ok(())
+        }
+
+        fn finish(&mut self) -> Result<(), ReportError> {
+            self.finished += 1;
+            Ok(())
+        }
+    }
+
+    fn tell(session: &mut Session<'_>, job: u64, path: &str) -> PeerReport {
+        let message = ToPeer::Result(Box::new(result(job, path)));
+        match session.handle(message, |_| Box::new(NoSources)).as_slice() {
+            [FromPeer::ResultDone { job: done, report }] if *done == JobId(job) => report.clone(),
+            other => panic!("unexpected answer {other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_result_that_comes_again_is_acknowledged_and_not_written_again() {
+        let mut notebook = Notebook::default();
+        let mut session = Session::new(&mut notebook);
+        assert_eq!(tell(&mut session, 1, "a.xodr"), PeerReport::Written);
+        assert_eq!(tell(&mut session, 1, "a.xodr"), PeerReport::Written);
+        assert_eq!(tell(&mut session, 2, "a.xodr"), PeerReport::Written);
+        session.rejoined();
+        assert_eq!(tell(&mut session, 1, "a.xodr"), PeerReport::Written);
+        assert_eq!(notebook.written, ["a.xodr", "a.xodr", "a.xodr"]);
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_said_with_the_reason() {
+        let mut notebook = Notebook::default();
+        let mut session = Session::new(&mut notebook);
+        let PeerReport::Failed(why) = tell(&mut session, 1, "fails.xodr") else {
+            panic!("it was not written");
+        };
+        assert_eq!(why, "failed to put the result in its form: it is full");
+    }
+
+    #[test]
+    fn a_panic_costs_one_result() {
+        let mut notebook = Notebook::default();
+        let mut session = Session::new(&mut notebook);
+        let report = tell(&mut session, 1, "panics.xodr");
+        assert!(matches!(report, PeerReport::Failed(_)), "{report:?}");
+        assert_eq!(tell(&mut session, 2, "b.xodr"), PeerReport::Written);
+    }
+
+    #[test]
+    fn drain_finishes_once_and_leaves() {
+        let mut notebook = Notebook::default();
+        let mut session = Session::new(&mut notebook);
+        let answer = session.handle(ToPeer::Drain, |_| Box::new(NoSources));
+        assert_eq!(answer, [FromPeer::Leaving]);
+        assert!(session.has_left());
+        session.finish();
+        assert_eq!(notebook.finished, 1);
+    }
+}

@@ -1,0 +1,280 @@
+//! The lines of the checked files, for reports that show them.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::ops::Deref;
+use std::path::Path;
+use std::time::SystemTime;
+
+use qcbus_document::Document;
+use qcbus_ingest::Limits;
+use qcbus_messages::{Digest, ResultMessage};
+
+/// Gives lines of files. A line that may not be the one that was checked is not given.
+pub trait Sources {
+    /// Line `row` (from 1) of the file at `path`, without its end; of a very long line the part
+    /// around the character at column `near` (from 1).
+    fn line(&self, path: &str, row: u64, near: u64) -> Option<Line>;
+}
+
+/// A line, or a part of a very long one: some maps are one line of many megabytes.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Line {
+    /// Its characters.
+    pub text: String,
+    /// How many characters of the line come before `text`.
+    pub skipped: u64,
+    /// Whether the line goes on after `text`.
+    pub goes_on: bool,
+}
+
+impl From<&str> for Line {
+    fn from(text: &str) -> Line {
+        Line {
+            text: text.to_owned(),
+            ..Line::default()
+        }
+    }
+}
+
+/// Characters that are given of a line on each side of the column asked for.
+const REACH: usize = 1000;
+
+/// No lines at all.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct NoSources;
+
+impl Sources for NoSources {
+    fn line(&self, _: &str, _: u64, _: u64) -> Option<Line> {
+        None
+    }
+}
+
+/// Lines out of a document image: those of the root file and of what it includes.
+pub struct ImageSources<B> {
+    image: B,
+    input: String,
+    files: RefCell<BTreeMap<String, Index>>,
+}
+
+/// What a source knows about a line.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Answer {
+    /// The line.
+    Line(Line),
+    /// The file is known and has no such line.
+    NoSuchLine,
+    /// The file is not part of this source.
+    OtherFile,
+}
+
+impl<B: Deref<Target = [u8]>> ImageSources<B> {
+    /// Lines of `image`, whose root is the file at `input`: files with equal bytes share one
+    /// image, so the image may name its root differently. A damaged image gives no lines.
+    pub fn new(image: B, input: &str) -> ImageSources<B> {
+        ImageSources {
+            image,
+            input: input.to_owned(),
+            files: RefCell::default(),
+        }
+    }
+
+    /// Whether the image holds that file, and its line.
+    pub fn answer(&self, path: &str, row: u64, near: u64) -> Answer {
+        let Ok(document) = Document::open(&self.image) else {
+            return Answer::OtherFile;
+        };
+        let mut sources = document.sources();
+        let source = if path == self.input {
+            sources.next()
+        } else {
+            sources.skip(1).find(|source| source.path == path)
+        };
+        let Some(source) = source else {
+            return Answer::OtherFile;
+        };
+        let text = document.source_text(&source);
+        let mut files = self.files.borrow_mut();
+        let index = files
+            .entry(path.to_owned())
+            .or_insert_with(|| Index::of(text));
+        match index.line(text, row) {
+            Some(line) => Answer::Line(index.part(line, near)),
+            None => Answer::NoSuchLine,
+        }
+    }
+}
+
+impl<B: Deref<Target = [u8]>> Sources for ImageSources<B> {
+    fn line(&self, path: &str, row: u64, near: u64) -> Option<Line> {
+        match self.answer(path, row, near) {
+            Answer::Line(line) => Some(line),
+            Answer::NoSuchLine | Answer::OtherFile => None,
+        }
+    }
+}
+
+/// Lines from an image where it has the file, from the disk otherwise.
+pub struct BothSources<B> {
+    /// Asked first.
+    pub image: Option<ImageSources<B>>,
+    /// Asked for files that are not part of the image.
+    pub files: FileSources,
+}
+
+impl<B: Deref<Target = [u8]>> Sources for BothSources<B> {
+    fn line(&self, path: &str, row: u64, near: u64) -> Option<Line> {
+        let answer = self
+            .image
+            .as_ref()
+            .map(|image| image.answer(path, row, near));
+        match answer {
+            Some(Answer::Line(line)) => Some(line),
+            Some(Answer::NoSuchLine) => None,
+            Some(Answer::OtherFile) | None => self.files.line(path, row, near),
+        }
+    }
+}
+
+/// Lines of files on disk, read as the broker reads them: packed, in any encoding. The checked
+/// file must still have the bytes that were checked; a file of which no digest is known must be
+/// older than the result.
+pub struct FileSources {
+    input: String,
+    digest: Digest,
+    written: Option<SystemTime>,
+    images: RefCell<BTreeMap<String, Option<ImageSources<Vec<u8>>>>>,
+}
+
+impl FileSources {
+    /// The files that this result speaks of.
+    pub fn new(result: &ResultMessage) -> FileSources {
+        FileSources {
+            input: result.input.clone(),
+            digest: result.digest,
+            written: modified(&result.xqar),
+            images: RefCell::default(),
+        }
+    }
+
+    fn open(&self, path: &str) -> Option<ImageSources<Vec<u8>>> {
+        let file = Path::new(path);
+        if !file.is_absolute() || !file.is_file() {
+            return None;
+        }
+        let known = path == self.input && self.digest != Digest::default();
+        if !known && modified(path)? > self.written? {
+            return None;
+        }
+        let boundary = file.parent()?;
+        let prepared = qcbus_ingest::prepare(file, boundary, &Limits::default()).ok()?;
+        if known && Digest(prepared.digest()) != self.digest {
+            return None;
+        }
+        Some(ImageSources::new(prepared.build(), path))
+    }
+}
+
+impl Sources for FileSources {
+    fn line(&self, path: &str, row: u64, near: u64) -> Option<Line> {
+        let mut images = self.images.borrow_mut();
+        let image = images
+            .entry(path.to_owned())
+            .or_insert_with(|| self.open(path));
+        image.as_ref()?.line(path, row, near)
+    }
+}
+
+fn modified(path: &str) -> Option<SystemTime> {
+    std::fs::metadata(path).ok()?.modified().ok()
+}
+
+/// Where the lines of a file begin.
+struct Index {
+    starts: Vec<u32>,
+    ascii: bool,
+}
+
+impl Index {
+    fn of(text: &str) -> Index {
+        let feeds = text.bytes().enumerate().filter(|&(_, byte)| byte == b'\n');
+        let after = feeds.filter_map(|(at, _)| u32::try_from(at + 1).ok());
+        Index {
+            starts: std::iter::once(0).chain(after).collect(),
+            ascii: text.is_ascii(),
+        }
+    }
+
+    fn line<'t>(&self, text: &'t str, row: u64) -> Option<&'t str> {
+        let row = usize::try_from(row).ok()?.checked_sub(1)?;
+        let start = *self.starts.get(row)? as usize;
+        let end = self.starts.get(row + 1).map_or(text.len(), |&n| n as usize);
+        let line = text.get(start..end)?.trim_end_matches(['\n', '\r']);
+        let marked = line.strip_prefix('\u{FEFF}').filter(|_| row == 0);
+        Some(marked.unwrap_or(line))
+    }
+
+    /// The part of the line around a column; characters are bytes where all of them are ASCII.
+    fn part(&self, line: &str, near: u64) -> Line {
+        if line.len() <= 2 * REACH {
+            return Line::from(line);
+        }
+        let near = usize::try_from(near).unwrap_or(usize::MAX);
+        let first = near.saturating_sub(REACH);
+        let byte_of = |character: usize| match self.ascii {
+            true => character.min(line.len()),
+            false => line
+                .char_indices()
+                .nth(character)
+                .map_or(line.len(), |(at, _)| at),
+        };
+        let start = byte_of(first);
+        let rest = &line[start..];
+        let mut ends = rest.char_indices().skip(2 * REACH);
+        let end = ends.next().map_or(rest.len(), |(at, _)| at);
+        Line {
+            text: rest[..end].to_owned(),
+            skipped: first as u64,
+            goes_on: end < rest.len(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_counted_by_line_feeds() {
+        let text = "\u{FEFF}one\r\ntwo\n\nfour";
+        let index = Index::of(text);
+        let row = |row| index.line(text, row);
+        assert_eq!(row(0), None);
+        assert_eq!(row(1), Some("one"));
+        assert_eq!(row(2), Some("two"));
+        assert_eq!(row(3), Some(""));
+        assert_eq!(row(4), Some("four"));
+        assert_eq!(row(5), None);
+        assert_eq!(row(u64::MAX), None);
+    }
+
+    #[test]
+    fn of_a_very_long_line_only_a_part_is_given() {
+        for letter in ["a", "ü"] {
+            let text = format!("{}<{}", letter.repeat(5000), letter.repeat(5000));
+            let part = Index::of(&text).part(&text, 5001);
+            assert_eq!(part.skipped, 4001);
+            assert_eq!(part.text.chars().count(), 2 * REACH);
+            assert_eq!(part.text.chars().nth(999), Some('<'));
+            assert!(part.goes_on);
+            let end = Index::of(&text).part(&text, u64::MAX);
+            assert_eq!((end.text.as_str(), end.goes_on), ("", false));
+        }
+    }
+
+    #[test]
+    fn a_damaged_image_gives_no_lines() {
+        let sources = ImageSources::new(vec![0_u8; 100], "a.xodr");
+        assert_eq!(sources.answer("a.xodr", 1, 1), Answer::OtherFile);
+    }
+}

@@ -1,0 +1,209 @@
+//! One issue.
+
+use std::fmt::Write as _;
+
+use qcbus_formats::xqar::{DomainInfo, InfoElement, Level};
+use qcbus_messages::ResultMessage;
+use qcbus_reporter_sdk::{Place, Sources, one_line, printable};
+
+use crate::Finding;
+use crate::paint::Paint;
+use crate::snippet::snippet;
+use crate::wrap::wrap;
+
+/// Everything that the rendering of an issue looks at besides the issue.
+pub(crate) struct View<'v> {
+    pub(crate) result: &'v ResultMessage,
+    pub(crate) sources: &'v dyn Sources,
+    pub(crate) paint: Paint,
+    pub(crate) width: usize,
+}
+
+impl View<'_> {
+    /// Writes headline, places with source lines, rule and reason.
+    pub(crate) fn write(&self, out: &mut String, finding: &Finding<'_>, why: Option<&str>) {
+        let gutter = gutter(&finding.places);
+        self.headline(out, finding);
+        for (number, place) in finding.places.iter().enumerate() {
+            self.place(out, place, finding.issue.level, gutter, number == 0);
+        }
+        if finding.places.is_empty() {
+            let path = printable(&self.result.display_path);
+            let arrow = self.paint.frame("-->");
+            let _ = writeln!(out, "{:gutter$}{arrow} {path}", "");
+        }
+        let mut note = |name: &str, text: &str| self.note(out, gutter, name, text);
+        note("rule", &rule_of(finding));
+        for info in &finding.issue.domain_info {
+            if info.name != qcbus_formats::location::NAME {
+                note(&one_line(&info.name), &flat(info));
+            }
+        }
+        if let Some(why) = why {
+            note("why", why);
+        }
+    }
+
+    fn headline(&self, out: &mut String, finding: &Finding<'_>) {
+        let level = finding.issue.level;
+        let text = printable(finding.issue.description.trim());
+        let mut lines = text.lines();
+        let first = self.paint.bold(lines.next().unwrap_or("(no description)"));
+        let _ = writeln!(out, "{}: {first}", self.paint.level(level, level.as_str()));
+        for line in lines {
+            let _ = writeln!(out, "    {}", line.trim_end());
+        }
+    }
+
+    fn place(&self, out: &mut String, place: &Place, level: Level, gutter: usize, main: bool) {
+        let arrow = self.paint.frame(if main { "-->" } else { ":::" });
+        let _ = writeln!(out, "{:gutter$}{arrow} {}", "", self.name(place));
+        let shown = self.snippet(out, place, level, gutter);
+        if !shown && !place.description.is_empty() {
+            self.note(out, gutter, "here", &place.description);
+        }
+        let facts = facts(place);
+        if !facts.is_empty() {
+            self.note(out, gutter, "at", &facts);
+        }
+        if let Some(at) = place.referred_at {
+            let text = format!("{}{}", self.result.display_path, row_column(at));
+            self.note(out, gutter, "referred to from", &text);
+        }
+        if !place.also.is_empty() {
+            let also = place.also.iter().map(|&at| row_column(at)[1..].to_owned());
+            self.note(out, gutter, "also at", &also.collect::<Vec<_>>().join(", "));
+        }
+    }
+
+    /// `PATH:ROW:COLUMN`, as far as known.
+    fn name(&self, place: &Place) -> String {
+        let mut name = match &place.path {
+            Some(path) => printable(&self.shortened(path)),
+            None => printable(&self.result.display_path),
+        };
+        if let Some(row) = place.row {
+            name.push_str(&row_column((row, place.column.unwrap_or(0))));
+        }
+        name
+    }
+
+    /// Another file's path, relative to the directory that the checked file's path is relative to.
+    fn shortened(&self, path: &str) -> String {
+        let base = self.result.input.strip_suffix(&self.result.display_path);
+        let base = base.filter(|base| base.ends_with('/'));
+        let short = base.and_then(|base| path.strip_prefix(base));
+        short.unwrap_or(path).to_owned()
+    }
+
+    /// The source line with marks; says whether there was one.
+    fn snippet(&self, out: &mut String, place: &Place, level: Level, gutter: usize) -> bool {
+        let Some(row) = place.row else { return false };
+        let path = place.path.as_deref().unwrap_or(&self.result.input);
+        let near = place.column.unwrap_or(1);
+        let Some(line) = self.sources.line(path, row, near) else {
+            return false;
+        };
+        let width = self.width.saturating_sub(gutter + 3).max(20);
+        let shown = snippet(&line, place.column, width);
+        let bar = self.paint.frame("|");
+        let number = self.paint.frame(&format!("{row:>gutter$}"));
+        let _ = writeln!(out, "{:gutter$} {bar}", "");
+        let text = format!("{number} {bar} {}", shown.text);
+        let _ = writeln!(out, "{}", text.trim_end());
+        let description = one_line(&place.description);
+        let (before, marks) = match shown.marks {
+            Some((before, count)) => (before, "^".repeat(count)),
+            None if description.is_empty() => return true,
+            None => (0, String::new()),
+        };
+        let said = format!("{marks} {description}");
+        let said = self.paint.level(level, said.trim());
+        let _ = writeln!(out, "{:gutter$} {bar} {:before$}{said}", "", "");
+        true
+    }
+
+    /// A line `= name: text`, wrapped below its text.
+    fn note(&self, out: &mut String, gutter: usize, name: &str, text: &str) {
+        let indent = gutter + 3 + name.len() + 2;
+        let lines = wrap(&printable(text), self.width.saturating_sub(indent).max(30));
+        let sign = self.paint.frame("=");
+        let name = self.paint.bold(&format!("{name}:"));
+        for (number, line) in lines.iter().enumerate() {
+            let _ = match number {
+                0 => writeln!(out, "{:gutter$} {sign} {name} {line}", ""),
+                _ => writeln!(out, "{:indent$}{line}", ""),
+            };
+        }
+    }
+}
+
+/// Columns for the largest row number that may be shown. Larger rows than files have are other
+/// tools' nonsense.
+fn gutter(places: &[Place]) -> usize {
+    let rows = places.iter().filter_map(|place| place.row);
+    rows.max().map_or(1, |row| row.to_string().len().min(8))
+}
+
+/// The rule's UID and the checker; ASAM's checkers carry the rule's name, so both are needed to
+/// look either up.
+fn rule_of(finding: &Finding<'_>) -> String {
+    let checker = format!("{}/{}", finding.bundle.name, finding.checker.id);
+    match finding.issue.rule_uid.as_str() {
+        "" => checker,
+        uid => format!("{uid} ({checker})"),
+    }
+}
+
+fn facts(place: &Place) -> String {
+    let mut facts = Vec::new();
+    if let Some(xpath) = &place.xpath {
+        facts.push(xpath.clone());
+    }
+    if let Some((id, s, t)) = &place.road {
+        facts.push(format!("road {id}, s = {s} m, t = {t} m"));
+    }
+    if let Some((x, y, z)) = place.inertial {
+        facts.push(format!("x = {x} m, y = {y} m, z = {z} m"));
+    }
+    if let Some(time) = place.time {
+        facts.push(format!("time {time} s"));
+    }
+    if let Some((index, channel)) = &place.message {
+        facts.push(format!("message {index} {channel}").trim_end().to_owned());
+    }
+    facts.join("; ")
+}
+
+/// `:ROW:COLUMN`, or `:ROW` when the column is not known.
+fn row_column((row, column): (u64, u64)) -> String {
+    match column {
+        0 => format!(":{row}"),
+        _ => format!(":{row}:{column}"),
+    }
+}
+
+/// A `DomainSpecificInfo` in one line: `Element key=value text, …`.
+fn flat(info: &DomainInfo) -> String {
+    let mut words = Vec::new();
+    for element in &info.content {
+        flatten(element, &mut words);
+    }
+    words.join(", ")
+}
+
+fn flatten(element: &InfoElement, words: &mut Vec<String>) {
+    let attributes = element.attributes.iter();
+    let pairs = attributes.map(|(name, value)| format!(" {name}={value}"));
+    let said = format!(
+        "{}{} {}",
+        element.name,
+        pairs.collect::<String>(),
+        element.text
+    );
+    words.push(one_line(&said));
+    words.retain(|word| !word.is_empty());
+    for child in &element.children {
+        flatten(child, words);
+    }
+}

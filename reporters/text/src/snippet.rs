@@ -1,0 +1,219 @@
+//! A source line with a caret under the place.
+
+use qcbus_reporter_sdk::{Line, printable};
+use unicode_width::UnicodeWidthChar as _;
+
+/// Columns that a tab is shown as.
+const TAB: usize = 4;
+
+/// The longest underline; an element's name or an attribute is shorter.
+const MAX_UNDERLINE: usize = 60;
+
+/// Where a line was cut.
+const CUT: char = '…';
+
+/// A line as shown, and where the marks go below it.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) struct Snippet {
+    /// The line, or the part of it around the place; no wider than asked for.
+    pub(crate) text: String,
+    /// Columns before the first mark and number of marks; `None` when no column is known.
+    pub(crate) marks: Option<(usize, usize)>,
+}
+
+/// One character and the columns that it takes.
+type Cell = (char, usize);
+
+/// Shows `line` within `width` columns so that character `column` (from 1) can be seen.
+pub(crate) fn snippet(line: &Line, column: Option<u64>, width: usize) -> Snippet {
+    let cells: Vec<Cell> = printable(&line.text).chars().map(cell).collect();
+    let at = column.map(|column| {
+        let before = column.saturating_sub(line.skipped).saturating_sub(1);
+        usize::try_from(before).map_or(cells.len(), |before| before.min(cells.len()))
+    });
+    let marked = at.map_or(0, |at| underlined(&cells, at));
+    let from = at.map_or(0, |at| first_shown(&cells, at, marked, width));
+    let cut_left = from > 0 || line.skipped > 0;
+    let mut shown = Shown::new(cut_left);
+    let mut to = from;
+    for &(c, columns) in &cells[from..] {
+        let last = to + 1 == cells.len() && !line.goes_on;
+        if shown.columns + columns + usize::from(!last) > width {
+            break;
+        }
+        shown.push(c, columns);
+        to += 1;
+    }
+    if to < cells.len() || line.goes_on {
+        shown.text.push(CUT);
+    }
+    let marks = at.map(|at| {
+        let before = usize::from(cut_left) + columns(&cells[from..at.max(from)]);
+        let end = (at + marked).clamp(at, to.max(at));
+        (before.min(width), columns(&cells[at..end]).max(1))
+    });
+    let text = shown.text.trim_end().to_owned();
+    Snippet { text, marks }
+}
+
+struct Shown {
+    text: String,
+    columns: usize,
+}
+
+impl Shown {
+    fn new(cut_left: bool) -> Shown {
+        Shown {
+            text: if cut_left { CUT.into() } else { String::new() },
+            columns: usize::from(cut_left),
+        }
+    }
+
+    fn push(&mut self, c: char, columns: usize) {
+        if c == '\t' {
+            self.text.extend(std::iter::repeat_n(' ', columns));
+        } else {
+            self.text.push(c);
+        }
+        self.columns += columns;
+    }
+}
+
+fn cell(c: char) -> Cell {
+    match c {
+        '\t' => (c, TAB),
+        _ => (c, c.width().unwrap_or(1)),
+    }
+}
+
+fn columns(cells: &[Cell]) -> usize {
+    cells.iter().map(|&(_, columns)| columns).sum()
+}
+
+/// The first character to show: the line's, unless the place would be cut off at the right; then
+/// a third of the width is kept before it.
+fn first_shown(cells: &[Cell], at: usize, marked: usize, width: usize) -> usize {
+    let end = (at + marked).min(cells.len());
+    if columns(cells) <= width || columns(&cells[..end]) + 1 < width {
+        return 0;
+    }
+    let mut from = at;
+    let mut before = 0;
+    while from > 0 && before + cells[from - 1].1 <= width / 3 {
+        from -= 1;
+        before += cells[from].1;
+    }
+    from
+}
+
+/// How many characters to mark: the start of a tag with its name, an attribute with its value,
+/// one character otherwise.
+fn underlined(cells: &[Cell], at: usize) -> usize {
+    let rest = &cells[at..];
+    let name_from = |start: usize| {
+        let name = rest.iter().skip(start).take_while(|&&(c, _)| is_name(c));
+        start + name.count()
+    };
+    let length = match rest.first() {
+        Some(('<', _)) => {
+            let slash = matches!(rest.get(1), Some(('/' | '?' | '!', _)));
+            name_from(1 + usize::from(slash))
+        }
+        Some(&(c, _)) if is_name(c) => attribute(rest, name_from(0)),
+        _ => 1,
+    };
+    length.clamp(1, MAX_UNDERLINE)
+}
+
+/// `name="value"` as a whole when that is what stands there.
+fn attribute(rest: &[Cell], name: usize) -> usize {
+    let quoted = match (rest.get(name), rest.get(name + 1)) {
+        (Some(('=', _)), Some(&(quote @ ('"' | '\''), _))) => rest
+            .iter()
+            .skip(name + 2)
+            .position(|&(c, _)| c == quote)
+            .map(|value| name + 2 + value + 1),
+        _ => None,
+    };
+    quoted.unwrap_or(name)
+}
+
+fn is_name(c: char) -> bool {
+    c.is_alphanumeric() || matches!(c, '_' | '-' | '.' | ':')
+}
+
+#[cfg(test)]
+mod tests {
+    use unicode_width::UnicodeWidthStr as _;
+
+    use super::*;
+
+    /// The line and its marks as they appear below each other.
+    fn show(line: &str, column: u64, width: usize) -> String {
+        let snippet = snippet(&Line::from(line), Some(column), width);
+        let (before, count) = snippet.marks.unwrap();
+        format!(
+            "{}\n{}{}",
+            snippet.text,
+            " ".repeat(before),
+            "^".repeat(count)
+        )
+    }
+
+    #[test]
+    fn tags_attributes_and_single_characters_are_marked() {
+        assert_eq!(show("  <road id='5'>", 3, 80), "  <road id='5'>\n  ^^^^^");
+        assert_eq!(
+            show("  <road id='5'>", 9, 80),
+            "  <road id='5'>\n        ^^^^^^"
+        );
+        assert_eq!(show("</road>", 1, 80), "</road>\n^^^^^^");
+        assert_eq!(show("a & b", 3, 80), "a & b\n  ^");
+    }
+
+    #[test]
+    fn tabs_and_wide_characters_move_the_caret() {
+        assert_eq!(show("\t<a/>", 2, 80), "    <a/>\n    ^^");
+        assert_eq!(
+            show("<a n='道路' b='1'/>", 11, 80),
+            "<a n='道路' b='1'/>\n            ^^^^^"
+        );
+        assert_eq!(show("ä\u{308}<b/>", 3, 80), "ä\u{308}<b/>\n ^^");
+    }
+
+    #[test]
+    fn a_column_beyond_the_line_points_past_its_end() {
+        assert_eq!(show("<a>", 99, 80), "<a>\n   ^");
+        assert_eq!(show("", 1, 80), "\n^");
+        assert_eq!(show("<a>", u64::MAX, 80), "<a>\n   ^");
+    }
+
+    #[test]
+    fn a_long_line_is_cut_around_the_column() {
+        let line = format!("{}<road id='7'>{}", "x".repeat(500), "y".repeat(500));
+        let shown = show(&line, 501, 40);
+        let text = shown.lines().next().unwrap();
+        assert!(text.starts_with("…xxx") && text.ends_with("y…"), "{text}");
+        assert!(text.width() <= 40, "{text}");
+        assert_eq!(shown.lines().nth(1).unwrap().trim_start(), "^^^^^");
+        let caret = shown.lines().nth(1).unwrap().find('^').unwrap();
+        assert_eq!(text.chars().nth(caret), Some('<'));
+    }
+
+    #[test]
+    fn a_part_of_a_line_is_cut_on_both_sides() {
+        let line = Line {
+            text: "abc <road> def".into(),
+            skipped: 1000,
+            goes_on: true,
+        };
+        let shown = snippet(&line, Some(1005), 80);
+        assert_eq!(shown.text, "…abc <road> def…");
+        assert_eq!(shown.marks, Some((5, 5)));
+    }
+
+    #[test]
+    fn without_a_column_nothing_is_marked() {
+        assert_eq!(snippet(&Line::from("<a>"), None, 80).marks, None);
+    }
+}

@@ -1,0 +1,174 @@
+//! The verdict, and what ran, what did not and why.
+
+use std::fmt::Write as _;
+
+use qcbus_formats::xqar::{Level, Status};
+use qcbus_messages::{Digest, ResultMessage};
+use qcbus_reporter_sdk::{one_line, printable};
+
+use crate::Options;
+use crate::paint::Paint;
+use crate::wrap::wrap;
+
+/// Writes the verdict line and the summary.
+pub(crate) fn write(out: &mut String, result: &ResultMessage, paint: Paint, options: &Options) {
+    let verdict = result.verdict;
+    let path = paint.bold(&printable(&result.display_path));
+    let word = paint.verdict(verdict, verdict.as_str());
+    let _ = writeln!(out, "{word}: {path}: {}", issues(result));
+    let _ = writeln!(out, "  checkers: {}", checkers(result));
+    for group in groups(result) {
+        group.write(out, options);
+    }
+    if result.digest != Digest::default() {
+        let _ = writeln!(out, "  sha256: {}", result.digest);
+    }
+}
+
+/// `2 errors, 1 warning`, or `no issues`.
+fn issues(result: &ResultMessage) -> String {
+    let of = |level: Level| {
+        let bundles = result.results.bundles.iter();
+        let checkers = bundles.flat_map(|bundle| &bundle.checkers);
+        let issues = checkers.flat_map(|checker| &checker.issues);
+        issues.filter(|issue| issue.level == level).count()
+    };
+    let counts = [
+        counted(of(Level::Error), "error", "errors"),
+        counted(of(Level::Warning), "warning", "warnings"),
+        counted(of(Level::Information), "information", "information"),
+    ];
+    let said: Vec<String> = counts.into_iter().flatten().collect();
+    match said.as_slice() {
+        [] => "no issues".into(),
+        _ => said.join(", "),
+    }
+}
+
+fn counted(count: usize, one: &str, many: &str) -> Option<String> {
+    (count > 0).then(|| format!("{count} {}", if count == 1 { one } else { many }))
+}
+
+/// Counts by status; `completed` is said even when it is none.
+fn checkers(result: &ResultMessage) -> String {
+    let of = |status: Option<Status>| {
+        let bundles = result.results.bundles.iter();
+        let checkers = bundles.flat_map(|bundle| &bundle.checkers);
+        checkers.filter(|checker| checker.status == status).count()
+    };
+    let rest = [
+        (of(Some(Status::Skipped)), "skipped"),
+        (of(Some(Status::Error)), "did not end"),
+        (of(None), "without a status"),
+    ];
+    let mut text = format!("{} completed", of(Some(Status::Completed)));
+    for (count, word) in rest.into_iter().filter(|&(count, _)| count > 0) {
+        let _ = write!(text, ", {count} {word}");
+    }
+    text
+}
+
+/// Checkers that ended alike for the same reason: when a file is not well-formed, all of the
+/// semantic ones are skipped, and one line says so.
+struct Group {
+    status: Status,
+    reason: String,
+    checkers: Vec<String>,
+}
+
+impl Group {
+    fn write(&self, out: &mut String, options: &Options) {
+        let width = options.width;
+        let word = match self.status {
+            Status::Skipped => "skipped",
+            Status::Completed | Status::Error => "did not end",
+        };
+        let reason = match self.reason.as_str() {
+            "" => "no reason given",
+            reason => reason,
+        };
+        let head = format!("{word}, {}: {reason}", self.checkers.len());
+        for (number, line) in wrap(&head, width.saturating_sub(6)).iter().enumerate() {
+            let _ = writeln!(out, "  {}{line}", if number == 0 { "" } else { "    " });
+        }
+        // What failed is always named; of what did not apply, a few names do on a terminal.
+        let most = match self.status {
+            Status::Skipped => options.skipped_names,
+            Status::Completed | Status::Error => usize::MAX,
+        };
+        let mut names = self
+            .checkers
+            .iter()
+            .take(most)
+            .cloned()
+            .collect::<Vec<_>>()
+            .join(" ");
+        let rest = self.checkers.len().saturating_sub(most);
+        if rest > 0 {
+            let _ = write!(names, " and {rest} more");
+        }
+        for line in wrap(&names, width.saturating_sub(6)) {
+            let _ = writeln!(out, "      {line}");
+        }
+    }
+}
+
+/// The groups that did not complete, what failed before what was skipped.
+fn groups(result: &ResultMessage) -> Vec<Group> {
+    let mut groups: Vec<Group> = Vec::new();
+    for bundle in &result.results.bundles {
+        for checker in &bundle.checkers {
+            let Some(status @ (Status::Error | Status::Skipped)) = checker.status else {
+                continue;
+            };
+            let name = printable(&format!("{}/{}", bundle.name, checker.id));
+            let reason = without_count(&one_line(&checker.summary)).to_owned();
+            let known = groups
+                .iter_mut()
+                .find(|group| group.status == status && group.reason == reason);
+            match known {
+                Some(group) => group.checkers.push(name),
+                None => groups.push(Group {
+                    status,
+                    reason,
+                    checkers: vec![name],
+                }),
+            }
+        }
+    }
+    groups.sort_by_key(|group| group.status != Status::Error);
+    groups
+}
+
+/// A summary without its status, which is said already, and without the count that pooling and
+/// ASAM's framework append.
+fn without_count(summary: &str) -> &str {
+    let bare = ["Skipped: ", "Error: "]
+        .into_iter()
+        .find_map(|status| summary.strip_prefix(status))
+        .unwrap_or(summary);
+    let counts = [" issue(s) are found.", " issues.", " issue."];
+    let Some(start) = counts
+        .into_iter()
+        .find_map(|count| bare.strip_suffix(count))
+    else {
+        return bare;
+    };
+    start
+        .trim_end_matches(|c: char| c.is_ascii_digit())
+        .trim_end()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::without_count;
+
+    #[test]
+    fn the_appended_count_is_no_reason() {
+        assert_eq!(without_count("Too old. 0 issue(s) are found."), "Too old.");
+        assert_eq!(without_count("0 issue(s) are found."), "");
+        assert_eq!(without_count("Too old."), "Too old.");
+        assert_eq!(without_count("Skipped: too old. 0 issues."), "too old.");
+        assert_eq!(without_count("Error: it died. 1 issue."), "it died.");
+    }
+}

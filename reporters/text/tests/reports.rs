@@ -1,0 +1,303 @@
+//! The text of whole reports, as people see it.
+
+use std::collections::BTreeMap;
+
+use qcbus_formats::location::OtherPlace;
+use qcbus_formats::xqar::{
+    Checker, CheckerBundle, DomainInfo, InfoElement, Issue, Level, Location, Locations, Param,
+    Results, Status,
+};
+use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
+use qcbus_report_text::{Options, TextReporter, render};
+use qcbus_reporter_sdk::{Line, NoSources, Reporter as _, Sources};
+
+const UNIQUE: &str = "asam.net:xodr:1.4.0:ids.id_unique_in_class";
+
+/// Files made of a few lines.
+struct Pages(BTreeMap<&'static str, Vec<&'static str>>);
+
+impl Sources for Pages {
+    fn line(&self, path: &str, row: u64, _: u64) -> Option<Line> {
+        let row = usize::try_from(row).ok()?.checked_sub(1)?;
+        Some(Line::from(*self.0.get(path)?.get(row)?))
+    }
+}
+
+fn pages() -> Pages {
+    let scenario = vec![
+        "<?xml version=\"1.0\"?>",
+        "<OpenSCENARIO>",
+        "  <RoadNetwork>",
+        "    <LogicFile filepath=\"harbour.xodr\"/>",
+    ];
+    let map = vec![
+        "<?xml version=\"1.0\"?>",
+        "<OpenDRIVE>",
+        "\t<road name=\"Kai\" id=\"5\" length=\"20\" junction=\"-1\"/>",
+        "\t<road name=\"道路\" id=\"5\" length=\"30\" junction=\"-1\"/>",
+        "</OpenDRIVE>",
+    ];
+    Pages(BTreeMap::from([
+        ("/farm/maps/harbour.xodr", map),
+        ("/farm/lane.xosc", scenario),
+    ]))
+}
+
+fn at(row: u64, column: u64, xpath: &str, description: &str) -> Locations {
+    let file = Location::File {
+        row,
+        column,
+        offset: None,
+    };
+    let xml = Location::Xml {
+        xpath: xpath.into(),
+    };
+    Locations {
+        description: description.into(),
+        places: vec![file, xml],
+    }
+}
+
+fn issue(level: Level, description: &str, uid: &str, locations: Vec<Locations>) -> Issue {
+    Issue {
+        id: 0,
+        description: description.into(),
+        level,
+        rule_uid: uid.into(),
+        locations,
+        domain_info: Vec::new(),
+    }
+}
+
+fn checker(id: &str, status: Status, summary: &str, issues: Vec<Issue>) -> Checker {
+    Checker {
+        id: id.into(),
+        summary: summary.into(),
+        status: Some(status),
+        issues,
+        ..Checker::default()
+    }
+}
+
+fn result(path: &str, verdict: Verdict, checkers: Vec<Checker>) -> ResultMessage {
+    let bundle = CheckerBundle {
+        name: "xodrBundle".into(),
+        checkers,
+        ..CheckerBundle::default()
+    };
+    ResultMessage {
+        job: JobId(1),
+        input: format!("/farm/{path}"),
+        display_path: path.into(),
+        xqar: format!("/out/{path}.xqar"),
+        verdict,
+        digest: Digest([7; 32]),
+        config: Digest::default(),
+        document: None,
+        results: Results {
+            version: "1.0.0".into(),
+            bundles: vec![bundle],
+        },
+        rules: BTreeMap::from([(
+            UNIQUE.to_owned(),
+            "Elements of one class are told apart by their ids alone. When two roads share an id, \
+             a link to it may lead to either, and simulators choose differently."
+                .to_owned(),
+        )]),
+        params: Vec::new(),
+    }
+}
+
+fn duplicates() -> ResultMessage {
+    let twice = |row, xpath: &str| {
+        issue(
+            Level::Error,
+            "the id \"5\" of this road is taken; ids of roads must differ",
+            UNIQUE,
+            vec![
+                at(row, 2, xpath, "a road with the id of another"),
+                at(3, 19, "/OpenDRIVE/road[1]/@id", "the first one"),
+            ],
+        )
+    };
+    let mut second = twice(4, "/OpenDRIVE/road[2]");
+    second.locations[0].places.push(Location::Road {
+        road_id: "5".into(),
+        s: 0.0,
+        t: -1.5,
+    });
+    let name = issue(
+        Level::Warning,
+        "the name \"道路\" is not in the naming scheme",
+        "",
+        vec![at(4, 14, "/OpenDRIVE/road[2]/@name", "")],
+    );
+    let checkers = vec![
+        checker("check_name", Status::Completed, "", vec![name]),
+        checker(
+            "check_ids",
+            Status::Completed,
+            "2 issue(s) are found.",
+            vec![second, twice(9, "/OpenDRIVE/road[7]")],
+        ),
+    ];
+    result("maps/harbour.xodr", Verdict::Rejected, checkers)
+}
+
+fn text(result: &ResultMessage) -> String {
+    render(result, &Options::default(), &pages())
+}
+
+#[test]
+fn issues_follow_the_file_and_a_rule_is_explained_once() {
+    insta::assert_snapshot!(text(&duplicates()));
+}
+
+#[test]
+fn an_accepted_file_is_two_lines_and_its_hash() {
+    let checkers = vec![checker("check_ids", Status::Completed, "", Vec::new())];
+    insta::assert_snapshot!(text(&result("a.xodr", Verdict::Accepted, checkers)));
+}
+
+#[test]
+fn what_did_not_run_is_said_with_its_reason() {
+    let newer = "The rule holds from 1.7.0 on, the file is of 1.4. 0 issue(s) are found.";
+    let checkers = vec![
+        checker("check_ids", Status::Completed, "", Vec::new()),
+        checker("check_lane_a", Status::Skipped, newer, Vec::new()),
+        checker("check_lane_b", Status::Skipped, newer, Vec::new()),
+        checker("check_signal", Status::Skipped, "", Vec::new()),
+        checker(
+            "check_geometry",
+            Status::Error,
+            "It did not end within 30 s and was stopped.",
+            Vec::new(),
+        ),
+    ];
+    insta::assert_snapshot!(text(&result("a.xodr", Verdict::Undetermined, checkers)));
+}
+
+#[test]
+fn a_place_in_another_file_is_shown_there() {
+    let mut found = issue(
+        Level::Error,
+        "the scenario's map has two roads \"5\"",
+        UNIQUE,
+        vec![at(
+            4,
+            5,
+            "/OpenSCENARIO/RoadNetwork/LogicFile",
+            "/farm/maps/harbour.xodr:4:2: the second one",
+        )],
+    );
+    let place = OtherPlace {
+        path: "/farm/maps/harbour.xodr".into(),
+        row: 4,
+        column: 2,
+        xpath: Some("/OpenDRIVE/road[2]".into()),
+    };
+    found.domain_info.push(place.to_info());
+    let checkers = vec![checker("check_map", Status::Completed, "", vec![found])];
+    insta::assert_snapshot!(text(&result("lane.xosc", Verdict::Rejected, checkers)));
+}
+
+#[test]
+fn nonsense_of_other_tools_is_tolerated() {
+    let zero = at(0, 0, "", "somewhere");
+    let no_column = at(3, 0, "/OpenDRIVE/road", "");
+    let far = at(u64::MAX, u64::MAX, "//*", "");
+    let escape = "a\u{1b}[2Jb\nsecond line";
+    let mut issues = vec![
+        issue(Level::Information, escape, "", vec![zero]),
+        issue(Level::Information, "", "x:y", vec![no_column, far]),
+        issue(Level::Warning, "no place at all", "x:y", Vec::new()),
+    ];
+    issues[2].domain_info.push(DomainInfo {
+        name: "vendor".into(),
+        content: vec![InfoElement {
+            name: "Thing".into(),
+            attributes: vec![("a".into(), "1".into())],
+            text: " some\n text".into(),
+            children: vec![InfoElement::default()],
+        }],
+    });
+    let mut only = checker("check_x", Status::Completed, "", issues);
+    only.status = None;
+    let result = result("maps/harbour.xodr", Verdict::Accepted, vec![only]);
+    insta::assert_snapshot!(text(&result));
+}
+
+#[test]
+fn colours_change_nothing_but_colours() {
+    let options = Options {
+        color: true,
+        ..Options::default()
+    };
+    let colored = render(&duplicates(), &options, &pages());
+    assert!(colored.contains("\u{1b}["));
+    let mut plain = String::new();
+    let mut rest = colored.as_str();
+    while let Some((before, after)) = rest.split_once('\u{1b}') {
+        plain.push_str(before);
+        rest = after.split_once('m').map_or("", |(_, after)| after);
+    }
+    plain.push_str(rest);
+    assert_eq!(plain, text(&duplicates()));
+}
+
+#[test]
+fn without_sources_descriptions_still_appear() {
+    let text = render(&duplicates(), &Options::default(), &NoSources);
+    assert!(text.contains("= here: the first one"), "{text}");
+}
+
+#[test]
+fn reports_go_beside_the_result_or_into_one_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name).to_string_lossy().into_owned();
+    let mut first = duplicates();
+    first.xqar = path("a.xodr.xqar");
+    TextReporter::new(true, false)
+        .report(&first, &pages())
+        .unwrap();
+    let own = std::fs::read_to_string(path("a.xodr.txt")).unwrap();
+    assert_eq!(own, text(&first));
+
+    let all = Param {
+        name: "OutputFile".into(),
+        value: path("all.txt"),
+    };
+    let mut other = result("a.xodr", Verdict::Accepted, Vec::new());
+    (first.params, other.params) = (vec![all.clone()], vec![all]);
+    let mut reporter = TextReporter::new(true, false);
+    for result in [&first, &other, &first] {
+        reporter.report(result, &pages()).unwrap();
+    }
+    reporter.finish().unwrap();
+    let expected = format!(
+        "==== a.xodr ====\n{}\n==== maps/harbour.xodr ====\n{}\n",
+        text(&other),
+        text(&first)
+    );
+    assert_eq!(std::fs::read_to_string(path("all.txt")).unwrap(), expected);
+
+    let mut again = TextReporter::new(true, true);
+    again.report(&other, &pages()).unwrap();
+    assert_eq!(std::fs::read_to_string(path("all.txt")).unwrap(), expected);
+}
+
+#[test]
+fn a_senseless_width_is_refused_with_what_is_allowed() {
+    let mut result = duplicates();
+    result.params.push(Param {
+        name: "LineWidth".into(),
+        value: "wide".into(),
+    });
+    let error = TextReporter::default()
+        .report(&result, &NoSources)
+        .unwrap_err();
+    insta::assert_snapshot!(
+        error,
+        @r#"use the parameter LineWidth="wide": a whole number from 40 to 1000 is needed"#
+    );
+}

@@ -1,0 +1,331 @@
+//! The files table: every file that is present, what is known of it, and the queue of those that
+//! wait. A path is in the queue at most once, so a file that changes a hundred times while it
+//! waits is checked once, with its newest bytes.
+
+use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use qcbus_document::FileKind;
+use qcbus_messages::JobId;
+
+use super::types::{Judged, Stamp};
+
+/// Index of a file in the table; never reused within a generation.
+pub type FileId = u32;
+
+/// Which queue a file waits in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lane {
+    /// New or changed: somebody waits for the verdict.
+    Fresh,
+    /// Judged already, to be judged again because bundles or configuration changed.
+    Background,
+}
+
+/// Where a file stands.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Stage {
+    /// Nothing to do.
+    Idle,
+    /// In a queue since then.
+    Waiting(Lane, Duration),
+    /// Being checked.
+    Active(JobId),
+}
+
+/// One file.
+#[derive(Debug)]
+pub struct FileEntry {
+    /// Absolute path.
+    pub path: Arc<Path>,
+    /// What its name promises.
+    pub kind: FileKind,
+    /// The newest stamp seen.
+    pub stamp: Stamp,
+    /// Whether it is there; a file that has gone stays in the table until its job has ended.
+    pub present: bool,
+    stage: Stage,
+    /// It changed while it was being checked.
+    pub dirty: bool,
+    /// Not before then, after something failed for want of room or disk.
+    pub not_before: Duration,
+    /// The verdict on some bytes, not always the present ones.
+    pub judged: Option<Arc<Judged>>,
+    /// Which reporters have which job's result, by index into the reporters' table.
+    pub delivered: Vec<(u32, JobId)>,
+}
+
+/// The table.
+#[derive(Debug, Default)]
+pub struct Files {
+    entries: BTreeMap<FileId, FileEntry>,
+    by_path: HashMap<Arc<Path>, FileId>,
+    dependents: HashMap<Arc<Path>, Vec<FileId>>,
+    next: FileId,
+    fresh: VecDeque<FileId>,
+    background: VecDeque<FileId>,
+    since_background: u8,
+    counts: Counts,
+}
+
+/// How many files are in which stage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counts {
+    /// In the fresh queue.
+    pub fresh: u64,
+    /// In the background queue.
+    pub background: u64,
+    /// Being checked.
+    pub active: u64,
+    /// Neither.
+    pub idle: u64,
+}
+
+impl Counts {
+    fn of(&mut self, stage: &Stage) -> &mut u64 {
+        match stage {
+            Stage::Idle => &mut self.idle,
+            Stage::Waiting(Lane::Fresh, _) => &mut self.fresh,
+            Stage::Waiting(Lane::Background, _) => &mut self.background,
+            Stage::Active(_) => &mut self.active,
+        }
+    }
+}
+
+impl FileEntry {
+    /// Where it stands.
+    pub fn stage(&self) -> &Stage {
+        &self.stage
+    }
+}
+
+/// One in this many files comes from the background even when fresh ones wait, so that the
+/// background gets on while a farm never rests.
+const BACKGROUND_SHARE: u8 = 16;
+
+impl Files {
+    /// The entry of a path.
+    pub fn id(&self, path: &Path) -> Option<FileId> {
+        self.by_path.get(path).copied()
+    }
+
+    /// The entry.
+    pub fn get(&self, id: FileId) -> Option<&FileEntry> {
+        self.entries.get(&id)
+    }
+
+    /// The entry, to change.
+    pub fn get_mut(&mut self, id: FileId) -> Option<&mut FileEntry> {
+        self.entries.get_mut(&id)
+    }
+
+    /// All entries in the order in which they were first seen.
+    pub fn iter(&self) -> impl Iterator<Item = (FileId, &FileEntry)> {
+        self.entries.iter().map(|(id, entry)| (*id, entry))
+    }
+
+    /// Adds a file that is not yet in the table.
+    pub fn insert(&mut self, path: &Arc<Path>, kind: FileKind, stamp: Stamp) -> FileId {
+        let id = self.next;
+        self.next += 1;
+        self.by_path.insert(path.clone(), id);
+        self.counts.idle += 1;
+        self.entries.insert(
+            id,
+            FileEntry {
+                path: path.clone(),
+                kind,
+                stamp,
+                present: true,
+                stage: Stage::Idle,
+                dirty: false,
+                not_before: Duration::ZERO,
+                judged: None,
+                delivered: Vec::new(),
+            },
+        );
+        id
+    }
+
+    /// Forgets a file for good.
+    pub fn remove(&mut self, id: FileId) {
+        self.set_dependencies(id, &[], &[]);
+        self.set_stage(id, Stage::Idle);
+        if let Some(entry) = self.entries.remove(&id) {
+            self.counts.idle -= 1;
+            for input in entry.judged.iter().flat_map(|judged| &judged.inputs) {
+                self.forget_dependent(&input.path, id);
+            }
+            if self.by_path.get(&entry.path) == Some(&id) {
+                self.by_path.remove(&entry.path);
+            }
+        }
+    }
+
+    /// Puts an idle file into a queue; one that waits in the background moves up when fresh.
+    /// An active one is marked as changed by the caller, not here.
+    pub fn enqueue(&mut self, id: FileId, lane: Lane, now: Duration) {
+        match self.entries.get(&id).map(|entry| &entry.stage) {
+            Some(Stage::Idle | Stage::Waiting(Lane::Background, _)) if lane == Lane::Fresh => {
+                self.set_stage(id, Stage::Waiting(Lane::Fresh, now));
+                self.fresh.push_back(id);
+            }
+            Some(Stage::Idle) => {
+                self.set_stage(id, Stage::Waiting(Lane::Background, now));
+                self.background.push_back(id);
+            }
+            _ => {}
+        }
+    }
+
+    /// Moves a file to another stage; the queues themselves are the business of
+    /// [`Files::enqueue`] and [`Files::dequeue`].
+    pub fn set_stage(&mut self, id: FileId, stage: Stage) {
+        let Some(entry) = self.entries.get_mut(&id) else {
+            return;
+        };
+        *self.counts.of(&entry.stage) -= 1;
+        *self.counts.of(&stage) += 1;
+        entry.stage = stage;
+    }
+
+    /// Takes the next file that may be checked at `now`, the fresh before the background.
+    pub fn dequeue(&mut self, now: Duration) -> Option<FileId> {
+        let background_first = self.since_background >= BACKGROUND_SHARE;
+        let order = if background_first {
+            [Lane::Background, Lane::Fresh]
+        } else {
+            [Lane::Fresh, Lane::Background]
+        };
+        order
+            .into_iter()
+            .find_map(|lane| self.dequeue_from(lane, now))
+    }
+
+    fn dequeue_from(&mut self, lane: Lane, now: Duration) -> Option<FileId> {
+        let queue = match lane {
+            Lane::Fresh => &mut self.fresh,
+            Lane::Background => &mut self.background,
+        };
+        for _ in 0..queue.len() {
+            let id = queue.pop_front()?;
+            let Some(entry) = self.entries.get(&id) else {
+                continue;
+            };
+            match entry.stage {
+                Stage::Waiting(at, _) if at == lane && entry.not_before <= now => {
+                    self.set_stage(id, Stage::Idle);
+                    self.since_background = match lane {
+                        Lane::Fresh => self.since_background.saturating_add(1),
+                        Lane::Background => 0,
+                    };
+                    return Some(id);
+                }
+                Stage::Waiting(at, _) if at == lane => queue.push_back(id),
+                // It moved to the other queue, or was taken from it: this place is void.
+                _ => {}
+            }
+        }
+        None
+    }
+
+    /// Whether nothing waits and nothing is active.
+    pub fn is_quiet(&self) -> bool {
+        self.counts.fresh + self.counts.background + self.counts.active == 0
+    }
+
+    /// How many files are in which stage.
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// How long the file at the head of the fresh queue has waited.
+    pub fn oldest_wait(&self, now: Duration) -> Duration {
+        let waiting = |id: &FileId| match self.entries.get(id)?.stage {
+            Stage::Waiting(Lane::Fresh, since) => Some(now.saturating_sub(since)),
+            _ => None,
+        };
+        self.fresh.iter().find_map(waiting).unwrap_or_default()
+    }
+
+    /// Remembers what a file depends on, so that [`Files::dependents`] finds it.
+    pub fn set_dependencies(&mut self, id: FileId, old: &[Arc<Path>], new: &[Arc<Path>]) {
+        for path in old {
+            self.forget_dependent(path, id);
+        }
+        for path in new {
+            let ids = self.dependents.entry(path.clone()).or_default();
+            if !ids.contains(&id) {
+                ids.push(id);
+            }
+        }
+    }
+
+    fn forget_dependent(&mut self, path: &Path, id: FileId) {
+        if let Some(ids) = self.dependents.get_mut(path) {
+            ids.retain(|other| *other != id);
+            if ids.is_empty() {
+                self.dependents.remove(path);
+            }
+        }
+    }
+
+    /// The files whose verdict depends on this path (other than the file itself).
+    pub fn dependents(&self, path: &Path) -> Vec<FileId> {
+        self.dependents.get(path).cloned().unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn files(count: u32) -> Files {
+        let mut files = Files::default();
+        for n in 0..count {
+            let path: Arc<Path> = Path::new(&format!("/x/{n}.xodr")).into();
+            files.insert(&path, FileKind::Xodr, Stamp::default());
+        }
+        files
+    }
+
+    #[test]
+    fn a_file_waits_once_however_often_it_is_queued() {
+        let mut files = files(1);
+        for _ in 0..3 {
+            files.enqueue(0, Lane::Background, Duration::ZERO);
+            files.enqueue(0, Lane::Fresh, Duration::ZERO);
+        }
+        assert_eq!(files.dequeue(Duration::ZERO), Some(0));
+        assert_eq!(files.dequeue(Duration::ZERO), None);
+        assert!(files.is_quiet());
+    }
+
+    #[test]
+    fn the_background_gets_its_share() {
+        let mut files = files(60);
+        files.enqueue(59, Lane::Background, Duration::ZERO);
+        for id in 0..59 {
+            files.enqueue(id, Lane::Fresh, Duration::ZERO);
+        }
+        let order: Vec<_> = std::iter::from_fn(|| files.dequeue(Duration::ZERO)).collect();
+        let place = order.iter().position(|id| *id == 59);
+        assert_eq!(place, Some(usize::from(BACKGROUND_SHARE)));
+        assert_eq!(order.len(), 60);
+    }
+
+    #[test]
+    fn a_file_that_must_rest_lets_others_pass() {
+        let mut files = files(2);
+        files.enqueue(0, Lane::Fresh, Duration::ZERO);
+        files.enqueue(1, Lane::Fresh, Duration::ZERO);
+        if let Some(entry) = files.get_mut(0) {
+            entry.not_before = Duration::from_secs(1);
+        }
+        assert_eq!(files.dequeue(Duration::ZERO), Some(1));
+        assert_eq!(files.dequeue(Duration::ZERO), None);
+        assert_eq!(files.dequeue(Duration::from_secs(1)), Some(0));
+    }
+}

@@ -1,0 +1,126 @@
+//! What a bundle said about a job, measured, cut to size and put in the form of a result.
+
+use qcbus_formats::xqar::{DomainInfo, InfoElement, Issue, Location, Locations, Status};
+use qcbus_messages::Catalogue;
+use sha2::{Digest as _, Sha256};
+
+use super::jobs::{Part, PartState};
+use super::types::{BundleOutcome, CheckerOutcome};
+
+/// A number that changes when another set of bundles, versions or checkers would take part.
+pub(super) fn signature<'a>(
+    bundles: impl Iterator<Item = (&'a str, &'a str, Option<&'a Catalogue>)>,
+) -> u64 {
+    let mut hash = Sha256::new();
+    for (name, version, catalogue) in bundles {
+        let Some(catalogue) = catalogue else {
+            hash.update(format!("{name}\0absent\0"));
+            continue;
+        };
+        hash.update(format!("{name}\0{version}\0{}\0", catalogue.build_date));
+        for checker in &catalogue.checkers {
+            hash.update(format!(
+                "{}\0{:?}\0{}\0",
+                checker.id, checker.rule_uids, checker.default_on
+            ));
+            // Another default is another result.
+            for param in &checker.params {
+                hash.update(format!("{}={}\0", param.name, param.default));
+            }
+        }
+    }
+    let digest = hash.finalize();
+    digest
+        .iter()
+        .take(8)
+        .fold(0, |number, byte| (number << 8) | u64::from(*byte))
+}
+
+/// What one part says in the result.
+pub(super) fn outcome(name: &str, part: &Part) -> BundleOutcome {
+    let failure = match &part.state {
+        PartState::Failed(why) => Some(why.clone()),
+        _ => None,
+    };
+    let said = |checker: u32| part.staged.get(&checker).filter(|_| failure.is_none());
+    let checkers = part.demanded.iter().map(|checker| {
+        let staged = said(*checker);
+        let done = staged.and_then(|staged| staged.done.clone());
+        let withheld = staged.map_or(0, |staged| staged.withheld);
+        let kept = staged.map_or(0, |staged| staged.issues.len());
+        let (mut status, mut reason, params, metadata) = done.unwrap_or_else(|| {
+            let why = failure.clone().unwrap_or_else(|| {
+                "the bundle said that it was done without a word on this checker".to_owned()
+            });
+            (Status::Error, why, Vec::new(), Vec::new())
+        });
+        if withheld > 0 {
+            status = Status::Error;
+            reason = format!(
+                "more findings than one checker may report: {kept} are kept, {withheld} were cut off"
+            );
+        }
+        let issues = staged.map(|staged| staged.issues.clone()).unwrap_or_default();
+        let issues = if status == Status::Skipped { Vec::new() } else { issues };
+        CheckerOutcome { checker: *checker, status, reason, params, issues, metadata }
+    });
+    BundleOutcome {
+        name: name.to_owned(),
+        version: part.version.clone(),
+        catalogue: part.catalogue.clone(),
+        checkers: checkers.collect(),
+        micros: part.micros,
+        failure: failure.clone(),
+    }
+}
+
+/// Roughly the memory that an issue holds.
+pub(super) fn weight(issue: &Issue) -> usize {
+    let place = |place: &Location| match place {
+        Location::Xml { xpath } => 64 + xpath.len(),
+        _ => 64,
+    };
+    let places =
+        |it: &Locations| 64 + it.description.len() + it.places.iter().map(place).sum::<usize>();
+    let infos = |it: &DomainInfo| it.name.len() + it.content.iter().map(info_weight).sum::<usize>();
+    256 + issue.description.len()
+        + issue.rule_uid.len()
+        + issue.locations.iter().map(places).sum::<usize>()
+        + issue.domain_info.iter().map(infos).sum::<usize>()
+}
+
+fn info_weight(element: &InfoElement) -> usize {
+    let attributes = element
+        .attributes
+        .iter()
+        .map(|(name, value)| 48 + name.len() + value.len());
+    let children = element.children.iter().map(info_weight);
+    96 + element.name.len()
+        + element.text.len()
+        + attributes.sum::<usize>()
+        + children.sum::<usize>()
+}
+
+/// Cuts an issue down to what may be kept.
+pub(super) fn clip(issue: &mut Issue, max: usize) {
+    clip_text(&mut issue.description, max);
+    clip_text(&mut issue.rule_uid, 512);
+    issue.locations.truncate(64);
+    issue.domain_info.truncate(16);
+    for place in &mut issue.locations {
+        clip_text(&mut place.description, max);
+        place.places.truncate(16);
+    }
+}
+
+/// Cuts a text at a character.
+pub(super) fn clip_text(text: &mut String, max: usize) {
+    if text.len() > max {
+        let end = (0..=max)
+            .rev()
+            .find(|at| text.is_char_boundary(*at))
+            .unwrap_or(0);
+        text.truncate(end);
+        text.push('…');
+    }
+}

@@ -1,0 +1,271 @@
+//! Reporters: every result reaches every reporter at least once, and none can hold up a verdict.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::time::Duration;
+
+use qcbus_messages::{FromPeer, Hello, JobId, PeerReport, Role};
+
+use super::files::FileId;
+use super::types::{Action, Delivery, Launch, Session};
+use super::{Actions, State};
+
+/// A reporter by name.
+#[derive(Debug, Default)]
+pub(super) struct Reporter {
+    pub name: String,
+    pub version: String,
+    pub session: Option<Session>,
+    pub incarnation: u64,
+    pub pid: u32,
+    pub launch: Option<Launch>,
+    pub capacity: usize,
+    /// Sent and not acknowledged.
+    pub active: BTreeMap<JobId, FileId>,
+    /// Files whose newest result is to be sent.
+    pub queue: VecDeque<FileId>,
+    pub heard: Duration,
+    pub moved: Duration,
+    pub done: u64,
+    pub failed: u64,
+    pub note: String,
+}
+
+impl State {
+    pub(super) fn reporter_named(&self, name: &str) -> Option<&Reporter> {
+        self.reporters.iter().find(|reporter| reporter.name == name)
+    }
+
+    /// The index of a reporter, which is made when it is new.
+    pub fn reporter_index(&mut self, name: &str) -> u32 {
+        let found = self
+            .reporters
+            .iter()
+            .position(|reporter| reporter.name == name);
+        let index = found.unwrap_or_else(|| {
+            self.reporters.push(Reporter {
+                name: name.to_owned(),
+                ..Reporter::default()
+            });
+            self.reporters.len() - 1
+        });
+        u32::try_from(index).unwrap_or(u32::MAX)
+    }
+
+    pub(super) fn reporter_joins(
+        &mut self,
+        session: Session,
+        hello: &Hello,
+        actions: &mut Actions,
+    ) {
+        let launch = hello.launch.map(Launch);
+        self.child_joined(&hello.name, launch);
+        let index = self.reporter_index(&hello.name);
+        let now = self.now;
+        let Some(reporter) = self.reporters.get_mut(index as usize) else {
+            return;
+        };
+        if let Some(old) = reporter.session.replace(session) {
+            self.sessions.remove(&old);
+            actions.push(Action::Disconnect { session: old });
+        }
+        reporter.version.clone_from(&hello.version);
+        reporter.incarnation = hello.incarnation;
+        reporter.pid = hello.pid;
+        reporter.launch = launch;
+        reporter.capacity = usize::from(hello.capacity).clamp(1, 64);
+        reporter.heard = now;
+        reporter.moved = now;
+        reporter.note.clear();
+        self.sessions
+            .insert(session, (Role::Reporter, hello.name.clone()));
+        actions.push(Action::Accept { session });
+        self.drain_unwanted(&hello.name, launch, actions);
+        self.queue_undelivered(index);
+        self.deliver(index, actions);
+    }
+
+    /// Queues every result that this reporter has not acknowledged.
+    fn queue_undelivered(&mut self, index: u32) {
+        let lacks: Vec<FileId> = self
+            .files
+            .iter()
+            .filter(|(_, entry)| {
+                entry
+                    .judged
+                    .as_ref()
+                    .is_some_and(|judged| !entry.delivered.contains(&(index, judged.job)))
+            })
+            .map(|(id, _)| id)
+            .collect();
+        if let Some(reporter) = self.reporters.get_mut(index as usize) {
+            reporter.active.clear();
+            reporter.queue = lacks.into();
+        }
+    }
+
+    /// A new result: every reporter that is there gets it.
+    pub(super) fn deliver_to_all(&mut self, file: FileId, actions: &mut Actions) {
+        for index in 0..self.reporters.len() {
+            let Some(reporter) = self.reporters.get_mut(index) else {
+                continue;
+            };
+            // One that is away gets everything that it lacks when it joins.
+            if reporter.session.is_some() {
+                reporter.queue.push_back(file);
+                self.deliver(u32::try_from(index).unwrap_or(u32::MAX), actions);
+            }
+        }
+    }
+
+    pub(super) fn deliver(&mut self, index: u32, actions: &mut Actions) {
+        while let Some(reporter) = self.reporters.get_mut(index as usize) {
+            let Some(session) = reporter.session else {
+                return;
+            };
+            if reporter.active.len() >= reporter.capacity {
+                return;
+            }
+            let Some(file) = reporter.queue.pop_front() else {
+                return;
+            };
+            let Some(entry) = self.files.get(file) else {
+                continue;
+            };
+            let Some(judged) = entry.judged.clone() else {
+                continue;
+            };
+            if entry.delivered.contains(&(index, judged.job))
+                || reporter.active.contains_key(&judged.job)
+            {
+                continue;
+            }
+            reporter.active.insert(judged.job, file);
+            reporter.moved = self.now;
+            let delivery = Delivery {
+                job: judged.job,
+                path: entry.path.clone(),
+                judged,
+            };
+            let reporter = reporter.name.clone();
+            actions.push(Action::Deliver {
+                session,
+                reporter,
+                delivery,
+            });
+        }
+    }
+
+    pub(super) fn reporter_says(&mut self, name: &str, message: FromPeer, actions: &mut Actions) {
+        let now = self.now;
+        let index = self.reporter_index(name);
+        let Some(reporter) = self.reporters.get_mut(index as usize) else {
+            return;
+        };
+        reporter.heard = now;
+        match message {
+            FromPeer::ResultDone { job, report } => {
+                let Some(file) = reporter.active.remove(&job) else {
+                    return;
+                };
+                reporter.moved = now;
+                reporter.done += 1;
+                let failed = match report {
+                    PeerReport::Written => None,
+                    PeerReport::Failed(why) => Some(why),
+                };
+                if let Some(why) = failed {
+                    reporter.failed += 1;
+                    reporter.note.clone_from(&why);
+                    self.notice(format!("{name} could not report: {why}"), actions);
+                }
+                if let Some(entry) = self.files.get_mut(file) {
+                    entry.delivered.retain(|(other, _)| *other != index);
+                    entry.delivered.push((index, job));
+                    let path = entry.path.clone();
+                    actions.push(Action::Delivered {
+                        reporter: name.to_owned(),
+                        path,
+                        job,
+                    });
+                }
+                self.deliver(index, actions);
+            }
+            FromPeer::Leaving => {
+                if let Some(session) = reporter.session.take() {
+                    self.sessions.remove(&session);
+                    self.retired.remove(&session);
+                    actions.push(Action::Disconnect { session });
+                }
+                self.child_left(name);
+            }
+            _ => {}
+        }
+    }
+
+    /// A result could not be read back: it was withdrawn or replaced, or the disk is in trouble.
+    pub(super) fn undeliverable(
+        &mut self,
+        session: Session,
+        job: JobId,
+        why: String,
+        actions: &mut Actions,
+    ) {
+        let Some((Role::Reporter, name)) = self.sessions.get(&session).cloned() else {
+            return;
+        };
+        let index = self.reporter_index(&name);
+        if let Some(reporter) = self.reporters.get_mut(index as usize)
+            && let Some(file) = reporter.active.remove(&job)
+            && self.files.get(file).is_some_and(|it| it.present)
+        {
+            self.notice(why, actions);
+        }
+        self.deliver(index, actions);
+    }
+
+    pub(super) fn reporter_died(&mut self, name: &str, why: &str, actions: &mut Actions) {
+        let index = self.reporter_index(name);
+        let Some(reporter) = self.reporters.get_mut(index as usize) else {
+            return;
+        };
+        if let Some(session) = reporter.session.take() {
+            self.sessions.remove(&session);
+            actions.push(Action::Disconnect { session });
+        }
+        let proved = reporter.done > 0;
+        reporter.note = why.to_owned();
+        reporter.active.clear();
+        reporter.queue.clear();
+        self.notice(format!("{name}: {why}"), actions);
+        self.child_down(name, proved, why, actions);
+    }
+
+    pub(super) fn watch_reporters(&mut self, actions: &mut Actions) {
+        let limit = self.settings.job_deadline;
+        let silence = self.settings.silence_limit;
+        let mut failing = Vec::new();
+        for reporter in &self.reporters {
+            if reporter.session.is_none() || reporter.active.is_empty() {
+                continue;
+            }
+            let moved = self.now.saturating_sub(reporter.moved);
+            let heard = self.now.saturating_sub(reporter.heard);
+            if moved > limit || heard.min(moved) > silence {
+                failing.push((reporter.name.clone(), reporter.launch, reporter.pid));
+            }
+        }
+        for (name, launch, pid) in failing {
+            if launch.is_some() {
+                actions.push(Action::Kill { launch, pid });
+            }
+            self.reporter_died(&name, "it does not acknowledge results", actions);
+        }
+    }
+
+    /// Whether every reporter that is there has everything.
+    pub(super) fn all_delivered(&self) -> bool {
+        self.reporters
+            .iter()
+            .all(|it| it.session.is_none() || (it.active.is_empty() && it.queue.is_empty()))
+    }
+}

@@ -1,0 +1,225 @@
+//! What `qcbus status` shows.
+
+use std::collections::VecDeque;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use qcbus_messages::Verdict;
+use qcbus_messages::control::{FileCounts, PeerStatus, QueueStatus, Status};
+
+use super::State;
+use super::bundles::Bundle;
+use super::children::ChildState;
+
+/// Verdicts of the last seconds.
+#[derive(Debug, Default)]
+pub(super) struct Rate {
+    times: VecDeque<(Duration, u64)>,
+}
+
+const RATE_WINDOW: Duration = Duration::from_secs(10);
+
+impl Rate {
+    /// Counts one, in buckets of a tenth of a second so that memory does not follow the rate.
+    pub fn note(&mut self, now: Duration) {
+        let bucket = Duration::from_millis(u64::try_from(now.as_millis() / 100 * 100).unwrap_or(0));
+        match self.times.back_mut() {
+            Some((at, count)) if *at == bucket => *count += 1,
+            _ => self.times.push_back((bucket, 1)),
+        }
+        while self
+            .times
+            .front()
+            .is_some_and(|(at, _)| now.saturating_sub(*at) > RATE_WINDOW)
+        {
+            self.times.pop_front();
+        }
+    }
+
+    fn per_second(&self, now: Duration) -> f64 {
+        let recent = self
+            .times
+            .iter()
+            .filter(|(at, _)| now.saturating_sub(*at) <= RATE_WINDOW);
+        let (mut total, mut first) = (0, now);
+        for (at, count) in recent {
+            total += count;
+            first = first.min(*at);
+        }
+        let span = now.saturating_sub(first).max(Duration::from_millis(100));
+        total as f64 / span.as_secs_f64()
+    }
+}
+
+impl State {
+    /// The part of the status that the state machine knows; the engine adds the rest.
+    pub fn status(&self) -> Status {
+        Status {
+            generation: self.settings.generation,
+            config: self.config.to_string(),
+            files: self.file_counts(),
+            queue: self.queue_status(),
+            peers: self.peer_status(),
+            notices: self.notices.iter().cloned().collect(),
+            ..Status::default()
+        }
+    }
+
+    /// The files that are there, in the order of their paths.
+    pub fn present_files(&self) -> Vec<Arc<Path>> {
+        let present = self.files.iter().filter(|(_, entry)| entry.present);
+        let mut paths: Vec<Arc<Path>> = present.map(|(_, entry)| entry.path.clone()).collect();
+        paths.sort();
+        paths
+    }
+
+    /// Keeps something for `status` that the state machine did not find out itself.
+    pub fn remark(&mut self, text: &str) {
+        self.notice(text.to_owned(), &mut Vec::new());
+    }
+
+    fn file_counts(&self) -> FileCounts {
+        let mut counts = FileCounts::default();
+        for (_, entry) in self.files.iter().filter(|(_, entry)| entry.present) {
+            counts.total += 1;
+            let idle = matches!(
+                entry.stage(),
+                super::Stage::Idle | super::Stage::Waiting(super::Lane::Background, _)
+            );
+            let Some(judged) = entry.judged.as_ref().filter(|_| idle) else {
+                continue;
+            };
+            counts.judged += 1;
+            match judged.verdict {
+                Verdict::Accepted => counts.accepted += 1,
+                Verdict::Rejected => counts.rejected += 1,
+                Verdict::Undetermined => counts.undetermined += 1,
+            }
+        }
+        counts
+    }
+
+    fn queue_status(&self) -> QueueStatus {
+        let counts = self.files.counts();
+        let rate = self.rate.per_second(self.now);
+        let left = (counts.fresh + counts.background + counts.active) as f64;
+        let estimated = if left == 0.0 {
+            Some(0.0)
+        } else {
+            (rate > 0.0).then(|| left / rate)
+        };
+        QueueStatus {
+            waiting: counts.fresh,
+            background: counts.background,
+            active: counts.active,
+            oldest_waiting_s: self.files.oldest_wait(self.now).as_secs_f64(),
+            rate,
+            estimated_s: estimated,
+        }
+    }
+
+    fn peer_status(&self) -> Vec<PeerStatus> {
+        let bundles = self
+            .bundles
+            .iter()
+            .map(|(name, bundle)| self.bundle_status(name, bundle));
+        let known = |it: &&super::reporters::Reporter| {
+            it.session.is_some() || self.children.contains_key(&it.name)
+        };
+        let reporters = self.reporters.iter().filter(known).map(|it| PeerStatus {
+            name: it.name.clone(),
+            role: "reporter".to_owned(),
+            version: it.version.clone(),
+            pid: it.pid,
+            state: if it.session.is_none() {
+                "down"
+            } else if it.active.is_empty() {
+                "ready"
+            } else {
+                "busy"
+            }
+            .to_owned(),
+            checkers: 0,
+            active: it.active.len() as u64,
+            done: it.done,
+            restarts: self.restarts(&it.name),
+            note: if it.failed > 0 {
+                format!("{} not reported: {}", it.failed, it.note)
+            } else {
+                it.note.clone()
+            },
+        });
+        let starting = self.children.iter().filter(|(name, _)| {
+            let reporter = self.reporter_named(name).is_some();
+            !self.bundles.contains_key(*name) && !reporter
+        });
+        let starting = starting.map(|(name, child)| PeerStatus {
+            name: name.clone(),
+            role: format!("{:?}", child.spec.role).to_lowercase(),
+            state: match child.state {
+                ChildState::GaveUp(_) => "gave up",
+                ChildState::Ended => "down",
+                _ => "starting",
+            }
+            .to_owned(),
+            restarts: child.restarts.into(),
+            ..PeerStatus::default()
+        });
+        bundles.chain(reporters).chain(starting).collect()
+    }
+
+    fn bundle_status(&self, name: &str, bundle: &Bundle) -> PeerStatus {
+        let waiting = bundle.queue.len() + bundle.suspects.len();
+        let silent = !bundle.active.is_empty()
+            && self.now.saturating_sub(bundle.heard) > Duration::from_secs(3);
+        let state = if self.child_gave_up(name) && bundle.session.is_none() {
+            "gave up"
+        } else if bundle.session.is_none() {
+            "down"
+        } else if bundle.leaving {
+            "draining"
+        } else if !bundle.ready {
+            "starting"
+        } else if silent {
+            "silent"
+        } else if bundle.active.is_empty() {
+            "ready"
+        } else {
+            "busy"
+        };
+        let note = if bundle.note.is_empty() && self.is_slowest(name, waiting) {
+            format!("slow: {waiting} jobs wait for it and for nobody else")
+        } else {
+            bundle.note.clone()
+        };
+        PeerStatus {
+            name: name.to_owned(),
+            role: "bundle".to_owned(),
+            version: bundle.version.clone(),
+            pid: bundle.pid,
+            state: state.to_owned(),
+            checkers: bundle
+                .catalogue
+                .as_ref()
+                .map_or(0, |it| it.checkers.len() as u64),
+            active: bundle.active.len() as u64,
+            done: bundle.done,
+            restarts: self.restarts(name),
+            note,
+        }
+    }
+
+    /// A bundle is named as slow when jobs pile up at it and at none of the others.
+    fn is_slowest(&self, name: &str, waiting: usize) -> bool {
+        let others = self.bundles.iter().filter(|(other, _)| *other != name);
+        waiting >= 4 && others.map(|(_, it)| it.queue.len()).max().unwrap_or(0) * 4 <= waiting
+    }
+
+    fn restarts(&self, name: &str) -> u64 {
+        self.children
+            .get(name)
+            .map_or(0, |child| child.restarts)
+            .into()
+    }
+}

@@ -1,0 +1,557 @@
+//! The words of the state machine: what can happen, and what it wants done.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use qcbus_document::FileKind;
+use qcbus_formats::xqar::{Issue, Metadata, Param, Status};
+use qcbus_messages::control::{FileVerdict, Response};
+use qcbus_messages::{
+    Catalogue, Digest, FromPeer, Hello, Job, JobDocument, JobId, MissingDocument, Role, ToPeer,
+    Verdict,
+};
+
+/// A peer's session on the bus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Session(pub u64);
+
+/// One start of a child process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Launch(pub u64);
+
+/// A client of the control socket that waits for an answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Ticket(pub u64);
+
+/// What `stat` says of a file: enough to see that it has changed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub struct Stamp {
+    /// Size in bytes.
+    pub size: u64,
+    /// Modification time in nanoseconds since 1970.
+    pub mtime_ns: i128,
+    /// Inode, because a rename can keep size and time.
+    pub inode: u64,
+}
+
+/// A file that a verdict depends on, as it was when it was read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Input {
+    /// Absolute path.
+    pub path: Arc<Path>,
+    /// Its stamp and digest; `None` when it was looked for and not there.
+    pub content: Option<(Stamp, Digest)>,
+}
+
+/// What reading a file and its dependencies gave.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PreparedJob {
+    /// Everything the verdict depends on, the root first.
+    pub inputs: Vec<Input>,
+    /// Digest over all inputs, see [`crate::intake`].
+    pub basis: Digest,
+    /// Whether some stamp is so young that the file may have changed unnoticed since.
+    pub racy: bool,
+    /// The published documents, the root first.
+    pub documents: Vec<JobDocument>,
+    /// What could not be had.
+    pub missing: Vec<MissingDocument>,
+    /// Source bytes in total.
+    pub bytes: u64,
+}
+
+impl PreparedJob {
+    /// Stamp and digest of the root.
+    pub fn root(&self) -> Option<(Stamp, Digest)> {
+        self.inputs.first().and_then(|input| input.content)
+    }
+}
+
+/// Why a file could not be prepared.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum PrepareFailure {
+    /// It is no longer there.
+    Vanished,
+    /// It is there and cannot be checked; the reason is for a person.
+    Unreadable {
+        /// Why.
+        reason: String,
+        /// What `stat` said, if it said anything.
+        stamp: Option<Stamp>,
+    },
+    /// No room for its image now; worth another try later.
+    NoRoom(String),
+    /// As many documents as the bus carries are in use; worth another try at once.
+    Busy,
+}
+
+/// A verdict as the files table remembers it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Judged {
+    /// The job that gave it.
+    pub job: JobId,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Digest of the root's bytes.
+    pub digest: Digest,
+    /// Digest over all inputs.
+    pub basis: Digest,
+    /// Configuration it was given under.
+    pub config: Digest,
+    /// Signature of the bundles that took part, see [`super::State::signature`].
+    pub bundles: u64,
+    /// Everything it depends on.
+    pub inputs: Vec<Input>,
+    /// Whether the stamps in `inputs` are too young to be trusted alone.
+    pub racy: bool,
+    /// Issues by level: errors, warnings, information.
+    pub counts: [u64; 3],
+    /// For undetermined: which checkers failed and why.
+    pub why: Vec<String>,
+    /// Where the result lies.
+    pub xqar: PathBuf,
+}
+
+/// What one checker of one bundle said.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CheckerOutcome {
+    /// Index into the catalogue.
+    pub checker: u32,
+    /// How it ended.
+    pub status: Status,
+    /// Why, unless completed.
+    pub reason: String,
+    /// The parameters used.
+    pub params: Vec<Param>,
+    /// The findings.
+    pub issues: Vec<Issue>,
+    /// Further facts.
+    pub metadata: Vec<Metadata>,
+}
+
+/// What one bundle said about one file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BundleOutcome {
+    /// Name.
+    pub name: String,
+    /// Version.
+    pub version: String,
+    /// What it offers; `None` for a bundle that was demanded and never seen.
+    pub catalogue: Option<Arc<Catalogue>>,
+    /// Why the whole bundle failed, if it did.
+    pub failure: Option<String>,
+    /// Its checkers' outcomes, by index.
+    pub checkers: Vec<CheckerOutcome>,
+    /// Time spent checking, in microseconds, as the bundle says.
+    pub micros: u64,
+}
+
+/// A job whose checking is over, ready to be pooled and stored.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FinishedJob {
+    /// Its number.
+    pub job: JobId,
+    /// The file.
+    pub path: Arc<Path>,
+    /// Its kind.
+    pub kind: FileKind,
+    /// Configuration.
+    pub config: Digest,
+    /// What was read; `None` when it could not be.
+    pub prepared: Option<Arc<PreparedJob>>,
+    /// Why it could not be read.
+    pub unreadable: Option<String>,
+    /// By bundle.
+    pub bundles: Vec<BundleOutcome>,
+    /// Signature of the bundles.
+    pub signature: u64,
+    /// Time since the job was taken from the queue.
+    pub elapsed: Duration,
+}
+
+/// What storing a result gave.
+#[derive(Debug, Clone, PartialEq)]
+pub enum StoreOutcome {
+    /// Written and in the journal.
+    Stored(Box<Judged>),
+    /// The file has changed since it was read; nothing was written.
+    Stale,
+    /// It could not be written; worth another try.
+    Failed(String),
+}
+
+/// A result for a reporter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Delivery {
+    /// The job.
+    pub job: JobId,
+    /// The file.
+    pub path: Arc<Path>,
+    /// Its verdict.
+    pub judged: Arc<Judged>,
+}
+
+/// A child process that the broker keeps running.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct ChildSpec {
+    /// The name under which it will say hello.
+    pub name: String,
+    /// Bundle or reporter.
+    pub role: Role,
+    /// Version from the manifest, if it says one; a change makes an upgrade.
+    pub version: Option<String>,
+    /// Program and arguments; the bus options are appended.
+    pub command: Vec<String>,
+    /// When to start it again.
+    pub restart: Restart,
+}
+
+/// When a child is started again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Restart {
+    /// Never.
+    Never,
+    /// When it ended with an error or a signal.
+    OnFailure,
+    /// Whenever it ended without having been asked to.
+    Always,
+}
+
+/// Everything that can happen to the broker.
+#[derive(Debug)]
+pub enum Event {
+    /// A file is there and quiet: new, changed, or seen in a scan.
+    Settled {
+        /// Absolute path.
+        path: Arc<Path>,
+        /// What `stat` says.
+        stamp: Stamp,
+    },
+    /// A file has gone.
+    Vanished {
+        /// Absolute path.
+        path: Arc<Path>,
+    },
+    /// The first scan is complete.
+    Scanned,
+    /// Reading a file is over.
+    Prepared {
+        /// The job.
+        job: JobId,
+        /// What it gave.
+        result: Result<Box<PreparedJob>, PrepareFailure>,
+    },
+    /// Storing a result is over.
+    Stored {
+        /// The job.
+        job: JobId,
+        /// What it gave.
+        outcome: StoreOutcome,
+    },
+    /// A peer says hello.
+    Hello {
+        /// Its session.
+        session: Session,
+        /// Its words.
+        hello: Hello,
+    },
+    /// A peer says something.
+    Message {
+        /// Its session.
+        session: Session,
+        /// Its words.
+        message: FromPeer,
+    },
+    /// A peer sends what is no message.
+    Garbage {
+        /// Its session.
+        session: Session,
+        /// What is wrong.
+        what: String,
+    },
+    /// A peer's process is dead.
+    Gone {
+        /// Its session.
+        session: Session,
+    },
+    /// A result could not be read back for a reporter.
+    Undeliverable {
+        /// The reporter's session.
+        session: Session,
+        /// The job.
+        job: JobId,
+        /// Why.
+        why: String,
+    },
+    /// A child could not be started or has ended.
+    Exited {
+        /// Which start.
+        launch: Launch,
+        /// How: for a person.
+        how: String,
+        /// Exit status 0.
+        success: bool,
+    },
+    /// A configuration is in force from now on.
+    Configured {
+        /// Its digest.
+        digest: Digest,
+        /// What it demands.
+        demand: Arc<dyn Demand>,
+    },
+    /// The children that should run from now on.
+    Children {
+        /// All of them.
+        specs: Vec<ChildSpec>,
+    },
+    /// A client waits for a verdict.
+    Wait {
+        /// The client.
+        ticket: Ticket,
+        /// The file.
+        path: Arc<Path>,
+        /// What `stat` says of it now.
+        stamp: Option<Stamp>,
+        /// Why nobody will ever check it, if so.
+        unwatched: Option<String>,
+        /// When to give up.
+        timeout: Option<Duration>,
+    },
+    /// Stop taking files, finish what is there, stop.
+    Drain,
+    /// Time has passed.
+    Tick,
+}
+
+/// Everything that the state machine wants done.
+#[derive(Debug)]
+pub enum Action {
+    /// Read the file and its dependencies, publish the images.
+    Prepare {
+        /// The job.
+        job: JobId,
+        /// The file.
+        path: Arc<Path>,
+    },
+    /// Let go of a job's documents.
+    Release {
+        /// The job.
+        job: JobId,
+    },
+    /// Publish a document once more.
+    PublishAgain {
+        /// The job that needs it.
+        job: JobId,
+        /// The document.
+        doc: qcbus_messages::DocId,
+    },
+    /// Say something to a peer.
+    Send {
+        /// Its session.
+        session: Session,
+        /// The words.
+        message: ToPeer,
+    },
+    /// Open a session.
+    Accept {
+        /// The session.
+        session: Session,
+    },
+    /// Turn a peer away.
+    Refuse {
+        /// The session.
+        session: Session,
+        /// For a person.
+        reason: String,
+    },
+    /// Close a session.
+    Disconnect {
+        /// The session.
+        session: Session,
+    },
+    /// Start a child.
+    Spawn {
+        /// Which start.
+        launch: Launch,
+        /// What to start.
+        spec: ChildSpec,
+    },
+    /// Kill a process that does not answer.
+    Kill {
+        /// The child's start, if it is one of ours.
+        launch: Option<Launch>,
+        /// Its process id.
+        pid: u32,
+    },
+    /// Pool, write, record.
+    Store(Box<FinishedJob>),
+    /// Remove the result of a file that has gone.
+    Withdraw {
+        /// The file.
+        path: Arc<Path>,
+    },
+    /// Remember that a file was looked at and found unchanged.
+    Restamp {
+        /// The file.
+        path: Arc<Path>,
+        /// Its verdict with fresh stamps.
+        judged: Arc<Judged>,
+    },
+    /// Send a result to a reporter.
+    Deliver {
+        /// Its session.
+        session: Session,
+        /// Its name.
+        reporter: String,
+        /// The result.
+        delivery: Delivery,
+    },
+    /// Remember that a reporter has a result.
+    Delivered {
+        /// Its name.
+        reporter: String,
+        /// The file.
+        path: Arc<Path>,
+        /// The job.
+        job: JobId,
+    },
+    /// Answer a client.
+    Answer {
+        /// The client.
+        ticket: Ticket,
+        /// The answer.
+        response: Response,
+    },
+    /// Watch these paths for changes though nobody asked for a check of them.
+    Depend {
+        /// The paths, each with the stamp under which it was read.
+        files: Vec<(Arc<Path>, Option<Stamp>)>,
+    },
+    /// A verdict stands: tell whoever listens.
+    Judged {
+        /// The file.
+        path: Arc<Path>,
+        /// Its verdict.
+        judged: Arc<Judged>,
+        /// `false` when the verdict stood already.
+        fresh: bool,
+    },
+    /// Something that a person should read.
+    Notice(String),
+    /// Everything is drained: leave the loop.
+    Stop,
+}
+
+/// What a configuration demands, as far as the state machine must know.
+pub trait Demand: Send + Sync + std::fmt::Debug {
+    /// Whether this bundle is to check anything at all.
+    fn wants_bundle(&self, name: &str, alias: &str) -> bool;
+    /// The indexes of the catalogue's checkers that are to run on a file of this kind.
+    fn checkers(&self, name: &str, catalogue: &Catalogue, kind: FileKind) -> Vec<u32>;
+    /// Bundles demanded by name, whether they have been seen or not.
+    fn named(&self) -> Vec<String>;
+    /// Whether `name` (as in [`Demand::named`]) means this bundle.
+    fn means(&self, named: &str, name: &str, alias: &str) -> bool;
+}
+
+/// Numbers that shape the state machine. All have defaults.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// Number of this broker's start; the upper half of every job number.
+    pub generation: u64,
+    /// Jobs between being read and being stored.
+    pub max_active: usize,
+    /// Files being read at once.
+    pub max_preparing: usize,
+    /// Results being stored at once.
+    pub max_storing: usize,
+    /// Documents of active jobs on the bus.
+    pub max_documents: usize,
+    /// A bundle must end a job within this time.
+    pub job_deadline: Duration,
+    /// A bundle with work that says nothing for this long is taken for dead.
+    pub silence_limit: Duration,
+    /// A demanded bundle that is not there is waited for this long.
+    pub absence_limit: Duration,
+    /// At the start, how long hellos are collected before missing children are started.
+    pub collect: Duration,
+    /// First pause before a child is started again; doubles up to `backoff_max`.
+    pub backoff: Duration,
+    /// Longest pause.
+    pub backoff_max: Duration,
+    /// A child that has run this long is taken for healthy and its pauses start anew.
+    pub healthy_after: Duration,
+    /// More restarts than this within `restart_window` and the broker gives up on a child.
+    pub max_restarts: u32,
+    /// See `max_restarts`.
+    pub restart_window: Duration,
+    /// Issues kept per checker and job.
+    pub max_issues: usize,
+    /// Bytes of texts kept per bundle and job.
+    pub max_staged_bytes: usize,
+    /// Longest text kept of anything a bundle says, in bytes.
+    pub max_text: usize,
+    /// Pause before something that failed for want of room or disk is tried again.
+    pub retry_after: Duration,
+    /// Pause before a file is tried again for which the bus had no place.
+    pub busy_pause: Duration,
+    /// Drain limit after which unfinished work is given up.
+    pub drain_limit: Duration,
+    /// Stop by itself once the scan is complete and everything has a verdict.
+    pub once: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings {
+            generation: 1,
+            max_active: 24,
+            max_preparing: 4,
+            max_storing: 8,
+            max_documents: 48,
+            job_deadline: Duration::from_secs(60),
+            silence_limit: Duration::from_secs(10),
+            absence_limit: Duration::from_secs(20),
+            collect: Duration::from_millis(500),
+            backoff: Duration::from_millis(100),
+            backoff_max: Duration::from_secs(30),
+            healthy_after: Duration::from_secs(10),
+            max_restarts: 20,
+            restart_window: Duration::from_secs(60),
+            max_issues: 10_000,
+            max_staged_bytes: 16 << 20,
+            max_text: 8 << 10,
+            retry_after: Duration::from_secs(1),
+            busy_pause: Duration::from_millis(20),
+            drain_limit: Duration::from_secs(30),
+            once: false,
+        }
+    }
+}
+
+/// A verdict as a client is told.
+pub fn file_verdict(path: &Path, judged: &Judged) -> FileVerdict {
+    FileVerdict {
+        file: path.to_path_buf(),
+        verdict: judged.verdict,
+        digest: judged.digest.to_string(),
+        xqar: judged.xqar.clone(),
+        errors: judged.counts[0],
+        warnings: judged.counts[1],
+        information: judged.counts[2],
+        why: judged.why.clone(),
+    }
+}
+
+/// The job as a bundle is told.
+pub fn job_message(job: JobId, config: Digest, kind: FileKind, prepared: &PreparedJob) -> Job {
+    Job {
+        job,
+        config,
+        kind,
+        documents: prepared.documents.clone(),
+        missing: prepared.missing.clone(),
+    }
+}

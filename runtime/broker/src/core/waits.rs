@@ -1,0 +1,122 @@
+//! Clients that wait for the verdict on a file's present bytes.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use qcbus_document::FileKind;
+use qcbus_messages::control::Response;
+
+use super::files::{FileId, Stage};
+use super::types::{Action, Stamp, Ticket, file_verdict};
+use super::{Actions, State};
+
+/// One client.
+#[derive(Debug)]
+pub(super) struct Waiter {
+    ticket: Ticket,
+    path: Arc<Path>,
+    until: Option<Duration>,
+}
+
+impl State {
+    /// A client asks. The stamp is of now, so a file that was written a moment ago and whose
+    /// change nobody has reported yet is judged anew before the answer.
+    pub(super) fn wait(
+        &mut self,
+        ticket: Ticket,
+        path: &Arc<Path>,
+        stamp: Option<Stamp>,
+        unwatched: Option<String>,
+        timeout: Option<Duration>,
+        actions: &mut Actions,
+    ) {
+        if let Some(reason) = unwatched {
+            actions.push(Action::Answer {
+                ticket,
+                response: Response::Unwatched { reason },
+            });
+            return;
+        }
+        if let Some(stamp) = stamp
+            && FileKind::of_path(path).is_some()
+        {
+            self.settled(path, stamp);
+        }
+        let until = timeout.map(|timeout| self.now + timeout);
+        self.waiters.push(Waiter {
+            ticket,
+            path: path.clone(),
+            until,
+        });
+        if let Some(id) = self.files.id(path) {
+            self.settle_waits(id, actions);
+        }
+    }
+
+    /// Answers everybody who waits for this file, if there is nothing more to wait for.
+    pub(super) fn settle_waits(&mut self, id: FileId, actions: &mut Actions) {
+        let Some(entry) = self.files.get(id) else {
+            return;
+        };
+        let background = matches!(entry.stage(), Stage::Waiting(super::Lane::Background, _));
+        let settled = *entry.stage() == Stage::Idle || background;
+        let Some(judged) = entry.judged.clone().filter(|_| settled && entry.present) else {
+            return;
+        };
+        let path = entry.path.clone();
+        self.answer_all(&path, actions, |path| {
+            Response::Verdict(file_verdict(path, &judged))
+        });
+    }
+
+    pub(super) fn answer_gone(&mut self, path: &Path, actions: &mut Actions) {
+        self.answer_all(path, actions, |path| Response::Unwatched {
+            reason: format!("{} has been deleted", path.display()),
+        });
+    }
+
+    fn answer_all(
+        &mut self,
+        path: &Path,
+        actions: &mut Actions,
+        response: impl Fn(&Path) -> Response,
+    ) {
+        let (answered, rest) = std::mem::take(&mut self.waiters)
+            .into_iter()
+            .partition(|it| *it.path == *path);
+        self.waiters = rest;
+        let answered: Vec<Waiter> = answered;
+        for waiter in answered {
+            actions.push(Action::Answer {
+                ticket: waiter.ticket,
+                response: response(path),
+            });
+        }
+    }
+
+    pub(super) fn expire_waits(&mut self, actions: &mut Actions) {
+        let now = self.now;
+        self.waiters.retain(|waiter| {
+            let over = waiter.until.is_some_and(|until| until <= now);
+            if over {
+                actions.push(Action::Answer {
+                    ticket: waiter.ticket,
+                    response: Response::TimedOut,
+                });
+            }
+            !over
+        });
+    }
+
+    /// The broker stops: nobody is left without an answer.
+    pub(super) fn end_waits(&mut self, actions: &mut Actions) {
+        for waiter in std::mem::take(&mut self.waiters) {
+            let reason = "the broker has stopped".to_owned();
+            actions.push(Action::Answer {
+                ticket: waiter.ticket,
+                response: Response::Failed { reason },
+            });
+        }
+    }
+}

@@ -1,0 +1,188 @@
+//! Writing files so that nobody ever sees half of one.
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::Path;
+
+use tempfile::NamedTempFile;
+
+/// Temporary names begin with this and the id of the process that writes.
+const PREFIX: &str = ".qcbus-";
+/// And end like this.
+const SUFFIX: &str = ".tmp";
+
+/// Writes `content` under a temporary name in the same directory and renames it into place.
+/// With `durable`, the content is on the disk before the name is.
+///
+/// # Errors
+/// Whatever the file system says; the temporary file is removed then.
+pub fn write_whole(path: &Path, content: &[u8], durable: bool) -> io::Result<()> {
+    let file = write_aside(path, content)?;
+    if durable {
+        file.as_file().sync_data()?;
+    }
+    file.persist(path).map_err(|error| error.error)?;
+    Ok(())
+}
+
+/// A file to be written: its path and its content.
+pub type Content<'a> = (&'a Path, &'a [u8]);
+
+/// Writes two files as [`write_whole`] does; `first` gets its name before `second` does. Both are
+/// synced at the same time, because then the file system's journal is written once for both.
+///
+/// # Errors
+/// As [`write_whole`], with the path that could not be written.
+pub fn write_both<'a>(
+    first: Content<'a>,
+    second: Content<'a>,
+    durable: bool,
+) -> Result<(), (&'a Path, io::Error)> {
+    let of = |path| move |error| (path, error);
+    let files = (
+        write_aside(first.0, first.1).map_err(of(first.0))?,
+        write_aside(second.0, second.1).map_err(of(second.0))?,
+    );
+    if durable {
+        sync_both(files.0.as_file(), files.1.as_file()).map_err(of(second.0))?;
+    }
+    let named = files.0.persist(first.0);
+    named.map_err(|error| (first.0, error.error))?;
+    let named = files.1.persist(second.0);
+    named.map_err(|error| (second.0, error.error))?;
+    Ok(())
+}
+
+fn sync_both(first: &File, second: &File) -> io::Result<()> {
+    std::thread::scope(|scope| {
+        let other = std::thread::Builder::new().spawn_scoped(scope, || first.sync_data());
+        let own = second.sync_data();
+        let other = match other {
+            Ok(other) => other
+                .join()
+                .unwrap_or_else(|_| Err(io::Error::other("a thread that syncs has panicked"))),
+            // There are no threads to be had.
+            Err(_) => first.sync_data(),
+        };
+        other.and(own)
+    })
+}
+
+/// Writes `content` under a temporary name beside `path`.
+fn write_aside(path: &Path, content: &[u8]) -> io::Result<NamedTempFile> {
+    let directory = path
+        .parent()
+        .ok_or_else(|| io::Error::other("a result needs a directory"))?;
+    std::fs::create_dir_all(directory)?;
+    let mut file = tempfile::Builder::new()
+        .prefix(&format!("{PREFIX}{}-", std::process::id()))
+        .suffix(SUFFIX)
+        .tempfile_in(directory)
+        .map_err(without_path)?;
+    file.as_file_mut().write_all(content)?;
+    // Results are for others to read, unlike most temporary files.
+    let mode = std::os::unix::fs::PermissionsExt::from_mode(0o644);
+    file.as_file().set_permissions(mode)?;
+    Ok(file)
+}
+
+/// The error alone: the temporary name in it says nothing to anybody, and differs every time.
+fn without_path(error: io::Error) -> io::Error {
+    let plain = io::Error::from(error.kind());
+    let known = error.get_ref().is_some() && plain.to_string() != "uncategorized error";
+    if known { plain } else { error }
+}
+
+/// Removes a file if it is there.
+///
+/// # Errors
+/// Whatever the file system says, other than that there is no such file.
+pub fn remove(path: &Path) -> io::Result<()> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// Removes what processes that were killed left half-written below a directory. To be called
+/// before this process writes: it may have been given the id of a dead one.
+pub fn sweep(directory: &Path) {
+    sweep_where(directory, &|pid| pid == std::process::id() || is_dead(pid));
+}
+
+/// As [`sweep`], while this process may be writing.
+pub fn sweep_dead(directory: &Path) {
+    sweep_where(directory, &|pid| pid != std::process::id() && is_dead(pid));
+}
+
+fn sweep_where(directory: &Path, is_over: &dyn Fn(u32) -> bool) {
+    // A directory that is not there yet, or cannot be read, has nothing to sweep.
+    let Ok(entries) = std::fs::read_dir(directory) else {
+        return;
+    };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let writer = writer_of(&name.to_string_lossy());
+        match entry.file_type() {
+            Ok(kind) if kind.is_dir() => sweep_where(&entry.path(), is_over),
+            Ok(kind) if kind.is_file() && writer.is_some_and(is_over) => {
+                if let Err(error) = remove(&entry.path()) {
+                    tracing::warn!("cannot remove {}: {error}", entry.path().display());
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+fn writer_of(name: &str) -> Option<u32> {
+    let rest = name.strip_prefix(PREFIX)?.strip_suffix(SUFFIX)?;
+    rest.split_once('-')?.0.parse().ok()
+}
+
+/// Whether a process cannot be writing any more.
+fn is_dead(pid: u32) -> bool {
+    !Path::new("/proc").join(pid.to_string()).exists()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_the_dead_left_is_swept() {
+        let dir = tempfile::tempdir().unwrap();
+        let below = dir.path().join("maps");
+        std::fs::create_dir(&below).unwrap();
+        let parent = rustix::process::getppid().unwrap().as_raw_nonzero();
+        let dead = below.join(".qcbus-4194999-a1b2c3.tmp");
+        let living = below.join(format!(".qcbus-{parent}-a1b2c3.tmp"));
+        let result = below.join("a.xodr.xqar");
+        for path in [&dead, &living, &result] {
+            std::fs::write(path, "half").unwrap();
+        }
+        sweep(dir.path());
+        assert!(!dead.exists());
+        assert!(living.exists() && result.exists());
+    }
+
+    #[test]
+    fn of_two_files_both_are_written_or_none() {
+        let dir = tempfile::TempDir::new().unwrap();
+        let path = |name: &str| dir.path().join(name);
+        let (first, second) = (path("a.verdict.json"), path("deep/a.xqar"));
+        write_both((&first, b"verdict"), (&second, b"result"), true).unwrap();
+        assert_eq!(std::fs::read(&first).unwrap(), b"verdict");
+        assert_eq!(std::fs::read(&second).unwrap(), b"result");
+
+        let (first, below_a_file) = (path("b.verdict.json"), second.join("b.xqar"));
+        let failed = write_both((&first, b"verdict"), (&below_a_file, b"result"), true);
+        assert!(failed.is_err());
+        let mut there: Vec<_> = std::fs::read_dir(dir.path())
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name())
+            .collect();
+        there.sort();
+        assert_eq!(there, ["a.verdict.json", "deep"]);
+    }
+}

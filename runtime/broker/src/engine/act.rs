@@ -1,0 +1,165 @@
+//! What the state machine wants done.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use qcbus_messages::{JobId, ToPeer};
+
+use super::{Announcement, Broker, Ready, Told};
+use crate::core::{Action, Delivery, Event, Session};
+use crate::journal::Entry;
+use crate::stages::reached;
+use crate::writers::Order;
+
+impl Broker {
+    pub(super) fn act(&mut self, action: Action) -> bool {
+        match action {
+            Action::Prepare { job, path } => self.prepare(job, path),
+            Action::Release { job } => self.intake.release(job),
+            Action::PublishAgain { job, doc } => {
+                let intake = self.intake.clone();
+                tokio::task::spawn_blocking(move || intake.publish_again(job, doc));
+            }
+            Action::Send { session, message } => {
+                if let Some(peer) = self.sessions.peers.get(&session) {
+                    self.host.send(*peer, &message);
+                }
+            }
+            Action::Accept { session } => self.accept(session),
+            Action::Refuse { session, reason } => {
+                tracing::warn!("a peer was turned away: {reason}");
+                if let Some(peer) = self.sessions.remove(session) {
+                    self.host.refuse(peer, &reason);
+                }
+            }
+            Action::Disconnect { session } => {
+                if let Some(peer) = self.sessions.remove(session) {
+                    self.host.disconnect(peer);
+                }
+            }
+            Action::Spawn { launch, spec } => self.children.spawn(launch, &spec),
+            Action::Kill { launch, pid } => self.children.kill(launch, pid),
+            Action::Store(job) => {
+                let root = self.intake.root(job.job);
+                let config = self.in_force.config.clone();
+                let path = job.path.clone();
+                reached("checked", &path);
+                self.intake.release(job.job);
+                self.writers
+                    .order(&path, Order::Store { job, config, root });
+            }
+            Action::Withdraw { path } => self.writers.order(&path, Order::Withdraw(path.clone())),
+            Action::Restamp { path, judged } => {
+                let entry = Entry::Judged {
+                    path: path.clone(),
+                    judged,
+                    history: None,
+                };
+                self.writers.order(&path, Order::Record(entry));
+            }
+            Action::Deliver {
+                session,
+                reporter,
+                delivery,
+            } => self.deliver(session, reporter, delivery),
+            Action::Delivered {
+                reporter,
+                path,
+                job,
+            } => {
+                let entry = Entry::Delivered {
+                    path: path.clone(),
+                    reporter,
+                    job,
+                };
+                self.writers.order(&path, Order::Record(entry));
+            }
+            Action::Answer { ticket, response } => {
+                if let Some(answer) = self.tickets.remove(&ticket) {
+                    // A client that has left needs no answer.
+                    let _ = answer.send(response);
+                }
+            }
+            Action::Depend { files } => {
+                if let Some(watcher) = &self.watcher {
+                    watcher.depend(files);
+                }
+            }
+            Action::Judged {
+                path,
+                judged,
+                fresh,
+            } => {
+                reached("judged", &path);
+                (self.tell)(Told::Verdict(Announcement {
+                    path,
+                    judged,
+                    fresh,
+                }));
+            }
+            Action::Notice(text) => (self.tell)(Told::Notice(text)),
+            Action::Stop => return false,
+        }
+        true
+    }
+
+    pub(super) fn accept(&mut self, session: Session) {
+        if let Some(peer) = self.sessions.peers.get(&session) {
+            let welcome = ToPeer::Welcome {
+                generation: self.host.generation(),
+                config: self.in_force.digest,
+            };
+            self.host.accept(*peer, &welcome);
+        }
+    }
+
+    pub(super) fn prepare(&self, job: JobId, path: Arc<Path>) {
+        let (intake, events) = (self.intake.clone(), self.inbox.events_in.clone());
+        tokio::task::spawn_blocking(move || {
+            reached("taken", &path);
+            let result = intake.prepare(job, &path);
+            // After the end of the loop nobody waits for this.
+            let _ = events.send(Event::Prepared { job, result });
+        });
+    }
+
+    pub(super) fn deliver(&self, session: Session, reporter: String, delivery: Delivery) {
+        let job = delivery.job;
+        let document = self.intake.recent_root(job);
+        let (store, config) = (self.store.clone(), self.in_force.config.clone());
+        let deliveries = self.inbox.deliveries_in.clone();
+        tokio::task::spawn_blocking(move || {
+            let message = crate::deliveries::message(
+                &reporter,
+                &delivery,
+                document,
+                &store.places,
+                config.as_ref(),
+            );
+            let message = message.map(|message| Box::new(ToPeer::Result(Box::new(message))));
+            // After the end of the loop nobody waits for this.
+            let _ = deliveries.send(Ready {
+                session,
+                job,
+                message,
+            });
+        });
+    }
+
+    pub(super) fn delivery(&mut self, ready: Ready) -> bool {
+        let Ready {
+            session,
+            job,
+            message,
+        } = ready;
+        match message {
+            Ok(message) => {
+                if let Some(peer) = self.sessions.peers.get(&session) {
+                    self.host.send(*peer, &message);
+                }
+                true
+            }
+            Err(why) => self.handle(Event::Undeliverable { session, job, why }),
+        }
+    }
+}

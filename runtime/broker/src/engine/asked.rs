@@ -1,0 +1,159 @@
+//! What commands ask, and what a change of configuration or manifests sets off.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use qcbus_messages::control::{Request, Response, Status};
+use tokio::sync::oneshot;
+
+use super::Broker;
+use super::start::in_force;
+use crate::control::Asked;
+use crate::core::{Event, Stamp, Ticket};
+use crate::reload::{LoadError, differences};
+use crate::stamp::{stamp_of, stamp_through_links};
+
+impl Broker {
+    pub(super) fn asked(&mut self, asked: Asked) -> bool {
+        match asked.request {
+            Request::Status => {
+                let status = self.status();
+                let _ = asked.answer.send(Response::Status(Box::new(status)));
+                true
+            }
+            Request::Wait { file, timeout_ms } => self.wait(&file, timeout_ms, asked.answer),
+            Request::Down => {
+                self.downs.push(asked.answer);
+                self.notify_stopping();
+                self.handle(Event::Drain)
+            }
+            Request::Reload => {
+                let response = match self.reload() {
+                    Ok(changes) => Response::Reloaded { changes },
+                    Err(error) => Response::Failed {
+                        reason: format!(
+                            "nothing was changed, what was in force stays in force: {error}"
+                        ),
+                    },
+                };
+                let _ = asked.answer.send(response);
+                true
+            }
+        }
+    }
+
+    pub(super) fn wait(
+        &mut self,
+        file: &Path,
+        timeout_ms: Option<u64>,
+        answer: oneshot::Sender<Response>,
+    ) -> bool {
+        self.next_ticket += 1;
+        let ticket = Ticket(self.next_ticket);
+        self.tickets.insert(ticket, answer);
+        self.look_at_inputs(file);
+        let stamp: Option<Stamp> = stamp_of(file).ok().flatten();
+        let unwatched = self.why_unwatched(file, stamp);
+        let timeout = timeout_ms.map(Duration::from_millis);
+        self.handle(Event::Wait {
+            ticket,
+            path: file.into(),
+            stamp,
+            unwatched,
+            timeout,
+        })
+    }
+
+    /// A client that asks must not be told what was true a moment ago: changes of dependencies
+    /// that the watcher has not come to yet are seen here.
+    pub(super) fn look_at_inputs(&mut self, file: &Path) {
+        for input in self.state.inputs_of(file).into_iter().skip(1) {
+            let stamp = stamp_through_links(&input.path);
+            if stamp == input.content.map(|content| content.0) {
+                continue;
+            }
+            let path = input.path;
+            self.handle(match stamp {
+                Some(stamp) => Event::Settled { path, stamp },
+                None => Event::Vanished { path },
+            });
+        }
+    }
+
+    pub(super) fn why_unwatched(&self, file: &Path, stamp: Option<Stamp>) -> Option<String> {
+        let shown = file.display();
+        if qcbus_document::FileKind::of_path(file).is_none() {
+            Some(format!(
+                "{shown} is no file that qcbus checks (.xodr .xodrz .xodr.gz .xosc .mosc)"
+            ))
+        } else if !self.options.roots.iter().any(|root| file.starts_with(root))
+            && !self.options.files.iter().any(|it| it == file)
+        {
+            Some(format!("{shown} lies outside the watched directories"))
+        } else if stamp.is_some() && crate::watch::is_left_alone(&self.options.roots, file) {
+            Some(format!("{shown} is ignored (by its name or a .qcignore)"))
+        } else {
+            None
+        }
+    }
+
+    /// Reads configuration and manifests again and applies them as a whole, or not at all.
+    pub(super) fn reload(&mut self) -> Result<Vec<String>, LoadError> {
+        let loaded = self.sources.load()?;
+        let changes = differences(&self.loaded, &loaded);
+        let in_force = Arc::new(in_force(&loaded)?);
+        let children = (loaded.children != self.loaded.children).then(|| loaded.children.clone());
+        for notice in loaded
+            .notices
+            .iter()
+            .filter(|it| !self.loaded.notices.contains(it))
+            .cloned()
+            .collect::<Vec<_>>()
+        {
+            self.say(notice);
+        }
+        self.loaded = loaded;
+        if in_force.digest != self.in_force.digest {
+            self.host.set_config(in_force.digest, &in_force.encoded);
+            self.in_force = in_force.clone();
+            self.handle(Event::Configured {
+                digest: in_force.digest,
+                demand: in_force.demand(),
+            });
+        }
+        if let Some(specs) = children {
+            self.handle(Event::Children { specs });
+        }
+        Ok(changes)
+    }
+
+    pub(super) fn reload_if_changed(&mut self, fingerprint: &mut BTreeMap<PathBuf, Option<Stamp>>) {
+        let now = self.sources.fingerprint();
+        if now == *fingerprint {
+            return;
+        }
+        *fingerprint = now;
+        match self.reload() {
+            Ok(changes) if changes.is_empty() => {}
+            Ok(changes) => self.say(format!("reloaded: {}", changes.join("; "))),
+            Err(error) => self.say(format!(
+                "not reloaded, what was in force stays in force: {error}"
+            )),
+        }
+    }
+
+    pub(super) fn status(&self) -> Status {
+        Status {
+            instance: self.options.instance.name().to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            pid: std::process::id(),
+            uptime_s: self.started.elapsed().as_secs(),
+            watching: self.options.roots.clone(),
+            watch_mode: self.watch_mode.clone(),
+            out: self.options.out.clone(),
+            ..self.state.status()
+        }
+    }
+}

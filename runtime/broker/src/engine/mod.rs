@@ -1,0 +1,351 @@
+//! The one loop: the world becomes events, the state machine's actions become deeds.
+
+mod act;
+mod asked;
+mod start;
+mod systemd;
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use qcbus_bus::{Host, HostEvent, PeerId, StartError as BusError};
+use qcbus_messages::control::Response;
+use qcbus_messages::{JobId, ToPeer};
+use tokio::sync::{mpsc, oneshot};
+
+use crate::control::{Asked, ControlSocket};
+use crate::core::{Event, Judged, Session, State, Ticket};
+use crate::demand::InForce;
+use crate::intake::Intake;
+use crate::journal::JournalError;
+use crate::options::Options;
+use crate::reload::{LoadError, Loaded, Sources};
+use crate::stages::reached;
+use crate::store::Store;
+use crate::supervise::Children;
+use crate::watch::{Seen, Watcher};
+use crate::writers::Writers;
+
+/// Why a broker cannot start.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// The bus.
+    #[error("{0}")]
+    Bus(#[from] BusError),
+    /// The journal.
+    #[error("{0}")]
+    Journal(#[from] JournalError),
+    /// The configuration or a manifest.
+    #[error("{0}")]
+    Load(#[from] LoadError),
+    /// Anything that the system refuses.
+    #[error("{what}: {source}")]
+    System {
+        /// What was tried.
+        what: String,
+        /// What the system says.
+        source: std::io::Error,
+    },
+}
+
+/// What a person at the keyboard or a service manager wants.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stop {
+    /// Finish what is there.
+    Drain,
+    /// At once.
+    Quit,
+}
+
+/// A verdict as the loop's owner is told.
+#[derive(Debug, Clone)]
+pub struct Announcement {
+    /// The file.
+    pub path: Arc<Path>,
+    /// Its verdict.
+    pub judged: Arc<Judged>,
+    /// `false`: it stood already.
+    pub fresh: bool,
+}
+
+/// What the loop's owner is told while it runs.
+#[derive(Debug, Clone)]
+pub enum Told {
+    /// A verdict.
+    Verdict(Announcement),
+    /// Something for a person.
+    Notice(String),
+    /// The first look at everything is done.
+    Scanned {
+        /// The files known, in the order of their paths.
+        files: Vec<Arc<Path>>,
+    },
+}
+
+/// A running broker.
+pub struct Broker {
+    options: Options,
+    started: Instant,
+    host: Host,
+    state: State,
+    intake: Arc<Intake>,
+    store: Arc<Store>,
+    writers: Writers,
+    children: Children,
+    sources: Sources,
+    loaded: Loaded,
+    in_force: Arc<InForce>,
+    watcher: Option<Watcher>,
+    watch_mode: String,
+    sessions: Sessions,
+    tickets: HashMap<Ticket, oneshot::Sender<Response>>,
+    downs: Vec<oneshot::Sender<Response>>,
+    next_ticket: u64,
+    inbox: Inbox,
+    tell: Box<dyn FnMut(Told) + Send>,
+    control: ControlSocket,
+}
+
+impl std::fmt::Debug for Broker {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Broker")
+            .field("options", &self.options)
+            .finish_non_exhaustive()
+    }
+}
+
+struct Inbox {
+    events: mpsc::UnboundedReceiver<Event>,
+    events_in: mpsc::UnboundedSender<Event>,
+    seen: mpsc::UnboundedReceiver<Seen>,
+    asked: mpsc::UnboundedReceiver<Asked>,
+    notices: mpsc::UnboundedReceiver<String>,
+    notices_in: mpsc::UnboundedSender<String>,
+    deliveries: mpsc::UnboundedReceiver<Ready>,
+    deliveries_in: mpsc::UnboundedSender<Ready>,
+}
+
+/// A result read back for a reporter, or why it could not be.
+struct Ready {
+    session: Session,
+    job: JobId,
+    message: Result<Box<ToPeer>, String>,
+}
+
+/// Sessions as the state machine and the bus number them.
+#[derive(Debug, Default)]
+struct Sessions {
+    peers: BTreeMap<Session, PeerId>,
+    sessions: BTreeMap<PeerId, Session>,
+    next: u64,
+}
+
+impl Sessions {
+    fn add(&mut self, peer: PeerId) -> Session {
+        self.next += 1;
+        let session = Session(self.next);
+        self.peers.insert(session, peer);
+        self.sessions.insert(peer, session);
+        session
+    }
+
+    fn remove(&mut self, session: Session) -> Option<PeerId> {
+        let peer = self.peers.remove(&session)?;
+        self.sessions.remove(&peer);
+        Some(peer)
+    }
+}
+
+/// How often the loop looks at the clock.
+const TICK: Duration = Duration::from_millis(50);
+
+/// How often configuration and manifests are looked at.
+const RELOAD_INTERVAL: Duration = Duration::from_secs(1);
+
+/// How often the history of jobs is pruned.
+const PRUNE_INTERVAL: Duration = Duration::from_secs(3600);
+
+impl Broker {
+    /// Runs until everything is done (`once`) or somebody wants it to stop.
+    pub async fn run(mut self, mut stops: mpsc::Receiver<Stop>) {
+        let children = self.loaded.children.clone();
+        self.handle(Event::Children { specs: children });
+        for notice in self.loaded.notices.clone() {
+            self.say(notice);
+        }
+        let mut tick = tokio::time::interval(TICK);
+        tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+        let mut fingerprint = self.sources.fingerprint();
+        let mut next_reload = Instant::now() + RELOAD_INTERVAL;
+        let mut next_prune = Instant::now();
+        let mut quit = false;
+        loop {
+            let go_on = tokio::select! {
+                event = self.host.next() => self.bus_event(event),
+                Some(event) = self.inbox.events.recv() => self.own_event(event),
+                Some(seen) = self.inbox.seen.recv() => self.seen(seen),
+                Some(asked) = self.inbox.asked.recv() => self.asked(asked),
+                Some(notice) = self.inbox.notices.recv() => { self.say(notice); true }
+                Some(ready) = self.inbox.deliveries.recv() => self.delivery(ready),
+                Some(stop) = stops.recv() => match stop {
+                    Stop::Drain => { self.notify_stopping(); self.handle(Event::Drain) }
+                    Stop::Quit => { quit = true; false }
+                },
+                _ = tick.tick() => self.handle(Event::Tick),
+            };
+            if !go_on {
+                break;
+            }
+            if Instant::now() >= next_reload {
+                next_reload = Instant::now() + RELOAD_INTERVAL;
+                self.reload_if_changed(&mut fingerprint);
+                self.notify_watchdog();
+            }
+            if Instant::now() >= next_prune {
+                next_prune = Instant::now() + PRUNE_INTERVAL;
+                self.prune();
+            }
+        }
+        self.end(quit).await;
+    }
+
+    async fn end(mut self, quit: bool) {
+        self.watcher = None;
+        self.children.kill_all();
+        if !quit {
+            self.writers.finish();
+        }
+        for down in self.downs.drain(..) {
+            // A client that has left needs no answer.
+            let _ = down.send(Response::Stopped);
+        }
+        self.tickets.clear();
+        self.control.flush().await;
+    }
+
+    /// Forgets the history of jobs beyond the retention time, off the loop.
+    fn prune(&self) {
+        let (store, keep) = (self.store.clone(), self.options.retention);
+        let notices = self.inbox.notices_in.clone();
+        tokio::task::spawn_blocking(move || {
+            if let Err(why) = store.prune(keep) {
+                // After the end of the loop nobody listens.
+                let _ = notices.send(why);
+            }
+        });
+    }
+
+    /// Gives one event to the state machine and does what it wants. `false`: the end.
+    fn handle(&mut self, event: Event) -> bool {
+        let actions = self.state.handle(self.started.elapsed(), event);
+        actions
+            .into_iter()
+            .fold(true, |go_on, action| go_on & self.act(action))
+    }
+
+    fn own_event(&mut self, event: Event) -> bool {
+        if let Event::Exited { launch, .. } = &event {
+            self.children.ended(*launch);
+            self.sweep_dead();
+        }
+        self.handle(event)
+    }
+
+    /// A process that was killed may have been writing a report: what it left half-written is
+    /// removed, off the loop.
+    fn sweep_dead(&self) {
+        let out = self.options.out.clone();
+        tokio::task::spawn_blocking(move || crate::disk::sweep_dead(&out));
+    }
+
+    fn bus_event(&mut self, event: HostEvent) -> bool {
+        let known = |peer, sessions: &Sessions| sessions.sessions.get(&peer).copied();
+        match event {
+            HostEvent::Hello { peer, hello } => {
+                let session = self.sessions.add(peer);
+                self.handle(Event::Hello { session, hello })
+            }
+            HostEvent::Message { peer, message } => match known(peer, &self.sessions) {
+                Some(session) => self.handle(Event::Message { session, message }),
+                None => true,
+            },
+            HostEvent::Garbage { peer, what } => match known(peer, &self.sessions) {
+                Some(session) => self.handle(Event::Garbage { session, what }),
+                None => true,
+            },
+            HostEvent::Gone { peer } => match known(peer, &self.sessions) {
+                Some(session) => {
+                    self.sessions.remove(session);
+                    self.sweep_dead();
+                    self.handle(Event::Gone { session })
+                }
+                None => true,
+            },
+        }
+    }
+
+    fn seen(&mut self, seen: Seen) -> bool {
+        match seen {
+            Seen::Settled(path, stamp) => {
+                reached("settled", &path);
+                self.handle(Event::Settled { path, stamp })
+            }
+            Seen::Vanished(path) => self.handle(Event::Vanished { path }),
+            Seen::Scanned => {
+                let files = self.state.present_files();
+                self.notify_ready(files.len());
+                (self.tell)(Told::Scanned { files });
+                self.handle(Event::Scanned)
+            }
+            Seen::Mode(mode) => {
+                self.watch_mode = mode;
+                true
+            }
+            Seen::Notice(notice) => {
+                self.say(notice);
+                true
+            }
+        }
+    }
+
+    fn say(&mut self, notice: String) {
+        self.state.remark(&notice);
+        (self.tell)(Told::Notice(notice));
+    }
+}
+
+struct Senders {
+    seen: mpsc::UnboundedSender<Seen>,
+    asked: mpsc::UnboundedSender<Asked>,
+    notices: mpsc::UnboundedSender<String>,
+}
+
+impl Inbox {
+    fn new() -> (Inbox, Senders) {
+        let (events_in, events) = mpsc::unbounded_channel();
+        let (seen_in, seen) = mpsc::unbounded_channel();
+        let (asked_in, asked) = mpsc::unbounded_channel();
+        let (notices_in, notices) = mpsc::unbounded_channel();
+        let (deliveries_in, deliveries) = mpsc::unbounded_channel();
+        let inbox = Inbox {
+            events,
+            events_in,
+            seen,
+            asked,
+            notices,
+            notices_in: notices_in.clone(),
+            deliveries,
+            deliveries_in,
+        };
+        (
+            inbox,
+            Senders {
+                seen: seen_in,
+                asked: asked_in,
+                notices: notices_in,
+            },
+        )
+    }
+}

@@ -1,0 +1,217 @@
+//! How a broker starts: the instance, the journal, the configuration, the first look.
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+use std::time::Instant;
+
+use qcbus_bus::Host;
+use tokio::sync::mpsc;
+
+use super::{Broker, Inbox, Sessions, StartError, Told};
+use crate::control::ControlSocket;
+use crate::core::{Stamp, State};
+use crate::demand::InForce;
+use crate::disk::sweep;
+use crate::intake::Intake;
+use crate::journal::{Journal, Remembered};
+use crate::options::Options;
+use crate::places::Places;
+use crate::reload::{LoadError, Loaded, Sources};
+use crate::stamp::{stamp_of, stamp_through_links};
+use crate::store::Store;
+use crate::supervise::{Children, Surroundings};
+use crate::watch::{Seen, WatchOptions, Watcher, scan_directory};
+use crate::writers::{Order, Writers};
+
+impl Broker {
+    /// Takes the instance, opens the journal, reads the configuration. Must be called within a
+    /// tokio runtime.
+    ///
+    /// # Errors
+    /// See [`StartError`]; nothing is left behind.
+    pub fn start(
+        mut options: Options,
+        tell: impl FnMut(Told) + Send + 'static,
+    ) -> Result<Broker, StartError> {
+        let sources = Sources {
+            config: options.config.clone(),
+            bundles_d: options.bundles_d.clone(),
+            standard: options.standard.clone(),
+            reporters: options.reporters.clone(),
+        };
+        let loaded = sources.load()?;
+        let mut host = Host::start(&options.instance, options.host)?;
+        options.settings.generation = host.generation();
+        let journal = match &options.state {
+            Some(state) => Journal::open(state)?,
+            None => Journal::in_memory()?,
+        };
+        let remembered = journal.remembered()?;
+        let in_force = Arc::new(in_force(&loaded)?);
+        host.set_config(in_force.digest, &in_force.encoded);
+        let state = State::new(options.settings.clone(), in_force.digest, in_force.demand());
+        let (inbox, senders) = Inbox::new();
+        let control = ControlSocket::listen(options.instance.dir(), senders.asked)
+            .map_err(|source| system("listen for commands", source))?;
+        if options.watch {
+            sweep(&options.out);
+            options.gate.iter().for_each(|gate| sweep(gate));
+        }
+        let store = Arc::new(store(&options, journal));
+        let writers = Writers::start(
+            options.settings.max_storing,
+            &store,
+            &inbox.events_in,
+            &senders.notices,
+        )
+        .map_err(|source| system("start writing", source))?;
+        let intake = intake(&options, &host);
+        let children = Children::new(surroundings(&options), inbox.events_in.clone());
+        let mut broker = Broker {
+            started: Instant::now(),
+            host,
+            state,
+            intake,
+            store,
+            writers,
+            children,
+            sources,
+            loaded,
+            in_force,
+            watcher: None,
+            watch_mode: "once".to_owned(),
+            sessions: Sessions::default(),
+            tickets: HashMap::new(),
+            downs: Vec::new(),
+            next_ticket: 0,
+            inbox,
+            tell: Box::new(tell),
+            control,
+            options,
+        };
+        let dependencies = broker.remember(remembered);
+        broker.look(senders.seen)?;
+        if let Some(watcher) = &broker.watcher {
+            watcher.depend(dependencies);
+        }
+        Ok(broker)
+    }
+
+    /// Takes over what the journal knows, as far as it is still true: the result must be where it
+    /// belongs, and what has changed while nobody watched is looked at again. Returns what the
+    /// verdicts depend on.
+    fn remember(&mut self, files: Vec<Remembered>) -> Vec<(Arc<Path>, Option<Stamp>)> {
+        let mut stamps: BTreeMap<Arc<Path>, Option<Stamp>> = BTreeMap::new();
+        for mut file in files {
+            if !self.store.is_complete(&file.path, &file.judged) {
+                if !file.path.exists() {
+                    self.writers
+                        .order(&file.path, Order::Withdraw(file.path.clone()));
+                }
+                continue;
+            }
+            for input in file.judged.inputs.iter().skip(1) {
+                let path = &input.path;
+                let now = *stamps
+                    .entry(path.clone())
+                    .or_insert_with(|| stamp_through_links(path));
+                file.judged.racy |= now != input.content.map(|content| content.0);
+            }
+            self.state
+                .remember(&file.path, file.judged, &file.delivered);
+        }
+        stamps.into_iter().collect()
+    }
+
+    /// Begins to look at the files: by watching, or once.
+    fn look(&mut self, seen: mpsc::UnboundedSender<Seen>) -> Result<(), StartError> {
+        if self.options.watch {
+            let options = WatchOptions {
+                roots: self.options.roots.clone(),
+                poll: self.options.poll,
+                rescan: self.options.rescan,
+            };
+            let watcher = Watcher::start(options, move |what| {
+                // After the end of the loop nobody listens.
+                let _ = seen.send(what);
+            });
+            self.watcher = Some(watcher.map_err(|source| system("watch", source))?);
+            return Ok(());
+        }
+        let (roots, files) = (self.options.roots.clone(), self.options.files.clone());
+        tokio::task::spawn_blocking(move || look_once(&roots, &files, &seen));
+        Ok(())
+    }
+}
+
+pub(super) fn in_force(loaded: &Loaded) -> Result<InForce, LoadError> {
+    InForce::new(loaded.config.clone()).map_err(|error| LoadError::Config(error.to_string()))
+}
+
+fn store(options: &Options, journal: Journal) -> Store {
+    let mut places = Places::new(options.out.clone(), options.roots.clone(), &options.files);
+    places.single.clone_from(&options.single_result);
+    Store {
+        places,
+        dialect: options.dialect,
+        durable: options.durable,
+        verdict_files: options.verdict_files,
+        gate: options.gate.clone(),
+        journal: Mutex::new(journal),
+    }
+}
+
+fn intake(options: &Options, host: &Host) -> Arc<Intake> {
+    let roots = options.roots.clone();
+    Arc::new(Intake::new(
+        host.documents(),
+        options.limits,
+        roots,
+        options.settings.max_documents,
+    ))
+}
+
+fn surroundings(options: &Options) -> Surroundings {
+    Surroundings {
+        instance_dir: options.instance.dir().to_path_buf(),
+        die_with_broker: options.die_with_broker,
+        memory_limit: options.memory_limit,
+    }
+}
+
+fn look_once(roots: &[PathBuf], files: &[PathBuf], seen: &mpsc::UnboundedSender<Seen>) {
+    // The loop may have been told to quit meanwhile; then nobody listens.
+    let tell = |what| drop(seen.send(what));
+    for root in roots {
+        let found = scan_directory(root);
+        found
+            .failures
+            .into_iter()
+            .for_each(|failure| tell(Seen::Notice(failure)));
+        for (path, stamp) in found.files {
+            tell(Seen::Settled(path.into(), stamp));
+        }
+    }
+    for file in files {
+        match stamp_of(file) {
+            Ok(Some(stamp)) => tell(Seen::Settled(file.as_path().into(), stamp)),
+            Ok(None) => tell(Seen::Notice(format!(
+                "{} is not there, or no regular file",
+                file.display()
+            ))),
+            Err(error) => tell(Seen::Notice(format!(
+                "cannot look at {}: {error}",
+                file.display()
+            ))),
+        }
+    }
+    tell(Seen::Scanned);
+}
+
+fn system(what: &str, source: std::io::Error) -> StartError {
+    StartError::System {
+        what: format!("cannot {what}"),
+        source,
+    }
+}

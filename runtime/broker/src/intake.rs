@@ -1,0 +1,523 @@
+//! From a path to published document images: the only place where the broker reads what it checks.
+
+use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use qcbus_bus::{Documents, Held, Loan, LoanError};
+use qcbus_document::{Document, FileKind};
+use qcbus_ingest::{BuildError, Content, IngestError, Limits, Prepared, Reference, Role};
+use qcbus_messages::{Digest, DocId, DocumentRole, JobDocument, JobId, MissingDocument};
+use sha2::{Digest as _, Sha256};
+
+use crate::core::{Input, PrepareFailure, PreparedJob, Stamp};
+use crate::stages::reached;
+use crate::stamp::{stamp_of, stamp_through_links};
+
+/// Reads files and publishes their images. Shared by the threads that do so.
+pub struct Intake {
+    documents: Documents,
+    limits: Limits,
+    roots: Vec<PathBuf>,
+    max_documents: usize,
+    next_doc: AtomicU64,
+    cache: Mutex<Cache>,
+    held: Mutex<HashMap<JobId, Vec<(DocId, Held)>>>,
+    recent: Mutex<VecDeque<(JobId, DocId)>>,
+}
+
+impl std::fmt::Debug for Intake {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Intake")
+            .field("roots", &self.roots)
+            .finish_non_exhaustive()
+    }
+}
+
+/// A published document.
+#[derive(Debug, Clone)]
+struct Published {
+    doc: DocId,
+    held: Held,
+    digest: Digest,
+    inputs: Vec<Input>,
+    bytes: u64,
+}
+
+/// Documents that are on the bus, so that a thousand scenarios on one map publish the map once.
+#[derive(Debug, Default)]
+struct Cache {
+    by_path: HashMap<PathBuf, Published>,
+    order: VecDeque<PathBuf>,
+}
+
+/// Shared documents (maps, catalogs) that are kept on the bus beyond the job that needed them.
+const CACHED: usize = 8;
+
+/// Ended jobs whose root document reporters may still find on the bus.
+const RECENT: usize = 256;
+
+/// A file that was written to this recently may change again without its stamp telling.
+const RACY: Duration = Duration::from_secs(2);
+
+impl Intake {
+    /// An intake that publishes through `documents`. `roots` are the watched or given directories:
+    /// includes and archives stay inside them.
+    pub fn new(
+        documents: Documents,
+        limits: Limits,
+        roots: Vec<PathBuf>,
+        max_documents: usize,
+    ) -> Intake {
+        Intake {
+            documents,
+            limits,
+            roots,
+            max_documents,
+            next_doc: AtomicU64::new(1),
+            cache: Mutex::default(),
+            held: Mutex::default(),
+            recent: Mutex::default(),
+        }
+    }
+
+    /// Reads a file with everything it refers to and publishes the images.
+    ///
+    /// # Errors
+    /// See [`PrepareFailure`].
+    pub fn prepare(&self, job: JobId, path: &Path) -> Result<Box<PreparedJob>, PrepareFailure> {
+        let root = self
+            .publish_fresh(path)
+            .map_err(|failure| self.explain(failure, path))?;
+        let mut gathered = Gathered::new(path, &root);
+        self.gather(&root.held, path, &mut gathered)?;
+        let prepared = gathered.finish();
+        self.hold(job, gathered.held);
+        Ok(Box::new(prepared))
+    }
+
+    /// Publishes a document of a job once more.
+    pub fn publish_again(&self, job: JobId, doc: DocId) {
+        let held = lock(&self.held).get(&job).and_then(|all| {
+            all.iter()
+                .find(|(it, _)| *it == doc)
+                .map(|(_, held)| held.clone())
+        });
+        if let Some(held) = held
+            && let Err(error) = self.documents.publish_again(&held)
+        {
+            // The peer asks again while it lacks the document.
+            tracing::warn!("document {} cannot be published again: {error}", doc.0);
+        }
+    }
+
+    /// The root image of a job, while it is held.
+    pub fn root(&self, job: JobId) -> Option<Held> {
+        lock(&self.held)
+            .get(&job)
+            .and_then(|all| all.first().map(|(_, held)| held.clone()))
+    }
+
+    /// The root document of a job that has ended lately; it may still be on the bus.
+    pub fn recent_root(&self, job: JobId) -> Option<DocId> {
+        lock(&self.recent)
+            .iter()
+            .find(|(it, _)| *it == job)
+            .map(|(_, doc)| *doc)
+    }
+
+    /// Lets go of a job's documents.
+    pub fn release(&self, job: JobId) {
+        let held = lock(&self.held).remove(&job);
+        if let Some((doc, _)) = held.as_ref().and_then(|all| all.first()) {
+            let mut recent = lock(&self.recent);
+            recent.push_back((job, *doc));
+            if recent.len() > RECENT {
+                recent.pop_front();
+            }
+        }
+    }
+
+    fn hold(&self, job: JobId, held: Vec<(DocId, Held)>) {
+        lock(&self.held).insert(job, held);
+    }
+
+    /// Follows the root's references.
+    fn gather(
+        &self,
+        root: &Held,
+        path: &Path,
+        gathered: &mut Gathered,
+    ) -> Result<(), PrepareFailure> {
+        let Ok(document) = Document::open(root) else {
+            return Ok(());
+        };
+        for reference in qcbus_ingest::references(&document) {
+            let Some(role) = role_of(reference.role) else {
+                continue;
+            };
+            if let Some(why) = &reference.unresolved {
+                gathered.miss(role, &reference, path, why.clone());
+            }
+            if let Some(directory) = &reference.directory {
+                gathered.listing(directory);
+            }
+            // The first of several candidates is meant, except that every file of a catalog
+            // directory is a catalog.
+            let every = reference.role == Role::CatalogDirectory;
+            let mut missing = None;
+            for candidate in &reference.candidates {
+                match self.candidate(role, &reference, candidate, gathered)? {
+                    None if every => {}
+                    None => {
+                        missing = None;
+                        break;
+                    }
+                    Some(why) if every => gathered.miss(role, &reference, candidate, why),
+                    Some(why) => {
+                        gathered.absent(candidate);
+                        missing = missing.or(Some((candidate, why)));
+                    }
+                }
+            }
+            if let Some((candidate, why)) = missing {
+                gathered.miss(role, &reference, candidate, why);
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds one referenced file; `Some` says why it could not be had.
+    fn candidate(
+        &self,
+        role: DocumentRole,
+        reference: &Reference,
+        path: &Path,
+        gathered: &mut Gathered,
+    ) -> Result<Option<String>, PrepareFailure> {
+        if gathered.has(path) {
+            return Ok(None);
+        }
+        if gathered.documents.len() >= self.max_documents {
+            return Ok(Some(format!(
+                "more than {} documents belong to this file",
+                self.max_documents
+            )));
+        }
+        match self.publish_shared(path) {
+            Ok(published) => {
+                gathered.push(path, role, reference.offset, &published);
+                Ok(None)
+            }
+            Err(Failure::Ingest(error)) => Ok(Some(error.to_string())),
+            Err(failure) => Err(self.explain(failure, path)),
+        }
+    }
+
+    /// A map or catalog: from the cache as long as nothing has changed.
+    fn publish_shared(&self, path: &Path) -> Result<Published, Failure> {
+        let cached = lock(&self.cache).by_path.get(path).cloned();
+        if let Some(published) = cached
+            && published.inputs.iter().all(is_unchanged)
+        {
+            return Ok(published);
+        }
+        let published = self.publish_fresh(path)?;
+        let mut cache = lock(&self.cache);
+        if cache
+            .by_path
+            .insert(path.to_path_buf(), published.clone())
+            .is_none()
+        {
+            cache.order.push_back(path.to_path_buf());
+        }
+        while cache.order.len() > CACHED {
+            if let Some(oldest) = cache.order.pop_front() {
+                cache.by_path.remove(&oldest);
+            }
+        }
+        Ok(published)
+    }
+
+    fn publish_fresh(&self, path: &Path) -> Result<Published, Failure> {
+        let prepared = qcbus_ingest::prepare(path, self.boundary(path), &self.limits)?;
+        reached("read", path);
+        let digest = Digest(prepared.digest());
+        let inputs = inputs_of(&prepared);
+        let kind = FileKind::of_path(path).unwrap_or(FileKind::Xosc);
+        let (loan, used) = self.build(&prepared)?;
+        reached("built", path);
+        let doc = DocId(self.next_doc.fetch_add(1, Ordering::Relaxed));
+        let held = loan
+            .publish(doc, used, digest, kind)
+            .map_err(|error| Failure::Build(error.to_string()))?;
+        reached("published", path);
+        let bytes = inputs
+            .iter()
+            .filter_map(|it| it.content)
+            .map(|(stamp, _)| stamp.size)
+            .sum();
+        Ok(Published {
+            doc,
+            held,
+            digest,
+            inputs,
+            bytes,
+        })
+    }
+
+    /// Parses straight into shared memory. The bound is an estimate that many resolved entities
+    /// can exceed; then the builder says how much it takes.
+    fn build(&self, prepared: &Prepared) -> Result<(Loan, usize), Failure> {
+        let mut room = prepared.upper_bound();
+        loop {
+            let mut loan = self.documents.loan(room)?;
+            match prepared.build_into(&mut loan) {
+                Ok(used) => return Ok((loan, used)),
+                Err(BuildError::SmallBuffer { needed, .. }) if needed > room => room = needed,
+                Err(error) => return Err(Failure::Build(error.to_string())),
+            }
+        }
+    }
+
+    /// The directory that includes may not leave.
+    fn boundary<'a>(&'a self, path: &'a Path) -> &'a Path {
+        let root = self.roots.iter().filter(|root| path.starts_with(root));
+        root.max_by_key(|root| root.as_os_str().len())
+            .map_or_else(|| path.parent().unwrap_or(path), PathBuf::as_path)
+    }
+
+    fn explain(&self, failure: Failure, path: &Path) -> PrepareFailure {
+        match failure {
+            Failure::Ingest(IngestError::Missing { .. } | IngestError::Unsettled { .. }) => {
+                match stamp_of(path) {
+                    Ok(None) => PrepareFailure::Vanished,
+                    // It is written to this very moment: it is read again shortly.
+                    _ => PrepareFailure::NoRoom(format!(
+                        "{} changes while it is read",
+                        path.display()
+                    )),
+                }
+            }
+            Failure::Ingest(error) => unreadable(path, error.to_string()),
+            Failure::Build(error) => unreadable(path, error),
+            Failure::Loan(LoanError::TooLarge(_)) => {
+                unreadable(path, format!("{} is too large for the bus", path.display()))
+            }
+            Failure::Loan(LoanError::Busy) => PrepareFailure::Busy,
+            Failure::Loan(error) => {
+                PrepareFailure::NoRoom(format!("cannot publish {}: {error}", path.display()))
+            }
+        }
+    }
+}
+
+#[derive(Debug)]
+enum Failure {
+    Ingest(IngestError),
+    Build(String),
+    Loan(LoanError),
+}
+
+impl From<IngestError> for Failure {
+    fn from(error: IngestError) -> Self {
+        Failure::Ingest(error)
+    }
+}
+
+impl From<LoanError> for Failure {
+    fn from(error: LoanError) -> Self {
+        Failure::Loan(error)
+    }
+}
+
+/// What has been found for one job so far.
+struct Gathered {
+    documents: Vec<JobDocument>,
+    missing: Vec<MissingDocument>,
+    inputs: BTreeMap<PathBuf, Input>,
+    root: Vec<Input>,
+    held: Vec<(DocId, Held)>,
+    bytes: u64,
+}
+
+impl Gathered {
+    fn new(path: &Path, root: &Published) -> Gathered {
+        let mut gathered = Gathered {
+            documents: Vec::new(),
+            missing: Vec::new(),
+            inputs: BTreeMap::new(),
+            root: root.inputs.iter().take(1).cloned().collect(),
+            held: Vec::new(),
+            bytes: 0,
+        };
+        gathered.push(path, DocumentRole::Root, 0, root);
+        gathered
+    }
+
+    fn push(&mut self, path: &Path, role: DocumentRole, referred_at: u32, published: &Published) {
+        self.documents.push(JobDocument {
+            doc: published.doc,
+            role,
+            path: path.to_string_lossy().into_owned(),
+            digest: published.digest,
+            referred_at,
+        });
+        for input in &published.inputs {
+            self.inputs.insert(input.path.to_path_buf(), input.clone());
+        }
+        self.held.push((published.doc, published.held.clone()));
+        self.bytes += published.bytes;
+    }
+
+    fn has(&self, path: &Path) -> bool {
+        self.documents
+            .iter()
+            .any(|document| Path::new(&document.path) == path)
+    }
+
+    /// A file that was looked for and not found: when it appears, the verdict is void.
+    fn absent(&mut self, path: &Path) {
+        self.inputs
+            .entry(path.to_path_buf())
+            .or_insert_with(|| Input {
+                path: path.into(),
+                content: None,
+            });
+    }
+
+    /// A directory whose files count: when one comes or goes, the verdict is void.
+    fn listing(&mut self, directory: &Path) {
+        let stamp = stamp_through_links(directory);
+        let content = stamp.map(|stamp| {
+            let digest = Sha256::digest(format!("{} {}", stamp.size, stamp.mtime_ns));
+            (stamp, Digest(digest.into()))
+        });
+        self.inputs.insert(
+            directory.to_path_buf(),
+            Input {
+                path: directory.into(),
+                content,
+            },
+        );
+    }
+
+    fn miss(&mut self, role: DocumentRole, reference: &Reference, path: &Path, why: String) {
+        self.absent(path);
+        self.missing.push(MissingDocument {
+            role,
+            reference: reference.text.clone(),
+            path: path.to_string_lossy().into_owned(),
+            why,
+            referred_at: reference.offset,
+        });
+    }
+
+    fn finish(&self) -> PreparedJob {
+        let root = self.root.first().map(|input| input.path.clone());
+        let others = self
+            .inputs
+            .values()
+            .filter(|input| Some(&input.path) != root.as_ref());
+        let inputs: Vec<Input> = self.root.iter().chain(others).cloned().collect();
+        PreparedJob {
+            basis: basis(&inputs),
+            racy: inputs
+                .iter()
+                .any(|input| input.content.is_some_and(|(stamp, _)| is_racy(stamp))),
+            inputs,
+            documents: self.documents.clone(),
+            missing: self.missing.clone(),
+            bytes: self.bytes,
+        }
+    }
+}
+
+/// What a referenced file is to the job; `None` for what is only named, never read.
+fn role_of(role: Role) -> Option<DocumentRole> {
+    match role {
+        Role::LogicFile => Some(DocumentRole::Map),
+        Role::CatalogDirectory => Some(DocumentRole::Catalog),
+        Role::ScenarioReference | Role::ScenarioFile => Some(DocumentRole::Scenario),
+        Role::Schema => None,
+    }
+}
+
+/// Digest over the paths and contents of all inputs.
+fn basis(inputs: &[Input]) -> Digest {
+    let mut hash = Sha256::new();
+    for input in inputs {
+        hash.update(input.path.as_os_str().as_encoded_bytes());
+        match input.content {
+            Some((_, digest)) => {
+                hash.update([0, 1]);
+                hash.update(digest.0);
+            }
+            None => hash.update([0, 0]),
+        }
+    }
+    Digest(hash.finalize().into())
+}
+
+fn inputs_of(prepared: &Prepared) -> Vec<Input> {
+    prepared
+        .files()
+        .iter()
+        .map(|file| Input {
+            path: file.path.as_path().into(),
+            content: file
+                .content
+                .as_ref()
+                .map(|it| (stamp_as_read(&file.path, it), Digest(it.digest))),
+        })
+        .collect()
+}
+
+/// The stamp of a file as it was read. The inode is taken from a second look: when that sees
+/// another size or time, the file has changed since, and no stamp will ever match this one.
+fn stamp_as_read(path: &Path, content: &Content) -> Stamp {
+    let since_1970 = content
+        .modified
+        .and_then(|time| time.duration_since(UNIX_EPOCH).ok());
+    let mtime_ns = since_1970
+        .and_then(|it| i128::try_from(it.as_nanos()).ok())
+        .unwrap_or_default();
+    let now =
+        stamp_through_links(path).filter(|it| it.size == content.size && it.mtime_ns == mtime_ns);
+    now.unwrap_or(Stamp {
+        size: content.size,
+        mtime_ns,
+        inode: 0,
+    })
+}
+
+fn is_unchanged(input: &Input) -> bool {
+    match input.content {
+        Some((stamp, _)) => !is_racy(stamp) && stamp_through_links(&input.path) == Some(stamp),
+        None => stamp_through_links(&input.path).is_none(),
+    }
+}
+
+fn is_racy(stamp: Stamp) -> bool {
+    let now = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default();
+    let age = i128::try_from(now.as_nanos()).unwrap_or(i128::MAX) - stamp.mtime_ns;
+    age < i128::try_from(RACY.as_nanos()).unwrap_or(0)
+}
+
+fn unreadable(path: &Path, reason: String) -> PrepareFailure {
+    match stamp_of(path) {
+        Ok(Some(stamp)) => PrepareFailure::Unreadable {
+            reason,
+            stamp: Some(stamp),
+        },
+        _ => PrepareFailure::Vanished,
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

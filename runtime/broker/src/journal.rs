@@ -1,0 +1,561 @@
+//! The journal: what must survive the broker, in SQLite. The schema is in `journal.sql`.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use qcbus_messages::{Digest, JobId, Verdict};
+use rusqlite::{Connection, OpenFlags, Transaction, params};
+
+use crate::core::{Input, Judged, Stamp};
+
+/// Version of the schema, kept in SQLite's `user_version`.
+pub const SCHEMA_VERSION: i64 = 1;
+
+const SCHEMA: &str = include_str!("journal.sql");
+
+/// Why the journal cannot be used, with the way out.
+#[derive(Debug, thiserror::Error)]
+pub enum JournalError {
+    /// Another process holds it.
+    #[error(
+        "the journal {path} is locked by another process ({source}); stop the other broker on this state directory, or give this one another with --state"
+    )]
+    Locked {
+        /// The journal.
+        path: PathBuf,
+        /// What SQLite says.
+        source: rusqlite::Error,
+    },
+    /// Its disk is full.
+    #[error(
+        "the journal {path} cannot be written: its disk is full; make room, it is tried again until there is some"
+    )]
+    Full {
+        /// The journal.
+        path: PathBuf,
+    },
+    /// It is no journal, or a broken one.
+    #[error(
+        "the journal {path} cannot be used: {source}. It only remembers which files are finished: move it away (`mv {path} {path}.broken`) and start again, everything is then judged anew; `qcbus doctor` looks into it"
+    )]
+    Broken {
+        /// The journal.
+        path: PathBuf,
+        /// What SQLite says.
+        source: rusqlite::Error,
+    },
+    /// It was written by a newer version of qcbus.
+    #[error(
+        "the journal {path} has schema {found}, this version of qcbus knows {SCHEMA_VERSION}: use the newer qcbus, or give this one another directory with --state"
+    )]
+    Newer {
+        /// The journal.
+        path: PathBuf,
+        /// Its schema.
+        found: i64,
+    },
+    /// Its directory cannot be made.
+    #[error("cannot make the state directory {path}: {source}; choose another with --state")]
+    Directory {
+        /// The directory.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+}
+
+/// A file with its verdict, as the journal remembers it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Remembered {
+    /// Absolute path.
+    pub path: Arc<Path>,
+    /// The verdict and what it depends on.
+    pub judged: Judged,
+    /// The reporters that have it, each with the job whose result it has.
+    pub delivered: Vec<(String, JobId)>,
+}
+
+/// What one job did, for the history.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct History {
+    /// Source bytes.
+    pub bytes: u64,
+    /// Microseconds from the queue to the stored result.
+    pub micros: u64,
+    /// By bundle: name, version, microseconds, failure.
+    pub bundles: Vec<(String, String, u64, String)>,
+    /// Bundle, checker, status, number of issues, of checkers worth mentioning.
+    pub checkers: Vec<(String, String, String, u64)>,
+}
+
+/// Something to remember.
+#[derive(Debug)]
+pub enum Entry {
+    /// A verdict.
+    Judged {
+        /// The file.
+        path: Arc<Path>,
+        /// Its verdict.
+        judged: Arc<Judged>,
+        /// How it came about; absent when the verdict only got fresh stamps.
+        history: Option<Box<History>>,
+    },
+    /// A file has gone.
+    Withdrawn {
+        /// The file.
+        path: Arc<Path>,
+    },
+    /// A reporter has a result.
+    Delivered {
+        /// The file.
+        path: Arc<Path>,
+        /// The reporter.
+        reporter: String,
+        /// The job.
+        job: JobId,
+    },
+}
+
+/// The open journal.
+#[derive(Debug)]
+pub struct Journal {
+    connection: Connection,
+    path: PathBuf,
+}
+
+impl Journal {
+    /// Opens or makes the journal in a state directory.
+    ///
+    /// # Errors
+    /// See [`JournalError`]; each says what to do.
+    pub fn open(state: &Path) -> Result<Journal, JournalError> {
+        std::fs::create_dir_all(state).map_err(|source| JournalError::Directory {
+            path: state.to_path_buf(),
+            source,
+        })?;
+        let path = state.join("journal.sqlite");
+        let fail = |source| classify(&path, source);
+        let connection = Connection::open(&path).map_err(fail)?;
+        connection
+            .busy_timeout(Duration::from_secs(5))
+            .map_err(fail)?;
+        prepare(&connection, &path)?;
+        Ok(Journal { connection, path })
+    }
+
+    /// A journal that is forgotten with the process, for a single run.
+    ///
+    /// # Errors
+    /// When SQLite cannot even do that.
+    pub fn in_memory() -> Result<Journal, JournalError> {
+        let path = PathBuf::from(":memory:");
+        let connection = Connection::open_in_memory().map_err(|source| classify(&path, source))?;
+        prepare(&connection, &path)?;
+        Ok(Journal { connection, path })
+    }
+
+    /// Looks a journal through without changing it: `None` when it is sound, else what is wrong.
+    pub fn examine(state: &Path) -> Option<String> {
+        let path = state.join("journal.sqlite");
+        if !path.exists() {
+            return None;
+        }
+        let check = || -> rusqlite::Result<String> {
+            let connection = Connection::open_with_flags(&path, OpenFlags::SQLITE_OPEN_READ_ONLY)?;
+            connection.query_row("PRAGMA quick_check", [], |row| row.get(0))
+        };
+        match check() {
+            Ok(answer) if answer == "ok" => None,
+            Ok(answer) => Some(answer),
+            Err(source) => Some(classify(&path, source).to_string()),
+        }
+    }
+
+    /// Everything that is remembered of files.
+    ///
+    /// # Errors
+    /// When the journal cannot be read. Rows that make no sense are left out: their files are
+    /// judged anew.
+    pub fn remembered(&self) -> Result<Vec<Remembered>, JournalError> {
+        self.read_all()
+            .map_err(|source| classify(&self.path, source))
+    }
+
+    fn read_all(&self) -> rusqlite::Result<Vec<Remembered>> {
+        let mut delivered: HashMap<String, Vec<(String, JobId)>> = HashMap::new();
+        let mut query = self
+            .connection
+            .prepare("SELECT path, reporter, job FROM deliveries")?;
+        let mut rows = query.query([])?;
+        while let Some(row) = rows.next()? {
+            let entry = (row.get(1)?, JobId(number(row.get(2)?)));
+            delivered.entry(row.get(0)?).or_default().push(entry);
+        }
+        let mut query = self.connection.prepare(
+            "SELECT path, job, verdict, digest, basis, config, bundles, errors, warnings, \
+             information, why, xqar, inputs, racy FROM files ORDER BY path",
+        )?;
+        let mut rows = query.query([])?;
+        let mut all = Vec::new();
+        while let Some(row) = rows.next()? {
+            let path: String = row.get(0)?;
+            if let Some(judged) = judged_of(row)? {
+                let delivered = delivered.remove(&path).unwrap_or_default();
+                all.push(Remembered {
+                    path: Path::new(&path).into(),
+                    judged,
+                    delivered,
+                });
+            }
+        }
+        Ok(all)
+    }
+
+    /// Writes entries in one transaction: all of them or none.
+    ///
+    /// # Errors
+    /// When SQLite cannot write, a full disk for instance; the entries are the caller's to keep.
+    pub fn write(&mut self, entries: &[Entry]) -> Result<(), JournalError> {
+        let path = self.path.clone();
+        let mut write = || -> rusqlite::Result<()> {
+            let transaction = self.connection.transaction()?;
+            for entry in entries {
+                put(&transaction, entry)?;
+            }
+            transaction.commit()
+        };
+        write().map_err(|source| classify(&path, source))
+    }
+
+    /// Forgets the history of jobs older than `keep`.
+    ///
+    /// # Errors
+    /// When SQLite cannot write.
+    pub fn prune(&mut self, keep: Duration) -> Result<usize, JournalError> {
+        let before = millis().saturating_sub(i64::try_from(keep.as_millis()).unwrap_or(i64::MAX));
+        self.connection
+            .execute("DELETE FROM jobs WHERE at < ?1", params![before])
+            .map_err(|source| classify(&self.path, source))
+    }
+}
+
+fn prepare(connection: &Connection, path: &Path) -> Result<(), JournalError> {
+    let fail = |source| classify(path, source);
+    let found: i64 = connection
+        .query_row("PRAGMA user_version", [], |row| row.get(0))
+        .map_err(fail)?;
+    if found > SCHEMA_VERSION {
+        return Err(JournalError::Newer {
+            path: path.to_path_buf(),
+            found,
+        });
+    }
+    // WAL with synchronous=NORMAL survives a killed process; after a power cut the last verdicts
+    // may be missing, and their files are judged anew.
+    connection
+        .execute_batch(&format!(
+            "PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL; PRAGMA foreign_keys = ON; \
+             {SCHEMA} PRAGMA user_version = {SCHEMA_VERSION};"
+        ))
+        .map_err(fail)
+}
+
+fn classify(path: &Path, source: rusqlite::Error) -> JournalError {
+    use rusqlite::ErrorCode::{DatabaseBusy, DatabaseLocked};
+    let path = path.to_path_buf();
+    match source.sqlite_error_code() {
+        Some(DatabaseBusy | DatabaseLocked) => JournalError::Locked { path, source },
+        Some(rusqlite::ErrorCode::DiskFull) => JournalError::Full { path },
+        _ => JournalError::Broken { path, source },
+    }
+}
+
+fn put(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> {
+    match entry {
+        Entry::Judged {
+            path,
+            judged,
+            history,
+        } => {
+            put_file(transaction, path, judged)?;
+            if let Some(history) = history {
+                put_history(transaction, path, judged, history)?;
+            }
+        }
+        Entry::Withdrawn { path } => {
+            let path = text(path);
+            transaction.execute("DELETE FROM files WHERE path = ?1", params![path])?;
+            transaction.execute("DELETE FROM deliveries WHERE path = ?1", params![path])?;
+        }
+        Entry::Delivered {
+            path,
+            reporter,
+            job,
+        } => {
+            transaction.execute(
+                "INSERT OR REPLACE INTO deliveries (path, reporter, job) VALUES (?1, ?2, ?3)",
+                params![text(path), reporter, signed(job.0)],
+            )?;
+        }
+    }
+    Ok(())
+}
+
+fn put_file(transaction: &Transaction<'_>, path: &Path, judged: &Judged) -> rusqlite::Result<()> {
+    let mut statement = transaction.prepare_cached(
+        "INSERT OR REPLACE INTO files (path, job, verdict, digest, basis, config, bundles, errors, \
+         warnings, information, why, xqar, inputs, racy, at) \
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15)",
+    )?;
+    statement.execute(params![
+        text(path),
+        signed(judged.job.0),
+        judged.verdict.as_str(),
+        judged.digest.to_string(),
+        judged.basis.to_string(),
+        judged.config.to_string(),
+        format!("{:016x}", judged.bundles),
+        signed(judged.counts[0]),
+        signed(judged.counts[1]),
+        signed(judged.counts[2]),
+        serde_json::to_string(&judged.why).unwrap_or_default(),
+        text(&judged.xqar),
+        inputs_to_text(&judged.inputs),
+        judged.racy,
+        millis(),
+    ])?;
+    Ok(())
+}
+
+fn put_history(
+    transaction: &Transaction<'_>,
+    path: &Path,
+    judged: &Judged,
+    history: &History,
+) -> rusqlite::Result<()> {
+    let job = signed(judged.job.0);
+    let mut statement = transaction.prepare_cached(
+        "INSERT OR REPLACE INTO jobs (job, path, digest, config, verdict, errors, warnings, \
+         information, bytes, micros, at) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
+    )?;
+    statement.execute(params![
+        job,
+        text(path),
+        judged.digest.to_string(),
+        judged.config.to_string(),
+        judged.verdict.as_str(),
+        signed(judged.counts[0]),
+        signed(judged.counts[1]),
+        signed(judged.counts[2]),
+        signed(history.bytes),
+        signed(history.micros),
+        millis(),
+    ])?;
+    let mut bundles = transaction
+        .prepare_cached("INSERT OR REPLACE INTO job_bundles VALUES (?1, ?2, ?3, ?4, ?5)")?;
+    for (bundle, version, micros, failure) in &history.bundles {
+        bundles.execute(params![job, bundle, version, signed(*micros), failure])?;
+    }
+    let mut checkers = transaction
+        .prepare_cached("INSERT OR REPLACE INTO job_checkers VALUES (?1, ?2, ?3, ?4, ?5)")?;
+    for (bundle, checker, status, issues) in &history.checkers {
+        checkers.execute(params![job, bundle, checker, status, signed(*issues)])?;
+    }
+    Ok(())
+}
+
+type InputRow = (String, Option<(u64, i128, u64, String)>);
+
+fn inputs_to_text(inputs: &[Input]) -> String {
+    let rows: Vec<InputRow> = inputs
+        .iter()
+        .map(|input| {
+            let content = input.content.map(|(stamp, digest)| {
+                (stamp.size, stamp.mtime_ns, stamp.inode, digest.to_string())
+            });
+            (text(&input.path), content)
+        })
+        .collect();
+    serde_json::to_string(&rows).unwrap_or_default()
+}
+
+fn inputs_from_text(text: &str) -> Option<Vec<Input>> {
+    let rows: Vec<InputRow> = serde_json::from_str(text).ok()?;
+    let input = |(path, content): InputRow| {
+        let content = match content {
+            None => None,
+            Some((size, mtime_ns, inode, digest)) => Some((
+                Stamp {
+                    size,
+                    mtime_ns,
+                    inode,
+                },
+                digest.parse().ok()?,
+            )),
+        };
+        Some(Input {
+            path: Path::new(&path).into(),
+            content,
+        })
+    };
+    rows.into_iter().map(input).collect()
+}
+
+fn judged_of(row: &rusqlite::Row<'_>) -> rusqlite::Result<Option<Judged>> {
+    let digest = |index| -> rusqlite::Result<Option<Digest>> {
+        Ok(row.get::<_, String>(index)?.parse().ok())
+    };
+    let verdict = match row.get::<_, String>(2)?.as_str() {
+        "accepted" => Verdict::Accepted,
+        "rejected" => Verdict::Rejected,
+        "undetermined" => Verdict::Undetermined,
+        _ => return Ok(None),
+    };
+    let (own, basis, config) = (digest(3)?, digest(4)?, digest(5)?);
+    let bundles = u64::from_str_radix(&row.get::<_, String>(6)?, 16).ok();
+    let inputs = inputs_from_text(&row.get::<_, String>(12)?);
+    let (Some(digest), Some(basis), Some(config), Some(bundles), Some(inputs)) =
+        (own, basis, config, bundles, inputs)
+    else {
+        return Ok(None);
+    };
+    Ok(Some(Judged {
+        job: JobId(number(row.get(1)?)),
+        verdict,
+        digest,
+        basis,
+        config,
+        bundles,
+        inputs,
+        racy: row.get(13)?,
+        counts: [
+            number(row.get(7)?),
+            number(row.get(8)?),
+            number(row.get(9)?),
+        ],
+        why: serde_json::from_str(&row.get::<_, String>(10)?).unwrap_or_default(),
+        xqar: PathBuf::from(row.get::<_, String>(11)?),
+    }))
+}
+
+/// Paths that are no UTF-8 lose something here, which only costs a new check after a restart.
+fn text(path: &Path) -> String {
+    path.to_string_lossy().into_owned()
+}
+
+fn signed(number: u64) -> i64 {
+    i64::try_from(number).unwrap_or(i64::MAX)
+}
+
+fn number(signed: i64) -> u64 {
+    u64::try_from(signed).unwrap_or(0)
+}
+
+/// Milliseconds since 1970. Only ever shown or compared with the retention time, so a clock that
+/// jumps does no harm.
+fn millis() -> i64 {
+    let since = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default();
+    i64::try_from(since.as_millis()).unwrap_or(i64::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn judged(job: u64) -> Judged {
+        Judged {
+            job: JobId(job),
+            verdict: Verdict::Undetermined,
+            digest: Digest([1; 32]),
+            basis: Digest([2; 32]),
+            config: Digest([3; 32]),
+            bundles: u64::MAX,
+            inputs: vec![
+                Input {
+                    path: Path::new("/a.xosc").into(),
+                    content: Some((
+                        Stamp {
+                            size: 1,
+                            mtime_ns: 1 << 70,
+                            inode: 3,
+                        },
+                        Digest([1; 32]),
+                    )),
+                },
+                Input {
+                    path: Path::new("/a.xodr").into(),
+                    content: None,
+                },
+            ],
+            racy: true,
+            counts: [1, 2, 3],
+            why: vec!["xodrBundle: it died".to_owned()],
+            xqar: PathBuf::from("/out/a.xosc.xqar"),
+        }
+    }
+
+    #[test]
+    fn what_was_written_is_remembered() {
+        let dir = tempfile::tempdir().unwrap();
+        let path: Arc<Path> = Path::new("/a.xosc").into();
+        let expected = Arc::new(judged(5));
+        {
+            let mut journal = Journal::open(dir.path()).unwrap();
+            let history = Some(Box::new(History::default()));
+            journal
+                .write(&[
+                    Entry::Judged {
+                        path: path.clone(),
+                        judged: expected.clone(),
+                        history,
+                    },
+                    Entry::Delivered {
+                        path: path.clone(),
+                        reporter: "json".into(),
+                        job: JobId(5),
+                    },
+                ])
+                .unwrap();
+        }
+        let mut journal = Journal::open(dir.path()).unwrap();
+        let all = journal.remembered().unwrap();
+        assert_eq!(all.len(), 1);
+        assert_eq!(all[0].judged, *expected);
+        assert_eq!(all[0].delivered, [("json".to_owned(), JobId(5))]);
+        journal.write(&[Entry::Withdrawn { path }]).unwrap();
+        assert!(journal.remembered().unwrap().is_empty());
+        assert_eq!(Journal::examine(dir.path()), None);
+    }
+
+    #[test]
+    fn a_broken_journal_says_so_and_what_to_do() {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(
+            dir.path().join("journal.sqlite"),
+            "this is no database at all, is it?",
+        )
+        .unwrap();
+        let error = Journal::open(dir.path()).unwrap_err().to_string();
+        assert!(error.contains("move it away"), "{error}");
+        assert!(Journal::examine(dir.path()).is_some());
+    }
+
+    #[test]
+    fn a_newer_journal_is_left_alone() {
+        let dir = tempfile::tempdir().unwrap();
+        drop(Journal::open(dir.path()).unwrap());
+        let connection = Connection::open(dir.path().join("journal.sqlite")).unwrap();
+        connection
+            .execute_batch("PRAGMA user_version = 99")
+            .unwrap();
+        drop(connection);
+        assert!(matches!(
+            Journal::open(dir.path()),
+            Err(JournalError::Newer { found: 99, .. })
+        ));
+    }
+}

@@ -1,0 +1,66 @@
+-- The journal of one qcbus state directory. Safe to read with `sqlite3` while the broker runs.
+-- Digests are SHA-256 in hexadecimal, times are milliseconds since 1970 (UTC).
+
+-- One row per file with a verdict: what the broker remembers over a restart.
+CREATE TABLE IF NOT EXISTS files (
+    path     TEXT PRIMARY KEY,      -- absolute
+    job      INTEGER NOT NULL,      -- the job that gave the verdict: generation << 32 | number
+    verdict  TEXT NOT NULL,         -- accepted, rejected, undetermined
+    digest   TEXT NOT NULL,         -- of the file's bytes
+    basis    TEXT NOT NULL,         -- digest over everything that the verdict depends on
+    config   TEXT NOT NULL,         -- digest of the configuration
+    bundles  TEXT NOT NULL,         -- signature of the bundles that took part
+    errors   INTEGER NOT NULL,
+    warnings INTEGER NOT NULL,
+    information INTEGER NOT NULL,
+    why      TEXT NOT NULL,         -- JSON list: for undetermined, the checkers that failed
+    xqar     TEXT NOT NULL,         -- where the result lies
+    inputs   TEXT NOT NULL,         -- JSON list of [path, size, mtime_ns, inode, digest]; null: absent
+    racy     INTEGER NOT NULL,      -- 1: read so soon after a write that the stamps prove nothing
+    at       INTEGER NOT NULL
+) WITHOUT ROWID;
+
+-- Every job that gave a verdict, for statistics; pruned after the retention time.
+CREATE TABLE IF NOT EXISTS jobs (
+    job      INTEGER PRIMARY KEY,
+    path     TEXT NOT NULL,
+    digest   TEXT NOT NULL,
+    config   TEXT NOT NULL,
+    verdict  TEXT NOT NULL,
+    errors   INTEGER NOT NULL,
+    warnings INTEGER NOT NULL,
+    information INTEGER NOT NULL,
+    bytes    INTEGER NOT NULL,      -- source bytes of the file and its dependencies
+    micros   INTEGER NOT NULL,      -- from the queue to the stored result
+    at       INTEGER NOT NULL
+);
+CREATE INDEX IF NOT EXISTS jobs_by_path ON jobs (path, at);
+CREATE INDEX IF NOT EXISTS jobs_by_time ON jobs (at);
+
+-- What each bundle did in a job.
+CREATE TABLE IF NOT EXISTS job_bundles (
+    job      INTEGER NOT NULL REFERENCES jobs (job) ON DELETE CASCADE,
+    bundle   TEXT NOT NULL,
+    version  TEXT NOT NULL,
+    micros   INTEGER NOT NULL,      -- time spent checking, as the bundle says
+    failure  TEXT NOT NULL,         -- empty: it did its work
+    PRIMARY KEY (job, bundle)
+) WITHOUT ROWID;
+
+-- Checkers with findings, or that did not complete.
+CREATE TABLE IF NOT EXISTS job_checkers (
+    job      INTEGER NOT NULL REFERENCES jobs (job) ON DELETE CASCADE,
+    bundle   TEXT NOT NULL,
+    checker  TEXT NOT NULL,
+    status   TEXT NOT NULL,
+    issues   INTEGER NOT NULL,
+    PRIMARY KEY (job, bundle, checker)
+) WITHOUT ROWID;
+
+-- Which reporter has acknowledged which result.
+CREATE TABLE IF NOT EXISTS deliveries (
+    path     TEXT NOT NULL,
+    reporter TEXT NOT NULL,
+    job      INTEGER NOT NULL,
+    PRIMARY KEY (path, reporter)
+) WITHOUT ROWID;

@@ -1,0 +1,31 @@
+//! The broker: watches, reads, publishes, collects, judges, and keeps its word when anything dies.
+//!
+//! `core` decides and does nothing; `engine` does and decides nothing. Everything else is a pair
+//! of hands: `watch` sees files, `intake` reads and publishes them, `store` and `writers` put
+//! results on the disk, `journal` remembers, `supervise` starts and kills, `control` answers
+//! commands, `reload` reads configuration and manifests.
+
+pub mod control;
+pub mod core;
+pub mod deliveries;
+mod demand;
+mod disk;
+mod engine;
+mod intake;
+pub mod journal;
+mod options;
+mod places;
+pub mod reload;
+mod stages;
+mod stamp;
+mod store;
+mod supervise;
+mod verdict_file;
+pub mod watch;
+mod writers;
+
+pub use demand::InForce;
+pub use engine::{Announcement, Broker, StartError, Stop, Told};
+pub use options::Options;
+pub use places::Places;
+pub use store::BUILD_DATE;

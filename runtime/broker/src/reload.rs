@@ -1,0 +1,307 @@
+//! The configuration and the bundle manifests: read, validate, compare, apply. The start of a
+//! broker is its first reload; a mistake never takes down what is in force.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use qcbus_formats::config::{BundleConfig, Config, reporter_for};
+use qcbus_formats::manifest::{self, Mode, Module, ModuleType};
+use qcbus_messages::Role;
+
+use crate::core::{ChildSpec, Restart, Stamp};
+use crate::stamp::stamp_through_links;
+
+/// Where the configuration and the children come from.
+#[derive(Debug, Clone)]
+pub struct Sources {
+    /// The configuration file.
+    pub config: Option<PathBuf>,
+    /// Directory of manifests.
+    pub bundles_d: Option<PathBuf>,
+    /// The children that come with the program.
+    pub standard: Vec<ChildSpec>,
+    /// Reporters that run when the configuration names them.
+    pub reporters: Vec<ChildSpec>,
+}
+
+/// What was read, valid as a whole.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Loaded {
+    /// The configuration.
+    pub config: Option<Config>,
+    /// Everything that is to run.
+    pub children: Vec<ChildSpec>,
+    /// What is odd, for a person.
+    pub notices: Vec<String>,
+}
+
+/// Why nothing was applied.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum LoadError {
+    /// The configuration cannot be used.
+    #[error("{0}")]
+    Config(String),
+    /// A manifest cannot be used.
+    #[error("{0}")]
+    Manifest(String),
+}
+
+impl Sources {
+    /// Reads everything.
+    ///
+    /// # Errors
+    /// The first thing that cannot be used, with file, row and column where there is one.
+    pub fn load(&self) -> Result<Loaded, LoadError> {
+        let mut loaded = Loaded {
+            children: self.standard.clone(),
+            ..Loaded::default()
+        };
+        if let Some(path) = &self.config {
+            let (config, notices) = read_config(path)?;
+            self.add_reporters(&config, &mut loaded);
+            loaded.config = Some(config);
+            loaded.notices = notices;
+        }
+        for path in self.manifests()? {
+            for module in read_manifest(&path)? {
+                add_module(module, &mut loaded);
+            }
+        }
+        Ok(loaded)
+    }
+
+    fn add_reporters(&self, config: &Config, loaded: &mut Loaded) {
+        for report in &config.reports {
+            let name = reporter_for(&report.application).unwrap_or(&report.application);
+            let spec = self.reporters.iter().find(|spec| spec.name == name);
+            if let Some(spec) = spec
+                && loaded.children.iter().all(|child| child.name != name)
+            {
+                loaded.children.push(spec.clone());
+            }
+        }
+    }
+
+    fn manifests(&self) -> Result<Vec<PathBuf>, LoadError> {
+        let Some(directory) = &self.bundles_d else {
+            return Ok(Vec::new());
+        };
+        let entries = match std::fs::read_dir(directory) {
+            Ok(entries) => entries,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+            Err(error) => {
+                return Err(LoadError::Manifest(format!(
+                    "cannot look into {}: {error}",
+                    directory.display()
+                )));
+            }
+        };
+        let mut paths: Vec<PathBuf> = entries
+            .flatten()
+            .map(|entry| entry.path())
+            .filter(|path| path.extension().is_some_and(|it| it == "json"))
+            .filter(|path| {
+                !path
+                    .file_name()
+                    .is_some_and(|it| it.to_string_lossy().starts_with('.'))
+            })
+            .collect();
+        paths.sort();
+        Ok(paths)
+    }
+
+    /// Something that differs as soon as any of the files does.
+    pub fn fingerprint(&self) -> BTreeMap<PathBuf, Option<Stamp>> {
+        let manifests = self.manifests().unwrap_or_default();
+        let paths = self.config.iter().cloned().chain(manifests);
+        paths
+            .map(|path| (path.clone(), stamp_through_links(&path)))
+            .collect()
+    }
+}
+
+/// Reads one configuration file.
+///
+/// # Errors
+/// [`LoadError::Config`] with path, row and column.
+pub fn read_config(path: &Path) -> Result<(Config, Vec<String>), LoadError> {
+    let bytes = std::fs::read(path)
+        .map_err(|error| LoadError::Config(format!("cannot read {}: {error}", path.display())))?;
+    let parsed = Config::parse(&bytes)
+        .map_err(|error| LoadError::Config(format!("{}:{error}", path.display())))?;
+    let notices = parsed.notices.iter().map(|notice| {
+        let level = format!("{:?}", notice.level).to_lowercase();
+        format!(
+            "{}:{}:{}: {level}: {}",
+            path.display(),
+            notice.row,
+            notice.column,
+            notice.text
+        )
+    });
+    Ok((parsed.config, notices.collect()))
+}
+
+fn read_manifest(path: &Path) -> Result<Vec<Module>, LoadError> {
+    let sources = manifest::Sources {
+        read: &|path| std::fs::read(path).map_err(|error| error.to_string()),
+        variable: &|name| std::env::var(name).ok(),
+    };
+    manifest::load(path, &sources).map_err(|error| LoadError::Manifest(error.to_string()))
+}
+
+fn add_module(module: Module, loaded: &mut Loaded) {
+    let manifest = module.manifest.display().to_string();
+    let role = match module.module_type {
+        ModuleType::CheckerBundle => Role::Bundle,
+        ModuleType::ReportModule => Role::Reporter,
+        ModuleType::ResultPooling => {
+            loaded.notices.push(format!(
+                "{manifest}: `{}`: qcbus pools results itself",
+                module.name
+            ));
+            return;
+        }
+    };
+    if module.mode != Mode::Bus {
+        loaded.notices.push(format!(
+            "{manifest}: `{}` has no \"mode\": \"bus\" and is not started: it does not speak on the bus",
+            module.name
+        ));
+        return;
+    }
+    let extra = |key: &str| {
+        module
+            .extra
+            .iter()
+            .find(|(name, _)| name == key)
+            .map(|(_, value)| value.as_str())
+    };
+    let restart = match extra("restart") {
+        Some("never") => Restart::Never,
+        Some("on-failure") => Restart::OnFailure,
+        _ => Restart::Always,
+    };
+    let spec = ChildSpec {
+        version: extra("version").map(str::to_owned),
+        // As ASAM's framework does, the command is the shell's to take apart.
+        command: vec![
+            "sh".into(),
+            "-c".into(),
+            format!("exec {} \"$@\"", module.exec_command),
+            "sh".into(),
+        ],
+        name: module.name,
+        role,
+        restart,
+    };
+    match loaded
+        .children
+        .iter_mut()
+        .find(|child| child.name == spec.name)
+    {
+        Some(child) => *child = spec,
+        None => loaded.children.push(spec),
+    }
+}
+
+/// What changed, line by line.
+pub fn differences(old: &Loaded, new: &Loaded) -> Vec<String> {
+    let mut lines = Vec::new();
+    for child in &new.children {
+        match old.children.iter().find(|it| it.name == child.name) {
+            None => lines.push(format!("added {}", child.name)),
+            Some(before) if before != child => lines.push(format!("changed {}", child.name)),
+            Some(_) => {}
+        }
+    }
+    for child in old
+        .children
+        .iter()
+        .filter(|it| new.children.iter().all(|new| new.name != it.name))
+    {
+        lines.push(format!("removed {}", child.name));
+    }
+    match (&old.config, &new.config) {
+        (Some(old), Some(new)) => config_differences(old, new, &mut lines),
+        (None, Some(_)) => lines.push("a configuration is in force".to_owned()),
+        (Some(_), None) => lines.push("no configuration is in force any more".to_owned()),
+        (None, None) => {}
+    }
+    lines
+}
+
+fn config_differences(old: &Config, new: &Config, lines: &mut Vec<String>) {
+    let params = |config: &Config| {
+        config
+            .params
+            .iter()
+            .map(|it| it.to_param())
+            .collect::<Vec<_>>()
+    };
+    if params(old) != params(new) {
+        lines.push("global parameters changed".to_owned());
+    }
+    for bundle in &new.bundles {
+        match old
+            .bundles
+            .iter()
+            .find(|it| it.application == bundle.application)
+        {
+            None => lines.push(format!("{} is demanded", bundle.application)),
+            Some(before) => bundle_differences(before, bundle, lines),
+        }
+    }
+    for bundle in &old.bundles {
+        if new
+            .bundles
+            .iter()
+            .all(|it| it.application != bundle.application)
+        {
+            lines.push(format!("{} is no longer demanded", bundle.application));
+        }
+    }
+    let names = |config: &Config| {
+        config
+            .reports
+            .iter()
+            .map(|it| it.application.clone())
+            .collect::<Vec<_>>()
+    };
+    if names(old) != names(new) {
+        lines.push(format!("reports: {}", names(new).join(", ")));
+    }
+}
+
+fn bundle_differences(old: &BundleConfig, new: &BundleConfig, lines: &mut Vec<String>) {
+    let name = &new.application;
+    let params = |it: &BundleConfig| it.params.iter().map(|it| it.to_param()).collect::<Vec<_>>();
+    if params(old) != params(new) {
+        lines.push(format!("{name}: parameters changed"));
+    }
+    for checker in &new.checkers {
+        match old.checkers.iter().find(|it| it.id == checker.id) {
+            None => lines.push(format!("{name}: {} is demanded", checker.id)),
+            Some(before)
+                if before.levels != checker.levels || before.relevel != checker.relevel =>
+            {
+                lines.push(format!("{name}: {}: levels changed", checker.id));
+            }
+            Some(before)
+                if before
+                    .params
+                    .iter()
+                    .map(|it| it.to_param())
+                    .ne(checker.params.iter().map(|it| it.to_param())) =>
+            {
+                lines.push(format!("{name}: {}: parameters changed", checker.id));
+            }
+            Some(_) => {}
+        }
+    }
+    for checker in &old.checkers {
+        if new.checkers.iter().all(|it| it.id != checker.id) {
+            lines.push(format!("{name}: {} is no longer demanded", checker.id));
+        }
+    }
+}

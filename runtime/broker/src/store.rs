@@ -1,0 +1,379 @@
+//! From outcomes to files on disk: pooling, the result, the verdict file, the gate.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+
+use qcbus_document::Document;
+use qcbus_formats::config::Config;
+use qcbus_formats::pool::{self, NoPlaces, PoolInput, Pooled, Resolver, Scope};
+use qcbus_formats::xqar::{self, Dialect, Status};
+use qcbus_messages::{Digest, Verdict};
+
+use crate::core::{BundleOutcome, FinishedJob, Input, Judged, StoreOutcome};
+use crate::disk::{remove, write_both, write_whole};
+use crate::journal::{Entry, History, Journal};
+use crate::places::Places;
+use crate::stages::reached;
+use crate::stamp::stamp_through_links;
+
+/// Writes results. Shared by the threads that do so.
+#[derive(Debug)]
+pub struct Store {
+    /// Where results go.
+    pub places: Places,
+    /// The form of the results.
+    pub dialect: Dialect,
+    /// Whether results are on the disk before they are announced.
+    pub durable: bool,
+    /// Whether `NAME.verdict.json` is written.
+    pub verdict_files: bool,
+    /// Where accepted files are published.
+    pub gate: Option<PathBuf>,
+    /// What is remembered.
+    pub journal: Mutex<Journal>,
+}
+
+impl Store {
+    /// Pools, writes, publishes, records.
+    pub fn store(
+        &self,
+        job: &FinishedJob,
+        config: Option<&Config>,
+        root: Option<&[u8]>,
+    ) -> StoreOutcome {
+        let inputs = job
+            .prepared
+            .as_ref()
+            .map_or(&[][..], |it| it.inputs.as_slice());
+        if has_changed(inputs) {
+            return StoreOutcome::Stale;
+        }
+        let outcomes: Vec<pool::BundleOutcome> = job.bundles.iter().filter_map(to_pool).collect();
+        let takes = |it: &BundleOutcome| {
+            it.catalogue
+                .as_ref()
+                .is_some_and(|it| it.kinds.contains(&job.kind))
+        };
+        let nothing_checked = !job.bundles.iter().any(takes);
+        let pooled = self.pool(job, outcomes.clone(), config, root);
+        reached("pooled", &job.path);
+        let verdict = verdict_of(&pooled, nothing_checked || job.unreadable.is_some());
+        let why = reasons(job, &pooled, nothing_checked);
+        let judged = judged(job, &pooled, verdict, why, self.places.xqar(&job.path));
+        match self.write(job, &outcomes, &pooled, &judged) {
+            Ok(()) => {}
+            Err(error) => return StoreOutcome::Failed(error),
+        }
+        // The file may have gone between the look and the rename: nothing may lie there then.
+        if stamp_through_links(&job.path).is_none() {
+            let _ = self.withdraw_files(&job.path);
+            return StoreOutcome::Stale;
+        }
+        StoreOutcome::Stored(Box::new(judged))
+    }
+
+    fn pool(
+        &self,
+        job: &FinishedJob,
+        bundles: Vec<pool::BundleOutcome>,
+        config: Option<&Config>,
+        root: Option<&[u8]>,
+    ) -> Pooled {
+        let input = PoolInput {
+            input_file: &job.path.to_string_lossy(),
+            config,
+            bundles,
+            remarks: Vec::new(),
+            scope: Scope::Whole,
+            version: env!("CARGO_PKG_VERSION"),
+            build_date: BUILD_DATE,
+        };
+        match root.and_then(|bytes| Document::open(bytes).ok()) {
+            Some(document) => pool::pool(input, &mut DocumentPlaces { document }),
+            None => pool::pool(input, &mut NoPlaces),
+        }
+    }
+
+    fn write(
+        &self,
+        job: &FinishedJob,
+        outcomes: &[pool::BundleOutcome],
+        pooled: &Pooled,
+        judged: &Judged,
+    ) -> Result<(), String> {
+        let fail = |path: &Path, error: &io::Error| {
+            format!(
+                "cannot write {}: {error}; it is tried again",
+                path.display()
+            )
+        };
+        let text = xqar::write(&pooled.results, self.dialect);
+        let verdict_path = self.places.verdict(&job.path);
+        if self.gate.is_some() && judged.verdict != Verdict::Accepted {
+            self.close_gate(&job.path)
+                .map_err(|error| fail(&job.path, &error))?;
+        }
+        if self.verdict_files {
+            // Whoever sees the new result sees its verdict.
+            let verdict =
+                crate::verdict_file::render(job, outcomes, pooled, judged.verdict, &judged.xqar);
+            let (verdict, result) = (
+                (&*verdict_path, &*verdict),
+                (&*judged.xqar, text.as_bytes()),
+            );
+            write_both(verdict, result, self.durable)
+                .map_err(|(path, error)| fail(path, &error))?;
+        } else {
+            write_whole(&judged.xqar, text.as_bytes(), self.durable)
+                .map_err(|error| fail(&judged.xqar, &error))?;
+        }
+        if judged.verdict == Verdict::Accepted {
+            self.open_gate(&job.path, &judged.digest)
+                .map_err(|error| fail(&job.path, &error))?;
+        }
+        reached("written", &job.path);
+        let history = Some(Box::new(history(job, pooled)));
+        let entry = Entry::Judged {
+            path: job.path.clone(),
+            judged: Arc::new(judged.clone()),
+            history,
+        };
+        self.record(&[entry])
+    }
+
+    /// Whether everything that a verdict brings with it lies where it belongs.
+    pub fn is_complete(&self, path: &Path, judged: &Judged) -> bool {
+        let published = |gate: &PathBuf| {
+            judged.verdict != Verdict::Accepted || gate.join(self.places.display(path)).exists()
+        };
+        judged.xqar == self.places.xqar(path)
+            && judged.xqar.exists()
+            && (!self.verdict_files || self.places.verdict(path).exists())
+            && self.gate.as_ref().is_none_or(published)
+    }
+
+    /// Writes to the journal.
+    ///
+    /// # Errors
+    /// What a person should know; the entries are not written then.
+    pub fn record(&self, entries: &[Entry]) -> Result<(), String> {
+        let mut journal = self
+            .journal
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        journal.write(entries).map_err(|error| error.to_string())
+    }
+
+    /// Forgets the history of jobs older than `keep`.
+    ///
+    /// # Errors
+    /// What a person should know.
+    pub fn prune(&self, keep: std::time::Duration) -> Result<(), String> {
+        let mut journal = self
+            .journal
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        journal
+            .prune(keep)
+            .map(|_| ())
+            .map_err(|error| error.to_string())
+    }
+
+    /// Removes what was written for a file that has gone.
+    ///
+    /// # Errors
+    /// What a person should know.
+    pub fn withdraw(&self, path: &Arc<Path>) -> Result<(), String> {
+        let fail =
+            |error: io::Error| format!("cannot withdraw the result of {}: {error}", path.display());
+        self.withdraw_files(path).map_err(fail)?;
+        self.record(&[Entry::Withdrawn { path: path.clone() }])
+    }
+
+    fn withdraw_files(&self, path: &Path) -> io::Result<()> {
+        self.close_gate(path)?;
+        remove(&self.places.xqar(path))?;
+        remove(&self.places.verdict(path))
+    }
+
+    /// Publishes an accepted file: the very bytes that were checked, or nothing.
+    fn open_gate(&self, path: &Path, digest: &Digest) -> io::Result<()> {
+        let Some(gate) = &self.gate else {
+            return Ok(());
+        };
+        let target = gate.join(self.places.display(path));
+        let bytes = std::fs::read(path)?;
+        if digest_of(&bytes) != *digest {
+            // It has changed since; the new bytes get their own verdict.
+            return remove(&target);
+        }
+        if std::fs::read(&target).is_ok_and(|there| there == bytes) {
+            return Ok(());
+        }
+        // A copy of the bytes just compared, not a link: a hard link would follow a writer who
+        // changes the file in place.
+        write_whole(&target, &bytes, self.durable)
+    }
+
+    fn close_gate(&self, path: &Path) -> io::Result<()> {
+        match &self.gate {
+            Some(gate) => remove(&gate.join(self.places.display(path))),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The date of the commit or release that this was built from, fixed so that equal input gives
+/// equal bytes.
+pub const BUILD_DATE: &str = "2026-11-21";
+
+/// Whether anything that the verdict depends on is not what it was when it was read.
+fn has_changed(inputs: &[Input]) -> bool {
+    inputs
+        .iter()
+        .any(|input| stamp_through_links(&input.path) != input.content.map(|(stamp, _)| stamp))
+}
+
+fn digest_of(bytes: &[u8]) -> Digest {
+    use sha2::{Digest as _, Sha256};
+    Digest(Sha256::digest(bytes).into())
+}
+
+fn verdict_of(pooled: &Pooled, incomplete: bool) -> Verdict {
+    if pooled.counts.errors > 0 {
+        Verdict::Rejected
+    } else if incomplete || !pooled.failed.is_empty() {
+        Verdict::Undetermined
+    } else {
+        Verdict::Accepted
+    }
+}
+
+/// Reasons shown to a person; more than these are counted.
+const REASONS: usize = 20;
+
+fn reasons(job: &FinishedJob, pooled: &Pooled, nothing_checked: bool) -> Vec<String> {
+    if let Some(why) = &job.unreadable {
+        return vec![why.clone()];
+    }
+    if nothing_checked {
+        return vec![format!(
+            "no bundle that is running checks .{} files",
+            job.kind.as_str()
+        )];
+    }
+    let mut why: Vec<String> = pooled
+        .failed
+        .iter()
+        .take(REASONS)
+        .map(|it| format!("{} / {}: {}", it.bundle, it.checker, it.reason))
+        .collect();
+    if pooled.failed.len() > REASONS {
+        why.push(format!("and {} more", pooled.failed.len() - REASONS));
+    }
+    why
+}
+
+fn judged(
+    job: &FinishedJob,
+    pooled: &Pooled,
+    verdict: Verdict,
+    why: Vec<String>,
+    xqar: PathBuf,
+) -> Judged {
+    let prepared = job.prepared.as_deref();
+    let root = prepared.and_then(crate::core::PreparedJob::root);
+    Judged {
+        job: job.job,
+        verdict,
+        digest: root.map(|(_, digest)| digest).unwrap_or_default(),
+        basis: prepared.map(|it| it.basis).unwrap_or_default(),
+        config: job.config,
+        bundles: job.signature,
+        inputs: prepared.map(|it| it.inputs.clone()).unwrap_or_default(),
+        racy: prepared.is_none_or(|it| it.racy),
+        counts: [
+            pooled.counts.errors,
+            pooled.counts.warnings,
+            pooled.counts.information,
+        ],
+        why,
+        xqar,
+    }
+}
+
+/// One bundle's outcome as pooling wants it. A bundle that was never seen has none: pooling itself
+/// lists what the configuration demands of it.
+fn to_pool(bundle: &BundleOutcome) -> Option<pool::BundleOutcome> {
+    let catalogue = bundle.catalogue.as_ref()?;
+    let checkers = bundle.checkers.iter().filter_map(|said| {
+        let offered = catalogue
+            .checkers
+            .get(usize::try_from(said.checker).ok()?)?;
+        Some(pool::CheckerOutcome {
+            id: offered.id.clone(),
+            description: offered.description.clone(),
+            rule_uids: offered.rule_uids.clone(),
+            status: Some(said.status),
+            reason: said.reason.clone(),
+            params: said.params.clone(),
+            issues: said.issues.clone(),
+            metadata: said.metadata.clone(),
+        })
+    });
+    Some(pool::BundleOutcome {
+        name: bundle.name.clone(),
+        alias: catalogue.alias.clone(),
+        version: bundle.version.clone(),
+        build_date: catalogue.build_date.clone(),
+        description: catalogue.description.clone(),
+        params: Vec::new(),
+        checkers: checkers.collect(),
+    })
+}
+
+fn history(job: &FinishedJob, pooled: &Pooled) -> History {
+    let bundles = job.bundles.iter().map(|it| {
+        (
+            it.name.clone(),
+            it.version.clone(),
+            it.micros,
+            it.failure.clone().unwrap_or_default(),
+        )
+    });
+    let mut checkers = Vec::new();
+    for bundle in &pooled.results.bundles {
+        for checker in &bundle.checkers {
+            let status = checker.status.unwrap_or(Status::Error);
+            if status != Status::Completed || !checker.issues.is_empty() {
+                let status = format!("{status:?}").to_lowercase();
+                let issues = checker.issues.len() as u64;
+                checkers.push((bundle.name.clone(), checker.id.clone(), status, issues));
+            }
+        }
+    }
+    History {
+        bytes: job.prepared.as_ref().map_or(0, |it| it.bytes),
+        micros: u64::try_from(job.elapsed.as_micros()).unwrap_or(u64::MAX),
+        bundles: bundles.collect(),
+        checkers,
+    }
+}
+
+/// Finds the row and column of an XPath in the image.
+struct DocumentPlaces<'a> {
+    document: Document<'a>,
+}
+
+impl Resolver for DocumentPlaces<'_> {
+    fn resolve(&mut self, xpath: &str) -> Option<pool::XPathPlace> {
+        let nodes = self.document.evaluate(xpath).ok()?;
+        let position = nodes.first()?.position();
+        Some(pool::XPathPlace {
+            row: position.row.into(),
+            column: position.column.into(),
+            offset: Some(position.offset.into()),
+        })
+    }
+}

@@ -1,0 +1,188 @@
+//! Starting and killing child processes. When to do so is the state machine's business.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+
+use tokio::process::{Child, Command};
+use tokio::sync::mpsc::UnboundedSender;
+
+use crate::core::{ChildSpec, Event, Launch};
+
+/// What every child is given.
+#[derive(Debug, Clone)]
+pub struct Surroundings {
+    /// Runtime directory of the instance, for `--instance-dir`.
+    pub instance_dir: PathBuf,
+    /// Whether children die with the broker at once (a private instance), or may outlive it and
+    /// join the next one.
+    pub die_with_broker: bool,
+    /// Most private memory (data segment and anonymous mappings) of a child, in bytes. The shared
+    /// segment does not count: it is mapped from a file.
+    pub memory_limit: Option<u64>,
+}
+
+/// The children of this broker.
+#[derive(Debug)]
+pub struct Children {
+    surroundings: Surroundings,
+    pids: BTreeMap<Launch, u32>,
+    events: UnboundedSender<Event>,
+}
+
+impl Children {
+    /// No children yet. Their ends are told to `events`.
+    pub fn new(surroundings: Surroundings, events: UnboundedSender<Event>) -> Children {
+        Children {
+            surroundings,
+            pids: BTreeMap::new(),
+            events,
+        }
+    }
+
+    /// Starts a child in a process group of its own.
+    pub fn spawn(&mut self, launch: Launch, spec: &ChildSpec) {
+        match self.start(launch, spec) {
+            Ok(child) => {
+                if let Some(pid) = child.id() {
+                    self.pids.insert(launch, pid);
+                }
+                tokio::spawn(watch(launch, child, self.events.clone()));
+            }
+            Err(error) => {
+                let program = spec.command.first().map_or("", String::as_str);
+                let how = format!("cannot start {program}: {error}");
+                // The loop that receives this is the one that called; it is there.
+                let _ = self.events.send(Event::Exited {
+                    launch,
+                    how,
+                    success: false,
+                });
+            }
+        }
+    }
+
+    fn start(&self, launch: Launch, spec: &ChildSpec) -> std::io::Result<Child> {
+        let Some((program, arguments)) = spec.command.split_first() else {
+            return Err(std::io::Error::other("the command is empty"));
+        };
+        let mut command = Command::new(program);
+        command
+            .args(arguments)
+            .arg("--instance-dir")
+            .arg(&self.surroundings.instance_dir)
+            .arg("--launch")
+            .arg(launch.0.to_string())
+            .stdin(Stdio::null())
+            .process_group(0)
+            .kill_on_drop(false);
+        if self.surroundings.die_with_broker {
+            command.arg("--die-with-parent");
+        }
+        restrict(&mut command, &self.surroundings);
+        command.spawn()
+    }
+
+    /// Forgets a child that has ended.
+    pub fn ended(&mut self, launch: Launch) {
+        self.pids.remove(&launch);
+    }
+
+    /// Kills a child with its process group, or a process that a former broker started.
+    pub fn kill(&self, launch: Option<Launch>, pid: u32) {
+        let own = launch.and_then(|launch| self.pids.get(&launch).copied());
+        let Some(pid) = own.or((pid > 1).then_some(pid)) else {
+            return;
+        };
+        let Ok(raw) = i32::try_from(pid) else { return };
+        let Some(pid) = rustix::process::Pid::from_raw(raw) else {
+            return;
+        };
+        if own.is_none() && !is_ours(raw) {
+            return;
+        }
+        use rustix::process::{Signal, kill_process, kill_process_group};
+        if kill_process_group(pid, Signal::KILL).is_err() {
+            // Not the leader of a group, or gone already.
+            let _ = kill_process(pid, Signal::KILL);
+        }
+    }
+
+    /// Kills whatever is left.
+    pub fn kill_all(&self) {
+        for launch in self.pids.keys() {
+            self.kill(Some(*launch), 0);
+        }
+    }
+}
+
+/// A process id may have been given to somebody else since: only a process that was started with
+/// `--launch` is killed by number.
+fn is_ours(pid: i32) -> bool {
+    let command = std::fs::read(Path::new("/proc").join(pid.to_string()).join("cmdline"));
+    command.is_ok_and(|line| {
+        line.split(|byte| *byte == 0)
+            .any(|word| word == b"--launch")
+    })
+}
+
+async fn watch(launch: Launch, mut child: Child, events: UnboundedSender<Event>) {
+    let (how, success) = match child.wait().await {
+        Ok(status) => (describe(status), status.success()),
+        Err(error) => (format!("its end could not be learned: {error}"), false),
+    };
+    // The broker may have stopped meanwhile.
+    let _ = events.send(Event::Exited {
+        launch,
+        how,
+        success,
+    });
+}
+
+fn describe(status: std::process::ExitStatus) -> String {
+    use std::os::unix::process::ExitStatusExt;
+    match (status.code(), status.signal()) {
+        // What the shell says when it cannot start a command.
+        (Some(127), _) => "its command was not found (exit code 127); see its manifest".to_owned(),
+        (Some(126), _) => "its command cannot be run (exit code 126); see its manifest".to_owned(),
+        (Some(code), _) => format!("it ended with exit code {code}"),
+        (None, Some(signal)) => format!("it was killed by signal {signal}"),
+        (None, None) => "it ended".to_owned(),
+    }
+}
+
+/// Limits that must be set between fork and exec.
+#[expect(
+    unsafe_code,
+    reason = "pre_exec is the only place where a child's own limits can be set"
+)]
+fn restrict(command: &mut Command, surroundings: &Surroundings) {
+    let memory = surroundings.memory_limit;
+    let with_broker = surroundings.die_with_broker;
+    let broker = std::process::id();
+    // SAFETY: between fork and exec only async-signal-safe functions are called: setrlimit, prctl
+    // and getppid; nothing is allocated and no lock is taken.
+    unsafe {
+        command.pre_exec(move || {
+            if let Some(bytes) = memory {
+                let limit = libc::rlimit {
+                    rlim_cur: bytes,
+                    rlim_max: bytes,
+                };
+                if libc::setrlimit(libc::RLIMIT_DATA, &raw const limit) != 0 {
+                    return Err(std::io::Error::last_os_error());
+                }
+            }
+            if with_broker {
+                if libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) != 0 {
+                    return Err(std::io::Error::last_os_error());
+                }
+                // The broker may have died between fork and prctl.
+                if u32::try_from(libc::getppid()) != Ok(broker) {
+                    return Err(std::io::Error::from_raw_os_error(libc::ESRCH));
+                }
+            }
+            Ok(())
+        });
+    }
+}

@@ -1,0 +1,137 @@
+//! Which files are looked at: the names that editors and copy tools leave behind are not, nor is
+//! what a `.qcignore` names (the grammar of `.gitignore`).
+
+use std::collections::HashMap;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+
+use ignore::gitignore::{Gitignore, GitignoreBuilder};
+
+/// Name of the file in which a directory's owner says what is not to be checked.
+pub const IGNORE_FILE: &str = ".qcignore";
+
+const SUFFIXES: [&str; 4] = ["~", ".tmp", ".part", ".swp"];
+
+/// Ignore rules below one directory, read when they are first needed.
+#[derive(Debug)]
+pub struct IgnoreRules {
+    root: PathBuf,
+    by_directory: HashMap<PathBuf, Option<Gitignore>>,
+}
+
+impl IgnoreRules {
+    /// Rules below `root`.
+    pub fn new(root: &Path) -> IgnoreRules {
+        IgnoreRules {
+            root: root.to_path_buf(),
+            by_directory: HashMap::new(),
+        }
+    }
+
+    /// Forgets what was read, because a rule file has changed.
+    pub fn forget(&mut self) {
+        self.by_directory.clear();
+    }
+
+    /// Whether a path below the root is left alone.
+    pub fn ignores(&mut self, path: &Path, is_dir: bool) -> bool {
+        let Ok(below) = path.strip_prefix(&self.root) else {
+            return true;
+        };
+        let by_name = if is_dir {
+            is_ignored_directory(path)
+        } else {
+            path.file_name().is_some_and(is_ignored_file)
+        };
+        if by_name || below.ancestors().skip(1).any(is_ignored_directory) {
+            return true;
+        }
+        // The nearest rule file that says anything decides.
+        let mut directory = path.parent();
+        while let Some(at) = directory.filter(|at| at.starts_with(&self.root)) {
+            let rules = self
+                .by_directory
+                .entry(at.to_path_buf())
+                .or_insert_with(|| read(at));
+            if let Some(rules) = rules {
+                let matched = rules.matched_path_or_any_parents(path, is_dir);
+                if matched.is_ignore() {
+                    return true;
+                }
+                if matched.is_whitelist() {
+                    return false;
+                }
+            }
+            directory = at.parent();
+        }
+        false
+    }
+}
+
+/// Whether a file's name alone is reason enough: dotfiles and unfinished copies.
+pub fn is_ignored_file(name: &OsStr) -> bool {
+    let name = name.to_string_lossy();
+    name.starts_with('.') || SUFFIXES.iter().any(|suffix| name.ends_with(suffix))
+}
+
+/// Directories that hold no work of people: git's, and our own state.
+fn is_ignored_directory(path: &Path) -> bool {
+    path.file_name()
+        .is_some_and(|name| name == ".git" || name == ".qcbus")
+}
+
+fn read(directory: &Path) -> Option<Gitignore> {
+    let file = directory.join(IGNORE_FILE);
+    if !file.is_file() {
+        return None;
+    }
+    let mut builder = GitignoreBuilder::new(directory);
+    // A line that cannot be understood is passed over; the others count.
+    if let Some(error) = builder.add(&file) {
+        tracing::warn!("{}: {error}", file.display());
+    }
+    builder.build().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_unfinished_copies_are_left_alone() {
+        for name in [
+            ".a.xodr",
+            "a.xodr~",
+            "a.xodr.tmp",
+            "a.xodr.part",
+            ".a.xodr.swp",
+        ] {
+            assert!(is_ignored_file(OsStr::new(name)), "{name}");
+        }
+        assert!(!is_ignored_file(OsStr::new("a.xodr")));
+    }
+
+    #[test]
+    fn of_hidden_directories_only_those_of_tools_are_left_alone() {
+        let mut rules = IgnoreRules::new(Path::new("/farm"));
+        assert!(rules.ignores(Path::new("/farm/.git/a.xodr"), false));
+        assert!(rules.ignores(Path::new("/farm/out/.qcbus/x/a.xodr"), false));
+        assert!(rules.ignores(Path::new("/farm/.git"), true));
+        assert!(!rules.ignores(Path::new("/farm/.github/a.xodr"), false));
+    }
+
+    #[test]
+    fn qcignore_speaks_gitignore_and_the_nearest_file_decides() {
+        let dir = tempfile::tempdir().unwrap();
+        let root = dir.path();
+        std::fs::create_dir(root.join("maps")).unwrap();
+        std::fs::write(root.join(IGNORE_FILE), "/old/\n*_draft.xodr\n").unwrap();
+        std::fs::write(root.join("maps").join(IGNORE_FILE), "!keep_draft.xodr\n").unwrap();
+        let mut rules = IgnoreRules::new(root);
+        assert!(rules.ignores(&root.join("old/a.xodr"), false));
+        assert!(rules.ignores(&root.join("maps/a_draft.xodr"), false));
+        assert!(!rules.ignores(&root.join("maps/keep_draft.xodr"), false));
+        assert!(!rules.ignores(&root.join("maps/a.xodr"), false));
+        assert!(rules.ignores(Path::new("/elsewhere/a.xodr"), false));
+    }
+}

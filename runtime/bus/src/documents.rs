@@ -1,0 +1,410 @@
+//! The broker's side of the document topics: lending slots, publishing, holding.
+
+use std::ops::{Deref, DerefMut};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
+
+use iceoryx2::port::update_connections::UpdateConnections;
+use iceoryx2::sample_mut::SampleMut;
+use qcbus_document::FileKind;
+use qcbus_messages::services::{BLOCK_BYTES, Topic};
+use qcbus_messages::{Digest, DocId};
+use tokio::sync::Notify;
+
+use crate::held::{Block, DocumentHeader, Held, LET_GO, Ticket, kind_code};
+use crate::ports::{self, Hub, PortError, Pub, Service, Sub, TopicService};
+
+/// Largest image, in bytes: offsets within an image are 32 bits wide.
+const MAX_IMAGE: usize = u32::MAX as usize;
+
+/// Why no slot could be lent.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum LoanError {
+    /// Shared memory has not enough room. Writing on would kill the process, so nothing was lent.
+    #[error(
+        "not enough shared memory: {needed} bytes are needed, {free} are free, of which {reserve} are kept in reserve"
+    )]
+    NoSpace {
+        /// Bytes asked for.
+        needed: u64,
+        /// Bytes free in /dev/shm, less what has been lent and may still be filled.
+        free: u64,
+        /// Bytes that stay free.
+        reserve: u64,
+    },
+    /// No image may be that large.
+    #[error("an image of {0} bytes is larger than any image may be")]
+    TooLarge(usize),
+    /// As many documents as the limits allow are being filled or held. Let go of some.
+    #[error("as many documents as the bus carries at once are being filled or held")]
+    Busy,
+    /// The bus refused, in its words.
+    #[error("the bus refused: {0}")]
+    Bus(String),
+}
+
+/// Why an image could not be published.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum PublishError {
+    /// More bytes were said to be used than were lent.
+    #[error("{used} bytes are used of {lent} lent")]
+    TooMuchUsed {
+        /// As claimed.
+        used: usize,
+        /// As lent.
+        lent: usize,
+    },
+    /// The bus refused, in its words.
+    #[error("the bus refused: {0}")]
+    Bus(String),
+}
+
+/// One size class.
+struct Class {
+    row: Topic,
+    service: TopicService<Block, DocumentHeader>,
+    publisher: RwLock<Pub<Block, DocumentHeader>>,
+    /// Whether something was published since the publisher was made.
+    used: AtomicBool,
+    /// Our own subscriber: through it the broker holds what it has published. It is locked from
+    /// sending to receiving, so that what is received is what was sent.
+    own: Mutex<Sub<Block, DocumentHeader>>,
+    held: Arc<AtomicUsize>,
+    lent: Arc<AtomicUsize>,
+}
+
+impl Class {
+    fn new(hub: &Hub, row: Topic) -> Result<Class, PortError> {
+        let service = hub.topic::<Block, DocumentHeader>(&row, "")?;
+        let own = ports::subscriber(&service, &row)?;
+        Ok(Class {
+            publisher: RwLock::new(ports::publisher(&service, &row)?),
+            service,
+            used: AtomicBool::new(false),
+            own: Mutex::new(own),
+            row,
+            held: Arc::default(),
+            lent: Arc::default(),
+        })
+    }
+
+    /// Replaces the publisher, and with it the history and every slot that was ever used: their
+    /// memory comes back when the last reader has let go. Without it a small /dev/shm would stay
+    /// full of documents that nobody needs, because only publishing pushes them out of the
+    /// history. To be called with a ticket to lend; does nothing when others have one, because
+    /// what was lent by the old publisher could not be published any more.
+    fn renew(&self) {
+        let mut publisher = self
+            .publisher
+            .write()
+            .unwrap_or_else(PoisonError::into_inner);
+        let alone = self.lent.load(Ordering::Acquire) == 1;
+        if !alone || !self.used.swap(false, Ordering::AcqRel) {
+            return;
+        }
+        match ports::publisher(&self.service, &self.row) {
+            Ok(fresh) => drop(std::mem::replace(&mut *publisher, fresh)),
+            Err(error) => tracing::warn!(%error, "cannot give shared memory back"),
+        }
+        if let Ok(mut sample) = publisher.loan_slice_uninit(1) {
+            sample.user_header_mut().doc = LET_GO;
+            let sent = initialised(sample).send();
+            tracing::debug!(?sent, topic = self.row.name, "asked for shared memory back");
+        }
+        drop(publisher);
+        let own = self.own.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Err(why) = own.update_connections() {
+            tracing::debug!(?why, "cannot let go of a former publisher");
+        }
+    }
+}
+
+struct Shared {
+    generation: u64,
+    classes: [Class; 2],
+    reserve: u64,
+    /// Bytes lent and perhaps not yet written, which `statvfs` does not count.
+    unwritten: AtomicU64,
+    stopped: AtomicBool,
+    /// Tells the broker's loop that peers wait for a document.
+    again: Notify,
+}
+
+/// Lends slots for document images and publishes them. Cheap to clone; meant for worker threads.
+#[derive(Clone)]
+pub struct Documents {
+    shared: Arc<Shared>,
+}
+
+impl Documents {
+    pub(crate) fn new(
+        hub: &Hub,
+        generation: u64,
+        rows: [Topic; 2],
+        reserve: u64,
+    ) -> Result<Documents, PortError> {
+        let [small, large] = rows;
+        let shared = Shared {
+            generation,
+            classes: [Class::new(hub, small)?, Class::new(hub, large)?],
+            reserve,
+            unwritten: AtomicU64::new(0),
+            stopped: AtomicBool::new(false),
+            again: Notify::new(),
+        };
+        Ok(Documents {
+            shared: Arc::new(shared),
+        })
+    }
+
+    /// Lends at least `len` bytes, zero or not: write before you read. All of it is backed by
+    /// memory when this returns, so writing cannot fail.
+    ///
+    /// # Errors
+    /// See [`LoanError`].
+    pub fn loan(&self, len: usize) -> Result<Loan, LoanError> {
+        if len > MAX_IMAGE {
+            return Err(LoanError::TooLarge(len));
+        }
+        if self.shared.stopped.load(Ordering::Acquire) {
+            return Err(LoanError::Bus("the broker has stopped".to_owned()));
+        }
+        let index = usize::from(len > self.shared.classes[0].row.slot_bytes());
+        let class = &self.shared.classes[index];
+        // One less than a subscriber may hold, because receiving needs a hand free.
+        let held = Ticket::take(&class.held, class.row.borrowed - 1).ok_or(LoanError::Busy)?;
+        let lent = Ticket::take(&class.lent, class.row.loans).ok_or(LoanError::Busy)?;
+        let blocks = len.div_ceil(BLOCK_BYTES).max(1);
+        let room = self.reserve((blocks * BLOCK_BYTES) as u64).or_else(|_| {
+            // Both: what is needed in one class may lie in the other.
+            self.give_back(index);
+            self.reserve((blocks * BLOCK_BYTES) as u64)
+        })?;
+        let publisher = class
+            .publisher
+            .read()
+            .unwrap_or_else(PoisonError::into_inner);
+        let mut sample = publisher
+            .loan_slice_uninit(blocks)
+            .map_err(|why| match why {
+                iceoryx2::port::LoanError::ExceedsMaxLoans
+                | iceoryx2::port::LoanError::OutOfMemory => LoanError::Busy,
+                other => LoanError::Bus(format!("{other:?}")),
+            })?;
+        drop(publisher);
+        back_with_memory(sample.payload_mut()).map_err(|()| room.error())?;
+        Ok(Loan {
+            sample: initialised(sample),
+            class: index,
+            len,
+            held,
+            _lent: lent,
+            _room: room,
+            documents: self.clone(),
+        })
+    }
+
+    /// Publishes a held image once more, for a peer that says that it lacks it. The bytes are
+    /// copied into a new slot: a slot in other hands cannot be sent again.
+    ///
+    /// # Errors
+    /// See [`LoanError`].
+    pub fn publish_again(&self, held: &Held) -> Result<(), LoanError> {
+        let mut loan = self.loan(held.len())?;
+        loan.copy_from_slice(held);
+        loan.publish(held.doc(), held.len(), held.digest(), held.kind())
+            .map_err(|error| LoanError::Bus(error.to_string()))?;
+        self.shared.again.notify_one();
+        Ok(())
+    }
+
+    /// Resolves when a document was published for peers that wait for it. Cancel-safe.
+    pub(crate) async fn published_again(&self) {
+        self.shared.again.notified().await;
+    }
+
+    /// Connects new subscribers, which sends them the history.
+    pub(crate) fn update_connections(&self) {
+        for class in &self.shared.classes {
+            let publisher = class
+                .publisher
+                .read()
+                .unwrap_or_else(PoisonError::into_inner);
+            if let Err(why) = publisher.update_connections() {
+                tracing::debug!(?why, topic = class.row.name, "cannot connect every peer");
+            }
+        }
+    }
+
+    /// From now on nothing is lent.
+    pub(crate) fn stop(&self) {
+        self.shared.stopped.store(true, Ordering::Release);
+    }
+
+    fn give_back(&self, ours: usize) {
+        for (index, class) in self.shared.classes.iter().enumerate() {
+            let ticket = (index != ours).then(|| Ticket::take(&class.lent, class.row.loans));
+            class.renew();
+            drop(ticket);
+        }
+        self.shared.again.notify_one();
+    }
+
+    fn reserve(&self, needed: u64) -> Result<Room, LoanError> {
+        let before = self.shared.unwritten.fetch_add(needed, Ordering::AcqRel);
+        let mut room = Room {
+            shared: Arc::clone(&self.shared),
+            bytes: needed,
+            free: 0,
+        };
+        room.free = free_shared_memory().saturating_sub(before);
+        if room.free < needed.saturating_add(self.shared.reserve) {
+            return Err(room.error());
+        }
+        Ok(room)
+    }
+}
+
+/// Bytes set aside until they have been written.
+struct Room {
+    shared: Arc<Shared>,
+    bytes: u64,
+    free: u64,
+}
+
+impl Room {
+    fn error(&self) -> LoanError {
+        LoanError::NoSpace {
+            needed: self.bytes,
+            free: self.free,
+            reserve: self.shared.reserve,
+        }
+    }
+}
+
+impl Drop for Room {
+    fn drop(&mut self) {
+        self.shared
+            .unwritten
+            .fetch_sub(self.bytes, Ordering::AcqRel);
+    }
+}
+
+/// Bytes that an ordinary user may still take in /dev/shm.
+pub(crate) fn free_shared_memory() -> u64 {
+    rustix::fs::statvfs("/dev/shm").map_or(0, |stat| stat.f_bavail.saturating_mul(stat.f_frsize))
+}
+
+/// The reserve asked for, but not more than a quarter of a small /dev/shm.
+pub(crate) fn fitting_reserve(wanted: u64) -> u64 {
+    match rustix::fs::statvfs("/dev/shm") {
+        Ok(stat) => wanted.min(stat.f_blocks.saturating_mul(stat.f_frsize) / 4),
+        Err(_) => wanted,
+    }
+}
+
+/// Has the kernel back the pages now. Without it the first write to a page that cannot be had
+/// is a SIGBUS; here it is an error. Kernels before 5.14 do not know the request: there the
+/// reserve alone has to do.
+fn back_with_memory<T>(blocks: &mut [T]) -> Result<(), ()> {
+    let page = rustix::param::page_size();
+    let start = blocks.as_mut_ptr().addr();
+    let lead = start % page;
+    let first: *mut std::ffi::c_void = blocks.as_mut_ptr().cast::<u8>().wrapping_sub(lead).cast();
+    let len = (lead + size_of_val(blocks)).next_multiple_of(page);
+    #[expect(unsafe_code, reason = "madvise takes raw pointers")]
+    // SAFETY: populating pages changes no byte. The range is the lent slot, widened to whole
+    // pages, which belong to the same mapping.
+    let done = unsafe { rustix::mm::madvise(first, len, rustix::mm::Advice::LinuxPopulateWrite) };
+    match done {
+        Ok(()) | Err(rustix::io::Errno::INVAL) => Ok(()),
+        Err(error) => {
+            tracing::warn!(%error, "shared memory cannot be had");
+            Err(())
+        }
+    }
+}
+
+type Uninit = iceoryx2::sample_mut_uninit::SampleMutUninit<
+    Service,
+    [std::mem::MaybeUninit<Block>],
+    DocumentHeader,
+>;
+
+#[expect(
+    unsafe_code,
+    reason = "zeroing 100 MB only to overwrite it would cost more than sending it"
+)]
+fn initialised(sample: Uninit) -> SampleMut<Service, [Block], DocumentHeader> {
+    // SAFETY: the slot is shared memory from the kernel, so its bytes have values, zero or what a
+    // former image left; and every pattern of bytes is a valid `Block` (it is `Pod`).
+    unsafe { sample.assume_init() }
+}
+
+/// A slot to be filled. Dropping it gives it back.
+pub struct Loan {
+    sample: SampleMut<Service, [Block], DocumentHeader>,
+    class: usize,
+    len: usize,
+    held: Ticket,
+    _lent: Ticket,
+    _room: Room,
+    documents: Documents,
+}
+
+impl Loan {
+    /// Publishes the first `used` bytes to every peer, and keeps a hold of them.
+    ///
+    /// # Errors
+    /// See [`PublishError`].
+    pub fn publish(
+        self,
+        doc: DocId,
+        used: usize,
+        digest: Digest,
+        kind: FileKind,
+    ) -> Result<Held, PublishError> {
+        let lent = self.len;
+        if used > lent {
+            return Err(PublishError::TooMuchUsed { used, lent });
+        }
+        let mut sample = self.sample;
+        *sample.user_header_mut() = DocumentHeader {
+            generation: self.documents.shared.generation,
+            doc: doc.0,
+            used: used as u64,
+            digest: digest.0,
+            kind: kind_code(kind),
+            reserved: 0,
+        };
+        let class = &self.documents.shared.classes[self.class];
+        class.used.store(true, Ordering::Release);
+        let own = class.own.lock().unwrap_or_else(PoisonError::into_inner);
+        let refused = |why: String| PublishError::Bus(why);
+        // An error may concern a single peer, so what counts is whether it comes back to us.
+        let sent = sample.send();
+        while let Some(back) = own.receive().map_err(|why| refused(format!("{why:?}")))? {
+            if back.user_header().doc == doc.0 {
+                return Held::new(back, self.documents.shared.generation, self.held)
+                    .ok_or_else(|| refused("the image came back changed".to_owned()));
+            }
+        }
+        Err(refused(format!("the image did not come back: {sent:?}")))
+    }
+}
+
+impl Deref for Loan {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        let bytes: &[u8] = bytemuck::cast_slice(self.sample.payload());
+        &bytes[..self.len]
+    }
+}
+
+impl DerefMut for Loan {
+    fn deref_mut(&mut self) -> &mut [u8] {
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(self.sample.payload_mut());
+        &mut bytes[..self.len]
+    }
+}

@@ -1,0 +1,568 @@
+//! The broker's end of the bus.
+
+use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::fmt;
+use std::time::{Duration, Instant};
+
+use iceoryx2::port::update_connections::UpdateConnections;
+use iceoryx2::prelude::*;
+use qcbus_messages::codec;
+use qcbus_messages::services::{FRAME_BUFFER, Limits, SPARE_SESSIONS, Services, Topic};
+use qcbus_messages::{Digest, FromPeer, Hello, ToPeer};
+
+use crate::documents::{Documents, fitting_reserve, free_shared_memory};
+use crate::generation::{Generation, sweep};
+use crate::instance::{Instance, InstanceError, InstanceLock, LockError};
+use crate::janitor::Janitor;
+use crate::link::SessionKey;
+use crate::ports::{self, Access, Hub, PortError, Pub, Sub};
+use crate::session::Session;
+use crate::wake::{TICK, Waker};
+
+/// Frames read from one peer before it is the next one's turn.
+const QUOTA: usize = 8;
+/// Events that wait to be fetched before reading pauses.
+const MAX_WAITING: usize = 512;
+/// Introductions read in one turn.
+const HELLOS: usize = 64;
+/// How long a session that has been ended waits for its last words to be read.
+const LINGER: Duration = Duration::from_secs(1);
+/// Processes whose attempts are remembered; beyond that, only those in session.
+const MAX_REMEMBERED: usize = 4096;
+/// How often processes are looked at.
+const WATCH_EVERY: Duration = Duration::from_millis(20);
+
+/// One session with a peer; never used again for another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct PeerId(pub u64);
+
+impl fmt::Display for PeerId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "peer {}", self.0)
+    }
+}
+
+/// What the bus is made for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct HostOptions {
+    /// Bundles and reporters at once.
+    pub max_peers: usize,
+    /// Documents that jobs under way may need, in the small class. The broker keeps its active
+    /// jobs below it, or slow peers have to ask for documents again.
+    pub active_documents: usize,
+    /// The same in the large class.
+    pub large_active_documents: usize,
+    /// Largest image of the small class, in bytes.
+    pub small_class_bytes: usize,
+    /// Bytes of /dev/shm that stay free; at most a quarter of a small one is kept.
+    pub shm_reserve_bytes: u64,
+}
+
+impl Default for HostOptions {
+    fn default() -> Self {
+        let limits = Limits::default();
+        HostOptions {
+            max_peers: limits.peers,
+            active_documents: limits.small_active,
+            large_active_documents: limits.large_active,
+            small_class_bytes: limits.small_bytes,
+            shm_reserve_bytes: 64 << 20,
+        }
+    }
+}
+
+impl HostOptions {
+    fn limits(&self) -> Limits {
+        let held = |active: usize| active + active.div_ceil(2) + 2;
+        let small_active = self.active_documents.max(1);
+        let large_active = self.large_active_documents.max(1);
+        Limits {
+            peers: self.max_peers.max(1),
+            small_active,
+            small_held: held(small_active),
+            small_bytes: self.small_class_bytes.max(4 << 10),
+            large_active,
+            large_held: held(large_active),
+            ..Limits::default()
+        }
+    }
+}
+
+/// Why the bus could not be set up.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// Another broker serves this instance.
+    #[error("instance `{instance}` is already served{}", .pid.map(|pid| format!(" by process {pid}")).unwrap_or_default())]
+    AlreadyRunning {
+        /// The instance.
+        instance: String,
+        /// The other broker.
+        pid: Option<u32>,
+    },
+    /// The runtime directory cannot be used.
+    #[error(transparent)]
+    Instance(#[from] InstanceError),
+    /// A file in the runtime directory cannot be written.
+    #[error("cannot write to the runtime directory: {0}")]
+    Io(#[from] std::io::Error),
+    /// There is no room for the bus itself; without it, the first write is a bus error.
+    #[error(
+        "not enough shared memory: {free} bytes are free in /dev/shm, a broker needs {needed} to start; make room there, or mount it larger"
+    )]
+    NoSharedMemory {
+        /// Free bytes.
+        free: u64,
+        /// Bytes that must be free.
+        needed: u64,
+    },
+    /// The bus refused, in its words.
+    #[error("the bus refused: {0}")]
+    Bus(String),
+}
+
+/// Bytes of shared memory that must be free before a broker starts: its services and ports take a
+/// few, and its peers' as much again.
+const START_BYTES: u64 = 16 << 20;
+
+impl From<PortError> for StartError {
+    fn from(error: PortError) -> Self {
+        StartError::Bus(error.to_string())
+    }
+}
+
+/// Something that the broker has to know.
+#[derive(Debug)]
+pub enum HostEvent {
+    /// A peer wants to take part: answer with [`Host::accept`] or [`Host::refuse`].
+    Hello {
+        /// Its session, new.
+        peer: PeerId,
+        /// Its introduction.
+        hello: Hello,
+    },
+    /// A peer says something.
+    Message {
+        /// The session.
+        peer: PeerId,
+        /// What.
+        message: FromPeer,
+    },
+    /// A peer sends what nobody can understand. What it sent before and sends later counts, unless
+    /// the broker disconnects it.
+    Garbage {
+        /// The session.
+        peer: PeerId,
+        /// For a person.
+        what: String,
+    },
+    /// A peer's process has ended or has left the bus. The session is over.
+    Gone {
+        /// The session.
+        peer: PeerId,
+    },
+}
+
+/// The broker's end of the bus: one generation of one instance.
+///
+/// Everything is removed when it is dropped, also what `Documents` handed out still refers to;
+/// memory that somebody has mapped stays readable.
+pub struct Host {
+    generation: Generation,
+    instance: Instance,
+    limits: Limits,
+    services: Services,
+    events: VecDeque<HostEvent>,
+    sessions: BTreeMap<PeerId, Session>,
+    /// The last attempt of every process to get a session.
+    attempts: HashMap<u64, u64>,
+    next_peer: u64,
+    next_turn: u64,
+    last_tick: Instant,
+    last_watch: Instant,
+    // What follows is dropped in this order: ports, the janitor, the node.
+    waker: Waker,
+    hello: Sub<u8, HelloHeader>,
+    config: Pub<u8, ConfigHeader>,
+    documents: Documents,
+    _janitor: Janitor,
+    hub: Hub,
+    _remains: Remains,
+}
+
+/// Dropped last: unlinks what is still there, and only then gives the instance up.
+struct Remains {
+    instance: Instance,
+    lock: Option<InstanceLock>,
+}
+
+impl Drop for Remains {
+    fn drop(&mut self) {
+        // The ports have unlinked what is theirs; this is for what workers and peers still hold.
+        sweep(&self.instance, None);
+        if let Some(lock) = self.lock.take() {
+            lock.release();
+        }
+    }
+}
+
+/// Goes before an introduction.
+#[derive(Debug, Clone, Copy, Default, ZeroCopySend)]
+#[type_name("qcbus.HelloHeader.1")]
+#[repr(C)]
+pub(crate) struct HelloHeader {
+    pub(crate) incarnation: u64,
+    pub(crate) attempt: u64,
+}
+
+/// Goes before the configuration.
+#[derive(Debug, Clone, Copy, Default, ZeroCopySend)]
+#[type_name("qcbus.ConfigHeader.1")]
+#[repr(C)]
+pub(crate) struct ConfigHeader {
+    pub(crate) digest: [u8; 32],
+    pub(crate) used: u64,
+}
+
+impl Host {
+    /// Takes the instance's lock, begins a new generation and removes what older ones left. Must
+    /// be called within a tokio runtime.
+    ///
+    /// # Errors
+    /// See [`StartError`].
+    pub fn start(instance: &Instance, options: HostOptions) -> Result<Host, StartError> {
+        instance.create_dir()?;
+        let lock = InstanceLock::take(instance).map_err(|error| match error {
+            LockError::Held { pid } => StartError::AlreadyRunning {
+                instance: instance.name().to_owned(),
+                pid,
+            },
+            LockError::Io(error) => StartError::Io(error),
+        })?;
+        let remains = Remains {
+            instance: instance.clone(),
+            lock: Some(lock),
+        };
+        let limits = options.limits();
+        let services = Services::new(&limits);
+        let (free, needed) = (free_shared_memory(), fitting_reserve(START_BYTES));
+        if free < needed {
+            return Err(StartError::NoSharedMemory { free, needed });
+        }
+        let generation = Generation::begin(instance, limits)?;
+        let hub = Hub::new(&generation.root, &generation.prefix, Access::Create)?;
+        let documents = Documents::new(
+            &hub,
+            generation.number,
+            [services.document_small, services.document_large],
+            fitting_reserve(options.shm_reserve_bytes),
+        )?;
+        let wake = hub.wake(&services.wake_broker, "")?;
+        let host = Host {
+            hello: subscribe(&hub, &services.hello)?,
+            config: publish(&hub, &services.config)?,
+            waker: Waker::new(ports::listener(&wake)?)?,
+            _janitor: Janitor::start(instance, &generation)?,
+            documents,
+            hub,
+            events: VecDeque::new(),
+            sessions: BTreeMap::new(),
+            attempts: HashMap::new(),
+            next_peer: 1,
+            next_turn: 0,
+            last_tick: Instant::now(),
+            last_watch: Instant::now(),
+            instance: instance.clone(),
+            _remains: remains,
+            generation,
+            limits,
+            services,
+        };
+        host.generation.announce(instance)?;
+        Ok(host)
+    }
+
+    /// Number of this start of a broker on this instance.
+    pub fn generation(&self) -> u64 {
+        self.generation.number
+    }
+
+    /// The next event; meanwhile everything queued is sent. Cancel-safe: nothing is lost when the
+    /// future is dropped. Nothing moves on the bus unless this is awaited.
+    pub async fn next(&mut self) -> HostEvent {
+        loop {
+            if let Some(event) = self.events.pop_front() {
+                return event;
+            }
+            self.turn();
+            if !self.events.is_empty() {
+                continue;
+            }
+            let documents = self.documents.clone();
+            tokio::select! {
+                () = self.waker.wait(TICK) => {}
+                () = documents.published_again() => self.ring(),
+            }
+        }
+    }
+
+    /// Welcomes a peer: what is sent to it from now on goes out behind the welcome.
+    pub fn accept(&mut self, peer: PeerId, welcome: &ToPeer) {
+        self.send(peer, welcome);
+        self.documents.update_connections();
+        if let Err(why) = self.config.update_connections() {
+            tracing::debug!(?why, "cannot connect every peer to the configuration");
+        }
+        if let Some(session) = self.sessions.get_mut(&peer) {
+            session.link.flush();
+        }
+    }
+
+    /// Sends a peer away. The session ends when it has read why, or after a second.
+    pub fn refuse(&mut self, peer: PeerId, reason: &str) {
+        let message = ToPeer::Refused {
+            reason: reason.to_owned(),
+        };
+        self.send(peer, &message);
+        if let Some(session) = self.sessions.get_mut(&peer) {
+            session.end(Instant::now() + LINGER, reason);
+        }
+    }
+
+    /// Sends a message: it is kept until the peer has acknowledged it. Never blocks. To a peer
+    /// that is unknown (any more) nothing is sent; messages above [`codec::MAX_MESSAGE`] are
+    /// refused and logged.
+    pub fn send(&mut self, peer: PeerId, message: &ToPeer) {
+        let Some(session) = self.sessions.get_mut(&peer) else {
+            return;
+        };
+        match codec::encode(message) {
+            Ok(bytes) => session.link.push(&bytes),
+            Err(error) => tracing::error!(%peer, %error, "a message was not sent"),
+        }
+    }
+
+    /// Bytes that the peer has not acknowledged.
+    pub fn backlog(&self, peer: PeerId) -> usize {
+        self.sessions
+            .get(&peer)
+            .map_or(0, |session| session.link.backlog())
+    }
+
+    /// Ends a session at once and gives its window back, whether the peer reacts or not. A peer
+    /// that still lives may introduce itself again.
+    pub fn disconnect(&mut self, peer: PeerId) {
+        if let Some(session) = self.sessions.get_mut(&peer) {
+            session.link.farewell("");
+        }
+        self.sessions.remove(&peer);
+    }
+
+    /// Publishes the configuration to everyone, also to those who come later.
+    pub fn set_config(&mut self, digest: Digest, bytes: &[u8]) {
+        if let Err(why) = self.publish_config(digest, bytes) {
+            tracing::error!(why, "the configuration was not published");
+        }
+        self.ring();
+    }
+
+    /// Lends and publishes documents, from any thread.
+    pub fn documents(&self) -> Documents {
+        self.documents.clone()
+    }
+
+    /// Sends and reads as much as there is, once, without waiting.
+    fn turn(&mut self) {
+        let now = Instant::now();
+        self.greet(now);
+        self.read();
+        let ticked = now.duration_since(self.last_tick) >= TICK;
+        if ticked {
+            self.last_tick = now;
+        }
+        for session in self.sessions.values_mut() {
+            if ticked {
+                session.link.tick(now);
+            } else {
+                session.link.flush();
+            }
+        }
+        if now.duration_since(self.last_watch) >= WATCH_EVERY {
+            self.last_watch = now;
+            self.watch(now);
+        }
+    }
+
+    /// Reads from every peer in turn, a few frames each, beginning with another one every time.
+    fn read(&mut self) {
+        let mut order: Vec<PeerId> = self.sessions.keys().copied().collect();
+        let count = order.len().max(1);
+        order.rotate_left((self.next_turn % count as u64) as usize);
+        self.next_turn = self.next_turn.wrapping_add(1);
+        loop {
+            let mut progress = false;
+            for peer in &order {
+                if self.events.len() >= MAX_WAITING {
+                    return;
+                }
+                if let Some(session) = self.sessions.get_mut(peer) {
+                    progress |= session.read(*peer, QUOTA, &mut self.events);
+                }
+            }
+            if !progress {
+                return;
+            }
+        }
+    }
+
+    /// Opens a session for everyone who is new.
+    fn greet(&mut self, now: Instant) {
+        for _ in 0..HELLOS {
+            let sample = match self.hello.receive() {
+                Ok(Some(sample)) => sample,
+                Ok(None) => return,
+                Err(why) => {
+                    tracing::debug!(?why, "cannot read introductions");
+                    return;
+                }
+            };
+            let header = *sample.user_header();
+            let key = SessionKey {
+                generation: self.generation.number,
+                incarnation: header.incarnation,
+                attempt: header.attempt,
+            };
+            // Introductions are repeated until they are answered, so most are known; and those of
+            // a session that is over may still lie about.
+            let known = self.attempts.get(&key.incarnation);
+            if known.is_some_and(|attempt| *attempt >= key.attempt) {
+                continue;
+            }
+            match codec::decode::<Hello>(&sample) {
+                Ok(hello) if hello.incarnation == key.incarnation => self.open(key, hello, now),
+                Ok(_) => tracing::warn!("an introduction contradicts itself"),
+                Err(error) => tracing::warn!(%error, "an introduction cannot be read"),
+            }
+        }
+    }
+
+    fn open(&mut self, key: SessionKey, hello: Hello, now: Instant) {
+        self.supersede(&key);
+        let allowed = self.limits.peers + SPARE_SESSIONS;
+        if self.sessions.len() >= allowed {
+            tracing::warn!(
+                name = hello.name,
+                "no room even to refuse a peer; it has to wait"
+            );
+            return;
+        }
+        let session = match Session::open(&self.hub, &self.services, key, hello.pid, now) {
+            Ok(session) => session,
+            Err(error) => {
+                tracing::warn!(%error, name = hello.name, "cannot open a session");
+                return;
+            }
+        };
+        let peer = PeerId(self.next_peer);
+        self.next_peer += 1;
+        let full = self.sessions.len() >= self.limits.peers;
+        self.sessions.insert(peer, session);
+        self.remember(&key);
+        if full {
+            let limit = self.limits.peers;
+            self.refuse(
+                peer,
+                &format!("the broker serves {limit} bundles and reporters already"),
+            );
+        } else {
+            self.events.push_back(HostEvent::Hello { peer, hello });
+        }
+    }
+
+    /// A process has at most one session: a new one ends the one before.
+    fn supersede(&mut self, key: &SessionKey) {
+        let older = self
+            .sessions
+            .iter()
+            .find(|(_, session)| session.key().incarnation == key.incarnation)
+            .map(|(peer, session)| (*peer, session.is_silent()));
+        if let Some((peer, silent)) = older {
+            self.sessions.remove(&peer);
+            if !silent {
+                self.events.push_back(HostEvent::Gone { peer });
+            }
+        }
+    }
+
+    fn remember(&mut self, key: &SessionKey) {
+        if self.attempts.len() >= MAX_REMEMBERED {
+            let there: Vec<u64> = self
+                .sessions
+                .values()
+                .map(|session| session.key().incarnation)
+                .collect();
+            self.attempts
+                .retain(|incarnation, _| there.contains(incarnation));
+        }
+        self.attempts.insert(key.incarnation, key.attempt);
+    }
+
+    /// Looks for peers that have died or left, and ends sessions whose time is over.
+    fn watch(&mut self, now: Instant) {
+        let over: Vec<(PeerId, bool)> = self
+            .sessions
+            .iter_mut()
+            .filter_map(|(peer, session)| {
+                let ended = session.is_over(now);
+                (ended || !session.is_there()).then_some((*peer, session.is_silent()))
+            })
+            .collect();
+        for (peer, silent) in over {
+            // What it said before it went still counts.
+            if let Some(session) = self.sessions.get_mut(&peer) {
+                session.read(peer, FRAME_BUFFER * 2, &mut self.events);
+            }
+            self.sessions.remove(&peer);
+            if !silent {
+                self.events.push_back(HostEvent::Gone { peer });
+            }
+        }
+    }
+
+    fn ring(&mut self) {
+        for session in self.sessions.values_mut() {
+            session.link.ring();
+        }
+    }
+
+    fn publish_config(&mut self, digest: Digest, bytes: &[u8]) -> Result<(), String> {
+        let mut sample = self
+            .config
+            .loan_slice_uninit(bytes.len().max(1))
+            .map_err(|why| format!("{why:?}"))?;
+        *sample.user_header_mut() = ConfigHeader {
+            digest: digest.0,
+            used: bytes.len() as u64,
+        };
+        let sample = sample.write_from_fn(|index| bytes.get(index).copied().unwrap_or(0));
+        sample.send().map(|_| ()).map_err(|why| format!("{why:?}"))
+    }
+}
+
+impl Drop for Host {
+    fn drop(&mut self) {
+        self.generation.withdraw(&self.instance);
+        self.documents.stop();
+        for session in self.sessions.values_mut() {
+            session.link.farewell("");
+        }
+        self.sessions.clear();
+    }
+}
+
+fn subscribe(hub: &Hub, row: &Topic) -> Result<Sub<u8, HelloHeader>, PortError> {
+    ports::subscriber(&hub.topic(row, "")?, row)
+}
+
+fn publish(hub: &Hub, row: &Topic) -> Result<Pub<u8, ConfigHeader>, PortError> {
+    ports::publisher(&hub.topic(row, "")?, row)
+}

@@ -1,0 +1,63 @@
+//! Cleaning up after the dead, off the broker's loop.
+
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread::{Builder, JoinHandle};
+use std::time::Duration;
+
+use iceoryx2::prelude::Config;
+
+use crate::generation::{Generation, sweep};
+use crate::instance::Instance;
+use crate::ports::{clean_dead_nodes, generation_config};
+
+const EVERY: Duration = Duration::from_millis(250);
+/// A clean-up takes milliseconds; one that hangs must not keep the broker from stopping.
+const STOP_WITHIN: Duration = Duration::from_secs(2);
+
+/// A thread that removes what older generations left, once, and what dead peers left, again and
+/// again.
+pub(crate) struct Janitor {
+    stop: Option<Sender<()>>,
+    stopped: Receiver<()>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Janitor {
+    pub(crate) fn start(instance: &Instance, generation: &Generation) -> std::io::Result<Janitor> {
+        let config = generation_config(&generation.root, &generation.prefix)
+            .map_err(std::io::Error::other)?;
+        let (stop, asked) = channel();
+        let (done, stopped) = channel();
+        let (instance, generation) = (instance.clone(), generation.clone());
+        let thread = Builder::new()
+            .name("bus-janitor".to_owned())
+            .spawn(move || {
+                sweep(&instance, Some(&generation));
+                clean_until_asked(&config, &asked);
+                let _ = done.send(());
+            })?;
+        Ok(Janitor {
+            stop: Some(stop),
+            stopped,
+            thread: Some(thread),
+        })
+    }
+}
+
+fn clean_until_asked(config: &Config, asked: &Receiver<()>) {
+    while let Err(RecvTimeoutError::Timeout) = asked.recv_timeout(EVERY) {
+        clean_dead_nodes(config);
+    }
+}
+
+impl Drop for Janitor {
+    fn drop(&mut self) {
+        drop(self.stop.take());
+        let in_time = self.stopped.recv_timeout(STOP_WITHIN).is_ok();
+        if let Some(thread) = self.thread.take()
+            && in_time
+        {
+            let _ = thread.join();
+        }
+    }
+}

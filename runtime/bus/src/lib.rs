@@ -1,0 +1,39 @@
+//! The bus between one broker and its bundles and reporters, over iceoryx2.
+//!
+//! [`Host`] is the broker's end, [`Peer`] everybody else's. Messages travel as reliable, ordered
+//! streams, one per peer and direction; document images are published once and read in place by
+//! everyone ([`Documents`], [`Held`]). Nothing here ever blocks: whoever does not read holds up
+//! nobody but himself.
+//!
+//! This is the only crate that names iceoryx2. How it is made:
+//!
+//! * `ports`: iceoryx2's configuration, and the only constructor of services and ports;
+//! * `stream`, `link`: the streams, first as arithmetic, then on the bus;
+//! * `instance`, `generation`, `process`, `janitor`: finding each other, noticing deaths, leaving
+//!   nothing behind;
+//! * `host` with `session`, `documents`; `peer` with `membership`, `library`; `held`; `wake`.
+
+mod documents;
+mod generation;
+mod held;
+mod host;
+mod instance;
+mod janitor;
+mod library;
+mod link;
+mod membership;
+mod peer;
+mod ports;
+mod private;
+mod process;
+mod session;
+mod stream;
+mod wake;
+
+pub use documents::{Documents, Loan, LoanError, PublishError};
+pub use held::Held;
+pub use host::{Host, HostEvent, HostOptions, PeerId, StartError};
+pub use instance::{Instance, InstanceError};
+pub use peer::{JoinError, Peer, PeerEvent, PeerOptions};
+pub use ports::ICEORYX2_VERSION;
+pub use private::{PRIVATE_PREFIX, sweep_private_instances};

@@ -1,0 +1,152 @@
+//! A peer's side of the document topics: what it holds, and what it lets go first.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::AtomicUsize;
+
+use qcbus_messages::DocId;
+use qcbus_messages::services::{Services, Topic};
+
+use crate::held::{Block, DocumentHeader, Held, LET_GO, Ticket};
+use crate::ports::{self, Hub, PortError, Sub};
+
+struct Shelf {
+    row: Topic,
+    subscriber: Sub<Block, DocumentHeader>,
+    out: Arc<AtomicUsize>,
+    books: BTreeMap<DocId, Book>,
+}
+
+struct Book {
+    held: Held,
+    /// Whether the peer has finished with it.
+    released: bool,
+    used_at: u64,
+}
+
+/// The documents that a peer holds.
+pub(crate) struct Library {
+    generation: u64,
+    clock: u64,
+    shelves: [Shelf; 2],
+}
+
+impl Library {
+    pub(crate) fn new(
+        hub: &Hub,
+        generation: u64,
+        services: &Services,
+    ) -> Result<Library, PortError> {
+        Ok(Library {
+            generation,
+            clock: 0,
+            shelves: [
+                Shelf::new(hub, services.document_small)?,
+                Shelf::new(hub, services.document_large)?,
+            ],
+        })
+    }
+
+    /// Takes in what was published; `arrived` gets the number of each document.
+    pub(crate) fn drain(&mut self, mut arrived: impl FnMut(DocId)) {
+        for shelf in &mut self.shelves {
+            while let Some(held) = shelf.receive(self.generation) {
+                self.clock += 1;
+                let book = Book {
+                    released: false,
+                    used_at: self.clock,
+                    held,
+                };
+                let doc = book.held.doc();
+                shelf.books.insert(doc, book);
+                arrived(doc);
+            }
+        }
+    }
+
+    pub(crate) fn get(&self, doc: DocId) -> Option<Held> {
+        self.shelves
+            .iter()
+            .find_map(|shelf| shelf.books.get(&doc))
+            .map(|book| book.held.clone())
+    }
+
+    pub(crate) fn forget(&mut self, doc: DocId) {
+        for shelf in &mut self.shelves {
+            if let Some(book) = shelf.books.get_mut(&doc) {
+                self.clock += 1;
+                book.released = true;
+                book.used_at = self.clock;
+            }
+            shelf.tidy();
+        }
+    }
+}
+
+impl Shelf {
+    fn new(hub: &Hub, row: Topic) -> Result<Shelf, PortError> {
+        let service = hub.topic::<Block, DocumentHeader>(&row, "")?;
+        Ok(Shelf {
+            subscriber: ports::subscriber(&service, &row)?,
+            row,
+            out: Arc::default(),
+            books: BTreeMap::new(),
+        })
+    }
+
+    /// The next document, unless there is none or every hand is full with documents in use.
+    fn receive(&mut self, generation: u64) -> Option<Held> {
+        loop {
+            let ticket = self.hand()?;
+            match self.subscriber.receive() {
+                Ok(Some(sample)) if sample.user_header().doc == LET_GO => {
+                    self.books
+                        .retain(|_, book| !book.released || !book.held.is_unused());
+                }
+                Ok(Some(sample)) => {
+                    if let Some(held) = Held::new(sample, generation, ticket) {
+                        return Some(held);
+                    }
+                }
+                Ok(None) => return None,
+                Err(why) => {
+                    tracing::debug!(?why, topic = self.row.name, "cannot read documents");
+                    return None;
+                }
+            }
+        }
+    }
+
+    /// A free hand; lets go of what is least needed when there is none.
+    fn hand(&mut self) -> Option<Ticket> {
+        loop {
+            if let Some(ticket) = Ticket::take(&self.out, self.row.borrowed - 1) {
+                return Some(ticket);
+            }
+            let least = self
+                .books
+                .iter()
+                .filter(|(_, book)| book.held.is_unused())
+                .min_by_key(|(_, book)| (!book.released, book.used_at))
+                .map(|(doc, _)| *doc)?;
+            self.books.remove(&least);
+        }
+    }
+
+    /// Keeps few of the documents that are finished with: a map may come again, but every one
+    /// kept is memory that the broker cannot use.
+    fn tidy(&mut self) {
+        let keep = self.row.buffer.div_ceil(4);
+        let mut released: Vec<(u64, DocId)> = self
+            .books
+            .iter()
+            .filter(|(_, book)| book.released)
+            .map(|(doc, book)| (book.used_at, *doc))
+            .collect();
+        released.sort_unstable();
+        let surplus = released.len().saturating_sub(keep);
+        for (_, doc) in &released[..surplus] {
+            self.books.remove(doc);
+        }
+    }
+}

@@ -1,0 +1,352 @@
+//! A peer's side of one session, from the introduction to its end.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use iceoryx2::prelude::*;
+use qcbus_messages::services::{HELLO_BYTES, Services};
+use qcbus_messages::{Digest, Hello, ToPeer, codec};
+
+use crate::generation::Generation;
+use crate::host::{ConfigHeader, HelloHeader};
+use crate::instance::Instance;
+use crate::library::Library;
+use crate::link::{FrameHeader, Link, SessionKey};
+use crate::peer::PeerEvent;
+use crate::ports::{self, Access, Hub, PortError, Pub, Sub, TopicService, WakeNotifier};
+use crate::process::Process;
+use crate::wake::{TICK, Waker};
+
+/// How often an introduction is repeated.
+const HELLO_EVERY: Duration = Duration::from_millis(50);
+/// Frames read before documents are looked at.
+const QUOTA: usize = 32;
+
+/// How things stand between peer and broker.
+#[derive(Debug)]
+pub(crate) enum Standing {
+    /// Not answered yet.
+    Waiting,
+    /// Welcomed in this turn.
+    JustWelcomed,
+    /// In session.
+    Welcome,
+    /// Sent away.
+    Refused(String),
+    /// Over, without a reason: another session may be had.
+    Ended,
+    /// Over, because something failed on this side.
+    Failed(String),
+}
+
+pub(crate) enum BeginError {
+    Hello(String),
+    Port(String),
+}
+
+impl From<PortError> for BeginError {
+    fn from(error: PortError) -> Self {
+        BeginError::Port(error.to_string())
+    }
+}
+
+/// The channels of a session, once the broker has made them.
+struct Channels {
+    link: Link,
+    waker: Waker,
+    to: TopicService<u8, FrameHeader>,
+    seen_broker: bool,
+}
+
+pub(crate) struct Membership {
+    generation: Generation,
+    services: Services,
+    key: SessionKey,
+    broker: Process,
+    introduction: Vec<u8>,
+    last_hello: Option<Instant>,
+    last_tick: Instant,
+    welcome: bool,
+    refused: Option<String>,
+    // Ports before the node.
+    channels: Option<Channels>,
+    library: Library,
+    config: Sub<u8, ConfigHeader>,
+    hello: Pub<u8, HelloHeader>,
+    wake_broker: Option<WakeNotifier>,
+    hub: Hub,
+}
+
+impl Membership {
+    /// Joins the generation and subscribes to what is shared, so that the broker's answer to the
+    /// introduction finds subscribers for documents and configuration.
+    pub(crate) fn begin(
+        generation: Generation,
+        broker: Process,
+        hello: &Hello,
+        attempt: u64,
+    ) -> Result<Membership, BeginError> {
+        let introduction =
+            codec::encode(hello).map_err(|error| BeginError::Hello(error.to_string()))?;
+        if introduction.len() > HELLO_BYTES {
+            let len = introduction.len();
+            let why = format!("{len} bytes of at most {HELLO_BYTES}");
+            return Err(BeginError::Hello(why));
+        }
+        let services = Services::new(&generation.limits);
+        let hub = Hub::new(&generation.root, &generation.prefix, Access::Open)?;
+        let config = hub.topic(&services.config, "")?;
+        let greetings = hub.topic(&services.hello, "")?;
+        let wake = hub.wake(&services.wake_broker, "")?;
+        Ok(Membership {
+            key: SessionKey {
+                generation: generation.number,
+                incarnation: hello.incarnation,
+                attempt,
+            },
+            library: Library::new(&hub, generation.number, &services)?,
+            config: ports::subscriber(&config, &services.config)?,
+            hello: ports::publisher(&greetings, &services.hello)?,
+            wake_broker: Some(ports::notifier(&wake)?),
+            channels: None,
+            generation,
+            services,
+            broker,
+            introduction,
+            last_hello: None,
+            last_tick: Instant::now(),
+            welcome: false,
+            refused: None,
+            hub,
+        })
+    }
+
+    pub(crate) fn library(&self) -> &Library {
+        &self.library
+    }
+
+    pub(crate) fn library_mut(&mut self) -> &mut Library {
+        &mut self.library
+    }
+
+    pub(crate) fn is_welcome(&self) -> bool {
+        self.welcome
+    }
+
+    pub(crate) fn push(&mut self, message: &[u8]) {
+        if let Some(channels) = &mut self.channels {
+            channels.link.push(message);
+        }
+    }
+
+    pub(crate) fn backlog(&self) -> usize {
+        self.channels
+            .as_ref()
+            .map_or(0, |channels| channels.link.backlog())
+    }
+
+    pub(crate) fn hurry(&mut self) {
+        if let Some(channels) = &mut self.channels {
+            channels.link.hurry();
+        }
+    }
+
+    pub(crate) fn flush(&mut self) {
+        let now = Instant::now();
+        let ticked = now.duration_since(self.last_tick) >= TICK;
+        if ticked {
+            self.last_tick = now;
+        }
+        match &mut self.channels {
+            Some(channels) if ticked => channels.link.tick(now),
+            Some(channels) => channels.link.flush(),
+            None => {}
+        }
+    }
+
+    pub(crate) fn farewell(&mut self) {
+        if let Some(channels) = &mut self.channels {
+            channels.link.farewell("leaving");
+        }
+    }
+
+    /// Returns when the broker has woken us, or after `limit`. Cancel-safe.
+    pub(crate) async fn wait(&self, limit: Duration) {
+        match &self.channels {
+            Some(channels) => channels.waker.wait(limit).await,
+            None => tokio::time::sleep(limit).await,
+        }
+    }
+
+    /// Does as much as can be done without waiting.
+    pub(crate) fn turn(
+        &mut self,
+        now: Instant,
+        max_events: usize,
+        events: &mut VecDeque<PeerEvent>,
+        config: &mut Option<(Digest, Arc<[u8]>)>,
+    ) -> Standing {
+        if self.channels.is_none()
+            && let Err(error) = self.connect(now)
+        {
+            return Standing::Failed(error);
+        }
+        let was_welcome = self.welcome;
+        let ended = self.read(max_events, events, config);
+        self.flush();
+        if let Some(reason) = self.refused.take() {
+            return Standing::Refused(reason);
+        }
+        match (was_welcome, self.welcome) {
+            _ if ended => Standing::Ended,
+            (false, true) => Standing::JustWelcomed,
+            (_, true) => Standing::Welcome,
+            (_, false) => Standing::Waiting,
+        }
+    }
+
+    /// Reads messages first and documents after them: then the documents of a job that has been
+    /// read are there, because they were published before it was sent. `true` when the broker
+    /// has ended the session.
+    pub(crate) fn read(
+        &mut self,
+        max_events: usize,
+        events: &mut VecDeque<PeerEvent>,
+        config: &mut Option<(Digest, Arc<[u8]>)>,
+    ) -> bool {
+        let mut messages = Vec::new();
+        let mut ended = false;
+        if let Some(channels) = &mut self.channels {
+            loop {
+                let drained = channels.link.drain(QUOTA, |bytes| {
+                    messages.push(codec::decode::<ToPeer>(bytes));
+                });
+                ended |= drained.farewell.is_some() || drained.broken.is_some();
+                if drained.frames < QUOTA || messages.len() + events.len() >= max_events {
+                    break;
+                }
+            }
+        }
+        self.read_config(events, config);
+        self.library
+            .drain(|doc| events.push_back(PeerEvent::Document(doc)));
+        // Documents and configurations before the messages that speak of them; but nothing
+        // before the welcome.
+        let behind = events.len();
+        for message in messages {
+            self.hear(message, events);
+        }
+        if let Some(at) = (behind..events.len())
+            .find(|at| matches!(events[*at], PeerEvent::Message(ToPeer::Welcome { .. })))
+            && let Some(welcome) = events.remove(at)
+        {
+            events.push_front(welcome);
+        }
+        ended
+    }
+
+    fn hear(
+        &mut self,
+        message: Result<ToPeer, codec::CodecError>,
+        events: &mut VecDeque<PeerEvent>,
+    ) {
+        match message {
+            Ok(ToPeer::Refused { reason }) => self.refused = Some(reason),
+            Ok(message) => {
+                self.welcome |= matches!(message, ToPeer::Welcome { .. });
+                events.push_back(PeerEvent::Message(message));
+            }
+            Err(error) => tracing::error!(%error, "the broker said what nobody can understand"),
+        }
+    }
+
+    fn read_config(
+        &self,
+        events: &mut VecDeque<PeerEvent>,
+        config: &mut Option<(Digest, Arc<[u8]>)>,
+    ) {
+        while let Ok(Some(sample)) = self.config.receive() {
+            let header = *sample.user_header();
+            let used = usize::try_from(header.used).unwrap_or(usize::MAX);
+            let Some(bytes) = sample.payload().get(..used) else {
+                continue;
+            };
+            let digest = Digest(header.digest);
+            *config = Some((digest, Arc::from(bytes)));
+            events.push_back(PeerEvent::Config(digest));
+        }
+    }
+
+    /// Introduces itself, again and again, until the broker has made the channels.
+    fn connect(&mut self, now: Instant) -> Result<(), String> {
+        let due = self
+            .last_hello
+            .is_none_or(|last| now.duration_since(last) >= HELLO_EVERY);
+        if due {
+            self.last_hello = Some(now);
+            self.introduce()?;
+        }
+        let suffix = self.key.suffix();
+        let Ok(to) = self.hub.topic(&self.services.to_peer, &suffix) else {
+            return Ok(());
+        };
+        self.channels = Some(self.open(to, &suffix).map_err(|error| error.to_string())?);
+        Ok(())
+    }
+
+    fn open(
+        &mut self,
+        to: TopicService<u8, FrameHeader>,
+        suffix: &str,
+    ) -> Result<Channels, PortError> {
+        let from = self.hub.topic(&self.services.from_peer, suffix)?;
+        let wake = self.hub.wake(&self.services.wake_peer, suffix)?;
+        let wake_broker = match self.wake_broker.take() {
+            Some(notifier) => notifier,
+            None => ports::notifier(&self.hub.wake(&self.services.wake_broker, "")?)?,
+        };
+        let waker = Waker::new(ports::listener(&wake)?).map_err(|why| PortError::waiting(&why))?;
+        let receiver = ports::subscriber(&to, &self.services.to_peer)?;
+        let sender = ports::publisher(&from, &self.services.from_peer)?;
+        let link = Link::new(self.key, sender, receiver, wake_broker);
+        link.ring();
+        Ok(Channels {
+            link,
+            waker,
+            to,
+            seen_broker: false,
+        })
+    }
+
+    fn introduce(&self) -> Result<(), String> {
+        let mut sample = self
+            .hello
+            .loan_slice_uninit(self.introduction.len())
+            .map_err(|why| format!("{why:?}"))?;
+        *sample.user_header_mut() = HelloHeader {
+            incarnation: self.key.incarnation,
+            attempt: self.key.attempt,
+        };
+        let sent = sample.write_from_slice(&self.introduction).send();
+        sent.map_err(|why| format!("{why:?}"))?;
+        if let Some(wake) = &self.wake_broker {
+            wake.notify().map_err(|why| format!("{why:?}"))?;
+        }
+        Ok(())
+    }
+
+    /// Whether the broker lives, serves the same generation, and keeps this session.
+    pub(crate) fn broker_is_there(&mut self, instance: &Instance) -> bool {
+        let kept = match &mut self.channels {
+            Some(channels) => {
+                let publishers = channels.to.dynamic_config().number_of_publishers();
+                channels.seen_broker |= publishers > 0;
+                publishers > 0 || !channels.seen_broker
+            }
+            None => true,
+        };
+        kept && self.broker.is_alive()
+            && Generation::current(instance).as_ref() == Some(&self.generation)
+    }
+}

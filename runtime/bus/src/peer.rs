@@ -1,0 +1,414 @@
+//! A bundle's or reporter's end of the bus.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use qcbus_messages::{Digest, DocId, FromPeer, Hello, PROTOCOL_VERSION, ToPeer, codec};
+
+use crate::generation::Generation;
+use crate::held::Held;
+use crate::instance::Instance;
+use crate::membership::{Membership, Standing};
+use crate::ports::ICEORYX2_VERSION;
+use crate::wake::TICK;
+
+/// How often somebody without a session looks for one.
+const SEEK_EVERY: Duration = Duration::from_millis(3);
+/// How long to wait after an attempt that failed on this side.
+const SEEK_AGAIN_AFTER: Duration = Duration::from_millis(50);
+/// How often a peer looks whether its broker is still there.
+const WATCH_EVERY: Duration = Duration::from_millis(60);
+/// How long leaving waits for the last acknowledgement.
+const LEAVE_WITHIN: Duration = Duration::from_secs(3);
+/// Events that wait to be fetched before reading pauses.
+const MAX_WAITING: usize = 256;
+
+/// How patient a peer is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PeerOptions {
+    /// How long to look for a broker when joining for the first time.
+    pub patience: Duration,
+    /// How long to survive the loss of the broker.
+    pub grace: Duration,
+}
+
+impl Default for PeerOptions {
+    fn default() -> Self {
+        PeerOptions {
+            patience: Duration::from_secs(2),
+            grace: Duration::from_secs(10),
+        }
+    }
+}
+
+/// Why a peer could not join.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum JoinError {
+    /// Nobody serves the instance.
+    #[error("no broker serves instance `{instance}`; start one with `qcbus serve`")]
+    NoBroker {
+        /// The instance.
+        instance: String,
+    },
+    /// The broker speaks another version of the messages.
+    #[error(
+        "the broker speaks protocol {theirs}, this program speaks {ours}; install the same version of both"
+    )]
+    ProtocolMismatch {
+        /// Version of this program.
+        ours: u32,
+        /// Version of the broker.
+        theirs: u32,
+    },
+    /// The broker uses another version of iceoryx2.
+    #[error(
+        "the broker uses iceoryx2 {theirs}, this program uses {ours}; install the same version of both"
+    )]
+    IceoryxMismatch {
+        /// Version of this program.
+        ours: String,
+        /// Version of the broker.
+        theirs: String,
+    },
+    /// The broker does not want this peer, and says why.
+    #[error("the broker refused: {0}")]
+    Refused(String),
+    /// The introduction does not fit a slot.
+    #[error("the introduction is too large: {0}")]
+    HelloTooLarge(String),
+    /// There is a broker, but it does not answer.
+    #[error("the broker, process {pid}, does not answer{}", .why.as_ref().map(|why| format!(": {why}")).unwrap_or_default())]
+    NoAnswer {
+        /// The broker.
+        pid: u32,
+        /// The last thing that went wrong on this side.
+        why: Option<String>,
+    },
+}
+
+/// Something that a peer has to know.
+#[derive(Debug)]
+pub enum PeerEvent {
+    /// The broker says something. The first is always the welcome.
+    Message(ToPeer),
+    /// A document has arrived: [`Peer::document`] has it.
+    Document(DocId),
+    /// A configuration has arrived: [`Peer::config`] has it.
+    Config(Digest),
+    /// This is a new session, the old one ended without a word: everything older is void, jobs,
+    /// document numbers and messages not yet sent. Documents held stay readable. A welcome follows.
+    Rejoined,
+    /// The session is over and there will be no other.
+    Closed {
+        /// For a person.
+        reason: String,
+    },
+}
+
+enum State {
+    /// In a session, or on the way into one.
+    Member(Box<Membership>),
+    /// Without a broker.
+    Seeking,
+    Closed(String),
+}
+
+/// A bundle's or reporter's end of the bus.
+pub struct Peer {
+    instance: Instance,
+    hello: Hello,
+    options: PeerOptions,
+    attempts: u64,
+    state: State,
+    /// Since when there has been no session.
+    lost: Option<Instant>,
+    joined_before: bool,
+    last_error: Option<String>,
+    last_watch: Instant,
+    seek_at: Instant,
+    events: VecDeque<PeerEvent>,
+    config: Option<(Digest, Arc<[u8]>)>,
+}
+
+impl Peer {
+    /// Joins the broker of an instance. Must be called within a tokio runtime. `hello.protocol`,
+    /// `hello.pid` are filled in here.
+    ///
+    /// # Errors
+    /// See [`JoinError`].
+    pub async fn join(
+        instance: &Instance,
+        hello: Hello,
+        options: PeerOptions,
+    ) -> Result<Peer, JoinError> {
+        Peer::join_claiming(PROTOCOL_VERSION, instance, hello, options).await
+    }
+
+    /// Joins and claims to speak this version of the messages: how a broker takes a peer of
+    /// another version has to be tested.
+    #[doc(hidden)]
+    pub async fn join_claiming(
+        protocol: u32,
+        instance: &Instance,
+        hello: Hello,
+        options: PeerOptions,
+    ) -> Result<Peer, JoinError> {
+        let mut peer = Peer {
+            instance: instance.clone(),
+            hello: Hello {
+                protocol,
+                pid: std::process::id(),
+                ..hello
+            },
+            options,
+            attempts: 0,
+            state: State::Seeking,
+            lost: Some(Instant::now()),
+            joined_before: false,
+            last_error: None,
+            last_watch: Instant::now(),
+            seek_at: Instant::now(),
+            events: VecDeque::new(),
+            config: None,
+        };
+        let until = Instant::now() + options.patience;
+        // A broker that is there gets longer: it may be busy starting.
+        let answer_until = until.max(Instant::now() + options.grace);
+        loop {
+            peer.turn()?;
+            if peer.joined_before {
+                return Ok(peer);
+            }
+            let now = Instant::now();
+            match (&peer.state, Generation::current(instance)) {
+                (State::Closed(reason), _) => return Err(JoinError::Refused(reason.clone())),
+                (State::Seeking, None) if now >= until => return Err(peer.no_broker()),
+                (_, Some(generation)) if now >= answer_until => {
+                    return Err(match generation.broker() {
+                        None => peer.no_broker(),
+                        Some(_) => JoinError::NoAnswer {
+                            pid: generation.pid,
+                            why: peer.last_error.take(),
+                        },
+                    });
+                }
+                (State::Seeking, Some(generation))
+                    if now >= until && generation.broker().is_none() =>
+                {
+                    return Err(peer.no_broker());
+                }
+                (_, None) if now >= answer_until => return Err(peer.no_broker()),
+                _ => peer.wait().await,
+            }
+        }
+    }
+
+    /// The next event; meanwhile everything queued is sent. Cancel-safe: nothing is lost when the
+    /// future is dropped. Nothing moves on the bus unless this is awaited. After
+    /// [`PeerEvent::Closed`] it says so again and again.
+    pub async fn next(&mut self) -> PeerEvent {
+        loop {
+            if let Some(event) = self.events.pop_front() {
+                return event;
+            }
+            if let State::Closed(reason) = &self.state {
+                return PeerEvent::Closed {
+                    reason: reason.clone(),
+                };
+            }
+            if let Err(error) = self.turn() {
+                self.close(error.to_string());
+            }
+            if self.events.is_empty() && !matches!(self.state, State::Closed(_)) {
+                self.wait().await;
+            }
+        }
+    }
+
+    /// Sends a message: it is kept until the broker has acknowledged it. Never blocks. Without a
+    /// session nothing is sent, because a new session voids everything older.
+    pub fn send(&mut self, message: &FromPeer) {
+        let State::Member(membership) = &mut self.state else {
+            return;
+        };
+        match codec::encode(message) {
+            Ok(bytes) => membership.push(&bytes),
+            Err(error) => tracing::error!(%error, "a message was not sent"),
+        }
+    }
+
+    /// Sends bytes that are no message: how a broker takes garbage has to be tested.
+    #[doc(hidden)]
+    pub fn send_garbage(&mut self, bytes: &[u8]) {
+        if let State::Member(membership) = &mut self.state {
+            membership.push(bytes);
+        }
+    }
+
+    /// Bytes that the broker has not acknowledged.
+    pub fn backlog(&self) -> usize {
+        match &self.state {
+            State::Member(membership) => membership.backlog(),
+            _ => 0,
+        }
+    }
+
+    /// A document, read in place; `None` when it has not arrived or was let go to make room.
+    pub fn document(&self, doc: DocId) -> Option<Held> {
+        match &self.state {
+            State::Member(membership) => membership.library().get(doc),
+            _ => None,
+        }
+    }
+
+    /// This document is finished with: it may go first when room is needed.
+    pub fn forget(&mut self, doc: DocId) {
+        if let State::Member(membership) = &mut self.state {
+            membership.library_mut().forget(doc);
+        }
+    }
+
+    /// The latest configuration and its digest.
+    pub fn config(&self) -> Option<(Digest, Arc<[u8]>)> {
+        self.config.clone()
+    }
+
+    /// Ends the session when the broker has acknowledged everything, or has not for three seconds.
+    pub async fn leave(mut self) {
+        let until = Instant::now() + LEAVE_WITHIN;
+        if let State::Member(membership) = &mut self.state {
+            membership.hurry();
+        }
+        while let State::Member(membership) = &mut self.state {
+            membership.flush();
+            let broker_is_there = membership.broker_is_there(&self.instance);
+            if membership.backlog() == 0 || Instant::now() >= until || !broker_is_there {
+                membership.farewell();
+                return;
+            }
+            membership.wait(TICK).await;
+            // What arrives now is nobody's concern any more, but acknowledgements are among it.
+            membership.read(usize::MAX, &mut VecDeque::new(), &mut None);
+        }
+    }
+
+    fn no_broker(&self) -> JoinError {
+        JoinError::NoBroker {
+            instance: self.instance.name().to_owned(),
+        }
+    }
+
+    async fn wait(&self) {
+        match &self.state {
+            State::Member(membership) if membership.is_welcome() => membership.wait(TICK).await,
+            State::Member(membership) => membership.wait(SEEK_EVERY).await,
+            _ => tokio::time::sleep(SEEK_EVERY).await,
+        }
+    }
+
+    fn close(&mut self, reason: String) {
+        self.state = State::Closed(reason);
+    }
+
+    /// Does as much as can be done without waiting.
+    fn turn(&mut self) -> Result<(), JoinError> {
+        let now = Instant::now();
+        if matches!(self.state, State::Seeking) && now >= self.seek_at {
+            self.seek()?;
+        }
+        if let State::Member(membership) = &mut self.state {
+            let standing = membership.turn(now, MAX_WAITING, &mut self.events, &mut self.config);
+            self.take_note(standing, now);
+        }
+        if now.duration_since(self.last_watch) >= WATCH_EVERY {
+            self.last_watch = now;
+            self.watch(now);
+        }
+        self.give_up(now);
+        Ok(())
+    }
+
+    fn take_note(&mut self, standing: Standing, now: Instant) {
+        match standing {
+            Standing::Waiting | Standing::Welcome => {}
+            Standing::JustWelcomed => {
+                if self.joined_before {
+                    self.events.push_front(PeerEvent::Rejoined);
+                }
+                self.joined_before = true;
+                self.lost = None;
+            }
+            Standing::Refused(reason) => self.close(reason),
+            Standing::Failed(why) => {
+                self.last_error = Some(why);
+                self.lose(now);
+            }
+            Standing::Ended => self.lose(now),
+        }
+    }
+
+    fn lose(&mut self, now: Instant) {
+        self.state = State::Seeking;
+        // What was not fetched belongs to the session that is over.
+        self.events.clear();
+        self.lost.get_or_insert(now);
+    }
+
+    /// Tries to get into the generation in force, if there is one.
+    fn seek(&mut self) -> Result<(), JoinError> {
+        let Some(generation) = Generation::current(&self.instance) else {
+            return Ok(());
+        };
+        let Some(broker) = generation.broker() else {
+            return Ok(());
+        };
+        check_versions(&generation)?;
+        self.attempts += 1;
+        self.seek_at = Instant::now() + SEEK_AGAIN_AFTER;
+        match Membership::begin(generation, broker, &self.hello, self.attempts) {
+            Ok(membership) => self.state = State::Member(Box::new(membership)),
+            Err(crate::membership::BeginError::Hello(why)) => {
+                return Err(JoinError::HelloTooLarge(why));
+            }
+            // The broker may just have gone, or not be ready: the next attempt will tell.
+            Err(crate::membership::BeginError::Port(why)) => self.last_error = Some(why),
+        }
+        Ok(())
+    }
+
+    fn watch(&mut self, now: Instant) {
+        if let State::Member(membership) = &mut self.state
+            && !membership.broker_is_there(&self.instance)
+        {
+            // What it said before it went is void, because the next session starts afresh.
+            self.lose(now);
+        }
+    }
+
+    fn give_up(&mut self, now: Instant) {
+        if let Some(since) = self.lost
+            && self.joined_before
+            && now.duration_since(since) >= self.options.grace
+        {
+            let seconds = self.options.grace.as_secs_f32();
+            self.close(format!("the broker has been gone for {seconds} s"));
+        }
+    }
+}
+
+fn check_versions(generation: &Generation) -> Result<(), JoinError> {
+    if generation.protocol != PROTOCOL_VERSION {
+        return Err(JoinError::ProtocolMismatch {
+            ours: PROTOCOL_VERSION,
+            theirs: generation.protocol,
+        });
+    }
+    if generation.iceoryx2 != ICEORYX2_VERSION {
+        return Err(JoinError::IceoryxMismatch {
+            ours: ICEORYX2_VERSION.to_owned(),
+            theirs: generation.iceoryx2.clone(),
+        });
+    }
+    Ok(())
+}

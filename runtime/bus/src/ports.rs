@@ -1,0 +1,345 @@
+//! The one place where iceoryx2 is configured, and where services and ports come from.
+//!
+//! Whoever wants a service hands in a row of [`qcbus_messages::services`]; there is no other way.
+
+use std::fmt::Debug;
+use std::path::Path;
+use std::time::Duration;
+
+use iceoryx2::port::listener::Listener;
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::prelude::*;
+use iceoryx2::service::port_factory::{event, publish_subscribe};
+use qcbus_messages::services::{Growth, Topic, Wake};
+
+pub(crate) type Service = ipc_threadsafe::Service;
+pub(crate) type Pub<T, H> = Publisher<Service, [T], H>;
+pub(crate) type Sub<T, H> = Subscriber<Service, [T], H>;
+pub(crate) type TopicService<T, H> = publish_subscribe::PortFactory<Service, [T], H>;
+pub(crate) type WakeService = event::PortFactory<Service>;
+pub(crate) type WakeListener = Listener<Service>;
+pub(crate) type WakeNotifier = Notifier<Service>;
+
+/// Version of iceoryx2, part of every name on the bus: both sides must have the same.
+/// The version of iceoryx2 that is linked in; peers must link the same.
+pub const ICEORYX2_VERSION: &str = "0.10.0";
+
+/// Something that iceoryx2 refused, in words. Its errors are no type of ours: callers can only
+/// tell a person.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{what}: {why}")]
+pub(crate) struct PortError {
+    what: String,
+    why: String,
+}
+
+impl PortError {
+    /// A descriptor cannot be waited on.
+    pub(crate) fn waiting(why: &std::io::Error) -> PortError {
+        PortError {
+            what: "waiting for the other side".to_owned(),
+            why: why.to_string(),
+        }
+    }
+}
+
+fn error(what: impl Into<String>) -> impl FnOnce(Box<dyn Debug>) -> PortError {
+    let what = what.into();
+    move |why| PortError {
+        what,
+        why: format!("{why:?}"),
+    }
+}
+
+/// Attaches words to an error of iceoryx2.
+trait Explain<T> {
+    fn explain(self, what: impl Into<String>) -> Result<T, PortError>;
+}
+
+impl<T, E: Debug + 'static> Explain<T> for Result<T, E> {
+    fn explain(self, what: impl Into<String>) -> Result<T, PortError> {
+        self.map_err(|why| error(what)(Box::new(why)))
+    }
+}
+
+/// Who makes a service: the broker creates, everyone else opens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Access {
+    Create,
+    Open,
+}
+
+/// The node of one process in one generation.
+pub(crate) struct Hub {
+    node: Node<Service>,
+    access: Access,
+}
+
+/// iceoryx2's settings for one generation. Never the global ones: those read a file from the
+/// working directory.
+pub(crate) fn generation_config(root: &Path, prefix: &str) -> Result<Config, PortError> {
+    let mut config = Config::default();
+    let root = iceoryx2::prelude::Path::new(root.as_os_str().as_encoded_bytes())
+        .explain("the runtime directory's path")?;
+    config.global.set_root_path(&root);
+    config.global.prefix = FileName::new(prefix.as_bytes()).explain("the prefix")?;
+    config.global.creation_timeout = Duration::from_millis(500);
+    // Dead nodes are cleaned by the broker's janitor and by nobody else: a peer has no business
+    // there, and the broker's loop has no 20 ms to give away.
+    config.global.service.cleanup_dead_nodes_on_open = false;
+    config.global.node.cleanup_dead_nodes_on_creation = false;
+    config.global.node.cleanup_dead_nodes_on_destruction = false;
+    config
+        .defaults
+        .publish_subscribe
+        .subscriber_expired_connection_buffer = 16;
+    Ok(config)
+}
+
+impl Hub {
+    /// Joins a generation.
+    pub(crate) fn new(root: &Path, prefix: &str, access: Access) -> Result<Hub, PortError> {
+        // What iceoryx2 has to say arrives as error values; it prints nothing of its own.
+        set_log_level_from_env_or(LogLevel::Fatal);
+        let config = generation_config(root, prefix)?;
+        let node = NodeBuilder::new()
+            .config(&config)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<Service>()
+            .explain("the node")?;
+        Ok(Hub { node, access })
+    }
+
+    /// The only constructor of publish-subscribe services. `key` distinguishes the services of
+    /// one session; it is empty for shared ones.
+    pub(crate) fn topic<T, H>(
+        &self,
+        row: &Topic,
+        key: &str,
+    ) -> Result<TopicService<T, H>, PortError>
+    where
+        T: Debug + ZeroCopySend + 'static,
+        H: Debug + ZeroCopySend + 'static,
+    {
+        debug_assert_eq!(size_of::<T>(), row.element, "{}", row.name);
+        let name = service_name(row.name, key)?;
+        let builder = self
+            .node
+            .service_builder(&name)
+            .publish_subscribe::<[T]>()
+            .user_header::<H>()
+            .enable_safe_overflow(row.overflow)
+            .max_publishers(row.publishers)
+            .max_subscribers(row.subscribers)
+            .max_nodes(row.nodes)
+            .history_size(row.history)
+            .subscriber_max_buffer_size(row.buffer)
+            .subscriber_max_borrowed_samples(row.borrowed);
+        match self.access {
+            Access::Create => builder.create().explain(format!("creating {name}")),
+            Access::Open => builder.open().explain(format!("opening {name}")),
+        }
+    }
+
+    /// The only constructor of event services.
+    pub(crate) fn wake(&self, row: &Wake, key: &str) -> Result<WakeService, PortError> {
+        let name = service_name(row.name, key)?;
+        let builder = self
+            .node
+            .service_builder(&name)
+            .event()
+            .max_notifiers(row.notifiers)
+            .max_listeners(row.listeners)
+            .max_nodes(row.nodes)
+            .event_id_max_value(row.max_event_id);
+        match self.access {
+            Access::Create => builder
+                .disable_deadline()
+                .disable_notifier_created_event()
+                .disable_notifier_dropped_event()
+                .disable_notifier_dead_event()
+                .create()
+                .explain(format!("creating {name}")),
+            Access::Open => builder.open().explain(format!("opening {name}")),
+        }
+    }
+}
+
+fn service_name(name: &str, key: &str) -> Result<ServiceName, PortError> {
+    let full = if key.is_empty() {
+        name.to_owned()
+    } else {
+        format!("{name}/{key}")
+    };
+    ServiceName::new(&full).explain(full)
+}
+
+/// A publisher as its row wants it.
+pub(crate) fn publisher<T, H>(
+    service: &TopicService<T, H>,
+    row: &Topic,
+) -> Result<Pub<T, H>, PortError>
+where
+    T: Debug + ZeroCopySend + 'static,
+    H: Debug + ZeroCopySend + 'static,
+{
+    let slots = row.slots();
+    service
+        .publisher_builder()
+        .initial_max_slice_len(row.elements)
+        .allocation_strategy(match row.growth {
+            Growth::Fixed => AllocationStrategy::Static,
+            Growth::PowerOfTwo => AllocationStrategy::PowerOfTwo,
+        })
+        .max_loaned_samples(row.loans)
+        .override_sample_preallocation(move |_| slots)
+        // Nothing on this bus ever blocks a sender: it is told, and keeps what was not taken.
+        .backpressure_strategy(BackpressureStrategy::DiscardData)
+        .create()
+        .explain(format!("a publisher of {}", row.name))
+}
+
+/// A subscriber as its row wants it.
+pub(crate) fn subscriber<T, H>(
+    service: &TopicService<T, H>,
+    row: &Topic,
+) -> Result<Sub<T, H>, PortError>
+where
+    T: Debug + ZeroCopySend + 'static,
+    H: Debug + ZeroCopySend + 'static,
+{
+    service
+        .subscriber_builder()
+        .buffer_size(row.buffer)
+        .history_request(row.history)
+        .create()
+        .explain(format!("a subscriber of {}", row.name))
+}
+
+/// Who wakes.
+pub(crate) fn notifier(service: &WakeService) -> Result<WakeNotifier, PortError> {
+    service
+        .notifier_builder()
+        .default_event_id(EventId::new(0))
+        .create()
+        .explain("a notifier")
+}
+
+/// Who is woken.
+pub(crate) fn listener(service: &WakeService) -> Result<WakeListener, PortError> {
+    service.listener_builder().create().explain("a listener")
+}
+
+/// Removes what dead processes of a generation left behind. Takes 6 to 20 ms per dead process,
+/// so it is called off the loop only.
+pub(crate) fn clean_dead_nodes(config: &Config) {
+    let mut dead = Vec::new();
+    let listed = Node::<Service>::list(config, |state| {
+        if let NodeState::Dead(view) = state {
+            dead.push(view);
+        }
+        CallbackProgression::Continue
+    });
+    if let Err(why) = listed {
+        tracing::debug!(?why, "cannot list the nodes of this generation");
+    }
+    for view in dead {
+        if let Err(why) = view.try_remove_stale_resources() {
+            tracing::debug!(?why, "a dead node is still to be cleaned");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use iceoryx2::service::static_config::publish_subscribe::StaticConfig;
+    use qcbus_messages::services::{Limits, Services};
+
+    use super::*;
+    use crate::held::{Block, DocumentHeader};
+
+    fn assert_as_written(row: &Topic, made: &StaticConfig) {
+        let numbers = (
+            made.max_publishers(),
+            made.max_subscribers(),
+            made.max_nodes(),
+            made.subscriber_max_buffer_size(),
+            made.subscriber_max_borrowed_samples(),
+            made.history_size(),
+        );
+        let wanted = (
+            row.publishers,
+            row.subscribers,
+            row.nodes,
+            row.buffer,
+            row.borrowed,
+            row.history,
+        );
+        assert_eq!(numbers, wanted, "{}", row.name);
+        assert_eq!(made.has_safe_overflow(), row.overflow, "{}", row.name);
+        let payload = &made.message_type_details().payload;
+        assert_eq!(
+            (payload.size(), payload.alignment()),
+            (row.element, row.element)
+        );
+    }
+
+    #[test]
+    fn services_are_made_as_the_table_says() {
+        let dir = tempfile::TempDir::new().unwrap();
+        let instance = crate::Instance::at(dir.path().to_owned());
+        let limits = Limits::default();
+        let generation = crate::generation::Generation::begin(&instance, limits).unwrap();
+        let hub = Hub::new(&generation.root, &generation.prefix, Access::Create).unwrap();
+        let services = Services::new(&limits);
+        for row in services.topics() {
+            if row.element == size_of::<Block>() {
+                let service = hub.topic::<Block, DocumentHeader>(&row, "").unwrap();
+                assert_as_written(&row, service.static_config());
+            } else {
+                let service = hub.topic::<u8, u64>(&row, "key").unwrap();
+                assert_as_written(&row, service.static_config());
+            }
+        }
+        drop(hub);
+        crate::generation::sweep(&instance, None);
+    }
+
+    #[test]
+    fn nobody_else_makes_services_or_ports() {
+        let makers = [
+            "service_builder(",
+            ".publish_subscribe::<",
+            ".publisher_builder(",
+            ".subscriber_builder(",
+            ".notifier_builder(",
+            ".listener_builder(",
+            "NodeBuilder",
+            "open_or_create",
+            "global_config()",
+        ];
+        let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+        for entry in fs::read_dir(sources).unwrap() {
+            let path = entry.unwrap().path();
+            if path.ends_with("ports.rs") {
+                continue;
+            }
+            let text = fs::read_to_string(&path).unwrap();
+            for maker in makers {
+                assert!(!text.contains(maker), "{maker} in {}", path.display());
+            }
+        }
+    }
+
+    #[test]
+    fn the_version_is_the_one_that_is_linked() {
+        let lock = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../Cargo.lock");
+        let text = fs::read_to_string(lock).unwrap();
+        let linked = format!("name = \"iceoryx2\"\nversion = \"{ICEORYX2_VERSION}\"");
+        assert!(text.contains(&linked));
+    }
+}

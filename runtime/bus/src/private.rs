@@ -1,0 +1,50 @@
+//! What private instances leave behind when their process is killed.
+
+use std::path::Path;
+
+use crate::generation::sweep;
+use crate::instance::{Instance, InstanceLock};
+
+/// Private instances (of `qcbus check`) begin with this and are nobody's but their process'.
+pub const PRIVATE_PREFIX: &str = "check-";
+
+/// Private instances younger than this may be on the way to taking their lock.
+const YOUNG: std::time::Duration = std::time::Duration::from_secs(10);
+
+/// Removes what dead private instances have left: their directories and their shared memory.
+/// Returns how many there were. Instances whose broker lives are left alone.
+pub fn sweep_private_instances() -> usize {
+    let Ok(probe) = Instance::base_dir() else {
+        return 0;
+    };
+    let Ok(entries) = std::fs::read_dir(&probe) else {
+        return 0;
+    };
+    let mut swept = 0;
+    for entry in entries.flatten() {
+        let is_private = entry
+            .file_name()
+            .to_string_lossy()
+            .starts_with(PRIVATE_PREFIX);
+        if is_private && !is_young(&entry.path()) {
+            swept += usize::from(sweep_one(&entry.path()));
+        }
+    }
+    swept
+}
+
+fn is_young(directory: &Path) -> bool {
+    let made = std::fs::metadata(directory).and_then(|data| data.modified());
+    made.is_ok_and(|made| made.elapsed().unwrap_or_default() < YOUNG)
+}
+
+fn sweep_one(directory: &Path) -> bool {
+    let instance = Instance::at(directory.to_path_buf());
+    // Whoever holds the lock is alive.
+    let Ok(lock) = InstanceLock::take(&instance) else {
+        return false;
+    };
+    sweep(&instance, None);
+    drop(lock);
+    std::fs::remove_dir_all(directory).is_ok()
+}

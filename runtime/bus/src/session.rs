@@ -1,0 +1,139 @@
+//! The broker's side of one session.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use iceoryx2::prelude::*;
+use qcbus_messages::services::Services;
+use qcbus_messages::{FromPeer, codec};
+
+use crate::host::{HostEvent, PeerId};
+use crate::link::{FrameHeader, Link, SessionKey};
+use crate::ports::{self, Hub, PortError, TopicService, WakeService};
+use crate::process::Process;
+
+/// How long a peer may take to open its channels after its introduction.
+const CONNECT_WITHIN: Duration = Duration::from_secs(10);
+
+pub(crate) struct Session {
+    key: SessionKey,
+    pub(crate) link: Link,
+    to: TopicService<u8, FrameHeader>,
+    _from: TopicService<u8, FrameHeader>,
+    _wake: WakeService,
+    /// `None` when the process id means nothing here, as between containers.
+    process: Option<Process>,
+    opened: Instant,
+    connected: bool,
+    farewell: bool,
+    /// When it ends, once it has been refused, and why.
+    ends: Option<(Instant, String)>,
+}
+
+impl Session {
+    /// Makes the services and ports. Takes about 2 ms.
+    pub(crate) fn open(
+        hub: &Hub,
+        services: &Services,
+        key: SessionKey,
+        pid: u32,
+        now: Instant,
+    ) -> Result<Session, PortError> {
+        let suffix = key.suffix();
+        let wake = hub.wake(&services.wake_peer, &suffix)?;
+        let from = hub.topic(&services.from_peer, &suffix)?;
+        // Last: the peer opens this one first, and then finds the others.
+        let to = hub.topic(&services.to_peer, &suffix)?;
+        let link = Link::new(
+            key,
+            ports::publisher(&to, &services.to_peer)?,
+            ports::subscriber(&from, &services.from_peer)?,
+            ports::notifier(&wake)?,
+        );
+        Ok(Session {
+            key,
+            link,
+            to,
+            _from: from,
+            _wake: wake,
+            process: Process::open(pid, None),
+            opened: now,
+            connected: false,
+            farewell: false,
+            ends: None,
+        })
+    }
+
+    pub(crate) fn key(&self) -> SessionKey {
+        self.key
+    }
+
+    /// Reads up to `quota` frames; `true` when there was one.
+    pub(crate) fn read(
+        &mut self,
+        peer: PeerId,
+        quota: usize,
+        events: &mut VecDeque<HostEvent>,
+    ) -> bool {
+        let silent = self.is_silent();
+        let drained = self.link.drain(quota, |bytes| {
+            if silent {
+                return;
+            }
+            events.push_back(match codec::decode::<FromPeer>(bytes) {
+                Ok(message) => HostEvent::Message { peer, message },
+                Err(error) => HostEvent::Garbage {
+                    peer,
+                    what: error.to_string(),
+                },
+            });
+        });
+        self.farewell |= drained.farewell.is_some();
+        if let Some(broken) = drained.broken {
+            events.push_back(HostEvent::Garbage {
+                peer,
+                what: broken.to_string(),
+            });
+        }
+        if drained.foreign > 0 && !silent {
+            events.push_back(HostEvent::Garbage {
+                peer,
+                what: format!("{} frames belong to no session", drained.foreign),
+            });
+        }
+        drained.frames > 0
+    }
+
+    /// Whether the peer's process lives and has its end of the channel open.
+    pub(crate) fn is_there(&mut self) -> bool {
+        let subscribed = self.to.dynamic_config().number_of_subscribers() > 0;
+        self.connected |= subscribed;
+        let alive = self.process.as_ref().is_none_or(Process::is_alive);
+        let left = self.connected && !subscribed;
+        let never_came = !self.connected && self.opened.elapsed() > CONNECT_WITHIN;
+        alive && !left && !never_came && !self.farewell
+    }
+
+    /// The peer was refused: end when it has read why, at the latest at `at`.
+    pub(crate) fn end(&mut self, at: Instant, reason: &str) {
+        self.link.hurry();
+        self.ends = Some((at, reason.to_owned()));
+    }
+
+    /// Whether the broker has done with this session.
+    pub(crate) fn is_silent(&self) -> bool {
+        self.ends.is_some()
+    }
+
+    /// Whether a session that was ended may be removed.
+    pub(crate) fn is_over(&mut self, now: Instant) -> bool {
+        let Some((at, reason)) = &self.ends else {
+            return false;
+        };
+        let over = now >= *at || self.link.backlog() == 0;
+        if over {
+            self.link.farewell(reason);
+        }
+        over
+    }
+}

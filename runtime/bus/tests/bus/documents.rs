@@ -1,0 +1,352 @@
+//! Documents are published once and read in place.
+
+use std::collections::BTreeMap;
+use std::os::unix::process::ExitStatusExt;
+
+use qcbus_bus::{Documents, Held, Host, HostEvent, HostOptions, LoanError, Peer};
+use qcbus_document::FileKind;
+use qcbus_messages::{Digest, DocId, FromPeer};
+
+use crate::helper::Helper;
+use crate::support::{Place, has_room, is_uniform, join, run, welcome};
+
+fn publish(documents: &Documents, doc: u64, len: usize) -> Held {
+    let mut loan = documents.loan(len + 10).unwrap();
+    assert_eq!(loan.len(), len + 10);
+    assert_eq!(loan.as_ptr().addr() % 64, 0);
+    loan.fill(pattern(doc));
+    let held = loan
+        .publish(DocId(doc), len, digest(doc), FileKind::Xosc)
+        .unwrap();
+    check(&held, doc, len);
+    held
+}
+
+fn pattern(doc: u64) -> u8 {
+    (doc % 251) as u8 + 1
+}
+
+fn digest(doc: u64) -> Digest {
+    Digest([pattern(doc); 32])
+}
+
+fn check(held: &Held, doc: u64, len: usize) {
+    assert_eq!(held.doc(), DocId(doc));
+    assert_eq!(held.digest(), digest(doc));
+    assert_eq!(held.kind(), FileKind::Xosc);
+    assert_eq!(held.len(), len);
+    assert_eq!(held.as_ptr().addr() % 64, 0);
+    assert!(is_uniform(held, pattern(doc)));
+}
+
+/// The document, when it has arrived.
+async fn arrival(host: &mut Host, peer: &mut Peer, doc: u64) -> Held {
+    loop {
+        if let Some(held) = peer.document(DocId(doc)) {
+            return held;
+        }
+        tokio::select! {
+            event = host.next() => panic!("{event:?}"),
+            _ = peer.next() => {}
+        }
+    }
+}
+
+#[test]
+fn every_size_arrives_and_is_aligned() {
+    run(async {
+        let place = Place::new();
+        let mut host = place.host();
+        let (_, mut peer) = join(&mut host, &place, "reader").await;
+        let documents = host.documents();
+        let sizes = [0, 1, 63, 64, 65, 500_000, 524_288, 600_000, 9_000_000];
+        for (doc, len) in (1..).zip(sizes) {
+            let held = publish(&documents, doc, len);
+            check(&arrival(&mut host, &mut peer, doc).await, doc, len);
+            drop(held);
+        }
+    });
+}
+
+#[test]
+fn a_hundred_megabytes_reach_four_readers_in_place() {
+    if !has_room(400_000_000) {
+        return;
+    }
+    run(async {
+        let place = Place::new();
+        let mut host = place.host();
+        let mut readers = Vec::new();
+        for name in ["a", "b", "c", "d"] {
+            readers.push(join(&mut host, &place, name).await.1);
+        }
+        let documents = host.documents();
+        let len = 100_000_000;
+        let worker = std::thread::spawn(move || publish(&documents, 5, len));
+        while !worker.is_finished() {
+            tokio::select! {
+                event = host.next() => panic!("{event:?}"),
+                () = tokio::task::yield_now() => {}
+            }
+        }
+        let ours = worker.join().unwrap();
+        for reader in &mut readers {
+            let held = arrival(&mut host, reader, 5).await;
+            assert_eq!(held.len(), len);
+            assert_eq!(held[..], ours[..]);
+        }
+    });
+}
+
+#[test]
+fn readers_have_no_copy() {
+    if !has_room(400_000_000) {
+        return;
+    }
+    run(async {
+        let place = Place::new();
+        let mut host = place.host();
+        let _readers: Vec<Helper> = (0..4)
+            .map(|_| Helper::start("reads_and_weighs_itself", &place.instance))
+            .collect();
+        let len = 100_000_000;
+        let held = publish(&host.documents(), 1, len);
+        let mut weighed = 0;
+        while weighed < 4 {
+            match host.next().await {
+                HostEvent::Hello { peer, .. } => {
+                    let welcome = welcome(&host);
+                    host.accept(peer, &welcome);
+                }
+                HostEvent::Message { message, .. } => {
+                    let FromPeer::JobDone { micros: kib, .. } = message else {
+                        panic!("{message:?}")
+                    };
+                    assert!(kib < 30_000, "{kib} KiB are private");
+                    weighed += 1;
+                }
+                other => panic!("{other:?}"),
+            }
+        }
+        check(&held, 1, len);
+    });
+}
+
+#[test]
+fn slots_are_recycled() {
+    if !has_room(1_000_000_000) {
+        return;
+    }
+    run(async {
+        let place = Place::new();
+        let mut host = place.host();
+        let (_, mut peer) = join(&mut host, &place, "reader").await;
+        let documents = host.documents();
+        let before = free_shared_memory();
+        let len = 20_000_000;
+        for doc in 1..=60 {
+            let held = publish(&documents, doc, len);
+            check(&arrival(&mut host, &mut peer, doc).await, doc, len);
+            peer.forget(DocId(doc));
+            drop(held);
+        }
+        let taken = before.saturating_sub(free_shared_memory());
+        assert!(taken < 30 * len as u64, "{taken} bytes for 60 documents");
+    });
+}
+
+fn free_shared_memory() -> u64 {
+    let stat = rustix::fs::statvfs("/dev/shm").unwrap();
+    stat.f_bavail * stat.f_frsize
+}
+
+#[test]
+fn who_comes_late_gets_what_is_there() {
+    run(async {
+        let place = Place::new();
+        let mut host = place.host();
+        let documents = host.documents();
+        let held: Vec<Held> = (1..=20)
+            .map(|doc| publish(&documents, doc, 10_000 * doc as usize))
+            .collect();
+        let large = publish(&documents, 21, 3_000_000);
+        let (_, mut peer) = join(&mut host, &place, "late").await;
+        for ours in held.iter().chain([&large]) {
+            let doc = ours.doc().0;
+            check(&arrival(&mut host, &mut peer, doc).await, doc, ours.len());
+        }
+    });
+}
+
+#[test]
+fn what_was_lost_is_published_again() {
+    run(async {
+        let place = Place::new();
+        let mut host = place.host();
+        let (_, mut peer) = join(&mut host, &place, "slow").await;
+        let documents = host.documents();
+        let first = publish(&documents, 1, 1_000);
+        // More than the slow reader's buffer takes while it does not read.
+        for doc in 2..=100 {
+            drop(publish(&documents, doc, 1_000));
+        }
+        arrival(&mut host, &mut peer, 100).await;
+        assert!(peer.document(DocId(1)).is_none());
+        documents.publish_again(&first).unwrap();
+        check(&arrival(&mut host, &mut peer, 1).await, 1, 1_000);
+    });
+}
+
+#[test]
+fn a_reader_never_runs_out_of_hands() {
+    run(async {
+        let place = Place::new();
+        let mut host = place.host();
+        let (_, mut peer) = join(&mut host, &place, "hoarder").await;
+        let documents = host.documents();
+        // Reads everything, forgets nothing, holds on to a few: the newest is always there.
+        let mut kept = BTreeMap::new();
+        for doc in 1..=400 {
+            drop(publish(&documents, doc, 100));
+            let held = arrival(&mut host, &mut peer, doc).await;
+            if doc % 20 == 0 {
+                kept.insert(doc, held);
+            }
+        }
+        for (doc, held) in kept {
+            check(&held, doc, 100);
+        }
+    });
+}
+
+#[test]
+fn no_more_is_lent_than_there_is() {
+    run(async {
+        let place = Place::new();
+        let host = place.host();
+        let documents = host.documents();
+        assert_eq!(
+            documents.loan(usize::MAX).err(),
+            Some(LoanError::TooLarge(usize::MAX))
+        );
+        let some: Vec<_> = (0..8).map(|_| documents.loan(100).unwrap()).collect();
+        assert_eq!(documents.loan(100).err(), Some(LoanError::Busy));
+        drop(some);
+        assert!(documents.loan(100).is_ok());
+
+        let place = Place::new();
+        let stat = rustix::fs::statvfs("/dev/shm").unwrap();
+        let options = HostOptions {
+            shm_reserve_bytes: u64::MAX,
+            ..HostOptions::default()
+        };
+        let host = Host::start(&place.instance, options).unwrap();
+        // The reserve is capped at a quarter, so what would leave less is refused.
+        let most = stat.f_bavail * stat.f_frsize - stat.f_blocks * stat.f_frsize / 4;
+        let refused = host.documents().loan(most as usize + (64 << 20));
+        if most < u64::from(u32::MAX) - (64 << 20) {
+            assert!(matches!(refused.err(), Some(LoanError::NoSpace { .. })));
+        }
+    });
+}
+
+#[test]
+fn documents_outlive_the_broker_in_the_hands_of_a_reader() {
+    run(async {
+        let place = Place::new();
+        let mut host = place.host();
+        let (_, mut peer) = join(&mut host, &place, "reader").await;
+        let documents = host.documents();
+        drop(publish(&documents, 1, 2_000_000));
+        let held = arrival(&mut host, &mut peer, 1).await;
+        drop(host);
+        assert!(matches!(documents.loan(1), Err(LoanError::Bus(_))));
+        drop(documents);
+        check(&held, 1, 2_000_000);
+        drop(peer);
+        check(&held, 1, 2_000_000);
+    });
+}
+
+#[test]
+fn a_killed_holder_gives_everything_back() {
+    run(async {
+        let place = Place::new();
+        let options = HostOptions {
+            active_documents: 2,
+            max_peers: 1,
+            ..HostOptions::default()
+        };
+        let mut host = Host::start(&place.instance, options).unwrap();
+        let documents = host.documents();
+        for doc in 1..=30 {
+            let holder = Helper::start("holds_documents", &place.instance);
+            drop(publish(&documents, doc, 1_000));
+            let id = loop {
+                if let HostEvent::Hello { peer, .. } = host.next().await {
+                    let welcome = welcome(&host);
+                    host.accept(peer, &welcome);
+                    break peer;
+                }
+            };
+            loop {
+                if let HostEvent::Message { message, .. } = host.next().await {
+                    // A late joiner gets the last two as well, and this one at the end.
+                    let FromPeer::JobDone { job, .. } = message else {
+                        panic!("{message:?}")
+                    };
+                    if job.0 == doc {
+                        break;
+                    }
+                }
+            }
+            holder.kill();
+            loop {
+                if let HostEvent::Gone { peer } = host.next().await {
+                    assert_eq!(peer, id);
+                    break;
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn writing_into_a_document_kills_the_writer_alone() {
+    run(async {
+        let place = Place::new();
+        let mut host = place.host();
+        let (_, mut peer) = join(&mut host, &place, "bystander").await;
+        let ours = publish(&host.documents(), 1, 1_000);
+        let mut writer = Helper::start("writes_into_a_document", &place.instance);
+        let id = loop {
+            if let HostEvent::Hello { peer, .. } = host.next().await {
+                let welcome = welcome(&host);
+                host.accept(peer, &welcome);
+                break peer;
+            }
+        };
+        loop {
+            if let HostEvent::Gone { peer } = host.next().await {
+                assert_eq!(peer, id);
+                break;
+            }
+        }
+        assert_eq!(writer.line(), "writes");
+        assert_eq!(writer.end().signal(), Some(libc::SIGSEGV));
+        check(&ours, 1, 1_000);
+        check(&arrival(&mut host, &mut peer, 1).await, 1, 1_000);
+    });
+}
+
+#[test]
+fn a_small_shared_memory_is_given_back_and_used_again() {
+    let place = Place::new();
+    let role = "lives_in_a_small_memory";
+    let Some(mut helper) = Helper::start_in_small_memory(role, &place.instance) else {
+        println!("skipped: mounting a small /dev/shm is not allowed here");
+        return;
+    };
+    assert_eq!(helper.line(), "40 documents, 1 refusals");
+    assert!(helper.end().success());
+}

@@ -1,0 +1,351 @@
+//! Other processes: this test binary, started again with a role in its environment.
+
+use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
+
+use qcbus_bus::{
+    Host, HostEvent, HostOptions, Instance, JoinError, LoanError, Peer, PeerEvent, PeerOptions,
+};
+use qcbus_document::FileKind;
+use qcbus_messages::{Digest, DocId, FromPeer, Job, JobId, ToPeer};
+
+use crate::support::{WATCHDOG, hello, is_uniform, run_forever, welcome};
+
+const ROLE: &str = "QCBUS_BUS_TEST_ROLE";
+const PLACE: &str = "QCBUS_BUS_TEST_PLACE";
+/// Lines that a helper prints for its test begin with this; the rest is the test harness'.
+const MARK: &str = "@@ ";
+
+/// A process that is killed, and waited for, when the test is over.
+pub struct Helper {
+    child: Child,
+    lines: Receiver<String>,
+}
+
+impl Helper {
+    pub fn start(role: &str, instance: &Instance) -> Helper {
+        Helper::run(
+            Command::new(std::env::current_exe().unwrap()),
+            role,
+            instance,
+        )
+    }
+
+    /// With a /dev/shm of its own of 64 MB; `None` when that is not allowed here.
+    pub fn start_in_small_memory(role: &str, instance: &Instance) -> Option<Helper> {
+        const MOUNT: &str = "mount -t tmpfs -o size=64m tmpfs /dev/shm";
+        let allowed = Command::new("unshare")
+            .args(["-m", "sh", "-c", MOUNT])
+            .stderr(Stdio::null())
+            .status();
+        if !allowed.is_ok_and(|status| status.success()) {
+            return None;
+        }
+        let mut command = Command::new("unshare");
+        let script = format!("{MOUNT} && exec \"$0\" \"$@\"");
+        command.args(["-m", "sh", "-c", &script]);
+        command.arg(std::env::current_exe().unwrap());
+        Some(Helper::run(command, role, instance))
+    }
+
+    fn run(mut command: Command, role: &str, instance: &Instance) -> Helper {
+        let mut child = command
+            .args(["--exact", "helper::other_process", "--nocapture"])
+            .env(ROLE, role)
+            .env(PLACE, instance.dir())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let output = BufReader::new(child.stdout.take().unwrap());
+        let (said, lines) = channel();
+        std::thread::spawn(move || {
+            for line in output.lines().map_while(Result::ok) {
+                if let Some((_, text)) = line.split_once(MARK) {
+                    let _ = said.send(text.to_owned());
+                }
+            }
+        });
+        Helper { child, lines }
+    }
+
+    pub fn pid(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// The next thing that the helper has to say.
+    pub fn line(&mut self) -> String {
+        self.lines
+            .recv_timeout(WATCHDOG)
+            .expect("the helper has ended, or never said anything")
+    }
+
+    /// What it has said meanwhile.
+    pub fn lines_so_far(&mut self) -> Vec<String> {
+        self.lines.try_iter().collect()
+    }
+
+    pub fn signal(&self, signal: rustix::process::Signal) {
+        let pid = rustix::process::Pid::from_child(&self.child);
+        rustix::process::kill_process(pid, signal).unwrap();
+    }
+
+    pub fn kill(mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+    }
+
+    /// Waits for its end.
+    pub fn end(mut self) -> std::process::ExitStatus {
+        self.child.wait().unwrap()
+    }
+}
+
+impl Drop for Helper {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn say(text: &str) {
+    println!("{MARK}{text}");
+}
+
+/// No test: what a helper process runs.
+#[test]
+fn other_process() {
+    let Ok(role) = std::env::var(ROLE) else {
+        return;
+    };
+    let instance = Instance::at(std::env::var_os(PLACE).unwrap().into());
+    run_forever(async {
+        match role.as_str() {
+            "holds_documents" => holds_documents(&instance).await,
+            "reads_and_weighs_itself" => reads_and_weighs_itself(&instance).await,
+            "lives_in_a_small_memory" => lives_in_a_small_memory(&instance).await,
+            "answers_jobs" => answers_jobs(&instance).await,
+            "writes_into_a_document" => writes_into_a_document(&instance).await,
+            "serves" => serves(&instance).await,
+            other => panic!("no role {other}"),
+        }
+    });
+}
+
+async fn member(instance: &Instance, name: &str) -> Result<Peer, JoinError> {
+    let options = PeerOptions {
+        patience: Duration::from_secs(30),
+        grace: Duration::from_secs(30),
+    };
+    Peer::join(instance, hello(name), options).await
+}
+
+/// Holds every document that arrives, for ever, and says so to the broker.
+async fn holds_documents(instance: &Instance) {
+    let mut peer = member(instance, "holder").await.unwrap();
+    let mut held = Vec::new();
+    loop {
+        if let PeerEvent::Document(doc) = peer.next().await {
+            held.extend(peer.document(doc));
+            peer.send(&FromPeer::JobDone {
+                job: JobId(doc.0),
+                micros: held.len() as u64,
+            });
+        }
+    }
+}
+
+/// Reads every byte of a document, and tells the broker how much memory of its own it has, in KiB.
+async fn reads_and_weighs_itself(instance: &Instance) {
+    let mut peer = member(instance, "reader").await.unwrap();
+    loop {
+        if let PeerEvent::Document(doc) = peer.next().await {
+            let held = peer.document(doc).unwrap();
+            assert!(is_uniform(&held, held[0]));
+            peer.send(&FromPeer::JobDone {
+                job: JobId(doc.0),
+                micros: private_memory(),
+            });
+        }
+    }
+}
+
+/// Broker and reader in one, in a /dev/shm that has no room for the history of large documents.
+async fn lives_in_a_small_memory(instance: &Instance) {
+    let place = crate::support::Place::at(instance);
+    let mut host = place.host();
+    let (_, mut peer) = crate::support::join(&mut host, &place, "reader").await;
+    let documents = host.documents();
+    let mut refused = 0;
+    for doc in 1..=40 {
+        let mut loan = loop {
+            match documents.loan(10_000_000) {
+                Ok(loan) => break loan,
+                Err(LoanError::NoSpace { .. }) => refused += 1,
+                Err(other) => panic!("{other}"),
+            }
+            tokio::select! {
+                event = host.next() => panic!("{event:?}"),
+                _ = peer.next() => {}
+                () = tokio::time::sleep(Duration::from_millis(5)) => {}
+            }
+        };
+        loan.fill(doc as u8);
+        let held = loan
+            .publish(DocId(doc), 10_000_000, Digest::default(), FileKind::Xodr)
+            .unwrap();
+        while peer.document(DocId(doc)).is_none() {
+            tokio::select! {
+                event = host.next() => panic!("{event:?}"),
+                _ = peer.next() => {}
+            }
+        }
+        assert!(is_uniform(&peer.document(DocId(doc)).unwrap(), doc as u8));
+        peer.forget(DocId(doc));
+        drop(held);
+    }
+    say(&format!("40 documents, {} refusals", refused.min(1)));
+}
+
+/// Memory of this process that it shares with nobody, in KiB (proc(5), `smaps_rollup`).
+fn private_memory() -> u64 {
+    std::fs::read_to_string("/proc/self/smaps_rollup")
+        .unwrap()
+        .lines()
+        .filter(|line| line.starts_with("Private_"))
+        .map(|line| {
+            line.split_whitespace()
+                .nth(1)
+                .unwrap()
+                .parse::<u64>()
+                .unwrap()
+        })
+        .sum()
+}
+
+/// Answers every job, with the sum of its document's bytes when it has one.
+async fn answers_jobs(instance: &Instance) {
+    let mut peer = member(instance, "answerer").await.unwrap();
+    say("joined");
+    let mut waiting: Vec<Job> = Vec::new();
+    loop {
+        match peer.next().await {
+            PeerEvent::Message(ToPeer::Job(job)) => {
+                let answered = waiting.is_empty() && answer(&mut peer, &job);
+                if !answered {
+                    let doc = job.documents[0].doc;
+                    peer.send(&FromPeer::NeedDocument { doc });
+                    waiting.push(job);
+                }
+            }
+            PeerEvent::Document(_) => waiting.retain(|job| !answer(&mut peer, job)),
+            PeerEvent::Message(ToPeer::Drain) => return peer.leave().await,
+            PeerEvent::Rejoined => {
+                waiting.clear();
+                say("rejoined");
+            }
+            PeerEvent::Closed { .. } => return,
+            _ => {}
+        }
+    }
+}
+
+/// `false` when its document is not there.
+fn answer(peer: &mut Peer, job: &Job) -> bool {
+    let mut sum = 0;
+    for document in &job.documents {
+        let Some(held) = peer.document(document.doc) else {
+            return false;
+        };
+        sum += held.iter().map(|byte| u64::from(*byte)).sum::<u64>();
+        peer.forget(document.doc);
+    }
+    peer.send(&FromPeer::JobDone {
+        job: job.job,
+        micros: sum,
+    });
+    true
+}
+
+#[expect(unsafe_code, reason = "what is tested is that this cannot be done")]
+async fn writes_into_a_document(instance: &Instance) {
+    let mut peer = member(instance, "scribbler").await.unwrap();
+    loop {
+        if let PeerEvent::Document(doc) = peer.next().await {
+            let held = peer.document(doc).unwrap();
+            say("writes");
+            // SAFETY: there is none; the process dies here, and that is the point.
+            unsafe { std::ptr::write_volatile(held.as_ptr().cast_mut(), 0) };
+            say("has written");
+        }
+    }
+}
+
+/// Jobs that a peer of [`serves`] has before it.
+const IN_FLIGHT: u64 = 8;
+
+/// A broker that keeps every peer busy without end, and says when an answer is missing, doubled or
+/// out of order.
+async fn serves(instance: &Instance) {
+    let mut host = Host::start(instance, HostOptions::default()).unwrap();
+    say(&format!("serves {}", host.generation()));
+    let documents = host.documents();
+    let mut image = documents.loan(1000).unwrap();
+    image.fill(1);
+    let held = image
+        .publish(DocId(1), 1000, Digest::default(), FileKind::Xodr)
+        .unwrap();
+    let mut expected = BTreeMap::new();
+    loop {
+        match host.next().await {
+            HostEvent::Hello { peer, .. } => {
+                let welcome = welcome(&host);
+                host.accept(peer, &welcome);
+                expected.insert(peer, 1);
+                for number in 1..=IN_FLIGHT {
+                    host.send(peer, &job_with(number, DocId(1)));
+                }
+            }
+            HostEvent::Message { peer, message } => match message {
+                FromPeer::JobDone { job, micros } => {
+                    let next = expected.get_mut(&peer).unwrap();
+                    if (*next, 1000) != (job.0, micros) {
+                        say(&format!("wrong: {job:?} {micros} instead of {next}"));
+                    }
+                    *next += 1;
+                    if job.0 % 100 == 1 {
+                        say(&format!("done {}", job.0));
+                    }
+                    host.send(peer, &job_with(job.0 + IN_FLIGHT, DocId(1)));
+                }
+                FromPeer::NeedDocument { .. } => {
+                    if let Err(error) = documents.publish_again(&held) {
+                        say(&format!("wrong: {error}"));
+                    }
+                }
+                _ => {}
+            },
+            HostEvent::Garbage { what, .. } => say(&format!("wrong: garbage, {what}")),
+            HostEvent::Gone { .. } => {}
+        }
+    }
+}
+
+pub fn job_with(number: u64, doc: DocId) -> ToPeer {
+    ToPeer::Job(Job {
+        job: JobId(number),
+        config: Digest::default(),
+        kind: FileKind::Xodr,
+        documents: vec![qcbus_messages::JobDocument {
+            doc,
+            role: qcbus_messages::DocumentRole::Root,
+            path: "/farm/map.xodr".to_owned(),
+            digest: Digest::default(),
+            referred_at: 0,
+        }],
+        missing: Vec::new(),
+    })
+}

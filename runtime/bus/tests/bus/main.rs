@@ -1,0 +1,17 @@
+//! The bus between real endpoints, in one process and in several.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "all of this is test code, also what is no `#[test]` itself"
+)]
+
+mod helper;
+mod support;
+
+mod deaths;
+mod delivery;
+mod documents;
+mod torture;

@@ -1,0 +1,417 @@
+//! The command line.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
+
+/// A checker for OpenDRIVE roads and OpenSCENARIO scenarios that parses every file once and lets
+/// independent checker bundles read it in place.
+#[derive(Debug, Parser)]
+#[command(name = "qcbus", version, about, max_term_width = 100)]
+#[command(
+    after_help = "Exit codes: 0 accepted · 1 rejected · 2 usage or configuration · \
+3 undetermined or timeout · 4 no broker · 5 internal error"
+)]
+pub struct Args {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Check files and directories once, and print what was found
+    Check(CheckArgs),
+    /// Watch directories and judge whatever appears in them
+    Serve(Box<ServeArgs>),
+    /// Let a running broker finish what it has and stop
+    Down(InstanceArgs),
+    /// Show how a running broker is doing
+    Status(StatusArgs),
+    /// Wait for the verdict on a file's present content
+    Wait(WaitArgs),
+    /// Let a running broker read its configuration and bundle manifests again
+    Reload(InstanceArgs),
+    /// List, run, add or remove checker bundles
+    #[command(subcommand)]
+    Bundle(BundleCommand),
+    /// Run a reporter
+    #[command(subcommand, hide = true)]
+    Reporter(ReporterCommand),
+    /// Explain a rule, or list all of them
+    Rule(RuleArgs),
+    /// Look at a configuration without using it
+    #[command(subcommand)]
+    Config(ConfigCommand),
+    /// Compile XML schemas to tables
+    #[command(subcommand)]
+    Schema(SchemaCommand),
+    /// Look for what may keep a broker from working, and say what to do
+    Doctor(DoctorArgs),
+}
+
+/// Which broker.
+#[derive(Debug, Clone, Default, ClapArgs)]
+pub struct InstanceArgs {
+    /// Name of the instance
+    #[arg(long, value_name = "NAME", default_value = "default")]
+    pub instance: String,
+    /// Runtime directory of the instance, instead of a name
+    #[arg(
+        long,
+        value_name = "DIR",
+        conflicts_with = "instance",
+        hide_short_help = true
+    )]
+    pub instance_dir: Option<PathBuf>,
+}
+
+/// How results are written.
+#[derive(Debug, Clone, ClapArgs)]
+pub struct OutputArgs {
+    /// Directory for results (default: qcbus-out)
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Form of the .xqar files
+    #[arg(long, value_enum, default_value_t = DialectArg::Current)]
+    pub xqar_dialect: DialectArg,
+}
+
+/// The forms of a result file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum DialectArg {
+    /// As ASAM's framework writes today
+    Current,
+    /// As QC4OpenX 1.0.0 wrote in 2023
+    Qc4openx,
+}
+
+/// Caps on what is read.
+#[derive(Debug, Clone, ClapArgs)]
+#[command(next_help_heading = "Limits")]
+pub struct LimitArgs {
+    /// Largest file on disk, in MiB
+    #[arg(long, value_name = "MIB", hide_short_help = true)]
+    pub max_file: Option<u64>,
+    /// Largest file after unpacking, in MiB
+    #[arg(long, value_name = "MIB", hide_short_help = true)]
+    pub max_unpacked: Option<u64>,
+    /// Largest ratio of unpacked to packed size
+    #[arg(long, value_name = "N", hide_short_help = true)]
+    pub max_ratio: Option<u32>,
+    /// Most members of an archive
+    #[arg(long, value_name = "N", hide_short_help = true)]
+    pub max_members: Option<u32>,
+    /// Deepest nesting of elements
+    #[arg(long, value_name = "N", hide_short_help = true)]
+    pub max_depth: Option<u16>,
+    /// A bundle must end a file within this time
+    #[arg(long, value_name = "TIME", value_parser = duration, hide_short_help = true)]
+    pub job_deadline: Option<Duration>,
+    /// A bundle with work that says nothing for this long is taken for dead
+    #[arg(long, value_name = "TIME", value_parser = duration, hide_short_help = true)]
+    pub silence_limit: Option<Duration>,
+    /// Most private memory of a bundle, in MiB
+    #[arg(long, value_name = "MIB", hide_short_help = true)]
+    pub memory_limit: Option<u64>,
+    /// Restarts of a bundle within a minute before it rests
+    #[arg(long, value_name = "N", hide_short_help = true)]
+    pub max_restarts: Option<u32>,
+}
+
+/// `qcbus check`.
+#[derive(Debug, ClapArgs)]
+pub struct CheckArgs {
+    /// Files and directories; with -c the default is the configuration's InputFile
+    #[arg(value_name = "PATH")]
+    pub paths: Vec<PathBuf>,
+    /// ASAM configuration: run what it demands, as it demands it
+    #[arg(short, long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// How results are written.
+    #[command(flatten)]
+    pub output: OutputArgs,
+    /// What to print
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub format: Format,
+    /// Print only the verdicts
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Directory of manifests of further bundles
+    #[arg(long, value_name = "DIR")]
+    pub bundles_d: Option<PathBuf>,
+    /// Directory of XML schemas (.xsd, .tbl) to use instead of those that come with qcbus
+    #[arg(long, value_name = "DIR")]
+    pub schema_dir: Option<PathBuf>,
+    /// Caps.
+    #[command(flatten)]
+    pub limits: LimitArgs,
+}
+
+/// What is printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// For people
+    Text,
+    /// One JSON document per file and line
+    Json,
+}
+
+/// `qcbus serve`.
+#[derive(Debug, ClapArgs)]
+pub struct ServeArgs {
+    /// Directories to watch
+    #[arg(value_name = "DIR", required = true)]
+    pub directories: Vec<PathBuf>,
+    /// Which instance to be.
+    #[command(flatten)]
+    pub instance: InstanceArgs,
+    /// ASAM configuration; read again whenever it changes
+    #[arg(short, long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// How results are written.
+    #[command(flatten)]
+    pub output: OutputArgs,
+    /// Directory of what must survive a restart (default: OUT/.qcbus)
+    #[arg(long, value_name = "DIR")]
+    pub state: Option<PathBuf>,
+    /// Directory of bundle manifests, watched (default: STATE/bundles.d)
+    #[arg(long, value_name = "DIR")]
+    pub bundles_d: Option<PathBuf>,
+    /// Directory of XML schemas (.xsd, .tbl) to use instead of those that come with qcbus
+    #[arg(long, value_name = "DIR")]
+    pub schema_dir: Option<PathBuf>,
+    /// Publish accepted files here, and only those
+    #[arg(long, value_name = "DIR")]
+    pub gate: Option<PathBuf>,
+    /// Run a reporter; may be given several times
+    #[arg(long, value_name = "NAME", value_enum)]
+    pub report: Vec<ReportArg>,
+    /// Look around at intervals instead of relying on file events (network file systems)
+    #[arg(long, value_name = "TIME", num_args = 0..=1, default_missing_value = "2s", value_parser = duration)]
+    pub poll: Option<Duration>,
+    /// How long the history of jobs is kept
+    #[arg(long, value_name = "TIME", default_value = "90d", value_parser = duration)]
+    pub retention: Duration,
+    /// Look through everything this often even when file events arrive
+    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = duration, hide_short_help = true)]
+    pub rescan: Duration,
+    /// Finish within this time when told to stop
+    #[arg(long, value_name = "TIME", default_value = "30s", value_parser = duration, hide_short_help = true)]
+    pub drain_limit: Duration,
+    /// Do not start the standard bundles
+    #[arg(long, hide_short_help = true)]
+    pub no_standard_bundles: bool,
+    /// Caps.
+    #[command(flatten)]
+    pub limits: LimitArgs,
+}
+
+/// The standard reporters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ReportArg {
+    /// NAME.txt beside every result
+    Text,
+    /// NAME.json beside every result
+    Json,
+}
+
+/// `qcbus status`.
+#[derive(Debug, ClapArgs)]
+pub struct StatusArgs {
+    /// Which broker.
+    #[command(flatten)]
+    pub instance: InstanceArgs,
+    /// For programs
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `qcbus wait`.
+#[derive(Debug, ClapArgs)]
+pub struct WaitArgs {
+    /// The file
+    pub file: PathBuf,
+    /// Give up after this time (30s, 5m); without it, wait for ever
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    pub timeout: Option<Duration>,
+    /// Which broker.
+    #[command(flatten)]
+    pub instance: InstanceArgs,
+    /// For programs
+    #[arg(long)]
+    pub json: bool,
+    /// Say nothing, only end with the exit code
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// `qcbus bundle …`.
+#[derive(Debug, Subcommand)]
+pub enum BundleCommand {
+    /// List the standard bundles and those that a broker has
+    List(StatusArgs),
+    /// Run a bundle: on the bus, on one FILE, or as an ASAM module with -c
+    Run(BundleRunArgs),
+    /// Let a running broker start one more bundle
+    Add(BundleAddArgs),
+    /// Let a running broker drain a bundle that was added
+    Remove(BundleRemoveArgs),
+}
+
+/// `qcbus bundle run`.
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "Arguments of a bundle:\n  \
+[--instance NAME | --instance-dir DIR]  join the bus of a running broker\n  \
+[--format text|json] FILE               check one file and print what was found\n  \
+-c CONFIG                               run as a module of ASAM's framework\n  \
+[--schema-dir DIR]                      with each of them: schemas to use instead of the known ones")]
+pub struct BundleRunArgs {
+    /// A standard bundle (xodr, xosc) or a program that is a bundle
+    pub name: String,
+    /// Arguments for the bundle; without any it joins the bus of the default instance
+    #[arg(
+        trailing_var_arg = true,
+        allow_hyphen_values = true,
+        value_name = "ARGUMENT"
+    )]
+    pub arguments: Vec<std::ffi::OsString>,
+}
+
+/// How a daemon joins the bus.
+#[derive(Debug, Clone, Default, ClapArgs)]
+pub struct BusArgs {
+    /// Which broker.
+    #[command(flatten)]
+    pub instance: InstanceArgs,
+    /// Given by the broker that starts this process
+    #[arg(long, hide = true)]
+    pub launch: Option<u64>,
+    /// Leave at once when the process that started this one dies
+    #[arg(long, hide = true)]
+    pub die_with_parent: bool,
+}
+
+/// `qcbus bundle add`.
+#[derive(Debug, ClapArgs)]
+pub struct BundleAddArgs {
+    /// The bundle's name, as it says it itself
+    pub name: String,
+    /// The program and its arguments
+    #[arg(required = true, trailing_var_arg = true, allow_hyphen_values = true)]
+    pub command: Vec<String>,
+    /// Directory of bundle manifests of the broker (default: qcbus-out/.qcbus/bundles.d)
+    #[arg(long, value_name = "DIR")]
+    pub bundles_d: Option<PathBuf>,
+}
+
+/// `qcbus bundle remove`.
+#[derive(Debug, ClapArgs)]
+pub struct BundleRemoveArgs {
+    /// The bundle's name
+    pub name: String,
+    /// Directory of bundle manifests of the broker (default: qcbus-out/.qcbus/bundles.d)
+    #[arg(long, value_name = "DIR")]
+    pub bundles_d: Option<PathBuf>,
+}
+
+/// `qcbus reporter …`.
+#[derive(Debug, Subcommand)]
+pub enum ReporterCommand {
+    /// Run a reporter on the bus
+    Run {
+        /// text or json
+        #[arg(value_enum)]
+        name: ReportArg,
+        /// How to join the bus.
+        #[command(flatten)]
+        bus: BusArgs,
+    },
+}
+
+/// `qcbus rule`.
+#[derive(Debug, ClapArgs)]
+pub struct RuleArgs {
+    /// A checker id or a rule UID
+    pub id: Option<String>,
+    /// How to print it
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub format: Format,
+}
+
+/// `qcbus config …`.
+#[derive(Debug, Subcommand)]
+pub enum ConfigCommand {
+    /// Say what is wrong or odd about a configuration
+    Check {
+        /// The configuration
+        file: PathBuf,
+    },
+}
+
+/// `qcbus schema …`.
+#[derive(Debug, Subcommand)]
+pub enum SchemaCommand {
+    /// Compile the .xsd files of a directory
+    Compile {
+        /// Directory of .xsd files, or one of them
+        path: PathBuf,
+        /// Where to write the tables
+        #[arg(short, long, value_name = "FILE")]
+        output: PathBuf,
+    },
+}
+
+/// `qcbus doctor`.
+#[derive(Debug, ClapArgs)]
+pub struct DoctorArgs {
+    /// Which broker.
+    #[command(flatten)]
+    pub instance: InstanceArgs,
+    /// State directory to look into
+    #[arg(long, value_name = "DIR", default_value = "qcbus-out/.qcbus")]
+    pub state: PathBuf,
+}
+
+/// Reads `250ms`, `30s`, `5m`, `2h`, `90d`; a number alone is seconds.
+pub fn duration(text: &str) -> Result<Duration, String> {
+    let split = text
+        .find(|c: char| !(c.is_ascii_digit() || c == '.'))
+        .unwrap_or(text.len());
+    let (number, unit) = text.split_at(split);
+    let wrong = || format!("`{text}` is no time; write 250ms, 30s, 5m, 2h or 90d");
+    let number: f64 = number.parse().map_err(|_| wrong())?;
+    let seconds = match unit {
+        "ms" => number / 1000.0,
+        "" | "s" => number,
+        "m" | "min" => number * 60.0,
+        "h" => number * 3600.0,
+        "d" => number * 86400.0,
+        _ => return Err(wrong()),
+    };
+    Duration::try_from_secs_f64(seconds).map_err(|_| wrong())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_sound() {
+        use clap::CommandFactory;
+        Args::command().debug_assert();
+    }
+
+    #[test]
+    fn times_are_read_as_people_write_them() {
+        assert_eq!(duration("250ms"), Ok(Duration::from_millis(250)));
+        assert_eq!(duration("30s"), Ok(Duration::from_secs(30)));
+        assert_eq!(duration("30"), Ok(Duration::from_secs(30)));
+        assert_eq!(duration("1.5m"), Ok(Duration::from_secs(90)));
+        assert_eq!(duration("90d"), Ok(Duration::from_secs(90 * 86400)));
+        assert!(duration("soon").is_err());
+        assert!(duration("3 parsecs").is_err());
+    }
+}

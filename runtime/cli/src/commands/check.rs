@@ -1,0 +1,388 @@
+//! `qcbus check`: a private broker for one run, the same engine as `serve`.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use qcbus_broker::core::{Delivery, Judged, Settings};
+use qcbus_broker::{Broker, Options, Places, Told};
+use qcbus_bus::{HostOptions, Instance};
+use qcbus_document::FileKind;
+use qcbus_formats::config::Config;
+use qcbus_messages::{Exit, Verdict};
+use qcbus_reporter_sdk::FileSources;
+
+use super::settings::{absolute, dialect, limits, memory_limit, program, settings};
+use crate::args::{CheckArgs, Format};
+use crate::{standard, talk};
+
+/// Runs the command.
+pub fn run(args: &CheckArgs) -> Exit {
+    talk::log("warn");
+    match prepare(args) {
+        Ok(prepared) => check(args, prepared),
+        Err((exit, why)) => {
+            talk::fail(&why);
+            exit
+        }
+    }
+}
+
+type Refusal = (Exit, String);
+
+fn usage(why: impl Into<String>) -> Refusal {
+    (Exit::Usage, why.into())
+}
+
+/// What is to be checked, and how.
+struct Prepared {
+    options: Options,
+    config: Option<Arc<Config>>,
+}
+
+fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
+    let config = args.config.as_deref().map(absolute);
+    let parsed = match &config {
+        Some(path) => Some(
+            qcbus_broker::reload::read_config(path)
+                .map_err(|error| usage(error.to_string()))?
+                .0,
+        ),
+        None => None,
+    };
+    let (roots, files) = targets(args, config.as_deref(), parsed.as_ref())?;
+    let asam = config.is_some() && roots.is_empty() && files.len() == 1;
+    let out = absolute(args.output.out.as_deref().unwrap_or(Path::new(if asam {
+        "."
+    } else {
+        "qcbus-out"
+    })));
+    let program = program().map_err(|why| (Exit::Internal, why))?;
+    let (kinds, config_named) = (kinds(&roots, &files), parsed.is_some());
+    let kinds = if config_named {
+        FileKind::ALL.into_iter().collect()
+    } else {
+        kinds
+    };
+    let bundles = standard::bundle_specs(&program, &kinds, args.schema_dir.as_deref());
+    let options = Options {
+        instance: private_instance().map_err(|why| (Exit::Internal, why))?,
+        roots,
+        files,
+        watch: false,
+        poll: None,
+        rescan: Duration::MAX,
+        single_result: asam.then(|| out.join("Result.xqar")),
+        out,
+        state: None,
+        retention: Duration::MAX,
+        dialect: dialect(args.output.xqar_dialect),
+        durable: false,
+        verdict_files: false,
+        gate: None,
+        config,
+        bundles_d: args.bundles_d.as_deref().map(absolute),
+        standard: wanted_bundles(bundles.map_err(usage)?, parsed.as_ref()),
+        reporters: standard::reporter_specs(&program),
+        die_with_broker: true,
+        memory_limit: memory_limit(&args.limits),
+        limits: limits(&args.limits),
+        host: HostOptions::default(),
+        settings: Settings {
+            once: true,
+            collect: Duration::ZERO,
+            ..settings(&args.limits)
+        },
+    };
+    Ok(Prepared {
+        options,
+        config: parsed.map(Arc::new),
+    })
+}
+
+/// A configuration runs what it names and nothing else.
+fn wanted_bundles(
+    specs: Vec<qcbus_broker::core::ChildSpec>,
+    config: Option<&Config>,
+) -> Vec<qcbus_broker::core::ChildSpec> {
+    let Some(config) = config else { return specs };
+    let named = |name: &str| {
+        let alias = standard::bundle(name).map_or("", |bundle| bundle.alias);
+        config.bundle(name, alias).is_some()
+    };
+    specs.into_iter().filter(|spec| named(&spec.name)).collect()
+}
+
+/// Directories and files, from the command line or from the configuration.
+fn targets(
+    args: &CheckArgs,
+    config_path: Option<&Path>,
+    config: Option<&Config>,
+) -> Result<(Vec<PathBuf>, Vec<PathBuf>), Refusal> {
+    let mut paths = args.paths.clone();
+    if paths.is_empty() {
+        let Some(config) = config else {
+            return Err(usage(
+                "nothing to check: name files or directories, or a configuration with -c",
+            ));
+        };
+        let Some(input) = config.input_file() else {
+            return Err(usage(
+                "the configuration names no InputFile; add one, or name a file after -c CONFIG",
+            ));
+        };
+        paths.push(input_path(Path::new(input), config_path));
+    }
+    let (mut roots, mut files) = (BTreeSet::new(), BTreeSet::new());
+    for path in &paths {
+        let real = std::fs::canonicalize(path)
+            .map_err(|error| usage(format!("cannot check {}: {error}", path.display())))?;
+        if real.is_dir() {
+            roots.insert(real);
+        } else if !real.is_file() {
+            let shown = path.display();
+            return Err(usage(format!(
+                "cannot check {shown}: it is no regular file"
+            )));
+        } else if FileKind::of_path(&real).is_some() {
+            files.insert(real);
+        } else {
+            let shown = path.display();
+            return Err(usage(format!(
+                "{shown} is no file that qcbus checks (.xodr .xodrz .xodr.gz .xosc .mosc)"
+            )));
+        }
+    }
+    files.retain(|file| !roots.iter().any(|root| file.starts_with(root)));
+    let nested: Vec<PathBuf> = roots
+        .iter()
+        .filter(|root| roots.iter().any(|it| it != *root && root.starts_with(it)))
+        .cloned()
+        .collect();
+    roots.retain(|root| !nested.contains(root));
+    Ok((roots.into_iter().collect(), files.into_iter().collect()))
+}
+
+/// A relative InputFile is meant from here, as ASAM's bundles take it, else from beside the
+/// configuration.
+fn input_path(input: &Path, config: Option<&Path>) -> PathBuf {
+    let beside = config
+        .and_then(Path::parent)
+        .map(|directory| directory.join(input));
+    match beside {
+        Some(beside) if !input.exists() && beside.exists() => beside,
+        _ => input.to_path_buf(),
+    }
+}
+
+fn kinds(roots: &[PathBuf], files: &[PathBuf]) -> BTreeSet<FileKind> {
+    if roots.is_empty() {
+        files
+            .iter()
+            .filter_map(|file| FileKind::of_path(file))
+            .collect()
+    } else {
+        FileKind::ALL.into_iter().collect()
+    }
+}
+
+fn private_instance() -> Result<Instance, String> {
+    qcbus_bus::sweep_private_instances();
+    let random = u64::from_le_bytes(random_bytes()?);
+    let name = format!("check-{}-{random:016x}", std::process::id());
+    Instance::named(&name).map_err(|error| error.to_string())
+}
+
+fn random_bytes() -> Result<[u8; 8], String> {
+    let mut bytes = [0; 8];
+    rustix::rand::getrandom(&mut bytes, rustix::rand::GetRandomFlags::empty())
+        .map_err(|error| format!("no random number: {error}"))?;
+    Ok(bytes)
+}
+
+fn check(args: &CheckArgs, prepared: Prepared) -> Exit {
+    let places = {
+        let options = &prepared.options;
+        let mut places = Places::new(options.out.clone(), options.roots.clone(), &options.files);
+        places.single.clone_from(&options.single_result);
+        places
+    };
+    let printer = Printer {
+        places,
+        config: prepared.config,
+        format: args.format,
+        quiet: args.quiet,
+        progress: talk::Progress::new(!args.quiet),
+        expected: Vec::new(),
+        printed: 0,
+        judged: BTreeMap::new(),
+        verdicts: Vec::new(),
+        notices: BTreeSet::new(),
+    };
+    let directory = prepared.options.instance.dir().to_path_buf();
+    let printer = Arc::new(Mutex::new(printer));
+    let exit = drive(prepared.options, &printer);
+    // Private to this run; what is left of it is of no use to anybody.
+    let _ = std::fs::remove_dir_all(directory);
+    let mut printer = printer.lock().unwrap_or_else(PoisonError::into_inner);
+    match exit {
+        Err((exit, why)) => {
+            talk::fail(&why);
+            exit
+        }
+        Ok(()) => printer.finish(),
+    }
+}
+
+fn drive(options: Options, printer: &Arc<Mutex<Printer>>) -> Result<(), Refusal> {
+    let internal = |why: String| (Exit::Internal, why);
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(|error| internal(format!("cannot start: {error}")))?;
+    runtime.block_on(async {
+        let printer = printer.clone();
+        let tell = move |told| {
+            printer
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .told(told);
+        };
+        let broker = Broker::start(options, tell).map_err(|error| match error {
+            qcbus_broker::StartError::Load(_) => usage(error.to_string()),
+            _ => internal(error.to_string()),
+        })?;
+        let stops = super::stops::listen().map_err(|error| internal(error.to_string()))?;
+        broker.run(stops).await;
+        Ok(())
+    })?;
+    // Threads that still read a file must not hold up the end.
+    runtime.shutdown_background();
+    Ok(())
+}
+
+/// Prints results in the order of their paths, each as soon as those before it are there.
+struct Printer {
+    places: Places,
+    config: Option<Arc<Config>>,
+    format: Format,
+    quiet: bool,
+    progress: talk::Progress,
+    expected: Vec<Arc<Path>>,
+    printed: usize,
+    judged: BTreeMap<Arc<Path>, Arc<Judged>>,
+    verdicts: Vec<Verdict>,
+    notices: BTreeSet<String>,
+}
+
+impl Printer {
+    fn told(&mut self, told: Told) {
+        match told {
+            Told::Notice(notice) => {
+                if self.notices.insert(notice.clone()) {
+                    self.progress.clear();
+                    talk::say(&format!("note: {notice}"));
+                }
+            }
+            Told::Scanned { files } => {
+                self.expected = files;
+                self.print_ready();
+            }
+            Told::Verdict(verdict) => {
+                self.judged.insert(verdict.path, verdict.judged);
+                self.print_ready();
+            }
+        }
+    }
+
+    fn print_ready(&mut self) {
+        while let Some(path) = self.expected.get(self.printed).cloned() {
+            let Some(judged) = self.judged.remove(&path) else {
+                break;
+            };
+            self.print(&path, judged);
+            self.printed += 1;
+        }
+        let (done, total) = (self.verdicts.len() + self.judged.len(), self.expected.len());
+        if total > 0 {
+            self.progress.show(&format!("{done}/{total} files"));
+        }
+    }
+
+    fn print(&mut self, path: &Arc<Path>, judged: Arc<Judged>) {
+        self.progress.clear();
+        self.verdicts.push(judged.verdict);
+        let shown = self.places.display(path);
+        if self.quiet && self.format == Format::Text {
+            talk::print(&format!("{}: {}\n", shown.display(), judged.verdict));
+            return;
+        }
+        let delivery = Delivery {
+            job: judged.job,
+            path: path.clone(),
+            judged,
+        };
+        let message = qcbus_broker::deliveries::message(
+            "stdout",
+            &delivery,
+            None,
+            &self.places,
+            self.config.as_ref(),
+        );
+        match (message, self.format) {
+            (Ok(message), Format::Text) => {
+                let options = qcbus_report_text::Options {
+                    width: talk::width(),
+                    color: talk::color(),
+                    skipped_names: 2,
+                };
+                let sources = FileSources::new(&message);
+                talk::print(&qcbus_report_text::render(&message, &options, &sources));
+            }
+            (Ok(message), Format::Json) => match qcbus_report_json::render(&message, 0) {
+                Ok(text) => talk::print(&text),
+                Err(error) => talk::fail(&error.to_string()),
+            },
+            (Err(why), _) => talk::fail(&why),
+        }
+    }
+
+    fn finish(&mut self) -> Exit {
+        self.progress.clear();
+        let rest: Vec<_> = std::mem::take(&mut self.judged).into_iter().collect();
+        for (path, judged) in rest {
+            self.print(&path, judged);
+        }
+        let count = |verdict| self.verdicts.iter().filter(|it| **it == verdict).count();
+        let total = self.verdicts.len();
+        if total == 0 {
+            talk::fail(
+                "nothing to check: there is no .xodr, .xodrz, .xodr.gz, .xosc or .mosc file",
+            );
+            return Exit::Usage;
+        }
+        if total < self.expected.len() {
+            let missing = self.expected.len() - total;
+            talk::say(&format!(
+                "note: {missing} files were not judged (removed meanwhile, or interrupted)"
+            ));
+        }
+        let files = if total == 1 { "file" } else { "files" };
+        if self.format == Format::Text && (total > 1 || self.quiet) {
+            talk::say(&format!(
+                "{total} {files}: {} accepted, {} rejected, {} undetermined; results in {}",
+                count(Verdict::Accepted),
+                count(Verdict::Rejected),
+                count(Verdict::Undetermined),
+                self.places.out.display()
+            ));
+        }
+        let exit = Exit::of_verdicts(self.verdicts.iter().copied());
+        if exit == Exit::Accepted && total < self.expected.len() {
+            Exit::Undetermined
+        } else {
+            exit
+        }
+    }
+}

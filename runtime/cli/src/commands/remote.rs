@@ -1,0 +1,119 @@
+//! Commands that ask a running broker: `down`, `wait`, `reload`.
+
+use qcbus_broker::control::{AskError, ask_broker};
+use qcbus_messages::Exit;
+use qcbus_messages::control::{FileVerdict, Request, Response};
+
+use super::settings::{absolute, instance};
+use crate::args::{InstanceArgs, WaitArgs};
+use crate::talk;
+
+/// Asks the broker of an instance; a failure has been said already.
+pub fn ask(args: &InstanceArgs, request: &Request) -> Result<Response, Exit> {
+    let instance = instance(args).map_err(|why| {
+        talk::fail(&why);
+        Exit::Usage
+    })?;
+    ask_broker(instance.dir(), request).map_err(|error| {
+        talk::fail(&error.to_string());
+        match error {
+            AskError::NoBroker { .. } => Exit::NoBroker,
+            AskError::NoAnswer(_) => Exit::Internal,
+        }
+    })
+}
+
+/// `qcbus down`.
+pub fn down(args: &InstanceArgs) -> Exit {
+    match ask(args, &Request::Down) {
+        Ok(Response::Stopped) => {
+            talk::say("stopped");
+            Exit::Accepted
+        }
+        Ok(other) => unexpected(&other),
+        Err(exit) => exit,
+    }
+}
+
+/// `qcbus reload`.
+pub fn reload(args: &InstanceArgs) -> Exit {
+    match ask(args, &Request::Reload) {
+        Ok(Response::Reloaded { changes }) if changes.is_empty() => {
+            talk::print("nothing changed\n");
+            Exit::Accepted
+        }
+        Ok(Response::Reloaded { changes }) => {
+            talk::print(&format!("{}\n", changes.join("\n")));
+            Exit::Accepted
+        }
+        Ok(other) => unexpected(&other),
+        Err(exit) => exit,
+    }
+}
+
+/// `qcbus wait`.
+pub fn wait(args: &WaitArgs) -> Exit {
+    let file = std::fs::canonicalize(&args.file).unwrap_or_else(|_| absolute(&args.file));
+    let timeout_ms = args
+        .timeout
+        .map(|it| u64::try_from(it.as_millis()).unwrap_or(u64::MAX));
+    match ask(&args.instance, &Request::Wait { file, timeout_ms }) {
+        Ok(Response::Verdict(verdict)) => tell(args, &verdict),
+        Ok(Response::TimedOut) => {
+            let why = if args.file.exists() {
+                ""
+            } else {
+                ": there is no such file"
+            };
+            talk::fail(&format!(
+                "no verdict on {} in time{why}",
+                args.file.display()
+            ));
+            Exit::Undetermined
+        }
+        Ok(Response::Unwatched { reason }) => {
+            talk::fail(&reason);
+            Exit::Usage
+        }
+        Ok(other) => unexpected(&other),
+        Err(exit) => exit,
+    }
+}
+
+fn tell(args: &WaitArgs, verdict: &FileVerdict) -> Exit {
+    if args.json {
+        match serde_json::to_string(verdict) {
+            Ok(text) => talk::print(&format!("{text}\n")),
+            Err(error) => talk::fail(&error.to_string()),
+        }
+    } else if !args.quiet {
+        talk::print(&format!(
+            "{}: {} ({}, {}); {}\n",
+            args.file.display(),
+            verdict.verdict,
+            count(verdict.errors, "error"),
+            count(verdict.warnings, "warning"),
+            verdict.xqar.display()
+        ));
+        for why in &verdict.why {
+            talk::print(&format!("  {why}\n"));
+        }
+    }
+    Exit::of_verdicts([verdict.verdict])
+}
+
+fn count(number: u64, of: &str) -> String {
+    let plural = if number == 1 { "" } else { "s" };
+    format!("{number} {of}{plural}")
+}
+
+fn unexpected(response: &Response) -> Exit {
+    match response {
+        Response::Failed { reason } => talk::fail(reason),
+        other => talk::fail(&format!("the broker answered something else: {other:?}")),
+    }
+    match response {
+        Response::Failed { .. } => Exit::Usage,
+        _ => Exit::Internal,
+    }
+}

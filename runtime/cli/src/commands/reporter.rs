@@ -1,0 +1,61 @@
+//! `qcbus reporter run`: a reporter daemon.
+
+use qcbus_messages::Exit;
+use qcbus_reporter_sdk::{Identity, Reporter, RunError};
+
+use super::settings::instance;
+use crate::args::{BusArgs, ReportArg};
+use crate::talk;
+
+/// Runs the command.
+pub fn run(name: ReportArg, bus: &BusArgs) -> Exit {
+    talk::log("warn");
+    let instance = match instance(&bus.instance) {
+        Ok(instance) => instance,
+        Err(why) => {
+            talk::fail(&why);
+            return Exit::Usage;
+        }
+    };
+    // A private run reports its own files and nothing of earlier ones.
+    let keep = !bus.die_with_parent;
+    let (own_name, mut reporter): (&str, Box<dyn Reporter>) = match name {
+        ReportArg::Text => (
+            qcbus_report_text::NAME,
+            Box::new(qcbus_report_text::TextReporter::new(talk::color(), keep)),
+        ),
+        ReportArg::Json => (
+            qcbus_report_json::NAME,
+            Box::new(qcbus_report_json::JsonReporter::new(keep)),
+        ),
+    };
+    let identity = Identity {
+        name: own_name.to_owned(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        launch: bus.launch,
+    };
+    let runtime = match tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+    {
+        Ok(runtime) => runtime,
+        Err(error) => {
+            talk::fail(&error.to_string());
+            return Exit::Internal;
+        }
+    };
+    match runtime.block_on(qcbus_reporter_sdk::run(
+        &instance,
+        &identity,
+        reporter.as_mut(),
+    )) {
+        Ok(()) => Exit::Accepted,
+        Err(error) => {
+            talk::fail(&format!("failed to {error}"));
+            match error {
+                RunError::Join(_) => Exit::NoBroker,
+                RunError::Closed(_) => Exit::Internal,
+            }
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! `qcbus schema compile`.
+
+use std::path::{Path, PathBuf};
+
+use qcbus_document::Document;
+use qcbus_ingest::{Limits, prepare_bytes};
+use qcbus_messages::Exit;
+
+use crate::talk;
+
+/// Runs the command.
+pub fn compile(path: &Path, output: &Path) -> Exit {
+    let files = match schema_files(path) {
+        Ok(files) if files.is_empty() => {
+            talk::fail(&format!("there is no .xsd file in {}", path.display()));
+            return Exit::Usage;
+        }
+        Ok(files) => files,
+        Err(error) => {
+            talk::fail(&format!("cannot look into {}: {error}", path.display()));
+            return Exit::Usage;
+        }
+    };
+    match tables(path, &files) {
+        Ok(text) => write(output, &text, files.len()),
+        Err(why) => {
+            talk::fail(&why);
+            Exit::Usage
+        }
+    }
+}
+
+/// The schema itself, or every schema of a directory: the files of one schema lie together.
+fn schema_files(path: &Path) -> std::io::Result<Vec<PathBuf>> {
+    if path.is_file() {
+        return Ok(vec![path.to_path_buf()]);
+    }
+    let mut files: Vec<PathBuf> = std::fs::read_dir(path)?
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| {
+            path.extension()
+                .is_some_and(|it| it.eq_ignore_ascii_case("xsd"))
+        })
+        .collect();
+    files.sort();
+    Ok(files)
+}
+
+fn tables(path: &Path, files: &[PathBuf]) -> Result<String, String> {
+    let mut images = Vec::new();
+    for file in files {
+        let bytes = std::fs::read(file)
+            .map_err(|error| format!("cannot read {}: {error}", file.display()))?;
+        images.push(prepare_bytes(file, bytes, &Limits::default()).build());
+    }
+    let mut documents = Vec::new();
+    for (image, file) in images.iter().zip(files) {
+        let document = Document::open(image).map_err(|error| error.to_string())?;
+        if let Some(fault) = document.faults().find(|fault| fault.code.makes_partial()) {
+            let at = document.position(fault.offset);
+            return Err(format!(
+                "{}:{}:{}: {}",
+                file.display(),
+                at.row,
+                at.column,
+                fault.text
+            ));
+        }
+        documents.push(document);
+    }
+    let title = path
+        .file_stem()
+        .map(|it| it.to_string_lossy().into_owned())
+        .unwrap_or_default();
+    qcbus_schema::compile(&title, &documents)
+        .map(|schema| schema.to_notation())
+        .map_err(|error| format!("failed to {error}"))
+}
+
+fn write(output: &Path, text: &str, files: usize) -> Exit {
+    match std::fs::write(output, text) {
+        Ok(()) => {
+            talk::say(&format!(
+                "{files} schema files compiled to {}",
+                output.display()
+            ));
+            Exit::Accepted
+        }
+        Err(error) => {
+            talk::fail(&format!("cannot write {}: {error}", output.display()));
+            Exit::Internal
+        }
+    }
+}

@@ -1,0 +1,191 @@
+//! `qcbus serve`: the long-running broker.
+
+use std::path::{Path, PathBuf};
+
+use qcbus_broker::{Broker, Options, StartError, Told};
+use qcbus_bus::{HostOptions, StartError as BusError};
+use qcbus_messages::Exit;
+
+use super::settings::{absolute, dialect, instance, limits, memory_limit, program, settings};
+use crate::args::{ReportArg, ServeArgs};
+use crate::{standard, talk};
+
+/// Runs the command.
+pub fn run(args: &ServeArgs) -> Exit {
+    talk::log("info");
+    let options = match options(args) {
+        Ok(options) => options,
+        Err(why) => {
+            talk::fail(&why);
+            return Exit::Usage;
+        }
+    };
+    let runtime = match tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+    {
+        Ok(runtime) => runtime,
+        Err(error) => {
+            talk::fail(&format!("cannot start: {error}"));
+            return Exit::Internal;
+        }
+    };
+    let exit = runtime.block_on(serve(options));
+    runtime.shutdown_background();
+    exit
+}
+
+async fn serve(options: Options) -> Exit {
+    let banner = banner(&options);
+    let broker = match Broker::start(options, tell) {
+        Ok(broker) => broker,
+        Err(error) => {
+            talk::fail(&explain(&error));
+            return match error {
+                StartError::Load(_) | StartError::Bus(BusError::AlreadyRunning { .. }) => {
+                    Exit::Usage
+                }
+                _ => Exit::Internal,
+            };
+        }
+    };
+    let stops = match super::stops::listen() {
+        Ok(stops) => stops,
+        Err(error) => {
+            talk::fail(&error.to_string());
+            return Exit::Internal;
+        }
+    };
+    talk::say(&banner);
+    broker.run(stops).await;
+    talk::say("stopped");
+    Exit::Accepted
+}
+
+fn explain(error: &StartError) -> String {
+    match error {
+        StartError::Bus(BusError::AlreadyRunning { .. }) => {
+            format!(
+                "{error}; use `qcbus status` to look at it, `qcbus down` to stop it, or --instance NAME for one more"
+            )
+        }
+        _ => error.to_string(),
+    }
+}
+
+fn banner(options: &Options) -> String {
+    let directories: Vec<String> = options
+        .roots
+        .iter()
+        .map(|it| it.display().to_string())
+        .collect();
+    format!(
+        "qcbus {} serves {} as instance `{}`, results in {}",
+        env!("CARGO_PKG_VERSION"),
+        directories.join(", "),
+        options.instance.name(),
+        options.out.display()
+    )
+}
+
+/// Log lines: one per verdict, each with the content hash.
+fn tell(told: Told) {
+    match told {
+        Told::Verdict(it) if it.fresh => tracing::info!(
+            verdict = it.judged.verdict.as_str(),
+            sha256 = %it.judged.digest,
+            errors = it.judged.counts[0],
+            warnings = it.judged.counts[1],
+            "{}",
+            it.path.display()
+        ),
+        Told::Verdict(_) => {}
+        Told::Notice(notice) => tracing::warn!("{notice}"),
+        Told::Scanned { files } => tracing::info!("{} files are there", files.len()),
+    }
+}
+
+fn options(args: &ServeArgs) -> Result<Options, String> {
+    let mut roots = Vec::new();
+    for directory in &args.directories {
+        let real = std::fs::canonicalize(directory)
+            .map_err(|error| format!("cannot watch {}: {error}", directory.display()))?;
+        if !real.is_dir() {
+            return Err(format!(
+                "cannot watch {}: it is no directory; use `qcbus check` for files",
+                directory.display()
+            ));
+        }
+        roots.push(real);
+    }
+    roots.sort();
+    roots.dedup();
+    let nested: Vec<PathBuf> = roots
+        .iter()
+        .filter(|root| roots.iter().any(|it| it != *root && root.starts_with(it)))
+        .cloned()
+        .collect();
+    roots.retain(|root| !nested.contains(root));
+    if let Some(gate) = args.gate.as_deref().map(absolute)
+        && let Some(root) = roots.iter().find(|root| gate.starts_with(root))
+    {
+        return Err(format!(
+            "the gate {} lies inside the watched directory {}: what is published there would be \
+             checked and published again; choose a directory outside",
+            gate.display(),
+            root.display()
+        ));
+    }
+    let out = absolute(args.output.out.as_deref().unwrap_or(Path::new("qcbus-out")));
+    let state = args
+        .state
+        .as_deref()
+        .map_or_else(|| out.join(".qcbus"), absolute);
+    let program = program()?;
+    let every_kind = qcbus_document::FileKind::ALL.into_iter().collect();
+    let mut children = if args.no_standard_bundles {
+        Vec::new()
+    } else {
+        standard::bundle_specs(&program, &every_kind, args.schema_dir.as_deref())?
+    };
+    let reporters = standard::reporter_specs(&program);
+    for report in &args.report {
+        let name = match report {
+            ReportArg::Text => qcbus_report_text::NAME,
+            ReportArg::Json => qcbus_report_json::NAME,
+        };
+        children.extend(reporters.iter().filter(|spec| spec.name == name).cloned());
+    }
+    Ok(Options {
+        instance: instance(&args.instance)?,
+        roots,
+        files: Vec::new(),
+        watch: true,
+        poll: args.poll,
+        rescan: args.rescan,
+        single_result: None,
+        bundles_d: Some(
+            args.bundles_d
+                .as_deref()
+                .map_or_else(|| state.join("bundles.d"), absolute),
+        ),
+        out,
+        state: Some(state),
+        retention: args.retention,
+        dialect: dialect(args.output.xqar_dialect),
+        durable: true,
+        verdict_files: true,
+        gate: args.gate.as_deref().map(absolute),
+        config: args.config.as_deref().map(absolute),
+        standard: children,
+        reporters,
+        die_with_broker: false,
+        memory_limit: memory_limit(&args.limits),
+        limits: limits(&args.limits),
+        host: HostOptions::default(),
+        settings: qcbus_broker::core::Settings {
+            drain_limit: args.drain_limit,
+            ..settings(&args.limits)
+        },
+    })
+}

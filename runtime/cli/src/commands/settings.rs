@@ -1,0 +1,67 @@
+//! From the command line to what a broker is told.
+
+use std::path::{Path, PathBuf};
+
+use qcbus_broker::core::Settings;
+use qcbus_bus::Instance;
+use qcbus_formats::xqar::Dialect;
+use qcbus_ingest::Limits;
+
+use crate::args::{DialectArg, InstanceArgs, LimitArgs};
+
+/// The instance that is meant.
+pub fn instance(args: &InstanceArgs) -> Result<Instance, String> {
+    match &args.instance_dir {
+        Some(dir) => Ok(Instance::at(absolute(dir))),
+        None => Instance::named(&args.instance).map_err(|error| error.to_string()),
+    }
+}
+
+/// A path from the root, as far as possible without looking at the disk.
+pub fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf())
+}
+
+/// The form of results.
+pub fn dialect(arg: DialectArg) -> Dialect {
+    match arg {
+        DialectArg::Current => Dialect::Current,
+        DialectArg::Qc4openx => Dialect::Qc4Openx,
+    }
+}
+
+const MIB: u64 = 1 << 20;
+
+/// The caps on what is read.
+pub fn limits(args: &LimitArgs) -> Limits {
+    let mut limits = Limits::default();
+    if let Some(mib) = args.max_file {
+        limits.max_file = mib.saturating_mul(MIB);
+    }
+    if let Some(mib) = args.max_unpacked {
+        limits.max_unpacked = mib.saturating_mul(MIB);
+    }
+    limits.max_ratio = args.max_ratio.unwrap_or(limits.max_ratio);
+    limits.max_members = args.max_members.unwrap_or(limits.max_members);
+    limits.max_depth = args.max_depth.unwrap_or(limits.max_depth);
+    limits
+}
+
+/// Most private memory of a child, in bytes.
+pub fn memory_limit(args: &LimitArgs) -> Option<u64> {
+    args.memory_limit.map(|mib| mib.saturating_mul(MIB))
+}
+
+/// The shape of the state machine.
+pub fn settings(args: &LimitArgs) -> Settings {
+    let mut settings = Settings::default();
+    settings.job_deadline = args.job_deadline.unwrap_or(settings.job_deadline);
+    settings.silence_limit = args.silence_limit.unwrap_or(settings.silence_limit);
+    settings.max_restarts = args.max_restarts.unwrap_or(settings.max_restarts);
+    settings
+}
+
+/// This program's own file, to start children from.
+pub fn program() -> Result<PathBuf, String> {
+    std::env::current_exe().map_err(|error| format!("cannot find this program's own file: {error}"))
+}

@@ -1,0 +1,171 @@
+//! `qcbus status`.
+
+use std::fmt::Write;
+
+use qcbus_messages::Exit;
+use qcbus_messages::control::{PeerStatus, Request, Response, Status};
+
+use super::remote::ask;
+use crate::args::StatusArgs;
+use crate::talk;
+
+/// Runs the command.
+pub fn run(args: &StatusArgs) -> Exit {
+    let status = match ask(&args.instance, &Request::Status) {
+        Ok(Response::Status(status)) => status,
+        Ok(other) => {
+            talk::fail(&format!("the broker answered something else: {other:?}"));
+            return Exit::Internal;
+        }
+        Err(exit) => return exit,
+    };
+    if args.json {
+        match serde_json::to_string_pretty(&status) {
+            Ok(text) => talk::print(&format!("{text}\n")),
+            Err(error) => {
+                talk::fail(&error.to_string());
+                return Exit::Internal;
+            }
+        }
+    } else {
+        talk::print(&render(&status));
+    }
+    Exit::Accepted
+}
+
+/// The status as a person reads it.
+pub fn render(status: &Status) -> String {
+    let mut text = String::new();
+    let files = &status.files;
+    let queue = &status.queue;
+    let mut line = |what: &str, value: String| {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{what:<10} {value}");
+    };
+    line(
+        "broker",
+        format!(
+            "instance `{}`, qcbus {}, process {}, up {}",
+            status.instance,
+            status.version,
+            status.pid,
+            span(status.uptime_s as f64)
+        ),
+    );
+    for (number, directory) in status.watching.iter().enumerate() {
+        let mode = if number == 0 {
+            format!(" ({})", status.watch_mode)
+        } else {
+            String::new()
+        };
+        line("watching", format!("{}{mode}", directory.display()));
+    }
+    line("results", status.out.display().to_string());
+    line(
+        "files",
+        format!(
+            "{}: {} accepted, {} rejected, {} undetermined, {} without a verdict",
+            files.total,
+            files.accepted,
+            files.rejected,
+            files.undetermined,
+            files.total - files.judged
+        ),
+    );
+    line("queue", queue_line(queue));
+    for peer in &status.peers {
+        line(&peer.role, peer_line(peer));
+    }
+    for notice in status.notices.iter().rev().take(5).rev() {
+        line("note", notice.clone());
+    }
+    text
+}
+
+fn queue_line(queue: &qcbus_messages::control::QueueStatus) -> String {
+    let mut line = format!("{} waiting, {} being checked", queue.waiting, queue.active);
+    if queue.background > 0 {
+        let _ = write!(line, ", {} to be checked again", queue.background);
+    }
+    if queue.waiting > 0 {
+        let _ = write!(line, "; the oldest for {}", span(queue.oldest_waiting_s));
+    }
+    if let Some(left) = queue.estimated_s.filter(|left| *left > 0.0) {
+        let _ = write!(line, "; {:.0} per second, {} to go", queue.rate, span(left));
+    }
+    line
+}
+
+fn peer_line(peer: &PeerStatus) -> String {
+    let mut line = format!("{} {}: {}", peer.name, peer.version, peer.state);
+    if peer.checkers > 0 {
+        let _ = write!(line, ", {} checkers", peer.checkers);
+    }
+    let _ = write!(line, ", {} done", peer.done);
+    if peer.restarts > 0 {
+        let _ = write!(line, ", started again {} times", peer.restarts);
+    }
+    if !peer.note.is_empty() {
+        let _ = write!(line, " ({})", peer.note);
+    }
+    line
+}
+
+fn span(seconds: f64) -> String {
+    let whole = seconds as u64;
+    match whole {
+        0..60 => format!("{seconds:.1} s"),
+        60..3600 => format!("{} min {} s", whole / 60, whole % 60),
+        3600..86400 => format!("{} h {} min", whole / 3600, whole % 3600 / 60),
+        _ => format!("{} d {} h", whole / 86400, whole % 86400 / 3600),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use qcbus_messages::control::{FileCounts, QueueStatus};
+
+    #[test]
+    fn a_busy_broker_as_a_person_sees_it() {
+        let status = Status {
+            instance: "farm".into(),
+            version: "0.1.0".into(),
+            pid: 4711,
+            uptime_s: 93784,
+            watching: vec!["/farm/in".into(), "/farm/more".into()],
+            watch_mode: "events".into(),
+            out: "/farm/out".into(),
+            files: FileCounts {
+                total: 120,
+                judged: 100,
+                accepted: 80,
+                rejected: 19,
+                undetermined: 1,
+            },
+            queue: QueueStatus {
+                waiting: 18,
+                background: 3,
+                active: 2,
+                oldest_waiting_s: 1.25,
+                rate: 250.0,
+                estimated_s: Some(75.0),
+            },
+            peers: vec![PeerStatus {
+                name: "xodrBundle".into(),
+                role: "bundle".into(),
+                version: "0.1.0".into(),
+                pid: 1,
+                state: "busy".into(),
+                checkers: 26,
+                active: 2,
+                done: 99,
+                restarts: 1,
+                note: "slow: 16 jobs wait for it and for nobody else".into(),
+            }],
+            notices: vec!["cannot write /farm/out/a.xqar: No space left on device".into()],
+            ..Status::default()
+        };
+        insta::assert_snapshot!(render(&status));
+    }
+}

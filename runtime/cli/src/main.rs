@@ -1,0 +1,29 @@
+//! `qcbus`: the one program. It ties broker, standard bundles and reporters together and holds no
+//! logic of its own.
+
+mod args;
+mod commands;
+mod standard;
+mod talk;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+fn main() -> ExitCode {
+    let args = match args::Args::try_parse() {
+        Ok(args) => args,
+        Err(error) => {
+            let asked_for_it = !error.use_stderr();
+            // A closed pipe is no reason to complain.
+            let _ = error.print();
+            let exit = if asked_for_it {
+                qcbus_messages::Exit::Accepted
+            } else {
+                qcbus_messages::Exit::Usage
+            };
+            return exit.into();
+        }
+    };
+    commands::run(args).into()
+}

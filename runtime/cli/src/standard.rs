@@ -1,0 +1,74 @@
+//! The bundles and reporters that come with the program.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use qcbus_broker::core::{ChildSpec, Restart};
+use qcbus_document::FileKind;
+use qcbus_messages::Role;
+use qcbus_sdk::{Bundle, UserFiles};
+
+/// The standard bundles.
+pub static BUNDLES: [&Bundle; 2] = [&qcbus_xodr::BUNDLE, &qcbus_xosc::BUNDLE];
+
+/// The standard bundle of this name or alias.
+pub fn bundle(name: &str) -> Option<&'static Bundle> {
+    BUNDLES
+        .iter()
+        .copied()
+        .find(|bundle| qcbus_formats::config::same_bundle(name, bundle.name, bundle.alias))
+}
+
+/// How to start the standard bundles that take any of these kinds of files, with the user's
+/// schemas.
+///
+/// # Errors
+/// When the schemas are of no use: said here, before a bundle is started that would end at once.
+pub fn bundle_specs(
+    program: &Path,
+    kinds: &BTreeSet<FileKind>,
+    schema_dir: Option<&Path>,
+) -> Result<Vec<ChildSpec>, String> {
+    let wanted = BUNDLES
+        .iter()
+        .filter(|bundle| bundle.kinds.iter().any(|kind| kinds.contains(kind)));
+    let specs = wanted.map(|bundle| {
+        let mut spec = spec(program, "bundle", bundle.alias, bundle.name, Role::Bundle);
+        if let Some(directory) = schema_dir {
+            let directory = std::path::absolute(directory).map_err(|error| error.to_string())?;
+            UserFiles::read(bundle, &directory)
+                .map_err(|error| format!("--schema-dir: failed to {error}"))?;
+            let directory = directory.to_string_lossy().into_owned();
+            spec.command.extend(["--schema-dir".to_owned(), directory]);
+        }
+        Ok(spec)
+    });
+    specs.collect()
+}
+
+/// How to start the standard reporters.
+pub fn reporter_specs(program: &Path) -> Vec<ChildSpec> {
+    [
+        ("text", qcbus_report_text::NAME),
+        ("json", qcbus_report_json::NAME),
+    ]
+    .into_iter()
+    .map(|(alias, name)| spec(program, "reporter", alias, name, Role::Reporter))
+    .collect()
+}
+
+fn spec(program: &Path, command: &str, alias: &str, name: &str, role: Role) -> ChildSpec {
+    let program = program.to_string_lossy().into_owned();
+    ChildSpec {
+        name: name.to_owned(),
+        role,
+        version: None,
+        command: vec![
+            program,
+            command.to_owned(),
+            "run".to_owned(),
+            alias.to_owned(),
+        ],
+        restart: Restart::Always,
+    }
+}

@@ -1,0 +1,321 @@
+//! `.mosc`: a zip archive around a modular scenario, read in memory and never unpacked to disk.
+
+use std::io::{Cursor, Read};
+
+use zip::ZipArchive;
+use zip::result::ZipError;
+
+use crate::finding::{Code, Finding};
+use crate::limits::{Exceeded, Limits};
+use crate::unpack::inflated_cap;
+
+/// The member that a modular scenario starts from.
+pub(crate) const MAIN_MEMBER: &str = "main.xosc";
+
+/// One member of an archive and what is wrong with the archive as a whole.
+pub(crate) struct Member {
+    /// The bytes, or what could be read of them; empty when the member is absent.
+    pub bytes: Vec<u8>,
+    /// Whether the archive has the member at all.
+    pub present: bool,
+    pub findings: Vec<Finding>,
+}
+
+/// Whether the bytes begin as a zip archive does (a member, or an archive without members).
+pub(crate) fn is_zip(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"PK\x05\x06")
+}
+
+/// Reads one member. Names that lead out of the archive are refused whichever member is asked
+/// for; the caps count over all members, so that no order of reading slips past them.
+pub(crate) fn read_member(packed: &[u8], name: &str, limits: &Limits) -> Member {
+    let mut member = Member {
+        bytes: Vec::new(),
+        present: false,
+        findings: Vec::new(),
+    };
+    let mut archive = match ZipArchive::new(Cursor::new(packed)) {
+        Ok(archive) => archive,
+        Err(error) => {
+            member.findings.push(damaged(packed, &error));
+            return member;
+        }
+    };
+    if let Err(finding) = check_directory(&mut archive, limits, &mut member.findings) {
+        member.findings.push(finding);
+        return member;
+    }
+    match read_checked(&mut archive, name, limits) {
+        Ok(Some(bytes)) => (member.bytes, member.present) = (bytes, true),
+        Ok(None) => member.findings.push(Finding::new(
+            Code::ArchiveMemberMissing,
+            0,
+            format!(
+                "the archive has no member {name}{}",
+                similar(&archive, name)
+            ),
+        )),
+        Err(finding) => {
+            member.present = true;
+            member.findings.push(finding);
+        }
+    }
+    member
+}
+
+type Archive<'b> = ZipArchive<Cursor<&'b [u8]>>;
+
+/// Names, number, declared sizes. What an archive declares is believed only where it accuses the
+/// archive; reading counts again.
+fn check_directory(
+    archive: &mut Archive<'_>,
+    limits: &Limits,
+    findings: &mut Vec<Finding>,
+) -> Result<(), Finding> {
+    let count = archive.len() as u64;
+    Exceeded::check(
+        "max_members",
+        "members",
+        count,
+        u64::from(limits.max_members),
+    )
+    .map_err(|exceeded| {
+        Finding::new(Code::ArchiveLimit, 0, format!("the archive has {exceeded}"))
+    })?;
+    if let Some(total) = archive.decompressed_size() {
+        let total = u64::try_from(total).unwrap_or(u64::MAX);
+        Exceeded::check("max_archive", "unpacked bytes", total, limits.max_archive).map_err(
+            |exceeded| {
+                Finding::new(
+                    Code::UnpackedLimit,
+                    0,
+                    format!("the archive has {exceeded}"),
+                )
+            },
+        )?;
+    }
+    if archive.has_duplicate_names() {
+        let text = "the archive has several members of one name; the last one is read";
+        findings.push(Finding::new(Code::ArchiveDuplicate, 0, text));
+    }
+    let escaping: Vec<String> = (0..archive.len())
+        .filter_map(|index| {
+            let entry = archive.by_index_raw(index).ok()?;
+            let name = entry.name().ok()?.into_owned();
+            (entry.is_symlink() || !stays_inside(&name)).then_some(name)
+        })
+        .take(4)
+        .collect();
+    for name in escaping {
+        let text = format!("the member {name:?} leads out of the archive; it is never read");
+        findings.push(Finding::new(Code::ArchiveEscapes, 0, text));
+    }
+    Ok(())
+}
+
+/// Whether a member's name is a plain relative path: no root, drive, backslash, `..` or NUL.
+pub(crate) fn stays_inside(name: &str) -> bool {
+    !name.is_empty()
+        && !name.starts_with('/')
+        && !name.contains(['\\', '\0', ':'])
+        && name.split('/').all(|part| part != "..")
+}
+
+fn read_checked(
+    archive: &mut Archive<'_>,
+    name: &str,
+    limits: &Limits,
+) -> Result<Option<Vec<u8>>, Finding> {
+    if !stays_inside(name) {
+        return Ok(None);
+    }
+    let entry = match archive.by_name(name) {
+        Ok(entry) => entry,
+        Err(ZipError::FileNotFound) => return Ok(None),
+        Err(error) => return Err(malformed(name, &error.to_string())),
+    };
+    if entry.is_symlink() || entry.is_dir() {
+        return Ok(None);
+    }
+    let cap = inflated_cap(
+        entry.compressed_size(),
+        limits.max_archive,
+        limits.max_ratio,
+    );
+    let mut bytes = Vec::new();
+    let read = entry
+        .take(cap.allowed.saturating_add(1))
+        .read_to_end(&mut bytes);
+    if bytes.len() as u64 > cap.allowed {
+        let code = if cap.limit == "max_ratio" {
+            Code::RatioLimit
+        } else {
+            Code::UnpackedLimit
+        };
+        let limit = if cap.limit == "max_ratio" {
+            cap.limit
+        } else {
+            "max_archive"
+        };
+        let exceeded = Exceeded {
+            limit,
+            found: cap.allowed + 1,
+            ..cap
+        };
+        return Err(Finding::new(
+            code,
+            0,
+            format!("the member {name} has {exceeded}"),
+        ));
+    }
+    read.map_err(|error| malformed(name, &error.to_string()))?;
+    Ok(Some(bytes))
+}
+
+fn malformed(name: &str, reason: &str) -> Finding {
+    Finding::new(
+        Code::ArchiveMalformed,
+        0,
+        format!("the member {name} cannot be read: {reason}"),
+    )
+}
+
+fn damaged(packed: &[u8], error: &ZipError) -> Finding {
+    // A local header without the directory at the end: the archive began well and was cut.
+    let code = if is_zip(packed) {
+        Code::ArchiveTruncated
+    } else {
+        Code::ArchiveMalformed
+    };
+    Finding::new(code, 0, format!("the archive cannot be read: {error}"))
+}
+
+/// A hint for the commonest mistake: the folder was packed instead of its content.
+fn similar(archive: &Archive<'_>, name: &str) -> String {
+    let base = name.rsplit('/').next().unwrap_or(name);
+    let ends = |other: &str| {
+        other
+            .rsplit('/')
+            .next()
+            .is_some_and(|o| o.eq_ignore_ascii_case(base))
+    };
+    let found = archive
+        .file_names()
+        .filter_map(Result::ok)
+        .find(|other| ends(other));
+    found.map_or_else(String::new, |other| format!("; it has {other:?}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use zip::ZipWriter;
+    use zip::write::SimpleFileOptions;
+
+    use super::*;
+
+    fn zip(members: &[(&str, &[u8])]) -> Vec<u8> {
+        let mut writer = ZipWriter::new(Cursor::new(Vec::new()));
+        for (name, bytes) in members {
+            writer
+                .start_file(*name, SimpleFileOptions::default())
+                .unwrap();
+            writer.write_all(bytes).unwrap();
+        }
+        writer.finish().unwrap().into_inner()
+    }
+
+    fn read(packed: &[u8], limits: Limits) -> (Vec<u8>, Vec<Code>, String) {
+        let member = read_member(packed, MAIN_MEMBER, &limits);
+        let texts: Vec<&str> = member
+            .findings
+            .iter()
+            .map(|finding| &*finding.text)
+            .collect();
+        let codes = member.findings.iter().map(|finding| finding.code).collect();
+        (member.bytes, codes, texts.join("; "))
+    }
+
+    #[test]
+    fn the_main_member_is_found() {
+        let packed = zip(&[("lib.xosc", b"<a/>"), ("main.xosc", b"<OpenSCENARIO/>")]);
+        let (bytes, codes, _) = read(&packed, Limits::default());
+        assert_eq!((&bytes[..], &codes[..]), (&b"<OpenSCENARIO/>"[..], &[][..]));
+        let (_, codes, text) = read(&zip(&[("x/Main.xosc", b"")]), Limits::default());
+        assert_eq!(codes, [Code::ArchiveMemberMissing]);
+        assert!(text.contains("it has \"x/Main.xosc\""), "{text}");
+    }
+
+    #[test]
+    fn names_that_lead_out_are_refused() {
+        let names = [
+            "../evil.xosc",
+            "/etc/passwd",
+            "a/../../b",
+            "C:x",
+            "a\\..\\b",
+        ];
+        for name in names {
+            let (bytes, codes, _) = read(
+                &zip(&[("main.xosc", b"<a/>"), (name, b"x")]),
+                Limits::default(),
+            );
+            assert_eq!(bytes, b"<a/>", "{name}");
+            assert_eq!(codes, [Code::ArchiveEscapes], "{name}");
+        }
+        assert!(stays_inside("a/b.xosc") && stays_inside("..a"));
+    }
+
+    #[test]
+    fn caps_name_themselves() {
+        let big = vec![b' '; 4 << 20];
+        let packed = zip(&[("main.xosc", &big), ("b", b""), ("c", b"")]);
+        let limits = Limits::default();
+        let cases = [
+            (
+                Limits {
+                    max_members: 2,
+                    ..limits
+                },
+                Code::ArchiveLimit,
+                "3 members, 2 are allowed",
+            ),
+            (
+                Limits {
+                    max_archive: 1 << 20,
+                    ..limits
+                },
+                Code::UnpackedLimit,
+                "max_archive",
+            ),
+            (
+                Limits {
+                    max_ratio: 10,
+                    ..limits
+                },
+                Code::RatioLimit,
+                "max_ratio",
+            ),
+        ];
+        for (limits, code, part) in cases {
+            let (bytes, codes, text) = read(&packed, limits);
+            assert!(bytes.is_empty());
+            assert_eq!(codes, [code], "{text}");
+            assert!(text.contains(part), "{text}");
+        }
+    }
+
+    #[test]
+    fn damage_is_a_finding() {
+        let packed = zip(&[("main.xosc", b"<a/>")]);
+        let (_, codes, _) = read(&packed[..packed.len() - 10], Limits::default());
+        assert_eq!(codes, [Code::ArchiveTruncated]);
+        let (_, codes, _) = read(b"<OpenSCENARIO/>", Limits::default());
+        assert_eq!(codes, [Code::ArchiveMalformed]);
+        let mut flipped = zip(&[("main.xosc", b"<OpenSCENARIO></OpenSCENARIO>")]);
+        flipped[45] ^= 0xFF;
+        let (_, codes, _) = read(&flipped, Limits::default());
+        assert_eq!(codes, [Code::ArchiveMalformed]);
+    }
+}

@@ -1,0 +1,439 @@
+//! From bytes to text: byte-order marks, encoding declarations, and what contradicts them.
+
+use std::borrow::Cow;
+
+use encoding_rs::{Encoding, UTF_16BE, UTF_16LE};
+
+use crate::finding::{Code, Finding};
+use crate::limits::{Exceeded, Limits};
+
+/// A file's text in UTF-8, and what was wrong with its bytes. A UTF-8 byte-order mark stays, so
+/// that offsets are those of the file on disk.
+pub(crate) struct Decoded {
+    pub text: String,
+    pub findings: Vec<Finding>,
+}
+
+/// How the bytes are to be read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Charset {
+    Utf8,
+    Ascii,
+    /// ISO-8859-1 proper: byte = code point. (The web's tables read windows-1252 under that name.)
+    Latin1,
+    Table(&'static Encoding),
+}
+
+/// Where the encoding was learnt from.
+struct Opening {
+    charset: Charset,
+    /// Length of the byte-order mark.
+    mark: usize,
+    finding: Option<Finding>,
+}
+
+/// Decodes a whole file. Bytes that cannot be read become U+FFFD and a finding each (the first few),
+/// so that the rest stays readable.
+pub(crate) fn decode(bytes: Vec<u8>, limits: &Limits) -> Decoded {
+    let opening = open(&bytes);
+    let mut findings: Vec<Finding> = opening.finding.into_iter().collect();
+    let text = match opening.charset {
+        Charset::Utf8 => utf8(bytes, &mut findings),
+        Charset::Ascii => ascii(bytes, &mut findings),
+        Charset::Latin1 => {
+            findings.push(transcoded("ISO-8859-1"));
+            bytes.iter().map(|&byte| char::from(byte)).collect()
+        }
+        Charset::Table(encoding) => {
+            findings.push(transcoded(encoding.name()));
+            let text = table(
+                encoding,
+                bytes.get(opening.mark..).unwrap_or(&[]),
+                &mut findings,
+            );
+            if is_utf16(encoding) {
+                check_utf16_declaration(&text, &mut findings);
+            }
+            text
+        }
+    };
+    let size = text.len() as u64;
+    match Exceeded::check(
+        "max_unpacked",
+        "bytes of decoded text",
+        size,
+        limits.max_unpacked,
+    ) {
+        Ok(()) => Decoded { text, findings },
+        Err(exceeded) => {
+            let finding = Finding::new(Code::UnpackedLimit, 0, format!("the text has {exceeded}"));
+            Decoded {
+                text: String::new(),
+                findings: vec![finding],
+            }
+        }
+    }
+}
+
+/// Byte-order mark first, then the pattern of `<?` in 16 bits, then the declaration.
+fn open(bytes: &[u8]) -> Opening {
+    let found = |charset, mark, finding| Opening {
+        charset,
+        mark,
+        finding,
+    };
+    if let Some(text) = bytes.strip_prefix(b"\xEF\xBB\xBF") {
+        return found(Charset::Utf8, 3, contradiction(text));
+    }
+    match bytes {
+        [0xFF, 0xFE, 0, 0, ..]
+        | [0, 0, 0xFE, 0xFF, ..]
+        | [0, 0, 0, b'<', ..]
+        | [b'<', 0, 0, 0, ..] => {
+            let text = "the file is in UTF-32, which is not read; store it as UTF-8";
+            found(
+                Charset::Utf8,
+                0,
+                Some(Finding::new(Code::EncodingUnknown, 0, text)),
+            )
+        }
+        [0xFF, 0xFE, ..] => found(Charset::Table(UTF_16LE), 2, None),
+        [0xFE, 0xFF, ..] => found(Charset::Table(UTF_16BE), 2, None),
+        [b'<', 0, second, 0, ..] if *second != 0 => found(Charset::Table(UTF_16LE), 0, None),
+        [0, b'<', 0, second, ..] if *second != 0 => found(Charset::Table(UTF_16BE), 0, None),
+        _ => by_declaration(bytes),
+    }
+}
+
+fn is_utf16(encoding: &'static Encoding) -> bool {
+    encoding == UTF_16LE || encoding == UTF_16BE
+}
+
+fn transcoded(name: &str) -> Finding {
+    let text = format!("the file is in {name}, not in UTF-8; places count its characters as UTF-8");
+    Finding::new(Code::EncodingTranscoded, 0, text)
+}
+
+fn by_declaration(bytes: &[u8]) -> Opening {
+    let Some((label, offset)) = declared(bytes) else {
+        return Opening {
+            charset: Charset::Utf8,
+            mark: 0,
+            finding: None,
+        };
+    };
+    let (charset, trouble) = match charset_of(&label) {
+        Some(Charset::Table(encoding)) if is_utf16(encoding) => {
+            let text = format!(
+                "the file declares encoding \"{label}\" but its characters are single bytes; \
+                 it is read as UTF-8"
+            );
+            (Charset::Utf8, Some((Code::EncodingMismatch, text)))
+        }
+        Some(charset) => (charset, None),
+        None => {
+            let text = format!(
+                "the declared encoding \"{label}\" is not known; the file is read as UTF-8"
+            );
+            (Charset::Utf8, Some((Code::EncodingUnknown, text)))
+        }
+    };
+    let finding = trouble.map(|(code, text)| Finding::new(code, offset, text));
+    Opening {
+        charset,
+        mark: 0,
+        finding,
+    }
+}
+
+/// A declaration that names something else than the UTF-8 byte-order mark before it.
+fn contradiction(text: &[u8]) -> Option<Finding> {
+    let (label, offset) = declared(text)?;
+    if charset_of(&label) == Some(Charset::Utf8) {
+        return None;
+    }
+    let text = format!(
+        "the file declares encoding \"{label}\" but begins with a UTF-8 byte-order mark; the mark \
+         is believed"
+    );
+    Some(Finding::new(Code::EncodingMismatch, offset + 3, text))
+}
+
+fn check_utf16_declaration(text: &str, findings: &mut Vec<Finding>) {
+    let Some((label, offset)) = declared(text.as_bytes()) else {
+        return;
+    };
+    let is_utf16_label = charset_of(&label)
+        .is_some_and(|charset| matches!(charset, Charset::Table(encoding) if is_utf16(encoding)));
+    if !is_utf16_label {
+        let text = format!("the file declares encoding \"{label}\" but its bytes are UTF-16");
+        findings.push(Finding::new(Code::EncodingMismatch, offset, text));
+    }
+}
+
+fn charset_of(label: &str) -> Option<Charset> {
+    let lower = label.trim().to_ascii_lowercase();
+    Some(match lower.as_str() {
+        "utf-8" | "utf8" => Charset::Utf8,
+        "us-ascii" | "ascii" | "iso646-us" | "ansi_x3.4-1968" => Charset::Ascii,
+        "iso-8859-1" | "iso8859-1" | "iso_8859-1" | "latin1" | "latin-1" | "l1" => Charset::Latin1,
+        _ => {
+            let encoding = Encoding::for_label_no_replacement(lower.as_bytes())?;
+            if encoding == encoding_rs::X_USER_DEFINED {
+                return None;
+            }
+            Charset::Table(encoding)
+        }
+    })
+}
+
+/// The label of `<?xml … encoding="…"?>` and the offset of the label, when the bytes begin with an
+/// XML declaration that has one.
+fn declared(bytes: &[u8]) -> Option<(String, usize)> {
+    let head = &bytes[..bytes.len().min(1024)];
+    let rest = head.strip_prefix(b"<?xml")?;
+    if !rest.first()?.is_ascii_whitespace() {
+        return None;
+    }
+    let declaration = &head[..head.windows(2).position(|pair| pair == b"?>")?];
+    let name = b"encoding";
+    let after = declaration
+        .windows(name.len())
+        .position(|window| window == name)?
+        + name.len();
+    let mut at = after;
+    let skip_blanks = |at: &mut usize| {
+        while declaration.get(*at).is_some_and(u8::is_ascii_whitespace) {
+            *at += 1;
+        }
+    };
+    skip_blanks(&mut at);
+    if declaration.get(at) != Some(&b'=') {
+        return None;
+    }
+    at += 1;
+    skip_blanks(&mut at);
+    let quote = *declaration
+        .get(at)
+        .filter(|byte| matches!(byte, b'"' | b'\''))?;
+    let label = &declaration[at + 1..];
+    let label = &label[..label.iter().position(|&byte| byte == quote)?];
+    Some((String::from_utf8_lossy(label).into_owned(), at + 1))
+}
+
+/// Most places of unreadable bytes that are named one by one.
+const NAMED_PLACES: usize = 8;
+
+fn utf8(bytes: Vec<u8>, findings: &mut Vec<Finding>) -> String {
+    let bytes = match String::from_utf8(bytes) {
+        Ok(text) => return text,
+        Err(error) => error.into_bytes(),
+    };
+    let mut text = String::with_capacity(bytes.len() + 64);
+    let mut named = 0;
+    for chunk in bytes.utf8_chunks() {
+        text.push_str(chunk.valid());
+        if chunk.invalid().is_empty() {
+            continue;
+        }
+        if named < NAMED_PLACES {
+            named += 1;
+            findings.push(Finding::new(
+                Code::EncodingMalformed,
+                text.len(),
+                format!(
+                    "the {} not valid UTF-8; wrong encoding declaration?",
+                    hex(chunk.invalid())
+                ),
+            ));
+        }
+        text.push(char::REPLACEMENT_CHARACTER);
+    }
+    text
+}
+
+fn hex(bytes: &[u8]) -> String {
+    let digits: Vec<String> = bytes.iter().map(|byte| format!("0x{byte:02X}")).collect();
+    if digits.len() == 1 {
+        format!("byte {} is", digits[0])
+    } else {
+        format!("bytes {} are", digits.join(" "))
+    }
+}
+
+fn ascii(bytes: Vec<u8>, findings: &mut Vec<Finding>) -> String {
+    let before = findings.len();
+    if let Some(offset) = bytes.iter().position(|byte| !byte.is_ascii()) {
+        let text = format!(
+            "the file declares US-ASCII but contains the byte 0x{:02X}; it is read as UTF-8",
+            bytes[offset]
+        );
+        findings.push(Finding::new(Code::EncodingMismatch, offset, text));
+    }
+    let text = utf8(bytes, findings);
+    findings.truncate(before + 1);
+    text
+}
+
+/// Decodes by one of the web's tables; unmappable bytes are found again as U+FFFD in the result.
+fn table(encoding: &'static Encoding, bytes: &[u8], findings: &mut Vec<Finding>) -> String {
+    let (text, malformed) = encoding.decode_without_bom_handling(bytes);
+    if malformed {
+        let places = text
+            .match_indices(char::REPLACEMENT_CHARACTER)
+            .take(NAMED_PLACES);
+        findings.extend(places.map(|(offset, _)| {
+            let text = format!("the bytes here are not valid {}", encoding.name());
+            Finding::new(Code::EncodingMalformed, offset, text)
+        }));
+    }
+    Cow::into_owned(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(bytes: &[u8]) -> (String, Vec<Finding>) {
+        let decoded = decode(bytes.to_vec(), &Limits::default());
+        (decoded.text, decoded.findings)
+    }
+
+    fn codes(findings: &[Finding]) -> Vec<Code> {
+        findings.iter().map(|finding| finding.code).collect()
+    }
+
+    fn with_declaration(label: &str, value: &[u8]) -> Vec<u8> {
+        let head = format!("<?xml version=\"1.0\" encoding=\"{label}\"?><a name=\"");
+        [head.as_bytes(), value, b"\"/>"].concat()
+    }
+
+    #[test]
+    fn one_byte_encodings_follow_the_declaration() {
+        let table: &[(&str, &[u8], &str)] = &[
+            ("UTF-8", "Straße €".as_bytes(), "Straße €"),
+            ("ISO-8859-1", b"Stra\xDFe \x80", "Straße \u{80}"),
+            ("latin1", b"\xE9", "é"),
+            ("ISO-8859-15", b"\xA4", "€"),
+            ("windows-1252", b"\x80 \xDF", "€ ß"),
+            ("windows-1250", b"\xEC", "ě"),
+            ("windows-1251", b"\xC6", "Ж"),
+            ("US-ASCII", b"plain", "plain"),
+        ];
+        for (label, bytes, expected) in table {
+            let (text, findings) = read(&with_declaration(label, bytes));
+            assert!(
+                text.ends_with(&format!("<a name=\"{expected}\"/>")),
+                "{label}: {text}"
+            );
+            assert!(
+                codes(&findings)
+                    .iter()
+                    .all(|&code| code == Code::EncodingTranscoded),
+                "{label}"
+            );
+            assert_eq!(
+                findings.is_empty(),
+                matches!(*label, "UTF-8" | "US-ASCII"),
+                "{label}"
+            );
+        }
+    }
+
+    #[test]
+    fn utf16_with_and_without_a_mark() {
+        let text = "<?xml version=\"1.0\" encoding=\"UTF-16\"?><a name=\"ß😀\"/>";
+        let little: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
+        let big: Vec<u8> = text.encode_utf16().flat_map(u16::to_be_bytes).collect();
+        for (mark, bytes) in [(&b"\xFF\xFE"[..], &little), (b"\xFE\xFF", &big)] {
+            for bytes in [[mark, bytes].concat(), bytes.clone()] {
+                let (read, findings) = read(&bytes);
+                assert_eq!(read, text);
+                assert_eq!(codes(&findings), [Code::EncodingTranscoded]);
+            }
+        }
+        let (_, findings) = read(&[&b"\xFF\xFE"[..], &little, b"\x00\xD8"].concat());
+        assert_eq!(
+            codes(&findings),
+            [Code::EncodingTranscoded, Code::EncodingMalformed]
+        );
+    }
+
+    #[test]
+    fn a_utf8_byte_order_mark_stays() {
+        assert_eq!(
+            read(b"\xEF\xBB\xBF<a/>"),
+            ("\u{FEFF}<a/>".to_string(), vec![])
+        );
+        assert_eq!(read(b""), (String::new(), vec![]));
+    }
+
+    #[test]
+    fn wrong_declarations_are_found_where_they_stand() {
+        let marked = [b"\xEF\xBB\xBF", &with_declaration("ISO-8859-1", b"x")[..]].concat();
+        let cases: &[(&[u8], Code, &str, usize)] = &[
+            (
+                &with_declaration("UTF-16", b"x"),
+                Code::EncodingMismatch,
+                "single bytes",
+                30,
+            ),
+            (
+                &with_declaration("klingon", b"x"),
+                Code::EncodingUnknown,
+                "is not known",
+                30,
+            ),
+            (&marked, Code::EncodingMismatch, "the mark is believed", 33),
+            (
+                &with_declaration("UTF-8", b"Stra\xDFe"),
+                Code::EncodingMalformed,
+                "byte 0xDF is not valid UTF-8",
+                51,
+            ),
+            (
+                &with_declaration("US-ASCII", b"\xC3\xA9"),
+                Code::EncodingMismatch,
+                "US-ASCII",
+                50,
+            ),
+            (
+                b"<a>\xE2\x82</a>",
+                Code::EncodingMalformed,
+                "bytes 0xE2 0x82 are not valid UTF-8",
+                3,
+            ),
+        ];
+        for (bytes, code, part, offset) in cases {
+            let (_, findings) = read(bytes);
+            assert_eq!(codes(&findings), [*code], "{part}: {findings:?}");
+            assert!(findings[0].text.contains(part), "{}", findings[0].text);
+            assert_eq!(findings[0].offset, *offset, "{part}");
+        }
+        let marked: Vec<u8> = "\u{FEFF}<?xml version='1.0' encoding='UTF-8'?><a/>"
+            .encode_utf16()
+            .flat_map(u16::to_le_bytes)
+            .collect();
+        let (text, findings) = read(&marked);
+        assert!(text.ends_with("<a/>"));
+        assert_eq!(
+            codes(&findings),
+            [Code::EncodingTranscoded, Code::EncodingMismatch]
+        );
+    }
+
+    #[test]
+    fn unreadable_bytes_keep_the_rest_readable() {
+        let (text, findings) = read(b"<a n='\xFF'><b m='\xFF'/></a>");
+        assert_eq!(text, "<a n='\u{FFFD}'><b m='\u{FFFD}'/></a>");
+        assert_eq!(
+            findings
+                .iter()
+                .map(|finding| finding.offset)
+                .collect::<Vec<_>>(),
+            [6, 17]
+        );
+        let (_, findings) = read(&[b"<a>", &[0xFF; 100][..]].concat());
+        assert_eq!(findings.len(), NAMED_PLACES);
+    }
+}

@@ -1,0 +1,29 @@
+//! From bytes on disk to document images: reading, gzip and zip, encodings, the checks of XML that
+//! a fast parser leaves out, OpenDRIVE's includes, and what other files a document refers to.
+//!
+//! [`prepare`] does all input and output; [`Prepared::build_into`] then parses once, straight into
+//! a buffer that the caller owns. A file that cannot be read at all is an [`IngestError`]; a file
+//! that can be read always becomes an image, whose faults say what is wrong with it.
+
+mod archive;
+mod count;
+mod decode;
+mod error;
+mod finding;
+#[doc(hidden)]
+pub mod fuzzing;
+mod limits;
+mod prepare;
+mod prepared;
+mod read;
+mod references;
+mod unpack;
+mod xml;
+
+pub use error::IngestError;
+pub use limits::{Exceeded, Limits};
+pub use prepare::{prepare, prepare_bytes};
+pub use prepared::Prepared;
+pub use qcbus_document::BuildError;
+pub use read::{Content, FileStamp};
+pub use references::{Reference, Role, references};

@@ -1,0 +1,320 @@
+//! From a path to a [`Prepared`] document: reading, unpacking, decoding, following includes.
+
+use std::collections::HashMap;
+use std::path::{Component, Path, PathBuf};
+
+use qcbus_document::{FaultCode, FileKind};
+
+use crate::archive::{MAIN_MEMBER, is_zip, read_member};
+use crate::decode::decode;
+use crate::error::IngestError;
+use crate::finding::Finding;
+use crate::limits::Limits;
+use crate::prepared::{NamedText, Prepared};
+use crate::read::{FileStamp, RawFile, read_file, stamp_of_bytes};
+use crate::unpack::{InflateError, gunzip, is_gzip};
+use crate::xml::{Include, Splice, SpliceKey, first_element, includes_of};
+
+/// Reads a file and everything that belongs to its image. Includes must lie below `boundary`.
+/// `path` may name a member of an archive as `archive.mosc!member`.
+///
+/// # Errors
+/// When no bytes could be had from the file itself. Whatever is wrong inside them, or with an
+/// included file, is a fault of the image.
+pub fn prepare(path: &Path, boundary: &Path, limits: &Limits) -> Result<Prepared, IngestError> {
+    let (file, members) = split_members(path);
+    let RawFile { bytes, stamp } = read_file(&file, limits)?;
+    let boundary = std::path::absolute(boundary).unwrap_or_else(|_| boundary.to_path_buf());
+    Ok(assemble(stamp, bytes, &members, Some(&boundary), limits))
+}
+
+/// Prepares bytes that are in memory already. Nothing is read from disk, so that every include is
+/// a fault.
+pub fn prepare_bytes(path: &Path, bytes: Vec<u8>, limits: &Limits) -> Prepared {
+    let (file, members) = split_members(path);
+    let stamp = stamp_of_bytes(&file, &bytes);
+    assemble(stamp, bytes, &members, None, limits)
+}
+
+/// Parts `archive.mosc!member!member` into the file on disk and the members. A `!` that follows
+/// no archive is an ordinary character.
+fn split_members(path: &Path) -> (PathBuf, Vec<String>) {
+    let Some(text) = path.to_str() else {
+        return (path.to_path_buf(), Vec::new());
+    };
+    let archive = text
+        .match_indices('!')
+        .find(|&(at, _)| ends_in_mosc(&text[..at]));
+    let Some((at, _)) = archive else {
+        return (path.to_path_buf(), Vec::new());
+    };
+    (
+        PathBuf::from(&text[..at]),
+        text[at + 1..].split('!').map(str::to_string).collect(),
+    )
+}
+
+fn ends_in_mosc(text: &str) -> bool {
+    FileKind::of_path(Path::new(text)) == Some(FileKind::Mosc)
+}
+
+fn assemble(
+    stamp: FileStamp,
+    bytes: Vec<u8>,
+    members: &[String],
+    boundary: Option<&Path>,
+    limits: &Limits,
+) -> Prepared {
+    let digest = stamp
+        .content
+        .as_ref()
+        .map_or([0; 32], |content| content.digest);
+    let root = open(&stamp.path, bytes, members, limits);
+    let mut reader = Includes {
+        limits,
+        boundary,
+        known: HashMap::new(),
+        files: vec![stamp],
+        texts: vec![root],
+    };
+    let splices = reader.follow();
+    Prepared::new(limits, digest, reader.files, reader.texts, splices)
+}
+
+/// Unpacks and decodes one file.
+fn open(path: &Path, bytes: Vec<u8>, members: &[String], limits: &Limits) -> NamedText {
+    let kind = FileKind::of_path(path);
+    if kind == Some(FileKind::Mosc) {
+        return open_archive(path, &bytes, members, limits);
+    }
+    let mut findings = Vec::new();
+    let packed = is_gzip(&bytes);
+    let bytes = if packed {
+        inflate(path, &bytes, limits, &mut findings)
+    } else {
+        bytes
+    };
+    if is_zip(&bytes) {
+        let text = "the file is a zip archive although its name promises XML; modular scenarios end in .mosc";
+        findings.push(Finding::new(FaultCode::ArchiveMalformed, 0, text));
+        return NamedText {
+            path: path.to_path_buf(),
+            text: String::new(),
+            findings,
+        };
+    }
+    if promises_gzip(path) && !packed && !bytes.is_empty() {
+        let text = "the name promises a gzip file, but the bytes are none";
+        findings.push(Finding::new(FaultCode::GzipMalformed, 0, text));
+    }
+    decoded(path.to_path_buf(), bytes, findings, limits)
+}
+
+fn decoded(
+    path: PathBuf,
+    bytes: Vec<u8>,
+    mut findings: Vec<Finding>,
+    limits: &Limits,
+) -> NamedText {
+    let decoded = decode(bytes, limits);
+    findings.extend(decoded.findings);
+    let named = crate::xml::chars::forbidden(&decoded.text)
+        .take(8)
+        .map(|(at, c)| {
+            let text = format!("the character U+{:04X} is not allowed in XML", u32::from(c));
+            Finding::new(FaultCode::BadCharacter, at, text)
+        });
+    findings.extend(named);
+    NamedText {
+        path,
+        text: decoded.text,
+        findings,
+    }
+}
+
+fn promises_gzip(path: &Path) -> bool {
+    let name = path.to_string_lossy().to_ascii_lowercase();
+    name.ends_with(".gz") || name.ends_with(".xodrz")
+}
+
+fn inflate(path: &Path, packed: &[u8], limits: &Limits, findings: &mut Vec<Finding>) -> Vec<u8> {
+    let inflated = gunzip(packed, limits);
+    if let Some(trouble) = inflated.trouble {
+        let code = match &trouble {
+            InflateError::Truncated { .. } => FaultCode::GzipTruncated,
+            InflateError::Damaged { .. } => FaultCode::GzipMalformed,
+            InflateError::Exceeded(exceeded) if exceeded.limit == "max_ratio" => {
+                FaultCode::RatioLimit
+            }
+            InflateError::Exceeded(_) => FaultCode::UnpackedLimit,
+        };
+        findings.push(Finding::new(code, 0, trouble.to_string()));
+    } else if !promises_gzip(path) {
+        let text = "the file is packed by gzip although its name promises plain XML";
+        findings.push(Finding::new(FaultCode::EncodingTranscoded, 0, text));
+    }
+    inflated.bytes
+}
+
+/// Opens `main.xosc` of an archive, or the member that the path leads to, through archives within
+/// archives.
+fn open_archive(path: &Path, packed: &[u8], members: &[String], limits: &Limits) -> NamedText {
+    let (name, rest) = match members.split_first() {
+        Some((name, rest)) if !name.is_empty() => (name.as_str(), rest),
+        _ => (MAIN_MEMBER, &[][..]),
+    };
+    let member = read_member(packed, name, limits);
+    let path = PathBuf::from(format!("{}!{name}", path.display()));
+    if ends_in_mosc(name) && member.present {
+        let mut inner = open_archive(&path, &member.bytes, rest, limits);
+        inner.findings.splice(0..0, member.findings);
+        return inner;
+    }
+    if !member.present {
+        return NamedText {
+            path,
+            text: String::new(),
+            findings: member.findings,
+        };
+    }
+    decoded(path, member.bytes, member.findings, limits)
+}
+
+/// Reads the files that `<include>` elements name, each of them once.
+struct Includes<'l> {
+    limits: &'l Limits,
+    boundary: Option<&'l Path>,
+    /// Canonical paths of the texts.
+    known: HashMap<PathBuf, usize>,
+    files: Vec<FileStamp>,
+    texts: Vec<NamedText>,
+}
+
+type Refusal = (FaultCode, String);
+
+impl Includes<'_> {
+    fn follow(&mut self) -> HashMap<SpliceKey, Splice> {
+        let mut splices = HashMap::new();
+        let is_map = first_element(&self.texts[0].text)
+            .is_some_and(|root| root.rsplit(':').next() == Some("OpenDRIVE"));
+        if !is_map {
+            return splices;
+        }
+        if let Ok(root) = self.texts[0].path.canonicalize() {
+            self.known.insert(root, 0);
+        }
+        let mut number = 0;
+        while number < self.texts.len() {
+            for include in includes_of(&self.texts[number].text) {
+                let splice = match self.resolve(number, &include) {
+                    Ok(target) => Splice::File(target),
+                    Err((code, text)) => Splice::Fault(code, text),
+                };
+                splices.insert((number, include.at), splice);
+            }
+            number += 1;
+        }
+        splices
+    }
+
+    fn resolve(&mut self, number: usize, include: &Include) -> Result<usize, Refusal> {
+        let written = include
+            .file
+            .as_deref()
+            .map(str::trim)
+            .filter(|file| !file.is_empty());
+        let Some(written) = written else {
+            let text = "an include needs the attribute file with the path of a file".to_string();
+            return Err((FaultCode::IncludeMalformed, text));
+        };
+        let Some(boundary) = self.boundary else {
+            let text =
+                format!("the include of {written} was not read: the document came without a file");
+            return Err((FaultCode::IncludeMissing, text));
+        };
+        if written.contains("://") {
+            let text = format!("the include of {written} is not fetched; only files are included");
+            return Err((FaultCode::IncludeMalformed, text));
+        }
+        let folder = self.texts[number]
+            .path
+            .parent()
+            .unwrap_or(Path::new(""))
+            .to_path_buf();
+        let path = normal(&folder.join(written));
+        let path = if !path.exists() && written.contains('\\') {
+            normal(&folder.join(written.replace('\\', "/")))
+        } else {
+            path
+        };
+        inside(&path, &normal(boundary), written)?;
+        if self.texts.len() > self.limits.max_includes as usize {
+            let limit = self.limits.max_includes;
+            let text = format!(
+                "more than {limit} included files; raise the limit max_includes to read them"
+            );
+            return Err((FaultCode::IncludeLimit, text));
+        }
+        self.load(path, boundary, written)
+    }
+
+    fn load(&mut self, path: PathBuf, boundary: &Path, written: &str) -> Result<usize, Refusal> {
+        let canonical = path.canonicalize().unwrap_or_else(|_| path.clone());
+        if let Ok(boundary) = boundary.canonicalize() {
+            // A symbolic link inside may still lead out.
+            if path.exists() {
+                inside(&canonical, &boundary, written)?;
+            }
+        }
+        if let Some(&number) = self.known.get(&canonical) {
+            return Ok(number);
+        }
+        match read_file(&path, self.limits) {
+            Ok(RawFile { bytes, stamp }) => {
+                let text = open(&stamp.path, bytes, &[], self.limits);
+                self.files.push(stamp);
+                self.texts.push(text);
+                self.known.insert(canonical, self.texts.len() - 1);
+                Ok(self.texts.len() - 1)
+            }
+            Err(error) => {
+                if !self.files.iter().any(|stamp| stamp.path == path) {
+                    self.files.push(FileStamp {
+                        path,
+                        content: None,
+                    });
+                }
+                Err((
+                    FaultCode::IncludeMissing,
+                    format!("the included file is missing: failed to {error}"),
+                ))
+            }
+        }
+    }
+}
+
+fn inside(path: &Path, boundary: &Path, written: &str) -> Result<(), Refusal> {
+    if path.starts_with(boundary) {
+        return Ok(());
+    }
+    let text = format!(
+        "the include of {written} leads out of {}; included files must lie inside",
+        boundary.display()
+    );
+    Err((FaultCode::IncludeEscapes, text))
+}
+
+/// A path without `.` and `..`, resolved by its words alone.
+pub(crate) fn normal(path: &Path) -> PathBuf {
+    let mut normal = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir => {
+                normal.pop();
+            }
+            part => normal.push(part),
+        }
+    }
+    normal
+}

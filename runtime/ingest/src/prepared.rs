@@ -1,0 +1,300 @@
+//! A document on its way: everything read, nothing parsed.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use qcbus_document::{BuildError, Capacities, FaultCode, ImageBuilder};
+
+use crate::count;
+use crate::finding::Finding;
+use crate::limits::{Exceeded, Limits};
+use crate::read::FileStamp;
+use crate::xml::{Counter, Halt, Input, SourceText, Splice, SpliceKey, parse};
+
+/// Heap set aside for the text of each fault; longer texts are cut.
+const FAULT_TEXT: usize = 512;
+
+/// A file with all that belongs to its image: its text, the texts of its includes, and what was
+/// wrong with their bytes.
+#[derive(Debug)]
+pub struct Prepared {
+    limits: Limits,
+    digest: [u8; 32],
+    files: Vec<FileStamp>,
+    texts: Vec<NamedText>,
+    splices: HashMap<SpliceKey, Splice>,
+    /// In the image's offsets.
+    findings: Vec<Finding>,
+    capacities: Capacities,
+    /// The image would be too large: it holds the fault alone.
+    refused: bool,
+}
+
+/// A text and the path that places in it are named by.
+#[derive(Debug)]
+pub(crate) struct NamedText {
+    pub path: PathBuf,
+    pub text: String,
+    pub findings: Vec<Finding>,
+}
+
+impl Prepared {
+    /// Puts the parts together and counts how large the image may become.
+    pub(crate) fn new(
+        limits: &Limits,
+        digest: [u8; 32],
+        files: Vec<FileStamp>,
+        mut texts: Vec<NamedText>,
+        splices: HashMap<SpliceKey, Splice>,
+    ) -> Prepared {
+        let mut findings = Vec::new();
+        let mut start = 0;
+        for text in &mut texts {
+            for finding in text.findings.drain(..) {
+                findings.push(Finding {
+                    offset: start + finding.offset,
+                    ..finding
+                });
+            }
+            start += text.text.len() + 1;
+        }
+        let capacities = Capacities::default();
+        let mut prepared = Prepared {
+            limits: *limits,
+            digest,
+            files,
+            texts,
+            splices,
+            findings,
+            capacities,
+            refused: false,
+        };
+        prepared.measure();
+        prepared
+    }
+
+    /// SHA-256 of the root file's bytes on disk (packed, if it is packed; for the member of an
+    /// archive, of the archive).
+    pub fn digest(&self) -> [u8; 32] {
+        self.digest
+    }
+
+    /// Every file that was read or looked for, the root file first. Whoever watches them knows
+    /// when this document is out of date; together with their digests they identify it.
+    pub fn files(&self) -> &[FileStamp] {
+        &self.files
+    }
+
+    /// The path by which the document names its root file: `archive!member` for a member.
+    pub fn path(&self) -> &Path {
+        self.texts.first().map_or(Path::new(""), |text| &text.path)
+    }
+
+    /// Bytes that [`Prepared::build_into`] needs. The image itself is shorter.
+    pub fn upper_bound(&self) -> usize {
+        self.capacities.image_len()
+    }
+
+    /// Builds the image into the first bytes of `out` and gives its length. However faulty the
+    /// file is, there is an image; its faults say what it lacks.
+    ///
+    /// # Errors
+    /// [`BuildError::SmallBuffer`] when `out` is too short. That can happen with a buffer of
+    /// [`Prepared::upper_bound`] bytes too, when a text holds uncommonly many values that have to
+    /// be resolved; the error's `needed` is exact then and enough for the next attempt.
+    pub fn build_into(&self, out: &mut [u8]) -> Result<usize, BuildError> {
+        match self.attempt(out, &self.capacities) {
+            Err(BuildError::NoRoom { .. }) => match self.exact() {
+                Ok(exact) => self.attempt(out, &exact),
+                Err(_) => self.attempt_refused(out),
+            },
+            outcome => outcome,
+        }
+    }
+
+    /// Builds the image into memory of its own.
+    ///
+    /// # Panics
+    /// Never: an image that cannot be built is an empty one that [`qcbus_document::Document`]
+    /// refuses to open.
+    pub fn build(&self) -> Vec<u8> {
+        let mut image = vec![0; self.upper_bound()];
+        let len = match self.build_into(&mut image) {
+            Err(BuildError::SmallBuffer { needed, .. }) => {
+                image = vec![0; needed];
+                self.build_into(&mut image)
+            }
+            outcome => outcome,
+        };
+        image.truncate(len.unwrap_or(0));
+        image
+    }
+
+    /// Chooses the capacities: the quick bound where it is plausible, the exact one where it is
+    /// not (a flood of tags) or cannot be had (a file included twice is parsed twice).
+    fn measure(&mut self) {
+        let known = self.known();
+        let cap = self.max_image();
+        if known.image_len() > cap {
+            return self.refuse(known.image_len());
+        }
+        let quick = self
+            .texts
+            .iter()
+            .map(|text| count::quick(&text.text))
+            .fold(known, add);
+        let plausible = quick.image_len() <= known.text.saturating_mul(4).saturating_add(1 << 20);
+        if plausible && self.splices.is_empty() && quick.image_len() <= cap {
+            self.capacities = quick;
+            return;
+        }
+        match self.exact() {
+            Ok(exact) if exact.image_len() <= cap => self.capacities = exact,
+            Ok(exact) => self.refuse(exact.image_len()),
+            Err(Halt::TooLarge(found)) => self.refuse(found),
+            Err(Halt::Build(_)) => self.refuse(cap),
+        }
+    }
+
+    /// What is known without a look at the texts.
+    fn known(&self) -> Capacities {
+        // The parser's faults, those of its caps, and those of the bytes.
+        let faults = self.limits.max_faults as usize + 2 + self.findings.len();
+        let paths: usize = self
+            .texts
+            .iter()
+            .map(|text| text.path.as_os_str().len() * 3)
+            .sum();
+        Capacities {
+            text: self.texts.iter().map(|text| text.text.len()).sum(),
+            sources: self.texts.len(),
+            faults,
+            heap: paths + faults * FAULT_TEXT,
+            ..Capacities::default()
+        }
+    }
+
+    fn exact(&self) -> Result<Capacities, Halt> {
+        let mut counter = Counter::new(self.known(), self.max_image());
+        let paths = self.paths();
+        parse(&self.input(&paths), &mut counter)?;
+        Ok(counter.counted)
+    }
+
+    /// Offsets have 32 bits, whatever the limit says.
+    fn max_image(&self) -> usize {
+        usize::try_from(self.limits.max_image)
+            .unwrap_or(usize::MAX)
+            .min(u32::MAX as usize)
+    }
+
+    /// Gives the document up but for one fault.
+    fn refuse(&mut self, found: usize) {
+        let exceeded = Exceeded {
+            limit: "max_image",
+            what: "bytes or more",
+            found: found as u64,
+            allowed: self.max_image() as u64,
+        };
+        let text = format!("the document image would have {exceeded}");
+        self.findings = vec![Finding::new(FaultCode::ImageLimit, 0, text)];
+        self.texts.truncate(1);
+        self.texts
+            .iter_mut()
+            .for_each(|text| text.text = String::new());
+        self.splices.clear();
+        self.refused = true;
+        self.capacities = self.known();
+    }
+
+    fn attempt(&self, out: &mut [u8], capacities: &Capacities) -> Result<usize, BuildError> {
+        let mut builder = ImageBuilder::new(out, capacities)?;
+        let paths = self.paths();
+        let input = self.input(&paths);
+        for source in &input.texts {
+            builder.source(source.path, source.text)?;
+        }
+        let mut faults = self.findings.clone();
+        if !self.refused {
+            match parse(&input, &mut builder) {
+                Ok(found) => faults.extend(found),
+                Err(Halt::Build(error)) => return Err(error),
+                Err(Halt::TooLarge(_)) => {}
+            }
+        }
+        faults.sort_by_key(|fault| fault.offset);
+        for fault in &faults {
+            let text = cut(&fault.text, FAULT_TEXT);
+            builder.fault(
+                fault.code,
+                u32::try_from(fault.offset).unwrap_or(u32::MAX),
+                text,
+            )?;
+        }
+        builder.finish(self.digest)
+    }
+
+    /// The image of a document that turned out too large only when its values were resolved.
+    fn attempt_refused(&self, out: &mut [u8]) -> Result<usize, BuildError> {
+        let mut refused = Prepared {
+            limits: self.limits,
+            digest: self.digest,
+            files: Vec::new(),
+            texts: vec![NamedText {
+                path: self.path().to_path_buf(),
+                text: String::new(),
+                findings: Vec::new(),
+            }],
+            splices: HashMap::new(),
+            findings: Vec::new(),
+            capacities: Capacities::default(),
+            refused: true,
+        };
+        refused.refuse(self.max_image());
+        refused.attempt(out, &refused.capacities)
+    }
+
+    fn paths(&self) -> Vec<String> {
+        self.texts
+            .iter()
+            .map(|text| text.path.to_string_lossy().into_owned())
+            .collect()
+    }
+
+    fn input<'t>(&'t self, paths: &'t [String]) -> Input<'t> {
+        let mut start = 0u32;
+        let place = |(text, path): (&'t NamedText, &'t String)| {
+            let source = SourceText {
+                path,
+                text: &text.text,
+                start,
+            };
+            let len = u32::try_from(text.text.len()).unwrap_or(u32::MAX);
+            start = start.saturating_add(len).saturating_add(1);
+            source
+        };
+        let texts = self.texts.iter().zip(paths).map(place).collect();
+        Input {
+            texts,
+            splices: &self.splices,
+            limits: &self.limits,
+        }
+    }
+}
+
+fn add(sum: Capacities, other: Capacities) -> Capacities {
+    Capacities {
+        nodes: sum.nodes.saturating_add(other.nodes),
+        attributes: sum.attributes.saturating_add(other.attributes),
+        names: sum
+            .names
+            .saturating_add(other.names)
+            .min(Capacities::MAX_NAMES),
+        heap: sum.heap.saturating_add(other.heap),
+        ..sum
+    }
+}
+
+fn cut(text: &str, max: usize) -> &str {
+    &text[..text.floor_char_boundary(max)]
+}

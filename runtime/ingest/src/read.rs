@@ -1,0 +1,254 @@
+//! Bytes from disk, and a stamp that says which bytes they were.
+
+use std::fs::{self, File, Metadata};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use sha2::{Digest, Sha256};
+
+use crate::error::IngestError;
+use crate::limits::{Exceeded, Limits};
+
+/// One file that a document was made from, or that was looked for in vain. Whoever watches these
+/// paths knows when the document is out of date.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FileStamp {
+    /// Absolute path.
+    pub path: PathBuf,
+    /// What was found there; `None` when the file was missing or could not be read.
+    pub content: Option<Content>,
+}
+
+/// The bytes behind a [`FileStamp`].
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Content {
+    /// Size on disk in bytes.
+    pub size: u64,
+    /// Time of the last modification; `None` where bytes came from memory.
+    pub modified: Option<SystemTime>,
+    /// SHA-256 of the bytes on disk.
+    pub digest: [u8; 32],
+}
+
+/// What was read from one file.
+pub(crate) struct RawFile {
+    pub bytes: Vec<u8>,
+    pub stamp: FileStamp,
+}
+
+/// Attempts at a file that changes under our hands before it is given up.
+const ATTEMPTS: usize = 3;
+
+/// Reads a whole file and proves, by its metadata before and after, that nobody wrote to it
+/// meanwhile.
+pub(crate) fn read_file(path: &Path, limits: &Limits) -> Result<RawFile, IngestError> {
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let mut outcome = "changed";
+    for _ in 0..ATTEMPTS {
+        match read_once(&path, limits, |file, bytes, cap| {
+            file.take(cap).read_to_end(bytes)
+        })? {
+            Attempt::Stable(raw) => return Ok(raw),
+            Attempt::Changed => outcome = "changed",
+            Attempt::Removed => outcome = "was removed",
+        }
+    }
+    Err(IngestError::Unsettled {
+        path,
+        what: outcome,
+    })
+}
+
+/// The stamp of bytes that were handed over instead of read.
+pub(crate) fn stamp_of_bytes(path: &Path, bytes: &[u8]) -> FileStamp {
+    let content = Content {
+        size: bytes.len() as u64,
+        modified: None,
+        digest: sha256(bytes),
+    };
+    FileStamp {
+        path: path.to_path_buf(),
+        content: Some(content),
+    }
+}
+
+/// SHA-256, as `sha256sum` prints it.
+pub(crate) fn sha256(bytes: &[u8]) -> [u8; 32] {
+    Sha256::digest(bytes).into()
+}
+
+enum Attempt {
+    Stable(RawFile),
+    Changed,
+    Removed,
+}
+
+/// One attempt; `fill` does the reading, so that a test can change the file in its midst.
+fn read_once(
+    path: &Path,
+    limits: &Limits,
+    fill: impl FnOnce(&mut File, &mut Vec<u8>, u64) -> io::Result<usize>,
+) -> Result<Attempt, IngestError> {
+    let fail = |source| unreadable(path, source);
+    // Looked at before it is opened: opening a named pipe would wait for its writer.
+    regular(path, &fs::metadata(path).map_err(fail)?)?;
+    let mut file = File::open(path).map_err(fail)?;
+    let before = file.metadata().map_err(fail)?;
+    regular(path, &before)?;
+    let too_large = |exceeded| IngestError::TooLarge {
+        path: path.to_path_buf(),
+        exceeded,
+    };
+    Exceeded::check("max_file", "bytes on disk", before.len(), limits.max_file)
+        .map_err(too_large)?;
+    let mut bytes = Vec::with_capacity(usize::try_from(before.len()).unwrap_or(0) + 1);
+    fill(&mut file, &mut bytes, limits.max_file.saturating_add(1)).map_err(fail)?;
+    Exceeded::check(
+        "max_file",
+        "bytes on disk",
+        bytes.len() as u64,
+        limits.max_file,
+    )
+    .map_err(too_large)?;
+    let after = match fs::metadata(path) {
+        Ok(after) => after,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Attempt::Removed),
+        Err(error) => return Err(fail(error)),
+    };
+    if !same_file(&before, &after) || bytes.len() as u64 != after.len() {
+        return Ok(Attempt::Changed);
+    }
+    let content = Content {
+        size: after.len(),
+        modified: after.modified().ok(),
+        digest: sha256(&bytes),
+    };
+    let stamp = FileStamp {
+        path: path.to_path_buf(),
+        content: Some(content),
+    };
+    Ok(Attempt::Stable(RawFile { bytes, stamp }))
+}
+
+fn regular(path: &Path, metadata: &Metadata) -> Result<(), IngestError> {
+    let what = match metadata.file_type() {
+        kind if kind.is_file() => return Ok(()),
+        kind if kind.is_dir() => "a directory",
+        _ => "a device, pipe or socket",
+    };
+    Err(IngestError::NotAFile {
+        path: path.to_path_buf(),
+        what,
+    })
+}
+
+fn unreadable(path: &Path, source: io::Error) -> IngestError {
+    let path = path.to_path_buf();
+    match source.kind() {
+        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => IngestError::Missing { path },
+        _ => IngestError::Unreadable { path, source },
+    }
+}
+
+#[cfg(unix)]
+fn same_file(before: &Metadata, after: &Metadata) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let key = |m: &Metadata| (m.dev(), m.ino(), m.size(), m.mtime(), m.mtime_nsec());
+    key(before) == key(after)
+}
+
+#[cfg(not(unix))]
+fn same_file(before: &Metadata, after: &Metadata) -> bool {
+    before.len() == after.len() && before.modified().ok() == after.modified().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use super::*;
+
+    fn read_while(path: &Path, meanwhile: impl FnOnce(&Path)) -> Result<Attempt, IngestError> {
+        read_once(path, &Limits::default(), |file, bytes, cap| {
+            let read = file.take(cap).read_to_end(bytes);
+            meanwhile(path);
+            read
+        })
+    }
+
+    #[test]
+    fn a_file_removed_while_being_read_is_noticed() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.xodr");
+        fs::write(&path, "<OpenDRIVE/>").unwrap();
+        let attempt = read_while(&path, |path| fs::remove_file(path).unwrap());
+        assert!(matches!(attempt, Ok(Attempt::Removed)));
+        assert!(matches!(
+            read_file(&path, &Limits::default()),
+            Err(IngestError::Missing { .. })
+        ));
+    }
+
+    #[test]
+    fn a_file_changed_or_replaced_while_being_read_is_noticed() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.xodr");
+        fs::write(&path, "<OpenDRIVE/>").unwrap();
+        let grown = read_while(&path, |path| {
+            File::options()
+                .append(true)
+                .open(path)
+                .unwrap()
+                .write_all(b"<!-- -->")
+                .unwrap();
+        });
+        assert!(matches!(grown, Ok(Attempt::Changed)));
+        let replaced = read_while(&path, |path| {
+            let other = path.with_extension("new");
+            fs::write(&other, fs::read(path).unwrap()).unwrap();
+            fs::rename(other, path).unwrap();
+        });
+        assert!(matches!(replaced, Ok(Attempt::Changed)));
+        assert!(matches!(read_while(&path, |_| ()), Ok(Attempt::Stable(_))));
+    }
+
+    #[test]
+    fn directories_devices_and_large_files_are_named_as_such() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("x.xodr");
+        fs::create_dir(&path).unwrap();
+        let error = read_file(&path, &Limits::default()).err().unwrap();
+        assert!(
+            error.to_string().ends_with("it is a directory, not a file"),
+            "{error}"
+        );
+        let error = read_file(Path::new("/dev/zero"), &Limits::default())
+            .err()
+            .unwrap();
+        assert!(matches!(error, IngestError::NotAFile { .. }));
+
+        let path = dir.path().join("large.xodr");
+        fs::write(&path, "<OpenDRIVE/>").unwrap();
+        let limits = Limits {
+            max_file: 5,
+            ..Limits::default()
+        };
+        let error = read_file(&path, &limits).err().unwrap();
+        assert!(
+            error
+                .to_string()
+                .ends_with("12 bytes on disk, 5 are allowed; raise the limit max_file to read it"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn the_digest_is_the_one_sha256sum_prints() {
+        let hex: String = sha256(b"abc")
+            .iter()
+            .map(|byte| format!("{byte:02x}"))
+            .collect();
+        assert!(hex.starts_with("ba7816bf8f01cfea414140de5dae2223"));
+    }
+}

@@ -1,0 +1,14 @@
+//! From text to the events of a tree: quick-xml finds the markup, the checks that it leaves out
+//! are made here.
+
+pub(crate) mod chars;
+mod includes;
+mod namespaces;
+mod parser;
+mod sink;
+mod tag;
+mod value;
+
+pub(crate) use includes::{Include, first_element, includes_of};
+pub(crate) use parser::{Input, SourceText, Splice, SpliceKey, parse};
+pub(crate) use sink::{Counter, Halt};

@@ -1,0 +1,695 @@
+//! The one pass over a document and its includes.
+
+mod character_data;
+mod misc;
+
+use std::collections::HashMap;
+
+use qcbus_document::{BuildError, Capacities, FaultCode};
+use quick_xml::Reader;
+use quick_xml::events::Event;
+
+use super::chars::name_with_colon;
+use super::includes::first_element;
+use super::namespaces::Prefixes;
+use super::sink::{Halt, Sink};
+use super::tag::{AttributeScanner, RawAttribute};
+use super::value::{BadReference, attribute_value};
+use crate::finding::Finding;
+use crate::limits::Limits;
+
+/// The texts of a document, the root file first, and what its includes lead to.
+pub(crate) struct Input<'t> {
+    pub texts: Vec<SourceText<'t>>,
+    pub splices: &'t HashMap<SpliceKey, Splice>,
+    pub limits: &'t Limits,
+}
+
+/// One file's text and its place in the image's text.
+#[derive(Clone, Copy)]
+pub(crate) struct SourceText<'t> {
+    pub path: &'t str,
+    pub text: &'t str,
+    pub start: u32,
+}
+
+/// An `<include>`: the number of its file, and the offset of its `<` in that file's text.
+pub(crate) type SpliceKey = (usize, usize);
+
+/// What an `<include>` leads to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Splice {
+    /// The number of a file.
+    File(usize),
+    /// Nowhere, and why.
+    Fault(FaultCode, String),
+}
+
+/// Parses a whole document into `sink`; gives the faults in the order of their discovery, with
+/// offsets of the image's text. However faulty the text is, what could be read reaches the sink.
+pub(crate) fn parse<S: Sink>(input: &Input<'_>, sink: &mut S) -> Result<Vec<Finding>, Halt> {
+    let mut parser = Parser::new(input, sink);
+    match parser.file(0, None) {
+        Ok(()) | Err(Stop::File | Stop::All) => Ok(parser.faults),
+        Err(Stop::Sink(Halt::Build(BuildError::TooManyNames))) => {
+            let text = format!(
+                "more than {} distinct names, an image holds no more",
+                Capacities::MAX_NAMES
+            );
+            parser
+                .faults
+                .push(Finding::new(FaultCode::NameLimit, 0, text));
+            Ok(parser.faults)
+        }
+        Err(Stop::Sink(halt)) => Err(halt),
+    }
+}
+
+/// Why parsing ends before the end of the text.
+enum Stop {
+    /// Of a fault after which nothing sensible can follow in this file.
+    File,
+    /// Of a cap: nothing more is read at all.
+    All,
+    /// The sink takes no more.
+    Sink(Halt),
+}
+
+impl From<Halt> for Stop {
+    fn from(halt: Halt) -> Stop {
+        Stop::Sink(halt)
+    }
+}
+
+/// An element that has been opened.
+struct Open<'t> {
+    name: &'t str,
+    /// Offset of its `<` in the text of its file.
+    at: usize,
+    /// No node: the root of an included file, which its parent stands for.
+    transparent: bool,
+    /// Prefix bindings in force before it.
+    prefixes: usize,
+    /// The include that ends with this element.
+    include: Option<SpliceKey>,
+}
+
+/// A run of character data that may still grow.
+#[derive(Default)]
+struct Run {
+    active: bool,
+    start: usize,
+    stop: usize,
+    /// The value so far, once it differs from the text.
+    value: String,
+    resolved: bool,
+}
+
+/// The file being read.
+#[derive(Clone, Copy)]
+struct File<'t> {
+    number: usize,
+    text: &'t str,
+    start: u32,
+    /// Length of the stack when the file began.
+    floor: usize,
+    /// The element that an included file's root must be.
+    parent: Option<&'t str>,
+}
+
+struct Parser<'p, 't, S> {
+    input: &'p Input<'t>,
+    sink: &'p mut S,
+    faults: Vec<Finding>,
+    stack: Vec<Open<'t>>,
+    /// Files being read, outermost first.
+    chain: Vec<usize>,
+    included: u32,
+    /// Includes are spliced in OpenDRIVE only.
+    splices: bool,
+    refused_doctype: bool,
+    run: Run,
+    prefixes: Prefixes<'t>,
+    /// Attributes of the current tag.
+    names: Vec<&'t str>,
+    scratch: String,
+    bad: Vec<BadReference>,
+}
+
+impl<'p, 't, S: Sink> Parser<'p, 't, S> {
+    fn new(input: &'p Input<'t>, sink: &'p mut S) -> Self {
+        Parser {
+            input,
+            sink,
+            faults: Vec::new(),
+            stack: Vec::new(),
+            chain: Vec::new(),
+            included: 0,
+            splices: false,
+            refused_doctype: false,
+            run: Run::default(),
+            prefixes: Prefixes::default(),
+            names: Vec::new(),
+            scratch: String::new(),
+            bad: Vec::new(),
+        }
+    }
+
+    /// Reads one file; `parent` is the element that an included file's root must be.
+    fn file(&mut self, number: usize, parent: Option<&'t str>) -> Result<(), Stop> {
+        let source = self.input.texts[number];
+        let file = File {
+            number,
+            text: source.text,
+            start: source.start,
+            floor: self.stack.len(),
+            parent,
+        };
+        let (mark, body) = marks(file.text);
+        if mark != body {
+            self.fault(
+                file,
+                FaultCode::TextOutsideRoot,
+                mark,
+                "a second byte-order mark",
+            )?;
+        }
+        if file.text[body..].trim_ascii().is_empty() {
+            return self.fault(file, FaultCode::Empty, 0, "the file is empty");
+        }
+        self.chain.push(number);
+        let mut reader = lenient(&file.text[body..]);
+        let outcome = self.events(file, &mut reader, body, mark);
+        self.chain.pop();
+        outcome
+    }
+
+    fn events(
+        &mut self,
+        file: File<'t>,
+        reader: &mut Reader<&'t [u8]>,
+        body: usize,
+        mark: usize,
+    ) -> Result<(), Stop> {
+        let mut seen_root = false;
+        loop {
+            let from = body + offset(reader.buffer_position());
+            let event = reader.read_event();
+            let to = body + offset(reader.buffer_position());
+            let outside = self.stack.len() == file.floor;
+            match event {
+                Ok(Event::Start(tag)) => {
+                    self.start_tag(file, from, tag.name().as_ref().len(), to, false, seen_root)?;
+                    seen_root = true;
+                }
+                Ok(Event::Empty(tag)) => {
+                    self.start_tag(file, from, tag.name().as_ref().len(), to, true, seen_root)?;
+                    seen_root = true;
+                }
+                Ok(Event::End(tag)) => self.end_tag(file, from, to, tag.name().as_ref())?,
+                Ok(Event::Text(_)) => self.text(file, from, to, outside, seen_root)?,
+                Ok(Event::GeneralRef(name)) => self.reference(file, from, to, &name, outside)?,
+                Ok(Event::CData(_)) => self.cdata(file, from, to, outside)?,
+                Ok(Event::Comment(_)) => self.comment(file, from, to)?,
+                Ok(Event::PI(_)) => self.instruction(file, from, to)?,
+                Ok(Event::Decl(_)) => self.declaration(file, from, to, from == mark)?,
+                Ok(Event::DocType(_)) => self.doctype(file, from)?,
+                Ok(Event::Eof) => return self.end_of_file(file, seen_root),
+                Err(error) => return self.broken(file, from, &error),
+            }
+        }
+    }
+
+    fn start_tag(
+        &mut self,
+        file: File<'t>,
+        from: usize,
+        name_len: usize,
+        to: usize,
+        empty: bool,
+        seen_root: bool,
+    ) -> Result<(), Stop> {
+        self.flush(file)?;
+        let name = &file.text[from + 1..from + 1 + name_len];
+        let outside = self.stack.len() == file.floor;
+        let mut transparent = outside && file.parent.is_some();
+        if outside {
+            self.root(file, from, name, seen_root)?;
+        }
+        if self.stack.len() >= usize::from(self.input.limits.max_depth) {
+            return self.too_deep(file, from);
+        }
+        let Some(colon) = name_with_colon(name) else {
+            self.bad_name(file, from, name)?;
+            return self.open_nameless(file, from, empty, name);
+        };
+        if transparent && name != file.parent.unwrap_or(name) {
+            transparent = false;
+        }
+        if !transparent {
+            self.sink.open(name, file.start + narrow(from))?;
+        }
+        let prefixes = self.prefixes.mark();
+        let inside = from + 1 + name_len..to - if empty { 2 } else { 1 };
+        self.attributes(file, inside, transparent)?;
+        if colon {
+            self.check_prefix(file, from + 1, name)?;
+        }
+        let include =
+            (self.splices && !outside && name == "include").then_some((file.number, from));
+        if empty {
+            self.prefixes.forget(prefixes);
+            if !transparent {
+                self.sink.close(file.start + narrow(to))?;
+            }
+            return include.map_or(Ok(()), |key| self.splice(file, key));
+        }
+        self.stack.push(Open {
+            name,
+            at: from,
+            transparent,
+            prefixes,
+            include,
+        });
+        Ok(())
+    }
+
+    /// The first element of a file, or one element too many.
+    fn root(
+        &mut self,
+        file: File<'t>,
+        from: usize,
+        name: &str,
+        seen_root: bool,
+    ) -> Result<(), Stop> {
+        if seen_root {
+            let text = format!("a second root element <{}>; a file has one", shown(name));
+            self.fault(file, FaultCode::SecondRoot, from, &text)?;
+            return Err(Stop::File);
+        }
+        match file.parent {
+            None => {
+                self.splices = name == "OpenDRIVE" || name.ends_with(":OpenDRIVE");
+                Ok(())
+            }
+            Some(_) => Ok(()),
+        }
+    }
+
+    fn too_deep(&mut self, file: File<'t>, from: usize) -> Result<(), Stop> {
+        let depth = self.input.limits.max_depth;
+        let text = format!(
+            "elements are nested deeper than {depth}; raise the limit max_depth to read the rest"
+        );
+        self.fault(file, FaultCode::DepthLimit, from, &text)?;
+        Err(Stop::All)
+    }
+
+    fn bad_name(&mut self, file: File<'t>, from: usize, name: &str) -> Result<(), Stop> {
+        let text = if name.is_empty() {
+            "no element name follows <; a literal < is written &lt;".to_string()
+        } else {
+            format!("{:?} is no name for an element", shown(name))
+        };
+        self.fault(file, FaultCode::BadName, from, &text)
+    }
+
+    /// An element without a usable name is no node, but its end tag is awaited.
+    fn open_nameless(
+        &mut self,
+        file: File<'t>,
+        from: usize,
+        empty: bool,
+        name: &'t str,
+    ) -> Result<(), Stop> {
+        if self.stack.len() == file.floor {
+            return Err(Stop::File);
+        }
+        if !empty {
+            let prefixes = self.prefixes.mark();
+            self.stack.push(Open {
+                name,
+                at: from,
+                transparent: true,
+                prefixes,
+                include: None,
+            });
+        }
+        Ok(())
+    }
+
+    fn attributes(
+        &mut self,
+        file: File<'t>,
+        inside: std::ops::Range<usize>,
+        transparent: bool,
+    ) -> Result<(), Stop> {
+        self.names.clear();
+        let mut colon = false;
+        for attribute in AttributeScanner::new(file.text, inside) {
+            let attribute = match attribute {
+                Ok(attribute) => attribute,
+                Err(fault) => {
+                    self.fault(file, fault.code, fault.offset, &fault.text)?;
+                    break;
+                }
+            };
+            let name = &file.text[attribute.name.clone()];
+            if attribute.missing_space {
+                let text = format!("no space before the attribute {}", shown(name));
+                self.fault(file, FaultCode::MissingSpace, attribute.name.start, &text)?;
+            }
+            if attribute.colon {
+                colon |= !self.prefixes.declare(name);
+            }
+            self.names.push(name);
+            self.attribute(file, name, &attribute, transparent)?;
+        }
+        if self.names.len() > 1 {
+            self.check_duplicates(file)?;
+        }
+        if colon {
+            self.check_prefixes(file)
+        } else {
+            Ok(())
+        }
+    }
+
+    #[inline]
+    fn attribute(
+        &mut self,
+        file: File<'t>,
+        name: &str,
+        attribute: &RawAttribute,
+        transparent: bool,
+    ) -> Result<(), Stop> {
+        let (name_at, value) = (attribute.name.start, attribute.value.clone());
+        if attribute.special {
+            self.resolve(file, value.start, &file.text[value.clone()])?;
+        }
+        if transparent {
+            return Ok(());
+        }
+        let resolved = attribute.special.then_some(&*self.scratch);
+        let (value_at, len) = (file.start + narrow(value.start), narrow(value.len()));
+        self.sink
+            .attribute(name, file.start + narrow(name_at), value_at, len, resolved)?;
+        Ok(())
+    }
+
+    /// Leaves the value of a raw attribute in `scratch`.
+    #[cold]
+    fn resolve(&mut self, file: File<'t>, at: usize, raw: &str) -> Result<(), Stop> {
+        self.scratch.clear();
+        self.bad.clear();
+        attribute_value(raw, &mut self.scratch, &mut self.bad);
+        for bad in std::mem::take(&mut self.bad) {
+            self.bad_reference(file, at + bad.offset, &bad.text)?;
+        }
+        match raw.find('<') {
+            Some(less) => {
+                let text = "< within an attribute's value must be written &lt;";
+                self.fault(file, FaultCode::BadAttribute, at + less, text)
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Few attributes are compared each with each, many are sorted: never quadratic.
+    fn check_duplicates(&mut self, file: File<'t>) -> Result<(), Stop> {
+        const FEW: usize = 12;
+        let names = &self.names;
+        let repeated: Option<&'t str> = if names.len() <= FEW {
+            (1..names.len())
+                .find(|&i| names[..i].iter().any(|earlier| same(earlier, names[i])))
+                .map(|i| names[i])
+        } else {
+            let mut seen = std::collections::HashSet::with_capacity(names.len());
+            names.iter().copied().find(|&name| !seen.insert(name))
+        };
+        let Some(name) = repeated else { return Ok(()) };
+        let at = offset_in(file.text, name);
+        let text = format!("the attribute {} appears twice in one element", shown(name));
+        self.fault(file, FaultCode::DuplicateAttribute, at, &text)
+    }
+
+    #[cold]
+    fn check_prefixes(&mut self, file: File<'t>) -> Result<(), Stop> {
+        let names = std::mem::take(&mut self.names);
+        for name in names.iter().filter(|name| name.contains(':')) {
+            self.check_prefix(file, offset_in(file.text, name), name)?;
+        }
+        self.names = names;
+        Ok(())
+    }
+
+    #[cold]
+    fn check_prefix(&mut self, file: File<'t>, at: usize, name: &str) -> Result<(), Stop> {
+        let Some(prefix) = self.prefixes.unbound(name) else {
+            return Ok(());
+        };
+        let text = format!(
+            "the prefix of {} is not bound; xmlns:{} is missing",
+            shown(name),
+            shown(prefix)
+        );
+        self.fault(file, FaultCode::UnboundPrefix, at, &text)
+    }
+
+    fn end_tag(&mut self, file: File<'t>, from: usize, to: usize, name: &str) -> Result<(), Stop> {
+        self.flush(file)?;
+        if self.stack.len() > file.floor && self.stack.last().is_some_and(|open| open.name == name)
+        {
+            return self.close(file, to);
+        }
+        self.mismatch(file, from, to, name)
+    }
+
+    fn close(&mut self, file: File<'t>, to: usize) -> Result<(), Stop> {
+        let Some(open) = self.stack.pop() else {
+            return Ok(());
+        };
+        self.prefixes.forget(open.prefixes);
+        if !open.transparent {
+            self.sink.close(file.start + narrow(to))?;
+        }
+        open.include.map_or(Ok(()), |key| self.splice(file, key))
+    }
+
+    /// An end tag that does not belong here. When it belongs to an outer element, the inner ones
+    /// are taken for closed; else it is skipped.
+    #[cold]
+    fn mismatch(&mut self, file: File<'t>, from: usize, to: usize, name: &str) -> Result<(), Stop> {
+        let text = match self.stack[file.floor..].last() {
+            Some(open) => format!(
+                "</{}> where </{}> is due, for the element opened in row {}",
+                shown(name),
+                shown(open.name),
+                row(file.text, open.at)
+            ),
+            None => format!("</{}> closes an element that was never opened", shown(name)),
+        };
+        self.fault(file, FaultCode::MismatchedTag, from, &text)?;
+        let Some(depth) = self.stack[file.floor..]
+            .iter()
+            .rposition(|open| open.name == name)
+        else {
+            return Ok(());
+        };
+        while self.stack.len() > file.floor + depth + 1 {
+            self.close(file, from)?;
+        }
+        self.close(file, to)
+    }
+
+    fn end_of_file(&mut self, file: File<'t>, seen_root: bool) -> Result<(), Stop> {
+        self.flush(file)?;
+        if !seen_root {
+            return self.fault(
+                file,
+                FaultCode::NoRoot,
+                file.text.len(),
+                "the file has no element",
+            );
+        }
+        let Some(open) = self.stack[file.floor..].last() else {
+            return Ok(());
+        };
+        let text = format!(
+            "the file ends while <{}>, opened in row {}, is open",
+            shown(open.name),
+            row(file.text, open.at)
+        );
+        self.fault(file, FaultCode::Unclosed, file.text.len(), &text)?;
+        self.close_rest(file)
+    }
+
+    fn close_rest(&mut self, file: File<'t>) -> Result<(), Stop> {
+        while self.stack.len() > file.floor {
+            self.close(file, file.text.len())?;
+        }
+        Ok(())
+    }
+
+    /// quick-xml gave up: markup that never ends, or is none.
+    #[cold]
+    fn broken(
+        &mut self,
+        file: File<'t>,
+        from: usize,
+        error: &quick_xml::Error,
+    ) -> Result<(), Stop> {
+        self.flush(file)?;
+        // Text may lie between the last event and the markup that is to blame.
+        let at = file.text[from..].find('<').map_or(from, |skip| from + skip);
+        let code = match error {
+            quick_xml::Error::Syntax(quick_xml::errors::SyntaxError::InvalidBangMarkup) => {
+                FaultCode::Syntax
+            }
+            quick_xml::Error::Syntax(_) => FaultCode::Unclosed,
+            _ => FaultCode::Syntax,
+        };
+        let text = match error {
+            quick_xml::Error::Syntax(error) => error.to_string(),
+            error => error.to_string(),
+        };
+        self.fault(file, code, at, &text)?;
+        Err(Stop::File)
+    }
+
+    /// Puts the children of an included file's root here.
+    #[cold]
+    fn splice(&mut self, file: File<'t>, key: SpliceKey) -> Result<(), Stop> {
+        let target = match self.input.splices.get(&key) {
+            Some(Splice::File(target)) => *target,
+            Some(Splice::Fault(code, text)) => return self.fault(file, *code, key.1, text),
+            None => {
+                return self.fault(
+                    file,
+                    FaultCode::IncludeMissing,
+                    key.1,
+                    "this include was not read",
+                );
+            }
+        };
+        if self.chain.contains(&target) {
+            let text = format!(
+                "this include leads back to {}, which is being included",
+                self.input.texts[target].path
+            );
+            return self.fault(file, FaultCode::IncludeCycle, key.1, &text);
+        }
+        self.included += 1;
+        let limit = self.input.limits.max_includes;
+        if self.included > limit {
+            let text =
+                format!("more than {limit} includes; raise the limit max_includes to read them");
+            self.fault(file, FaultCode::IncludeLimit, key.1, &text)?;
+            return Err(Stop::All);
+        }
+        let Some(parent) = self.stack.last().map(|open| open.name) else {
+            return Ok(());
+        };
+        if let Some(root) =
+            first_element(self.input.texts[target].text).filter(|root| *root != parent)
+        {
+            let text = format!(
+                "the root of the included file is <{}>, but it must be <{parent}>, the element around the include",
+                shown(root)
+            );
+            return self.fault(file, FaultCode::IncludeParentMismatch, key.1, &text);
+        }
+        let floor = self.stack.len();
+        match self.file(target, Some(parent)) {
+            // The faulty file ends here; the one that includes it goes on.
+            Err(Stop::File) => {
+                self.run.active = false;
+                let end = self.input.texts[target];
+                let file = File {
+                    number: target,
+                    text: end.text,
+                    start: end.start,
+                    floor,
+                    parent: None,
+                };
+                self.close_rest(file)
+            }
+            outcome => outcome,
+        }
+    }
+
+    #[cold]
+    fn fault(
+        &mut self,
+        file: File<'t>,
+        code: FaultCode,
+        at: usize,
+        text: &str,
+    ) -> Result<(), Stop> {
+        let at = file.start as usize + at;
+        let limit = self.input.limits.max_faults as usize;
+        if self.faults.len() < limit {
+            self.faults.push(Finding::new(code, at, text));
+            return Ok(());
+        }
+        let text = format!("more than {limit} faults, the rest of the file is not read");
+        self.faults
+            .push(Finding::new(FaultCode::FaultLimit, at, text));
+        Err(Stop::All)
+    }
+}
+
+/// Length of the byte-order mark, and of all that wrongly follow it. (quick-xml would skip one
+/// without counting it.)
+pub(super) fn marks(text: &str) -> (usize, usize) {
+    let body = text.len() - text.trim_start_matches('\u{FEFF}').len();
+    (body.min('\u{FEFF}'.len_utf8()), body)
+}
+
+/// quick-xml with its checks off: those made here recover, and say where and why.
+pub(super) fn lenient(text: &str) -> Reader<&[u8]> {
+    let mut reader = Reader::from_str(text);
+    let config = reader.config_mut();
+    config.check_end_names = false;
+    config.allow_unmatched_ends = true;
+    config.allow_dangling_amp = true;
+    reader
+}
+
+/// Equality that mostly ends at the first letter, before any call.
+#[inline]
+fn same(one: &str, other: &str) -> bool {
+    one.len() == other.len() && one.as_bytes().first() == other.as_bytes().first() && one == other
+}
+
+/// A name or text as messages show it: bounded, whatever the file holds.
+fn shown(text: &str) -> &str {
+    text.char_indices()
+        .nth(60)
+        .map_or(text, |(at, _)| &text[..at])
+}
+
+/// The row of an offset; for messages only, it counts from the start.
+fn row(text: &str, at: usize) -> usize {
+    text.as_bytes()[..at]
+        .iter()
+        .filter(|&&byte| byte == b'\n')
+        .count()
+        + 1
+}
+
+/// Where `part`, a slice of `text`, lies in it.
+fn offset_in(text: &str, part: &str) -> usize {
+    (part.as_ptr() as usize).saturating_sub(text.as_ptr() as usize)
+}
+
+/// Positions of a text in memory fit.
+pub(super) fn offset(position: u64) -> usize {
+    usize::try_from(position).unwrap_or(usize::MAX)
+}
+
+/// Texts above 4 GiB are refused before they are parsed.
+#[inline]
+fn narrow(at: usize) -> u32 {
+    u32::try_from(at).unwrap_or(u32::MAX)
+}

@@ -1,0 +1,148 @@
+//! What other files a scenario refers to.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
+use std::fs;
+use std::io::{Cursor, Write};
+use std::path::{Path, PathBuf};
+
+use qcbus_document::Document;
+use qcbus_ingest::{Limits, Reference, Role, prepare_bytes, references};
+
+fn of(path: &Path, text: &str) -> Vec<Reference> {
+    let image = prepare_bytes(path, text.into(), &Limits::default()).build();
+    references(&Document::open(&image).unwrap())
+}
+
+fn map(filepath: &str) -> Reference {
+    let text = format!(
+        "<OpenSCENARIO><ParameterDeclarations><ParameterDeclaration name='map' value='maps/a.xodr'/>\
+         <ParameterDeclaration name='ext' value='xodr'/></ParameterDeclarations>\
+         <RoadNetwork><LogicFile filepath='{filepath}'/></RoadNetwork></OpenSCENARIO>"
+    );
+    let mut found = of(Path::new("/farm/s/x.xosc"), &text);
+    assert_eq!(found.len(), 1);
+    let reference = found.remove(0);
+    assert!(text[reference.offset as usize..].starts_with("<LogicFile"));
+    assert_eq!(
+        (reference.role, &*reference.text),
+        (Role::LogicFile, filepath)
+    );
+    reference
+}
+
+#[test]
+fn maps_are_relative_to_the_scenario() {
+    for (filepath, expected) in [
+        ("../m/a.xodr", &["/farm/m/a.xodr"][..]),
+        ("/abs/a.xodr", &["/abs/a.xodr"]),
+        ("a%20b.xodr", &["/farm/s/a%20b.xodr", "/farm/s/a b.xodr"]),
+        (
+            "..\\m\\a.xodr",
+            &["/farm/s/..\\m\\a.xodr", "/farm/m/a.xodr"],
+        ),
+        ("file:///abs/a.xodr", &["/abs/a.xodr"]),
+        ("$map", &["/farm/s/maps/a.xodr"]),
+        ("a.$ext", &["/farm/s/a.xodr"]),
+        ("./Town05/map", &["/farm/s/Town05/map"]),
+    ] {
+        let reference = map(filepath);
+        let expected: Vec<PathBuf> = expected.iter().map(PathBuf::from).collect();
+        assert_eq!(reference.candidates, expected, "{filepath}");
+        assert_eq!(reference.unresolved, None);
+    }
+}
+
+#[test]
+fn what_names_no_file_says_why() {
+    for (filepath, part) in [
+        ("Town05", "the name of a map that the simulator knows"),
+        ("", "the path is empty"),
+        ("http://x/a.xodr", "nothing is fetched"),
+        ("$unknown/a.xodr", "$unknown has no plain default"),
+        ("${1+2}.xodr", "is an expression"),
+    ] {
+        let reference = map(filepath);
+        assert_eq!(reference.candidates, Vec::<PathBuf>::new());
+        assert!(reference.unresolved.unwrap().contains(part), "{filepath}");
+    }
+}
+
+#[test]
+fn catalog_directories_are_listed() {
+    let dir = tempfile::tempdir().unwrap();
+    let catalogs = dir.path().join("catalogs");
+    fs::create_dir(&catalogs).unwrap();
+    for name in ["b.xosc", "a.xosc", "readme.txt"] {
+        fs::write(catalogs.join(name), "").unwrap();
+    }
+    let text = "<OpenSCENARIO><CatalogLocations><VehicleCatalog><Directory path='./catalogs'/>\
+                </VehicleCatalog><RouteCatalog><Directory path='nowhere'/></RouteCatalog>\
+                </CatalogLocations></OpenSCENARIO>";
+    let found = of(&dir.path().join("x.xosc"), text);
+    assert_eq!(found.len(), 2);
+    assert_eq!(found[0].role, Role::CatalogDirectory);
+    assert_eq!(
+        found[0].candidates,
+        [catalogs.join("a.xosc"), catalogs.join("b.xosc")]
+    );
+    assert_eq!(found[0].directory, Some(catalogs));
+    assert_eq!(
+        found[1].unresolved.as_deref(),
+        Some("there is no such directory")
+    );
+    assert_eq!(found[1].directory, Some(dir.path().join("nowhere")));
+}
+
+#[test]
+fn other_roles() {
+    let text = "<OpenSCENARIO xmlns:xsi='http://www.w3.org/2001/XMLSchema-instance' \
+                xsi:noNamespaceSchemaLocation='http://x/OpenSCENARIO.xsd'>\
+                <ParameterValueDistribution><ScenarioFile filepath='../a.xosc'/>\
+                </ParameterValueDistribution></OpenSCENARIO>";
+    let found = of(Path::new("/farm/d/x.xosc"), text);
+    assert_eq!(
+        (found[0].role, found[0].candidates.len()),
+        (Role::Schema, 0)
+    );
+    assert!(found[0].unresolved.is_some());
+    assert_eq!(
+        (found[1].role, &found[1].candidates[0]),
+        (Role::ScenarioFile, &PathBuf::from("/farm/a.xosc"))
+    );
+}
+
+#[test]
+fn members_of_an_archive_come_before_what_lies_beside_it() {
+    let main = "<OpenSCENARIO><RoadNetwork><LogicFile filepath='m.xodr'/></RoadNetwork>\
+                <ManeuverGroup><ScenarioReference scenarioFileName='lib.xosc'/></ManeuverGroup>\
+                </OpenSCENARIO>";
+    let mut writer = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    for (name, text) in [("main.xosc", main), ("lib.xosc", "<lib/>")] {
+        writer
+            .start_file(name, zip::write::SimpleFileOptions::default())
+            .unwrap();
+        writer.write_all(text.as_bytes()).unwrap();
+    }
+    let archive = writer.finish().unwrap().into_inner();
+    let prepared = prepare_bytes(
+        Path::new("/farm/x.mosc"),
+        archive.clone(),
+        &Limits::default(),
+    );
+    assert_eq!(prepared.path(), Path::new("/farm/x.mosc!main.xosc"));
+    let image = prepared.build();
+    let found = references(&Document::open(&image).unwrap());
+    assert_eq!(found[0].candidates, [PathBuf::from("/farm/m.xodr")]);
+    let member = PathBuf::from("/farm/x.mosc!lib.xosc");
+    assert_eq!(found[1].role, Role::ScenarioReference);
+    assert_eq!(
+        found[1].candidates,
+        [member.clone(), PathBuf::from("/farm/lib.xosc")]
+    );
+
+    let image = prepare_bytes(&member, archive, &Limits::default()).build();
+    let document = Document::open(&image).unwrap();
+    assert!(document.root().unwrap().is("lib"));
+    assert_eq!(document.path(), "/farm/x.mosc!lib.xosc");
+}

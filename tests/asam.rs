@@ -1,0 +1,279 @@
+//! The way of ASAM's framework: a configuration goes in, `Result.xqar` and reports come out, and
+//! ASAM's own library reads them.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use qcbus_formats::xqar::Results;
+use support::asam;
+use support::desk::{Desk, checkers, files_below, issues, sample_farm};
+use support::inside::skip;
+
+const IDS: &str = "check_asam_xodr_ids_id_unique_in_class";
+const HEADER: &str = "check_qcbus_xodr_header_attributes";
+
+/// A configuration for a faulty map with two configured checkers and more children.
+fn config(input: &Path, levels: &str, more: &str) -> String {
+    format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<Config>\n\
+         <Param name=\"InputFile\" value=\"{}\"/>\n\
+         <CheckerBundle application=\"xodrBundle\">\n\
+         <Checker checkerId=\"{IDS}\" {levels}/>\n\
+         <Checker checkerId=\"{HEADER}\" {levels}/>\n\
+         </CheckerBundle>\n{more}</Config>\n",
+        input.display()
+    )
+}
+
+fn header_faults() -> PathBuf {
+    sample_farm().join("faulty/header_faults.xodr")
+}
+
+const ALL: &str = "maxLevel=\"1\" minLevel=\"3\"";
+
+#[test]
+fn a_configuration_runs_what_it_names_and_nothing_else() {
+    let desk = Desk::new();
+    desk.write("config.xml", config(&header_faults(), ALL, ""));
+    let said = desk.qcbus(&["check", "-c", "config.xml"]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    let results = desk.result("Result.xqar");
+    let bundles: Vec<&str> = results.bundles.iter().map(|it| it.name.as_str()).collect();
+    assert_eq!(bundles.first(), Some(&"xodrBundle"), "{bundles:?}");
+    let configured: Vec<&str> = results.bundles[0]
+        .checkers
+        .iter()
+        .map(|it| it.id.as_str())
+        .collect();
+    assert_eq!(
+        configured,
+        [IDS, HEADER],
+        "in the order of the configuration"
+    );
+    assert!(
+        bundles[1..].iter().all(|name| *name == "qcbus"),
+        "{bundles:?}"
+    );
+    let written: Vec<PathBuf> = files_below(desk.path());
+    assert!(
+        written.iter().all(|it| it.starts_with(".run")
+            || it.ends_with("Result.xqar")
+            || it.ends_with("config.xml")),
+        "{written:?}"
+    );
+
+    desk.qcbus(&["check", "-c", "config.xml", "--out", "elsewhere"]);
+    let read = |name: &str| std::fs::read(desk.path().join(name)).unwrap();
+    assert_eq!(read("Result.xqar"), read("elsewhere/Result.xqar"));
+}
+
+fn levels_kept(results: &Results) -> Vec<u8> {
+    let ours = issues(results).filter(|(checker, _)| checker.id == HEADER);
+    let mut levels: Vec<u8> = ours.map(|(_, issue)| issue.level as u8).collect();
+    levels.sort_unstable();
+    levels
+}
+
+#[test]
+fn levels_are_an_interval_in_both_orders() {
+    let kept = |levels: &str| {
+        let desk = Desk::new();
+        desk.write("config.xml", config(&header_faults(), levels, ""));
+        desk.qcbus(&["check", "-c", "config.xml"]);
+        let results = desk.result("Result.xqar");
+        let old = checkers(&results).filter(|it| it.id != IDS && it.id != HEADER);
+        let remarks = old
+            .flat_map(|it| &it.issues)
+            .map(|it| it.description.clone());
+        (
+            levels_kept(&results).len(),
+            remarks.collect::<Vec<_>>().join("\n"),
+        )
+    };
+    let (all, _) = kept(ALL);
+    assert_eq!(all, 3, "two errors and a warning");
+    let (old_order, remark) = kept("minLevel=\"1\" maxLevel=\"3\"");
+    assert_eq!(old_order, 3);
+    assert!(
+        remark.contains("minLevel"),
+        "the old order is remarked upon: {remark}"
+    );
+    let (errors, remark) = kept("maxLevel=\"1\" minLevel=\"1\"");
+    assert_eq!(errors, 2);
+    assert!(
+        remark.contains('1'),
+        "what was filtered is counted: {remark}"
+    );
+}
+
+#[test]
+fn report_modules_run_afterwards_with_their_params() {
+    let desk = Desk::new();
+    let (text, json) = (
+        desk.path().join("r/report.txt"),
+        desk.path().join("r/report.json"),
+    );
+    let modules = format!(
+        "<ReportModule application=\"TextReport\"><Param name=\"OutputFile\" value=\"{}\"/></ReportModule>\n\
+         <ReportModule application=\"qc-report-json\"><Param name=\"OutputFile\" value=\"{}\"/>\
+         <Param name=\"Indent\" value=\"4\"/></ReportModule>\n",
+        text.display(),
+        json.display()
+    );
+    desk.write("config.xml", config(&header_faults(), ALL, &modules));
+    let said = desk.qcbus(&["check", "-c", "config.xml"]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    let text =
+        std::fs::read_to_string(text).unwrap_or_else(|it| panic!("{it}\n{}", said.whole(&desk)));
+    assert!(text.contains("there is a second `header`"), "{text}");
+    let json = std::fs::read_to_string(json).unwrap();
+    assert!(
+        json.lines().any(|line| line.starts_with("    \"")),
+        "it is indented by 4: {json}"
+    );
+    let _: serde_json::Value = serde_json::from_str(&json).unwrap();
+}
+
+#[test]
+fn a_malformed_configuration_is_refused_with_its_place() {
+    let desk = Desk::new();
+    // The slip in an example of 2023: a letter outside the quotes.
+    let broken = config(&header_faults(), ALL, "").replace("value=\"", "value=\"e\"");
+    desk.write("config.xml", broken);
+    for command in [
+        &["check", "-c", "config.xml"][..],
+        &["config", "check", "config.xml"],
+    ] {
+        let said = desk.qcbus(command);
+        assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
+        assert!(said.stderr.contains("config.xml:3:"), "{}", said.stderr);
+    }
+    assert!(!desk.path().join("Result.xqar").exists());
+}
+
+#[test]
+fn unknown_names_are_warned_about_with_their_place() {
+    let desk = Desk::new();
+    let more = "<CheckerBundle application=\"xodrBundel\"><Checker checkerId=\"c\" maxLevel=\"1\" minLevel=\"3\"/></CheckerBundle>\n\
+                <ReportModule application=\"GithubReport\"/>\n";
+    desk.write(
+        "config.xml",
+        config(&header_faults(), ALL, more).replace(HEADER, "check_qcbus_xodr_header_atributes"),
+    );
+    let said = desk.qcbus(&["config", "check", "config.xml"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    for (name, row) in [
+        ("check_qcbus_xodr_header_atributes", 6),
+        ("xodrBundel", 8),
+        ("GithubReport", 9),
+    ] {
+        let warned = said.stdout.lines().any(|line| {
+            line.starts_with(&format!("config.xml:{row}:"))
+                && line.contains(": warning: ")
+                && line.contains(name)
+        });
+        assert!(warned, "{name}: {}", said.stdout);
+    }
+}
+
+#[test]
+fn a_bundle_is_a_module_of_the_framework() {
+    let desk = Desk::new();
+    let with_file = config(&header_faults(), ALL, "").replace(
+        "<Checker checkerId=\"check_asam",
+        "<Param name=\"resultFile\" value=\"xodr.xqar\"/>\n<Checker checkerId=\"check_asam",
+    );
+    desk.write("config.xml", with_file);
+    let said = desk.qcbus(&["bundle", "run", "xodr", "-c", "config.xml"]);
+    assert!(said.code.is_some_and(|it| it <= 1), "{}", said.whole(&desk));
+    let written = std::fs::read_to_string(desk.path().join("xodr.xqar")).unwrap();
+    assert_eq!(asam::complaints(&written), [""; 0]);
+    assert!(issues(&desk.result("xodr.xqar")).any(|(checker, _)| checker.id == HEADER));
+}
+
+/// A Python with ASAM's library, or why there is none.
+fn python() -> Result<PathBuf, String> {
+    let home = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("asam-venv");
+    let python = home.join("bin/python");
+    let run = |program: &Path, arguments: &[&str]| -> Result<(), String> {
+        let mut command = Command::new(program);
+        command
+            .args(arguments)
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped());
+        let output = command
+            .output()
+            .map_err(|error| format!("{}: {error}", program.display()))?;
+        let why = String::from_utf8_lossy(&output.stderr);
+        output
+            .status
+            .success()
+            .then_some(())
+            .ok_or(why.trim().to_owned())
+    };
+    if run(&python, &["-c", "import qc_baselib"]).is_err() {
+        run(
+            Path::new("python3"),
+            &["-m", "venv", &home.to_string_lossy()],
+        )?;
+        run(
+            &python,
+            &["-m", "pip", "install", "--quiet", "asam-qc-baselib==1.1.0"],
+        )?;
+    }
+    Ok(python)
+}
+
+const READ: &str = "\
+import sys
+from qc_baselib import Result
+for name in sys.argv[1:]:
+    result = Result()
+    result.load_from_file(name)
+    for bundle in result.get_checker_bundle_results():
+        for checker in bundle.checkers:
+            print(bundle.name, checker.checker_id, checker.status.value, len(checker.issues))
+";
+
+#[test]
+fn asams_own_library_reads_every_result() {
+    let python = match python() {
+        Ok(python) => python,
+        Err(why) => return skip("asams_own_library_reads_every_result", &why),
+    };
+    let desk = Desk::new();
+    desk.qcbus(&["check", &sample_farm().to_string_lossy(), "--out", "out"]);
+    desk.write("config.xml", config(&header_faults(), ALL, ""));
+    desk.qcbus(&["check", "-c", "config.xml"]);
+    let files = files_below(&desk.path().join("out"));
+    let mut files: Vec<PathBuf> = files
+        .iter()
+        .map(|file| desk.path().join("out").join(file))
+        .collect();
+    files.push(desk.path().join("Result.xqar"));
+    let mut expected = String::new();
+    for file in &files {
+        for bundle in &support::desk::read_result(file).bundles {
+            for checker in &bundle.checkers {
+                let status = checker.status.unwrap().as_str();
+                expected.push_str(&format!(
+                    "{} {} {status} {}\n",
+                    bundle.name,
+                    checker.id,
+                    checker.issues.len()
+                ));
+            }
+        }
+    }
+    let said = desk.run(Command::new(python).arg("-c").arg(READ).args(&files));
+    assert_eq!(said.code, Some(0), "{}", said.stderr);
+    assert_eq!(said.stdout, expected);
+}

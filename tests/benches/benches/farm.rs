@@ -1,0 +1,429 @@
+//! The whole thing with the real programme: file closed → verdict with a warm broker, where that
+//! time goes, and `check` of one file as a process.
+//!
+//! `cargo build --release -p qcbus && cargo bench -p qcbus-benches --bench farm`
+
+use std::io::{BufRead, BufReader, Write};
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use qcbus_benches::Result;
+use qcbus_benches::figures::{digits, head, millis, quantile, row, size};
+use qcbus_benches::maps::map;
+use qcbus_messages::control::{Request, Response};
+
+fn main() -> Result<()> {
+    let program = program()?;
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{}", qcbus_benches::machine::describe())?;
+    writeln!(out, "\nFile closed → verdict, warm broker:\n")?;
+    warm(&program, &mut out)?;
+    writeln!(out, "\nWhere the time goes (medians, ms; logging on):\n")?;
+    stages(&program, &mut out)?;
+    writeln!(out, "\nMany files at once:\n")?;
+    burst(&program, &mut out)?;
+    writeln!(out, "\n`check` of one file, a whole process:\n")?;
+    whole_processes(&program, &mut out)
+}
+
+/// The `qcbus` that was built beside this bench.
+fn program() -> Result<PathBuf> {
+    let own = std::env::current_exe()?;
+    let found = own.ancestors().map(|dir| dir.join("qcbus"));
+    let mut found = found.filter(|path| path.is_file());
+    Ok(found
+        .next()
+        .ok_or("build it first: cargo build --release -p qcbus")?)
+}
+
+/// Files as people have them, when they are at hand, named from the workspace's root.
+const REAL: [(&str, &str); 5] = [
+    (
+        "straight_500m.xodr",
+        "../shared/cases/real/esmini/resources/xodr/straight_500m.xodr",
+    ),
+    (
+        "multi_intersections.xodr",
+        "../shared/cases/real/esmini/resources/xodr/multi_intersections.xodr",
+    ),
+    (
+        "UC_Motorway-Exit-Entry.xodr",
+        "../shared/cases/real/qc-framework/.github/workflows/linux-files/UC_Motorway-Exit-Entry.xodr",
+    ),
+    (
+        "cut-in.xosc",
+        "../shared/cases/real/esmini/resources/xosc/cut-in.xosc",
+    ),
+    (
+        "parking_demo.xosc",
+        "../shared/cases/real/esmini/resources/xosc/parking_demo.xosc",
+    ),
+];
+
+/// Name, bytes as a function of the round, rounds.
+struct Case {
+    name: String,
+    ending: &'static str,
+    make: Box<dyn Fn(u64) -> Vec<u8>>,
+    rounds: u64,
+}
+
+fn cases() -> Vec<Case> {
+    let generated = [
+        (10_000, 200),
+        (500_000, 200),
+        (20_000_000, 8),
+        (100_000_000, 3),
+    ];
+    let mut cases: Vec<Case> = generated
+        .into_iter()
+        .map(|(bytes, rounds)| Case {
+            name: format!("generated, {}", size(bytes)),
+            ending: "xodr",
+            make: Box::new(move |number| map(bytes, number).into_bytes()),
+            rounds,
+        })
+        .collect();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    for (name, path) in REAL {
+        match std::fs::read(root.join(path)) {
+            Ok(bytes) => cases.push(Case {
+                name: format!("{name}, {}", size(bytes.len())),
+                ending: if name.ends_with("xosc") {
+                    "xosc"
+                } else {
+                    "xodr"
+                },
+                // A comment at the end makes every copy another file.
+                make: Box::new(move |number| {
+                    let mut bytes = bytes.clone();
+                    bytes.extend(format!("<!-- {number} -->\n").bytes());
+                    bytes
+                }),
+                rounds: 100,
+            }),
+            Err(error) => {
+                // Not everybody has them.
+                let _ = writeln!(std::io::stderr(), "skipped {name}: {error}");
+            }
+        }
+    }
+    cases
+}
+
+fn warm(program: &Path, out: &mut impl Write) -> Result<()> {
+    let columns = [
+        "file", "files", "p50 ms", "p90 ms", "p99 ms", "best ms", "verdict",
+    ];
+    writeln!(out, "{}", head(&columns))?;
+    for case in cases() {
+        let mut farm = Farm::start(program, false)?;
+        let mut times = Vec::new();
+        let mut verdict = String::new();
+        for number in 0..case.rounds {
+            let delivered = farm.deliver(&case, number)?;
+            times.push(millis(delivered.answered - delivered.closed));
+            verdict = delivered.verdict;
+        }
+        farm.stop()?;
+        let mut cells = vec![case.name, case.rounds.to_string()];
+        cells.extend([0.5, 0.9, 0.99, 0.0].map(|q| digits(quantile(&mut times, q))));
+        cells.push(verdict);
+        writeln!(out, "{}", row(&cells))?;
+    }
+    Ok(())
+}
+
+/// As the broker logs them, in order, and what ends with each.
+const STAGES: [(&str, &str); 9] = [
+    ("settled", "seen and settled"),
+    ("taken", "waiting for a reader"),
+    ("read", "read, hash, decode"),
+    ("built", "image"),
+    ("published", "publish"),
+    ("checked", "job out, rules, answers in"),
+    ("pooled", "pool"),
+    ("written", "result and verdict file, with fsync"),
+    ("judged", "journal, event"),
+];
+
+fn stages(program: &Path, out: &mut impl Write) -> Result<()> {
+    let mut columns = vec!["file"];
+    columns.extend(STAGES.map(|(_, what)| what));
+    columns.extend(["answer to `wait`", "sum"]);
+    writeln!(out, "{}", head(&columns))?;
+    for case in cases() {
+        let mut farm = Farm::start(program, true)?;
+        let mut spans: Vec<Vec<f64>> = vec![Vec::new(); STAGES.len() + 2];
+        for number in 0..case.rounds.min(40) {
+            farm.said().clear();
+            let delivered = farm.deliver(&case, number)?;
+            let mut before = of_day(delivered.closed_at);
+            let begin = before;
+            for (index, (stage, _)) in STAGES.iter().enumerate() {
+                let at = farm.when(stage, &delivered.path)?;
+                spans[index].push((at - before) * 1e3);
+                before = at;
+            }
+            let answered = begin + (delivered.answered - delivered.closed).as_secs_f64();
+            spans[STAGES.len()].push((answered - before) * 1e3);
+            spans[STAGES.len() + 1].push((answered - begin) * 1e3);
+        }
+        farm.stop()?;
+        let mut cells = vec![case.name];
+        cells.extend(
+            spans
+                .iter_mut()
+                .map(|times| digits(quantile(times, 0.5).max(0.0))),
+        );
+        writeln!(out, "{}", row(&cells))?;
+    }
+    Ok(())
+}
+
+fn burst(program: &Path, out: &mut impl Write) -> Result<()> {
+    writeln!(out, "{}", head(&["files", "each", "files/s", "MB/s"]))?;
+    for (files, bytes) in [(500, 10_000), (100, 500_000)] {
+        let mut best = f64::MAX;
+        for _ in 0..3 {
+            let mut farm = Farm::start(program, false)?;
+            let paths: Vec<PathBuf> = (0..files)
+                .map(|number| farm.watched.join(format!("b{number}.xodr")))
+                .collect();
+            let texts: Vec<String> = (0..files).map(|number| map(bytes, number)).collect();
+            let start = Instant::now();
+            for (path, text) in paths.iter().zip(&texts) {
+                std::fs::write(path, text)?;
+            }
+            for path in &paths {
+                farm.wait(path)?;
+            }
+            best = best.min(start.elapsed().as_secs_f64());
+            farm.stop()?;
+        }
+        let cells = [
+            files.to_string(),
+            size(bytes),
+            format!("{:.0}", files as f64 / best),
+            format!("{:.0}", files as f64 * bytes as f64 / 1e6 / best),
+        ];
+        writeln!(out, "{}", row(&cells))?;
+    }
+    Ok(())
+}
+
+/// A broker that watches a directory, warmed up.
+struct Farm {
+    broker: Child,
+    watched: PathBuf,
+    control: BufReader<UnixStream>,
+    said: Arc<Mutex<Vec<String>>>,
+    _dir: tempfile::TempDir,
+}
+
+struct Delivered {
+    path: PathBuf,
+    closed: Instant,
+    closed_at: SystemTime,
+    answered: Instant,
+    verdict: String,
+}
+
+impl Farm {
+    fn start(program: &Path, log: bool) -> Result<Farm> {
+        let dir = tempfile::TempDir::new()?;
+        let (watched, instance) = (dir.path().join("in"), dir.path().join("i"));
+        std::fs::create_dir(&watched)?;
+        let watched = std::fs::canonicalize(watched)?;
+        let level = if log {
+            "qcbus_broker::stages=debug"
+        } else {
+            "error"
+        };
+        let mut broker = Command::new(program)
+            .arg("serve")
+            .arg(&watched)
+            .arg("--instance-dir")
+            .arg(&instance)
+            .arg("--out")
+            .arg(dir.path().join("out"))
+            .env("QCBUS_LOG", level)
+            .stderr(Stdio::piped())
+            .spawn()?;
+        let said = Arc::new(Mutex::new(Vec::new()));
+        listen(&mut broker, &said);
+        let mut farm = Farm {
+            control: connect(&instance.join("control.sock"))?,
+            broker,
+            watched,
+            said,
+            _dir: dir,
+        };
+        let map = |number| map(10_000, number).into_bytes();
+        let warm_up = Case {
+            name: String::new(),
+            ending: "xodr",
+            make: Box::new(map),
+            rounds: 10,
+        };
+        for number in 0..warm_up.rounds {
+            farm.deliver(&warm_up, number + 1_000_000)?;
+        }
+        Ok(farm)
+    }
+
+    fn said(&self) -> std::sync::MutexGuard<'_, Vec<String>> {
+        self.said.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// When the broker logged a stage of a file, in seconds of the day. The log may be a little
+    /// behind the verdict.
+    fn when(&self, stage: &str, path: &Path) -> Result<f64> {
+        let (stage, path) = (format!("stage=\"{stage}\""), path.display().to_string());
+        for _ in 0..1000 {
+            let said = self.said();
+            let line = said
+                .iter()
+                .find(|line| line.contains(&stage) && line.ends_with(&path));
+            if let Some(time) = line.and_then(|line| line.get(11..26)) {
+                let parts: Vec<f64> = time.split(':').flat_map(str::parse).collect();
+                if let [hours, minutes, seconds] = parts[..] {
+                    return Ok(hours * 3600.0 + minutes * 60.0 + seconds);
+                }
+            }
+            drop(said);
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        Err(format!("no {stage} of {path} in the log").into())
+    }
+
+    /// Writes one file and waits for its verdict. A moment of rest before it: a farm is idle when
+    /// a file comes.
+    fn deliver(&mut self, case: &Case, number: u64) -> Result<Delivered> {
+        let path = self.watched.join(format!("f{number}.{}", case.ending));
+        let bytes = (case.make)(number);
+        std::thread::sleep(Duration::from_millis(30));
+        let mut file = std::fs::File::create(&path)?;
+        file.write_all(&bytes)?;
+        drop(file);
+        let (closed, closed_at) = (Instant::now(), SystemTime::now());
+        let verdict = self.wait(&path)?;
+        Ok(Delivered {
+            path,
+            closed,
+            closed_at,
+            answered: Instant::now(),
+            verdict,
+        })
+    }
+
+    fn wait(&mut self, file: &Path) -> Result<String> {
+        let request = Request::Wait {
+            file: file.to_path_buf(),
+            timeout_ms: Some(60_000),
+        };
+        match ask(&mut self.control, &request)? {
+            Response::Verdict(verdict) => Ok(verdict.verdict.to_string()),
+            other => Err(format!("no verdict: {other:?}").into()),
+        }
+    }
+
+    fn stop(mut self) -> Result<()> {
+        ask(&mut self.control, &Request::Down)?;
+        self.broker.wait()?;
+        Ok(())
+    }
+}
+
+fn listen(broker: &mut Child, said: &Arc<Mutex<Vec<String>>>) {
+    let Some(errors) = broker.stderr.take() else {
+        return;
+    };
+    let said = said.clone();
+    std::thread::spawn(move || {
+        for line in BufReader::new(errors).lines().map_while(|line| line.ok()) {
+            said.lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .push(line);
+        }
+    });
+}
+
+fn connect(socket: &Path) -> Result<BufReader<UnixStream>> {
+    for _ in 0..5_000 {
+        match UnixStream::connect(socket) {
+            Ok(stream) => return Ok(BufReader::new(stream)),
+            Err(_) => std::thread::sleep(Duration::from_millis(1)),
+        }
+    }
+    Err("the broker does not listen".into())
+}
+
+fn ask(control: &mut BufReader<UnixStream>, request: &Request) -> Result<Response> {
+    let mut text = serde_json::to_vec(request)?;
+    text.push(b'\n');
+    control.get_mut().write_all(&text)?;
+    let mut line = String::new();
+    control.read_line(&mut line)?;
+    Ok(serde_json::from_str(&line)?)
+}
+
+fn of_day(time: SystemTime) -> f64 {
+    let since = time.duration_since(UNIX_EPOCH).unwrap_or_default();
+    (since.as_secs() % 86_400) as f64 + f64::from(since.subsec_nanos()) / 1e9
+}
+
+/// A process with all its children: bundles that outlive it for a moment are waited for as well,
+/// because this bench is their next of kin.
+fn whole_processes(program: &Path, out: &mut impl Write) -> Result<()> {
+    rustix::process::set_child_subreaper(Some(rustix::process::getpid()))?;
+    let columns = ["file", "runs", "wall p50 ms", "wall best ms", "CPU mean ms"];
+    writeln!(out, "{}", head(&columns))?;
+    let dir = tempfile::TempDir::new()?;
+    for case in cases() {
+        let runs = (case.rounds / 5).max(3);
+        let path = dir.path().join(format!("f.{}", case.ending));
+        std::fs::write(&path, (case.make)(0))?;
+        let before = cpu_of_children()?;
+        let mut times = Vec::new();
+        for _ in 0..runs {
+            let start = Instant::now();
+            Command::new(program)
+                .arg("check")
+                .arg("--quiet")
+                .arg(&path)
+                .arg("--out")
+                .arg(dir.path().join("out"))
+                .stdout(Stdio::null())
+                .stderr(Stdio::null())
+                .status()?;
+            times.push(millis(start.elapsed()));
+            while rustix::process::wait(rustix::process::WaitOptions::empty()).is_ok() {}
+        }
+        let cpu = millis(cpu_of_children()? - before) / runs as f64;
+        let cells = [
+            case.name,
+            runs.to_string(),
+            digits(quantile(&mut times, 0.5)),
+            digits(quantile(&mut times, 0.0)),
+            digits(cpu),
+        ];
+        writeln!(out, "{}", row(&cells))?;
+    }
+    Ok(())
+}
+
+/// User and system time of all children that have ended and been waited for, in hundredths of a
+/// second: exact enough over many runs.
+fn cpu_of_children() -> Result<Duration> {
+    let stat = std::fs::read_to_string("/proc/self/stat")?;
+    let (_, rest) = stat.rsplit_once(')').ok_or("no process status")?;
+    let ticks = rest.split_whitespace().skip(13).take(2);
+    let ticks: u64 = ticks
+        .map(str::parse::<u64>)
+        .sum::<std::result::Result<_, _>>()?;
+    Ok(Duration::from_millis(ticks * 10))
+}

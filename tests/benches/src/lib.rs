@@ -1,0 +1,13 @@
+//! What the benches share: generated maps, peers that only answer, figures and tables.
+//!
+//! Every bench is a program of its own (`cargo bench -p qcbus-benches --bench NAME`) and prints
+//! Markdown, so that the tables of `docs/performance.md` can be made again.
+
+pub mod figures;
+pub mod machine;
+pub mod maps;
+pub mod peers;
+pub mod scenarios;
+
+/// What goes wrong in a bench ends it.
+pub type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;

@@ -1,0 +1,162 @@
+//! What a person reads who types commands: helps, mistakes, explanations.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use support::content::Content;
+use support::desk::Desk;
+
+/// Types several commands and shows what was said.
+fn session(desk: &Desk, commands: &[&str]) -> String {
+    let mut text = String::new();
+    for command in commands {
+        let words: Vec<&str> = command.split_whitespace().collect();
+        text.push_str(&format!(
+            "$ qcbus {command}\n{}\n",
+            desk.qcbus(&words).whole(desk)
+        ));
+    }
+    text
+}
+
+#[test]
+fn help_of_every_command() {
+    let desk = Desk::new();
+    insta::assert_snapshot!(session(
+        &desk,
+        &[
+            "--help",
+            "check --help",
+            "serve --help",
+            "down --help",
+            "status --help",
+            "wait --help",
+            "reload --help",
+            "bundle --help",
+            "bundle run --help",
+            "bundle add --help",
+            "bundle remove --help",
+            "rule --help",
+            "config check --help",
+            "doctor --help",
+        ]
+    ));
+}
+
+#[test]
+fn mistakes_are_said_with_what_to_do() {
+    let desk = Desk::new();
+    desk.write("notes.txt", "nothing");
+    std::fs::create_dir(desk.path().join("empty")).unwrap();
+    insta::assert_snapshot!(session(
+        &desk,
+        &[
+            "chekc",
+            "check",
+            "check nowhere.xodr",
+            "check notes.txt",
+            "check empty",
+            "check --colour x",
+            "check -c nowhere.xml",
+            "serve",
+            "serve nowhere",
+            "serve notes.txt",
+            "wait",
+            "wait x.xodr",
+            "wait x.xodr --timeout soon",
+            "status",
+            "down",
+            "reload",
+            "rule nope",
+            "rule check_asam_xodr_ids_id_unique_in_clas",
+            "config check nowhere.xml",
+            "bundle run nobody",
+            "bundle run xodr --frob",
+            "bundle remove nobody",
+            "bundle add a/b true",
+            "status --instance a/b",
+        ]
+    ));
+}
+
+#[test]
+fn wait_knows_why_there_will_be_no_verdict() {
+    use support::farm::Farm;
+    let farm = Farm::new();
+    farm.write(".qcignore", b"*_wip.xodr\n");
+    farm.write("a_wip.xodr", &Content::Good(1).bytes());
+    farm.write("b.xodr", &Content::NoHeader(1).bytes());
+    let _broker = farm.serve_ready();
+    let mut text = String::new();
+    let root = farm.root();
+    for (file, more) in [
+        (root.join("a_wip.xodr"), "5s"),
+        (root.join("notes.txt"), "5s"),
+        (root.join("gone.xodr"), "1ms"),
+        (farm.base().join("outside.xodr"), "5s"),
+        (root.join("b.xodr"), "5m"),
+    ] {
+        let said = farm.qcbus(&["wait", &file.to_string_lossy(), "--timeout", more]);
+        text.push_str(&String::from_utf8_lossy(&said.stdout));
+        text.push_str(&String::from_utf8_lossy(&said.stderr));
+        text.push_str(&format!("--- exit {}\n", said.status.code().unwrap()));
+    }
+    insta::assert_snapshot!(text.replace(&*farm.base().to_string_lossy(), "[DESK]"));
+}
+
+#[test]
+fn a_rule_explains_itself() {
+    let desk = Desk::new();
+    let said = desk.qcbus(&["rule", "check_asam_xodr_xml_fileheader_is_present"]);
+    insta::assert_snapshot!(said.whole(&desk));
+    let listed = desk.qcbus(&["rule"]);
+    assert!(listed.stdout.lines().count() > 10);
+    for line in listed.stdout.lines() {
+        let id = line.split_whitespace().next().unwrap();
+        assert_eq!(desk.qcbus(&["rule", id]).code, Some(0), "{id}");
+    }
+}
+
+#[test]
+fn doctor_and_bundle_list_work_without_a_broker() {
+    let desk = Desk::new();
+    let said = desk.qcbus(&["doctor"]);
+    assert!(
+        said.stdout
+            .lines()
+            .all(|it| it.starts_with("ok") || it.starts_with("FIX") || it.starts_with("  "))
+    );
+    assert!(said.stdout.contains("shared memory") && said.stdout.contains("journal"));
+    let said = desk.qcbus(&["bundle", "list"]);
+    assert_eq!(said.code, Some(0));
+    let names: Vec<&str> = said
+        .stdout
+        .lines()
+        .filter_map(|it| it.split_whitespace().next())
+        .collect();
+    assert_eq!(names, ["xodrBundle", "xoscBundle"]);
+}
+
+#[test]
+fn quiet_and_json_say_no_more_than_asked() {
+    let desk = Desk::new();
+    desk.write("in/a.xodr", Content::Good(1).bytes());
+    desk.write("in/b.xodr", Content::NoHeader(1).bytes());
+    let quiet = desk.qcbus(&["check", "in", "--quiet"]);
+    assert_eq!(quiet.stdout, "a.xodr: accepted\nb.xodr: rejected\n");
+    let json = desk.qcbus(&["check", "in", "--format", "json"]);
+    assert_eq!(
+        (json.code, json.stdout.lines().count()),
+        (Some(1), 2),
+        "{}",
+        json.stdout
+    );
+    for line in json.stdout.lines() {
+        let _: serde_json::Value = serde_json::from_str(line).unwrap();
+    }
+}

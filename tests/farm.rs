@@ -1,0 +1,264 @@
+//! The sample farm: what its README promises is what `qcbus check` says, shows and writes.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::path::PathBuf;
+
+use qcbus_formats::xqar::{Level, Status};
+use support::asam;
+use support::desk::{Desk, files_below, issues, places, read_result, sample_farm};
+
+/// A row of the README's table of faulty files.
+#[derive(Debug)]
+struct Promise {
+    file: String,
+    /// The end of a checker id or of a rule UID.
+    rule: String,
+    /// Rows, with columns where the table names them.
+    places: Vec<(u64, Option<u64>)>,
+}
+
+/// Cells of the table below a heading.
+fn table(heading: &str) -> Vec<Vec<String>> {
+    let text = std::fs::read_to_string(sample_farm().join("README.md")).unwrap();
+    let section = text
+        .split("\n## ")
+        .find(|it| it.starts_with(heading))
+        .unwrap();
+    let rows = section.lines().filter(|line| line.starts_with("| `"));
+    rows.map(|row| {
+        row.trim_matches('|')
+            .split('|')
+            .map(|cell| cell.trim().to_owned())
+            .collect()
+    })
+    .collect()
+}
+
+/// The first word in backticks.
+fn quoted(cell: &str) -> String {
+    cell.split('`')
+        .nth(1)
+        .unwrap_or_else(|| panic!("nothing quoted in {cell}"))
+        .to_owned()
+}
+
+fn promises() -> Vec<Promise> {
+    let row = |row: Vec<String>| Promise {
+        file: quoted(&row[0]),
+        rule: quoted(&row[2]).trim_start_matches('…').to_owned(),
+        places: numbers(&row[3]),
+    };
+    table("Rejected").into_iter().map(row).collect()
+}
+
+fn numbers(cell: &str) -> Vec<(u64, Option<u64>)> {
+    let words = cell.split(|c: char| !c.is_ascii_digit() && c != ':');
+    let words = words.filter(|word| !word.is_empty());
+    words
+        .map(|word| match word.split_once(':') {
+            Some((row, column)) => (row.parse().unwrap(), Some(column.parse().unwrap())),
+            None => (word.parse().unwrap(), None),
+        })
+        .collect()
+}
+
+fn checkable() -> Vec<PathBuf> {
+    let mut files = files_below(&sample_farm());
+    files.retain(|file| qcbus_document::FileKind::of_path(file).is_some());
+    files
+}
+
+#[test]
+fn every_promised_issue_is_found_at_its_place() {
+    let desk = Desk::new();
+    let said = desk.qcbus(&["check", &sample_farm().to_string_lossy(), "--out", "out"]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    let promises = promises();
+    assert_eq!(promises.len(), 10, "the table is read");
+    for Promise {
+        file,
+        rule,
+        places: promised,
+    } in promises
+    {
+        let results = desk.result(&format!("out/{file}.xqar"));
+        let found: Vec<(u64, u64)> = issues(&results)
+            .filter(|(checker, issue)| {
+                checker.id.ends_with(&rule) || issue.rule_uid.ends_with(&rule)
+            })
+            .flat_map(|(_, issue)| places(issue))
+            .collect();
+        assert!(!promised.is_empty());
+        for (row, column) in promised {
+            let hit = found
+                .iter()
+                .any(|it| it.0 == row && column.is_none_or(|column| it.1 == column));
+            assert!(
+                hit,
+                "{file}: {rule} at {row}:{column:?}, found at {found:?}"
+            );
+        }
+        assert!(
+            said.stdout.contains(&format!("rejected: {file}: ")),
+            "{}",
+            said.stdout
+        );
+    }
+}
+
+#[test]
+fn good_files_are_accepted_without_a_word_of_blame() {
+    let desk = Desk::new();
+    let said = desk.qcbus(&["check", &sample_farm().to_string_lossy(), "--out", "out"]);
+    let good = table("Accepted");
+    assert_eq!(
+        good.len() + promises().len(),
+        checkable().len(),
+        "every file is in the README"
+    );
+    for row in good {
+        let file = quoted(&row[0]);
+        assert!(
+            said.stdout.contains(&format!("accepted: {file}: ")),
+            "{file}: {}",
+            said.stdout
+        );
+        let results = desk.result(&format!("out/{file}.xqar"));
+        let blame: Vec<_> = issues(&results)
+            .filter(|(_, it)| it.level <= Level::Warning)
+            .collect();
+        assert!(blame.is_empty(), "{file}: {blame:#?}");
+    }
+}
+
+#[test]
+fn every_issue_is_printed_with_row_and_column() {
+    let desk = Desk::new();
+    let said = desk.qcbus(&["check", &sample_farm().to_string_lossy(), "--out", "out"]);
+    let mut count = 0;
+    for file in checkable() {
+        let file = file.to_string_lossy();
+        let results = desk.result(&format!("out/{file}.xqar"));
+        for (_, issue) in issues(&results) {
+            let (row, column) = places(issue)[0];
+            let place = format!("{file}:{row}:{column}\n");
+            assert!(said.stdout.contains(&place), "{place}{}", said.stdout);
+            assert!(
+                said.stdout.contains(&issue.description),
+                "{}",
+                issue.description
+            );
+            count += 1;
+        }
+    }
+    assert!(count >= 13, "only {count} issues");
+}
+
+#[test]
+fn only_valid_xml_is_judged_on_its_meaning() {
+    let desk = Desk::new();
+    let file = sample_farm().join("faulty/not_well_formed.xodr");
+    let said = desk.qcbus(&["check", &file.to_string_lossy()]);
+    assert_eq!(said.code, Some(1));
+    let results = desk.result("qcbus-out/not_well_formed.xodr.xqar");
+    for checker in support::desk::checkers(&results) {
+        let expected = match checker.id.as_str() {
+            "check_asam_xodr_xml_valid_xml_document" => Status::Completed,
+            _ => Status::Skipped,
+        };
+        assert_eq!(
+            checker.status,
+            Some(expected),
+            "{}: {}",
+            checker.id,
+            checker.summary
+        );
+    }
+}
+
+#[test]
+fn results_lie_where_they_are_looked_for() {
+    let desk = Desk::new();
+    let farm = sample_farm();
+    desk.qcbus(&["check", &farm.to_string_lossy(), "--out", "tree"]);
+    let expected: Vec<PathBuf> = checkable()
+        .iter()
+        .map(|file| format!("{}.xqar", file.display()).into())
+        .collect();
+    assert_eq!(
+        files_below(&desk.path().join("tree")),
+        expected,
+        "one each, and nothing else"
+    );
+
+    let ring = farm.join("maps/ring.xodr");
+    desk.qcbus(&["check", &ring.to_string_lossy()]);
+    assert!(
+        desk.path().join("qcbus-out/ring.xodr.xqar").exists(),
+        "a file's base name"
+    );
+
+    let (one, two) = (
+        desk.write("a/x/m.xodr", "<OpenDRIVE/>"),
+        desk.write("a/y/m.xodr", "<OpenDRIVE/>"),
+    );
+    desk.qcbus(&[
+        "check",
+        &one.to_string_lossy(),
+        &two.to_string_lossy(),
+        "--out",
+        "pair",
+    ]);
+    let expected = ["x/m.xodr.xqar", "y/m.xodr.xqar"].map(PathBuf::from);
+    assert_eq!(
+        files_below(&desk.path().join("pair")),
+        expected,
+        "names that collide"
+    );
+
+    desk.qcbus(&["check", "a/x", "a/y", "--out", "two"]);
+    assert_eq!(
+        files_below(&desk.path().join("two")).len(),
+        2,
+        "two directories, none overwritten"
+    );
+}
+
+#[test]
+fn two_runs_write_the_same_bytes() {
+    let desk = Desk::new();
+    let farm = sample_farm();
+    let one = desk.qcbus(&["check", &farm.to_string_lossy(), "--out", "one"]);
+    let two = desk.qcbus(&["check", &farm.to_string_lossy(), "--out", "two"]);
+    assert_eq!(one.stdout, two.stdout);
+    for file in files_below(&desk.path().join("one")) {
+        let read = |run: &str| std::fs::read_to_string(desk.path().join(run).join(&file)).unwrap();
+        let text = read("one");
+        assert!(text == read("two"), "{} differs", file.display());
+        assert!(
+            !text.contains(&*desk.path().to_string_lossy()),
+            "it names where it was run"
+        );
+    }
+}
+
+#[test]
+fn every_result_is_as_asam_describes_it() {
+    let desk = Desk::new();
+    desk.qcbus(&["check", &sample_farm().to_string_lossy(), "--out", "out"]);
+    let files = files_below(&desk.path().join("out"));
+    assert_eq!(files.len(), checkable().len());
+    for file in files {
+        let path = desk.path().join("out").join(&file);
+        let complaints = asam::complaints(&std::fs::read_to_string(&path).unwrap());
+        assert!(complaints.is_empty(), "{}: {complaints:#?}", file.display());
+        assert!(!read_result(&path).bundles.is_empty());
+    }
+}

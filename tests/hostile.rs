@@ -1,0 +1,373 @@
+//! Input that was made to break something. Each file gets an issue at a place or a clear error;
+//! the file beside it is judged as ever, and nothing else happens.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::io::Write;
+use std::path::Path;
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use qcbus_formats::xqar::Status;
+use qcbus_messages::Verdict;
+use support::asam;
+use support::content::Content;
+use support::desk::{Desk, checkers, files_below, issues, places};
+use support::farm::{Farm, tail};
+use support::inside::skip;
+use support::watchdog::until_or;
+
+/// Checks a directory with a hostile file and a good one. The hostile one must be rejected with an
+/// issue that says `text` and lies at `place`; the other must be accepted.
+fn is_rejected(desk: &Desk, name: &str, text: &str, place: (u64, u64)) {
+    desk.write("in/good.xodr", Content::Good(1).bytes());
+    let said = desk.qcbus(&["check", "in", "--out", "out"]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(desk));
+    assert!(
+        said.stdout.contains("accepted: good.xodr: "),
+        "{}",
+        said.whole(desk)
+    );
+    assert!(
+        said.stdout.contains(&format!("rejected: {name}: ")),
+        "{}",
+        said.whole(desk)
+    );
+    let told: Vec<&str> = said.stderr.lines().collect();
+    assert_eq!(told.len(), 1, "nothing but the count is said: {told:?}");
+    let results = desk.result(&format!("out/{name}.xqar"));
+    let found: Vec<_> = issues(&results)
+        .map(|(_, issue)| (issue.description.as_str(), places(issue)))
+        .collect();
+    let hit = found
+        .iter()
+        .any(|(said, at)| said.contains(text) && at.contains(&place));
+    assert!(hit, "no issue says `{text}` at {place:?}: {found:#?}");
+    assert!(checkers(&results).all(|it| it.status != Some(Status::Error)));
+    let written = std::fs::read_to_string(desk.path().join(format!("out/{name}.xqar"))).unwrap();
+    assert_eq!(asam::complaints(&written), [""; 0]);
+}
+
+fn hostile(name: &str, bytes: impl AsRef<[u8]>, text: &str, place: (u64, u64)) {
+    let desk = Desk::new();
+    desk.write(&format!("in/{name}"), bytes);
+    is_rejected(&desk, name, text, place);
+}
+
+const XML: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
+
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+    encoder.write_all(bytes).unwrap();
+    encoder.finish().unwrap()
+}
+
+#[test]
+fn empty_file() {
+    hostile("x.xodr", "", "the file is empty", (1, 1));
+}
+
+#[test]
+fn a_directory_named_like_a_file() {
+    let desk = Desk::new();
+    desk.write("in/good.xodr", Content::Good(1).bytes());
+    desk.write("in/x.xodr/inner.xodr", Content::NoHeader(2).bytes());
+    let said = desk.qcbus(&["check", "in", "--out", "out"]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    assert!(
+        said.stdout.contains("rejected: x.xodr/inner.xodr: 1 error"),
+        "{}",
+        said.whole(&desk)
+    );
+    assert_eq!(
+        files_below(&desk.path().join("out")).len(),
+        2,
+        "the directory has no result"
+    );
+}
+
+#[test]
+fn two_hundred_megabytes_of_open_tags() {
+    let mut text = XML.to_owned();
+    text.push_str(&"<a>".repeat((200 << 20) / 3));
+    hostile("x.xodr", text, "1024", (2, 1 + 3 * 1024));
+}
+
+#[test]
+fn a_hundred_thousand_nested_elements() {
+    let (open, close) = ("<a>\n".repeat(100_000), "</a>".repeat(100_000));
+    hostile("x.xosc", format!("{open}{close}"), "1024", (1025, 1));
+}
+
+#[test]
+fn entity_bomb() {
+    let text = format!(
+        "{XML}<!DOCTYPE bomb [<!ENTITY a \"ha\"><!ENTITY b \"&a;&a;&a;&a;&a;&a;&a;&a;\">\
+         <!ENTITY c \"&b;&b;&b;&b;&b;&b;&b;&b;\">]>\n<OpenDRIVE>&c;</OpenDRIVE>\n"
+    );
+    hostile("x.xodr", text, "DOCTYPE", (2, 1));
+}
+
+#[test]
+fn external_entity() {
+    let text = format!(
+        "{XML}<!DOCTYPE x [<!ENTITY secret SYSTEM \"file:///etc/passwd\">]>\n\
+         <OpenDRIVE><header name=\"&secret;\"/></OpenDRIVE>\n"
+    );
+    let desk = Desk::new();
+    desk.write("in/x.xodr", text);
+    is_rejected(&desk, "x.xodr", "DOCTYPE", (2, 1));
+    let written = std::fs::read_to_string(desk.path().join("out/x.xodr.xqar")).unwrap();
+    assert!(!written.contains("root:"), "what it points to is not read");
+}
+
+#[test]
+fn gzip_bomb() {
+    hostile(
+        "x.xodrz",
+        gzip(&vec![b' '; 16 << 20]),
+        "inflating was stopped",
+        (1, 1),
+    );
+}
+
+#[test]
+fn truncated_gzip() {
+    let whole = gzip(&Content::Good(1).bytes());
+    hostile("x.xodr.gz", &whole[..whole.len() / 2], "gzip", (1, 1));
+}
+
+#[test]
+fn wrong_encoding_declaration() {
+    // It says UTF-16 and is not.
+    let text = "<?xml version=\"1.0\" encoding=\"UTF-16\"?>\n<OpenDRIVE/>\n";
+    hostile("x.xodr", text, "UTF-16", (1, 31));
+}
+
+#[test]
+fn unknown_encoding() {
+    let text = "<?xml version=\"1.0\" encoding=\"KLINGON\"?>\n<OpenDRIVE/>\n";
+    hostile("x.xodr", text, "KLINGON", (1, 31));
+}
+
+#[test]
+fn invalid_utf_8() {
+    let mut bytes = format!("{XML}<OpenDRIVE>\n<header name=\"M").into_bytes();
+    bytes.push(0xfc);
+    bytes.extend(b"hle\"/></OpenDRIVE>\n");
+    hostile("x.xodr", bytes, "UTF-8", (3, 16));
+}
+
+#[test]
+fn nul_bytes() {
+    hostile(
+        "x.xodr",
+        format!("{XML}<OpenDRIVE>\n  \0</OpenDRIVE>\n"),
+        "U+0000",
+        (3, 3),
+    );
+}
+
+#[test]
+fn nothing_but_nul_bytes() {
+    hostile("x.xodr", [0; 4096], "U+0000", (1, 1));
+}
+
+#[test]
+fn two_roots() {
+    hostile(
+        "x.xodr",
+        format!("{XML}<OpenDRIVE/>\n<OpenDRIVE/>\n"),
+        "second root",
+        (3, 1),
+    );
+}
+
+#[test]
+fn text_after_the_root() {
+    hostile(
+        "x.xodr",
+        format!("{XML}<OpenDRIVE/>\nthe end"),
+        "after the root",
+        (3, 1),
+    );
+}
+
+#[test]
+fn include_cycle() {
+    let desk = Desk::new();
+    let include = |file: &str| format!("<OpenDRIVE>\n<include file=\"{file}\"/>\n</OpenDRIVE>\n");
+    desk.write("in/x.xodr", include("one.xml"));
+    desk.write("in/one.xml", include("two.xml"));
+    desk.write("in/two.xml", include("one.xml"));
+    // FIXME: the place in the root file should be its `include`, 2:1.
+    is_rejected(&desk, "x.xodr", "leads back to", (1, 1));
+}
+
+#[test]
+fn include_outside_the_root() {
+    let desk = Desk::new();
+    desk.write("secret.xml", "<OpenDRIVE><road id=\"secret\"/></OpenDRIVE>");
+    desk.write(
+        "in/x.xodr",
+        "<OpenDRIVE>\n  <include file=\"../secret.xml\"/>\n</OpenDRIVE>\n",
+    );
+    is_rejected(&desk, "x.xodr", "leads out of", (2, 3));
+}
+
+#[test]
+fn something_that_never_ends_its_answer() {
+    // A pipe that nobody writes to: opening it waits for ever.
+    let desk = Desk::new();
+    desk.write("in/good.xodr", Content::Good(1).bytes());
+    let status = std::process::Command::new("mkfifo")
+        .arg(desk.path().join("in/x.xodr"))
+        .status();
+    if !status.is_ok_and(|it| it.success()) {
+        return skip("something_that_never_ends_its_answer", "there is no mkfifo");
+    }
+    let said = desk.qcbus(&["check", "in", "--out", "out"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    let said = desk.qcbus(&["check", "in/x.xodr", "in/good.xodr", "--out", "out"]);
+    assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
+    assert!(said.stderr.contains("no regular file"), "{}", said.stderr);
+}
+
+#[test]
+fn unreadable_file() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let desk = Desk::new();
+    let file = desk.write("in/x.xodr", Content::Good(2).bytes());
+    desk.write("in/good.xodr", Content::Good(1).bytes());
+    std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o000)).unwrap();
+    if std::fs::read(&file).is_ok() {
+        return skip("unreadable_file", "this user may read everything");
+    }
+    let said = desk.qcbus(&["check", "in", "--out", "out"]);
+    assert!(said.code.is_some_and(|it| it != 0), "{}", said.whole(&desk));
+    assert!(
+        said.stdout.contains("accepted: good.xodr: "),
+        "{}",
+        said.whole(&desk)
+    );
+}
+
+/// Small hostile files, for a broker that must outlive them.
+fn zoo_of_files() -> Vec<(&'static str, Vec<u8>)> {
+    vec![
+        ("empty.xodr", Vec::new()),
+        ("deep.xodr", "<a>".repeat(100_000).into_bytes()),
+        (
+            "doctype.xodr",
+            format!("{XML}<!DOCTYPE x [<!ENTITY a \"b\">]><x>&a;</x>").into_bytes(),
+        ),
+        ("bomb.xodrz", gzip(&vec![b' '; 16 << 20])),
+        (
+            "torn.xodr.gz",
+            gzip(&Content::Good(1).bytes())[..40].to_vec(),
+        ),
+        ("nul.xosc", vec![0; 4096]),
+        ("bytes.xosc", (0..=255).cycle().take(100_000).collect()),
+        ("no_zip.mosc", b"PK\x03\x04 not really".to_vec()),
+        ("two.xodr", b"<OpenDRIVE/><OpenDRIVE/>".to_vec()),
+        ("attributes.xodr", many_attributes()),
+    ]
+}
+
+fn many_attributes() -> Vec<u8> {
+    let mut text = String::from("<OpenDRIVE");
+    for number in 0..200_000 {
+        text.push_str(&format!(" a{number}=\"\""));
+    }
+    text.push_str("/>");
+    text.into_bytes()
+}
+
+#[test]
+fn a_broker_outlives_all_of_them_at_once() {
+    let farm = Farm::new();
+    let mut broker = farm.serve_ready();
+    let bundles = |farm: &Farm| -> Vec<u32> {
+        let peers = farm.status().unwrap().peers;
+        peers
+            .iter()
+            .filter(|it| it.role == "bundle")
+            .map(|it| it.pid)
+            .collect()
+    };
+    let before = bundles(&farm);
+    let files = zoo_of_files();
+    for (name, bytes) in &files {
+        farm.write(name, bytes);
+    }
+    farm.write("good.xodr", &Content::Good(1).bytes());
+    farm.settle(files.len() + 1);
+    for (name, _) in &files {
+        let verdict = farm.verdict(name);
+        assert_eq!(verdict.verdict, Verdict::Rejected, "{name}: {verdict:?}");
+        let written = std::fs::read_to_string(farm.out().join(format!("{name}.xqar"))).unwrap();
+        assert_eq!(asam::complaints(&written), [""; 0], "{name}");
+    }
+    assert_eq!(farm.verdict("good.xodr").verdict, Verdict::Accepted);
+    assert!(broker.is_alive());
+    assert_eq!(bundles(&farm), before, "no bundle died of it");
+}
+
+#[test]
+fn files_removed_while_they_are_read() {
+    let farm = Farm::new();
+    let mut broker = farm.serve_ready();
+    // Large enough to be on its way for a while.
+    let large = large_map(4 << 20);
+    for round in 0..12 {
+        let name = format!("{round}.xodr");
+        farm.write(&name, &large);
+        if round % 3 == 0 {
+            until_or(
+                "it is on its way",
+                || {
+                    let status = farm.status()?;
+                    (status.queue.active + status.queue.waiting + status.files.judged > 0)
+                        .then_some(())
+                },
+                || tail(&farm.log()),
+            );
+        }
+        std::fs::remove_file(farm.root().join(&name)).unwrap();
+    }
+    farm.write("good.xodr", &Content::Good(1).bytes());
+    assert_eq!(farm.verdict("good.xodr").verdict, Verdict::Accepted);
+    farm.settle(1);
+    until_or(
+        "nothing is left of what was removed",
+        || (results(&farm.out()) == ["good.xodr.verdict.json", "good.xodr.xqar"]).then_some(()),
+        || format!("{:?}\n{}", results(&farm.out()), tail(&farm.log())),
+    );
+    assert!(broker.is_alive());
+}
+
+fn results(out: &Path) -> Vec<String> {
+    let files = files_below(out)
+        .into_iter()
+        .filter(|file| !file.starts_with(".qcbus"));
+    files
+        .map(|file| file.to_string_lossy().into_owned())
+        .collect()
+}
+
+fn large_map(bytes: usize) -> Vec<u8> {
+    let text = String::from_utf8(Content::Good(1).bytes()).unwrap();
+    let end = text.find("</OpenDRIVE>").unwrap();
+    let mut large = text[..end].to_owned();
+    while large.len() < bytes {
+        large.push_str("<userData code=\"filler\" value=\"nothing to see here\"/>\n");
+    }
+    large.push_str("</OpenDRIVE>\n");
+    large.into_bytes()
+}

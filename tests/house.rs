@@ -1,0 +1,324 @@
+//! The rules of the house: who may know whom, and what may not be in the tree.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on should panic"
+)]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use cargo_metadata::{DependencyKind, Metadata, MetadataCommand, Package};
+
+/// What is said, and nothing done: open to all.
+const IDL: &[&str] = &["qcbus-document", "qcbus-formats", "qcbus-messages"];
+
+/// Which crates of ours a crate may link, besides [`IDL`]. `None`: any.
+const MAY_KNOW: &[(&str, Option<&[&str]>)] = &[
+    ("qcbus-document", Some(&[])),
+    ("qcbus-formats", Some(&[])),
+    ("qcbus-messages", Some(&[])),
+    ("qcbus-bus", Some(&[])),
+    ("qcbus-ingest", Some(&[])),
+    ("qcbus-broker", Some(&["qcbus-bus", "qcbus-ingest"])),
+    ("qcbus-sdk", Some(&["qcbus-bus", "qcbus-ingest"])),
+    ("qcbus-opendrive", Some(&[])),
+    ("qcbus-schema", Some(&[])),
+    ("qcbus-xodr", Some(BUNDLE)),
+    ("qcbus-xosc", Some(BUNDLE)),
+    ("qcbus-reporter-sdk", Some(&["qcbus-bus", "qcbus-ingest"])),
+    ("qcbus-report-text", Some(&["qcbus-reporter-sdk"])),
+    ("qcbus-report-json", Some(&["qcbus-reporter-sdk"])),
+    ("qcbus", None),
+    ("qcbus-zoo", None),
+    ("qcbus-benches", None),
+];
+
+/// What a bundle may link: its sdk and the models.
+const BUNDLE: &[&str] = &["qcbus-sdk", "qcbus-opendrive", "qcbus-schema"];
+
+/// Among the crates of [`IDL`], who may know whom: the lowest knows nobody.
+const INSIDE_IDL: &[(&str, &[&str])] = &[
+    ("qcbus-document", &[]),
+    ("qcbus-formats", &[]),
+    ("qcbus-messages", &["qcbus-document", "qcbus-formats"]),
+];
+
+/// Models read images and nothing else; ingest counts beside them, it writes the images.
+const ONLY_DOCUMENT: &[&str] = &["qcbus-opendrive", "qcbus-schema"];
+
+/// Foreign crates that few may name, so that they can be exchanged. Benches compare with them.
+const FENCED: &[(&str, &[&str])] = &[
+    ("iceoryx2", &["qcbus-bus", "qcbus-benches"]),
+    ("bincode", &["qcbus-messages", "qcbus-benches"]),
+    (
+        "quick-xml",
+        &["qcbus-ingest", "qcbus-formats", "qcbus-benches"],
+    ),
+];
+
+/// No file of code is longer than what one head holds.
+const MAX_LINES: usize = 800;
+
+fn metadata() -> Metadata {
+    // Without dependencies nothing is resolved, so nothing is downloaded either.
+    MetadataCommand::new().no_deps().exec().unwrap()
+}
+
+fn root() -> PathBuf {
+    metadata().workspace_root.into_std_path_buf()
+}
+
+fn linked<'p>(package: &'p Package, kinds: &[DependencyKind]) -> BTreeSet<&'p str> {
+    let dependencies = package.dependencies.iter();
+    let of_kind = dependencies.filter(|dependency| kinds.contains(&dependency.kind));
+    of_kind.map(|dependency| dependency.name.as_str()).collect()
+}
+
+fn allowed(name: &str) -> Option<BTreeSet<&'static str>> {
+    let inside = INSIDE_IDL.iter().find(|(idl, _)| *idl == name);
+    if let Some((_, others)) = inside {
+        return Some(others.iter().copied().collect());
+    }
+    if ONLY_DOCUMENT.contains(&name) {
+        return Some(BTreeSet::from(["qcbus-document"]));
+    }
+    let (_, others) = MAY_KNOW
+        .iter()
+        .find(|(other, _)| *other == name)
+        .unwrap_or_else(|| panic!("{name} is new: say in MAY_KNOW whom it may know, and why"));
+    let others = (*others)?;
+    Some(others.iter().chain(IDL).copied().collect())
+}
+
+#[test]
+fn nobody_links_what_they_may_not_know() {
+    let metadata = metadata();
+    let ours: BTreeSet<&str> = metadata.packages.iter().map(|p| p.name.as_str()).collect();
+    let mut wrong = Vec::new();
+    for package in &metadata.packages {
+        let Some(allowed) = allowed(&package.name) else {
+            continue;
+        };
+        let build = [DependencyKind::Normal, DependencyKind::Build];
+        for other in linked(package, &build).intersection(&ours) {
+            if !allowed.contains(other) {
+                wrong.push(format!("{} links {other}", package.name));
+            }
+        }
+        // Tests may read files to have something to work on, and know no more than that.
+        for other in linked(package, &[DependencyKind::Development]).intersection(&ours) {
+            let reads = IDL.contains(other) || *other == "qcbus-ingest";
+            if !reads && !allowed.contains(other) {
+                wrong.push(format!("the tests of {} link {other}", package.name));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn every_crate_of_the_table_is_there() {
+    let metadata = metadata();
+    let ours: BTreeSet<&str> = metadata.packages.iter().map(|p| p.name.as_str()).collect();
+    let table: BTreeSet<&str> = MAY_KNOW.iter().map(|(name, _)| *name).collect();
+    assert_eq!(ours, table);
+}
+
+#[test]
+fn fenced_crates_are_linked_and_named_by_few() {
+    let metadata = metadata();
+    let mut wrong = Vec::new();
+    for (fenced, friends) in FENCED {
+        let path = format!("{}::", fenced.replace('-', "_"));
+        for package in &metadata.packages {
+            if friends.contains(&package.name.as_str()) {
+                continue;
+            }
+            if package.dependencies.iter().any(|d| d.name == *fenced) {
+                wrong.push(format!("{} depends on {fenced}", package.name));
+            }
+            let directory = package.manifest_path.parent().unwrap();
+            for (file, text) in sources(directory.as_std_path()) {
+                if code(&text).any(|(_, line)| line.contains(&path)) {
+                    wrong.push(format!("{} names {path}", file.display()));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn the_codec_is_the_one_file_that_names_its_encoding() {
+    let named = sources(&root().join("idl/messages"))
+        .into_iter()
+        .filter(|(_, text)| code(text).any(|(_, line)| line.contains("bincode::")))
+        .map(|(file, _)| file.file_name().unwrap().to_owned())
+        .collect::<Vec<_>>();
+    assert_eq!(named, ["codec.rs"]);
+}
+
+#[test]
+fn the_lints_of_the_workspace_hold_for_every_crate() {
+    for package in metadata().packages {
+        let manifest = std::fs::read_to_string(&package.manifest_path).unwrap();
+        assert!(
+            manifest.contains("[lints]\nworkspace = true"),
+            "{} has no `[lints] workspace = true`",
+            package.manifest_path
+        );
+    }
+}
+
+#[test]
+fn no_file_is_longer_than_a_head_holds() {
+    let long: BTreeMap<PathBuf, usize> = sources(&root())
+        .into_iter()
+        .map(|(file, text)| (file, text.lines().count()))
+        .filter(|(_, lines)| *lines > MAX_LINES)
+        .collect();
+    assert!(long.is_empty(), "more than {MAX_LINES} lines: {long:#?}");
+}
+
+#[test]
+fn no_test_is_switched_off() {
+    let off = ["#[ignore", ", ignore"].map(str::to_owned);
+    let mut wrong = Vec::new();
+    for (file, text) in sources(&root()) {
+        for (number, line) in code(&text) {
+            let line = line.trim_start();
+            let attribute = line.starts_with("#[");
+            if attribute && off.iter().any(|word| line.contains(word.as_str())) {
+                wrong.push(format!("{}:{number}: {line}", file.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn no_file_knows_the_machine_it_was_written_on() {
+    // In pieces, so that this file is not found.
+    let homes = [["/wo", "rk/"], ["/ro", "ot/"]].map(|halves| halves.concat());
+    let mut wrong = Vec::new();
+    for file in files(&root()) {
+        let Ok(text) = std::fs::read_to_string(&file) else {
+            continue;
+        };
+        for (number, line) in text.lines().enumerate() {
+            let named = |home: &String| {
+                let mut found = line.match_indices(home.as_str());
+                found.any(|(at, _)| starts_a_path(&line[..at]))
+            };
+            if homes.iter().any(named) {
+                wrong.push(format!("{}:{}: {line}", file.display(), number + 1));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn paths_named_in_documents_exist() {
+    let root = root();
+    let mut wrong = Vec::new();
+    for file in files(&root) {
+        let markdown = file.extension().is_some_and(|suffix| suffix == "md");
+        let inside_tests = file.starts_with(root.join("tests/farm"));
+        let map = file.starts_with(root.join("docs")) || file.parent() == Some(&root);
+        if !markdown || inside_tests || !map {
+            continue;
+        }
+        let text = std::fs::read_to_string(&file).unwrap();
+        for path in named_paths(&text, &root) {
+            if !root.join(&path).exists() {
+                wrong.push(format!("{} names {path}", file.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn the_farm_and_its_table_agree() {
+    let farm = root().join("tests/farm");
+    let table = std::fs::read_to_string(farm.join("README.md")).unwrap();
+    let rows = table.lines().filter_map(|line| line.strip_prefix("| `"));
+    let named: BTreeSet<PathBuf> = rows
+        .filter_map(|row| Some(PathBuf::from(row.split_once('`')?.0)))
+        .collect();
+    let there: BTreeSet<PathBuf> = files(&farm)
+        .into_iter()
+        .map(|file| file.strip_prefix(&farm).unwrap().to_owned())
+        .filter(|file| file.extension().is_some_and(|suffix| suffix != "md"))
+        // Included by another file, no file to check.
+        .filter(|file| file.extension().is_some_and(|suffix| suffix != "xml"))
+        .collect();
+    assert_eq!(named, there);
+}
+
+/// Whether a path may begin after `before`: not in the middle of another one.
+fn starts_a_path(before: &str) -> bool {
+    !before.ends_with(|c: char| c.is_alphanumeric() || matches!(c, '.' | '_' | '-' | '}'))
+}
+
+/// What is written in backticks and begins with a directory of ours.
+fn named_paths(text: &str, root: &Path) -> BTreeSet<String> {
+    let quoted = text.split('`').skip(1).step_by(2);
+    let plain = |word: &&str| {
+        word.contains('/')
+            && word
+                .chars()
+                .all(|c| c.is_ascii_alphanumeric() || matches!(c, '/' | '.' | '_' | '-'))
+    };
+    let ours = |word: &&str| {
+        let first = word.split('/').next().unwrap_or_default();
+        !first.is_empty() && first != ".." && first != "target" && root.join(first).is_dir()
+    };
+    quoted
+        .filter(plain)
+        .filter(ours)
+        .map(str::to_owned)
+        .collect()
+}
+
+/// Lines of code with their numbers: comments are free to name anything.
+fn code(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let numbered = text.lines().enumerate();
+    numbered
+        .filter(|(_, line)| !line.trim_start().starts_with("//"))
+        .map(|(number, line)| (number + 1, line))
+}
+
+fn sources(directory: &Path) -> Vec<(PathBuf, String)> {
+    let files = files(directory).into_iter();
+    let rust = files.filter(|file| file.extension().is_some_and(|suffix| suffix == "rs"));
+    rust.map(|file| {
+        let text = std::fs::read_to_string(&file).unwrap();
+        (file, text)
+    })
+    .collect()
+}
+
+/// All files below, in order, without what is built and what git keeps.
+fn files(directory: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut open = vec![directory.to_owned()];
+    while let Some(directory) = open.pop() {
+        for entry in std::fs::read_dir(&directory).unwrap() {
+            let entry = entry.unwrap();
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let kind = entry.file_type().unwrap();
+            let built = name.starts_with("target") || name == "qcbus-out" || name == ".git";
+            if kind.is_dir() && !built {
+                open.push(entry.path());
+            } else if kind.is_file() {
+                found.push(entry.path());
+            }
+        }
+    }
+    found.sort();
+    found
+}

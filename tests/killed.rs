@@ -1,0 +1,182 @@
+//! Bundles are killed in the middle of their work. Nothing is lost, and nothing is accepted that
+//! was not checked.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::process::{Child, Command, Stdio};
+
+use qcbus_formats::xqar::Status;
+use qcbus_messages::Verdict;
+use qcbus_messages::control::PeerStatus;
+use rustix::process::Signal;
+use support::content::Content;
+use support::farm::{Farm, tail, zoo};
+use support::processes::signal_pid;
+use support::watchdog::until_or;
+
+/// A bundle as the status shows it, once `wanted` holds.
+fn peer(farm: &Farm, name: &str, wanted: impl Fn(&PeerStatus) -> bool) -> PeerStatus {
+    until_or(
+        &format!("{name} gets there"),
+        || {
+            farm.status()?
+                .peers
+                .into_iter()
+                .find(|it| it.name == name)
+                .filter(&wanted)
+        },
+        || format!("{:#?}\n{}", farm.status(), tail(&farm.log())),
+    )
+}
+
+fn kill(peer: &PeerStatus, signal: Signal) {
+    signal_pid(i32::try_from(peer.pid).unwrap(), signal);
+}
+
+/// Why checkers of a bundle ended in error, in the result of a file.
+fn errors(farm: &Farm, name: &str, bundle: &str) -> Vec<String> {
+    let results = farm.result(name);
+    let bundles = results.bundles.iter().filter(|it| it.name == bundle);
+    let failed = bundles
+        .flat_map(|it| &it.checkers)
+        .filter(|it| it.status == Some(Status::Error));
+    failed.map(|it| it.summary.clone()).collect()
+}
+
+fn is_complete(farm: &Farm, name: &str, bundle: &str) -> bool {
+    farm.verdict(name);
+    let results = farm.result(name);
+    let there = results
+        .bundles
+        .iter()
+        .any(|it| it.name == bundle && !it.checkers.is_empty());
+    there && errors(farm, name, bundle).is_empty()
+}
+
+#[test]
+fn a_standard_bundle_that_is_killed_in_a_job_does_it_again() {
+    let farm = Farm::new();
+    let _broker = farm.serve_ready();
+    let first = peer(&farm, "xodrBundle", |it| it.state == "ready");
+    // Stopped before the file comes: it is certain that the job is not done when the kill comes.
+    kill(&first, Signal::STOP);
+    for number in 0..3 {
+        farm.write(&format!("{number}.xodr"), &Content::Good(number).bytes());
+    }
+    farm.write("bad.xodr", &Content::NoHeader(9).bytes());
+    peer(&farm, "xodrBundle", |it| it.active > 0);
+    kill(&first, Signal::KILL);
+    farm.settle(4);
+    for number in 0..3 {
+        let name = format!("{number}.xodr");
+        assert_eq!(farm.verdict(&name).verdict, Verdict::Accepted);
+        assert!(is_complete(&farm, &name, "xodrBundle"), "{name}");
+    }
+    assert_eq!(farm.verdict("bad.xodr").verdict, Verdict::Rejected);
+    let second = peer(&farm, "xodrBundle", |it| it.state == "ready");
+    assert_ne!(second.pid, first.pid);
+    assert!(second.restarts >= 1);
+}
+
+#[test]
+fn a_slow_bundle_is_killed_again_and_again_and_every_job_is_complete() {
+    let farm = Farm::new();
+    let _broker = farm.serve_ready();
+    farm.let_in("slow", "--millis 300");
+    let mut last = 0;
+    for round in 0..3 {
+        let name = format!("{round}.xodr");
+        peer(&farm, "slow", |it| it.state == "ready" && it.pid != last);
+        farm.write(&name, &Content::Good(round).bytes());
+        let busy = peer(&farm, "slow", |it| it.active > 0);
+        last = busy.pid;
+        kill(&busy, Signal::KILL);
+        assert_eq!(farm.verdict(&name).verdict, Verdict::Accepted, "{name}");
+        assert!(is_complete(&farm, &name, "slow"), "{name}");
+    }
+    assert!(peer(&farm, "slow", |_| true).restarts >= 3);
+}
+
+/// A bundle that nobody supervises; killed with the test.
+struct ByHand(Child);
+
+impl ByHand {
+    fn start(farm: &Farm, millis: &str) -> ByHand {
+        let mut command = Command::new(zoo());
+        command
+            .args(["slow", "--millis", millis, "--instance-dir"])
+            .arg(farm.instance());
+        let quiet = command
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null());
+        ByHand(quiet.spawn().unwrap())
+    }
+}
+
+impl Drop for ByHand {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+fn a_bundle_that_nobody_starts_again_leaves_errors_behind_until_it_is_back() {
+    let farm = Farm::new();
+    let _broker = farm.serve_ready();
+    // Never through with a job, so the kill comes in the middle of one.
+    let bundle = ByHand::start(&farm, "600000");
+    peer(&farm, "slow", |it| it.state == "ready");
+    farm.write("a.xodr", &Content::Good(1).bytes());
+    farm.write("bad.xodr", &Content::NoHeader(2).bytes());
+    peer(&farm, "slow", |it| it.active > 0);
+    drop(bundle);
+    // The job ends by itself; what did not run is listed, and nothing is accepted.
+    let verdict = farm.verdict("a.xodr");
+    assert_eq!(verdict.verdict, Verdict::Undetermined);
+    assert!(
+        verdict.why.iter().any(|it| it.contains("check_zoo_0")),
+        "{:?}",
+        verdict.why
+    );
+    assert_eq!(
+        errors(&farm, "a.xodr", "slow").len(),
+        2,
+        "{:#?}",
+        farm.result("a.xodr")
+    );
+    assert!(
+        is_complete(&farm, "a.xodr", "xodrBundle"),
+        "the others' work counts"
+    );
+    assert_eq!(
+        farm.verdict("bad.xodr").verdict,
+        Verdict::Rejected,
+        "an error is an error"
+    );
+    let said = farm.qcbus(&["wait", &farm.root().join("a.xodr").to_string_lossy()]);
+    assert_eq!(said.status.code(), Some(3));
+    // The next jobs go on, and are not accepted either: the bundle has not said good-bye.
+    farm.write("next.xodr", &Content::Good(3).bytes());
+    assert_eq!(farm.verdict("next.xodr").verdict, Verdict::Undetermined);
+    // It comes back: all becomes complete, also what was judged without it.
+    let _bundle = ByHand::start(&farm, "1");
+    farm.write("after.xodr", &Content::Good(4).bytes());
+    for name in ["after.xodr", "next.xodr", "a.xodr", "bad.xodr"] {
+        until_or(
+            &format!("{name} is complete"),
+            || is_complete(&farm, name, "slow").then_some(()),
+            || format!("{:#?}\n{}", farm.verdict(name), tail(&farm.log())),
+        );
+    }
+    for name in ["after.xodr", "next.xodr", "a.xodr"] {
+        assert_eq!(farm.verdict(name).verdict, Verdict::Accepted, "{name}");
+    }
+}

@@ -1,0 +1,101 @@
+//! Which troubles there are, and how often each comes.
+
+use crate::support::dice::Dice;
+
+/// The configuration under which everything is judged in the end.
+pub const CALM: &str = "<Config>\n  <CheckerBundle application=\"xodrBundle\"/>\n  \
+    <CheckerBundle application=\"xoscBundle\"/>\n</Config>\n";
+
+/// A configuration that demands animals, too, whether they are there or not.
+pub const WILD: &str = "<Config>\n  <CheckerBundle application=\"xodrBundle\"/>\n  \
+    <CheckerBundle application=\"dies_on_every_job\"/>\n  \
+    <CheckerBundle application=\"sends_garbage\"/>\n  \
+    <CheckerBundle application=\"lies_about_job_id\"/>\n  \
+    <CheckerBundle application=\"slow\"/>\n  \
+    <CheckerBundle application=\"floods_issues\"/>\n</Config>\n";
+
+/// What cannot be used and must change nothing.
+pub const BROKEN: &str = "<Config>\n  <CheckerBundle application=\"xodrBundle\">\n";
+
+/// Animals that come and go.
+pub const ANIMALS: &[&str] = &[
+    "hangs_after_hello",
+    "floods_issues",
+    "dies_on_every_job",
+    "lies_about_job_id",
+    "never_acknowledges",
+    "sends_garbage",
+    "stops_reading",
+    "allocates_forever",
+    "slow",
+    "polite",
+    "hangs_in_a_job",
+    "reporter_never_acknowledges",
+];
+
+/// Something to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Trouble {
+    /// Kill the broker and start another.
+    KillBroker,
+    /// Kill a standard bundle.
+    KillBundle,
+    /// Kill a reporter.
+    KillReporter,
+    /// Kill an animal.
+    KillAnimal,
+    /// Stop any process for a while.
+    Stop,
+    /// An animal comes or goes.
+    Animal,
+    /// The configuration changes.
+    Configure,
+    /// A file is written at once.
+    Write,
+    /// A file is written in two halves with a pause between.
+    WriteTorn,
+    /// A file is written under another name and renamed into place.
+    Rename,
+    /// A file gets another name.
+    Move,
+    /// A file is cut off.
+    Truncate,
+    /// A file is deleted.
+    Delete,
+    /// A file is written again and again while it is checked.
+    Rewrite,
+    /// Shared memory runs full for a while.
+    Fill,
+}
+
+/// Every trouble with its share.
+const SHARES: &[(u64, Trouble)] = &[
+    (6, Trouble::KillBroker),
+    (26, Trouble::KillBundle),
+    (10, Trouble::KillReporter),
+    (8, Trouble::KillAnimal),
+    (4, Trouble::Stop),
+    (4, Trouble::Animal),
+    (2, Trouble::Configure),
+    (16, Trouble::Write),
+    (8, Trouble::WriteTorn),
+    (8, Trouble::Rename),
+    (4, Trouble::Move),
+    (5, Trouble::Truncate),
+    (6, Trouble::Delete),
+    (6, Trouble::Rewrite),
+    (2, Trouble::Fill),
+];
+
+/// What comes next.
+pub fn any(dice: &mut Dice) -> Trouble {
+    let total: u64 = SHARES.iter().map(|(share, _)| share).sum();
+    let mut at = dice.below(total);
+    for (share, trouble) in SHARES {
+        if at < *share {
+            return *trouble;
+        }
+        at -= share;
+    }
+    Trouble::Write
+}

@@ -1,0 +1,304 @@
+//! A farm: a watched directory with everything that a broker beside it needs, in a directory of
+//! its own. Whatever was started for it is killed when it is dropped, also when a test panics.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+use qcbus_broker::control::ask_broker;
+use qcbus_formats::xqar::{self, Results};
+use qcbus_messages::control::{FileVerdict, Request, Response, Status};
+use rustix::process::Signal;
+use tempfile::TempDir;
+
+use super::broker::Broker;
+use super::processes::{self, Process};
+use super::watchdog;
+
+/// A farm.
+#[derive(Debug)]
+pub struct Farm {
+    dir: TempDir,
+    /// Further arguments of `qcbus serve`.
+    pub arguments: Vec<String>,
+}
+
+impl Farm {
+    /// An empty one.
+    pub fn new() -> Farm {
+        let dir = TempDir::with_prefix("qcbus-test-").unwrap();
+        for name in ["farm", "bundles.d"] {
+            std::fs::create_dir(dir.path().join(name)).unwrap();
+        }
+        Farm {
+            dir,
+            arguments: Vec::new(),
+        }
+    }
+
+    /// With further arguments of `qcbus serve`.
+    pub fn with(arguments: &[&str]) -> Farm {
+        let mut farm = Farm::new();
+        farm.arguments
+            .extend(arguments.iter().map(|it| (*it).to_owned()));
+        farm
+    }
+
+    /// Where everything lies.
+    pub fn base(&self) -> &Path {
+        self.dir.path()
+    }
+
+    /// The watched directory.
+    pub fn root(&self) -> PathBuf {
+        self.dir.path().join("farm")
+    }
+
+    /// The results' directory.
+    pub fn out(&self) -> PathBuf {
+        self.dir.path().join("out")
+    }
+
+    /// The instance's runtime directory.
+    pub fn instance(&self) -> PathBuf {
+        self.dir.path().join("instance")
+    }
+
+    /// The manifests' directory.
+    pub fn bundles_d(&self) -> PathBuf {
+        self.dir.path().join("bundles.d")
+    }
+
+    /// The journal.
+    pub fn journal(&self) -> PathBuf {
+        self.out().join(".qcbus/journal.sqlite")
+    }
+
+    /// The broker's log.
+    pub fn log_path(&self) -> PathBuf {
+        self.dir.path().join("serve.log")
+    }
+
+    /// What the brokers have said so far.
+    pub fn log(&self) -> String {
+        std::fs::read_to_string(self.log_path()).unwrap_or_default()
+    }
+
+    /// The command that serves this farm.
+    pub fn serve_command(&self) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+        command
+            .arg("serve")
+            .arg(self.root())
+            .arg("--instance-dir")
+            .arg(self.instance())
+            .arg("--out")
+            .arg(self.out())
+            .arg("--bundles-d")
+            .arg(self.bundles_d())
+            .args(&self.arguments)
+            .env("NO_COLOR", "1");
+        command
+    }
+
+    /// Starts a broker.
+    pub fn serve(&self) -> Broker {
+        Broker::start(&mut self.serve_command(), &self.log_path())
+    }
+
+    /// Starts a broker and waits until it answers and its standard bundles are ready.
+    pub fn serve_ready(&self) -> Broker {
+        let broker = self.serve();
+        watchdog::until_or(
+            "the broker and its bundles are ready",
+            || self.is_ready(),
+            || self.log(),
+        );
+        broker
+    }
+
+    fn is_ready(&self) -> Option<()> {
+        let status = self.status()?;
+        let standard = status.peers.iter().filter(|it| it.name.ends_with("Bundle"));
+        let ready = standard
+            .filter(|it| it.state == "ready" || it.state == "busy")
+            .count();
+        (ready >= 2).then_some(())
+    }
+
+    /// Runs a qcbus command on this instance.
+    pub fn qcbus(&self, arguments: &[&str]) -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+        command
+            .args(arguments)
+            .arg("--instance-dir")
+            .arg(self.instance());
+        command.env("NO_COLOR", "1").output().unwrap()
+    }
+
+    /// Asks the broker, if there is one.
+    pub fn ask(&self, request: &Request) -> Option<Response> {
+        ask_broker(&self.instance(), request).ok()
+    }
+
+    /// The broker's status, if there is one.
+    pub fn status(&self) -> Option<Status> {
+        match self.ask(&Request::Status)? {
+            Response::Status(status) => Some(*status),
+            _ => None,
+        }
+    }
+
+    /// The verdict on a file's present bytes, whatever dies meanwhile.
+    pub fn verdict(&self, name: &str) -> FileVerdict {
+        let file = self.root().join(name);
+        let explain = || format!("{name}\n{:#?}\n{}", self.status(), self.log());
+        watchdog::until_or(
+            "a verdict",
+            || {
+                let request = Request::Wait {
+                    file: file.clone(),
+                    timeout_ms: Some(120_000),
+                };
+                match self.ask(&request)? {
+                    Response::Verdict(verdict) => Some(verdict),
+                    _ => None,
+                }
+            },
+            explain,
+        )
+    }
+
+    /// Waits until everything that is there has its verdict and nothing is under way.
+    pub fn settle(&self, total: usize) -> Status {
+        let total = u64::try_from(total).unwrap();
+        let settled = |status: &Status| {
+            let queue = status.queue;
+            let quiet = queue.waiting + queue.background + queue.active == 0;
+            quiet && status.files.total == total && status.files.judged == total
+        };
+        let explain = || format!("{total} files\n{:#?}\n{}", self.status(), tail(&self.log()));
+        watchdog::until_or(
+            "all files are judged",
+            || self.status().filter(settled),
+            explain,
+        )
+    }
+
+    /// Puts a file there at once.
+    pub fn write(&self, name: &str, bytes: &[u8]) {
+        std::fs::write(self.root().join(name), bytes).unwrap();
+    }
+
+    /// The result of a file.
+    pub fn result(&self, name: &str) -> Results {
+        let path = self.out().join(format!("{name}.xqar"));
+        let bytes = std::fs::read(&path).unwrap_or_else(|it| panic!("{}: {it}", path.display()));
+        xqar::read(&bytes).unwrap()
+    }
+
+    /// The verdict file of a file.
+    pub fn verdict_file(&self, name: &str) -> serde_json::Value {
+        let path = self.out().join(format!("{name}.verdict.json"));
+        let bytes = std::fs::read(&path).unwrap_or_else(|it| panic!("{}: {it}", path.display()));
+        serde_json::from_slice(&bytes).unwrap()
+    }
+
+    /// Lets an animal in.
+    pub fn let_in(&self, animal: &str, arguments: &str) {
+        let module_type = if animal.starts_with("reporter") {
+            "report_module"
+        } else {
+            "checker_bundle"
+        };
+        let manifest = serde_json::json!({ "module": [{
+            "name": animal,
+            "exec_type": "executable",
+            "module_type": module_type,
+            "exec_command": format!("{} {animal} {arguments}", zoo().display()),
+            "mode": "bus",
+        }]});
+        let path = self.bundles_d().join(format!("{animal}.json"));
+        // Renamed into place: a manifest that is half there is refused, with a notice.
+        let unfinished = self.bundles_d().join(format!(".{animal}"));
+        std::fs::write(&unfinished, manifest.to_string()).unwrap();
+        std::fs::rename(&unfinished, &path).unwrap();
+    }
+
+    /// Sends an animal away.
+    pub fn send_away(&self, animal: &str) {
+        let _ = std::fs::remove_file(self.bundles_d().join(format!("{animal}.json")));
+    }
+
+    /// All processes of this instance.
+    pub fn processes(&self) -> Vec<Process> {
+        processes::of_directory(&self.instance())
+    }
+
+    /// What the shared memory of this instance begins with; there must have been a broker.
+    pub fn shm_prefix(&self) -> String {
+        let path = self.instance().join("id");
+        watchdog::until("the instance has an identity", || {
+            std::fs::read_to_string(&path)
+                .ok()
+                .filter(|it| !it.is_empty())
+        })
+    }
+}
+
+impl Drop for Farm {
+    fn drop(&mut self) {
+        // What dies may have been about to start something.
+        for _ in 0..3 {
+            for process in self.processes() {
+                process.signal(Signal::KILL);
+            }
+        }
+    }
+}
+
+/// Segments in /dev/shm whose name begins like this.
+pub fn shm_segments(prefix: &str) -> Vec<String> {
+    let entries = std::fs::read_dir("/dev/shm").unwrap().flatten();
+    let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+    names.filter(|name| name.starts_with(prefix)).collect()
+}
+
+/// The end of a log.
+pub fn tail(log: &str) -> String {
+    let lines: Vec<&str> = log.lines().collect();
+    lines[lines.len().saturating_sub(60)..].join("\n")
+}
+
+/// The zoo's program, built when it is first needed, beside the program under test.
+pub fn zoo() -> PathBuf {
+    static ZOO: OnceLock<PathBuf> = OnceLock::new();
+    ZOO.get_or_init(build_zoo).clone()
+}
+
+fn build_zoo() -> PathBuf {
+    let beside = Path::new(env!("CARGO_BIN_EXE_qcbus")).with_file_name("zoo");
+    if std::env::var_os(super::inside::INSIDE).is_some() && beside.exists() {
+        return beside;
+    }
+    let mut build = Command::new(env!("CARGO"));
+    build.args([
+        "build",
+        "-q",
+        "--package",
+        "qcbus-zoo",
+        "--bin",
+        "zoo",
+        "--manifest-path",
+    ]);
+    build.arg(concat!(env!("CARGO_MANIFEST_DIR"), "/../../Cargo.toml"));
+    // target/PROFILE/zoo
+    if beside.parent().is_some_and(|it| it.ends_with("release")) {
+        build.arg("--release");
+    }
+    if let Some(target) = beside.parent().and_then(Path::parent) {
+        build.arg("--target-dir").arg(target);
+    }
+    assert!(build.status().unwrap().success(), "the zoo cannot be built");
+    beside
+}

@@ -1,0 +1,58 @@
+//! Running a test in a mount namespace of its own, with small file systems that may be filled.
+
+use std::process::{Command, ExitStatus};
+
+/// Set in the environment of a test that runs inside.
+pub const INSIDE: &str = "QCBUS_TEST_INSIDE";
+
+/// Whether this process runs inside.
+pub fn is_inside() -> bool {
+    std::env::var_os(INSIDE).is_some()
+}
+
+/// Why nothing can be mounted here; `None` when it can.
+pub fn refused() -> Option<String> {
+    let output = namespace("mount -t tmpfs -o size=1m tmpfs /dev/shm", &["true"]).output();
+    match output {
+        Err(error) => Some(format!("`unshare` cannot be run: {error}")),
+        Ok(output) if !output.status.success() => {
+            let why = String::from_utf8_lossy(&output.stderr).trim().to_owned();
+            Some(format!(
+                "mounting a tmpfs in a namespace of one's own is not allowed: {why}"
+            ))
+        }
+        Ok(_) => None,
+    }
+}
+
+/// Runs one test of this executable again, inside, after `prepare` (shell). `None`: it cannot be
+/// done here, and why has been printed.
+pub fn run_inside(test: &str, prepare: &str) -> Option<ExitStatus> {
+    if let Some(why) = refused() {
+        skip(test, &why);
+        return None;
+    }
+    let itself = std::env::current_exe().unwrap();
+    let arguments = [&itself.to_string_lossy(), "--exact", test, "--nocapture"];
+    let status = namespace(prepare, &arguments)
+        .env(INSIDE, "1")
+        .status()
+        .unwrap();
+    Some(status)
+}
+
+fn namespace(prepare: &str, arguments: &[&str]) -> Command {
+    let mut command = Command::new("unshare");
+    command.args(["--mount", "--propagation", "private", "sh", "-c"]);
+    command
+        .arg(format!("{prepare} && exec \"$@\""))
+        .arg("sh")
+        .args(arguments);
+    command
+}
+
+/// Says that a test does nothing here.
+#[expect(clippy::print_stderr, reason = "a test that is skipped must say so")]
+pub fn skip(test: &str, why: &str) {
+    eprintln!("skipped: {test}: {why}");
+}

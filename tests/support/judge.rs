@@ -1,0 +1,155 @@
+//! The judge: what must be so once a farm has come to rest.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use qcbus_formats::xqar::Status;
+use qcbus_messages::Verdict;
+use sha2::{Digest, Sha256};
+
+use super::content::Content;
+use super::farm::Farm;
+
+/// The files that are there, by name.
+pub type Files = BTreeMap<String, Content>;
+
+/// What the judge found.
+#[derive(Debug, Default)]
+pub struct Judgement {
+    /// What is not as it must be.
+    pub complaints: Vec<String>,
+    /// Pairs of file and bundle that are condemned: the bundle died twice with the file alone.
+    pub condemned: usize,
+}
+
+/// The words with which the broker condemns.
+const CONDEMNED: &str = "times on this file alone in a fresh process";
+
+/// Looks at everything. `strangers` are bundles whose checkers may be in error.
+pub fn judge(farm: &Farm, files: &Files, strangers: &[&str]) -> Judgement {
+    let mut judgement = Judgement::default();
+    for (name, content) in files {
+        judgement.file(farm, name, content, strangers);
+    }
+    judgement.nothing_else(farm, files);
+    judgement
+}
+
+impl Judgement {
+    /// Fails the running test when there are complaints.
+    pub fn demand(&self, log: &str) {
+        let count = self.complaints.len();
+        let first: Vec<&String> = self.complaints.iter().take(20).collect();
+        assert!(count == 0, "{count} complaints: {first:#?}\n{log}");
+    }
+
+    fn complain(&mut self, name: &str, what: impl std::fmt::Display) {
+        self.complaints.push(format!("{name}: {what}"));
+    }
+
+    fn file(&mut self, farm: &Farm, name: &str, content: &Content, strangers: &[&str]) {
+        let bytes = content.bytes();
+        if std::fs::read(farm.root().join(name)).ok().as_ref() != Some(&bytes) {
+            return self.complain(name, "the test does not know what is in it");
+        }
+        if !farm.out().join(format!("{name}.xqar")).exists() {
+            return self.complain(name, "it has no result");
+        }
+        let told = farm.verdict_file(name);
+        let digest = hex(&Sha256::digest(&bytes));
+        if told["sha256"].as_str() != Some(&digest) {
+            self.complain(
+                name,
+                format!("the verdict is about {}, not {digest}", told["sha256"]),
+            );
+        }
+        let (complete, foreign) = self.is_complete(farm, name, strangers);
+        if complete && !expected_rule_fired(farm, name, content) {
+            self.complain(name, format!("the fault was not found: {content:?}"));
+        }
+        let verdict = told["verdict"].as_str().unwrap_or_default();
+        let expected = content.verdict();
+        let allowed = match expected {
+            _ if !complete => verdict != Verdict::Accepted.as_str(),
+            Verdict::Accepted if foreign => verdict == Verdict::Undetermined.as_str(),
+            expected => verdict == expected.as_str(),
+        };
+        if !allowed {
+            self.complain(
+                name,
+                format!("verdict {verdict}, expected {expected}: {content:?}"),
+            );
+        }
+    }
+
+    /// Whether the standard bundles said all that they must, and whether a stranger failed.
+    fn is_complete(&mut self, farm: &Farm, name: &str, strangers: &[&str]) -> (bool, bool) {
+        let results = farm.result(name);
+        let (mut complete, mut foreign, mut seen) = (true, false, false);
+        for bundle in &results.bundles {
+            let stranger = strangers.contains(&bundle.name.as_str());
+            seen |= bundle.name == "xodrBundle";
+            for checker in &bundle.checkers {
+                if matches!(checker.status, Some(Status::Completed | Status::Skipped)) {
+                    continue;
+                }
+                if stranger {
+                    foreign = true;
+                } else if checker.summary.contains(CONDEMNED) {
+                    complete = false;
+                } else {
+                    self.complain(name, format!("{}: {}", checker.id, checker.summary));
+                }
+            }
+        }
+        if !seen {
+            self.complain(name, "xodrBundle is not in its result");
+        }
+        self.condemned += usize::from(!complete);
+        (complete, foreign)
+    }
+
+    /// No result without a file, nothing half-written.
+    fn nothing_else(&mut self, farm: &Farm, files: &Files) {
+        for entry in std::fs::read_dir(farm.out()).unwrap().flatten() {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            if name == ".qcbus" {
+                continue;
+            }
+            let results = [".xqar", ".verdict.json"];
+            let file = results.iter().find_map(|suffix| name.strip_suffix(suffix));
+            // Reports are the reporters' own: nobody tells them that a file has gone.
+            let report = file.is_none() && [".txt", ".json"].iter().any(|it| name.ends_with(it));
+            if !report && !file.is_some_and(|file| files.contains_key(file)) {
+                self.complain(&name, "lies among the results, and no file is there for it");
+            }
+        }
+    }
+}
+
+/// Whether the rule that the oracle expects has an issue.
+fn expected_rule_fired(farm: &Farm, name: &str, content: &Content) -> bool {
+    let Some(expected) = content.checker() else {
+        return true;
+    };
+    let results = farm.result(name);
+    let mut checkers = results.bundles.iter().flat_map(|bundle| &bundle.checkers);
+    checkers.any(|checker| checker.id == expected && !checker.issues.is_empty())
+}
+
+/// Verdicts in the journal by what they are about: path, digest, configuration.
+pub fn verdicts_in_journal(journal: &Path) -> BTreeMap<(String, String, String), u64> {
+    let connection = rusqlite::Connection::open(journal).unwrap();
+    let mut query = connection
+        .prepare("SELECT path, digest, config, count(*) FROM jobs GROUP BY path, digest, config")
+        .unwrap();
+    let rows = query.query_map([], |row| {
+        let key = (row.get(0)?, row.get(1)?, row.get(2)?);
+        Ok((key, u64::try_from(row.get::<_, i64>(3)?).unwrap()))
+    });
+    rows.unwrap().map(Result::unwrap).collect()
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}

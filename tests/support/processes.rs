@@ -1,0 +1,99 @@
+//! Processes, by what `/proc` says of them.
+
+use std::path::{Path, PathBuf};
+
+/// A process that belongs to an instance.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Process {
+    /// Its id.
+    pub pid: i32,
+    /// Its command line.
+    pub words: Vec<String>,
+}
+
+/// What a process is to the instance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Part {
+    /// `qcbus serve`.
+    Broker,
+    /// A standard bundle.
+    Bundle,
+    /// A standard reporter.
+    Reporter,
+    /// An animal.
+    Animal,
+    /// A command such as `qcbus wait`.
+    Other,
+}
+
+impl Process {
+    /// What it is.
+    pub fn part(&self) -> Part {
+        let said = |word: &str| self.words.iter().skip(1).any(|it| it == word);
+        let program = self.words.first().map_or("", String::as_str);
+        if program.ends_with("/zoo") {
+            Part::Animal
+        } else if said("serve") {
+            Part::Broker
+        } else if said("bundle") && said("run") {
+            Part::Bundle
+        } else if said("reporter") && said("run") {
+            Part::Reporter
+        } else {
+            Part::Other
+        }
+    }
+
+    /// Sends a signal. A process that has gone meanwhile is no mistake.
+    pub fn signal(&self, signal: rustix::process::Signal) {
+        signal_pid(self.pid, signal);
+    }
+}
+
+/// Sends a signal to a process that this test has started.
+pub fn signal_pid(pid: i32, signal: rustix::process::Signal) {
+    if let Some(pid) = rustix::process::Pid::from_raw(pid) {
+        let _ = rustix::process::kill_process(pid, signal);
+    }
+}
+
+/// All processes that were told of this directory, zombies left out: they have no command line.
+pub fn of_directory(directory: &Path) -> Vec<Process> {
+    let wanted = directory.to_string_lossy();
+    let mut found: Vec<Process> = all()
+        .filter(|process| process.words.iter().any(|word| *word == wanted))
+        .filter(|process| process.pid != i32::try_from(std::process::id()).unwrap())
+        .collect();
+    found.sort_by_key(|process| process.pid);
+    found
+}
+
+fn all() -> impl Iterator<Item = Process> {
+    std::fs::read_dir("/proc")
+        .unwrap()
+        .flatten()
+        .filter_map(|entry| {
+            let pid = entry.file_name().to_str()?.parse().ok()?;
+            let line = std::fs::read(entry.path().join("cmdline")).ok()?;
+            let words = line
+                .split(|byte| *byte == 0)
+                .filter(|word| !word.is_empty());
+            let words = words
+                .map(|word| String::from_utf8_lossy(word).into_owned())
+                .collect();
+            Some(Process { pid, words })
+        })
+}
+
+/// A line of `/proc/PID/status` that counts KiB.
+pub fn memory_kib(pid: u32, field: &str) -> Option<u64> {
+    let path = PathBuf::from(format!("/proc/{pid}/status"));
+    let text = std::fs::read_to_string(path).ok()?;
+    let line = text.lines().find(|line| line.starts_with(field))?;
+    line.split_whitespace().nth(1)?.parse().ok()
+}
+
+/// Memory of a process that is its own: what it maps from /dev/shm is not counted.
+pub fn private_kib(pid: u32) -> Option<u64> {
+    memory_kib(pid, "RssAnon:")
+}

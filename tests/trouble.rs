@@ -1,0 +1,251 @@
+//! What a person reads when something is wrong: each message says what, and what to do.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    missing_docs,
+    reason = "all of this is test code, also what is no `#[test]` itself"
+)]
+
+mod support;
+
+use std::path::Path;
+use std::process::Output;
+
+use support::content::Content;
+use support::farm::Farm;
+use support::inside::{is_inside, run_inside};
+use support::watchdog::until_or;
+
+/// The words of a run, with this test's own paths, process ids and numbers taken out.
+fn told(farm: &Farm, text: &str) -> String {
+    let base = farm.base().to_string_lossy();
+    let text = text.replace(&*base, "BASE");
+    let words = text.lines().map(without_numbers);
+    words.collect::<Vec<_>>().join("\n")
+}
+
+/// Process ids and byte counts differ from run to run.
+fn without_numbers(line: &str) -> String {
+    let mut out = String::new();
+    let mut digits = String::new();
+    for c in line.chars().chain(['\n']) {
+        if c.is_ascii_digit() {
+            digits.push(c);
+            continue;
+        }
+        let long = digits.len() >= 3;
+        out.push_str(if long { "N" } else { &digits });
+        digits.clear();
+        out.push(c);
+    }
+    out.trim_end().to_owned()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// A notice in the status of the broker that begins or goes on like this.
+fn notice(farm: &Farm, words: &str) -> String {
+    let look = || {
+        let notices = farm.status()?.notices;
+        notices.into_iter().find(|it| it.contains(words))
+    };
+    let found = until_or("a notice", look, || format!("{words}\n{}", farm.log()));
+    told(farm, &found)
+}
+
+#[test]
+fn a_corrupt_journal() {
+    let farm = Farm::new();
+    std::fs::create_dir_all(farm.journal().parent().unwrap()).unwrap();
+    std::fs::write(
+        farm.journal(),
+        "this was a database once, before the disk broke",
+    )
+    .unwrap();
+    let output = farm.serve_command().output().unwrap();
+    assert_eq!(output.status.code(), Some(5));
+    insta::assert_snapshot!(told(&farm, &stderr(&output)));
+    assert!(
+        !farm.instance().join("control.sock").exists(),
+        "nothing stays behind"
+    );
+}
+
+#[test]
+fn a_second_broker_on_the_same_instance() {
+    let farm = Farm::new();
+    let _broker = farm.serve_ready();
+    let output = farm.serve_command().output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    insta::assert_snapshot!(told(&farm, &stderr(&output)));
+    farm.write("a.xodr", &Content::Good(1).bytes());
+    // The first one has not noticed.
+    farm.verdict("a.xodr");
+}
+
+#[test]
+fn a_bundle_of_another_version() {
+    let farm = Farm::new();
+    let _broker = farm.serve_ready();
+    farm.let_in("speaks_another_protocol", "");
+    insta::assert_snapshot!(notice(&farm, "turned away"));
+}
+
+#[test]
+fn a_bundle_that_cannot_be_started() {
+    let farm = Farm::new();
+    let _broker = farm.serve_ready();
+    let manifest = r#"{"module": [{"name": "missing", "exec_type": "executable",
+        "module_type": "checker_bundle", "exec_command": "/no/such/program", "mode": "bus"}]}"#;
+    std::fs::write(farm.bundles_d().join("missing.json"), manifest).unwrap();
+    insta::assert_snapshot!(notice(&farm, "missing: "));
+}
+
+#[test]
+fn a_watched_directory_that_goes_and_comes_back() {
+    let farm = Farm::new();
+    let _broker = farm.serve_ready();
+    farm.write("a.xodr", &Content::Good(1).bytes());
+    farm.verdict("a.xodr");
+    let aside = farm.base().join("aside");
+    std::fs::rename(farm.root(), &aside).unwrap();
+    insta::assert_snapshot!(notice(&farm, "is gone"));
+    assert!(
+        farm.out().join("a.xodr.xqar").exists(),
+        "its results are kept"
+    );
+    std::fs::rename(&aside, farm.root()).unwrap();
+    insta::assert_snapshot!(notice(&farm, "is back"));
+    farm.write("b.xodr", &Content::Good(2).bytes());
+    farm.verdict("b.xodr");
+}
+
+#[test]
+fn a_watched_directory_that_is_not_there() {
+    let farm = Farm::new();
+    std::fs::remove_dir(farm.root()).unwrap();
+    let output = farm.serve_command().output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    insta::assert_snapshot!(told(&farm, &stderr(&output)));
+}
+
+/// Runs inside what may mount, or says why it cannot.
+fn inside(test: &str, prepare: &str, body: fn()) {
+    if is_inside() {
+        return body();
+    }
+    if let Some(status) = run_inside(test, prepare) {
+        assert!(status.success(), "see above");
+    }
+}
+
+fn mount(directory: &Path, options: &str) {
+    let mut command = std::process::Command::new("mount");
+    command
+        .args(["-t", "tmpfs", "-o", options, "tmpfs"])
+        .arg(directory);
+    assert!(command.status().unwrap().success());
+}
+
+#[test]
+fn an_output_directory_that_cannot_be_written() {
+    inside("an_output_directory_that_cannot_be_written", "true", || {
+        let mut farm = Farm::new();
+        std::fs::create_dir(farm.out()).unwrap();
+        // Root may write anywhere but on a file system that is read-only.
+        mount(&farm.out(), "ro,size=1m");
+        let output = farm.serve_command().output().unwrap();
+        assert_eq!(output.status.code(), Some(5));
+        insta::assert_snapshot!(told(&farm, &stderr(&output)));
+        // With the state elsewhere it starts, and says why results do not come.
+        let state = farm.base().join("state").to_string_lossy().into_owned();
+        farm.arguments = vec!["--state".to_owned(), state];
+        let _broker = farm.serve_ready();
+        farm.write("a.xodr", &Content::Good(1).bytes());
+        insta::assert_snapshot!(notice(&farm, "cannot write"));
+    });
+}
+
+#[test]
+fn an_output_disk_that_is_full() {
+    inside("an_output_disk_that_is_full", "true", || {
+        let mut farm = Farm::new();
+        std::fs::create_dir(farm.out()).unwrap();
+        mount(&farm.out(), "size=1m");
+        let state = farm.base().join("state").to_string_lossy().into_owned();
+        farm.arguments = vec!["--state".to_owned(), state];
+        let filler = farm.out().join("filler");
+        std::fs::write(&filler, vec![0; 1 << 20]).unwrap();
+        let _broker = farm.serve_ready();
+        farm.write("a.xodr", &Content::Good(1).bytes());
+        insta::assert_snapshot!(notice(&farm, "cannot write"));
+        let left: Vec<String> = std::fs::read_dir(farm.out())
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+            .collect();
+        assert!(
+            !left.iter().any(|name| name.ends_with(".xqar")),
+            "nothing half-written: {left:?}"
+        );
+        std::fs::remove_file(&filler).unwrap();
+        // With room again, the verdict comes by itself.
+        let verdict = farm.verdict("a.xodr");
+        assert_eq!(verdict.verdict, Content::Good(1).verdict());
+    });
+}
+
+#[test]
+fn a_state_disk_that_is_full() {
+    inside("a_state_disk_that_is_full", "true", || {
+        let mut farm = Farm::new();
+        let state = farm.base().join("state");
+        std::fs::create_dir(&state).unwrap();
+        mount(&state, "size=1m");
+        farm.arguments = vec!["--state".to_owned(), state.to_string_lossy().into_owned()];
+        let _broker = farm.serve_ready();
+        let filler = std::fs::File::create(state.join("filler")).unwrap();
+        let free = {
+            let space = rustix::fs::statvfs(&state).unwrap();
+            space.f_bavail * space.f_frsize
+        };
+        rustix::fs::fallocate(&filler, rustix::fs::FallocateFlags::empty(), 0, free).unwrap();
+        for number in 0..20 {
+            farm.write(&format!("{number}.xodr"), &Content::Good(number).bytes());
+        }
+        insta::assert_snapshot!(notice(&farm, "journal"));
+        drop(filler);
+        std::fs::remove_file(state.join("filler")).unwrap();
+        farm.settle(20);
+    });
+}
+
+#[test]
+fn a_shared_memory_that_is_full() {
+    let prepare = "mount -t tmpfs -o size=64m tmpfs /dev/shm";
+    inside("a_shared_memory_that_is_full", prepare, || {
+        let farm = Farm::new();
+        let _broker = farm.serve_ready();
+        let filler = std::fs::File::create("/dev/shm/filler").unwrap();
+        let space = rustix::fs::statvfs("/dev/shm").unwrap();
+        let size = (space.f_bavail * space.f_frsize).saturating_sub(1 << 20);
+        rustix::fs::fallocate(&filler, rustix::fs::FallocateFlags::empty(), 0, size).unwrap();
+        farm.write("a.xodr", &Content::Good(1).bytes());
+        insta::assert_snapshot!(notice(&farm, "cannot publish"));
+        let late = Farm::new();
+        let output = late.serve_command().output().unwrap();
+        assert_eq!(
+            output.status.code(),
+            Some(5),
+            "nothing starts in it, and no bus error"
+        );
+        insta::assert_snapshot!(told(&late, &stderr(&output)));
+        drop(filler);
+        std::fs::remove_file("/dev/shm/filler").unwrap();
+        let verdict = farm.verdict("a.xodr");
+        assert_eq!(verdict.verdict, Content::Good(1).verdict());
+    });
+}

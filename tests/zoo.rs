@@ -1,0 +1,286 @@
+//! One animal at a time beside the standard bundles: it harms nobody but itself.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    missing_docs,
+    reason = "all of this is test code, also what is no `#[test]` itself"
+)]
+
+mod support;
+
+use qcbus_formats::xqar::Status;
+use qcbus_messages::Verdict;
+use support::content::Content;
+use support::farm::{Farm, tail};
+use support::judge::{Files, judge};
+use support::processes::private_kib;
+use support::watchdog::{until_or, until_so};
+
+/// Limits that bring misbehaviour to light soon, yet leave a busy machine time to be busy.
+const IMPATIENT: &[&str] = &[
+    "--silence-limit",
+    "4s",
+    "--job-deadline",
+    "6s",
+    "--max-restarts",
+    "2",
+    "--memory-limit",
+    "1024",
+];
+
+/// Most private memory of the broker: far above what it needs, far below what a flood would take.
+const BROKER_KIB: u64 = 1 << 20;
+
+fn some_files(farm: &Farm) -> Files {
+    let contents = [
+        Content::Good(1),
+        Content::NoHeader(2),
+        Content::NoVersion(3),
+        Content::WrongRoot(4),
+        Content::Good(5),
+        Content::Torn(b"<OpenDRIVE>".to_vec()),
+    ];
+    let named = contents.into_iter().enumerate();
+    let files: Files = named
+        .map(|(at, content)| (format!("{at}.xodr"), content))
+        .collect();
+    for (name, content) in &files {
+        farm.write(name, &content.bytes());
+    }
+    files
+}
+
+/// Serves a farm with an animal in it, and demands what must hold beside any animal.
+fn beside(animal: &str, reason: &str) -> (Farm, support::broker::Broker) {
+    let farm = Farm::with(IMPATIENT);
+    let broker = farm.serve_ready();
+    farm.let_in(animal, "");
+    until_or(
+        "the animal has been seen",
+        || is_known(&farm, animal),
+        || farm.log(),
+    );
+    let mut files = some_files(&farm);
+    farm.settle(files.len());
+    // A fresh file passes while the animal is still there.
+    let fresh = Content::Good(99);
+    farm.write("fresh.xodr", &fresh.bytes());
+    files.insert("fresh.xodr".to_owned(), fresh);
+    farm.verdict("fresh.xodr");
+    farm.settle(files.len());
+    judge(&farm, &files, &[animal]).demand(&tail(&farm.log()));
+    if !reason.is_empty() {
+        let reasons = reasons_of(&farm, "0.xodr", animal);
+        assert!(reasons.iter().all(|it| it.contains(reason)), "{reasons:#?}");
+        assert_eq!(farm.verdict("0.xodr").verdict, Verdict::Undetermined);
+        assert!(
+            !reasons.is_empty(),
+            "its checkers are listed\n{}",
+            tail(&farm.log())
+        );
+    }
+    let memory = private_kib(broker.pid()).unwrap();
+    assert!(memory < BROKER_KIB, "the broker holds {memory} KiB");
+    (farm, broker)
+}
+
+fn is_known(farm: &Farm, animal: &str) -> Option<()> {
+    let status = farm.status()?;
+    let named =
+        |it: &qcbus_messages::control::PeerStatus| it.name == animal && it.state != "starting";
+    let told = |notice: &String| notice.contains(animal) && !notice.contains("reloaded");
+    (status.peers.iter().any(named) || status.notices.iter().any(told)).then_some(())
+}
+
+/// Why the animal's checkers failed on a file.
+fn reasons_of(farm: &Farm, name: &str, animal: &str) -> Vec<String> {
+    let results = farm.result(name);
+    let bundles = results
+        .bundles
+        .iter()
+        .filter(|bundle| bundle.name == animal);
+    let failed = bundles.flat_map(|bundle| &bundle.checkers);
+    let failed = failed.filter(|checker| checker.status == Some(Status::Error));
+    failed.map(|checker| checker.summary.clone()).collect()
+}
+
+fn notices(farm: &Farm) -> String {
+    farm.status()
+        .map(|status| status.notices.join("\n"))
+        .unwrap_or_default()
+}
+
+#[test]
+fn hangs_after_hello() {
+    let (farm, _broker) = beside("hangs_after_hello", "");
+    until_so("it is told apart from those who answer", || {
+        notices(&farm).contains("hangs_after_hello: it joined and never said what it checks")
+    });
+    assert_eq!(
+        farm.verdict("0.xodr").verdict,
+        Verdict::Accepted,
+        "it was never demanded"
+    );
+}
+
+#[test]
+fn hangs_in_a_job() {
+    beside("hangs_in_a_job", "hangs_in_a_job");
+}
+
+#[test]
+fn floods_issues() {
+    let (farm, _broker) = beside("floods_issues", "");
+    let reasons = reasons_of(&farm, "0.xodr", "floods_issues");
+    assert!(
+        reasons.iter().any(|it| it.contains("were cut off")),
+        "{reasons:#?}"
+    );
+}
+
+#[test]
+fn dies_on_every_job() {
+    let (farm, _broker) = beside("dies_on_every_job", "dies_on_every_job");
+    assert!(notices(&farm).contains("dies_on_every_job"));
+}
+
+#[test]
+fn lies_about_job_id() {
+    // A lie may by chance name a job that it has: then it is "done" without a word on anything.
+    let (farm, _broker) = beside("lies_about_job_id", "");
+    assert!(!reasons_of(&farm, "0.xodr", "lies_about_job_id").is_empty());
+    until_so("it is said", || {
+        notices(&farm).contains("it speaks of jobs or checkers")
+    });
+}
+
+#[test]
+fn never_acknowledges() {
+    beside("never_acknowledges", "never_acknowledges");
+}
+
+#[test]
+fn sends_garbage() {
+    beside("sends_garbage", "sends_garbage");
+}
+
+#[test]
+fn stops_reading() {
+    beside("stops_reading", "stops_reading");
+}
+
+#[test]
+fn allocates_forever() {
+    beside("allocates_forever", "allocates_forever");
+}
+
+#[test]
+fn a_reporter_that_never_acknowledges() {
+    let (farm, _broker) = beside("reporter_never_acknowledges", "");
+    until_so("it is said", || {
+        notices(&farm).contains("reporter_never_acknowledges: it does not acknowledge results")
+    });
+    assert_eq!(farm.verdict("0.xodr").verdict, Verdict::Accepted);
+}
+
+#[test]
+fn another_protocol_is_refused_with_both_versions() {
+    let (farm, _broker) = beside("speaks_another_protocol", "");
+    until_so("it is said", || notices(&farm).contains("speaks protocol"));
+    assert_eq!(
+        farm.verdict("0.xodr").verdict,
+        Verdict::Accepted,
+        "it never took part"
+    );
+}
+
+#[test]
+fn a_slow_bundle_loses_nothing() {
+    let farm = Farm::with(&["--silence-limit", "20s"]);
+    let _broker = farm.serve_ready();
+    farm.let_in("slow", "--millis 20");
+    until_or("it is ready", || is_known(&farm, "slow"), || farm.log());
+    let mut files = Files::new();
+    for number in 0..60 {
+        let content = Content::Good(number);
+        farm.write(&format!("{number}.xodr"), &content.bytes());
+        files.insert(format!("{number}.xodr"), content);
+    }
+    farm.settle(files.len());
+    judge(&farm, &files, &[]).demand(&tail(&farm.log()));
+    assert!(
+        farm.result("7.xodr")
+            .bundles
+            .iter()
+            .any(|bundle| bundle.name == "slow")
+    );
+}
+
+#[test]
+fn only_the_poisonous_file_is_condemned() {
+    let farm = Farm::with(&["--silence-limit", "20s"]);
+    let _broker = farm.serve_ready();
+    farm.let_in("dies_on_some_files", "");
+    until_or(
+        "it is ready",
+        || is_known(&farm, "dies_on_some_files"),
+        || farm.log(),
+    );
+    farm.write("poison.xodr", &Content::Good(7).bytes());
+    let files = some_files(&farm);
+    farm.settle(files.len() + 1);
+    assert_eq!(farm.verdict("poison.xodr").verdict, Verdict::Undetermined);
+    let reasons = reasons_of(&farm, "poison.xodr", "dies_on_some_files");
+    assert!(
+        reasons
+            .iter()
+            .all(|it| it.contains("alone in a fresh process")),
+        "{reasons:#?}"
+    );
+    assert_eq!(farm.verdict("0.xodr").verdict, Verdict::Accepted);
+    // It is not tried again until something changes.
+    let restarts = |farm: &Farm| -> u64 {
+        let peers = farm.status().unwrap().peers;
+        peers
+            .iter()
+            .find(|it| it.name == "dies_on_some_files")
+            .unwrap()
+            .restarts
+    };
+    let before = restarts(&farm);
+    farm.write("fresh.xodr", &Content::Good(8).bytes());
+    assert_eq!(farm.verdict("fresh.xodr").verdict, Verdict::Accepted);
+    assert_eq!(restarts(&farm), before);
+}
+
+#[test]
+fn one_more_bundle_comes_is_replaced_and_goes() {
+    let farm = Farm::new();
+    let _broker = farm.serve_ready();
+    let files = some_files(&farm);
+    farm.settle(files.len());
+    let versions = |farm: &Farm| -> Vec<String> {
+        let results = farm.result("0.xodr");
+        let bundles = results.bundles.iter().filter(|it| it.name == "polite");
+        bundles.map(|bundle| bundle.version.clone()).collect()
+    };
+    assert!(versions(&farm).is_empty());
+    for version in ["1.0.0", "2.0.0"] {
+        farm.let_in("polite", &format!("--version {version}"));
+        until_or(
+            "old files are judged again by it",
+            || (versions(&farm) == [version]).then_some(()),
+            || farm.log(),
+        );
+    }
+    farm.send_away("polite");
+    until_or(
+        "old files are judged again without it",
+        || versions(&farm).is_empty().then_some(()),
+        || farm.log(),
+    );
+    farm.settle(files.len());
+    judge(&farm, &files, &[]).demand(&tail(&farm.log()));
+}

@@ -1,0 +1,19 @@
+//! Crashes on whatever it is given.
+
+use qcbus_bus::Peer;
+use qcbus_messages::Job;
+
+use crate::keeper::{Animal, GOOD, Manners, Mood};
+
+pub(super) const ANIMAL: Animal = Animal {
+    name: "dies_on_every_job",
+    manners: Manners {
+        job,
+        ..GOOD.manners
+    },
+    ..GOOD
+};
+
+fn job(_: &mut Peer, _: &Job) -> Mood {
+    Mood::Die
+}

@@ -1,0 +1,18 @@
+//! Joins and never says what it checks.
+
+use qcbus_bus::Peer;
+
+use crate::keeper::{Animal, GOOD, Manners, Mood};
+
+pub(super) const ANIMAL: Animal = Animal {
+    name: "hangs_after_hello",
+    manners: Manners {
+        welcomed,
+        ..GOOD.manners
+    },
+    ..GOOD
+};
+
+fn welcomed(_: &mut Peer) -> Mood {
+    Mood::Freeze
+}

@@ -1,0 +1,66 @@
+//! The animals, one per file.
+
+mod allocates_forever;
+mod dies_on_every_job;
+mod dies_on_some_files;
+mod floods_issues;
+mod hangs_after_hello;
+mod hangs_in_a_job;
+mod lies_about_job_id;
+mod never_acknowledges;
+mod reporter_never_acknowledges;
+mod sends_garbage;
+mod slow;
+mod speaks_another_protocol;
+mod stops_reading;
+mod writes_to_the_image;
+
+pub use dies_on_some_files::POISON;
+pub use speaks_another_protocol::PROTOCOL as ANOTHER_PROTOCOL;
+
+use crate::keeper::Animal;
+
+/// All of them but the polite one, which is a real bundle.
+pub static ANIMALS: &[Animal] = &[
+    allocates_forever::ANIMAL,
+    dies_on_every_job::ANIMAL,
+    dies_on_some_files::ANIMAL,
+    floods_issues::ANIMAL,
+    hangs_after_hello::ANIMAL,
+    hangs_in_a_job::ANIMAL,
+    lies_about_job_id::ANIMAL,
+    never_acknowledges::ANIMAL,
+    reporter_never_acknowledges::ANIMAL,
+    sends_garbage::ANIMAL,
+    slow::ANIMAL,
+    speaks_another_protocol::ANIMAL,
+    stops_reading::ANIMAL,
+    writes_to_the_image::ANIMAL,
+];
+
+/// The animal of this name.
+pub fn named(name: &str) -> Option<&'static Animal> {
+    ANIMALS.iter().find(|animal| animal.name == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_unique_and_good_on_the_bus() {
+        for (at, animal) in ANIMALS.iter().enumerate() {
+            assert!(
+                ANIMALS[at + 1..]
+                    .iter()
+                    .all(|other| other.name != animal.name)
+            );
+            assert!(
+                animal
+                    .name
+                    .chars()
+                    .all(|c| c.is_ascii_lowercase() || c == '_')
+            );
+        }
+    }
+}

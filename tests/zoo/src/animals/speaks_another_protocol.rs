@@ -1,0 +1,14 @@
+//! Was built for another version of the messages, and says so.
+
+use qcbus_messages::PROTOCOL_VERSION;
+
+use crate::keeper::{Animal, GOOD};
+
+/// The version that it claims to speak.
+pub const PROTOCOL: u32 = PROTOCOL_VERSION + 41;
+
+pub(super) const ANIMAL: Animal = Animal {
+    name: "speaks_another_protocol",
+    protocol: PROTOCOL,
+    ..GOOD
+};

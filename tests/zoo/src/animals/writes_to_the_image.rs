@@ -1,0 +1,37 @@
+//! Writes into the document image that it was given to read. The image is mapped for reading only,
+//! so this ends with a segmentation fault in this process, and the image stays what it is.
+
+use qcbus_bus::Peer;
+use qcbus_messages::Job;
+
+use crate::keeper::{Animal, GOOD, Manners, Mood, answer};
+
+pub(super) const ANIMAL: Animal = Animal {
+    name: "writes_to_the_image",
+    manners: Manners {
+        job,
+        ..GOOD.manners
+    },
+    ..GOOD
+};
+
+fn job(peer: &mut Peer, job: &Job) -> Mood {
+    let root = job.documents.first();
+    if let Some(held) = root.and_then(|root| peer.document(root.doc)) {
+        overwrite(&held);
+    }
+    // Only reached when the write went through: then the test fails, as it should.
+    answer(peer, job.job);
+    Mood::GoOn
+}
+
+#[expect(
+    unsafe_code,
+    reason = "no safe code can do what this animal is there for"
+)]
+fn overwrite(image: &[u8]) {
+    let first = image.as_ptr().cast_mut();
+    // SAFETY: none is claimed. The memory is mapped without the right to write, and the process is
+    // meant to die here; a volatile write is not optimised away.
+    unsafe { first.write_volatile(0xFF) };
+}

@@ -1,0 +1,288 @@
+//! What all animals have in common: joining the bus, hearing, and how a job is properly answered.
+
+use std::collections::VecDeque;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use qcbus_bus::{Instance, JoinError, Peer, PeerEvent, PeerOptions};
+use qcbus_document::FileKind;
+use qcbus_formats::xqar::{Level, Status};
+use qcbus_messages::{
+    Catalogue, CheckerInfo, FromPeer, Hello, Job, JobId, PROTOCOL_VERSION, PeerReport, Role, ToPeer,
+};
+
+use crate::{Args, complain};
+
+/// An animal: data and its manners.
+#[derive(Debug, Clone, Copy)]
+pub struct Animal {
+    /// What it does, and its name on the bus.
+    pub name: &'static str,
+    /// Bundle or reporter.
+    pub role: Role,
+    /// The version of the messages that it claims to speak.
+    pub protocol: u32,
+    /// How it behaves.
+    pub manners: Manners,
+}
+
+/// How an animal behaves. Everything that is not said here is done properly.
+#[derive(Debug, Clone, Copy)]
+pub struct Manners {
+    /// After the welcome.
+    pub welcomed: fn(&mut Peer) -> Mood,
+    /// A job is to be checked; its root document is at hand.
+    pub job: fn(&mut Peer, &Job) -> Mood,
+    /// A result is to be reported.
+    pub result: fn(&mut Peer, JobId) -> Mood,
+}
+
+/// What comes next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mood {
+    /// The loop goes on.
+    GoOn,
+    /// The process stays and does nothing any more, not even read.
+    Freeze,
+    /// The process ends as crashed ones do.
+    Die,
+}
+
+/// An animal with good manners, to begin with.
+pub const GOOD: Animal = Animal {
+    name: "",
+    role: Role::Bundle,
+    protocol: PROTOCOL_VERSION,
+    manners: Manners {
+        welcomed: introduce,
+        job: check,
+        result: acknowledge,
+    },
+};
+
+/// Says what it checks: two checkers for every kind of file.
+pub fn introduce(peer: &mut Peer) -> Mood {
+    peer.send(&FromPeer::Catalogue(Box::new(catalogue())));
+    Mood::GoOn
+}
+
+/// Finds nothing and says so.
+pub fn check(peer: &mut Peer, job: &Job) -> Mood {
+    answer(peer, job.job);
+    Mood::GoOn
+}
+
+/// Acknowledges a result without writing anything.
+pub fn acknowledge(peer: &mut Peer, job: JobId) -> Mood {
+    let report = PeerReport::Written;
+    peer.send(&FromPeer::ResultDone { job, report });
+    Mood::GoOn
+}
+
+/// The whole answer to a job without findings.
+pub fn answer(peer: &mut Peer, job: JobId) {
+    for checker in 0..CHECKERS {
+        checker_done(peer, job, checker);
+    }
+    peer.send(&FromPeer::JobDone { job, micros: 1 });
+}
+
+/// One checker has ended without findings.
+pub fn checker_done(peer: &mut Peer, job: JobId, checker: u32) {
+    peer.send(&FromPeer::CheckerDone {
+        job,
+        checker,
+        status: Status::Completed,
+        reason: String::new(),
+        params: Vec::new(),
+        metadata: Vec::new(),
+    });
+}
+
+/// Checkers of every animal.
+pub const CHECKERS: u32 = 2;
+
+fn catalogue() -> Catalogue {
+    let checker = |number: u32| CheckerInfo {
+        id: format!("check_zoo_{number}"),
+        description: "looks at nothing".to_owned(),
+        rule_uids: vec![format!("example.org:xodr:1.0.0:zoo.{number}")],
+        kinds: FileKind::ALL.to_vec(),
+        default_on: true,
+        level: Level::Warning,
+        params: Vec::new(),
+    };
+    Catalogue {
+        alias: String::new(),
+        description: "an animal of the zoo".to_owned(),
+        build_date: "2026-11-21".to_owned(),
+        kinds: FileKind::ALL.to_vec(),
+        checkers: (0..CHECKERS).map(checker).collect(),
+    }
+}
+
+/// How often a sign of life is given, and missing documents are asked for again.
+const HEARTBEAT: Duration = Duration::from_secs(1);
+
+/// Keeps an animal until the broker lets it go or its manners end it.
+pub fn keep(animal: &'static Animal, args: &Args) -> ExitCode {
+    if args.die_with_parent {
+        use rustix::process::{Signal, set_parent_process_death_signal};
+        if let Err(error) = set_parent_process_death_signal(Some(Signal::KILL)) {
+            complain(&format!("cannot follow the parent process: {error}"));
+        }
+    }
+    let instance = match &args.instance_dir {
+        Some(dir) => Ok(Instance::at(dir.clone())),
+        None => Instance::named(&args.instance),
+    };
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build();
+    match (instance, runtime) {
+        (Ok(instance), Ok(runtime)) => runtime.block_on(live(animal, args, &instance)),
+        (Err(error), _) => fail(&error.to_string(), 2),
+        (_, Err(error)) => fail(&error.to_string(), 5),
+    }
+}
+
+async fn live(animal: &'static Animal, args: &Args, instance: &Instance) -> ExitCode {
+    let hello = hello(animal, args);
+    let joined = Peer::join_claiming(animal.protocol, instance, hello, PeerOptions::default());
+    let peer = match joined.await {
+        Ok(peer) => peer,
+        Err(error @ JoinError::NoBroker { .. }) => return fail(&error.to_string(), 4),
+        Err(error) => return fail(&error.to_string(), 5),
+    };
+    let mut cage = Cage {
+        animal,
+        takes: args.takes.unwrap_or_default(),
+        peer,
+        jobs: VecDeque::new(),
+        begun: None,
+        draining: false,
+    };
+    let mut beat = tokio::time::interval(HEARTBEAT);
+    beat.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+    loop {
+        let pause = cage.pause();
+        let mood = tokio::select! {
+            event = cage.peer.next() => match cage.hear(event) {
+                Ok(mood) => mood,
+                Err(code) => return code,
+            },
+            _ = beat.tick() => cage.beat(),
+            () = tokio::time::sleep(pause.unwrap_or_default()), if pause.is_some() => cage.work(),
+        };
+        match mood {
+            Mood::GoOn => {}
+            Mood::Freeze => std::future::pending().await,
+            Mood::Die => std::process::abort(),
+        }
+        if cage.draining && cage.jobs.is_empty() {
+            cage.peer.send(&FromPeer::Leaving);
+            cage.peer.leave().await;
+            return ExitCode::SUCCESS;
+        }
+    }
+}
+
+fn hello(animal: &Animal, args: &Args) -> Hello {
+    use std::hash::BuildHasher as _;
+    Hello {
+        protocol: PROTOCOL_VERSION,
+        role: animal.role,
+        name: args.name.clone().unwrap_or_else(|| animal.name.to_owned()),
+        version: args.version.clone(),
+        incarnation: std::hash::RandomState::new().hash_one(std::process::id()),
+        pid: std::process::id(),
+        launch: args.launch,
+        capacity: 4,
+    }
+}
+
+struct Cage {
+    animal: &'static Animal,
+    takes: Duration,
+    peer: Peer,
+    jobs: VecDeque<Job>,
+    begun: Option<Instant>,
+    draining: bool,
+}
+
+impl Cage {
+    fn hear(&mut self, event: PeerEvent) -> Result<Mood, ExitCode> {
+        let message = match event {
+            PeerEvent::Message(message) => message,
+            PeerEvent::Rejoined => {
+                self.jobs.clear();
+                return Ok(Mood::GoOn);
+            }
+            PeerEvent::Closed { reason } => return Err(fail(&reason, 4)),
+            PeerEvent::Document(_) | PeerEvent::Config(_) => return Ok(Mood::GoOn),
+        };
+        Ok(match message {
+            ToPeer::Welcome { .. } if self.animal.role == Role::Bundle => {
+                (self.animal.manners.welcomed)(&mut self.peer)
+            }
+            ToPeer::Job(job) => {
+                self.jobs.push_back(job);
+                self.ask_for_documents();
+                Mood::GoOn
+            }
+            ToPeer::Cancel { job } => {
+                self.jobs.retain(|it| it.job != job);
+                self.begun = None;
+                Mood::GoOn
+            }
+            ToPeer::Result(result) => (self.animal.manners.result)(&mut self.peer, result.job),
+            ToPeer::Drain => {
+                self.draining = true;
+                Mood::GoOn
+            }
+            ToPeer::Welcome { .. } | ToPeer::Refused { .. } => Mood::GoOn,
+        })
+    }
+
+    fn beat(&mut self) -> Mood {
+        let job = self.jobs.front().map(|job| job.job);
+        self.peer.send(&FromPeer::Heartbeat { job, checker: None });
+        self.ask_for_documents();
+        Mood::GoOn
+    }
+
+    fn ask_for_documents(&mut self) {
+        let Some(job) = self.jobs.front() else { return };
+        for document in &job.documents {
+            if self.peer.document(document.doc).is_none() {
+                let doc = document.doc;
+                self.peer.send(&FromPeer::NeedDocument { doc });
+            }
+        }
+    }
+
+    /// How long until the job at hand is done; `None`: there is nothing to do.
+    fn pause(&mut self) -> Option<Duration> {
+        let root = self.jobs.front()?.documents.first()?.doc;
+        self.peer.document(root)?;
+        let begun = *self.begun.get_or_insert_with(Instant::now);
+        Some(self.takes.saturating_sub(begun.elapsed()))
+    }
+
+    fn work(&mut self) -> Mood {
+        self.begun = None;
+        let Some(job) = self.jobs.pop_front() else {
+            return Mood::GoOn;
+        };
+        let mood = (self.animal.manners.job)(&mut self.peer, &job);
+        for document in &job.documents {
+            self.peer.forget(document.doc);
+        }
+        mood
+    }
+}
+
+fn fail(why: &str, code: u8) -> ExitCode {
+    complain(why);
+    ExitCode::from(code)
+}

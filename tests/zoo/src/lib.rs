@@ -1,0 +1,47 @@
+//! The zoo: small programs that behave on the bus as no bundle or reporter should, each under an
+//! honest name, and one that behaves. Tests of the broker let them loose.
+//!
+//! One animal is one file in `animals/`; [`animals::ANIMALS`] is the list. What they have in common
+//! is in `keeper`: joining, the loop, and how a job is answered when it is answered.
+
+pub mod animals;
+mod args;
+mod keeper;
+mod polite;
+
+use std::process::ExitCode;
+
+pub use args::{Args, USAGE};
+pub use keeper::{Animal, Manners, Mood};
+
+/// Runs the animal that the arguments name.
+pub fn main(arguments: impl Iterator<Item = String>) -> ExitCode {
+    let args = match Args::parse(arguments) {
+        Ok(args) => args,
+        Err(why) => {
+            complain(&format!("{why}\n\n{USAGE}"));
+            return ExitCode::from(2);
+        }
+    };
+    if args.animal == polite::NAME {
+        return polite::run(args);
+    }
+    match animals::named(&args.animal) {
+        Some(animal) => keeper::keep(animal, &args),
+        None => {
+            let known: Vec<&str> = animals::ANIMALS.iter().map(|it| it.name).collect();
+            complain(&format!(
+                "no animal is called `{}`; there are {}, {}",
+                args.animal,
+                polite::NAME,
+                known.join(", ")
+            ));
+            ExitCode::from(2)
+        }
+    }
+}
+
+#[expect(clippy::print_stderr, reason = "the one place where the zoo talks")]
+fn complain(text: &str) {
+    eprintln!("zoo: {text}");
+}
