@@ -58,6 +58,12 @@ const STRIKES: u8 = 2;
 impl State {
     /// A process says hello.
     pub(super) fn hello(&mut self, session: Session, hello: &Hello, actions: &mut Actions) {
+        if self.draining() {
+            // Nobody's fault and of no interest to anyone: it came as the broker went.
+            let reason = "this broker is stopping".to_owned();
+            actions.push(Action::Refuse { session, reason });
+            return;
+        }
         if let Some(reason) = self.turn_away(hello) {
             self.notice(format!("turned away: {reason}"), actions);
             actions.push(Action::Refuse { session, reason });
@@ -83,8 +89,6 @@ impl State {
                 "`{}` is no name for a peer: 1 to 64 of A-Z a-z 0-9 . _ -",
                 hello.name
             ))
-        } else if self.draining() {
-            Some("this broker is stopping".to_owned())
         } else {
             self.taken(hello)
         }

@@ -261,7 +261,9 @@ impl State {
                 }
                 return;
             }
-            self.notice(format!("{name}: {how}"), actions);
+            if !self.draining() {
+                self.notice(format!("{name}: {how}"), actions);
+            }
             self.child_down(&name, false, how, actions);
             self.fail_absent(actions);
             return;

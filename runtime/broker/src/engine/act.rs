@@ -27,7 +27,7 @@ impl Broker {
             }
             Action::Accept { session } => self.accept(session),
             Action::Refuse { session, reason } => {
-                tracing::warn!("a peer was turned away: {reason}");
+                tracing::debug!("a peer was turned away: {reason}");
                 if let Some(peer) = self.sessions.remove(session) {
                     self.host.refuse(peer, &reason);
                 }
