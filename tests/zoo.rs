@@ -15,7 +15,7 @@ use qcbus_messages::Verdict;
 use support::content::Content;
 use support::farm::{Farm, tail};
 use support::judge::{Files, judge};
-use support::processes::private_kib;
+use support::processes::{peak_private_kib, private_kib};
 use support::watchdog::{until_or, until_so};
 
 /// Limits that bring misbehaviour to light soon, yet leave a busy machine time to be busy.
@@ -32,6 +32,9 @@ const IMPATIENT: &[&str] = &[
 
 /// Most private memory of the broker: far above what it needs, far below what a flood would take.
 const BROKER_KIB: u64 = 1 << 20;
+
+/// Most private memory of the broker beside a bundle that reports 16 MiB about every file.
+const FLOODED_KIB: u64 = 512 << 10;
 
 fn some_files(farm: &Farm) -> Files {
     let contents = [
@@ -132,12 +135,19 @@ fn hangs_in_a_job() {
 
 #[test]
 fn floods_issues() {
-    let (farm, _broker) = beside("floods_issues", "");
+    let (farm, broker) = beside("floods_issues", "");
     let reasons = reasons_of(&farm, "0.xodr", "floods_issues");
     assert!(
         reasons.iter().any(|it| it.contains("were cut off")),
         "{reasons:#?}"
     );
+    // Many floods at once fill the broker no more than a few do: what waits, waits in the queue.
+    for at in 0..40 {
+        farm.write(&format!("many{at}.xodr"), &Content::Good(at).bytes());
+    }
+    farm.settle(47);
+    let peak = peak_private_kib(broker.pid()).unwrap();
+    assert!(peak < FLOODED_KIB, "the broker held {peak} KiB");
 }
 
 #[test]

@@ -13,7 +13,7 @@ use crate::support::content::Content;
 use crate::support::farm::{Farm, shm_segments, tail};
 use crate::support::inside::is_inside;
 use crate::support::judge::{judge, verdicts_in_journal};
-use crate::support::processes::{memory_kib, private_kib};
+use crate::support::processes::{peak_private_kib, private_kib};
 use crate::support::watchdog::{until, until_or};
 use crate::{end, report};
 
@@ -125,9 +125,7 @@ impl Driver {
     pub fn sample(&mut self) {
         let Some(broker) = &self.broker else { return };
         let now = private_kib(broker.pid()).unwrap_or_default();
-        // The peak counts shared memory, too; take away what is shared now.
-        let shared = memory_kib(broker.pid(), "RssShmem:").unwrap_or_default();
-        let peak = memory_kib(broker.pid(), "VmHWM:").unwrap_or_default();
-        self.peak_kib = self.peak_kib.max(now).max(peak.saturating_sub(shared));
+        let peak = peak_private_kib(broker.pid()).unwrap_or_default();
+        self.peak_kib = self.peak_kib.max(now).max(peak);
     }
 }

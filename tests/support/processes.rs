@@ -97,3 +97,9 @@ pub fn memory_kib(pid: u32, field: &str) -> Option<u64> {
 pub fn private_kib(pid: u32) -> Option<u64> {
     memory_kib(pid, "RssAnon:")
 }
+
+/// The most private memory that a process has had: what it shares now is taken off the peak of all.
+pub fn peak_private_kib(pid: u32) -> Option<u64> {
+    let shared = memory_kib(pid, "RssShmem:")?;
+    Some(memory_kib(pid, "VmHWM:")?.saturating_sub(shared))
+}

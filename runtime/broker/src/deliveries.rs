@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use qcbus_formats::config::{Config, reporter_for};
-use qcbus_formats::xqar::{self, Param, Results};
+use qcbus_formats::xqar::{self, Checker, Param, Results};
+use qcbus_messages::codec::MAX_MESSAGE;
 use qcbus_messages::{DocId, ResultMessage};
 
-use crate::core::Delivery;
+use crate::core::{Delivery, weight};
 use crate::places::Places;
 
 /// Builds the message for one reporter.
@@ -30,7 +31,9 @@ pub fn message(
         )
     };
     let bytes = std::fs::read(&judged.xqar).map_err(|error| fail(&error))?;
-    let results = xqar::read(&bytes).map_err(|error| fail(&error))?;
+    let mut results = xqar::read(&bytes).map_err(|error| fail(&error))?;
+    drop(bytes);
+    cut_to(&mut results, MOST_BYTES);
     Ok(ResultMessage {
         job: delivery.job,
         input: delivery.path.to_string_lossy().into_owned(),
@@ -47,6 +50,41 @@ pub fn message(
         params: params_of(reporter, config),
         results,
     })
+}
+
+/// Findings in one message, in bytes of memory. Half of what the bus carries in one: the encoded
+/// form is smaller, and the rest of the message has room, too.
+const MOST_BYTES: usize = MAX_MESSAGE / 2;
+
+/// Cuts a result that is too large for one message where most is said, and says so there. The
+/// stored result holds everything.
+fn cut_to(results: &mut Results, most: usize) {
+    let mut checkers: Vec<&mut Checker> = results
+        .bundles
+        .iter_mut()
+        .flat_map(|bundle| &mut bundle.checkers)
+        .collect();
+    let bytes = |checker: &Checker| checker.issues.iter().map(weight).sum::<usize>();
+    let mut weighed: Vec<usize> = checkers.iter().map(|checker| bytes(checker)).collect();
+    let before: Vec<usize> = checkers.iter().map(|it| it.issues.len()).collect();
+    while weighed.iter().sum::<usize>() > most {
+        let heaviest = (0..weighed.len()).max_by_key(|at| weighed.get(*at));
+        let Some(at) = heaviest else { break };
+        let (Some(checker), Some(weighs)) = (checkers.get_mut(at), weighed.get_mut(at)) else {
+            break;
+        };
+        checker.issues.truncate(checker.issues.len() / 2);
+        *weighs = bytes(checker);
+    }
+    for (checker, before) in checkers.iter_mut().zip(before) {
+        let cut = before - checker.issues.len();
+        if cut > 0 {
+            let gap = if checker.summary.is_empty() { "" } else { "; " };
+            checker.summary.push_str(&format!(
+                "{gap}{cut} further findings are in the .xqar, a report has no room for them"
+            ));
+        }
+    }
 }
 
 /// What the rules that were broken are about.
@@ -70,4 +108,48 @@ fn params_of(reporter: &str, config: Option<&Arc<Config>>) -> Vec<Param> {
     });
     mine.map(|report| config.report_params(report))
         .unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use qcbus_formats::xqar::{CheckerBundle, Issue, Level};
+
+    use super::*;
+
+    fn checker(id: &str, issues: usize) -> Checker {
+        let issue = |id| Issue {
+            id,
+            description: "x".repeat(1000),
+            level: Level::Warning,
+            rule_uid: String::new(),
+            locations: Vec::new(),
+            domain_info: Vec::new(),
+        };
+        Checker {
+            id: id.to_owned(),
+            summary: "said".to_owned(),
+            issues: (0..issues as u64).map(issue).collect(),
+            ..Checker::default()
+        }
+    }
+
+    #[test]
+    fn a_result_that_is_too_large_is_cut_where_most_is_said() {
+        let mut results = Results::default();
+        results.bundles.push(CheckerBundle {
+            checkers: vec![checker("modest", 2), checker("flood", 1000)],
+            ..CheckerBundle::default()
+        });
+        let whole = results.clone();
+        cut_to(&mut results, 10_000_000);
+        assert_eq!(results, whole, "it fits");
+        cut_to(&mut results, 200_000);
+        let [modest, flood] = results.bundles[0].checkers.as_slice() else {
+            panic!("a checker is gone");
+        };
+        assert_eq!(modest, &whole.bundles[0].checkers[0]);
+        assert_eq!(flood.issues.len(), 125);
+        let said = "said; 875 further findings are in the .xqar, a report has no room for them";
+        assert_eq!(flood.summary, said);
+    }
 }

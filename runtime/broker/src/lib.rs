@@ -3,7 +3,8 @@
 //! `core` decides and does nothing; `engine` does and decides nothing. Everything else is a pair
 //! of hands: `watch` sees files, `intake` reads and publishes them, `store` and `writers` put
 //! results on the disk, `journal` remembers, `supervise` starts and kills, `control` answers
-//! commands, `reload` reads configuration and manifests.
+//! commands, `reload` reads configuration and manifests, `memory` gives back what was
+//! taken.
 
 pub mod control;
 pub mod core;
@@ -13,6 +14,7 @@ mod disk;
 mod engine;
 mod intake;
 pub mod journal;
+pub mod memory;
 mod options;
 mod places;
 pub mod reload;

@@ -35,10 +35,10 @@ pub struct Store {
 }
 
 impl Store {
-    /// Pools, writes, publishes, records.
+    /// Pools, writes, publishes, records. The findings are taken out of the job.
     pub fn store(
         &self,
-        job: &FinishedJob,
+        job: &mut FinishedJob,
         config: Option<&Config>,
         root: Option<&[u8]>,
     ) -> StoreOutcome {
@@ -49,19 +49,20 @@ impl Store {
         if has_changed(inputs) {
             return StoreOutcome::Stale;
         }
-        let outcomes: Vec<pool::BundleOutcome> = job.bundles.iter().filter_map(to_pool).collect();
+        let outcomes: Vec<pool::BundleOutcome> =
+            job.bundles.iter_mut().filter_map(to_pool).collect();
         let takes = |it: &BundleOutcome| {
             it.catalogue
                 .as_ref()
                 .is_some_and(|it| it.kinds.contains(&job.kind))
         };
         let nothing_checked = !job.bundles.iter().any(takes);
-        let pooled = self.pool(job, outcomes.clone(), config, root);
+        let pooled = self.pool(job, outcomes, config, root);
         reached("pooled", &job.path);
         let verdict = verdict_of(&pooled, nothing_checked || job.unreadable.is_some());
         let why = reasons(job, &pooled, nothing_checked);
         let judged = judged(job, &pooled, verdict, why, self.places.xqar(&job.path));
-        match self.write(job, &outcomes, &pooled, &judged) {
+        match self.write(job, &pooled, &judged) {
             Ok(()) => {}
             Err(error) => return StoreOutcome::Failed(error),
         }
@@ -95,13 +96,7 @@ impl Store {
         }
     }
 
-    fn write(
-        &self,
-        job: &FinishedJob,
-        outcomes: &[pool::BundleOutcome],
-        pooled: &Pooled,
-        judged: &Judged,
-    ) -> Result<(), String> {
+    fn write(&self, job: &FinishedJob, pooled: &Pooled, judged: &Judged) -> Result<(), String> {
         let fail = |path: &Path, error: &io::Error| {
             format!(
                 "cannot write {}: {error}; it is tried again",
@@ -116,8 +111,7 @@ impl Store {
         }
         if self.verdict_files {
             // Whoever sees the new result sees its verdict.
-            let verdict =
-                crate::verdict_file::render(job, outcomes, pooled, judged.verdict, &judged.xqar);
+            let verdict = crate::verdict_file::render(job, pooled, judged.verdict, &judged.xqar);
             let (verdict, result) = (
                 (&*verdict_path, &*verdict),
                 (&*judged.xqar, text.as_bytes()),
@@ -305,9 +299,10 @@ fn judged(
 
 /// One bundle's outcome as pooling wants it. A bundle that was never seen has none: pooling itself
 /// lists what the configuration demands of it.
-fn to_pool(bundle: &BundleOutcome) -> Option<pool::BundleOutcome> {
+/// Takes what was found: there can be megabytes of it.
+fn to_pool(bundle: &mut BundleOutcome) -> Option<pool::BundleOutcome> {
     let catalogue = bundle.catalogue.as_ref()?;
-    let checkers = bundle.checkers.iter().filter_map(|said| {
+    let checkers = bundle.checkers.iter_mut().filter_map(|said| {
         let offered = catalogue
             .checkers
             .get(usize::try_from(said.checker).ok()?)?;
@@ -317,9 +312,9 @@ fn to_pool(bundle: &BundleOutcome) -> Option<pool::BundleOutcome> {
             rule_uids: offered.rule_uids.clone(),
             status: Some(said.status),
             reason: said.reason.clone(),
-            params: said.params.clone(),
-            issues: said.issues.clone(),
-            metadata: said.metadata.clone(),
+            params: std::mem::take(&mut said.params),
+            issues: std::mem::take(&mut said.issues),
+            metadata: std::mem::take(&mut said.metadata),
         })
     });
     Some(pool::BundleOutcome {

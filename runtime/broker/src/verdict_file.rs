@@ -1,12 +1,12 @@
 //! The verdict file `NAME.verdict.json` beside a result: everything that a farm needs to decide,
 //! without reading the result itself.
 
-use qcbus_formats::pool::{BundleOutcome, FailedChecker, Pooled};
+use qcbus_formats::pool::{FailedChecker, Pooled};
 use qcbus_formats::xqar::Status;
 use qcbus_messages::Verdict;
 use serde::Serialize;
 
-use crate::core::{FinishedJob, Input};
+use crate::core::{BundleOutcome, FinishedJob, Input};
 
 /// The content of a verdict file. Fields are only ever added.
 #[derive(Debug, Serialize)]
@@ -51,7 +51,6 @@ struct CheckerLine<'a> {
 /// The text of a verdict file.
 pub fn render(
     job: &FinishedJob,
-    outcomes: &[BundleOutcome],
     pooled: &Pooled,
     verdict: Verdict,
     xqar: &std::path::Path,
@@ -73,8 +72,10 @@ pub fn render(
         depends_on: depends_on.collect(),
         configuration_sha256: job.config.to_string(),
         qcbus_version: env!("CARGO_PKG_VERSION"),
-        bundles: outcomes
+        bundles: job
+            .bundles
             .iter()
+            .filter(|it| it.catalogue.is_some())
             .map(|it| BundleLine {
                 name: &it.name,
                 version: &it.version,
@@ -85,7 +86,7 @@ pub fn render(
         warnings: pooled.counts.warnings,
         information: pooled.counts.information,
         filtered: pooled.removed.errors + pooled.removed.warnings + pooled.removed.information,
-        skipped: skipped(outcomes),
+        skipped: skipped(&job.bundles),
         failed: pooled.failed.iter().map(failed).collect(),
         result: xqar.to_string_lossy().into_owned(),
     };
@@ -94,18 +95,20 @@ pub fn render(
     text
 }
 
-fn skipped(outcomes: &[BundleOutcome]) -> Vec<CheckerLine<'_>> {
+fn skipped(bundles: &[BundleOutcome]) -> Vec<CheckerLine<'_>> {
     let mut lines = Vec::new();
-    for bundle in outcomes {
-        for checker in bundle
-            .checkers
-            .iter()
-            .filter(|it| it.status == Some(Status::Skipped))
-        {
+    for bundle in bundles {
+        let offered = bundle.catalogue.as_deref();
+        let skipped = bundle.checkers.iter();
+        for said in skipped.filter(|it| it.status == Status::Skipped) {
+            let index = usize::try_from(said.checker).unwrap_or(usize::MAX);
+            let Some(checker) = offered.and_then(|it| it.checkers.get(index)) else {
+                continue;
+            };
             lines.push(CheckerLine {
                 bundle: &bundle.name,
                 checker: &checker.id,
-                reason: &checker.reason,
+                reason: &said.reason,
             });
         }
     }

@@ -130,8 +130,8 @@ impl Lane {
 
     /// Does what waits, up to the first order that fails.
     fn work(&mut self) -> bool {
-        while let Some(order) = self.waiting.pop_front() {
-            let done = match &order {
+        while let Some(mut order) = self.waiting.pop_front() {
+            let done = match &mut order {
                 Order::Store { job, config, root } => {
                     let root = root.as_deref();
                     let outcome = self.store.store(job, config.as_deref(), root);

@@ -6,15 +6,19 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use qcbus_document::FileKind;
-use qcbus_formats::xqar::{Issue, Metadata, Param, Status};
+use qcbus_formats::xqar::Status;
 use qcbus_messages::{Catalogue, DocId, JobId, ToPeer};
 
 use super::files::{FileId, Lane, Stage};
-use super::outcome::{clip, clip_text, outcome, signature, weight};
+use super::outcome::{outcome, signature};
+use super::staging::Staged;
 use super::types::{
     Action, BundleOutcome, CheckerOutcome, FinishedJob, PrepareFailure, PreparedJob, StoreOutcome,
 };
 use super::{Actions, State};
+
+/// Between two notices that there is no room.
+const ROOM_NOTICE_PAUSE: Duration = Duration::from_secs(10);
 
 /// A job in flight.
 #[derive(Debug)]
@@ -68,14 +72,6 @@ pub(super) enum PartState {
     },
     Done,
     Failed(String),
-}
-
-/// What one checker has said so far.
-#[derive(Debug, Default)]
-pub(super) struct Staged {
-    pub issues: Vec<Issue>,
-    pub withheld: u64,
-    pub done: Option<(Status, String, Vec<Param>, Vec<Metadata>)>,
 }
 
 impl Part {
@@ -184,7 +180,11 @@ impl State {
                 }
             }
             Err(PrepareFailure::NoRoom(why)) => {
-                self.notice(why, actions);
+                // Every file in the queue would say the same and push out all other notices.
+                if self.now >= self.mute_room_until {
+                    self.mute_room_until = self.now + ROOM_NOTICE_PAUSE;
+                    self.notice(why, actions);
+                }
                 self.requeue_later(id, self.settings.retry_after, actions);
             }
             Err(PrepareFailure::Busy) => {
@@ -331,23 +331,24 @@ impl State {
     /// Gives a bundle its next jobs: suspects one at a time and alone, others up to its capacity.
     pub(super) fn dispatch(&mut self, name: &str, actions: &mut Actions) {
         loop {
+            let findings = self.room_for_findings();
             let Some(bundle) = self.bundles.get_mut(name) else {
                 return;
             };
             let (Some(session), true) = (bundle.session, bundle.ready && !bundle.leaving) else {
                 return;
             };
-            let alone = !bundle.suspects.is_empty();
-            let room = if alone { 1 } else { bundle.capacity };
+            let room = if bundle.suspects.is_empty() {
+                bundle.capacity
+            } else {
+                1
+            };
             if bundle.active.len() >= room {
                 return;
             }
-            let next = if alone {
-                bundle.suspects.pop_front()
-            } else {
-                bundle.queue.pop_front()
+            let Some((id, suspect)) = bundle.next_job(findings) else {
+                return;
             };
-            let Some(id) = next else { return };
             let fresh = bundle.fresh_process;
             let Some(job) = self.jobs.get_mut(&id) else {
                 continue;
@@ -363,7 +364,7 @@ impl State {
             };
             part.state = PartState::Sent {
                 since: self.now,
-                alone_and_fresh: alone && fresh,
+                alone_and_fresh: suspect && fresh,
             };
             let message = super::types::job_message(id, self.config, job.kind, &prepared);
             bundle.active.insert(id);
@@ -400,66 +401,6 @@ impl State {
         if let Some(job) = bundle.active.iter().find(has) {
             actions.push(Action::PublishAgain { job: *job, doc });
         }
-    }
-
-    /// A batch of findings; kept aside until the bundle says that it is done.
-    pub(super) fn issues(
-        &mut self,
-        name: &str,
-        id: JobId,
-        checker: u32,
-        issues: Vec<Issue>,
-    ) -> bool {
-        let (max_issues, max_bytes, max_text) = (
-            self.settings.max_issues,
-            self.settings.max_staged_bytes,
-            self.settings.max_text,
-        );
-        let Some(part) = self.sent_part(name, id, checker) else {
-            return false;
-        };
-        for mut issue in issues {
-            clip(&mut issue, max_text);
-            let size = weight(&issue);
-            let full = part.staged_bytes + size > max_bytes;
-            let staged = part.staged.entry(checker).or_default();
-            if full || staged.issues.len() >= max_issues {
-                staged.withheld += 1;
-            } else {
-                staged.issues.push(issue);
-                part.staged_bytes += size;
-            }
-        }
-        true
-    }
-
-    /// One checker has ended.
-    #[expect(clippy::too_many_arguments, reason = "the fields of one message")]
-    pub(super) fn checker_done(
-        &mut self,
-        name: &str,
-        id: JobId,
-        checker: u32,
-        status: Status,
-        reason: String,
-        params: Vec<Param>,
-        metadata: Vec<Metadata>,
-    ) -> bool {
-        let max_text = self.settings.max_text;
-        let Some(part) = self.sent_part(name, id, checker) else {
-            return false;
-        };
-        let mut reason = reason;
-        clip_text(&mut reason, max_text);
-        part.staged.entry(checker).or_default().done = Some((status, reason, params, metadata));
-        true
-    }
-
-    fn sent_part(&mut self, name: &str, id: JobId, checker: u32) -> Option<&mut Part> {
-        let part = self.jobs.get_mut(&id)?.parts.get_mut(name)?;
-        let offered = part.catalogue.as_ref().map_or(0, |it| it.checkers.len());
-        let known = usize::try_from(checker).is_ok_and(|index| index < offered);
-        (known && matches!(part.state, PartState::Sent { .. })).then_some(part)
     }
 
     /// A bundle is through with a job.

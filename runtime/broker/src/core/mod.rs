@@ -10,6 +10,7 @@ mod files;
 mod jobs;
 mod outcome;
 mod reporters;
+mod staging;
 mod status;
 mod types;
 mod waits;
@@ -26,6 +27,7 @@ use qcbus_document::FileKind;
 use qcbus_messages::{Digest, JobId, Role, ToPeer};
 
 pub use files::{FileId, Lane, Stage};
+pub(crate) use outcome::weight;
 pub use types::*;
 
 use bundles::Bundle;
@@ -63,6 +65,8 @@ pub struct State {
     notices: VecDeque<String>,
     rate: Rate,
     judged_once: bool,
+    /// Until then nobody need be told again that there is no room.
+    mute_room_until: Duration,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -108,6 +112,7 @@ impl State {
             notices: VecDeque::new(),
             rate: Rate::default(),
             judged_once: false,
+            mute_room_until: Duration::ZERO,
         }
     }
 

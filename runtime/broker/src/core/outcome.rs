@@ -75,7 +75,7 @@ pub(super) fn outcome(name: &str, part: &Part) -> BundleOutcome {
 }
 
 /// Roughly the memory that an issue holds.
-pub(super) fn weight(issue: &Issue) -> usize {
+pub(crate) fn weight(issue: &Issue) -> usize {
     let place = |place: &Location| match place {
         Location::Xml { xpath } => 64 + xpath.len(),
         _ => 64,

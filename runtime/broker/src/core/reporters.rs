@@ -9,6 +9,17 @@ use super::files::FileId;
 use super::types::{Action, Delivery, Launch, Session};
 use super::{Actions, State};
 
+/// Findings under way to one reporter. A result with more of them travels alone: otherwise a bundle
+/// that reports far too much would fill the broker with results that are waiting to be read.
+const FINDINGS_UNDER_WAY: u64 = 2_000;
+
+/// A result that was sent and is not acknowledged.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sent {
+    pub file: FileId,
+    pub findings: u64,
+}
+
 /// A reporter by name.
 #[derive(Debug, Default)]
 pub(super) struct Reporter {
@@ -20,7 +31,7 @@ pub(super) struct Reporter {
     pub launch: Option<Launch>,
     pub capacity: usize,
     /// Sent and not acknowledged.
-    pub active: BTreeMap<JobId, FileId>,
+    pub active: BTreeMap<JobId, Sent>,
     /// Files whose newest result is to be sent.
     pub queue: VecDeque<FileId>,
     pub heard: Duration,
@@ -139,7 +150,13 @@ impl State {
             {
                 continue;
             }
-            reporter.active.insert(judged.job, file);
+            let findings = judged.counts.iter().sum();
+            let under_way: u64 = reporter.active.values().map(|sent| sent.findings).sum();
+            if !reporter.active.is_empty() && under_way + findings > FINDINGS_UNDER_WAY {
+                reporter.queue.push_front(file);
+                return;
+            }
+            reporter.active.insert(judged.job, Sent { file, findings });
             reporter.moved = self.now;
             let delivery = Delivery {
                 job: judged.job,
@@ -164,7 +181,7 @@ impl State {
         reporter.heard = now;
         match message {
             FromPeer::ResultDone { job, report } => {
-                let Some(file) = reporter.active.remove(&job) else {
+                let Some(Sent { file, .. }) = reporter.active.remove(&job) else {
                     return;
                 };
                 reporter.moved = now;
@@ -215,7 +232,7 @@ impl State {
         };
         let index = self.reporter_index(&name);
         if let Some(reporter) = self.reporters.get_mut(index as usize)
-            && let Some(file) = reporter.active.remove(&job)
+            && let Some(Sent { file, .. }) = reporter.active.remove(&job)
             && self.files.get(file).is_some_and(|it| it.present)
         {
             self.notice(why, actions);

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use proptest::prelude::*;
 use qcbus_document::FileKind;
-use qcbus_formats::xqar::{Level, Status};
+use qcbus_formats::xqar::{Issue, Level, Status};
 use qcbus_messages::{
     Catalogue, CheckerInfo, Digest, DocId, DocumentRole, FromPeer, Hello, JobDocument, JobId,
     PROTOCOL_VERSION, Role, ToPeer, Verdict,
@@ -119,6 +119,17 @@ fn catalogue(name: &str) -> Catalogue {
     }
 }
 
+fn finding() -> Issue {
+    Issue {
+        id: 0,
+        description: "too much".to_owned(),
+        level: Level::Warning,
+        rule_uid: String::new(),
+        locations: Vec::new(),
+        domain_info: Vec::new(),
+    }
+}
+
 impl World {
     fn new() -> World {
         let in_force = InForce::new(None).unwrap();
@@ -127,6 +138,7 @@ impl World {
             max_active: 4,
             max_preparing: 2,
             max_storing: 2,
+            max_findings_bytes: 1000,
             ..Settings::default()
         };
         let mut world = World {
@@ -281,6 +293,16 @@ impl World {
             return;
         };
         for checker in 0..2 {
+            // Some have much to say, so that the room for findings runs out now and then.
+            let issues = vec![finding(); usize::from(n % 3)];
+            self.say(
+                session,
+                FromPeer::Issues {
+                    job,
+                    checker,
+                    issues,
+                },
+            );
             self.say(
                 session,
                 FromPeer::CheckerDone {
@@ -634,4 +656,27 @@ fn a_cancelled_job_makes_room_for_the_next() {
     let second = given(&world);
     assert_eq!(second.len(), 1);
     assert_ne!(first, second);
+}
+
+#[test]
+fn jobs_wait_while_findings_take_up_the_room() {
+    let mut world = World::new();
+    world.join("First");
+    for file in 0..4 {
+        world.write(file);
+        world.prepare(0, true);
+    }
+    let held = |world: &World| -> usize {
+        let jobs = world.state.jobs.values();
+        let parts = jobs.flat_map(|job| job.parts.values());
+        parts.map(|part| part.staged_bytes).sum()
+    };
+    // Both given jobs are answered with more than there is room for, and nothing is stored.
+    world.answer(2);
+    world.answer(2);
+    assert!(held(&world) > world.state.settings.max_findings_bytes);
+    let given: usize = world.peers.values().map(|bundle| bundle.jobs.len()).sum();
+    assert_eq!(given, 0, "the others wait");
+    world.settle();
+    assert_eq!(world.judged.len(), 4);
 }

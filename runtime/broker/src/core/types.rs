@@ -491,6 +491,9 @@ pub struct Settings {
     pub max_issues: usize,
     /// Bytes of texts kept per bundle and job.
     pub max_staged_bytes: usize,
+    /// Bytes of findings of all jobs that are not stored yet, beyond which no further job is given
+    /// out: what a bundle that reports far too much can make the broker hold.
+    pub max_findings_bytes: usize,
     /// Longest text kept of anything a bundle says, in bytes.
     pub max_text: usize,
     /// Pause before something that failed for want of room or disk is tried again.
@@ -522,6 +525,7 @@ impl Default for Settings {
             restart_window: Duration::from_secs(60),
             max_issues: 10_000,
             max_staged_bytes: 16 << 20,
+            max_findings_bytes: 16 << 20,
             max_text: 8 << 10,
             retry_after: Duration::from_secs(1),
             busy_pause: Duration::from_millis(20),

@@ -45,6 +45,7 @@ impl Broker {
                 let path = job.path.clone();
                 reached("checked", &path);
                 self.intake.release(job.job);
+                self.untrimmed = true;
                 self.writers
                     .order(&path, Order::Store { job, config, root });
             }
@@ -61,7 +62,10 @@ impl Broker {
                 session,
                 reporter,
                 delivery,
-            } => self.deliver(session, reporter, delivery),
+            } => {
+                self.untrimmed = true;
+                self.deliver(session, reporter, delivery);
+            }
             Action::Delivered {
                 reporter,
                 path,

@@ -103,6 +103,8 @@ pub struct Broker {
     tickets: HashMap<Ticket, oneshot::Sender<Response>>,
     downs: Vec<oneshot::Sender<Response>>,
     next_ticket: u64,
+    /// Results were stored or delivered since free memory was last given back.
+    untrimmed: bool,
     inbox: Inbox,
     tell: Box<dyn FnMut(Told) + Send>,
     control: ControlSocket,
@@ -167,6 +169,9 @@ const RELOAD_INTERVAL: Duration = Duration::from_secs(1);
 /// How often the history of jobs is pruned.
 const PRUNE_INTERVAL: Duration = Duration::from_secs(3600);
 
+/// While files are judged, how often free memory is given back.
+const TRIM_INTERVAL: Duration = Duration::from_secs(10);
+
 impl Broker {
     /// Runs until everything is done (`once`) or somebody wants it to stop.
     pub async fn run(mut self, mut stops: mpsc::Receiver<Stop>) {
@@ -180,6 +185,7 @@ impl Broker {
         let mut fingerprint = self.sources.fingerprint();
         let mut next_reload = Instant::now() + RELOAD_INTERVAL;
         let mut next_prune = Instant::now();
+        let mut next_trim = Instant::now() + TRIM_INTERVAL;
         let mut quit = false;
         loop {
             let go_on = tokio::select! {
@@ -206,6 +212,11 @@ impl Broker {
             if Instant::now() >= next_prune {
                 next_prune = Instant::now() + PRUNE_INTERVAL;
                 self.prune();
+            }
+            if self.untrimmed && Instant::now() >= next_trim {
+                next_trim = Instant::now() + TRIM_INTERVAL;
+                self.untrimmed = false;
+                tokio::task::spawn_blocking(crate::memory::give_back);
             }
         }
         self.end(quit).await;

@@ -85,6 +85,7 @@ impl Broker {
             tickets: HashMap::new(),
             downs: Vec::new(),
             next_ticket: 0,
+            untrimmed: false,
             inbox,
             tell: Box::new(tell),
             control,

@@ -12,6 +12,7 @@ use crate::{standard, talk};
 
 /// Runs the command.
 pub fn run(args: &ServeArgs) -> Exit {
+    qcbus_broker::memory::share_heaps();
     talk::log("info");
     let options = match options(args) {
         Ok(options) => options,

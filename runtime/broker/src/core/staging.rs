@@ -1,0 +1,120 @@
+//! What bundles have said about jobs that are not stored yet, and how much of it there may be.
+
+use qcbus_formats::xqar::{Issue, Metadata, Param, Status};
+use qcbus_messages::JobId;
+
+use super::State;
+use super::bundles::Bundle;
+use super::jobs::{JobStage, Part, PartState};
+use super::outcome::{clip, clip_text, weight};
+
+/// What one checker has said so far.
+#[derive(Debug, Default)]
+pub(super) struct Staged {
+    pub issues: Vec<Issue>,
+    pub withheld: u64,
+    pub done: Option<(Status, String, Vec<Param>, Vec<Metadata>)>,
+}
+
+/// Which jobs there is room for among the findings that are kept.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Room {
+    /// Any.
+    Free,
+    /// Only the oldest, if there is one. It must come to an end for room to come free, and jobs
+    /// that wait for each other's bundles would otherwise wait for ever.
+    Full(Option<JobId>),
+}
+
+impl State {
+    /// While findings take up all the room that they may have, younger jobs stay queued.
+    pub(super) fn room_for_findings(&self) -> Room {
+        let staged = self.jobs.values().flat_map(|job| job.parts.values());
+        let bytes: usize = staged.map(|part| part.staged_bytes).sum();
+        if bytes < self.settings.max_findings_bytes {
+            return Room::Free;
+        }
+        let mut under_way = self
+            .jobs
+            .iter()
+            .filter(|(_, job)| job.stage != JobStage::Preparing);
+        Room::Full(under_way.next().map(|(id, _)| *id))
+    }
+
+    /// A batch of findings; kept aside until the bundle says that it is done.
+    pub(super) fn issues(
+        &mut self,
+        name: &str,
+        id: JobId,
+        checker: u32,
+        issues: Vec<Issue>,
+    ) -> bool {
+        let (max_issues, max_bytes, max_text) = (
+            self.settings.max_issues,
+            self.settings.max_staged_bytes,
+            self.settings.max_text,
+        );
+        let Some(part) = self.sent_part(name, id, checker) else {
+            return false;
+        };
+        for mut issue in issues {
+            clip(&mut issue, max_text);
+            let size = weight(&issue);
+            let full = part.staged_bytes + size > max_bytes;
+            let staged = part.staged.entry(checker).or_default();
+            if full || staged.issues.len() >= max_issues {
+                staged.withheld += 1;
+            } else {
+                staged.issues.push(issue);
+                part.staged_bytes += size;
+            }
+        }
+        true
+    }
+
+    /// One checker has ended.
+    #[expect(clippy::too_many_arguments, reason = "the fields of one message")]
+    pub(super) fn checker_done(
+        &mut self,
+        name: &str,
+        id: JobId,
+        checker: u32,
+        status: Status,
+        reason: String,
+        params: Vec<Param>,
+        metadata: Vec<Metadata>,
+    ) -> bool {
+        let max_text = self.settings.max_text;
+        let Some(part) = self.sent_part(name, id, checker) else {
+            return false;
+        };
+        let mut reason = reason;
+        clip_text(&mut reason, max_text);
+        part.staged.entry(checker).or_default().done = Some((status, reason, params, metadata));
+        true
+    }
+
+    fn sent_part(&mut self, name: &str, id: JobId, checker: u32) -> Option<&mut Part> {
+        let part = self.jobs.get_mut(&id)?.parts.get_mut(name)?;
+        let offered = part.catalogue.as_ref().map_or(0, |it| it.checkers.len());
+        let known = usize::try_from(checker).is_ok_and(|index| index < offered);
+        (known && matches!(part.state, PartState::Sent { .. })).then_some(part)
+    }
+}
+
+impl Bundle {
+    /// Takes the next job from the queues and says whether it is a suspect, to be tried alone.
+    /// Suspects come first.
+    pub(super) fn next_job(&mut self, room: Room) -> Option<(JobId, bool)> {
+        let Room::Full(oldest) = room else {
+            let suspect = self.suspects.pop_front().map(|id| (id, true));
+            return suspect.or_else(|| self.queue.pop_front().map(|id| (id, false)));
+        };
+        let oldest = oldest?;
+        if let Some(at) = self.suspects.iter().position(|id| *id == oldest) {
+            return self.suspects.remove(at).map(|id| (id, true));
+        }
+        let at = self.queue.iter().position(|id| *id == oldest)?;
+        self.queue.remove(at).map(|id| (id, false))
+    }
+}
