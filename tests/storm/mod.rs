@@ -102,7 +102,7 @@ fn demand(mut driver: Driver, start_kib: u64, end_kib: u64, seconds: u64) {
     ));
 }
 
-/// The reporter has everything, too.
+/// The reporter has everything, too, and nothing about files that have gone.
 fn reports_are_there(driver: &Driver) {
     for name in driver.files.keys() {
         let path = driver.farm.out().join(format!("{name}.txt"));
@@ -112,6 +112,20 @@ fn reports_are_there(driver: &Driver) {
             || format!("{}\n{:#?}", path.display(), driver.farm.status()),
         );
     }
+    let left = || -> Vec<String> {
+        let entries = std::fs::read_dir(driver.farm.out()).unwrap().flatten();
+        let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+        let gone = |name: &String| {
+            let file = name.strip_suffix(".txt");
+            file.is_some_and(|file| !driver.files.contains_key(file))
+        };
+        names.filter(gone).collect()
+    };
+    until_or(
+        "no report of a file that has gone",
+        || left().is_empty().then_some(()),
+        || format!("{:?}\n{:#?}", left(), driver.farm.status()),
+    );
 }
 
 impl Driver {

@@ -118,7 +118,7 @@ impl Judgement {
             }
             let results = [".xqar", ".verdict.json"];
             let file = results.iter().find_map(|suffix| name.strip_suffix(suffix));
-            // Reports are the reporters' own: nobody tells them that a file has gone.
+            // Reports are withdrawn by their reporters, later than results.
             let report = file.is_none() && [".txt", ".json"].iter().any(|it| name.ends_with(it));
             if !report && !file.is_some_and(|file| files.contains_key(file)) {
                 self.complain(&name, "lies among the results, and no file is there for it");

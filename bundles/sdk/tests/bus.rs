@@ -108,7 +108,9 @@ async fn talk(host: &mut Host) -> (usize, Status) {
                 FromPeer::CheckerDone { status: ended, .. } => status = ended,
                 FromPeer::JobDone { .. } => host.send(peer, &ToPeer::Drain),
                 FromPeer::Leaving => return (issues, status),
-                FromPeer::Heartbeat { .. } | FromPeer::ResultDone { .. } => {}
+                FromPeer::Heartbeat { .. }
+                | FromPeer::ResultDone { .. }
+                | FromPeer::WithdrawalDone { .. } => {}
             },
             HostEvent::Garbage { what, .. } => panic!("{what}"),
             HostEvent::Gone { .. } => panic!("the bundle went away"),

@@ -32,6 +32,8 @@ pub enum ToPeer {
     },
     /// Report this.
     Result(Box<ResultMessage>),
+    /// The file of a result has gone: take back what was reported about it.
+    Withdrawn(Withdrawn),
     /// No further jobs: finish what is there, say `Leaving`, and go.
     Drain,
 }
@@ -104,6 +106,19 @@ pub struct ResultMessage {
     pub results: Results,
     /// What the rules that were broken are about, by rule UID, from the bundles' pages.
     pub rules: BTreeMap<String, String>,
+    /// Parameters for this reporter from the configuration.
+    pub params: Vec<Param>,
+}
+
+/// A checked file that has gone, for reporters.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Withdrawn {
+    /// Absolute path of the file, as in the result.
+    pub input: String,
+    /// Path for people, as in the result.
+    pub display_path: String,
+    /// Absolute path where the `.xqar` was.
+    pub xqar: String,
     /// Parameters for this reporter from the configuration.
     pub params: Vec<Param>,
 }

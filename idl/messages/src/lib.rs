@@ -13,7 +13,9 @@ pub mod peer_to_broker;
 pub mod services;
 pub mod verdict;
 
-pub use broker_to_peer::{Job, JobDocument, MissingDocument, PeerReport, ResultMessage, ToPeer};
+pub use broker_to_peer::{
+    Job, JobDocument, MissingDocument, PeerReport, ResultMessage, ToPeer, Withdrawn,
+};
 pub use catalogue::{Catalogue, CheckerInfo, Hello, ParamInfo, Role};
 pub use exit::Exit;
 pub use ids::{Digest, DocId, DocumentRole, JobId, PROTOCOL_VERSION};

@@ -53,6 +53,13 @@ pub enum FromPeer {
         /// What came of it.
         report: PeerReport,
     },
+    /// A reporter has taken back what it reported about a file that has gone, or cannot.
+    WithdrawalDone {
+        /// Absolute path of the file.
+        input: String,
+        /// What came of it.
+        report: PeerReport,
+    },
     /// Still alive.
     Heartbeat {
         /// What it is working on.

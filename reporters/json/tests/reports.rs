@@ -170,7 +170,7 @@ fn one_file_holds_the_newest_report_of_each_checked_file() {
 fn a_senseless_indent_is_refused_with_what_is_allowed() {
     let mut result = result("a.xodr");
     result.params.push(param("Indent", "-1"));
-    let error = JsonReporter::default().report(&result, &NoSources);
+    let error = JsonReporter::new(false).report(&result, &NoSources);
     assert_eq!(
         error.unwrap_err().to_string(),
         "use the parameter Indent=\"-1\": a whole number from 0 to 16 is needed"

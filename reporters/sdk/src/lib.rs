@@ -6,13 +6,14 @@
 //! reporter on an `.xqar` that exists already, as ASAM's report modules do.
 //!
 //! What reporters have in common lies here too: the lines of the checked files ([`Sources`]), the
-//! places of an issue with those in other files ([`places`]), and where reports go ([`Output`],
-//! [`Shelf`]).
+//! places of an issue with those in other files ([`places`]), and where reports go ([`Outlet`],
+//! [`Output`], [`Shelf`]).
 
 mod clean;
 mod daemon;
 mod loaded;
 mod once;
+mod outlet;
 mod output;
 mod place;
 mod session;
@@ -23,6 +24,7 @@ pub use clean::{one_line, printable};
 pub use daemon::{Identity, RunError, run};
 pub use loaded::{LoadError, load, verdict_of};
 pub use once::{OnceError, OneShot, report_once};
+pub use outlet::{Outlet, Subject};
 pub use output::{Output, param, replace_file};
 pub use place::{Place, places};
 pub use session::Session;
@@ -31,7 +33,7 @@ pub use sources::{Answer, BothSources, FileSources, ImageSources, Line, NoSource
 
 use std::path::PathBuf;
 
-use qcbus_messages::ResultMessage;
+use qcbus_messages::{ResultMessage, Withdrawn};
 
 /// Something that writes results.
 ///
@@ -43,6 +45,13 @@ pub trait Reporter {
     /// # Errors
     /// [`ReportError`] when it could not be written; it is told to the broker and not tried again.
     fn report(&mut self, result: &ResultMessage, sources: &dyn Sources) -> Result<(), ReportError>;
+
+    /// A file has gone: takes back what was reported about it. Nothing may be there to take back.
+    ///
+    /// # Errors
+    /// [`ReportError`] when it could not be taken back; it is told to the broker and not tried
+    /// again.
+    fn withdraw(&mut self, gone: &Withdrawn) -> Result<(), ReportError>;
 
     /// All results have been given; brings what was collected into its final order.
     ///

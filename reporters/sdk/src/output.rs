@@ -4,9 +4,8 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use qcbus_formats::xqar::Param;
-use qcbus_messages::ResultMessage;
 
-use crate::ReportError;
+use crate::{ReportError, Subject};
 
 /// Where reports go: the parameter `OutputFile`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -38,16 +37,16 @@ impl Output {
         }
     }
 
-    /// The file that a result's own report goes to; `None` for streams and the one file for all.
+    /// The file that a report of its own goes to; `None` for streams and the one file for all.
     /// `suffix` is without a dot.
-    pub fn own_file(&self, result: &ResultMessage, suffix: &str) -> Option<PathBuf> {
+    pub fn own_file(&self, subject: Subject<'_>, suffix: &str) -> Option<PathBuf> {
         match self {
             Output::BesideResult => {
-                let stem = result.xqar.strip_suffix(".xqar").unwrap_or(&result.xqar);
+                let stem = subject.xqar.strip_suffix(".xqar").unwrap_or(subject.xqar);
                 Some(PathBuf::from(format!("{stem}.{suffix}")))
             }
             Output::Directory(directory) => {
-                let path = format!("{}.{suffix}", result.display_path);
+                let path = format!("{}.{suffix}", subject.display_path);
                 Some(directory.join(inside(Path::new(&path))))
             }
             Output::File(_) | Output::Stdout | Output::Stderr => None,
@@ -122,11 +121,11 @@ mod tests {
         let result = result(1, "maps/a.xodr");
         assert_eq!(Output::of(&[]), Output::BesideResult);
         assert_eq!(
-            Output::of(&[]).own_file(&result, "txt"),
+            Output::of(&[]).own_file(Subject::from(&result), "txt"),
             Some(PathBuf::from("/out/maps/a.xodr.txt"))
         );
         assert_eq!(
-            Output::of(&params("r/")).own_file(&result, "json"),
+            Output::of(&params("r/")).own_file(Subject::from(&result), "json"),
             Some(PathBuf::from("r/maps/a.xodr.json"))
         );
         assert_eq!(
@@ -140,7 +139,7 @@ mod tests {
     fn a_path_for_people_cannot_lead_out_of_the_directory() {
         let result = result(1, "../../etc/a.xodr");
         assert_eq!(
-            Output::of(&params("r/")).own_file(&result, "txt"),
+            Output::of(&params("r/")).own_file(Subject::from(&result), "txt"),
             Some(PathBuf::from("r/etc/a.xodr.txt"))
         );
     }

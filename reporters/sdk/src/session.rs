@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use qcbus_messages::{FromPeer, JobId, PeerReport, ResultMessage, ToPeer};
+use qcbus_messages::{FromPeer, JobId, PeerReport, ResultMessage, ToPeer, Withdrawn};
 
 use crate::{Reporter, Sources};
 
@@ -39,6 +39,11 @@ impl<'r> Session<'r> {
                 job: result.job,
                 report: self.write(&result, sources),
             }],
+            ToPeer::Withdrawn(gone) => {
+                let report = self.withdraw(&gone);
+                let input = gone.input;
+                vec![FromPeer::WithdrawalDone { input, report }]
+            }
             ToPeer::Drain => {
                 self.finish();
                 vec![FromPeer::Leaving]
@@ -91,6 +96,16 @@ impl<'r> Session<'r> {
             }
             Ok(Err(error)) => PeerReport::Failed(format!("failed to {error}")),
             Err(_) => PeerReport::Failed("the reporter panicked over this result".into()),
+        }
+    }
+
+    fn withdraw(&mut self, gone: &Withdrawn) -> PeerReport {
+        self.written.retain(|(_, input)| *input != gone.input);
+        let withdraw = AssertUnwindSafe(|| self.reporter.withdraw(gone));
+        match catch_unwind(withdraw) {
+            Ok(Ok(())) => PeerReport::Written,
+            Ok(Err(error)) => PeerReport::Failed(format!("failed to {error}")),
+            Err(_) => PeerReport::Failed("the reporter panicked over this withdrawal".into()),
         }
     }
 
@@ -150,6 +165,11 @@ mod tests {
             Ok(())
         }
 
+        fn withdraw(&mut self, gone: &Withdrawn) -> Result<(), ReportError> {
+            self.written.retain(|path| *path != gone.display_path);
+            Ok(())
+        }
+
         fn finish(&mut self) -> Result<(), ReportError> {
             self.finished += 1;
             Ok(())
@@ -193,6 +213,29 @@ mod tests {
         let report = tell(&mut session, 1, "panics.xodr");
         assert!(matches!(report, PeerReport::Failed(_)), "{report:?}");
         assert_eq!(tell(&mut session, 2, "b.xodr"), PeerReport::Written);
+    }
+
+    #[test]
+    fn a_file_that_has_gone_takes_its_report_with_it() {
+        let mut notebook = Notebook::default();
+        let mut session = Session::new(&mut notebook);
+        tell(&mut session, 1, "a.xodr");
+        tell(&mut session, 2, "b.xodr");
+        let gone = Withdrawn {
+            input: "/in/a.xodr".into(),
+            display_path: "a.xodr".into(),
+            xqar: "/out/a.xodr.xqar".into(),
+            params: Vec::new(),
+        };
+        let answer = session.handle(ToPeer::Withdrawn(gone), |_| Box::new(NoSources));
+        let done = FromPeer::WithdrawalDone {
+            input: "/in/a.xodr".into(),
+            report: PeerReport::Written,
+        };
+        assert_eq!(answer, [done]);
+        // It is there again, unchanged: the same job counts anew.
+        tell(&mut session, 1, "a.xodr");
+        assert_eq!(notebook.written, ["b.xodr", "a.xodr"]);
     }
 
     #[test]

@@ -4,10 +4,16 @@ use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use crate::{ReportError, replace_file};
+use crate::{ReportError, Subject, replace_file};
 
 /// How a report's sections follow each other in one file.
 pub trait Format {
+    /// Under what the section of a checked file is found again, as [`Format::split`] gives it.
+    fn key(&self, subject: Subject<'_>) -> String;
+
+    /// A report as a section.
+    fn section(&self, key: &str, text: String) -> String;
+
     /// The sections of a file written earlier, by the path of the checked file. What is not of
     /// this form is dropped.
     fn split(&self, text: &str) -> BTreeMap<String, String>;
@@ -68,6 +74,17 @@ impl Shelf {
         }
     }
 
+    /// Takes a section out, if it is there.
+    ///
+    /// # Errors
+    /// [`ReportError::Write`].
+    pub fn withdraw(&mut self, key: &str) -> Result<(), ReportError> {
+        match self.sections.remove(key) {
+            Some(_) => self.rewrite(),
+            None => Ok(()),
+        }
+    }
+
     /// Brings the sections in the order of their paths.
     ///
     /// # Errors
@@ -103,6 +120,14 @@ mod tests {
     struct Lines;
 
     impl Format for Lines {
+        fn key(&self, subject: Subject<'_>) -> String {
+            subject.input.to_owned()
+        }
+
+        fn section(&self, key: &str, text: String) -> String {
+            format!("{key}={text}\n")
+        }
+
         fn split(&self, text: &str) -> BTreeMap<String, String> {
             text.split_inclusive('\n')
                 .filter(|line| line.ends_with('\n'))
@@ -124,6 +149,9 @@ mod tests {
         assert_eq!(read(), "a=1\nb=1\n");
         shelf.put("a", "a=2\n".into()).unwrap();
         assert_eq!(read(), "a=2\nb=1\n");
+        shelf.withdraw("a").unwrap();
+        shelf.withdraw("never there").unwrap();
+        assert_eq!(read(), "b=1\n");
     }
 
     #[test]

@@ -17,6 +17,7 @@ use qcbus_document::FileKind;
 use qcbus_formats::xqar::Results;
 use qcbus_messages::{
     Digest, DocId, FromPeer, Hello, JobId, PeerReport, ResultMessage, Role, ToPeer, Verdict,
+    Withdrawn,
 };
 use qcbus_reporter_sdk::{Identity, ReportError, Reporter, Sources, run};
 
@@ -37,6 +38,11 @@ impl Reporter for SecondLines {
         }
         let line = sources.line(&result.input, 2, 1).map(|line| line.text);
         self.seen.push((result.display_path.clone(), line));
+        Ok(())
+    }
+
+    fn withdraw(&mut self, gone: &Withdrawn) -> Result<(), ReportError> {
+        self.seen.retain(|(path, _)| *path != gone.display_path);
         Ok(())
     }
 

@@ -1,12 +1,11 @@
 //! The daemon: where the text goes.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 
 use qcbus_formats::xqar::Param;
-use qcbus_messages::ResultMessage;
+use qcbus_messages::{ResultMessage, Withdrawn};
 use qcbus_reporter_sdk::{
-    Format, Output, ReportError, Reporter, Shelf, Sources, one_line, param, replace_file,
+    Format, Outlet, Output, ReportError, Reporter, Sources, Subject, one_line, param,
 };
 
 use crate::{Options, render};
@@ -15,35 +14,20 @@ use crate::{Options, render};
 pub const DEFAULT_WIDTH: usize = 100;
 
 /// Writes text reports.
-#[derive(Default)]
 pub struct TextReporter {
     /// Whether to colour what goes to `__stdout__` and `__stderr__`. Files are never coloured.
-    pub color: bool,
-    /// Whether reports that the one file of `OutputFile` already holds stay in it: for a daemon
-    /// that is started again beside the same broker.
-    pub keep: bool,
-    shelves: BTreeMap<PathBuf, Shelf>,
+    color: bool,
+    outlet: Outlet<Sections>,
 }
 
 impl TextReporter {
-    /// A reporter that has written nothing yet.
+    /// A reporter that has written nothing yet. `color`: whether to colour what goes to
+    /// `__stdout__` and `__stderr__`; files are never coloured. `keep`: whether reports that the
+    /// one file of `OutputFile` already holds stay in it.
     pub fn new(color: bool, keep: bool) -> TextReporter {
         TextReporter {
             color,
-            keep,
-            shelves: BTreeMap::new(),
-        }
-    }
-
-    fn shelve(&mut self, path: &Path, key: &str, text: &str) -> Result<(), ReportError> {
-        let section = format!("{RULER} {key} {RULER}\n{text}\n");
-        if !self.shelves.contains_key(path) {
-            let shelf = Shelf::open(path, &Sections, self.keep)?;
-            self.shelves.insert(path.to_owned(), shelf);
-        }
-        match self.shelves.get_mut(path) {
-            Some(shelf) => shelf.put(key, section),
-            None => Ok(()),
+            outlet: Outlet::new(Sections, "txt", keep),
         }
     }
 }
@@ -58,28 +42,16 @@ impl Reporter for TextReporter {
             ..Options::default()
         };
         let text = render(result, &options, sources);
-        match output {
-            Output::Stdout => stream("__stdout__", &mut std::io::stdout().lock(), &text),
-            Output::Stderr => stream("__stderr__", &mut std::io::stderr().lock(), &text),
-            Output::File(path) => self.shelve(&path, &one_line(&result.display_path), &text),
-            Output::BesideResult | Output::Directory(_) => match output.own_file(result, "txt") {
-                Some(path) => replace_file(&path, text.as_bytes()),
-                None => Ok(()),
-            },
-        }
+        self.outlet.put(Subject::from(result), text)
+    }
+
+    fn withdraw(&mut self, gone: &Withdrawn) -> Result<(), ReportError> {
+        self.outlet.withdraw(Subject::from(gone))
     }
 
     fn finish(&mut self) -> Result<(), ReportError> {
-        self.shelves.values_mut().try_for_each(Shelf::sort)
+        self.outlet.finish()
     }
-}
-
-fn stream(name: &str, out: &mut dyn std::io::Write, text: &str) -> Result<(), ReportError> {
-    let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
-    written.map_err(|source| ReportError::Write {
-        path: name.into(),
-        source,
-    })
 }
 
 fn line_width(params: &[Param]) -> Result<usize, ReportError> {
@@ -103,6 +75,14 @@ const RULER: &str = "====";
 struct Sections;
 
 impl Format for Sections {
+    fn key(&self, subject: Subject<'_>) -> String {
+        one_line(subject.display_path)
+    }
+
+    fn section(&self, key: &str, text: String) -> String {
+        format!("{RULER} {key} {RULER}\n{text}\n")
+    }
+
     fn split(&self, text: &str) -> BTreeMap<String, String> {
         let mut sections = BTreeMap::<String, String>::new();
         let mut current: Option<String> = None;

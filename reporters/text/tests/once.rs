@@ -47,7 +47,7 @@ fn the_result_file_is_enough() {
         params: params(&output),
         ..OneShot::default()
     };
-    report_once(&mut TextReporter::default(), NAME, &what).unwrap();
+    report_once(&mut TextReporter::new(false, false), NAME, &what).unwrap();
     let text = std::fs::read_to_string(output).unwrap();
     let place = dir.path().canonicalize().unwrap().join("quay.xodr");
     let text = text.replace(&*place.to_string_lossy(), "DIR/quay.xodr");
@@ -76,7 +76,7 @@ fn a_configuration_names_result_output_and_width() {
         config: Some(at("config.xml")),
         ..OneShot::default()
     };
-    let error = report_once(&mut TextReporter::default(), NAME, &what).unwrap_err();
+    let error = report_once(&mut TextReporter::new(false, false), NAME, &what).unwrap_err();
     assert!(
         error.to_string().contains("LineWidth=\"narrow\""),
         "{error}"
@@ -85,7 +85,7 @@ fn a_configuration_names_result_output_and_width() {
         name: "LineWidth".into(),
         value: "80".into(),
     });
-    report_once(&mut TextReporter::default(), NAME, &what).unwrap();
+    report_once(&mut TextReporter::new(false, false), NAME, &what).unwrap();
     let text = std::fs::read_to_string(at("report.txt")).unwrap();
     assert!(text.contains("rejected"), "{text}");
 }
@@ -94,7 +94,7 @@ fn a_configuration_names_result_output_and_width() {
 fn what_cannot_be_used_is_named() {
     let dir = tempfile::tempdir().unwrap();
     let fails = |what: &OneShot| {
-        report_once(&mut TextReporter::default(), NAME, what)
+        report_once(&mut TextReporter::new(false, false), NAME, what)
             .unwrap_err()
             .to_string()
     };

@@ -293,7 +293,7 @@ fn a_senseless_width_is_refused_with_what_is_allowed() {
         name: "LineWidth".into(),
         value: "wide".into(),
     });
-    let error = TextReporter::default()
+    let error = TextReporter::new(false, false)
         .report(&result, &NoSources)
         .unwrap_err();
     insta::assert_snapshot!(

@@ -2,12 +2,13 @@
 //! space and no memory.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
 
 use qcbus_formats::config::{Config, reporter_for};
 use qcbus_formats::xqar::{self, Checker, Param, Results};
 use qcbus_messages::codec::MAX_MESSAGE;
-use qcbus_messages::{DocId, ResultMessage};
+use qcbus_messages::{DocId, ResultMessage, Withdrawn};
 
 use crate::core::{Delivery, weight};
 use crate::places::Places;
@@ -50,6 +51,21 @@ pub fn message(
         params: params_of(reporter, config),
         results,
     })
+}
+
+/// What one reporter is told when a file has gone.
+pub fn withdrawn(
+    reporter: &str,
+    path: &Path,
+    places: &Places,
+    config: Option<&Arc<Config>>,
+) -> Withdrawn {
+    Withdrawn {
+        input: path.to_string_lossy().into_owned(),
+        display_path: places.display(path).to_string_lossy().into_owned(),
+        xqar: places.xqar(path).to_string_lossy().into_owned(),
+        params: params_of(reporter, config),
+    }
 }
 
 /// Findings in one message, in bytes of memory. Half of what the bus carries in one: the encoded

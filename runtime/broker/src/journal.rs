@@ -106,6 +106,15 @@ pub enum Entry {
     Withdrawn {
         /// The file.
         path: Arc<Path>,
+        /// Who is to take back a report about it.
+        reporters: Vec<String>,
+    },
+    /// A reporter has taken back its report about a file that has gone.
+    Voided {
+        /// The file.
+        path: Arc<Path>,
+        /// The reporter.
+        reporter: String,
     },
     /// A reporter has a result.
     Delivered {
@@ -213,6 +222,25 @@ impl Journal {
         Ok(all)
     }
 
+    /// Files that have gone and the reporters that have not yet taken back what they said of them.
+    ///
+    /// # Errors
+    /// When the journal cannot be read.
+    pub fn voids(&self) -> Result<Vec<(Arc<Path>, String)>, JournalError> {
+        let read = || -> rusqlite::Result<Vec<(Arc<Path>, String)>> {
+            let mut query = self.connection.prepare(
+                "SELECT path, reporter FROM deliveries WHERE job = 0 \
+                 AND path NOT IN (SELECT path FROM files)",
+            )?;
+            let rows = query.query_map([], |row| {
+                let path: String = row.get(0)?;
+                Ok((Path::new(&path).into(), row.get(1)?))
+            })?;
+            rows.collect()
+        };
+        read().map_err(|source| classify(&self.path, source))
+    }
+
     /// Writes entries in one transaction: all of them or none.
     ///
     /// # Errors
@@ -284,23 +312,43 @@ fn put(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> {
                 put_history(transaction, path, judged, history)?;
             }
         }
-        Entry::Withdrawn { path } => {
+        Entry::Withdrawn { path, reporters } => {
             let path = text(path);
             transaction.execute("DELETE FROM files WHERE path = ?1", params![path])?;
             transaction.execute("DELETE FROM deliveries WHERE path = ?1", params![path])?;
+            for reporter in reporters {
+                deliver(transaction, &path, reporter, JobId(0))?;
+            }
+        }
+        Entry::Voided { path, reporter } => {
+            transaction.execute(
+                "DELETE FROM deliveries WHERE path = ?1 AND reporter = ?2 AND job = 0",
+                params![text(path), reporter],
+            )?;
         }
         Entry::Delivered {
             path,
             reporter,
             job,
         } => {
-            transaction.execute(
-                "INSERT OR REPLACE INTO deliveries (path, reporter, job) VALUES (?1, ?2, ?3)",
-                params![text(path), reporter, signed(job.0)],
-            )?;
+            deliver(transaction, &text(path), reporter, *job)?;
         }
     }
     Ok(())
+}
+
+fn deliver(
+    transaction: &Transaction<'_>,
+    path: &str,
+    reporter: &str,
+    job: JobId,
+) -> rusqlite::Result<()> {
+    let mut statement = transaction.prepare_cached(
+        "INSERT OR REPLACE INTO deliveries (path, reporter, job) VALUES (?1, ?2, ?3)",
+    )?;
+    statement
+        .execute(params![path, reporter, signed(job.0)])
+        .map(|_| ())
 }
 
 fn put_file(transaction: &Transaction<'_>, path: &Path, judged: &Judged) -> rusqlite::Result<()> {
@@ -526,8 +574,21 @@ mod tests {
         assert_eq!(all.len(), 1);
         assert_eq!(all[0].judged, *expected);
         assert_eq!(all[0].delivered, [("json".to_owned(), JobId(5))]);
-        journal.write(&[Entry::Withdrawn { path }]).unwrap();
+        let reporters = vec!["json".to_owned(), "text".to_owned()];
+        let gone = path.clone();
+        journal
+            .write(&[Entry::Withdrawn {
+                path: gone,
+                reporters,
+            }])
+            .unwrap();
         assert!(journal.remembered().unwrap().is_empty());
+        let json = (path.clone(), "json".to_owned());
+        let text = (path.clone(), "text".to_owned());
+        assert_eq!(journal.voids().unwrap(), [json, text.clone()]);
+        let reporter = "json".to_owned();
+        journal.write(&[Entry::Voided { path, reporter }]).unwrap();
+        assert_eq!(journal.voids().unwrap(), [text]);
         assert_eq!(Journal::examine(dir.path()), None);
     }
 

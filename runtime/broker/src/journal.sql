@@ -57,7 +57,8 @@ CREATE TABLE IF NOT EXISTS job_checkers (
     PRIMARY KEY (job, bundle, checker)
 ) WITHOUT ROWID;
 
--- Which reporter has acknowledged which result.
+-- Which reporter has acknowledged which result. Job 0: the file has gone, and the reporter has not
+-- yet taken back its report about it.
 CREATE TABLE IF NOT EXISTS deliveries (
     path     TEXT NOT NULL,
     reporter TEXT NOT NULL,

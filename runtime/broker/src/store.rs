@@ -174,15 +174,19 @@ impl Store {
             .map_err(|error| error.to_string())
     }
 
-    /// Removes what was written for a file that has gone.
+    /// Removes what was written for a file that has gone, and remembers who is to take back a
+    /// report about it.
     ///
     /// # Errors
     /// What a person should know.
-    pub fn withdraw(&self, path: &Arc<Path>) -> Result<(), String> {
+    pub fn withdraw(&self, path: &Arc<Path>, reporters: &[String]) -> Result<(), String> {
         let fail =
             |error: io::Error| format!("cannot withdraw the result of {}: {error}", path.display());
         self.withdraw_files(path).map_err(fail)?;
-        self.record(&[Entry::Withdrawn { path: path.clone() }])
+        self.record(&[Entry::Withdrawn {
+            path: path.clone(),
+            reporters: reporters.to_vec(),
+        }])
     }
 
     fn withdraw_files(&self, path: &Path) -> io::Result<()> {

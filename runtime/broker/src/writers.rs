@@ -29,7 +29,12 @@ pub enum Order {
         root: Option<Held>,
     },
     /// Remove the result of a file that has gone.
-    Withdraw(Arc<Path>),
+    Withdraw {
+        /// The file.
+        path: Arc<Path>,
+        /// Who is to take back a report about it.
+        reporters: Vec<String>,
+    },
     /// Remember something.
     Record(Entry),
 }
@@ -138,7 +143,7 @@ impl Lane {
                     self.tell(job, outcome);
                     Ok(())
                 }
-                Order::Withdraw(path) => self.store.withdraw(path),
+                Order::Withdraw { path, reporters } => self.store.withdraw(path, reporters),
                 Order::Record(_) => self.record(&order),
             };
             if let Err(why) = done {
@@ -161,7 +166,7 @@ impl Lane {
     fn record(&self, order: &Order) -> Result<(), String> {
         match order {
             Order::Record(entry) => self.store.record(std::slice::from_ref(entry)),
-            Order::Store { .. } | Order::Withdraw(_) => Ok(()),
+            Order::Store { .. } | Order::Withdraw { .. } => Ok(()),
         }
     }
 }

@@ -236,6 +236,11 @@ impl Cage {
                 Mood::GoOn
             }
             ToPeer::Result(result) => (self.animal.manners.result)(&mut self.peer, result.job),
+            ToPeer::Withdrawn(gone) => {
+                let (input, report) = (gone.input, PeerReport::Written);
+                self.peer.send(&FromPeer::WithdrawalDone { input, report });
+                Mood::GoOn
+            }
             ToPeer::Drain => {
                 self.draining = true;
                 Mood::GoOn

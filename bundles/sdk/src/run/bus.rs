@@ -268,7 +268,7 @@ impl Daemon {
             ToPeer::Drain => self.draining = true,
             // The session ends with these words; `Closed` follows. Results are for reporters.
             ToPeer::Refused { reason } => tracing::error!(reason, "the broker refused"),
-            ToPeer::Result(_) => {}
+            ToPeer::Result(_) | ToPeer::Withdrawn(_) => {}
         }
     }
 

@@ -210,7 +210,7 @@ impl State {
                 self.bundle_left(name, actions);
                 (true, None)
             }
-            FromPeer::ResultDone { .. } => (false, None),
+            FromPeer::ResultDone { .. } | FromPeer::WithdrawalDone { .. } => (false, None),
         };
         if !known {
             self.offence(name, about, actions);

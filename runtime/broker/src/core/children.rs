@@ -65,6 +65,10 @@ impl State {
             self.children.remove(&name);
             self.drain_peer(&name, actions);
         }
+        for spec in specs.iter().filter(|it| it.role == Role::Reporter) {
+            // Known from now on, so that it hears of files that go before it has joined.
+            self.reporter_index(&spec.name);
+        }
         let due = self.now.max(self.settings.collect);
         for spec in specs {
             match self.children.get_mut(&spec.name) {

@@ -16,6 +16,8 @@ mod types;
 mod waits;
 
 #[cfg(test)]
+mod reporter_tests;
+#[cfg(test)]
 mod tests;
 
 use std::collections::{BTreeMap, VecDeque};
@@ -272,8 +274,13 @@ impl State {
             return;
         }
         let path = entry.path.clone();
+        let reporters = self.void_reports(id);
         self.files.remove(id);
-        actions.push(Action::Withdraw { path: path.clone() });
+        actions.push(Action::Withdraw {
+            path: path.clone(),
+            reporters,
+        });
+        self.deliver_everything(actions);
         self.answer_gone(&path, actions);
     }
 

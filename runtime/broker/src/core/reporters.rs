@@ -1,6 +1,8 @@
 //! Reporters: every result reaches every reporter at least once, and none can hold up a verdict.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
 use qcbus_messages::{FromPeer, Hello, JobId, PeerReport, Role};
@@ -34,11 +36,29 @@ pub(super) struct Reporter {
     pub active: BTreeMap<JobId, Sent>,
     /// Files whose newest result is to be sent.
     pub queue: VecDeque<FileId>,
+    /// Files that have gone and whose reports are to be taken back.
+    pub void: BTreeSet<Arc<Path>>,
+    /// Those of which it was told.
+    pub voiding: BTreeSet<Arc<Path>>,
     pub heard: Duration,
     pub moved: Duration,
     pub done: u64,
     pub failed: u64,
     pub note: String,
+}
+
+impl Reporter {
+    /// Whether something was sent that it has not answered.
+    fn owes(&self) -> bool {
+        !self.active.is_empty() || !self.voiding.is_empty()
+    }
+
+    /// A session is over: what was said in it counts no more.
+    fn forget_session(&mut self) {
+        self.active.clear();
+        self.queue.clear();
+        self.void.append(&mut self.voiding);
+    }
 }
 
 impl State {
@@ -109,8 +129,54 @@ impl State {
             .map(|(id, _)| id)
             .collect();
         if let Some(reporter) = self.reporters.get_mut(index as usize) {
-            reporter.active.clear();
+            reporter.forget_session();
             reporter.queue = lacks.into();
+        }
+    }
+
+    /// A file has gone: whoever has, or may have, reported about it is to take that back. Returns
+    /// their names.
+    pub(super) fn void_reports(&mut self, id: FileId) -> Vec<String> {
+        let Some(entry) = self.files.get(id) else {
+            return Vec::new();
+        };
+        let judged = entry.judged.is_some();
+        let mut names = Vec::new();
+        for (index, reporter) in self.reporters.iter_mut().enumerate() {
+            let has = |it: &(u32, JobId)| usize::try_from(it.0) == Ok(index);
+            let under_way = reporter.active.values().any(|sent| sent.file == id);
+            reporter.active.retain(|_, sent| sent.file != id);
+            let pending =
+                reporter.void.contains(&entry.path) || reporter.voiding.contains(&entry.path);
+            // A former broker may have sent it and died before it heard of the report.
+            let here = reporter.session.is_some() || self.children.contains_key(&reporter.name);
+            if under_way || pending || entry.delivered.iter().any(has) || (judged && here) {
+                reporter.void.insert(entry.path.clone());
+                names.push(reporter.name.clone());
+            }
+        }
+        names
+    }
+
+    /// Puts in what the journal knows of a file that has gone and of which a reporter may still
+    /// hold a report.
+    pub fn remember_void(&mut self, path: &Arc<Path>, reporter: &str) {
+        let index = self.reporter_index(reporter);
+        if let Some(reporter) = self.reporters.get_mut(index as usize) {
+            reporter.void.insert(path.clone());
+        }
+    }
+
+    /// Whether a result that was read back for a reporter is still to be sent: its file may have
+    /// gone meanwhile.
+    pub fn awaits_result(&self, session: Session, job: JobId) -> bool {
+        let mut reporters = self.reporters.iter();
+        reporters.any(|it| it.session == Some(session) && it.active.contains_key(&job))
+    }
+
+    pub(super) fn deliver_everything(&mut self, actions: &mut Actions) {
+        for index in 0..self.reporters.len() {
+            self.deliver(u32::try_from(index).unwrap_or(u32::MAX), actions);
         }
     }
 
@@ -133,8 +199,19 @@ impl State {
             let Some(session) = reporter.session else {
                 return;
             };
-            if reporter.active.len() >= reporter.capacity {
+            if reporter.active.len() + reporter.voiding.len() >= reporter.capacity {
                 return;
+            }
+            // Before any result: a file that is there again has its new report written after this.
+            if let Some(path) = reporter.void.pop_first() {
+                reporter.voiding.insert(path.clone());
+                reporter.moved = self.now;
+                actions.push(Action::Void {
+                    session,
+                    reporter: reporter.name.clone(),
+                    path,
+                });
+                continue;
             }
             let Some(file) = reporter.queue.pop_front() else {
                 return;
@@ -207,6 +284,23 @@ impl State {
                 }
                 self.deliver(index, actions);
             }
+            FromPeer::WithdrawalDone { input, report } => {
+                let Some(path) = reporter.voiding.take(Path::new(&input)) else {
+                    return;
+                };
+                reporter.moved = now;
+                let again = reporter.void.contains(&path);
+                if let PeerReport::Failed(why) = report {
+                    reporter.failed += 1;
+                    reporter.note.clone_from(&why);
+                    self.notice(format!("{name} could not withdraw: {why}"), actions);
+                }
+                if !again {
+                    let reporter = name.to_owned();
+                    actions.push(Action::Voided { reporter, path });
+                }
+                self.deliver(index, actions);
+            }
             FromPeer::Leaving => {
                 if let Some(session) = reporter.session.take() {
                     self.sessions.remove(&session);
@@ -251,8 +345,7 @@ impl State {
         }
         let proved = reporter.done > 0;
         reporter.note = why.to_owned();
-        reporter.active.clear();
-        reporter.queue.clear();
+        reporter.forget_session();
         self.notice(format!("{name}: {why}"), actions);
         self.child_down(name, proved, why, actions);
     }
@@ -262,7 +355,7 @@ impl State {
         let silence = self.settings.silence_limit;
         let mut failing = Vec::new();
         for reporter in &self.reporters {
-            if reporter.session.is_none() || reporter.active.is_empty() {
+            if reporter.session.is_none() || !reporter.owes() {
                 continue;
             }
             let moved = self.now.saturating_sub(reporter.moved);
@@ -281,8 +374,8 @@ impl State {
 
     /// Whether every reporter that is there has everything.
     pub(super) fn all_delivered(&self) -> bool {
-        self.reporters
-            .iter()
-            .all(|it| it.session.is_none() || (it.active.is_empty() && it.queue.is_empty()))
+        self.reporters.iter().all(|it| {
+            it.session.is_none() || (!it.owes() && it.queue.is_empty() && it.void.is_empty())
+        })
     }
 }

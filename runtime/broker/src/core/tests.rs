@@ -211,7 +211,7 @@ impl World {
                 let number = judged.inputs[0].content.unwrap().0.size;
                 self.judged.insert(file_of(&path), (number, judged.verdict));
             }
-            Action::Withdraw { path } => {
+            Action::Withdraw { path, .. } => {
                 self.judged.remove(&file_of(&path));
             }
             _ => {}

@@ -391,6 +391,24 @@ pub enum Action {
     Withdraw {
         /// The file.
         path: Arc<Path>,
+        /// Who has reported about it and is to take that back.
+        reporters: Vec<String>,
+    },
+    /// Tell a reporter that a file has gone.
+    Void {
+        /// The reporter's session.
+        session: Session,
+        /// The reporter.
+        reporter: String,
+        /// The file.
+        path: Arc<Path>,
+    },
+    /// Remember that a reporter has taken back what it said of a file that has gone.
+    Voided {
+        /// The reporter.
+        reporter: String,
+        /// The file.
+        path: Arc<Path>,
     },
     /// Remember that a file was looked at and found unchanged.
     Restamp {

@@ -49,7 +49,20 @@ impl Broker {
                 self.writers
                     .order(&path, Order::Store { job, config, root });
             }
-            Action::Withdraw { path } => self.writers.order(&path, Order::Withdraw(path.clone())),
+            Action::Withdraw { path, reporters } => {
+                let at = path.clone();
+                self.writers.order(&at, Order::Withdraw { path, reporters });
+            }
+            Action::Void {
+                session,
+                reporter,
+                path,
+            } => self.void(session, &reporter, &path),
+            Action::Voided { reporter, path } => {
+                let at = path.clone();
+                self.writers
+                    .order(&at, Order::Record(Entry::Voided { path, reporter }));
+            }
             Action::Restamp { path, judged } => {
                 let entry = Entry::Judged {
                     path: path.clone(),
@@ -150,6 +163,15 @@ impl Broker {
         });
     }
 
+    /// Tells a reporter that a file has gone.
+    fn void(&mut self, session: Session, reporter: &str, path: &Path) {
+        let config = self.in_force.config.as_ref();
+        let gone = crate::deliveries::withdrawn(reporter, path, &self.store.places, config);
+        if let Some(peer) = self.sessions.peers.get(&session) {
+            self.host.send(*peer, &ToPeer::Withdrawn(gone));
+        }
+    }
+
     pub(super) fn delivery(&mut self, ready: Ready) -> bool {
         let Ready {
             session,
@@ -157,6 +179,7 @@ impl Broker {
             message,
         } = ready;
         match message {
+            Ok(_) if !self.state.awaits_result(session, job) => true,
             Ok(message) => {
                 if let Some(peer) = self.sessions.peers.get(&session) {
                     self.host.send(*peer, &message);

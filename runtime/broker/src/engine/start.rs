@@ -48,6 +48,7 @@ impl Broker {
             None => Journal::in_memory()?,
         };
         let remembered = journal.remembered()?;
+        let voids = journal.voids()?;
         let in_force = Arc::new(in_force(&loaded)?);
         host.set_config(in_force.digest, &in_force.encoded);
         let state = State::new(options.settings.clone(), in_force.digest, in_force.demand());
@@ -91,6 +92,9 @@ impl Broker {
             control,
             options,
         };
+        for (path, reporter) in &voids {
+            broker.state.remember_void(path, reporter);
+        }
         let dependencies = broker.remember(remembered);
         broker.look(senders.seen)?;
         if let Some(watcher) = &broker.watcher {
@@ -106,10 +110,7 @@ impl Broker {
         let mut stamps: BTreeMap<Arc<Path>, Option<Stamp>> = BTreeMap::new();
         for mut file in files {
             if !self.store.is_complete(&file.path, &file.judged) {
-                if !file.path.exists() {
-                    self.writers
-                        .order(&file.path, Order::Withdraw(file.path.clone()));
-                }
+                self.forget_incomplete(file);
                 continue;
             }
             for input in file.judged.inputs.iter().skip(1) {
@@ -123,6 +124,18 @@ impl Broker {
                 .remember(&file.path, file.judged, &file.delivered);
         }
         stamps.into_iter().collect()
+    }
+
+    /// A result that is not all there counts for nothing, nor does what was reported of it.
+    fn forget_incomplete(&mut self, file: Remembered) {
+        let reporters: Vec<String> = file.delivered.into_iter().map(|(name, _)| name).collect();
+        for reporter in &reporters {
+            self.state.remember_void(&file.path, reporter);
+        }
+        if !file.path.exists() {
+            let (at, path) = (file.path.clone(), file.path);
+            self.writers.order(&at, Order::Withdraw { path, reporters });
+        }
     }
 
     /// Begins to look at the files: by watching, or once.

@@ -1,0 +1,166 @@
+//! What reporters are told of files that go, whoever dies in between.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use qcbus_messages::{Digest, FromPeer, Hello, JobId, PROTOCOL_VERSION, PeerReport, Role, Verdict};
+
+use super::*;
+use crate::InForce;
+
+const TEXT: &str = "text";
+
+/// A state machine that knows one judged file from the journal.
+struct Desk {
+    state: State,
+    path: Arc<Path>,
+    sessions: u64,
+}
+
+impl Desk {
+    /// `delivered`: the journal says that the reporter has it.
+    fn new(delivered: bool) -> Desk {
+        let in_force = InForce::new(None).unwrap();
+        let mut state = State::new(Settings::default(), in_force.digest, in_force.demand());
+        let path: Arc<Path> = Path::new("/x/a.xodr").into();
+        let judged = Judged {
+            job: JobId(7),
+            verdict: Verdict::Accepted,
+            digest: Digest::default(),
+            basis: Digest::default(),
+            config: Digest::default(),
+            bundles: 0,
+            inputs: Vec::new(),
+            racy: false,
+            counts: [0; 3],
+            why: Vec::new(),
+            xqar: "/out/a.xodr.xqar".into(),
+        };
+        let by = [(TEXT.to_owned(), JobId(7))];
+        state.remember(&path, judged, if delivered { &by } else { &[] });
+        Desk {
+            state,
+            path,
+            sessions: 0,
+        }
+    }
+
+    fn event(&mut self, event: Event) -> Vec<Action> {
+        self.state.handle(Duration::from_secs(1), event)
+    }
+
+    fn join(&mut self) -> (Session, Vec<Action>) {
+        self.sessions += 1;
+        let session = Session(self.sessions);
+        let hello = Hello {
+            protocol: PROTOCOL_VERSION,
+            role: Role::Reporter,
+            name: TEXT.to_owned(),
+            version: "1".to_owned(),
+            incarnation: self.sessions,
+            pid: 100 + u32::try_from(self.sessions).unwrap(),
+            launch: None,
+            capacity: 4,
+        };
+        (session, self.event(Event::Hello { session, hello }))
+    }
+
+    fn vanish(&mut self) -> Vec<Action> {
+        let path = self.path.clone();
+        self.event(Event::Vanished { path })
+    }
+
+    fn say(&mut self, session: Session, message: FromPeer) -> Vec<Action> {
+        self.event(Event::Message { session, message })
+    }
+}
+
+fn withdrawn() -> FromPeer {
+    FromPeer::WithdrawalDone {
+        input: "/x/a.xodr".to_owned(),
+        report: PeerReport::Written,
+    }
+}
+
+fn is_told(actions: &[Action]) -> bool {
+    let told =
+        |it: &Action| matches!(it, Action::Void { path, .. } if **path == *Path::new("/x/a.xodr"));
+    actions.iter().any(told)
+}
+
+fn is_over(actions: &[Action]) -> bool {
+    let over = |it: &Action| matches!(it, Action::Voided { reporter, .. } if reporter == TEXT);
+    actions.iter().any(over)
+}
+
+#[test]
+fn a_reporter_that_is_there_is_told_at_once() {
+    let mut desk = Desk::new(true);
+    let (session, _) = desk.join();
+    let actions = desk.vanish();
+    assert!(is_told(&actions), "{actions:?}");
+    let named =
+        |it: &Action| matches!(it, Action::Withdraw { reporters, .. } if reporters == &[TEXT]);
+    assert!(actions.iter().any(named), "the journal knows: {actions:?}");
+    assert!(is_over(&desk.say(session, withdrawn())));
+    assert!(!is_over(&desk.say(session, withdrawn())), "only once");
+}
+
+#[test]
+fn a_reporter_that_is_away_is_told_when_it_comes() {
+    let mut desk = Desk::new(true);
+    assert!(!is_told(&desk.vanish()));
+    let (_, actions) = desk.join();
+    assert!(is_told(&actions), "{actions:?}");
+}
+
+#[test]
+fn a_reporter_that_dies_before_it_has_done_so_is_told_again() {
+    let mut desk = Desk::new(true);
+    let (session, _) = desk.join();
+    assert!(is_told(&desk.vanish()));
+    desk.event(Event::Gone { session });
+    let (session, actions) = desk.join();
+    assert!(is_told(&actions), "{actions:?}");
+    assert!(is_over(&desk.say(session, withdrawn())));
+    let (_, actions) = desk.join();
+    assert!(!is_told(&actions), "{actions:?}");
+}
+
+#[test]
+fn a_result_under_way_is_not_sent_after_its_file_has_gone() {
+    let mut desk = Desk::new(false);
+    let (session, actions) = desk.join();
+    let sent = |it: &Action| matches!(it, Action::Deliver { .. });
+    assert!(actions.iter().any(sent), "{actions:?}");
+    assert!(desk.state.awaits_result(session, JobId(7)));
+    assert!(is_told(&desk.vanish()));
+    assert!(!desk.state.awaits_result(session, JobId(7)));
+}
+
+#[test]
+fn what_a_former_broker_sent_unheard_is_taken_back_too() {
+    let mut desk = Desk::new(false);
+    let spec = ChildSpec {
+        name: TEXT.to_owned(),
+        role: Role::Reporter,
+        version: None,
+        command: vec!["text".to_owned()],
+        restart: Restart::OnFailure,
+    };
+    desk.event(Event::Children { specs: vec![spec] });
+    desk.vanish();
+    let (_, actions) = desk.join();
+    assert!(is_told(&actions), "{actions:?}");
+}
+
+#[test]
+fn what_the_journal_remembers_is_said_after_a_restart() {
+    let mut desk = Desk::new(false);
+    let gone: Arc<Path> = Path::new("/x/gone.xodr").into();
+    desk.state.remember_void(&gone, TEXT);
+    let (_, actions) = desk.join();
+    let told = |it: &Action| matches!(it, Action::Void { path, .. } if *path == gone);
+    assert!(actions.iter().any(told), "{actions:?}");
+}
