@@ -120,12 +120,17 @@ pub(super) fn unknown_root(root: Node<'_>, known: &[&str], title: &str) -> Wordi
         .suggesting(closest(root.name(), known.iter().copied()))
 }
 
-pub(super) fn repeated(node: Node<'_>) -> Wording {
-    let parent = node.parent().map_or("", |parent| parent.name());
-    Wording::new(
+pub(super) fn repeated(node: Node<'_>, parent: Node<'_>, count: u32, most: u32) -> Wording {
+    let limit = match most {
+        1 => "at most once".to_owned(),
+        most => format!("at most {most} times"),
+    };
+    let text = format!(
+        "<{}> occurs {count} times in <{}>, but may occur {limit}",
         node.name(),
-        format!("<{}> occurs more often than <{parent}> allows", node.name()),
-    )
+        parent.name()
+    );
+    Wording::new(node.name(), text).expecting(vec![limit])
 }
 
 pub(super) fn no_children(node: Node<'_>, parent: Node<'_>) -> Wording {
@@ -161,16 +166,23 @@ pub(super) fn missing_before(
 /// Siblings looked at to say before which one a child belongs.
 const MAX_SIBLINGS: usize = 200;
 
-/// The name of the sibling after which a child could no longer come.
-fn comes_before<'a>(
+/// The sibling because of which a child has no place.
+enum Obstacle<'a> {
+    /// The child must come before it.
+    Before(&'a str),
+    /// There may be only one of the two.
+    Instead(&'a str),
+}
+
+fn obstacle<'a>(
     node: Node<'a>,
     parent: Node<'a>,
     model: &Model,
     schema: &Schema,
-) -> Option<&'a str> {
+) -> Option<Obstacle<'a>> {
     let name = schema.names.find(node.name())?;
-    let may_come = |state| way_to(model, state, |edge, _| edge == Some(name)).is_some();
-    let (mut state, mut open, mut closing) = (0, true, None);
+    let way = |state, name| way_to(model, state, |edge, _| edge == Some(name));
+    let (mut state, mut obstacle) = (0, None);
     for sibling in parent
         .children()
         .take(MAX_SIBLINGS)
@@ -184,16 +196,22 @@ fn comes_before<'a>(
         else {
             continue;
         };
-        if edge.to != state {
-            state = edge.to;
-            let still = may_come(state);
-            if open && !still {
-                closing = Some(sibling.name());
-            }
-            open = still;
+        if edge.to == state {
+            continue;
         }
+        match (way(state, name), way(edge.to, name)) {
+            (Some((after, _)), None) => {
+                obstacle = Some(match way(after, edge.name) {
+                    Some(_) => Obstacle::Before(sibling.name()),
+                    None => Obstacle::Instead(sibling.name()),
+                });
+            }
+            (_, Some(_)) => obstacle = None,
+            (None, None) => {}
+        }
+        state = edge.to;
     }
-    closing.filter(|_| !open)
+    obstacle
 }
 
 pub(super) fn misplaced(
@@ -204,19 +222,19 @@ pub(super) fn misplaced(
     schema: &Schema,
 ) -> Wording {
     let (expected, words) = expected_here(model, state, parent, schema);
-    let text = match comes_before(node, parent, model, schema) {
-        Some(later) => format!(
-            "<{}> in <{}> comes too late: it must come before <{later}>",
-            node.name(),
-            parent.name()
+    let (name, parent_name) = (node.name(), parent.name());
+    let text = match obstacle(node, parent, model, schema) {
+        Some(Obstacle::Before(later)) => {
+            format!("<{name}> in <{parent_name}> comes too late: it must come before <{later}>")
+        }
+        Some(Obstacle::Instead(other)) => format!(
+            "<{name}> cannot stand beside <{other}>: <{parent_name}> takes one or the other"
         ),
         None => format!(
-            "<{}> may occur in <{}>, but not at this place: children have a fixed order, expected here: {words}",
-            node.name(),
-            parent.name()
+            "<{name}> may occur in <{parent_name}>, but not at this place: children have a fixed order, expected here: {words}"
         ),
     };
-    Wording::new(node.name(), text).expecting(expected)
+    Wording::new(name, text).expecting(expected)
 }
 
 pub(super) fn unexpected_child(
