@@ -140,6 +140,11 @@ fn children_that_do_not_fit_are_told_apart() {
             "<b/><c/><b/>",
             Some("<b> in <a> comes too late: it must come before <c>"),
         ),
+        ("<d/>", Some("<a> lacks <c>, which must come before <d>")),
+        (
+            "<e/><c/>",
+            Some("<e> in <a> comes too early: <c> must come before it"),
+        ),
         (
             "<c/><d/><e/>",
             Some("<e> cannot stand beside <d>: <a> takes one or the other"),
@@ -157,6 +162,12 @@ fn children_that_do_not_fit_are_told_apart() {
         let texts: Vec<&str> = found.iter().map(|one| one.1.as_str()).collect();
         assert_eq!(texts, said.into_iter().collect::<Vec<_>>(), "{children}");
     }
+    // What was expected before a sibling counts as if it had been there.
+    let found = findings(&schema, "t.xml", "<a><d/><b/></a>");
+    assert_eq!(
+        found[1].1,
+        "<b> in <a> comes too late: it must come before <d>"
+    );
 }
 
 #[test]
@@ -184,6 +195,32 @@ fn findings_teach() {
             .any(|text| text.contains("did you mean \"planView\"?")),
         "{texts:?}"
     );
+    for (attributes, said) in [
+        (
+            "xmlns:xsi='http://www.w3.org/2001/XMLSchema' xsi:noNamespaceSchemaLocation='a.xsd'",
+            Some(
+                "xsi:noNamespaceSchemaLocation of <OpenDRIVE> means nothing: \
+                 xmlns:xsi must be \"http://www.w3.org/2001/XMLSchema-instance\"",
+            ),
+        ),
+        (
+            "xmlns:i='http://www.w3.org/2001/XMLSchema-instance' i:noNamespaceSchemaLocation='a.xsd'",
+            None,
+        ),
+        (
+            "version='1.7'",
+            Some("<OpenDRIVE> has no attribute version: it takes none"),
+        ),
+    ] {
+        let text = road("").replacen("<OpenDRIVE", &format!("<OpenDRIVE {attributes}"), 1);
+        let found = findings(table, "t.xodr", &text);
+        let first = found.iter().map(|one| one.1.as_str()).next();
+        assert_eq!(
+            first.filter(|text| *text != "<OpenDRIVE> lacks <road>"),
+            said,
+            "{attributes}"
+        );
+    }
     let found = findings(table, "t.xodr", &road("<raod/>"));
     assert!(
         found

@@ -3,6 +3,7 @@
 use qcbus_document::{Attribute, Node};
 
 use super::children::way_to;
+use super::types::XSI;
 use crate::assertion::Assertion;
 use crate::defects;
 use crate::model::{AttributeUse, ElementDecl, Model, Schema};
@@ -144,6 +145,9 @@ pub(super) fn no_children(node: Node<'_>, parent: Node<'_>) -> Wording {
     )
 }
 
+/// Siblings looked at to say how a child and they belong together.
+const MAX_SIBLINGS: usize = 200;
+
 pub(super) fn missing_before(
     node: Node<'_>,
     parent: Node<'_>,
@@ -152,19 +156,23 @@ pub(super) fn missing_before(
 ) -> Wording {
     let names = texts(skipped.iter().copied(), schema);
     let defect = defects::missing_child(&names);
-    let text = format!(
-        "<{}> in <{}> comes too early: {} must come before it",
-        node.name(),
-        parent.name(),
-        elements(&names)
-    );
+    let (name, parent_name, list) = (node.name(), parent.name(), elements(&names));
+    let comes_later = || {
+        let mut siblings = parent.children().take(MAX_SIBLINGS);
+        siblings.any(|one| {
+            steps(names.len());
+            names.iter().any(|name| one.is(name))
+        })
+    };
+    let text = if comes_later() {
+        format!("<{name}> in <{parent_name}> comes too early: {list} must come before it")
+    } else {
+        format!("<{parent_name}> lacks {list}, which must come before <{name}>")
+    };
     Wording::new(node.name(), text)
         .expecting(names)
         .excused(defect)
 }
-
-/// Siblings looked at to say before which one a child belongs.
-const MAX_SIBLINGS: usize = 200;
 
 /// The sibling because of which a child has no place.
 enum Obstacle<'a> {
@@ -188,20 +196,16 @@ fn obstacle<'a>(
         .take(MAX_SIBLINGS)
         .take_while(|one| *one != node)
     {
-        let known = schema.names.find(sibling.name());
-        let Some(edge) = model
-            .edges(state)
-            .iter()
-            .find(|edge| Some(edge.name) == known)
-        else {
+        let Some(known) = schema.names.find(sibling.name()) else {
             continue;
         };
-        if edge.to == state {
+        // As the walk went: what should have come before a sibling counts as if it had.
+        let Some((to, _)) = way(state, known).filter(|(to, _)| *to != state) else {
             continue;
-        }
-        match (way(state, name), way(edge.to, name)) {
+        };
+        match (way(state, name), way(to, name)) {
             (Some((after, _)), None) => {
-                obstacle = Some(match way(after, edge.name) {
+                obstacle = Some(match way(after, known) {
                     Some(_) => Obstacle::Before(sibling.name()),
                     None => Obstacle::Instead(sibling.name()),
                 });
@@ -209,7 +213,7 @@ fn obstacle<'a>(
             (_, Some(_)) => obstacle = None,
             (None, None) => {}
         }
-        state = edge.to;
+        state = to;
     }
     obstacle
 }
@@ -408,12 +412,23 @@ pub(super) fn unexpected_attribute(
     let suggestion = suggestion.or_else(longer);
     let list = match (&suggestion, free.as_slice()) {
         (Some(_), _) => String::new(),
-        (None, []) => " and none that is not used yet".to_owned(),
+        (None, []) if declared.is_empty() => ": it takes none".to_owned(),
+        (None, []) => ", and all that it has are there".to_owned(),
         (None, free) => format!(", attributes not used yet: {}", free.join(", ")),
     };
     Wording::new(attribute.name(), text + &list)
         .expecting(free)
         .suggesting(suggestion.as_deref())
+}
+
+/// An attribute such as `xsi:type` whose prefix means something else, or nothing.
+pub(super) fn unbound_prefix(node: Node<'_>, attribute: Attribute<'_>, prefix: &str) -> Wording {
+    let text = format!(
+        "{} of <{}> means nothing: xmlns:{prefix} must be \"{XSI}\"",
+        attribute.name(),
+        node.name()
+    );
+    Wording::new(attribute.name(), text).expecting(vec![XSI.to_owned()])
 }
 
 pub(super) fn missing_attribute(
