@@ -135,7 +135,7 @@ impl<'a, 's> Walk<'a, 's> {
         };
         let names = &self.names;
         let numbers = frame.numbers.get_or_insert_with(|| {
-            let mut numbers = Box::<HashMap<NameId, Number>>::default();
+            let mut numbers = HashMap::<NameId, Number>::new();
             for child in parent.children() {
                 steps(1);
                 numbers.entry(names.element(child)).or_default().children += 1;

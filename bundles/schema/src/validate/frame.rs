@@ -24,7 +24,7 @@ pub(super) struct Frame<'s> {
     /// How many unknown children an `all` group met.
     pub(super) strangers: u32,
     /// The children, counted by name once one of them is wrong.
-    pub(super) numbers: Option<Box<HashMap<NameId, Number>>>,
+    pub(super) numbers: Option<HashMap<NameId, Number>>,
 }
 
 /// The children of one name.
