@@ -25,6 +25,8 @@ const MAY_KNOW: &[(&str, Option<&[&str]>)] = &[
     ("qcbus-sdk", Some(&["qcbus-bus", "qcbus-ingest"])),
     ("qcbus-opendrive", Some(&[])),
     ("qcbus-schema", Some(&[])),
+    // What the schema rules of all bundles have in common: for bundles, from their parts.
+    ("qcbus-schema-rule", Some(&["qcbus-sdk", "qcbus-schema"])),
     ("qcbus-xodr", Some(BUNDLE)),
     ("qcbus-xosc", Some(BUNDLE)),
     ("qcbus-reporter-sdk", Some(&["qcbus-bus", "qcbus-ingest"])),
@@ -35,8 +37,13 @@ const MAY_KNOW: &[(&str, Option<&[&str]>)] = &[
     ("qcbus-benches", None),
 ];
 
-/// What a bundle may link: its sdk and the models.
-const BUNDLE: &[&str] = &["qcbus-sdk", "qcbus-opendrive", "qcbus-schema"];
+/// What a bundle may link: its sdk, the models and the schema rule.
+const BUNDLE: &[&str] = &[
+    "qcbus-sdk",
+    "qcbus-opendrive",
+    "qcbus-schema",
+    "qcbus-schema-rule",
+];
 
 /// Among the crates of [`IDL`], who may know whom: the lowest knows nobody.
 const INSIDE_IDL: &[(&str, &[&str])] = &[

@@ -4,14 +4,19 @@ xmlschema (OpenDRIVE 1.8) on real files and on seeded mutants.
 
     pip install lxml xmlschema
     differential.py --tool TARGET/release/examples/schema_tool --xsd DIR [--files DIR]... [--mutants N]
-                    [--seed N] [--record FILE]
+                    [--seed N]... [--record FILE]
 
 DIR holds one folder of XSDs per table, named like the table: `xodr-1.7/`, `xosc-1.3/` (the script
 `tables_agree.py --keep DIR` makes it). Namespaces: the validator disregards them, so the oracles get
 the files without a default namespace, or with the schema's own.
+
+Every seed makes `--mutants` of them; whole files are judged once, whatever the seeds. A disagreement
+counts as one in all figures but the last, which leaves out those where `proof.py` proves the other
+validator wrong.
 """
 
 import argparse
+import collections
 import json
 import pathlib
 import random
@@ -24,53 +29,45 @@ import lxml.etree as et
 import xmlschema
 
 from mutate import elements, mutation, splice
+from oracle import Oracle
+from proof import Case, explanation
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 TABLES = ROOT / "bundles/schema/tables"
 DOCUMENTS = ROOT / "bundles/schema/tests/documents"
-VIRES = {"xodr-1.1", "xodr-1.2"}
+
+Row = collections.namedtuple("Row", "path cut text")
+Ours = collections.namedtuple("Ours", "verdict row end_row offset code words")
 
 
-class Oracle:
-    """The other validator for one table."""
+class Tally:
+    """Counts over some rows."""
 
-    def __init__(self, name, folder):
+    def __init__(self, name):
         self.name = name
-        self.slow = name == "xodr-1.8"
-        main = [p for p in sorted(folder.glob("*.xsd")) if re.search(r"_core|_Core|OpenDRIVE_1|OpenSCENARIO", p.name)][0]
-        self.schema = xmlschema.XMLSchema11(str(main)) if self.slow else et.XMLSchema(et.parse(str(main)))
+        self.total = self.agreed = self.invalid = self.rows = self.rows_agreed = 0
+        self.reasons = collections.Counter()
 
-    def judge(self, text):
-        """(verdict, line of the first error)"""
-        text = re.sub(r"\sxmlns=(\"[^\"]*\"|'[^']*')", "", text)
-        if self.name in VIRES:
-            text = text.replace("<OpenDRIVE", '<OpenDRIVE xmlns="www.vires.com"', 1)
-        try:
-            tree = et.fromstring(text.encode())
-        except et.XMLSyntaxError:
-            return "ill-formed", 0
-        if self.slow:
-            return ("valid" if self.schema.is_valid(tree) else "invalid"), 0
-        valid = self.schema.validate(tree)
-        line = 0 if valid else self.schema.error_log[0].line
-        return ("valid" if valid else "invalid"), line
+    def print(self):
+        """One line, and one per class of disagreement."""
+        proven = sum(count for reason, count in self.reasons.items() if reason)
+        print(
+            f"{self.name}: {self.agreed} of {self.total} verdicts agree ({share(self.agreed, self.total)}), {self.invalid} invalid;"
+            f" with {proven} proven defects {share(self.agreed + proven, self.total)};"
+            f" first rows: {self.rows_agreed} of {self.rows} ({share(self.rows_agreed, self.rows)})"
+        )
+        for reason, count in self.reasons.most_common():
+            print(f"    {count} × {reason or 'UNEXPLAINED'}")
+
+    def __iadd__(self, other):
+        for field in ("total", "agreed", "invalid", "rows", "rows_agreed"):
+            setattr(self, field, getattr(self, field) + getattr(other, field))
+        self.reasons += other.reasons
+        return self
 
 
-def explanation(oracle, wanted, verdict, words):
-    """Why the other validator is known to be wrong here; see docs/schema.md."""
-    if (wanted, verdict) != ("valid", "invalid"):
-        return None
-    if not oracle.slow and re.match(r'"[+-]?[0-9.]+[eE]" is no value', words):
-        return "libxml2 takes an exponent without digits for a number"
-    if words.startswith('"NaN"'):
-        return "xmlschema and libxml2 let NaN pass every bound"
-    if oracle.slow and "white space between its tags" in words:
-        return "xmlschema lets white space pass in an element without content"
-    if oracle.slow and words.startswith("<userData> may not contain text"):
-        return "xmlschema lets text pass where the content is xs:any"
-    if oracle.slow and "refers to nothing" in words and "<connection>" in words:
-        return "xmlschema misses references from elements whose type an alternative chose"
-    return None
+def share(part, whole):
+    return f"{100 * part / max(whole, 1):.3f} %"
 
 
 def table_for(text):
@@ -95,7 +92,7 @@ def read(path):
 
 
 def judge_ours(tool, table, texts):
-    """Our verdicts: (verdict, row, row of the tag's end, code, text) per text."""
+    """Our verdict and first finding per text."""
     with tempfile.TemporaryDirectory() as folder:
         suffix = table.split("-")[0]
         names = []
@@ -106,22 +103,15 @@ def judge_ours(tool, table, texts):
         done = subprocess.run(
             [tool, "validate", str(TABLES / f"{table}.tbl")], input="\n".join(names), text=True, capture_output=True, check=True
         )
-    return [line.split("\t")[1:] for line in done.stdout.splitlines()]
+    found = []
+    for line in done.stdout.splitlines():
+        verdict, row, end_row, offset, code, words = line.split("\t")[1:]
+        found.append(Ours(verdict, int(row), int(end_row), int(offset), code, words))
+    return found
 
 
-def main():
-    arguments = argparse.ArgumentParser()
-    arguments.add_argument("--tool", required=True)
-    arguments.add_argument("--xsd", required=True, type=pathlib.Path)
-    arguments.add_argument("--files", action="append", default=[], type=pathlib.Path)
-    arguments.add_argument("--mutants", type=int, default=5000)
-    arguments.add_argument("--seed", type=int, default=1)
-    arguments.add_argument("--record", type=pathlib.Path, help="write the verdicts over our own documents")
-    arguments.add_argument("--verbose", action="store_true", help="print first rows that differ")
-    options = arguments.parse_args()
-    rng = random.Random(options.seed)
-    oracles = {f.name: Oracle(f.name, f) for f in sorted(options.xsd.iterdir()) if (TABLES / f"{f.name}.tbl").exists()}
-
+def base_documents(options, oracles):
+    """(path, text, table) of our own documents and of the real files."""
     bases = []
     own = sorted(DOCUMENTS.glob("*.x*"))
     for path in own + sorted(p for f in options.files for p in f.rglob("*") if p.suffix in (".xodr", ".xosc")):
@@ -132,65 +122,101 @@ def main():
         if name in oracles:
             bases.append((path, text, name))
     print(f"{len(bases)} base documents ({len(own)} our own), {len(oracles)} schemas")
+    return bases
 
+
+def whole_files(bases, oracles):
+    """Every document, also against the other versions of its kind."""
     work = {name: [] for name in oracles}
     for path, text, name in bases:
         kind = name.split("-")[0]
         for other in oracles:
             if other == name or (other.startswith(kind) and not oracles[other].slow and len(text) < 200_000):
-                work[other].append((path, None, text))
-    real = sum(len(rows) for rows in work.values())
+                work[other].append(Row(path, None, text))
+    return work
+
+
+def mutants(bases, oracles, seed, wanted):
+    """So many mutants, half of them of our own documents."""
+    rng = random.Random(seed)
+    work = {name: [] for name in oracles}
     small = [base for base in bases if len(base[1]) < 60_000]
+    own = [base for base in small if DOCUMENTS in base[0].parents]
     trees = {}
-    made = 0
-    while made < options.mutants:
-        path, text, name = rng.choice([b for b in small if b[0] in own] if rng.random() < 0.5 and own else small)
+    while wanted:
+        path, text, name = rng.choice(own if rng.random() < 0.5 and own else small)
         if oracles[name].slow and len(text) > 25_000:
             continue
         if path not in trees:
             trees[path] = elements(text)
         cut = mutation(rng, text, trees[path])
         if cut is not None:
-            work[name].append((path, cut, splice(text, cut)))
-            made += 1
-    print(f"{real} rows of whole files, {made} mutants, seed {options.seed}")
+            work[name].append(Row(path, cut, splice(text, cut)))
+            wanted -= 1
+    return work
 
-    agreed = rows_agreed = rows_all = total = invalid = 0
-    unexplained = 0
-    disagreements, record = [], []
+
+def compare(title, work, oracles, options, record):
+    """Judges all rows by both."""
+    tally = Tally(title)
+    judge = lambda table, texts: judge_ours(options.tool, table, texts)
     for name, rows in work.items():
-        ours = judge_ours(options.tool, name, [text for _, _, text in rows])
-        for (path, cut, text), (verdict, row, end_row, code, words) in zip(rows, ours, strict=True):
-            wanted, line = oracles[name].judge(text)
-            total += 1
-            invalid += wanted == "invalid"
-            if verdict == wanted:
-                agreed += 1
-                if wanted == "invalid" and not oracles[name].slow:
-                    rows_all += 1
-                    same = line in (int(row), int(end_row))
-                    rows_agreed += same
-                    if not same and options.verbose:
-                        print("ROW", name, path, cut, line, row, end_row, words, str(oracles[name].schema.error_log[:1]))
-                if cut and path in own and wanted != "ill-formed":
-                    record.append({"document": path.name, "at": cut[0], "remove": cut[1], "insert": cut[2], "valid": wanted == "valid"})
-            else:
-                why = ""
-                if wanted == "invalid" and not oracles[name].slow:
-                    why = str(oracles[name].schema.error_log[:1])
-                reason = explanation(oracles[name], wanted, verdict, words)
-                unexplained += reason is None
-                disagreements.append((reason or "UNEXPLAINED", name, str(path), cut, wanted, verdict, words, why))
-    print(f"{agreed} of {total} verdicts agree ({100 * agreed / total:.3f} %), {invalid} invalid; unexplained: {unexplained}")
-    print(f"{rows_agreed} of {rows_all} first rows agree with lxml")
-    for row in disagreements:
-        print(*row, sep="\n    ")
+        oracle = oracles[name]
+        for row, ours in zip(rows, judge(name, [row.text for row in rows]), strict=True):
+            wanted, line = oracle.judge(row.text)
+            tally.total += 1
+            tally.invalid += wanted == "invalid"
+            if ours.verdict != wanted:
+                words = oracle.words() if wanted == "invalid" else ""
+                reason = explanation(Case(row.text, oracle, judge, wanted, ours))
+                tally.reasons[reason] += 1
+                print(f"  {reason or 'UNEXPLAINED'}", name, row.path, row.cut, wanted, ours.verdict, ours.words, words, sep="\n      ")
+                continue
+            tally.agreed += 1
+            if wanted == "invalid" and not oracle.slow:
+                tally.rows += 1
+                same = line in (ours.row, ours.end_row)
+                tally.rows_agreed += same
+                if not same and options.verbose:
+                    print("ROW", name, row.path, row.cut, line, ours.row, ours.end_row, ours.words, oracle.words())
+            if row.cut and DOCUMENTS in row.path.parents and wanted != "ill-formed":
+                at, remove, insert = row.cut
+                record.append({"document": row.path.name, "at": at, "remove": remove, "insert": insert, "valid": wanted == "valid"})
+    tally.print()
+    sys.stdout.flush()
+    return tally
+
+
+def main():
+    arguments = argparse.ArgumentParser()
+    arguments.add_argument("--tool", required=True)
+    arguments.add_argument("--xsd", required=True, type=pathlib.Path)
+    arguments.add_argument("--files", action="append", default=[], type=pathlib.Path)
+    arguments.add_argument("--mutants", type=int, default=5000, help="for each seed")
+    arguments.add_argument("--seed", type=int, action="append", default=[])
+    arguments.add_argument("--record", type=pathlib.Path, help="write the verdicts over our own documents")
+    arguments.add_argument("--verbose", action="store_true", help="print first rows that differ")
+    options = arguments.parse_args()
+    seeds = options.seed or [1]
+    oracles = {f.name: Oracle(f.name, f) for f in sorted(options.xsd.iterdir()) if (TABLES / f"{f.name}.tbl").exists()}
+    bases = base_documents(options, oracles)
+    record = []
+    files = compare("whole files", whole_files(bases, oracles), oracles, options, record)
+    mutated = Tally("all mutants")
+    for seed in seeds:
+        work = mutants(bases, oracles, seed, options.mutants)
+        mutated += compare(f"seed {seed}", work, oracles, options, record)
+    mutated.print()
+    pooled = Tally("pooled")
+    pooled += files
+    pooled += mutated
+    pooled.print()
     if options.record:
-        rng.shuffle(record)
-        head = {"seed": options.seed, "oracles": f"lxml {et.__version__}, xmlschema {xmlschema.__version__}"}
+        random.Random(seeds[0]).shuffle(record)
+        head = {"seed": seeds[0], "oracles": f"lxml {et.__version__}, xmlschema {xmlschema.__version__}"}
         lines = [json.dumps(head)] + [json.dumps(row) for row in record[:800]]
         options.record.write_text("\n".join(lines) + "\n")
-    return 0 if agreed >= 0.999 * total and unexplained == 0 else 1
+    return 0 if pooled.agreed >= 0.999 * pooled.total and None not in pooled.reasons else 1
 
 
 if __name__ == "__main__":

@@ -3,7 +3,8 @@
 //! ```text
 //! schema_tool compile TITLE OUT XSD...   write tables
 //! schema_tool validate TABLES            read file names from stdin, print one verdict per line:
-//!                                        file, valid|invalid|ill-formed, row, end row of the tag, code, text
+//!                                        file, valid|invalid|ill-formed, row, end row of the tag, byte
+//!                                        offset of the element or attribute value, code, text
 //! schema_tool generate TABLES SEED SIZE  print a document made from the tables
 //! schema_tool load                       time and memory of reading all shipped tables
 //! schema_tool time TABLES FILE           megabytes per second of validation alone
@@ -83,16 +84,18 @@ fn verdict(schema: &Schema, file: &str) -> Result<String, String> {
     let image = image(file)?;
     let document = Document::open(&image).map_err(|error| error.to_string())?;
     if !document.is_well_formed() {
-        return Ok("ill-formed\t0\t0\t\t".to_owned());
+        return Ok("ill-formed\t0\t0\t0\t\t".to_owned());
     }
     let report = schema.validate(&document, Limits::default());
     let Some(first) = report.findings.first() else {
-        return Ok("valid\t0\t0\t\t".to_owned());
+        return Ok("valid\t0\t0\t0\t\t".to_owned());
     };
     let row = document.position(first.node.offset()).row;
     let text = first.text.replace(['\n', '\t'], " ");
+    let at = first.node.offset();
+    let at = first.attribute.map_or(at, |it| it.value_offset());
     Ok(format!(
-        "invalid\t{row}\t{}\t{}\t{text}",
+        "invalid\t{row}\t{}\t{at}\t{}\t{text}",
         tag_end(&document, first.node),
         first.code.as_str()
     ))

@@ -117,6 +117,60 @@ fn content_models_count_and_order() {
 }
 
 #[test]
+fn children_that_do_not_fit_are_told_apart() {
+    let schema = compiled(&schema(
+        "<xs:element name='a'><xs:complexType><xs:sequence>\
+           <xs:element name='b' minOccurs='0' maxOccurs='unbounded'/>\
+           <xs:element name='c' maxOccurs='2'/>\
+           <xs:choice minOccurs='0'><xs:element name='d'/><xs:element name='e'/></xs:choice>\
+           <xs:element name='c' minOccurs='0'/>\
+           <xs:element name='f' minOccurs='0'><xs:complexType><xs:all>\
+             <xs:element name='g'/><xs:element name='h' minOccurs='0'/></xs:all></xs:complexType></xs:element>\
+         </xs:sequence></xs:complexType></xs:element>",
+    ))
+    .expect("a schema");
+    for (children, said) in [
+        ("<c/><c/><c/><f><g/></f>", None),
+        (
+            "<c/><c/><c/><c/><c/>",
+            Some("<c> occurs 5 times in <a>, but may occur at most 3 times"),
+        ),
+        // However often it may occur, it may not come here.
+        (
+            "<b/><c/><b/>",
+            Some("<b> in <a> comes too late: it must come before <c>"),
+        ),
+        ("<d/>", Some("<a> lacks <c>, which must come before <d>")),
+        (
+            "<e/><c/>",
+            Some("<e> in <a> comes too early: <c> must come before it"),
+        ),
+        (
+            "<c/><d/><e/>",
+            Some("<e> cannot stand beside <d>: <a> takes one or the other"),
+        ),
+        (
+            "<c/><e/><e/>",
+            Some("<e> occurs 2 times in <a>, but may occur at most once"),
+        ),
+        (
+            "<c/><f><g/><h/><g/><g/></f>",
+            Some("<g> occurs 3 times in <f>, but may occur at most once"),
+        ),
+    ] {
+        let found = findings(&schema, "t.xml", &format!("<a>{children}</a>"));
+        let texts: Vec<&str> = found.iter().map(|one| one.1.as_str()).collect();
+        assert_eq!(texts, said.into_iter().collect::<Vec<_>>(), "{children}");
+    }
+    // What was expected before a sibling counts as if it had been there.
+    let found = findings(&schema, "t.xml", "<a><d/><b/></a>");
+    assert_eq!(
+        found[1].1,
+        "<b> in <a> comes too late: it must come before <d>"
+    );
+}
+
+#[test]
 fn findings_teach() {
     let table = support::table("xodr-1.7");
     let road = |inner: &str| {
@@ -141,6 +195,32 @@ fn findings_teach() {
             .any(|text| text.contains("did you mean \"planView\"?")),
         "{texts:?}"
     );
+    for (attributes, said) in [
+        (
+            "xmlns:xsi='http://www.w3.org/2001/XMLSchema' xsi:noNamespaceSchemaLocation='a.xsd'",
+            Some(
+                "xsi:noNamespaceSchemaLocation of <OpenDRIVE> means nothing: \
+                 xmlns:xsi must be \"http://www.w3.org/2001/XMLSchema-instance\"",
+            ),
+        ),
+        (
+            "xmlns:i='http://www.w3.org/2001/XMLSchema-instance' i:noNamespaceSchemaLocation='a.xsd'",
+            None,
+        ),
+        (
+            "version='1.7'",
+            Some("<OpenDRIVE> has no attribute version: it takes none"),
+        ),
+    ] {
+        let text = road("").replacen("<OpenDRIVE", &format!("<OpenDRIVE {attributes}"), 1);
+        let found = findings(table, "t.xodr", &text);
+        let first = found.iter().map(|one| one.1.as_str()).next();
+        assert_eq!(
+            first.filter(|text| *text != "<OpenDRIVE> lacks <road>"),
+            said,
+            "{attributes}"
+        );
+    }
     let found = findings(table, "t.xodr", &road("<raod/>"));
     assert!(
         found

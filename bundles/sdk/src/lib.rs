@@ -17,6 +17,7 @@ mod plan;
 mod resource;
 mod rule;
 pub mod run;
+mod seen;
 mod sink;
 mod subject;
 mod version;

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::bundle::groups;
 use crate::resource::Resource;
+use crate::seen::Seen;
 use crate::{Brought, Bundle, Checker, UserFiles, Values};
 
 /// A bundle's checkers, prepared for checking: which are demanded, and with which values.
@@ -16,6 +17,8 @@ pub struct Plan {
     pub(crate) entries: Vec<Entry>,
     /// What was made of the user's files.
     pub(crate) brought: Vec<Brought>,
+    /// What the files looked like that parameters name.
+    seen: Vec<Seen>,
 }
 
 /// How one checker takes part.
@@ -54,6 +57,7 @@ impl Plan {
             checkers,
             entries,
             brought: Vec::new(),
+            seen: Vec::new(),
         }
     }
 
@@ -82,8 +86,11 @@ impl Plan {
                 .find(|(known, _)| std::ptr::eq(*known, resource));
             let outcome = match known {
                 Some((_, outcome)) => outcome.clone(),
-                None => bring(resource, given, &values.text(&resource.param))
-                    .map(|brought| self.brought.extend(brought)),
+                None => {
+                    let directory = values.text(&resource.param);
+                    let brought = bring(resource, given, directory.trim(), &mut self.seen);
+                    brought.map(|brought| self.brought.extend(brought))
+                }
             };
             read.push((resource, outcome.clone()));
             if let Err(why) = outcome {
@@ -103,6 +110,11 @@ impl Plan {
         &self.checkers
     }
 
+    /// Whether a file that a parameter names has changed since it was read.
+    pub(crate) fn is_outdated(&self) -> bool {
+        self.seen.iter().any(Seen::is_outdated)
+    }
+
     /// Whether the result of the checker with this index is asked for.
     pub fn is_demanded(&self, index: usize) -> bool {
         self.entries.get(index).is_some_and(|entry| entry.demanded)
@@ -111,20 +123,22 @@ impl Plan {
 
 /// What a checker gets: from the command line, else from where its parameter says.
 fn bring(
-    resource: &Resource,
+    resource: &'static Resource,
     given: Option<&UserFiles>,
     directory: &str,
+    seen: &mut Vec<Seen>,
 ) -> Result<Option<Brought>, String> {
     if let Some(brought) = given.and_then(|given| given.of(resource)) {
         return Ok(Some(brought));
     }
-    match directory.trim() {
-        "" => Ok(None),
-        path => resource
-            .read(Path::new(path))
-            .map(Some)
-            .map_err(|error| format!("failed to {error}")),
+    if directory.is_empty() {
+        return Ok(None);
     }
+    let path = Path::new(directory);
+    // Looked at before it is read: what changes in between is noticed later.
+    seen.push(Seen::new(resource, path));
+    let read = resource.read(path).map(Some);
+    read.map_err(|error| format!("failed to {error}"))
 }
 
 fn preconditions(checkers: &[Checker], checker: &Checker) -> Result<Vec<usize>, String> {

@@ -119,7 +119,8 @@ impl Resource {
         (self.make)(&files).map_err(ResourceError::Unusable)
     }
 
-    fn files(&self, path: &Path) -> Result<Vec<ResourceFile>, ResourceError> {
+    /// The files that are read, in order; a path that is no directory counts as a file.
+    pub(crate) fn listing(&self, path: &Path) -> Result<Vec<PathBuf>, ResourceError> {
         let mut found = Vec::new();
         if path.is_dir() {
             let mut budget = MOST;
@@ -128,6 +129,12 @@ impl Resource {
         } else {
             found.push(path.to_owned());
         }
+        found.sort();
+        Ok(found)
+    }
+
+    fn files(&self, path: &Path) -> Result<Vec<ResourceFile>, ResourceError> {
+        let found = self.listing(path)?;
         if found.is_empty() {
             let endings: Vec<String> = self.endings.iter().map(|end| format!(".{end}")).collect();
             return Err(ResourceError::Nothing {
@@ -135,7 +142,6 @@ impl Resource {
                 endings: endings.join(" or "),
             });
         }
-        found.sort();
         let whole = path.components().count();
         let below = if path.is_dir() {
             whole

@@ -7,7 +7,6 @@ mod examples;
 mod families;
 mod model;
 mod rules;
-mod schema;
 
 use qcbus_document::FileKind;
 use qcbus_sdk::{Bundle, Version, basic};

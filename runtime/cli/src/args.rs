@@ -354,9 +354,12 @@ pub enum ConfigCommand {
 /// `qcbus schema …`.
 #[derive(Debug, Subcommand)]
 pub enum SchemaCommand {
-    /// Compile the .xsd files of a directory
+    /// Compile the .xsd files of a directory to tables for --schema-dir
+    ///
+    /// All files of the directory are one schema. What tables are for is told by their root element
+    /// and the first number such as 1.7 in the name of the directory or file.
     Compile {
-        /// Directory of .xsd files, or one of them
+        /// Directory of the .xsd files of one schema, or a schema of one file
         path: PathBuf,
         /// Where to write the tables
         #[arg(short, long, value_name = "FILE")]

@@ -36,12 +36,61 @@ fn desk() -> TempDir {
 }
 
 /// A broker that does not outlive a test that fails.
-struct Broker(Child);
+struct Broker<'d> {
+    process: Child,
+    desk: &'d Path,
+}
 
-impl Drop for Broker {
+impl<'d> Broker<'d> {
+    fn serve(desk: &'d Path, options: &[&str]) -> Broker<'d> {
+        let process = Command::new(env!("CARGO_BIN_EXE_qcbus"))
+            .args(["serve", ".", "--instance", "schemas"])
+            .args(options)
+            .current_dir(desk)
+            .env("XDG_RUNTIME_DIR", desk)
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        Broker { process, desk }
+    }
+
+    fn ask(&self, command: &[&str]) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_qcbus"))
+            .args(command)
+            .args(["--instance", "schemas"])
+            .current_dir(self.desk)
+            .env("XDG_RUNTIME_DIR", self.desk)
+            .output()
+            .unwrap()
+    }
+
+    /// The result for the map as it is now.
+    fn judge(&mut self) -> String {
+        // Until the broker is there, `wait` says so with exit code 4.
+        while self
+            .ask(&["wait", "map.xodr", "-q", "--timeout", "60s"])
+            .status
+            .code()
+            == Some(4)
+        {
+            assert!(
+                self.process.try_wait().unwrap().is_none(),
+                "the broker has ended"
+            );
+        }
+        result(self.desk, "qcbus-out/map.xodr.xqar")
+    }
+
+    fn down(mut self) {
+        self.ask(&["down"]);
+        self.process.wait().unwrap();
+    }
+}
+
+impl Drop for Broker<'_> {
     fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
+        let _ = self.process.kill();
+        let _ = self.process.wait();
     }
 }
 
@@ -185,39 +234,10 @@ fn a_broken_schema_of_a_configuration_is_the_checkers_error_unless_the_flag_says
 fn other_schemas_make_a_running_broker_judge_again() {
     let desk = desk();
     let check = |schemas: &[&str]| {
-        // Two brokers, one after the other, over one state.
-        let arguments: Vec<&str> = [&["serve", ".", "--instance", "schemas"][..], schemas].concat();
-        let mut broker = Command::new(env!("CARGO_BIN_EXE_qcbus"))
-            .args(&arguments)
-            .current_dir(desk.path())
-            .env("XDG_RUNTIME_DIR", desk.path())
-            .stderr(Stdio::null())
-            .spawn()
-            .map(Broker)
-            .unwrap();
-        let ask = |command: &[&str]| {
-            Command::new(env!("CARGO_BIN_EXE_qcbus"))
-                .args(command)
-                .args(["--instance", "schemas"])
-                .current_dir(desk.path())
-                .env("XDG_RUNTIME_DIR", desk.path())
-                .output()
-                .unwrap()
-        };
-        // Until the broker is there, `wait` says so with exit code 4.
-        while ask(&["wait", "map.xodr", "-q", "--timeout", "60s"])
-            .status
-            .code()
-            == Some(4)
-        {
-            assert!(
-                broker.0.try_wait().unwrap().is_none(),
-                "the broker has ended"
-            );
-        }
-        let found = result(desk.path(), "qcbus-out/map.xodr.xqar");
-        ask(&["down"]);
-        broker.0.wait().unwrap();
+        // One broker after the other over one state.
+        let mut broker = Broker::serve(desk.path(), schemas);
+        let found = broker.judge();
+        broker.down();
         found
     };
     assert!(check(&[]).contains("OpenDRIVE 1.7"));
@@ -226,4 +246,61 @@ fn other_schemas_make_a_running_broker_judge_again() {
         &check(&["--schema-dir", "own"])
     ));
     assert!(check(&[]).contains("OpenDRIVE 1.7"));
+}
+
+#[test]
+fn a_running_broker_uses_what_a_schema_of_its_configuration_has_become() {
+    let desk = desk();
+    let write = |name: &str, text: &str| std::fs::write(desk.path().join(name), text).unwrap();
+    let own = desk.path().join("own").display().to_string();
+    configuration(desk.path(), "", "", &own);
+    let mut broker = Broker::serve(desk.path(), &["-c", "config.xml"]);
+    let found = broker.judge();
+    assert!(names_own_schema(desk.path(), &found), "{found}");
+
+    write(
+        "own/map.xsd",
+        &OWN.replace("</xs:seq", "<xs:element name=\"road\"/></xs:seq"),
+    );
+    write(
+        "map.xodr",
+        &MAP.replace("<road/>", "<road /><!-- saved -->"),
+    );
+    let found = broker.judge();
+    assert!(found.contains("own/map.xsd sha256:"), "{found}");
+    assert!(!found.contains("has no child &lt;road&gt;"), "{found}");
+
+    write("own/map.xsd", BROKEN);
+    write("map.xodr", MAP);
+    let found = broker.judge();
+    assert!(
+        found.contains("own/map.xsd:2:1: &lt;xs:import&gt;"),
+        "{found}"
+    );
+    broker.down();
+}
+
+#[test]
+fn tables_are_for_the_version_in_the_name_of_their_directory() {
+    let desk = desk();
+    let dir = desk.path().join("acme-1.7");
+    std::fs::create_dir(&dir).unwrap();
+    std::fs::write(dir.join("map.xsd"), OWN).unwrap();
+    let compile = ["schema", "compile", "acme-1.7", "-o", "own.tbl"];
+    let output = qcbus(desk.path(), &compile);
+    assert!(output.status.success(), "{output:?}");
+    let tables = result(desk.path(), "own.tbl");
+    assert!(tables.contains("\ntitle acme-1.7\n"), "{tables}");
+
+    let map = |minor: &str| {
+        let text = MAP.replace("revMinor=\"7\"", &format!("revMinor=\"{minor}\""));
+        std::fs::write(desk.path().join("map.xodr"), text).unwrap();
+        qcbus(
+            desk.path(),
+            &["check", "-q", "--schema-dir", "own.tbl", "map.xodr"],
+        );
+        result(desk.path(), "qcbus-out/map.xodr.xqar")
+    };
+    assert!(map("7").contains("own.tbl sha256:"));
+    assert!(map("6").contains("OpenDRIVE 1.6"));
 }

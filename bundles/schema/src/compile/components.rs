@@ -200,7 +200,7 @@ fn include(node: Node<'_>, names: &[&str]) -> Result<(), CompileError> {
     }
     Err(CompileError::at(
         node,
-        Problem::Missing("included file", location.to_owned()),
+        Problem::NotGiven(location.to_owned()),
     ))
 }
 

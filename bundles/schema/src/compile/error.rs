@@ -62,6 +62,15 @@ pub enum Problem {
     /// An attribute value outside the subset.
     #[error("the value `{1}` of the attribute {0} is not supported")]
     Value(&'static str, String),
+    /// The same where one value is known.
+    #[error("the value `{1}` of the attribute {0} is not supported, only `{2}`")]
+    Only(&'static str, String, &'static str),
+    /// A built-in type outside the subset.
+    #[error("the built-in type `{0}` is not supported")]
+    Builtin(String),
+    /// An included file that was not given.
+    #[error("`{0}` was not given; all files of a schema lie in one directory")]
+    NotGiven(String),
     /// An attribute that must be there.
     #[error("the attribute {0} is missing")]
     NoAttribute(&'static str),

@@ -225,7 +225,7 @@ fn any(node: Node<'_>) -> Result<Particle, CompileError> {
         let value = node.attr("processContents").unwrap_or("strict").to_owned();
         return Err(CompileError::at(
             node,
-            Problem::Value("processContents", value),
+            Problem::Only("processContents", value, "skip"),
         ));
     }
     match node.attr("namespace") {

@@ -28,10 +28,7 @@ impl<'d> Compiler<'d, '_> {
     /// The number of a built-in type.
     pub(super) fn builtin(&mut self, node: Node<'d>, local: &str) -> Result<u32, CompileError> {
         let Some(builtin) = Builtin::find(local) else {
-            return Err(CompileError::at(
-                node,
-                Problem::Missing("built-in type (of those supported)", local.to_owned()),
-            ));
+            return Err(CompileError::at(node, Problem::Builtin(local.to_owned())));
         };
         if let Some(&id) = self.simple.builtins.get(&builtin) {
             return Ok(id);

@@ -118,10 +118,18 @@ impl<'a, 's> Walk<'a, 's> {
             local,
             "type" | "nil" | "schemaLocation" | "noNamespaceSchemaLocation"
         );
-        if known && self.bindings.is_xsi(node, prefix) {
-            return;
+        if !known {
+            self.unexpected(node, id, attribute, declared);
+        } else if !self.bindings.is_xsi(node, prefix) {
+            let key = (id, u32::from(attribute.name_number()));
+            self.reporter.add_at(
+                Code::UnexpectedAttribute,
+                key,
+                node,
+                Some(attribute),
+                || wording::unbound_prefix(node, attribute, prefix),
+            );
         }
-        self.unexpected(node, id, attribute, declared);
     }
 
     fn unexpected(

@@ -5,24 +5,20 @@
 //! does not know (perhaps a slip of the pen). In each case the automaton is brought into the state
 //! from which the rest of the children makes most sense, so that one cause gives one finding.
 
-use std::collections::{HashSet, VecDeque};
+use std::collections::{HashMap, HashSet, VecDeque};
 
 use qcbus_document::Node;
 
-use super::frame::{Body, Frame};
-use super::memo::Meant;
+use super::frame::{Body, Frame, Number};
+use super::memo::{Meant, Memo};
 use super::{Walk, wording};
 use crate::finding::Code;
-use crate::model::{ElementDecl, Model};
+use crate::model::{AllModel, ElementDecl, Model};
 use crate::names::NameId;
 use crate::work::steps;
 
 /// States looked at when searching the way to an expected child.
 const MAX_SEARCH: usize = 256;
-
-/// Earlier siblings looked at, for all children of an element together, to tell a repeated child
-/// from a misplaced one: no more than the square of their number, so about thirty per child.
-const MAX_SIBLINGS: usize = 1_000;
 
 impl<'a, 's> Walk<'a, 's> {
     /// The declaration of an element within its parent; `None` if its content is not checked.
@@ -56,13 +52,12 @@ impl<'a, 's> Walk<'a, 's> {
                 let bit = 1u64 << index.min(63);
                 let repeated = *seen & bit != 0;
                 *seen |= bit;
-                let declared = &model.members[index];
+                let model: &'s AllModel = model;
                 if repeated {
-                    let key = (std::ptr::from_ref(*model) as usize, u32::from(name.0));
-                    self.reporter
-                        .add(Code::RepeatedElement, key, node, || wording::repeated(node));
+                    let key = std::ptr::from_ref(model) as usize;
+                    self.is_surplus(node, name, key, |_| Some(1));
                 }
-                Some(declared)
+                model.members.get(index)
             }
             Body::Nothing | Body::Text(_) => {
                 let parent = self.document.node(frame.node)?;
@@ -117,10 +112,7 @@ impl<'a, 's> Walk<'a, 's> {
         {
             // Reported as missing before; it was only late.
             self.stack.last_mut()?.troubles.swap_remove(at);
-        } else if self.has_twin(node, parent) {
-            self.reporter
-                .add(Code::RepeatedElement, key, node, || wording::repeated(node));
-        } else {
+        } else if !self.is_surplus(node, name, key.0, |memo| memo.most(model, name)) {
             self.stack.last_mut()?.troubles.push(name);
             self.reporter.add(Code::MisplacedElement, key, node, || {
                 wording::misplaced(node, parent, model, state, self.schema)
@@ -129,24 +121,42 @@ impl<'a, 's> Walk<'a, 's> {
         model.children.get(index)
     }
 
-    /// Whether a child of the same name stands before. Looks at a limited number of
-    /// siblings for all wrong children of an element together.
-    fn has_twin(&mut self, node: Node<'a>, parent: Node<'a>) -> bool {
-        let Some(frame) = self.stack.last_mut() else {
+    /// Whether there are more children of a name beside this one than there may be; said once, at the
+    /// first that does not fit.
+    fn is_surplus(
+        &mut self,
+        node: Node<'a>,
+        name: NameId,
+        model: usize,
+        most: impl FnOnce(&mut Memo<'s>) -> Option<u32>,
+    ) -> bool {
+        let (Some(parent), Some(frame)) = (node.parent(), self.stack.last_mut()) else {
             return false;
         };
-        let looked = &mut frame.looked;
-        for other in parent.children().take_while(|other| *other != node) {
-            steps(1);
-            *looked += 1;
-            if other.is(node.name()) {
-                return true;
+        let names = &self.names;
+        let numbers = frame.numbers.get_or_insert_with(|| {
+            let mut numbers = HashMap::<NameId, Number>::new();
+            for child in parent.children() {
+                steps(1);
+                numbers.entry(names.element(child)).or_default().children += 1;
             }
-            if *looked > MAX_SIBLINGS {
-                return false;
-            }
+            numbers
+        });
+        // A name that the model knows may occur at least once.
+        let Some(number) = numbers.get_mut(&name).filter(|it| it.children > 1) else {
+            return false;
+        };
+        let count = number.children;
+        let Some(most) = most(&mut self.memo).filter(|most| count > *most) else {
+            return false;
+        };
+        if !std::mem::replace(&mut number.told, true) {
+            let key = (model, u32::from(name.0));
+            self.reporter.add(Code::RepeatedElement, key, node, || {
+                wording::repeated(node, parent, count, most)
+            });
         }
-        false
+        true
     }
 
     /// A child that the model does not know at all.

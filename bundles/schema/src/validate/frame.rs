@@ -1,5 +1,7 @@
 //! The open elements.
 
+use std::collections::HashMap;
+
 use super::keys::Mark;
 use super::types::Kind;
 use crate::model::{AllModel, Content, Model};
@@ -21,8 +23,16 @@ pub(super) struct Frame<'s> {
     pub(super) stranger: Option<u16>,
     /// How many unknown children an `all` group met.
     pub(super) strangers: u32,
-    /// How many siblings of wrong children were looked at.
-    pub(super) looked: usize,
+    /// The children, counted by name once one of them is wrong.
+    pub(super) numbers: Option<HashMap<NameId, Number>>,
+}
+
+/// The children of one name.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Number {
+    pub(super) children: u32,
+    /// That they are too many was said.
+    pub(super) told: bool,
 }
 
 /// What an open element may contain, and how far it has come.

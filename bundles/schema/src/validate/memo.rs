@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 use super::children::{Way, way_to};
+use super::limit;
 use crate::model::{AllModel, Model};
 use crate::names::{NameId, Names};
 use crate::similar::closest;
@@ -19,6 +20,8 @@ type Place = (usize, u16, u16);
 pub(super) struct Memo<'s> {
     ways: HashMap<Place, Option<Rc<Way>>>,
     meant: HashMap<Place, Meant<'s>>,
+    /// How often a model allows a name.
+    most: HashMap<(usize, u16), Option<u32>>,
 }
 
 /// Which child was probably meant.
@@ -51,6 +54,15 @@ impl<'s> Memo<'s> {
             return self.ways.get(&key).cloned().unwrap_or_else(search);
         }
         self.ways.entry(key).or_insert_with(search).clone()
+    }
+
+    /// How many children of a name a model allows; `None` is any number.
+    pub(super) fn most(&mut self, model: &'s Model, name: NameId) -> Option<u32> {
+        let key = (std::ptr::from_ref(model) as usize, name.0);
+        *self
+            .most
+            .entry(key)
+            .or_insert_with(|| limit::most(model, name))
     }
 
     /// What a child unknown to a model was probably meant to be; `number` is the document's for

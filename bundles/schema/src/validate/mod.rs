@@ -8,6 +8,7 @@ mod attributes;
 mod children;
 mod frame;
 mod keys;
+mod limit;
 #[cfg(test)]
 mod linear;
 mod memo;
@@ -166,7 +167,7 @@ impl<'a, 's> Walk<'a, 's> {
             troubles: Vec::new(),
             stranger: None,
             strangers: 0,
-            looked: 0,
+            numbers: None,
         });
         node.index() + 1
     }

@@ -3,6 +3,7 @@
 use qcbus_document::{Attribute, Node};
 
 use super::children::way_to;
+use super::types::XSI;
 use crate::assertion::Assertion;
 use crate::defects;
 use crate::model::{AttributeUse, ElementDecl, Model, Schema};
@@ -120,12 +121,17 @@ pub(super) fn unknown_root(root: Node<'_>, known: &[&str], title: &str) -> Wordi
         .suggesting(closest(root.name(), known.iter().copied()))
 }
 
-pub(super) fn repeated(node: Node<'_>) -> Wording {
-    let parent = node.parent().map_or("", |parent| parent.name());
-    Wording::new(
+pub(super) fn repeated(node: Node<'_>, parent: Node<'_>, count: u32, most: u32) -> Wording {
+    let limit = match most {
+        1 => "at most once".to_owned(),
+        most => format!("at most {most} times"),
+    };
+    let text = format!(
+        "<{}> occurs {count} times in <{}>, but may occur {limit}",
         node.name(),
-        format!("<{}> occurs more often than <{parent}> allows", node.name()),
-    )
+        parent.name()
+    );
+    Wording::new(node.name(), text).expecting(vec![limit])
 }
 
 pub(super) fn no_children(node: Node<'_>, parent: Node<'_>) -> Wording {
@@ -139,6 +145,9 @@ pub(super) fn no_children(node: Node<'_>, parent: Node<'_>) -> Wording {
     )
 }
 
+/// Siblings looked at to say how a child and they belong together.
+const MAX_SIBLINGS: usize = 200;
+
 pub(super) fn missing_before(
     node: Node<'_>,
     parent: Node<'_>,
@@ -147,53 +156,66 @@ pub(super) fn missing_before(
 ) -> Wording {
     let names = texts(skipped.iter().copied(), schema);
     let defect = defects::missing_child(&names);
-    let text = format!(
-        "<{}> in <{}> comes too early: {} must come before it",
-        node.name(),
-        parent.name(),
-        elements(&names)
-    );
+    let (name, parent_name, list) = (node.name(), parent.name(), elements(&names));
+    let comes_later = || {
+        let mut siblings = parent.children().take(MAX_SIBLINGS);
+        siblings.any(|one| {
+            steps(names.len());
+            names.iter().any(|name| one.is(name))
+        })
+    };
+    let text = if comes_later() {
+        format!("<{name}> in <{parent_name}> comes too early: {list} must come before it")
+    } else {
+        format!("<{parent_name}> lacks {list}, which must come before <{name}>")
+    };
     Wording::new(node.name(), text)
         .expecting(names)
         .excused(defect)
 }
 
-/// Siblings looked at to say before which one a child belongs.
-const MAX_SIBLINGS: usize = 200;
+/// The sibling because of which a child has no place.
+enum Obstacle<'a> {
+    /// The child must come before it.
+    Before(&'a str),
+    /// There may be only one of the two.
+    Instead(&'a str),
+}
 
-/// The name of the sibling after which a child could no longer come.
-fn comes_before<'a>(
+fn obstacle<'a>(
     node: Node<'a>,
     parent: Node<'a>,
     model: &Model,
     schema: &Schema,
-) -> Option<&'a str> {
+) -> Option<Obstacle<'a>> {
     let name = schema.names.find(node.name())?;
-    let may_come = |state| way_to(model, state, |edge, _| edge == Some(name)).is_some();
-    let (mut state, mut open, mut closing) = (0, true, None);
+    let way = |state, name| way_to(model, state, |edge, _| edge == Some(name));
+    let (mut state, mut obstacle) = (0, None);
     for sibling in parent
         .children()
         .take(MAX_SIBLINGS)
         .take_while(|one| *one != node)
     {
-        let known = schema.names.find(sibling.name());
-        let Some(edge) = model
-            .edges(state)
-            .iter()
-            .find(|edge| Some(edge.name) == known)
-        else {
+        let Some(known) = schema.names.find(sibling.name()) else {
             continue;
         };
-        if edge.to != state {
-            state = edge.to;
-            let still = may_come(state);
-            if open && !still {
-                closing = Some(sibling.name());
+        // As the walk went: what should have come before a sibling counts as if it had.
+        let Some((to, _)) = way(state, known).filter(|(to, _)| *to != state) else {
+            continue;
+        };
+        match (way(state, name), way(to, name)) {
+            (Some((after, _)), None) => {
+                obstacle = Some(match way(after, known) {
+                    Some(_) => Obstacle::Before(sibling.name()),
+                    None => Obstacle::Instead(sibling.name()),
+                });
             }
-            open = still;
+            (_, Some(_)) => obstacle = None,
+            (None, None) => {}
         }
+        state = to;
     }
-    closing.filter(|_| !open)
+    obstacle
 }
 
 pub(super) fn misplaced(
@@ -204,19 +226,19 @@ pub(super) fn misplaced(
     schema: &Schema,
 ) -> Wording {
     let (expected, words) = expected_here(model, state, parent, schema);
-    let text = match comes_before(node, parent, model, schema) {
-        Some(later) => format!(
-            "<{}> in <{}> comes too late: it must come before <{later}>",
-            node.name(),
-            parent.name()
+    let (name, parent_name) = (node.name(), parent.name());
+    let text = match obstacle(node, parent, model, schema) {
+        Some(Obstacle::Before(later)) => {
+            format!("<{name}> in <{parent_name}> comes too late: it must come before <{later}>")
+        }
+        Some(Obstacle::Instead(other)) => format!(
+            "<{name}> cannot stand beside <{other}>: <{parent_name}> takes one or the other"
         ),
         None => format!(
-            "<{}> may occur in <{}>, but not at this place: children have a fixed order, expected here: {words}",
-            node.name(),
-            parent.name()
+            "<{name}> may occur in <{parent_name}>, but not at this place: children have a fixed order, expected here: {words}"
         ),
     };
-    Wording::new(node.name(), text).expecting(expected)
+    Wording::new(name, text).expecting(expected)
 }
 
 pub(super) fn unexpected_child(
@@ -390,12 +412,23 @@ pub(super) fn unexpected_attribute(
     let suggestion = suggestion.or_else(longer);
     let list = match (&suggestion, free.as_slice()) {
         (Some(_), _) => String::new(),
-        (None, []) => " and none that is not used yet".to_owned(),
+        (None, []) if declared.is_empty() => ": it takes none".to_owned(),
+        (None, []) => ", and all that it has are there".to_owned(),
         (None, free) => format!(", attributes not used yet: {}", free.join(", ")),
     };
     Wording::new(attribute.name(), text + &list)
         .expecting(free)
         .suggesting(suggestion.as_deref())
+}
+
+/// An attribute such as `xsi:type` whose prefix means something else, or nothing.
+pub(super) fn unbound_prefix(node: Node<'_>, attribute: Attribute<'_>, prefix: &str) -> Wording {
+    let text = format!(
+        "{} of <{}> means nothing: xmlns:{prefix} must be \"{XSI}\"",
+        attribute.name(),
+        node.name()
+    );
+    Wording::new(attribute.name(), text).expecting(vec![XSI.to_owned()])
 }
 
 pub(super) fn missing_attribute(

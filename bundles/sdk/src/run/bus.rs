@@ -202,8 +202,8 @@ struct Daemon {
     given: Option<UserFiles>,
     peer: Peer,
     works: std::sync::mpsc::Sender<Work>,
-    /// What each configuration demands; made once.
-    plans: BTreeMap<Digest, Arc<Plan>>,
+    /// Each configuration and what it demands; made once, unless files that it names change.
+    plans: BTreeMap<Digest, (Option<Config>, Arc<Plan>)>,
     waiting: VecDeque<Job>,
     running: Option<Running>,
     /// The checker at work.
@@ -354,7 +354,6 @@ impl Daemon {
 
     /// The work of a job, once its configuration and all its documents are here.
     fn prepare(&mut self, job: &Job) -> Option<(Arc<Plan>, Work)> {
-        let plan = self.plan(job.config)?;
         let held = |doc| self.peer.document(doc);
         let (root, linked) = job.documents.split_first()?;
         let root = held(root.doc)?;
@@ -366,12 +365,15 @@ impl Daemon {
                 image: held(document.doc)?,
             })
         });
+        let linked = linked.collect::<Option<_>>()?;
+        // Last: it may look at files.
+        let plan = self.plan(job.config)?;
         let work = Work {
             job: job.job,
             kind: job.kind,
             plan: plan.clone(),
             root,
-            linked: linked.collect::<Option<_>>()?,
+            linked,
             missing: job.missing.clone(),
             cancelled: Arc::default(),
         };
@@ -379,23 +381,32 @@ impl Daemon {
     }
 
     fn plan(&mut self, digest: Digest) -> Option<Arc<Plan>> {
-        if let Some(plan) = self.plans.get(&digest) {
-            return Some(plan.clone());
-        }
-        let (current, bytes) = self
+        let config = match self.plans.remove(&digest) {
+            Some((config, plan)) if !plan.is_outdated() => {
+                self.plans.insert(digest, (config, plan.clone()));
+                return Some(plan);
+            }
+            Some((config, _)) => config,
+            None => self.read_config(digest)?,
+        };
+        let plan = Arc::new(configured(
+            self.bundle,
+            config.as_ref(),
+            self.given.as_ref(),
+        ));
+        self.plans.insert(digest, (config, plan.clone()));
+        Some(plan)
+    }
+
+    fn read_config(&self, digest: Digest) -> Option<Option<Config>> {
+        let (_, bytes) = self
             .peer
             .config()
             .filter(|(current, _)| *current == digest)?;
         let config = codec::decode::<Option<Config>>(&bytes);
         let config =
             config.inspect_err(|error| tracing::error!(%error, "cannot read the configuration"));
-        let plan = Arc::new(configured(
-            self.bundle,
-            config.ok()?.as_ref(),
-            self.given.as_ref(),
-        ));
-        self.plans.insert(current, plan.clone());
-        Some(plan)
+        config.ok()
     }
 
     fn progress(&mut self, event: Progress) {

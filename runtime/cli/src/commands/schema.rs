@@ -69,21 +69,34 @@ fn tables(path: &Path, files: &[PathBuf]) -> Result<String, String> {
         }
         documents.push(document);
     }
-    let title = path
-        .file_stem()
-        .map(|it| it.to_string_lossy().into_owned())
-        .unwrap_or_default();
-    qcbus_schema::compile(&title, &documents)
+    qcbus_schema::compile(&title(path), &documents)
         .map(|schema| schema.to_notation())
         .map_err(|error| format!("failed to {error}"))
+}
+
+/// The name of the file without its ending, or of the directory as it is: the version in it
+/// (`xodr-1.7`) tells `--schema-dir` what the tables are for.
+fn title(path: &Path) -> String {
+    let whole = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+    let name = if path.is_dir() {
+        whole.file_name()
+    } else {
+        path.file_stem()
+    };
+    name.map(|it| it.to_string_lossy().into_owned())
+        .unwrap_or_default()
 }
 
 fn write(output: &Path, text: &str, files: usize) -> Exit {
     match std::fs::write(output, text) {
         Ok(()) => {
+            let files = match files {
+                1 => "1 file".to_owned(),
+                files => format!("{files} files"),
+            };
             talk::say(&format!(
-                "{files} schema files compiled to {}",
-                output.display()
+                "{files} compiled to {output}, to be used by --schema-dir {output}",
+                output = output.display()
             ));
             Exit::Accepted
         }

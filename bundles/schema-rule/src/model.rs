@@ -1,13 +1,13 @@
-//! The result of validating the root against its schema, as a model: rules about it are skipped
-//! when no schema applies.
+//! The result of validating the root against its schema, and the schemas that a user brings.
 
 use std::sync::Arc;
 
 use qcbus_schema::{BroughtContent, BroughtFile, Checked, Options, Outcome, Override};
 use qcbus_sdk::{Brought, Model, Param, Resource, ResourceFile, Skip, Subject};
 
-/// Marks rules about the validated document.
-pub(crate) struct Validated;
+/// Marks rules about the validated document; they are skipped when no schema applies.
+#[derive(Debug)]
+pub struct Validated;
 
 impl Model for Validated {
     type Of<'d> = Checked<'d>;

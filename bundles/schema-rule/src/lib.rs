@@ -1,0 +1,65 @@
+//! The schema rule of a bundle: what [`qcbus_schema`], which knows only documents, says about one, as
+//! issues. What differs between bundles is the rule's name and page:
+//!
+//! ```text
+//! pub static RULE: Rule<Validated> = Rule {
+//!     id: "check_asam_xodr_xml_valid_schema",
+//!     uids: &["asam.net:xodr:1.0.0:xml.valid_schema"],
+//!     after: &["check_asam_xodr_xml_version_is_defined"],
+//!     page: include_str!("xml_valid_schema.md"),
+//!     ..qcbus_schema_rule::RULE
+//! };
+//! ```
+
+mod model;
+
+pub use model::Validated;
+
+use model::{SCHEMA_DIR, SCHEMAS};
+use qcbus_schema::{Checked, Severity};
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+/// What the schema rules of all bundles have in common, for the `..` of one.
+pub const RULE: Rule<Validated> = Rule {
+    params: &[SCHEMA_DIR],
+    resource: Some(&SCHEMAS),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(checked: &Checked<'_>, found: &mut Sink<'_>) {
+    for fact in checked.provenance() {
+        found.fact(fact.key, fact.value, fact.description);
+    }
+    for finding in &checked.findings {
+        let place = match finding.attribute {
+            Some(attribute) => Place::from(attribute),
+            None => Place::from(finding.node),
+        };
+        found
+            .issue(place, finding.text.as_str())
+            .level(level(checked.severity(finding)));
+    }
+    for rest in &checked.rest {
+        let Some(root) = found.subject().root().root() else {
+            return;
+        };
+        let text = format!(
+            "{} further findings like these are not listed: {} of `{}`",
+            rest.count,
+            rest.code.as_str(),
+            rest.subject
+        );
+        found
+            .issue(root, text)
+            .level(level(checked.severity_of_rest(rest)));
+    }
+}
+
+fn level(severity: Severity) -> Level {
+    match severity {
+        Severity::Error => Level::Error,
+        Severity::Warning => Level::Warning,
+        Severity::Information => Level::Information,
+    }
+}

@@ -1,0 +1,132 @@
+//! How often children of one name may occur in an element, told from its automaton.
+
+use crate::model::Model;
+use crate::names::NameId;
+use crate::work::steps;
+
+/// The most children of a name on any way through the model; `None` if there is no limit.
+///
+/// The longest way in a graph whose knots (strongly connected components, found as Tarjan does)
+/// come one by one, each after those it leads to. A child of that name inside a knot can be repeated
+/// for ever.
+pub(super) fn most(model: &Model, name: NameId) -> Option<u32> {
+    let states = model.states.len();
+    let mut search = Search {
+        model,
+        name,
+        order: vec![UNSEEN; states],
+        low: vec![UNSEEN; states],
+        most: vec![None; states],
+        open: Vec::new(),
+        next: 0,
+    };
+    search.run()
+}
+
+const UNSEEN: u32 = u32::MAX;
+
+struct Search<'m> {
+    model: &'m Model,
+    name: NameId,
+    /// When a state was first seen, and the earliest state that it leads back to.
+    order: Vec<u32>,
+    low: Vec<u32>,
+    /// Of states whose knot is done.
+    most: Vec<Option<u32>>,
+    /// States whose knot is not done.
+    open: Vec<u16>,
+    next: u32,
+}
+
+impl Search<'_> {
+    fn run(&mut self) -> Option<u32> {
+        self.see(0);
+        let mut way: Vec<(u16, usize)> = vec![(0, 0)];
+        while let Some((state, turn)) = way.last_mut() {
+            let (state, at) = (*state, *turn);
+            *turn += 1;
+            steps(1);
+            if let Some((to, _)) = self.step(state, at) {
+                if self.order.get(usize::from(to)) == Some(&UNSEEN) {
+                    self.see(to);
+                    way.push((to, 0));
+                } else if self.is_open(to) {
+                    self.lower(state, value(&self.order, to));
+                }
+                continue;
+            }
+            way.pop();
+            if let Some((before, _)) = way.last() {
+                self.lower(*before, value(&self.low, state));
+            }
+            if value(&self.low, state) == value(&self.order, state) {
+                self.close(state)?;
+            }
+        }
+        self.most.first().copied().flatten()
+    }
+
+    /// The step from a state with this number: where it leads, and whether by the name.
+    fn step(&self, state: u16, number: usize) -> Option<(u16, bool)> {
+        let edges = self.model.edges(state);
+        if let Some(edge) = edges.get(number) {
+            return Some((edge.to, edge.name == self.name));
+        }
+        let any = self.model.states.get(usize::from(state))?.wildcard?;
+        let known = || edges.iter().any(|edge| edge.name == self.name);
+        (number == edges.len()).then(|| (any, !known()))
+    }
+
+    fn see(&mut self, state: u16) {
+        for numbers in [&mut self.order, &mut self.low] {
+            if let Some(number) = numbers.get_mut(usize::from(state)) {
+                *number = self.next;
+            }
+        }
+        self.next += 1;
+        self.open.push(state);
+    }
+
+    fn is_open(&self, state: u16) -> bool {
+        self.most
+            .get(usize::from(state))
+            .is_some_and(Option::is_none)
+    }
+
+    fn lower(&mut self, state: u16, number: u32) {
+        if let Some(low) = self.low.get_mut(usize::from(state)) {
+            *low = number.min(*low);
+        }
+    }
+
+    /// Ends the knot that begins with this state; `None` if the name can be repeated in it.
+    fn close(&mut self, first: u16) -> Option<()> {
+        let start = self.open.iter().rposition(|state| *state == first)?;
+        let knot = self.open.split_off(start);
+        let mut most = 0;
+        for state in &knot {
+            let mut number = 0;
+            while let Some((to, by_name)) = self.step(*state, number) {
+                steps(1);
+                number += 1;
+                let beyond = self.most.get(usize::from(to)).copied().flatten();
+                match beyond {
+                    Some(beyond) => most = most.max(beyond + u32::from(by_name)),
+                    // Not done: it is in this knot.
+                    None if by_name => return None,
+                    None => {}
+                }
+            }
+        }
+        for state in knot {
+            if let Some(known) = self.most.get_mut(usize::from(state)) {
+                *known = Some(most);
+            }
+        }
+        Some(())
+    }
+}
+
+fn value(numbers: &[u32], state: u16) -> u32 {
+    numbers.get(usize::from(state)).copied().unwrap_or(UNSEEN)
+}
