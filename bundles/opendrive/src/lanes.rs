@@ -6,6 +6,7 @@ use qcbus_document::Node;
 
 use crate::geometry::finite;
 use crate::lane::{Lane, LaneGroup};
+use crate::names::{Name, Names};
 use crate::profile::Profile;
 use crate::road::Road;
 use crate::section_ref::SectionRef;
@@ -25,9 +26,16 @@ pub struct LaneLayer<'a> {
 }
 
 impl<'a> LaneLayer<'a> {
-    pub(crate) fn read(node: Node<'a>, index: usize, road_length: f64) -> LaneLayer<'a> {
-        let nodes = node.children().filter(|child| child.is("laneSection"));
-        let sections = nodes.zip(0..).map(|(node, at)| LaneSection::read(node, at));
+    pub(crate) fn read(
+        node: Node<'a>,
+        index: usize,
+        road_length: f64,
+        names: &Names,
+    ) -> LaneLayer<'a> {
+        let nodes = names.children(node, Name::LaneSection);
+        let sections = nodes
+            .zip(0..)
+            .map(|(node, at)| LaneSection::read(node, at, names));
         let mut steps = Steps::new(sections.collect());
         let terminal = chain(&mut steps, road_length);
         LaneLayer {
@@ -198,14 +206,17 @@ pub struct LaneSection<'a> {
 }
 
 impl<'a> LaneSection<'a> {
-    fn read(node: Node<'a>, index: u32) -> LaneSection<'a> {
+    fn read(node: Node<'a>, index: u32, names: &Names) -> LaneSection<'a> {
         let mut lanes = Vec::new();
         for part in node.children() {
-            let Some(group) = LaneGroup::of(part) else {
-                continue;
+            let group = match names.name(part) {
+                Name::Left => LaneGroup::Left,
+                Name::Center => LaneGroup::Center,
+                Name::Right => LaneGroup::Right,
+                _ => continue,
             };
-            let nodes = part.children().filter(|child| child.is("lane"));
-            lanes.extend(nodes.map(|node| Lane::read(node, group)));
+            let nodes = names.children(part, Name::Lane);
+            lanes.extend(nodes.map(|node| Lane::read(node, group, names)));
         }
         let holds = |side: Side| lanes.iter().any(|lane| lane.group().side() == Some(side));
         let single = flag(node, "singleSide").unwrap_or(false);

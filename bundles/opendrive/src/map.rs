@@ -1,12 +1,13 @@
 //! The whole map.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use qcbus_document::{Document, Node};
 
 use crate::index::IdIndex;
 use crate::junction::Junction;
 use crate::lane_ref::{LaneKey, LaneRef};
+use crate::names::Names;
 use crate::objects::{Object, listed};
 use crate::railroad::{JunctionGroup, Station};
 use crate::road::Road;
@@ -66,10 +67,11 @@ impl<'a> RoadMap<'a> {
         let mut roads = Vec::new();
         let mut junctions = Vec::new();
         let mut header = None;
+        let names = Arc::new(Names::of(document));
         for child in root.into_iter().flat_map(|root| root.children()) {
             let place = |len: usize| u32::try_from(len).unwrap_or(u32::MAX);
             match child.name() {
-                "road" => roads.push(Road::read(child, place(roads.len()))),
+                "road" => roads.push(Road::read(child, place(roads.len()), &names)),
                 "junction" => junctions.push(Junction::read(child, place(junctions.len()))),
                 "header" => header = header.or(Some(child)),
                 _ => {}

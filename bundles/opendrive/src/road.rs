@@ -1,16 +1,18 @@
 //! Roads (OpenDRIVE 1.9, chapter 10).
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use qcbus_document::Node;
 
 use crate::geometry::Pose;
 use crate::lanes::LaneLayer;
 use crate::lateral::LateralProfile;
+use crate::names::Names;
 use crate::plan_view::{END_TOLERANCE, PlanView};
 use crate::profile::Profile;
 use crate::section_ref::SectionRef;
 use crate::steps::Place;
+use crate::surface::Frame;
 use crate::value::{ContactPoint, LayerKind, known, number};
 use crate::view::view;
 
@@ -36,6 +38,9 @@ pub struct Road<'a> {
     elevation: OnceLock<Profile<'a>>,
     lateral: OnceLock<LateralProfile<'a>>,
     layers: OnceLock<Vec<LaneLayer<'a>>>,
+    names: Arc<Names>,
+    /// The cross sections at the start and at the end, once somebody has asked.
+    end_frames: [OnceLock<Option<Frame>>; 2],
 }
 
 /// The elements directly within a road, found in one pass; of several equals the first.
@@ -73,7 +78,7 @@ impl<'a> Parts<'a> {
 }
 
 impl<'a> Road<'a> {
-    pub(crate) fn read(node: Node<'a>, index: u32) -> Road<'a> {
+    pub(crate) fn read(node: Node<'a>, index: u32, names: &Arc<Names>) -> Road<'a> {
         Road {
             node,
             index,
@@ -85,6 +90,8 @@ impl<'a> Road<'a> {
             elevation: OnceLock::new(),
             lateral: OnceLock::new(),
             layers: OnceLock::new(),
+            names: Arc::clone(names),
+            end_frames: [OnceLock::new(), OnceLock::new()],
         }
     }
 
@@ -200,7 +207,7 @@ impl<'a> Road<'a> {
         self.layers.get_or_init(|| {
             let lanes = self.node.children_named("lanes").enumerate();
             lanes
-                .map(|(index, node)| LaneLayer::read(node, index, self.length))
+                .map(|(index, node)| LaneLayer::read(node, index, self.length, &self.names))
                 .collect()
         })
     }
@@ -242,6 +249,19 @@ impl<'a> Road<'a> {
             ContactPoint::Start => self.plan_view().first(),
             ContactPoint::End => self.plan_view().last(),
         }
+    }
+
+    /// The cross section at an end, as `find` finds it when it is asked for the first time.
+    pub(crate) fn end_frame_or(
+        &self,
+        end: ContactPoint,
+        find: impl FnOnce() -> Option<Frame>,
+    ) -> Option<Frame> {
+        let slot = match end {
+            ContactPoint::Start => &self.end_frames[0],
+            ContactPoint::End => &self.end_frames[1],
+        };
+        *slot.get_or_init(find)
     }
 
     /// The coordinate of an end: 0 or `@length`.

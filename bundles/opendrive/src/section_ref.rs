@@ -114,19 +114,24 @@ impl<'m, 'a> SectionRef<'m, 'a> {
     /// The cross section of a side at `ds` metres from the section's start: each lane with t of
     /// its inner and its outer border, from the center outward, as far as they are defined.
     pub fn spans(self, side: Side, ds: impl Into<Place>) -> Vec<LaneSpan<'m, 'a>> {
+        self.each_span(side, ds).collect()
+    }
+
+    /// The same as [`SectionRef::spans`], one after the other.
+    pub fn each_span(
+        self,
+        side: Side,
+        ds: impl Into<Place>,
+    ) -> impl Iterator<Item = LaneSpan<'m, 'a>> {
         let ds = ds.into();
-        let mut spans = Vec::new();
-        let Some(mut inner) = self.center_t(ds).filter(|_| self.is_numbered(side)) else {
-            return spans;
-        };
+        let mut border = self.center_t(ds).filter(|_| self.is_numbered(side));
         let by_width = self.has_widths(side);
-        for lane in self.side(side) {
-            let outer = lane.outer_from(by_width, inner, ds);
-            let Some(outer) = outer else { break };
-            spans.push(LaneSpan { lane, inner, outer });
-            inner = outer;
-        }
-        spans
+        self.side(side).map_while(move |lane| {
+            let inner = border?;
+            let outer = lane.outer_from(by_width, inner, ds)?;
+            border = Some(outer);
+            Some(LaneSpan { lane, inner, outer })
+        })
     }
 
     /// t of the outermost border of a side at `ds`, the center's where a side has no lanes.

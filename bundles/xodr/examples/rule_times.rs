@@ -48,7 +48,10 @@ fn by_rule(measured: &[Measured]) {
     rules.sort_by_key(|(_, took)| std::cmp::Reverse(**took));
     for (id, _) in rules {
         for map in measured {
-            print!("{:9.3} ", map.rules.get(id).copied().map_or(0.0, milliseconds));
+            print!(
+                "{:9.3} ",
+                map.rules.get(id).copied().map_or(0.0, milliseconds)
+            );
         }
         println!(" {id}");
     }
@@ -107,7 +110,10 @@ fn cpu() -> Duration {
         tv_sec: 0,
         tv_nsec: 0,
     };
-    #[expect(unsafe_code, reason = "std has no clock that stands still while others run")]
+    #[expect(
+        unsafe_code,
+        reason = "std has no clock that stands still while others run"
+    )]
     // SAFETY: `time` is a timespec that outlives the call.
     unsafe {
         libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time);

@@ -150,6 +150,6 @@ pub(crate) fn lane_records_under(
             from: lane.at.s(),
             uid,
         };
-        list.check(lane.node().children_named(element), equal, found);
+        list.check(lane.elements(element), equal, found);
     }
 }

@@ -3,8 +3,7 @@
 //! Roads are cut into pieces a few metres long: quadrangles as wide as the lanes for vehicles.
 //! A grid tells which pieces may overlap; the work is bounded, whatever the map says.
 
-use std::collections::{HashMap, HashSet};
-
+use foldhash::{HashMap, HashSet};
 use qcbus_opendrive::geometry::Point;
 use qcbus_opendrive::{LaneRef, Place, Road, RoadMap, Side};
 
@@ -27,6 +26,27 @@ pub(crate) struct Slice {
     pub width: f64,
     z: f64,
     corners: [Point; 4],
+    bounds: Bounds,
+}
+
+/// The rectangle around a piece: the least and the greatest x, then y.
+#[derive(Clone, Copy)]
+struct Bounds([f64; 2], [f64; 2]);
+
+impl Bounds {
+    fn of(corners: &[Point; 4]) -> Bounds {
+        let range = |part: fn(&Point) -> f64| {
+            let values = corners.iter().map(part);
+            let low = values.clone().fold(f64::INFINITY, f64::min);
+            [low, values.fold(f64::NEG_INFINITY, f64::max)]
+        };
+        Bounds(range(|point| point.x), range(|point| point.y))
+    }
+
+    fn meets(&self, other: &Bounds) -> bool {
+        let meets = |one: [f64; 2], other: [f64; 2]| one[0] <= other[1] && other[0] <= one[1];
+        meets(self.0, other.0) && meets(self.1, other.1)
+    }
 }
 
 /// Two pieces that cover the same ground.
@@ -84,11 +104,12 @@ fn is_travelled(lane: LaneRef<'_, '_>) -> bool {
 /// The left and the right end of the lanes for vehicles at s, and the elevation.
 fn edge(road: &Road<'_>, s: Place, limits: &Limits) -> Option<(Point, Point, f64)> {
     let mut extent: Option<(f64, f64)> = None;
+    let layer = road.permanent()?;
     for side in Side::BOTH {
-        let Some(section) = road.permanent()?.section_at(road, side, s) else {
+        let Some(section) = layer.section_at(road, side, s) else {
             continue;
         };
-        for span in section.spans(side, s.shifted(-section.s()?)) {
+        for span in section.each_span(side, s.shifted(-section.s()?)) {
             if is_travelled(span.lane) {
                 let (low, high) = extent.unwrap_or((f64::INFINITY, f64::NEG_INFINITY));
                 let (one, other) = (span.inner.min(span.outer), span.inner.max(span.outer));
@@ -99,9 +120,11 @@ fn edge(road: &Road<'_>, s: Place, limits: &Limits) -> Option<(Point, Point, f64
     let (right, left) = extent.map(|(low, high)| (low + limits.shrink, high - limits.shrink))?;
     let pose = road.pose(s)?;
     let proper = left - right > 0.1;
+    let (sin, cos) = pose.hdg.sin_cos();
+    let beside = |t: f64| Point::finite(pose.x - sin * t, pose.y + cos * t);
     proper.then_some((
-        pose.beside(left)?,
-        pose.beside(right)?,
+        beside(left)?,
+        beside(right)?,
         road.elevation().at_or_zero(s)?,
     ))
 }
@@ -120,6 +143,7 @@ fn slice(
         width: start.0.distance(start.1).max(end.0.distance(end.1)),
         z: 0.5 * (start.2 + end.2),
         corners,
+        bounds: Bounds::of(&corners),
     };
     // Where a border turns back the corners are not in order, and nothing can be said.
     let convex = (0..4).all(|at| {
@@ -142,8 +166,8 @@ pub(crate) fn overlaps<'p>(
     wanted: impl Fn(&Slice, &Slice) -> bool,
     mut found: impl FnMut(Overlap<'p>),
 ) {
-    let mut cells: HashMap<(i64, i64), Vec<u32>> = HashMap::new();
-    let mut reported: HashSet<(usize, usize)> = HashSet::new();
+    let mut cells: HashMap<(i64, i64), Vec<u32>> = HashMap::default();
+    let mut reported: HashSet<(usize, usize)> = HashSet::default();
     // Enough for every map that is one; pieces heaped up at one place are not compared for ever.
     let mut budget = 10_000_000 + 100 * slices.len();
     for (one, at) in slices.iter().zip(0_u32..) {
@@ -156,7 +180,8 @@ pub(crate) fn overlaps<'p>(
                 }
                 let pair = (other.road.min(one.road), other.road.max(one.road));
                 let level = (one.z - other.z).abs() <= limits.clearance;
-                if !level || !wanted(other, one) || reported.contains(&pair) {
+                let near = level && one.bounds.meets(&other.bounds);
+                if !near || !wanted(other, one) || reported.contains(&pair) {
                     continue;
                 }
                 if let Some((area, point)) =
@@ -180,13 +205,9 @@ pub(crate) fn overlaps<'p>(
 
 /// The cells that a piece touches; none when it is too large to be a piece of a road.
 fn cells_of(slice: &Slice) -> impl Iterator<Item = (i64, i64)> + use<> {
-    let range = |part: fn(&Point) -> f64| {
-        let values = slice.corners.iter().map(part);
-        let low = values.clone().fold(f64::INFINITY, f64::min) / CELL;
-        let high = values.fold(f64::NEG_INFINITY, f64::max) / CELL;
-        (low.floor(), high.floor())
-    };
-    let ((left, right), (bottom, top)) = (range(|point| point.x), range(|point| point.y));
+    let Bounds(x, y) = slice.bounds;
+    let [left, right] = x.map(|x| (x / CELL).floor());
+    let [bottom, top] = y.map(|y| (y / CELL).floor());
     let fits = (right - left + 1.0) * (top - bottom + 1.0) <= MOST_CELLS
         && [left, right, bottom, top]
             .iter()
