@@ -5,7 +5,7 @@
 
 use foldhash::{HashMap, HashSet};
 use qcbus_opendrive::geometry::Point;
-use qcbus_opendrive::{LaneRef, Place, Road, RoadMap, Side};
+use qcbus_opendrive::{LaneLayer, LaneRef, Place, Road, RoadMap, SectionRef, Side};
 
 use super::driving::is_drivable;
 
@@ -82,9 +82,14 @@ pub(crate) fn slices(map: &RoadMap<'_>, limits: &Limits) -> Vec<Slice> {
         };
         let count = (length / step).ceil().clamp(1.0, MOST_PIECES) as usize;
         let at = |index: usize| length * index as f64 / count as f64;
-        let mut before = edge(road, Place::at(0.0), limits);
+        let Some(layer) = road.permanent() else {
+            continue;
+        };
+        let lanes: Vec<[Vec<bool>; 2]> = layer.sections(road).map(travelled).collect();
+        let edge = |place| edge(road, layer, &lanes, place, limits);
+        let mut before = edge(Place::at(0.0));
         for index in 0..count {
-            let after = edge(road, Place::before(at(index + 1)), limits);
+            let after = edge(Place::before(at(index + 1)));
             if let (Some(start), Some(end)) = (before, after) {
                 slices.extend(slice(road, [at(index), at(index + 1)], start, end));
             }
@@ -101,16 +106,36 @@ fn is_travelled(lane: LaneRef<'_, '_>) -> bool {
     is_drivable(lane) && !aside
 }
 
-/// The left and the right end of the lanes for vehicles at s, and the elevation.
-fn edge(road: &Road<'_>, s: Place, limits: &Limits) -> Option<(Point, Point, f64)> {
+/// Which lanes of a section are for vehicles, left and right, outward up to the last that is.
+fn travelled(section: SectionRef<'_, '_>) -> [Vec<bool>; 2] {
+    Side::BOTH.map(|side| {
+        let mut lanes: Vec<bool> = section.side(side).map(is_travelled).collect();
+        lanes.truncate(lanes.iter().rposition(|lane| *lane).map_or(0, |last| last + 1));
+        lanes
+    })
+}
+
+/// The left and the right end of the lanes for vehicles at s, and the elevation. `lanes` are those
+/// of each section of the layer.
+fn edge<'a>(
+    road: &Road<'a>,
+    layer: &LaneLayer<'a>,
+    lanes: &[[Vec<bool>; 2]],
+    s: Place,
+    limits: &Limits,
+) -> Option<(Point, Point, f64)> {
     let mut extent: Option<(f64, f64)> = None;
-    let layer = road.permanent()?;
-    for side in Side::BOTH {
+    for (slot, side) in Side::BOTH.into_iter().enumerate() {
         let Some(section) = layer.section_at(road, side, s) else {
             continue;
         };
-        for span in section.each_span(side, s.shifted(-section.s()?)) {
-            if is_travelled(span.lane) {
+        let of_vehicles = &lanes.get(section.index())?[slot];
+        if of_vehicles.is_empty() {
+            continue;
+        }
+        let spans = section.each_span(side, s.shifted(-section.s()?));
+        for (is_for_vehicles, span) in of_vehicles.iter().zip(spans) {
+            if *is_for_vehicles {
                 let (low, high) = extent.unwrap_or((f64::INFINITY, f64::NEG_INFINITY));
                 let (one, other) = (span.inner.min(span.outer), span.inner.max(span.outer));
                 extent = Some((low.min(one), high.max(other)));

@@ -140,8 +140,8 @@ fn run(document: &Document<'_>, found: &mut Sink<'_>) {
     let defined = Defined::of(document);
     for reference in REFERENCES {
         for node in document.elements(reference.element) {
-            let parent = node.parent().map_or("", |parent| parent.name());
-            if reference.parent.is_empty() || reference.parent == parent {
+            let parent = node.parent();
+            if reference.parent.is_empty() || parent.is_some_and(|it| it.is(reference.parent)) {
                 check(reference, node, &defined, found);
             }
         }

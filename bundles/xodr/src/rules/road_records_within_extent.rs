@@ -1,5 +1,5 @@
 use qcbus_document::Node;
-use qcbus_opendrive::{RoadMap, SectionRef};
+use qcbus_opendrive::{LaneRef, RoadMap, SectionRef};
 use qcbus_sdk::{Level, Param, Place, Rule, Sink};
 
 use crate::families::ascending;
@@ -66,10 +66,24 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                 road: road.id(),
             };
             for name in LANE_RECORDS {
-                section.check(lane.elements(name), name, found);
+                if !all_start_by(lane, name, section.limit) {
+                    section.check(lane.elements(name), name, found);
+                }
             }
         }
     }
+}
+
+/// Whether the records of a lane are known already to start no later than `limit`.
+fn all_start_by(lane: LaneRef<'_, '_>, name: &str, limit: f64) -> bool {
+    let fits = |start: Option<f64>| start.is_some_and(|start| start <= limit);
+    let profile = match name {
+        "width" => lane.widths(),
+        "border" => lane.borders(),
+        "height" => return lane.heights().iter().all(|one| fits(one.s_offset())),
+        _ => return false,
+    };
+    profile.records().iter().all(|record| fits(record.start()))
 }
 
 /// What records lie in.
