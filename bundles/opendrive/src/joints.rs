@@ -84,6 +84,7 @@ pub struct LaneEnd {
 
 impl<'a> RoadMap<'a> {
     /// The road at a place of [`RoadMap::roads`].
+    #[inline]
     pub fn road_at(&self, index: usize) -> Option<&Road<'a>> {
         self.roads().get(index)
     }
@@ -117,6 +118,7 @@ impl<'a> RoadMap<'a> {
     }
 
     /// What a road's own link says about one of its ends.
+    #[inline]
     pub fn linked_end(&self, road: &Road<'a>, end: ContactPoint) -> Option<RoadContact<'a>> {
         let linked = self.caches.linked.get_or_init(|| {
             let roads = self.roads().iter();

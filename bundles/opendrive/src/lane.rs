@@ -110,31 +110,37 @@ impl<'a> Lane<'a> {
     }
 
     /// The `<lane>` element.
+    #[inline]
     pub fn node(&self) -> Node<'a> {
         self.node
     }
 
     /// `@id`, if it is an integer.
+    #[inline]
     pub fn id(&self) -> Option<i64> {
         self.id
     }
 
     /// `@id` as written.
+    #[inline]
     pub fn id_text(&self) -> Option<&'a str> {
         self.id_text
     }
 
     /// The group in which it is written, whatever its id says.
+    #[inline]
     pub fn group(&self) -> LaneGroup {
         self.group
     }
 
     /// `@type`.
+    #[inline]
     pub fn kind(&self) -> Option<&'a str> {
         self.kind
     }
 
     /// `@level`: whether the lane is kept out of the lateral profile; false when missing.
+    #[inline]
     pub fn level(&self) -> Option<bool> {
         self.level
     }
@@ -155,11 +161,13 @@ impl<'a> Lane<'a> {
     }
 
     /// The `<link>` element.
+    #[inline]
     pub fn link_node(&self) -> Option<Node<'a>> {
         self.link
     }
 
     /// The linked lanes at an end: `<predecessor>` or `<successor>` elements, of any number.
+    #[inline]
     pub fn links(&self, end: ContactPoint) -> impl Iterator<Item = LaneLink<'a>> + use<'a> {
         let links = self.link_node().into_iter();
         links
@@ -167,6 +175,7 @@ impl<'a> Lane<'a> {
             .map(LaneLink::of)
     }
 
+    #[inline]
     fn records(&self) -> &LaneRecords<'a> {
         self.records.get_or_init(|| {
             let nodes = |name: &'static str| self.elements(name);
@@ -179,16 +188,19 @@ impl<'a> Lane<'a> {
     }
 
     /// The `<width>` records (11.7.1): metres over the distance from the section's start.
+    #[inline]
     pub fn widths(&self) -> &Profile<'a> {
         &self.records().widths
     }
 
     /// The `<border>` records (11.7.2): t of the outer border.
+    #[inline]
     pub fn borders(&self) -> &Profile<'a> {
         &self.records().borders
     }
 
     /// The `<height>` records (11.7.3) in document order.
+    #[inline]
     pub fn heights(&self) -> &[LaneHeight<'a>] {
         self.records().heights.items()
     }
@@ -202,6 +214,7 @@ impl<'a> Lane<'a> {
     }
 
     /// The elements of any name directly within it; costs nothing where there are none.
+    #[inline]
     pub fn elements<'s>(&self, name: &'s str) -> impl Iterator<Item = Node<'a>> + use<'a, 's> {
         let any = self.has & Name::bit_of(name) != 0;
         let node = any.then_some(self.node).into_iter();
@@ -233,11 +246,13 @@ impl<'a> Lane<'a> {
     }
 
     /// The absolute value of its id; lanes without one are farthest out.
+    #[inline]
     pub(crate) fn distance(&self) -> u64 {
         self.id.map_or(u64::MAX, i64::unsigned_abs)
     }
 
     /// Its place on its side, counted from the center outward from zero.
+    #[inline]
     pub(crate) fn rank(&self) -> u32 {
         self.rank
     }
@@ -268,6 +283,7 @@ impl<'a> LaneHeight<'a> {
     }
 
     /// The element.
+    #[inline]
     pub fn node(&self) -> Node<'a> {
         self.node
     }

@@ -54,16 +54,19 @@ impl<'a> LaneLayer<'a> {
     }
 
     /// Its place among the road's layers.
+    #[inline]
     pub fn index(&self) -> usize {
         self.index as usize
     }
 
     /// Permanent or temporary.
+    #[inline]
     pub fn kind(&self) -> LayerKind {
         self.kind
     }
 
     /// The lane offset (11.5): t of the center lane over s.
+    #[inline]
     pub fn offset(&self) -> &Profile<'a> {
         &self.offset
     }
@@ -74,6 +77,7 @@ impl<'a> LaneLayer<'a> {
     }
 
     /// The sections in document order; `road` is the road that the layer belongs to.
+    #[inline]
     pub fn sections<'m>(
         &'m self,
         road: &'m Road<'a>,
@@ -85,6 +89,7 @@ impl<'a> LaneLayer<'a> {
     }
 
     /// The section at a place in document order.
+    #[inline]
     pub fn section<'m>(&'m self, road: &'m Road<'a>, index: usize) -> Option<SectionRef<'m, 'a>> {
         let section = self.steps.items().get(index)?;
         Some(SectionRef::new(road, self, section))
@@ -248,11 +253,13 @@ impl<'a> LaneSection<'a> {
     }
 
     /// Its place among the sections of its layer, in document order.
+    #[inline]
     pub fn index(&self) -> usize {
         self.index as usize
     }
 
     /// `@s`, in metres.
+    #[inline]
     pub fn s(&self) -> Option<f64> {
         known(self.s)
     }
@@ -264,16 +271,19 @@ impl<'a> LaneSection<'a> {
 
     /// Whether the section says something about this side: a section for a single side is silent
     /// about the other.
+    #[inline]
     pub fn covers(&self, side: Side) -> bool {
         self.sides[slot(side)]
     }
 
     /// Where the section ends for a side, in metres along s.
+    #[inline]
     pub fn end(&self, side: Side) -> Option<f64> {
         finite(self.ends[slot(side)])
     }
 
     /// The length for a side in metres; zero or negative in faulty files.
+    #[inline]
     pub fn length(&self, side: Side) -> Option<f64> {
         finite(self.end(side)? - self.s()?)
     }
@@ -289,11 +299,13 @@ impl<'a> LaneSection<'a> {
 
     /// Whether the ids of a side tell the order of its lanes: all are integers of the side's
     /// sign, none occurs twice, and there are at most 256. Otherwise its borders cannot be evaluated.
+    #[inline]
     pub fn is_numbered(&self, side: Side) -> bool {
         self.numbered[slot(side)]
     }
 
     /// The section before or after it for a side.
+    #[inline]
     pub(crate) fn beside(&self, side: Side, end: ContactPoint) -> Option<u32> {
         match end {
             ContactPoint::Start => self.previous[slot(side)],
@@ -302,14 +314,17 @@ impl<'a> LaneSection<'a> {
     }
 
     /// Whether a side has widths, as `any` finds out when it is asked for the first time.
+    #[inline]
     pub(crate) fn widths_or(&self, side: Side, any: impl Fn(Side) -> bool) -> bool {
         self.widths.get_or_init(|| Side::BOTH.map(any))[slot(side)]
     }
 
+    #[inline]
     pub(crate) fn own_lanes(&self) -> &[Lane<'a>] {
         &self.lanes
     }
 
+    #[inline]
     pub(crate) fn outward(&self, side: Side) -> &[u32] {
         &self.outward[slot(side)]
     }

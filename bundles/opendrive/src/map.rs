@@ -108,11 +108,13 @@ impl<'a> RoadMap<'a> {
     }
 
     /// All roads in document order.
+    #[inline]
     pub fn roads(&self) -> &[Road<'a>] {
         &self.roads
     }
 
     /// The first road with this id.
+    #[inline]
     pub fn road(&self, id: &str) -> Option<&Road<'a>> {
         self.roads_with_id(id).next()
     }
@@ -132,11 +134,13 @@ impl<'a> RoadMap<'a> {
     }
 
     /// All junctions in document order.
+    #[inline]
     pub fn junctions(&self) -> &[Junction<'a>] {
         &self.junctions
     }
 
     /// The first junction with this id.
+    #[inline]
     pub fn junction(&self, id: &str) -> Option<&Junction<'a>> {
         self.junctions_with_id(id).next()
     }
@@ -246,16 +250,19 @@ impl<'a> RoadMap<'a> {
     }
 
     /// The lane sections of all roads and layers, in document order.
+    #[inline]
     pub fn sections(&self) -> impl Iterator<Item = SectionRef<'_, 'a>> {
         self.roads.iter().flat_map(Road::sections)
     }
 
     /// All lanes in document order.
+    #[inline]
     pub fn lanes(&self) -> impl Iterator<Item = LaneRef<'_, 'a>> {
         self.sections().flat_map(SectionRef::lanes)
     }
 
     /// The lane at a place in the map.
+    #[inline]
     pub fn lane(&self, key: LaneKey) -> Option<LaneRef<'_, 'a>> {
         let road = self.roads.get(key.road as usize)?;
         let layer = road.layers().get(key.layer as usize)?;

@@ -96,27 +96,32 @@ impl<'a> Road<'a> {
     }
 
     /// The `<road>` element.
+    #[inline]
     pub fn node(&self) -> Node<'a> {
         self.node
     }
 
     /// Its place among the map's roads.
+    #[inline]
     pub fn index(&self) -> usize {
         self.index as usize
     }
 
     /// `@id`, empty when missing.
+    #[inline]
     pub fn id(&self) -> &'a str {
         self.id
     }
 
     /// `@length`, in metres.
+    #[inline]
     pub fn length(&self) -> Option<f64> {
         known(self.length)
     }
 
     /// The id of the junction that the road belongs to; `None` when it belongs to none (`-1` or
     /// no attribute).
+    #[inline]
     pub fn junction(&self) -> Option<&'a str> {
         self.junction.filter(|id| *id != "-1")
     }
@@ -136,6 +141,7 @@ impl<'a> Road<'a> {
     }
 
     /// The link at an end: `<predecessor>` at the start, `<successor>` at the end.
+    #[inline]
     pub fn link(&self, end: ContactPoint) -> Option<RoadLink<'a>> {
         let node = self.parts.link?.child(end.link_name())?;
         Some(RoadLink::of(node))
@@ -182,12 +188,14 @@ impl<'a> Road<'a> {
     }
 
     /// The reference line.
+    #[inline]
     pub fn plan_view(&self) -> &PlanView<'a> {
         self.plan_view
             .get_or_init(|| PlanView::read(self.parts.plan_view))
     }
 
     /// The elevation profile (10.5.1): z over s.
+    #[inline]
     pub fn elevation(&self) -> &Profile<'a> {
         self.elevation.get_or_init(|| {
             let node = self.parts.elevation.into_iter();
@@ -197,12 +205,14 @@ impl<'a> Road<'a> {
     }
 
     /// Superelevation, shape and cross section surface (10.5.2 to 10.5.4).
+    #[inline]
     pub fn lateral(&self) -> &LateralProfile<'a> {
         self.lateral
             .get_or_init(|| LateralProfile::read(self.parts.lateral))
     }
 
     /// The lane layers, one per `<lanes>` element.
+    #[inline]
     pub fn layers(&self) -> &[LaneLayer<'a>] {
         self.layers.get_or_init(|| {
             let lanes = self.node.children_named("lanes").enumerate();
@@ -213,16 +223,19 @@ impl<'a> Road<'a> {
     }
 
     /// The first layer of this kind.
+    #[inline]
     pub fn layer(&self, kind: LayerKind) -> Option<&LaneLayer<'a>> {
         self.layers().iter().find(|layer| layer.kind() == kind)
     }
 
     /// The permanent lanes.
+    #[inline]
     pub fn permanent(&self) -> Option<&LaneLayer<'a>> {
         self.layer(LayerKind::Permanent)
     }
 
     /// All lane sections of all layers, in document order.
+    #[inline]
     pub fn sections(&self) -> impl Iterator<Item = SectionRef<'_, 'a>> {
         self.layers().iter().flat_map(|layer| layer.sections(self))
     }

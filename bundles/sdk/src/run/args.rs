@@ -124,7 +124,10 @@ mod tests {
             })
         );
         let timed = of(&["a.xodr", "--timings"]);
-        assert!(matches!(timed, Ok(Mode::File { timings: true, .. })), "{timed:?}");
+        assert!(
+            matches!(timed, Ok(Mode::File { timings: true, .. })),
+            "{timed:?}"
+        );
         assert_eq!(
             of(&["--schema-dir", "own", "-c", "c.xml"]),
             Ok(Mode::Module {

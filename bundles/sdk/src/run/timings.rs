@@ -60,7 +60,13 @@ mod tests {
             .map(|line| line.split_whitespace().collect())
             .collect();
         let column = |at: usize| -> Vec<&str> { lines.iter().map(|line| line[at]).collect() };
-        assert_eq!(column(2), ["slow", "quick", "idle", "all", "models,", "altogether"]);
-        assert_eq!(column(0), ["30.000", "1.000", "0.000", "31.000", "9.000", "40.000"]);
+        assert_eq!(
+            column(2),
+            ["slow", "quick", "idle", "all", "models,", "altogether"]
+        );
+        assert_eq!(
+            column(0),
+            ["30.000", "1.000", "0.000", "31.000", "9.000", "40.000"]
+        );
     }
 }

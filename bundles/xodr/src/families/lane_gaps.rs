@@ -29,7 +29,7 @@ pub(crate) fn lane_gaps<'m, 'a>(
     limit: f64,
     zero: f64,
 ) -> Vec<LaneGap<'m, 'a>> {
-    let mut boundaries: Vec<(_, Touch<'m, 'a>)> = Vec::new();
+    let (mut touches, mut boundaries) = (Vec::new(), Vec::new());
     let mut astray = HashSet::default();
     let mut gaps = Vec::new();
     for joint in map.lane_joints() {
@@ -38,15 +38,16 @@ pub(crate) fn lane_gaps<'m, 'a>(
         };
         let [low, high] = touch.in_order();
         if touch.overlaps(limit) {
-            boundaries.push(((section(low), section(high)), touch));
+            boundaries.push(((section(low), section(high)), touches.len()));
+            touches.push(touch);
         } else if astray.insert((low, high)) {
             gaps.extend(gaps_of(&[touch], limit));
         }
     }
-    boundaries.sort_by_key(|(at, _)| *at);
+    boundaries.sort_unstable();
     for boundary in boundaries.chunk_by(|(one, _), (next, _)| one == next) {
-        let touches = boundary.iter().map(|(_, touch)| *touch);
-        let groups = hanging_together(touches).into_iter();
+        let touches = boundary.iter().filter_map(|(_, at)| touches.get(*at));
+        let groups = hanging_together(touches.copied()).into_iter();
         gaps.extend(groups.flat_map(|group| gaps_of(&group, limit)));
     }
     gaps

@@ -110,7 +110,12 @@ fn is_travelled(lane: LaneRef<'_, '_>) -> bool {
 fn travelled(section: SectionRef<'_, '_>) -> [Vec<bool>; 2] {
     Side::BOTH.map(|side| {
         let mut lanes: Vec<bool> = section.side(side).map(is_travelled).collect();
-        lanes.truncate(lanes.iter().rposition(|lane| *lane).map_or(0, |last| last + 1));
+        lanes.truncate(
+            lanes
+                .iter()
+                .rposition(|lane| *lane)
+                .map_or(0, |last| last + 1),
+        );
         lanes
     })
 }
