@@ -127,7 +127,7 @@ def asam_checkers():
     code = (
         "import pathlib, re, qc_opendrive\n"
         "for file in sorted(pathlib.Path(qc_opendrive.__file__).parent.rglob('*.py')):\n"
-        "    print(*re.findall(r'CHECKER_ID\\s*=\\s*\"([^\"]+)\"', file.read_text()), sep='\\n')\n"
+        "    print(*re.findall(r'CHECKER_ID\\s*=[\\s(]*\"([^\"]+)\"', file.read_text()), sep='\\n')\n"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     return sorted(set(run.stdout.split())) if run.returncode == 0 else []
@@ -138,7 +138,7 @@ def asam(path, checkers, limit):
     with tempfile.TemporaryDirectory() as directory:
         config = pathlib.Path(directory) / "config.xml"
         result = pathlib.Path(directory) / "result.xqar"
-        listed = "".join(f'<Checker checkerId="{one}"/>' for one in checkers)
+        listed = "".join(f'<Checker checkerId="{one}" minLevel="1" maxLevel="3"/>' for one in checkers)
         config.write_text(CONFIG.format(map=path, result=result, checkers=listed))
         command = [sys.executable, "-m", "qc_opendrive.main", "-c", str(config)]
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
