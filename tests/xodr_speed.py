@@ -134,7 +134,7 @@ def asam_checkers():
 
 
 def asam(path, checkers, limit):
-    """CPU milliseconds of a whole process that checks one map; None when it takes too long."""
+    """CPU milliseconds of a whole process that checks one map, and whether it came to its end."""
     with tempfile.TemporaryDirectory() as directory:
         config = pathlib.Path(directory) / "config.xml"
         result = pathlib.Path(directory) / "result.xqar"
@@ -142,14 +142,16 @@ def asam(path, checkers, limit):
         config.write_text(CONFIG.format(map=path, result=result, checkers=listed))
         command = [sys.executable, "-m", "qc_opendrive.main", "-c", str(config)]
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        ended = True
         try:
             subprocess.run(command, check=True, capture_output=True, cwd=directory, timeout=limit)
         except subprocess.TimeoutExpired:
-            return None
+            ended = False
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        if not result.exists():
+        if ended and not result.exists():
             sys.exit(f"ASAM's bundle wrote no result for {path}")
-        return 1e3 * (after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+        used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        return 1e3 * used, ended
 
 
 def main():
@@ -174,13 +176,11 @@ def main():
         [(best, median)] = ours([path], args.runs)
         medians[path.name] = median
         size = path.stat().st_size
-        theirs = asam(path, checkers, args.asam_limit) if checkers else None
-        if theirs is not None:
-            compared = f"{theirs:,.0f} | {theirs / median:,.0f}"
-        elif checkers:
-            compared = f"> {args.asam_limit:.0f} s | > {1e3 * args.asam_limit / median:,.0f}"
-        else:
-            compared = "- | -"
+        compared = "- | -"
+        if checkers:
+            theirs, ended = asam(path, checkers, args.asam_limit)
+            more = "" if ended else "> "
+            compared = f"{more}{theirs:,.0f} | {more}{theirs / median:,.0f}"
         row = f"| {path.name} | {size:,} | {best:.2f} | {median:.2f} | {1e6 * median / size:.1f}"
         print(f"{row} | {compared} |", flush=True)
     print()

@@ -231,7 +231,7 @@ impl<'a> Lane<'a> {
             ContactPoint::Start => &self.borders[0],
             ContactPoint::End => &self.borders[1],
         };
-        slot.get_or_init(|| Box::new(Edge::BOTH.map(|edge| find(edge))))
+        slot.get_or_init(|| Box::new(Edge::BOTH.map(find)))
     }
 
     /// How far the height record that is valid at `ds` lifts the lane's borders above the road
