@@ -17,6 +17,8 @@ use crate::value::{ContactPoint, LayerKind, Side};
 pub(crate) struct Caches<'a> {
     joints: OnceLock<Vec<LaneJoint<'a>>>,
     pub(crate) touching: OnceLock<Vec<crate::TouchingLanes<'a>>>,
+    /// What each road's own links say about its start and its end.
+    linked: OnceLock<Vec<[Option<RoadContact<'a>>; 2]>>,
     connections: OnceLock<Vec<(usize, Connection<'a>)>>,
     contacts: OnceLock<Vec<RoadContact<'a>>>,
     /// Both ends of every contact, in order, with the contact's place.
@@ -82,6 +84,7 @@ pub struct LaneEnd {
 
 impl<'a> RoadMap<'a> {
     /// The road at a place of [`RoadMap::roads`].
+    #[inline]
     pub fn road_at(&self, index: usize) -> Option<&Road<'a>> {
         self.roads().get(index)
     }
@@ -115,7 +118,22 @@ impl<'a> RoadMap<'a> {
     }
 
     /// What a road's own link says about one of its ends.
+    #[inline]
     pub fn linked_end(&self, road: &Road<'a>, end: ContactPoint) -> Option<RoadContact<'a>> {
+        let linked = self.caches.linked.get_or_init(|| {
+            let roads = self.roads().iter();
+            roads
+                .map(|road| ContactPoint::BOTH.map(|end| self.read_link(road, end)))
+                .collect()
+        });
+        let [start, last] = linked.get(road.index())?;
+        match end {
+            ContactPoint::Start => *start,
+            ContactPoint::End => *last,
+        }
+    }
+
+    fn read_link(&self, road: &Road<'a>, end: ContactPoint) -> Option<RoadContact<'a>> {
         let link = road.link(end)?;
         let linked = self.road(link.road_id()?)?;
         Some(RoadContact {

@@ -4,9 +4,12 @@ use std::sync::OnceLock;
 
 use qcbus_document::Node;
 
+use crate::lane_ref::Edge;
+use crate::names::{Name, Names};
 use crate::profile::Profile;
 use crate::steps::{Place, Starts, Steps};
-use crate::value::{ContactPoint, Side, flag, known, numbers, parse_integer};
+use crate::surface::BorderPoint;
+use crate::value::{ContactPoint, Side, flag, known, numbers, parse_flag, parse_integer};
 use crate::view::view;
 
 /// The part of a lane section in which a lane is written.
@@ -49,8 +52,19 @@ pub struct Lane<'a> {
     group: LaneGroup,
     /// Its place on its side, counted from the center outward.
     rank: u32,
+    id_text: Option<&'a str>,
+    kind: Option<&'a str>,
+    level: Option<bool>,
+    link: Option<Node<'a>>,
+    /// Which elements it has, by [`Name::bit`].
+    has: u16,
     records: OnceLock<Box<LaneRecords<'a>>>,
+    /// Its borders at the start and at the end, once somebody has asked.
+    borders: [OnceLock<Box<Borders>>; 2],
 }
+
+/// The inner and the outer border of a lane at an end.
+pub(crate) type Borders = [Option<BorderPoint>; 2];
 
 /// The records that give a lane its shape.
 #[derive(Debug)]
@@ -61,47 +75,74 @@ struct LaneRecords<'a> {
 }
 
 impl<'a> Lane<'a> {
-    pub(crate) fn read(node: Node<'a>, group: LaneGroup) -> Lane<'a> {
+    pub(crate) fn read(node: Node<'a>, group: LaneGroup, names: &Names) -> Lane<'a> {
+        let (mut id_text, mut kind, mut level) = (None, None, None);
+        for attribute in node.attributes() {
+            let slot = match attribute.name() {
+                "id" => &mut id_text,
+                "type" => &mut kind,
+                "level" => &mut level,
+                _ => continue,
+            };
+            *slot = slot.or(Some(attribute.value()));
+        }
+        let (mut has, mut link) = (0, None);
+        for child in node.children() {
+            let name = names.name(child);
+            has |= name.bit();
+            if name == Name::Link {
+                link = link.or(Some(child));
+            }
+        }
         Lane {
             node,
-            id: node.attr("id").and_then(parse_integer),
+            id: id_text.and_then(parse_integer),
             group,
             rank: 0,
+            id_text,
+            kind,
+            level: level.map_or(Some(false), parse_flag),
+            link,
+            has,
             records: OnceLock::new(),
+            borders: [OnceLock::new(), OnceLock::new()],
         }
     }
 
     /// The `<lane>` element.
+    #[inline]
     pub fn node(&self) -> Node<'a> {
         self.node
     }
 
     /// `@id`, if it is an integer.
+    #[inline]
     pub fn id(&self) -> Option<i64> {
         self.id
     }
 
     /// `@id` as written.
+    #[inline]
     pub fn id_text(&self) -> Option<&'a str> {
-        self.node.attr("id")
+        self.id_text
     }
 
     /// The group in which it is written, whatever its id says.
+    #[inline]
     pub fn group(&self) -> LaneGroup {
         self.group
     }
 
     /// `@type`.
+    #[inline]
     pub fn kind(&self) -> Option<&'a str> {
-        self.node.attr("type")
+        self.kind
     }
 
     /// `@level`: whether the lane is kept out of the lateral profile; false when missing.
+    #[inline]
     pub fn level(&self) -> Option<bool> {
-        match self.node.attr("level") {
-            None => Some(false),
-            Some(_) => flag(self.node, "level"),
-        }
+        self.level
     }
 
     /// `@direction`: `standard`, `reversed` or `both`.
@@ -120,11 +161,13 @@ impl<'a> Lane<'a> {
     }
 
     /// The `<link>` element.
+    #[inline]
     pub fn link_node(&self) -> Option<Node<'a>> {
-        self.node.child("link")
+        self.link
     }
 
     /// The linked lanes at an end: `<predecessor>` or `<successor>` elements, of any number.
+    #[inline]
     pub fn links(&self, end: ContactPoint) -> impl Iterator<Item = LaneLink<'a>> + use<'a> {
         let links = self.link_node().into_iter();
         links
@@ -132,10 +175,10 @@ impl<'a> Lane<'a> {
             .map(LaneLink::of)
     }
 
+    #[inline]
     fn records(&self) -> &LaneRecords<'a> {
         self.records.get_or_init(|| {
-            let nodes =
-                |name: &'static str| self.node.children().filter(move |child| child.is(name));
+            let nodes = |name: &'static str| self.elements(name);
             Box::new(LaneRecords {
                 widths: Profile::read(nodes("width"), "sOffset"),
                 borders: Profile::read(nodes("border"), "sOffset"),
@@ -145,16 +188,19 @@ impl<'a> Lane<'a> {
     }
 
     /// The `<width>` records (11.7.1): metres over the distance from the section's start.
+    #[inline]
     pub fn widths(&self) -> &Profile<'a> {
         &self.records().widths
     }
 
     /// The `<border>` records (11.7.2): t of the outer border.
+    #[inline]
     pub fn borders(&self) -> &Profile<'a> {
         &self.records().borders
     }
 
     /// The `<height>` records (11.7.3) in document order.
+    #[inline]
     pub fn heights(&self) -> &[LaneHeight<'a>] {
         self.records().heights.items()
     }
@@ -164,7 +210,28 @@ impl<'a> Lane<'a> {
         &self,
         name: &'s str,
     ) -> impl Iterator<Item = LaneRecord<'a>> + use<'a, 's> {
-        self.node.children_named(name).map(LaneRecord::of)
+        self.elements(name).map(LaneRecord::of)
+    }
+
+    /// The elements of any name directly within it; costs nothing where there are none.
+    #[inline]
+    pub fn elements<'s>(&self, name: &'s str) -> impl Iterator<Item = Node<'a>> + use<'a, 's> {
+        let any = self.has & Name::bit_of(name) != 0;
+        let node = any.then_some(self.node).into_iter();
+        node.flat_map(move |node| node.children_named(name))
+    }
+
+    /// Its borders at an end, as `find` finds them when it is asked for the first time.
+    pub(crate) fn borders_or(
+        &self,
+        end: ContactPoint,
+        find: impl Fn(Edge) -> Option<BorderPoint>,
+    ) -> &Borders {
+        let slot = match end {
+            ContactPoint::Start => &self.borders[0],
+            ContactPoint::End => &self.borders[1],
+        };
+        slot.get_or_init(|| Box::new(Edge::BOTH.map(find)))
     }
 
     /// How far the height record that is valid at `ds` lifts the lane's borders above the road
@@ -179,11 +246,13 @@ impl<'a> Lane<'a> {
     }
 
     /// The absolute value of its id; lanes without one are farthest out.
+    #[inline]
     pub(crate) fn distance(&self) -> u64 {
         self.id.map_or(u64::MAX, i64::unsigned_abs)
     }
 
     /// Its place on its side, counted from the center outward from zero.
+    #[inline]
     pub(crate) fn rank(&self) -> u32 {
         self.rank
     }
@@ -214,6 +283,7 @@ impl<'a> LaneHeight<'a> {
     }
 
     /// The element.
+    #[inline]
     pub fn node(&self) -> Node<'a> {
         self.node
     }

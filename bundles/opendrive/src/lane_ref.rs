@@ -57,12 +57,14 @@ pub struct LaneRef<'m, 'a> {
 impl<'a> Deref for LaneRef<'_, 'a> {
     type Target = Lane<'a>;
 
+    #[inline]
     fn deref(&self) -> &Lane<'a> {
         self.lane
     }
 }
 
 impl<'m, 'a> LaneRef<'m, 'a> {
+    #[inline]
     pub(crate) fn new(at: SectionRef<'m, 'a>, index: usize) -> Option<LaneRef<'m, 'a>> {
         let lane = at.section().own_lanes().get(index)?;
         let index = u32::try_from(index).ok()?;
@@ -70,11 +72,13 @@ impl<'m, 'a> LaneRef<'m, 'a> {
     }
 
     /// The lane itself.
+    #[inline]
     pub fn lane(self) -> &'m Lane<'a> {
         self.lane
     }
 
     /// Its place in the map.
+    #[inline]
     pub fn key(self) -> LaneKey {
         let narrow = |index: usize| u32::try_from(index).unwrap_or(u32::MAX);
         LaneKey {
@@ -86,16 +90,19 @@ impl<'m, 'a> LaneRef<'m, 'a> {
     }
 
     /// The side on which it is written; `None` for the center lane.
+    #[inline]
     pub fn side(self) -> Option<Side> {
         self.lane.group().side()
     }
 
     /// The length of the section for this lane's side, in metres.
+    #[inline]
     pub fn length(self) -> Option<f64> {
         self.at.length(self.side().unwrap_or(Side::Right))
     }
 
     /// The place at an end of the section: at its start, or just before its end.
+    #[inline]
     pub fn end_place(self, end: ContactPoint) -> Option<Place> {
         match end {
             ContactPoint::Start => Some(Place::at(0.0)),
@@ -125,6 +132,7 @@ impl<'m, 'a> LaneRef<'m, 'a> {
     }
 
     /// t of the outer border at `ds`, given t of the inner one.
+    #[inline]
     pub(crate) fn outer_from(self, by_width: bool, inner: f64, ds: Place) -> Option<f64> {
         let side = self.side()?;
         if by_width {

@@ -6,6 +6,7 @@ use qcbus_document::Node;
 
 use crate::geometry::finite;
 use crate::lane::{Lane, LaneGroup};
+use crate::names::{Name, Names};
 use crate::profile::Profile;
 use crate::road::Road;
 use crate::section_ref::SectionRef;
@@ -25,9 +26,16 @@ pub struct LaneLayer<'a> {
 }
 
 impl<'a> LaneLayer<'a> {
-    pub(crate) fn read(node: Node<'a>, index: usize, road_length: f64) -> LaneLayer<'a> {
-        let nodes = node.children().filter(|child| child.is("laneSection"));
-        let sections = nodes.zip(0..).map(|(node, at)| LaneSection::read(node, at));
+    pub(crate) fn read(
+        node: Node<'a>,
+        index: usize,
+        road_length: f64,
+        names: &Names,
+    ) -> LaneLayer<'a> {
+        let nodes = names.children(node, Name::LaneSection);
+        let sections = nodes
+            .zip(0..)
+            .map(|(node, at)| LaneSection::read(node, at, names));
         let mut steps = Steps::new(sections.collect());
         let terminal = chain(&mut steps, road_length);
         LaneLayer {
@@ -46,16 +54,19 @@ impl<'a> LaneLayer<'a> {
     }
 
     /// Its place among the road's layers.
+    #[inline]
     pub fn index(&self) -> usize {
         self.index as usize
     }
 
     /// Permanent or temporary.
+    #[inline]
     pub fn kind(&self) -> LayerKind {
         self.kind
     }
 
     /// The lane offset (11.5): t of the center lane over s.
+    #[inline]
     pub fn offset(&self) -> &Profile<'a> {
         &self.offset
     }
@@ -66,6 +77,7 @@ impl<'a> LaneLayer<'a> {
     }
 
     /// The sections in document order; `road` is the road that the layer belongs to.
+    #[inline]
     pub fn sections<'m>(
         &'m self,
         road: &'m Road<'a>,
@@ -77,6 +89,7 @@ impl<'a> LaneLayer<'a> {
     }
 
     /// The section at a place in document order.
+    #[inline]
     pub fn section<'m>(&'m self, road: &'m Road<'a>, index: usize) -> Option<SectionRef<'m, 'a>> {
         let section = self.steps.items().get(index)?;
         Some(SectionRef::new(road, self, section))
@@ -198,14 +211,17 @@ pub struct LaneSection<'a> {
 }
 
 impl<'a> LaneSection<'a> {
-    fn read(node: Node<'a>, index: u32) -> LaneSection<'a> {
+    fn read(node: Node<'a>, index: u32, names: &Names) -> LaneSection<'a> {
         let mut lanes = Vec::new();
         for part in node.children() {
-            let Some(group) = LaneGroup::of(part) else {
-                continue;
+            let group = match names.name(part) {
+                Name::Left => LaneGroup::Left,
+                Name::Center => LaneGroup::Center,
+                Name::Right => LaneGroup::Right,
+                _ => continue,
             };
-            let nodes = part.children().filter(|child| child.is("lane"));
-            lanes.extend(nodes.map(|node| Lane::read(node, group)));
+            let nodes = names.children(part, Name::Lane);
+            lanes.extend(nodes.map(|node| Lane::read(node, group, names)));
         }
         let holds = |side: Side| lanes.iter().any(|lane| lane.group().side() == Some(side));
         let single = flag(node, "singleSide").unwrap_or(false);
@@ -237,11 +253,13 @@ impl<'a> LaneSection<'a> {
     }
 
     /// Its place among the sections of its layer, in document order.
+    #[inline]
     pub fn index(&self) -> usize {
         self.index as usize
     }
 
     /// `@s`, in metres.
+    #[inline]
     pub fn s(&self) -> Option<f64> {
         known(self.s)
     }
@@ -253,16 +271,19 @@ impl<'a> LaneSection<'a> {
 
     /// Whether the section says something about this side: a section for a single side is silent
     /// about the other.
+    #[inline]
     pub fn covers(&self, side: Side) -> bool {
         self.sides[slot(side)]
     }
 
     /// Where the section ends for a side, in metres along s.
+    #[inline]
     pub fn end(&self, side: Side) -> Option<f64> {
         finite(self.ends[slot(side)])
     }
 
     /// The length for a side in metres; zero or negative in faulty files.
+    #[inline]
     pub fn length(&self, side: Side) -> Option<f64> {
         finite(self.end(side)? - self.s()?)
     }
@@ -278,11 +299,13 @@ impl<'a> LaneSection<'a> {
 
     /// Whether the ids of a side tell the order of its lanes: all are integers of the side's
     /// sign, none occurs twice, and there are at most 256. Otherwise its borders cannot be evaluated.
+    #[inline]
     pub fn is_numbered(&self, side: Side) -> bool {
         self.numbered[slot(side)]
     }
 
     /// The section before or after it for a side.
+    #[inline]
     pub(crate) fn beside(&self, side: Side, end: ContactPoint) -> Option<u32> {
         match end {
             ContactPoint::Start => self.previous[slot(side)],
@@ -291,14 +314,17 @@ impl<'a> LaneSection<'a> {
     }
 
     /// Whether a side has widths, as `any` finds out when it is asked for the first time.
+    #[inline]
     pub(crate) fn widths_or(&self, side: Side, any: impl Fn(Side) -> bool) -> bool {
         self.widths.get_or_init(|| Side::BOTH.map(any))[slot(side)]
     }
 
+    #[inline]
     pub(crate) fn own_lanes(&self) -> &[Lane<'a>] {
         &self.lanes
     }
 
+    #[inline]
     pub(crate) fn outward(&self, side: Side) -> &[u32] {
         &self.outward[slot(side)]
     }

@@ -18,6 +18,7 @@ mod lane_ref;
 mod lanes;
 mod lateral;
 mod map;
+mod names;
 mod objects;
 mod outlines;
 mod plan_view;

@@ -1,12 +1,13 @@
 //! The whole map.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use qcbus_document::{Document, Node};
 
 use crate::index::IdIndex;
 use crate::junction::Junction;
 use crate::lane_ref::{LaneKey, LaneRef};
+use crate::names::Names;
 use crate::objects::{Object, listed};
 use crate::railroad::{JunctionGroup, Station};
 use crate::road::Road;
@@ -66,10 +67,11 @@ impl<'a> RoadMap<'a> {
         let mut roads = Vec::new();
         let mut junctions = Vec::new();
         let mut header = None;
+        let names = Arc::new(Names::of(document));
         for child in root.into_iter().flat_map(|root| root.children()) {
             let place = |len: usize| u32::try_from(len).unwrap_or(u32::MAX);
             match child.name() {
-                "road" => roads.push(Road::read(child, place(roads.len()))),
+                "road" => roads.push(Road::read(child, place(roads.len()), &names)),
                 "junction" => junctions.push(Junction::read(child, place(junctions.len()))),
                 "header" => header = header.or(Some(child)),
                 _ => {}
@@ -106,11 +108,13 @@ impl<'a> RoadMap<'a> {
     }
 
     /// All roads in document order.
+    #[inline]
     pub fn roads(&self) -> &[Road<'a>] {
         &self.roads
     }
 
     /// The first road with this id.
+    #[inline]
     pub fn road(&self, id: &str) -> Option<&Road<'a>> {
         self.roads_with_id(id).next()
     }
@@ -130,11 +134,13 @@ impl<'a> RoadMap<'a> {
     }
 
     /// All junctions in document order.
+    #[inline]
     pub fn junctions(&self) -> &[Junction<'a>] {
         &self.junctions
     }
 
     /// The first junction with this id.
+    #[inline]
     pub fn junction(&self, id: &str) -> Option<&Junction<'a>> {
         self.junctions_with_id(id).next()
     }
@@ -244,16 +250,19 @@ impl<'a> RoadMap<'a> {
     }
 
     /// The lane sections of all roads and layers, in document order.
+    #[inline]
     pub fn sections(&self) -> impl Iterator<Item = SectionRef<'_, 'a>> {
         self.roads.iter().flat_map(Road::sections)
     }
 
     /// All lanes in document order.
+    #[inline]
     pub fn lanes(&self) -> impl Iterator<Item = LaneRef<'_, 'a>> {
         self.sections().flat_map(SectionRef::lanes)
     }
 
     /// The lane at a place in the map.
+    #[inline]
     pub fn lane(&self, key: LaneKey) -> Option<LaneRef<'_, 'a>> {
         let road = self.roads.get(key.road as usize)?;
         let layer = road.layers().get(key.layer as usize)?;

@@ -35,16 +35,19 @@ impl<'a> Record<'a> {
     }
 
     /// The element.
+    #[inline]
     pub fn node(&self) -> Node<'a> {
         self.node
     }
 
     /// Where the record starts: `@s` of the road, `@sOffset` in the section.
+    #[inline]
     pub fn start(&self) -> Option<f64> {
         known(self.start)
     }
 
     /// The polynomial, if all four coefficients are there.
+    #[inline]
     pub fn cubic(&self) -> Option<Cubic> {
         let Cubic { a, b, c, d } = self.cubic;
         let all = [a, b, c, d];
@@ -54,12 +57,14 @@ impl<'a> Record<'a> {
     }
 
     /// The value at `x`, measured like the record's start.
+    #[inline]
     pub fn at(&self, x: f64) -> Option<f64> {
         self.cubic()?.eval(x - self.start()?)
     }
 }
 
 impl Starts for Record<'_> {
+    #[inline]
     fn start(&self) -> f64 {
         self.start
     }
@@ -98,17 +103,20 @@ impl<'a> Profile<'a> {
     }
 
     /// The records in document order.
+    #[inline]
     pub fn records(&self) -> &[Record<'a>] {
         self.steps.items()
     }
 
     /// Whether there is no record.
+    #[inline]
     pub fn is_empty(&self) -> bool {
         self.records().is_empty()
     }
 
     /// The records in ascending order of start (those with equal starts as written); none when a
     /// record's start is unknown.
+    #[inline]
     pub fn in_order(&self) -> impl DoubleEndedIterator<Item = &Record<'a>> {
         self.steps.in_order()
     }
@@ -120,6 +128,7 @@ impl<'a> Profile<'a> {
 
     /// The record that is valid at a place: the last that starts at or before it. `None` before
     /// the first record, when the valid record is incomplete, or when any start is unknown.
+    #[inline]
     pub fn valid_at(&self, place: impl Into<Place>) -> Option<Valid<'_, 'a>> {
         let place = place.into();
         let record = self.steps.ranked(self.steps.rank_at(place)?)?;
@@ -131,6 +140,7 @@ impl<'a> Profile<'a> {
     }
 
     /// The value at a place; see [`Profile::valid_at`].
+    #[inline]
     pub fn at(&self, place: impl Into<Place>) -> Option<f64> {
         let valid = self.valid_at(place)?;
         valid.cubic.eval(valid.ds)
@@ -144,6 +154,7 @@ impl<'a> Profile<'a> {
 
     /// The value at a place, and zero where the profile does not say anything: without records
     /// and before the first one, as for elevation, superelevation and lane offset.
+    #[inline]
     pub fn at_or_zero(&self, place: impl Into<Place>) -> Option<f64> {
         let place = place.into();
         if self.steps.silent_at(place) {
@@ -166,6 +177,7 @@ impl<'a> Profile<'a> {
     /// Each record with the stretch over which it is valid, up to `end`, in ascending order.
     /// Records that start at or beyond `end` or that the next one replaces at once are left out,
     /// as are incomplete ones.
+    #[inline]
     pub fn stretches(&self, end: f64) -> impl Iterator<Item = Stretch<'_, 'a>> {
         (0..self.steps.ranks()).filter_map(move |rank| {
             let record = self.steps.ranked(rank)?;

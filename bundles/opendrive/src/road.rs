@@ -1,16 +1,18 @@
 //! Roads (OpenDRIVE 1.9, chapter 10).
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use qcbus_document::Node;
 
 use crate::geometry::Pose;
 use crate::lanes::LaneLayer;
 use crate::lateral::LateralProfile;
+use crate::names::Names;
 use crate::plan_view::{END_TOLERANCE, PlanView};
 use crate::profile::Profile;
 use crate::section_ref::SectionRef;
 use crate::steps::Place;
+use crate::surface::Frame;
 use crate::value::{ContactPoint, LayerKind, known, number};
 use crate::view::view;
 
@@ -36,6 +38,9 @@ pub struct Road<'a> {
     elevation: OnceLock<Profile<'a>>,
     lateral: OnceLock<LateralProfile<'a>>,
     layers: OnceLock<Vec<LaneLayer<'a>>>,
+    names: Arc<Names>,
+    /// The cross sections at the start and at the end, once somebody has asked.
+    end_frames: [OnceLock<Option<Frame>>; 2],
 }
 
 /// The elements directly within a road, found in one pass; of several equals the first.
@@ -73,7 +78,7 @@ impl<'a> Parts<'a> {
 }
 
 impl<'a> Road<'a> {
-    pub(crate) fn read(node: Node<'a>, index: u32) -> Road<'a> {
+    pub(crate) fn read(node: Node<'a>, index: u32, names: &Arc<Names>) -> Road<'a> {
         Road {
             node,
             index,
@@ -85,31 +90,38 @@ impl<'a> Road<'a> {
             elevation: OnceLock::new(),
             lateral: OnceLock::new(),
             layers: OnceLock::new(),
+            names: Arc::clone(names),
+            end_frames: [OnceLock::new(), OnceLock::new()],
         }
     }
 
     /// The `<road>` element.
+    #[inline]
     pub fn node(&self) -> Node<'a> {
         self.node
     }
 
     /// Its place among the map's roads.
+    #[inline]
     pub fn index(&self) -> usize {
         self.index as usize
     }
 
     /// `@id`, empty when missing.
+    #[inline]
     pub fn id(&self) -> &'a str {
         self.id
     }
 
     /// `@length`, in metres.
+    #[inline]
     pub fn length(&self) -> Option<f64> {
         known(self.length)
     }
 
     /// The id of the junction that the road belongs to; `None` when it belongs to none (`-1` or
     /// no attribute).
+    #[inline]
     pub fn junction(&self) -> Option<&'a str> {
         self.junction.filter(|id| *id != "-1")
     }
@@ -129,6 +141,7 @@ impl<'a> Road<'a> {
     }
 
     /// The link at an end: `<predecessor>` at the start, `<successor>` at the end.
+    #[inline]
     pub fn link(&self, end: ContactPoint) -> Option<RoadLink<'a>> {
         let node = self.parts.link?.child(end.link_name())?;
         Some(RoadLink::of(node))
@@ -175,12 +188,14 @@ impl<'a> Road<'a> {
     }
 
     /// The reference line.
+    #[inline]
     pub fn plan_view(&self) -> &PlanView<'a> {
         self.plan_view
             .get_or_init(|| PlanView::read(self.parts.plan_view))
     }
 
     /// The elevation profile (10.5.1): z over s.
+    #[inline]
     pub fn elevation(&self) -> &Profile<'a> {
         self.elevation.get_or_init(|| {
             let node = self.parts.elevation.into_iter();
@@ -190,32 +205,37 @@ impl<'a> Road<'a> {
     }
 
     /// Superelevation, shape and cross section surface (10.5.2 to 10.5.4).
+    #[inline]
     pub fn lateral(&self) -> &LateralProfile<'a> {
         self.lateral
             .get_or_init(|| LateralProfile::read(self.parts.lateral))
     }
 
     /// The lane layers, one per `<lanes>` element.
+    #[inline]
     pub fn layers(&self) -> &[LaneLayer<'a>] {
         self.layers.get_or_init(|| {
             let lanes = self.node.children_named("lanes").enumerate();
             lanes
-                .map(|(index, node)| LaneLayer::read(node, index, self.length))
+                .map(|(index, node)| LaneLayer::read(node, index, self.length, &self.names))
                 .collect()
         })
     }
 
     /// The first layer of this kind.
+    #[inline]
     pub fn layer(&self, kind: LayerKind) -> Option<&LaneLayer<'a>> {
         self.layers().iter().find(|layer| layer.kind() == kind)
     }
 
     /// The permanent lanes.
+    #[inline]
     pub fn permanent(&self) -> Option<&LaneLayer<'a>> {
         self.layer(LayerKind::Permanent)
     }
 
     /// All lane sections of all layers, in document order.
+    #[inline]
     pub fn sections(&self) -> impl Iterator<Item = SectionRef<'_, 'a>> {
         self.layers().iter().flat_map(|layer| layer.sections(self))
     }
@@ -242,6 +262,19 @@ impl<'a> Road<'a> {
             ContactPoint::Start => self.plan_view().first(),
             ContactPoint::End => self.plan_view().last(),
         }
+    }
+
+    /// The cross section at an end, as `find` finds it when it is asked for the first time.
+    pub(crate) fn end_frame_or(
+        &self,
+        end: ContactPoint,
+        find: impl FnOnce() -> Option<Frame>,
+    ) -> Option<Frame> {
+        let slot = match end {
+            ContactPoint::Start => &self.end_frames[0],
+            ContactPoint::End => &self.end_frames[1],
+        };
+        *slot.get_or_init(find)
     }
 
     /// The coordinate of an end: 0 or `@length`.

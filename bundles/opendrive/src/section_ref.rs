@@ -22,12 +22,14 @@ pub struct SectionRef<'m, 'a> {
 impl<'a> Deref for SectionRef<'_, 'a> {
     type Target = LaneSection<'a>;
 
+    #[inline]
     fn deref(&self) -> &LaneSection<'a> {
         self.section
     }
 }
 
 impl<'m, 'a> SectionRef<'m, 'a> {
+    #[inline]
     pub(crate) fn new(
         road: &'m Road<'a>,
         layer: &'m LaneLayer<'a>,
@@ -41,16 +43,19 @@ impl<'m, 'a> SectionRef<'m, 'a> {
     }
 
     /// The section itself.
+    #[inline]
     pub fn section(self) -> &'m LaneSection<'a> {
         self.section
     }
 
     /// The lanes in document order.
+    #[inline]
     pub fn lanes(self) -> impl Iterator<Item = LaneRef<'m, 'a>> {
         (0..self.section.own_lanes().len()).filter_map(move |at| self.lane_at(at))
     }
 
     /// The lane at a place in document order.
+    #[inline]
     pub fn lane_at(self, index: usize) -> Option<LaneRef<'m, 'a>> {
         LaneRef::new(self, index)
     }
@@ -74,6 +79,7 @@ impl<'m, 'a> SectionRef<'m, 'a> {
     }
 
     /// The lanes of a side, from the center outward.
+    #[inline]
     pub fn side(self, side: Side) -> impl DoubleEndedIterator<Item = LaneRef<'m, 'a>> {
         let places = self.section.outward(side).iter();
         places.filter_map(move |at| self.lane_at(*at as usize))
@@ -91,22 +97,26 @@ impl<'m, 'a> SectionRef<'m, 'a> {
     }
 
     /// The next section for a side.
+    #[inline]
     pub fn next(self, side: Side) -> Option<SectionRef<'m, 'a>> {
         self.neighbour(side, ContactPoint::End)
     }
 
     /// The previous section for a side.
+    #[inline]
     pub fn previous(self, side: Side) -> Option<SectionRef<'m, 'a>> {
         self.neighbour(side, ContactPoint::Start)
     }
 
     /// The section that touches this one at an end, for a side, by order of `@s`.
+    #[inline]
     pub fn neighbour(self, side: Side, end: ContactPoint) -> Option<SectionRef<'m, 'a>> {
         let place = self.section.beside(side, end)?;
         self.layer.section(self.road, place as usize)
     }
 
     /// t of the center lane at `ds` metres from the section's start: the lane offset (11.5).
+    #[inline]
     pub fn center_t(self, ds: impl Into<Place>) -> Option<f64> {
         self.layer.offset().at_or_zero(ds.into().shifted(self.s()?))
     }
@@ -114,19 +124,25 @@ impl<'m, 'a> SectionRef<'m, 'a> {
     /// The cross section of a side at `ds` metres from the section's start: each lane with t of
     /// its inner and its outer border, from the center outward, as far as they are defined.
     pub fn spans(self, side: Side, ds: impl Into<Place>) -> Vec<LaneSpan<'m, 'a>> {
+        self.each_span(side, ds).collect()
+    }
+
+    /// The same as [`SectionRef::spans`], one after the other.
+    #[inline]
+    pub fn each_span(
+        self,
+        side: Side,
+        ds: impl Into<Place>,
+    ) -> impl Iterator<Item = LaneSpan<'m, 'a>> {
         let ds = ds.into();
-        let mut spans = Vec::new();
-        let Some(mut inner) = self.center_t(ds).filter(|_| self.is_numbered(side)) else {
-            return spans;
-        };
+        let mut border = self.center_t(ds).filter(|_| self.is_numbered(side));
         let by_width = self.has_widths(side);
-        for lane in self.side(side) {
-            let outer = lane.outer_from(by_width, inner, ds);
-            let Some(outer) = outer else { break };
-            spans.push(LaneSpan { lane, inner, outer });
-            inner = outer;
-        }
-        spans
+        self.side(side).map_while(move |lane| {
+            let inner = border?;
+            let outer = lane.outer_from(by_width, inner, ds)?;
+            border = Some(outer);
+            Some(LaneSpan { lane, inner, outer })
+        })
     }
 
     /// t of the outermost border of a side at `ds`, the center's where a side has no lanes.

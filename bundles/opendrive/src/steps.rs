@@ -16,21 +16,25 @@ pub struct Place {
 
 impl Place {
     /// At `x`: what starts at `x` is valid.
+    #[inline]
     pub fn at(x: f64) -> Place {
         Place { x, below: false }
     }
 
     /// Just before `x`: what ends at `x` is still valid.
+    #[inline]
     pub fn before(x: f64) -> Place {
         Place { x, below: true }
     }
 
     /// The coordinate.
+    #[inline]
     pub fn x(self) -> f64 {
         self.x
     }
 
     /// The same place seen from an origin that lies `by` further back.
+    #[inline]
     pub fn shifted(self, by: f64) -> Place {
         Place {
             x: self.x + by,
@@ -39,11 +43,13 @@ impl Place {
     }
 
     /// Whether something that starts at `start` is valid here.
+    #[inline]
     pub fn is_after(self, start: f64) -> bool {
         start <= self.horizon()
     }
 
     /// Up to which start something is valid here.
+    #[inline]
     fn horizon(self) -> f64 {
         if self.below {
             self.x - SAME_PLACE
@@ -102,6 +108,7 @@ impl<T: Starts> Steps<T> {
     }
 
     /// All items in document order.
+    #[inline]
     pub(crate) fn items(&self) -> &[T] {
         &self.items
     }
@@ -112,11 +119,13 @@ impl<T: Starts> Steps<T> {
     }
 
     /// How many items have a rank: all, or none when a start is missing.
+    #[inline]
     pub(crate) fn ranks(&self) -> usize {
         if self.unplaced { 0 } else { self.items.len() }
     }
 
     /// The place in document order of the item with this rank.
+    #[inline]
     pub(crate) fn index(&self, rank: usize) -> Option<usize> {
         if rank >= self.ranks() {
             None
@@ -128,17 +137,20 @@ impl<T: Starts> Steps<T> {
     }
 
     /// The item with this rank in ascending order of start; those with equal starts as written.
+    #[inline]
     pub(crate) fn ranked(&self, rank: usize) -> Option<&T> {
         self.items.get(self.index(rank)?)
     }
 
     /// The items in ascending order of start; none when a start is missing.
+    #[inline]
     pub(crate) fn in_order(&self) -> impl DoubleEndedIterator<Item = &T> {
         (0..self.ranks()).filter_map(|rank| self.ranked(rank))
     }
 
     /// The rank of the last item that has started; `None` before the first one, and when a start
     /// is missing.
+    #[inline]
     pub(crate) fn rank_at(&self, place: Place) -> Option<usize> {
         if self.unplaced || !place.x.is_finite() {
             return None;
@@ -154,6 +166,7 @@ impl<T: Starts> Steps<T> {
     }
 
     /// Whether nothing is said about the place: there are no items, or the first starts later.
+    #[inline]
     pub(crate) fn silent_at(&self, place: Place) -> bool {
         !self.unplaced && place.x.is_finite() && self.rank_at(place).is_none()
     }

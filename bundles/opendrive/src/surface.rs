@@ -2,6 +2,7 @@
 //! 10.5, 11.7.3, 11.7.4).
 
 use crate::geometry::{Point, Point3, Pose, finite};
+use crate::lane::Borders;
 use crate::lane_ref::{Edge, LaneRef};
 use crate::road::Road;
 use crate::steps::Place;
@@ -48,11 +49,13 @@ impl<'a> Road<'a> {
     /// The cross section at one of the road's ends, where the reference line really begins or
     /// ends.
     pub fn end_frame(&self, end: ContactPoint) -> Option<Frame> {
-        let place = match end {
-            ContactPoint::Start => Place::at(0.0),
-            ContactPoint::End => Place::before(self.length()?),
-        };
-        self.frame_on(self.end_pose(end)?, place)
+        self.end_frame_or(end, || {
+            let place = match end {
+                ContactPoint::Start => Place::at(0.0),
+                ContactPoint::End => Place::before(self.length()?),
+            };
+            self.frame_on(self.end_pose(end)?, place)
+        })
     }
 
     fn frame_on(&self, pose: Pose, s: Place) -> Option<Frame> {
@@ -122,17 +125,22 @@ impl<'m, 'a> LaneRef<'m, 'a> {
     /// A border at an end of the section. At the ends of the road the reference line's own end
     /// counts, whatever `@length` says.
     pub fn border_at(self, edge: Edge, end: ContactPoint) -> Option<BorderPoint> {
-        let ds = self.end_place(end)?;
-        self.border_in(self.frame_at(end)?, edge, ds)
+        let [inner, outer] = self.end_borders(end);
+        match edge {
+            Edge::Inner => *inner,
+            Edge::Outer => *outer,
+        }
     }
 
     /// Both borders at an end of the section, inner and outer; see [`LaneRef::border_at`].
     pub fn borders_at(self, end: ContactPoint) -> Option<[BorderPoint; 2]> {
-        let (ds, frame) = (self.end_place(end)?, self.frame_at(end)?);
-        Some([
-            self.border_in(frame, Edge::Inner, ds)?,
-            self.border_in(frame, Edge::Outer, ds)?,
-        ])
+        let [inner, outer] = *self.end_borders(end);
+        Some([inner?, outer?])
+    }
+
+    fn end_borders(self, end: ContactPoint) -> &'m Borders {
+        let find = |edge| self.border_in(self.frame_at(end)?, edge, self.end_place(end)?);
+        self.lane().borders_or(end, find)
     }
 
     /// The cross section of the road at an end of the section.

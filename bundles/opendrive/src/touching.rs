@@ -1,6 +1,6 @@
 //! Where linked lanes touch: their touching points (OpenDRIVE 1.9, annex D.1.1).
 
-use std::collections::HashSet;
+use foldhash::HashSet;
 
 use crate::joints::{LaneEnd, LaneJoint};
 use crate::map::RoadMap;
@@ -38,7 +38,10 @@ impl<'a> RoadMap<'a> {
     pub fn touching_lanes(&self) -> &[TouchingLanes<'a>] {
         self.caches.touching.get_or_init(|| {
             let joints = self.lane_joints();
-            let mut seen = HashSet::with_capacity(joints.len());
+            let mut seen = HashSet::with_capacity_and_hasher(
+                joints.len(),
+                foldhash::fast::RandomState::default(),
+            );
             let first = |joint: &&LaneJoint<'a>| {
                 let (one, other) = (joint.from, joint.to);
                 seen.insert((one.min(other), one.max(other)))

@@ -4,24 +4,33 @@ use std::fmt;
 
 use qcbus_document::Node;
 
-/// White space as XML defines it.
-const XML_SPACE: [char; 4] = [' ', '\t', '\r', '\n'];
+/// The text without white space around it, as XML defines that.
+#[inline]
+fn trim(text: &str) -> &str {
+    let is_space = |byte: Option<&u8>| matches!(byte, Some(b' ' | b'\t' | b'\r' | b'\n'));
+    let bytes = text.as_bytes();
+    // Hardly anybody writes any, and looking for it costs as much as reading a short number.
+    if !is_space(bytes.first()) && !is_space(bytes.last()) {
+        return text;
+    }
+    text.trim_matches([' ', '\t', '\r', '\n'])
+}
 
 /// A finite number, or `None`.
 pub(crate) fn parse_number(text: &str) -> Option<f64> {
-    let value: f64 = text.trim_matches(XML_SPACE).parse().ok()?;
+    let value: f64 = trim(text).parse().ok()?;
     value.is_finite().then_some(value)
 }
 
 /// An integer of at most 64 bits, or `None`.
 pub(crate) fn parse_integer(text: &str) -> Option<i64> {
-    text.trim_matches(XML_SPACE).parse().ok()
+    trim(text).parse().ok()
 }
 
 /// A boolean in any of the spellings that OpenDRIVE has had: `true`/`false`, `1`/`0`,
 /// `yes`/`no`.
 pub(crate) fn parse_flag(text: &str) -> Option<bool> {
-    match text.trim_matches(XML_SPACE) {
+    match trim(text) {
         "true" | "1" | "yes" => Some(true),
         "false" | "0" | "no" => Some(false),
         _ => None,
@@ -70,10 +79,14 @@ pub(crate) fn layer(node: Node<'_>, name: &str) -> LayerKind {
 /// Several numbers in one pass over the attributes; absent and broken ones are NaN.
 pub(crate) fn numbers<const N: usize>(node: Node<'_>, names: [&str; N]) -> [f64; N] {
     let mut found = [f64::NAN; N];
+    // Most files list them in the order of the standard: the next one is looked for first.
+    let mut next = 0;
     for attribute in node.attributes() {
-        let name = attribute.name();
-        if let Some(slot) = names.iter().position(|wanted| *wanted == name) {
+        let slots = (next..N).chain(0..next.min(N));
+        let mut slots = slots.filter(|slot| attribute.is(names[*slot]));
+        if let Some(slot) = slots.next() {
             found[slot] = parse_number(attribute.value()).unwrap_or(f64::NAN);
+            next = slot + 1;
         }
     }
     found

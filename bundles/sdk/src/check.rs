@@ -80,8 +80,8 @@ enum Ending {
 }
 
 /// How a checker is let through: with a note when its rule is not normative for the version.
-struct Pass {
-    values: Values,
+struct Pass<'r> {
+    values: &'r Values,
     not_normative: Option<String>,
 }
 
@@ -141,7 +141,7 @@ impl<'r> Run<'r> {
         self.cancelled
     }
 
-    fn one(&mut self, index: usize, pass: Pass, apply: Apply<'_, 'r>) {
+    fn one(&mut self, index: usize, pass: Pass<'r>, apply: Apply<'_, 'r>) {
         let checker = &self.plan.checkers[index];
         self.listener.begins(index);
         let start = Instant::now();
@@ -182,10 +182,11 @@ impl<'r> Run<'r> {
     }
 
     /// Parameters, preconditions, version: in this order.
-    fn gate(&self, index: usize) -> Result<Pass, Outcome> {
-        let (checker, entry) = (&self.plan.checkers[index], &self.plan.entries[index]);
+    fn gate(&self, index: usize) -> Result<Pass<'r>, Outcome> {
+        let plan = self.plan;
+        let (checker, entry) = (&plan.checkers[index], &plan.entries[index]);
         let fails = |reason: &String| Outcome::without_run(Status::Error, reason.clone());
-        let values = entry.values.as_ref().map_err(fails)?.clone();
+        let values = entry.values.as_ref().map_err(fails)?;
         let with_params = |mut outcome: Outcome| {
             outcome.params = values.listed();
             outcome

@@ -31,7 +31,7 @@ pub use plan::Plan;
 pub use qcbus_formats::xqar::{Issue, Level, Status};
 pub use resource::{Brought, Resource, ResourceError, ResourceFile, UserFiles};
 pub use rule::{AnyRule, Backport, Facts, Model, Rule, Skip};
-pub use run::{Exit, Mode, examine, main, run};
+pub use run::{Exit, Mode, Timings, examine, examine_timed, main, run};
 pub use sink::{Finding, Sink};
 pub use subject::{Linked, Subject};
 pub use version::{Version, VersionError, VersionRange};

@@ -18,7 +18,7 @@ use crate::{Param, Subject, Values, Version};
 pub struct Sink<'d> {
     subject: &'d Subject<'d>,
     facts: Facts,
-    values: Values,
+    values: &'d Values,
     /// Said on every issue of a rule that is not normative for the document's version.
     not_normative: Option<String>,
     kept: Vec<((usize, u32), Issue)>,
@@ -42,7 +42,7 @@ impl<'d> Sink<'d> {
     pub(crate) fn new(
         subject: &'d Subject<'d>,
         facts: Facts,
-        values: Values,
+        values: &'d Values,
         not_normative: Option<String>,
     ) -> Sink<'d> {
         let scratch = issue(String::new(), facts.level, "");

@@ -13,7 +13,7 @@ use qcbus_formats::pool::CheckerOutcome;
 use qcbus_formats::xqar::Status;
 use qcbus_sdk::{
     AnyRule, Backport, Bundle, Checker, Level, Loaded, Model, Param, Plan, Rule, Sink, Skip,
-    Subject, Version, basic, examine,
+    Subject, Version, basic, examine, examine_timed,
 };
 
 const LIMIT: Param = Param::number("limit", 0.0, "m", "a limit");
@@ -161,6 +161,21 @@ fn findings_are_located_and_in_document_order() {
     );
     assert!(places[1].contains("row: 4"), "{places:?}");
     assert_eq!(outcome.issues[0].locations.len(), 2);
+}
+
+#[test]
+fn timings_name_every_demanded_checker_and_sum_up() {
+    let loaded = Loaded::from_bytes(Path::new("a.xodr"), MAP.as_bytes().to_vec()).unwrap();
+    let (outcome, timings) = examine_timed(&Plan::by_default(&BUNDLE), &loaded).unwrap();
+    let text = timings.to_string();
+    for checker in &outcome.checkers {
+        let lines = text
+            .lines()
+            .filter(|line| line.ends_with(&format!("ms  {}", checker.id)));
+        assert_eq!(lines.count(), 1, "{} in\n{text}", checker.id);
+    }
+    assert_eq!(timings.checkers.len(), outcome.checkers.len());
+    assert!(timings.sum() <= timings.whole, "{text}");
 }
 
 #[test]

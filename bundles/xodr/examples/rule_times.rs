@@ -1,7 +1,8 @@
-//! How long every rule takes, by size of the map.
+//! How long the rules take on maps, from the image of the document, in one thread.
 //!
-//! `cargo run --release -p qcbus-xodr --example rule_times -- MAP.xodr [MEGABYTES]` repeats the roads
-//! of the map with fresh ids, each copy a kilometre further north, until the file has that size.
+//! `cargo run --release -p qcbus-xodr --example rule_times -- [--rules] [--runs N] MAP.xodr…` prints
+//! the CPU time of all rules together per map; with `--rules` what each took, of the maps one after
+//! the other, sorted by the last. `tests/xodr_speed.py` makes large maps to measure.
 
 #![expect(
     clippy::print_stdout,
@@ -14,98 +15,127 @@ use std::time::Duration;
 
 use qcbus_sdk::{Issue, Listener, Loaded, Outcome, Plan, check};
 
-/// The measurements are the best of so many runs.
-const RUNS: usize = 3;
-
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
-    let Some(path) = arguments.next() else {
-        println!("usage: rule_times MAP.xodr [MEGABYTES]");
-        return Ok(());
-    };
-    let text = std::fs::read_to_string(&path)?;
-    let megabytes = arguments.next().and_then(|word| word.parse().ok());
-    let size = megabytes.unwrap_or(20) * 1_000_000;
-    let half = measure(&repeat_roads(&text, size / 2))?;
-    let whole = measure(&repeat_roads(&text, size))?;
-    let mut rules: Vec<(&String, &Duration)> = whole.iter().collect();
-    rules.sort_by_key(|(_, took)| std::cmp::Reverse(**took));
-    let milliseconds = |took: &Duration| took.as_secs_f64() * 1e3;
-    for (id, took) in &rules {
-        let before = half.get(*id).map_or(0.0, milliseconds);
-        println!("{before:9.2} ms {:9.2} ms  {id}", milliseconds(took));
+    let (mut rules, mut runs, mut maps) = (false, 5, Vec::new());
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--rules" => rules = true,
+            "--runs" => runs = arguments.next().unwrap_or_default().parse()?,
+            _ => maps.push(argument),
+        }
     }
-    let sum = |all: &BTreeMap<String, Duration>| milliseconds(&all.values().sum());
-    println!("{:9.2} ms {:9.2} ms  all together", sum(&half), sum(&whole));
+    let measured: Vec<Measured> = maps
+        .iter()
+        .map(|map| measure(map, runs))
+        .collect::<Result<_, _>>()?;
+    for (map, measured) in maps.iter().zip(&measured) {
+        let [best, median] = [measured.best, measured.median].map(milliseconds);
+        println!(
+            "{best:9.3} ms best {median:9.3} ms median  {} issues  {map}",
+            measured.issues
+        );
+    }
+    if rules {
+        by_rule(&measured);
+    }
     Ok(())
 }
 
-/// The map with its roads repeated under fresh ids until it has `size` bytes.
-fn repeat_roads(text: &str, size: usize) -> String {
-    let (Some(from), Some(to)) = (text.find("<road "), text.rfind("</road>")) else {
-        return text.to_owned();
-    };
-    let (head, roads, tail) = (&text[..from], &text[from..to + 7], &text[to + 7..]);
-    let mut map = head.to_owned();
-    let mut copy = 0;
-    while map.len() + tail.len() < size {
-        let linked = roads.replace("elementId=\"", &format!("elementId=\"{copy}-"));
-        for road in linked.split("<road ").skip(1) {
-            map.push_str("<road ");
-            let road = road.replacen(" id=\"", &format!(" id=\"{copy}-"), 1);
-            map.push_str(&moved(&road, f64::from(copy) * 1000.0));
+fn by_rule(measured: &[Measured]) {
+    let Some(last) = measured.last() else { return };
+    let mut rules: Vec<(&String, &Duration)> = last.rules.iter().collect();
+    rules.sort_by_key(|(_, took)| std::cmp::Reverse(**took));
+    for (id, _) in rules {
+        for map in measured {
+            print!(
+                "{:9.3} ",
+                map.rules.get(id).copied().map_or(0.0, milliseconds)
+            );
         }
-        copy += 1;
+        println!(" {id}");
     }
-    map + tail
 }
 
-/// The road with all its geometries moved to the north.
-fn moved(road: &str, by: f64) -> String {
-    let mut parts = road.split("<geometry ");
-    let mut text = parts.next().unwrap_or_default().to_owned();
-    for part in parts {
-        text.push_str("<geometry ");
-        let y = part.split_once(" y=\"");
-        let number = y.and_then(|(before, rest)| Some((before, rest.split_once('"')?)));
-        match number {
-            Some((before, (y, rest))) => {
-                let y = y.parse::<f64>().unwrap_or(0.0) + by;
-                text.push_str(&format!("{before} y=\"{y}\"{rest}"));
-            }
-            None => text.push_str(part),
-        }
-    }
-    text
+fn milliseconds(took: Duration) -> f64 {
+    took.as_secs_f64() * 1e3
 }
 
-fn measure(text: &str) -> Result<BTreeMap<String, Duration>, Box<dyn std::error::Error>> {
-    let loaded = Loaded::from_bytes(Path::new("map.xodr"), text.as_bytes().to_vec())?;
-    let subject = loaded.subject(&qcbus_xodr::BUNDLE)?;
+/// What was measured of one map.
+struct Measured {
+    /// CPU of all rules together.
+    best: Duration,
+    median: Duration,
+    /// The least that each rule took.
+    rules: BTreeMap<String, Duration>,
+    issues: usize,
+}
+
+fn measure(map: &str, runs: usize) -> Result<Measured, Box<dyn std::error::Error>> {
+    let path = Path::new(map);
+    let loaded = Loaded::from_path(path, path.parent().unwrap_or(path))?;
     let plan = Plan::by_default(&qcbus_xodr::BUNDLE);
-    let mut best: BTreeMap<String, Duration> = BTreeMap::new();
-    for _ in 0..RUNS {
-        let mut times = Times {
-            plan: &plan,
-            took: BTreeMap::new(),
-        };
+    let mut rules: BTreeMap<String, Duration> = BTreeMap::new();
+    let (mut totals, mut issues) = (Vec::new(), 0);
+    for _ in 0..runs.max(1) {
+        // As a bundle does it: what a subject remembers is not carried over to the next run.
+        let before = cpu();
+        let subject = loaded.subject(&qcbus_xodr::BUNDLE)?;
+        let mut times = Times::default();
         check(&plan, &subject, &mut times);
-        for (id, took) in times.took {
-            let slot = best.entry(id).or_insert(took);
+        totals.push(cpu().saturating_sub(before));
+        issues = times.issues;
+        for (checker, took) in times.took {
+            let slot = rules.entry(plan.checkers()[checker].id.clone());
+            let slot = slot.or_insert(took);
             *slot = took.min(*slot);
         }
     }
-    Ok(best)
+    totals.sort_unstable();
+    Ok(Measured {
+        best: totals[0],
+        median: totals[totals.len() / 2],
+        rules,
+        issues,
+    })
 }
 
-struct Times<'p> {
-    plan: &'p Plan,
-    took: BTreeMap<String, Duration>,
+/// The CPU time of this thread.
+fn cpu() -> Duration {
+    let mut time = libc::timespec {
+        tv_sec: 0,
+        tv_nsec: 0,
+    };
+    #[expect(
+        unsafe_code,
+        reason = "std has no clock that stands still while others run"
+    )]
+    // SAFETY: `time` is a timespec that outlives the call.
+    unsafe {
+        libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time);
+    }
+    let seconds = u64::try_from(time.tv_sec).unwrap_or(0);
+    Duration::from_secs(seconds) + Duration::from_nanos(u64::try_from(time.tv_nsec).unwrap_or(0))
 }
 
-impl Listener for Times<'_> {
-    fn ended(&mut self, checker: usize, _: Vec<Issue>, outcome: Outcome) {
-        let id = self.plan.checkers()[checker].id.clone();
-        self.took.insert(id, outcome.took);
+/// The CPU time from the begin of each checker to its end.
+#[derive(Default)]
+struct Times {
+    began: Option<Duration>,
+    took: Vec<(usize, Duration)>,
+    issues: usize,
+}
+
+impl Listener for Times {
+    fn begins(&mut self, _: usize) {
+        self.began = Some(cpu());
+    }
+
+    fn ended(&mut self, checker: usize, issues: Vec<Issue>, _: Outcome) {
+        // One that is skipped does not begin.
+        if let Some(began) = self.began.take() {
+            self.took.push((checker, cpu().saturating_sub(began)));
+        }
+        self.issues += issues.len();
     }
 }

@@ -14,6 +14,7 @@ pub struct Attribute<'a> {
 
 impl<'a> Attribute<'a> {
     /// The name as written, prefix included (`xsi:type`).
+    #[inline]
     pub fn name(&self) -> &'a str {
         self.record()
             .map_or("", |record| self.node.document().name(record.name.get()))
@@ -30,7 +31,7 @@ impl<'a> Attribute<'a> {
     pub fn is(&self, name: &str) -> bool {
         let document = self.node.document();
         self.record()
-            .is_some_and(|record| document.name_bytes(record.name.get()) == name.as_bytes())
+            .is_some_and(|record| document.is_name(record.name.get(), name))
     }
 
     /// The value, entities resolved and white space normalised as XML demands.
@@ -80,6 +81,7 @@ impl<'a> Attribute<'a> {
         self.node
     }
 
+    #[inline]
     fn record(&self) -> Option<&'a AttributeRecord> {
         self.node
             .document()
@@ -102,6 +104,7 @@ pub struct Attributes<'a> {
 }
 
 impl<'a> Attributes<'a> {
+    #[inline]
     pub(crate) fn new(node: Node<'a>, first: u32, stop: u32) -> Attributes<'a> {
         Attributes {
             node,
@@ -125,6 +128,13 @@ impl<'a> Iterator for Attributes<'a> {
         })
     }
 
+    #[inline]
+    fn nth(&mut self, n: usize) -> Option<Attribute<'a>> {
+        let n = u32::try_from(n).unwrap_or(u32::MAX);
+        self.next = self.next.saturating_add(n).min(self.stop);
+        self.next()
+    }
+
     fn size_hint(&self) -> (usize, Option<usize>) {
         let left = self.stop.saturating_sub(self.next) as usize;
         (left, Some(left))
@@ -134,6 +144,18 @@ impl<'a> Iterator for Attributes<'a> {
 impl ExactSizeIterator for Attributes<'_> {}
 
 impl<'a> Document<'a> {
+    /// The records of those attributes that are still to come.
+    #[inline]
+    pub(crate) fn attribute_records(&self, of: &Attributes<'_>) -> &'a [AttributeRecord] {
+        let size = size_of::<AttributeRecord>();
+        let range = of.next as usize * size..of.stop as usize * size;
+        let bytes = self.section(Section::Attributes).get(range);
+        bytes
+            .and_then(|bytes| bytemuck::try_cast_slice(bytes).ok())
+            .unwrap_or(&[])
+    }
+
+    #[inline]
     pub(crate) fn attributes_len(&self) -> u32 {
         let bytes = self.header().extents[Section::Attributes as usize]
             .len

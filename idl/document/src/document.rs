@@ -116,13 +116,15 @@ impl<'a> Document<'a> {
     }
 
     /// The root element; `None` when the file has none.
+    #[inline]
     pub fn root(&self) -> Option<Node<'a>> {
         self.node(0).filter(Node::is_element)
     }
 
     /// The node at `index` in document order, which may be character data.
+    #[inline]
     pub fn node(&self, index: u32) -> Option<Node<'a>> {
-        (index < self.len()).then(|| Node::new(*self, index))
+        self.node_record(index).map(|_| Node::new(*self, index))
     }
 
     /// How many nodes there are: elements and runs of character data.
@@ -200,6 +202,7 @@ impl<'a> Document<'a> {
             .unwrap_or(&[])
     }
 
+    #[inline]
     pub(crate) fn records<T: Pod>(&self, section: Section) -> &'a [T] {
         bytemuck::try_cast_slice(self.section(section)).unwrap_or(&[])
     }
@@ -216,6 +219,7 @@ impl<'a> Document<'a> {
         self.record(Section::Nodes, index as usize)
     }
 
+    #[inline]
     pub(crate) fn text_at(&self, offset: u32, len: u32) -> Option<&'a str> {
         str_at(self.section(Section::Text), offset, len)
     }
@@ -240,6 +244,7 @@ impl<'a> Document<'a> {
             .unwrap_or("")
     }
 
+    #[inline]
     pub(crate) fn name_of(&self, record: &NameRecord) -> Option<&'a str> {
         let (offset, len) = (record.offset.get(), record.len.get());
         if len & NAME_IN_HEAP == 0 {
@@ -250,8 +255,7 @@ impl<'a> Document<'a> {
     }
 
     /// The bytes of a name, without the price of looking whether they are UTF-8: for comparing.
-    #[inline]
-    pub(crate) fn name_bytes(&self, id: u16) -> &'a [u8] {
+    fn name_bytes(&self, id: u16) -> &'a [u8] {
         let Some(record) = self.record::<NameRecord>(Section::Names, usize::from(id)) else {
             return &[];
         };
@@ -266,16 +270,51 @@ impl<'a> Document<'a> {
             .unwrap_or(&[])
     }
 
+    /// Whether the name with this number is this one.
+    #[inline]
+    pub(crate) fn is_name(&self, id: u16, name: &str) -> bool {
+        self.record::<NameRecord>(Section::Names, usize::from(id))
+            .is_some_and(|record| self.is_record_of(record, name.as_bytes()))
+    }
+
+    #[inline]
+    fn is_record_of(&self, record: &NameRecord, name: &[u8]) -> bool {
+        let len = record.len.get();
+        // Nearly all names of other lengths are told apart here.
+        if (len & !NAME_IN_HEAP) as usize != name.len() {
+            return false;
+        }
+        let section = if len & NAME_IN_HEAP == 0 {
+            Section::Text
+        } else {
+            Section::Heap
+        };
+        let rest = self.section(section).get(record.offset.get() as usize..);
+        rest.and_then(|rest| rest.get(..name.len()))
+            .is_some_and(|found| same_bytes(found, name))
+    }
+
+    /// What tells a name by its number, again and again.
+    #[inline]
+    pub(crate) fn matcher<'s>(&self, name: &'s str) -> NameMatcher<'a, 's> {
+        NameMatcher {
+            document: *self,
+            names: self.section(Section::Names),
+            name,
+        }
+    }
+
     /// The id of a name by binary search over the sorted ids.
     pub(crate) fn name_id(&self, name: &str) -> Option<u16> {
         let order: &[U16] = self.records(Section::NameOrder);
         let found = order
-            .binary_search_by(|id| self.name(id.get()).cmp(name))
+            .binary_search_by(|id| self.name_bytes(id.get()).cmp(name.as_bytes()))
             .ok()?;
         Some(order[found].get())
     }
 
     /// The elements of a name, as node indices in document order.
+    #[inline]
     pub(crate) fn postings(&self, id: u16) -> &'a [U32] {
         let postings: &'a [U32] = self.records(Section::Postings);
         self.record::<NameRecord>(Section::Names, usize::from(id))
@@ -301,9 +340,42 @@ impl std::fmt::Debug for Document<'_> {
     }
 }
 
+#[inline]
 fn str_at(bytes: &[u8], offset: u32, len: u32) -> Option<&str> {
     let bytes = bytes.get(offset as usize..)?.get(..len as usize)?;
     std::str::from_utf8(bytes).ok()
+}
+
+/// Names as short as these are told apart faster here than by a call of `memcmp`.
+#[inline]
+fn same_bytes(one: &[u8], other: &[u8]) -> bool {
+    match (one.first_chunk::<4>(), other.first_chunk::<4>()) {
+        (Some(a), Some(b)) => {
+            u32::from_le_bytes(*a) == u32::from_le_bytes(*b)
+                && (one.len() <= 8 && one.last_chunk::<4>() == other.last_chunk::<4>()
+                    || one.len() > 8 && one == other)
+        }
+        _ => one.iter().eq(other),
+    }
+}
+
+/// Whether numbers stand for one name; see [`Document::matcher`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct NameMatcher<'a, 's> {
+    document: Document<'a>,
+    names: &'a [u8],
+    name: &'s str,
+}
+
+impl NameMatcher<'_, '_> {
+    #[inline]
+    pub(crate) fn is(&self, id: u16) -> bool {
+        let at = usize::from(id) * size_of::<NameRecord>();
+        let bytes = self.names.get(at..at + size_of::<NameRecord>());
+        bytes
+            .and_then(|bytes| bytemuck::try_from_bytes(bytes).ok())
+            .is_some_and(|record| self.document.is_record_of(record, self.name.as_bytes()))
+    }
 }
 
 /// The elements of one name in document order; made by [`Document::elements`].

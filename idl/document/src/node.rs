@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use std::hash::{Hash, Hasher};
 
 use crate::attribute::{Attribute, Attributes};
-use crate::document::Document;
+use crate::document::{Document, NameMatcher};
 use crate::layout::{ELEMENT, NodeRecord, RESOLVED_TEXT, TEXT};
 use crate::source::Position;
 use crate::value::{self, ValueError};
@@ -21,11 +21,13 @@ pub struct Node<'a> {
 }
 
 impl<'a> Node<'a> {
+    #[inline]
     pub(crate) fn new(document: Document<'a>, index: u32) -> Node<'a> {
         Node { document, index }
     }
 
     /// The local name, without prefix; empty for character data.
+    #[inline]
     pub fn name(&self) -> &'a str {
         match self.record() {
             Some(record) if record.kind.get() == ELEMENT => self.document.name(record.name.get()),
@@ -79,8 +81,7 @@ impl<'a> Node<'a> {
     #[inline]
     pub fn is(&self, name: &str) -> bool {
         self.record().is_some_and(|record| {
-            record.kind.get() == ELEMENT
-                && self.document.name_bytes(record.name.get()) == name.as_bytes()
+            record.kind.get() == ELEMENT && self.document.is_name(record.name.get(), name)
         })
     }
 
@@ -92,27 +93,37 @@ impl<'a> Node<'a> {
     }
 
     /// Its place in document order, for [`Document::node`].
+    #[inline]
     pub fn index(&self) -> u32 {
         self.index
     }
 
     /// The document it belongs to.
+    #[inline]
     pub fn document(&self) -> Document<'a> {
         self.document
     }
 
     /// The value of an attribute, entities resolved. Prefixed attributes go by their name as
     /// written (`xsi:type`).
+    #[inline]
     pub fn attr(&self, name: &str) -> Option<&'a str> {
         self.attribute(name).map(|attribute| attribute.value())
     }
 
     /// An attribute by its name as written.
     pub fn attribute(&self, name: &str) -> Option<Attribute<'a>> {
-        self.attributes().find(|attribute| attribute.is(name))
+        let mut attributes = self.attributes();
+        let matcher = self.document.matcher(name);
+        let records = self.document.attribute_records(&attributes);
+        let at = records
+            .iter()
+            .position(|record| matcher.is(record.name.get()))?;
+        attributes.nth(at)
     }
 
     /// All attributes in the order in which they are written, `xmlns` declarations included.
+    #[inline]
     pub fn attributes(&self) -> Attributes<'a> {
         let first = self
             .record()
@@ -148,6 +159,7 @@ impl<'a> Node<'a> {
     }
 
     /// The element it lies in; `None` for the root.
+    #[inline]
     pub fn parent(&self) -> Option<Node<'a>> {
         let parent = self.record()?.parent.get();
         // Parents come first; anything else is corrupt and could lead round in circles.
@@ -157,6 +169,7 @@ impl<'a> Node<'a> {
     }
 
     /// The elements directly within it.
+    #[inline]
     pub fn children(&self) -> Children<'a> {
         match self.record() {
             Some(record) if record.kind.get() == ELEMENT => Children {
@@ -174,14 +187,16 @@ impl<'a> Node<'a> {
 
     /// The first element of this name directly within it.
     pub fn child(&self, name: &str) -> Option<Node<'a>> {
-        self.children().find(|child| child.is(name))
+        self.children_named(name).next()
     }
 
     /// The elements of this name directly within it.
     pub fn children_named<'s>(&self, name: &'s str) -> ChildrenNamed<'a, 's> {
         ChildrenNamed {
             children: self.children(),
-            name,
+            matcher: self.document.matcher(name),
+            known: None,
+            other: None,
         }
     }
 
@@ -251,6 +266,7 @@ impl<'a> Node<'a> {
     }
 
     /// Offset of its `<` in the image's text.
+    #[inline]
     pub fn offset(&self) -> u32 {
         self.record().map_or(0, |record| record.start.get())
     }
@@ -271,6 +287,7 @@ impl<'a> Node<'a> {
     }
 
     /// One past the last node of its subtree, never at or before the node itself.
+    #[inline]
     pub(crate) fn end(&self) -> u32 {
         let end = self.record().map_or(0, |record| record.end.get());
         end.max(self.index.saturating_add(1))
@@ -303,6 +320,7 @@ impl<'a> Document<'a> {
 }
 
 impl PartialEq for Node<'_> {
+    #[inline]
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other) == Ordering::Equal
     }
@@ -323,6 +341,7 @@ impl PartialOrd for Node<'_> {
 }
 
 impl Ord for Node<'_> {
+    #[inline]
     fn cmp(&self, other: &Self) -> Ordering {
         let place = |node: &Self| (node.index, node.document.address());
         place(self).cmp(&place(other))
@@ -349,18 +368,29 @@ pub struct Children<'a> {
     end: u32,
 }
 
-impl<'a> Iterator for Children<'a> {
-    type Item = Node<'a>;
-
-    fn next(&mut self) -> Option<Node<'a>> {
+impl<'a> Children<'a> {
+    /// The next child element with its record.
+    #[inline]
+    fn advance(&mut self) -> Option<(u32, &'a NodeRecord)> {
         while self.next < self.end {
-            let node = self.document.node(self.next)?;
-            self.next = node.end();
-            if node.is_element() {
-                return Some(node);
+            let index = self.next;
+            let record = self.document.node_record(index)?;
+            self.next = record.end.get().max(index.saturating_add(1));
+            if record.kind.get() == ELEMENT {
+                return Some((index, record));
             }
         }
         None
+    }
+}
+
+impl<'a> Iterator for Children<'a> {
+    type Item = Node<'a>;
+
+    #[inline]
+    fn next(&mut self) -> Option<Node<'a>> {
+        let (index, _) = self.advance()?;
+        Some(Node::new(self.document, index))
     }
 }
 
@@ -368,15 +398,43 @@ impl<'a> Iterator for Children<'a> {
 #[derive(Clone, Debug)]
 pub struct ChildrenNamed<'a, 's> {
     children: Children<'a>,
-    name: &'s str,
+    matcher: NameMatcher<'a, 's>,
+    /// The number of the name, once a child has borne it, and the last one of another name:
+    /// siblings are mostly alike.
+    known: Option<u16>,
+    other: Option<u16>,
+}
+
+impl ChildrenNamed<'_, '_> {
+    #[inline]
+    fn admits(&mut self, number: u16) -> bool {
+        if self.known.is_some() {
+            return self.known == Some(number);
+        }
+        if self.other == Some(number) {
+            return false;
+        }
+        let same = self.matcher.is(number);
+        let slot = if same {
+            &mut self.known
+        } else {
+            &mut self.other
+        };
+        *slot = Some(number);
+        same
+    }
 }
 
 impl<'a> Iterator for ChildrenNamed<'a, '_> {
     type Item = Node<'a>;
 
     fn next(&mut self) -> Option<Node<'a>> {
-        let name = self.name;
-        self.children.by_ref().find(|child| child.is(name))
+        while let Some((index, record)) = self.children.advance() {
+            if self.admits(record.name.get()) {
+                return Some(Node::new(self.children.document, index));
+            }
+        }
+        None
     }
 }
 
@@ -393,10 +451,11 @@ impl<'a> Iterator for Descendants<'a> {
 
     fn next(&mut self) -> Option<Node<'a>> {
         while self.next < self.end {
-            let node = self.document.node(self.next)?;
+            let index = self.next;
+            let record = self.document.node_record(index)?;
             self.next += 1;
-            if node.is_element() {
-                return Some(node);
+            if record.kind.get() == ELEMENT {
+                return Some(Node::new(self.document, index));
             }
         }
         None

@@ -194,6 +194,11 @@ impl Wrong {
 
 /// White space as XML defines it, which is less than Unicode's.
 fn trim(value: &str) -> &str {
+    let is_space = |byte: Option<&u8>| matches!(byte, Some(b' ' | b'\t' | b'\n' | b'\r'));
+    let bytes = value.as_bytes();
+    if !is_space(bytes.first()) && !is_space(bytes.last()) {
+        return value;
+    }
     value.trim_matches([' ', '\t', '\n', '\r'])
 }
 

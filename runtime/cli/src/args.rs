@@ -265,7 +265,7 @@ pub enum BundleCommand {
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "Arguments of a bundle:\n  \
 [--instance NAME | --instance-dir DIR]  join the bus of a running broker\n  \
-[--format text|json] FILE               check one file and print what was found\n  \
+[--format text|json] [--timings] FILE   check one file, print what was found (and timings)\n  \
 -c CONFIG                               run as a module of ASAM's framework\n  \
 [--schema-dir DIR]                      with each of them: schemas to use instead of the known ones")]
 pub struct BundleRunArgs {

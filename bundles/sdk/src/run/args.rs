@@ -10,8 +10,8 @@ pub const USAGE: &str = "\
 usage:
   BUNDLE [--instance NAME | --instance-dir DIR] [--launch N] [--die-with-parent]
          run on the bus of an instance (`default` unless named)
-  BUNDLE [--format text|json] FILE
-         check one file and print what was found
+  BUNDLE [--format text|json] [--timings] FILE
+         check one file and print what was found; with --timings, on stderr, what every checker took
   BUNDLE -c CONFIG
          run as a module of ASAM's quality checker framework
   each with [--schema-dir DIR]: XML schemas (.xsd, .tbl) to use instead of those it comes with
@@ -35,6 +35,9 @@ pub enum UsageError {
         /// What it was given.
         value: String,
     },
+    /// Something that is of no use without something else.
+    #[error("`{0}` needs {1}")]
+    Lacks(&'static str, &'static str),
     /// Two things that exclude each other.
     #[error("`{0}` and `{1}` exclude each other")]
     Conflict(&'static str, &'static str),
@@ -43,7 +46,7 @@ pub enum UsageError {
 pub(super) fn parse(mut arguments: impl Iterator<Item = OsString>) -> Result<Mode, UsageError> {
     let mut bus = BusOptions::default();
     let (mut on_bus, mut config, mut file, mut format) = (false, None, None, None);
-    let mut schema_dir = None;
+    let (mut schema_dir, mut timings) = (None, false);
     while let Some(argument) = arguments.next() {
         let option = argument.to_string_lossy().into_owned();
         let mut value = || {
@@ -62,6 +65,7 @@ pub(super) fn parse(mut arguments: impl Iterator<Item = OsString>) -> Result<Mod
                 let text = value()?.to_string_lossy().into_owned();
                 format = Some(Format::of(&text).ok_or_else(|| bad(text))?);
             }
+            "--timings" => timings = true,
             "--instance" => bus.instance = value()?.to_string_lossy().into_owned(),
             "--instance-dir" => bus.instance_dir = Some(PathBuf::from(value()?)),
             "--launch" => {
@@ -81,6 +85,9 @@ pub(super) fn parse(mut arguments: impl Iterator<Item = OsString>) -> Result<Mod
             "--instance" | "--instance-dir" | "--launch"
         );
     }
+    if timings && file.is_none() {
+        return Err(UsageError::Lacks("--timings", "FILE"));
+    }
     match (file, config) {
         (Some(_), Some(_)) => Err(UsageError::Conflict("FILE", "-c")),
         (Some(_), None) if on_bus => Err(UsageError::Conflict("FILE", "--instance")),
@@ -88,6 +95,7 @@ pub(super) fn parse(mut arguments: impl Iterator<Item = OsString>) -> Result<Mod
         (Some(path), None) => Ok(Mode::File {
             path,
             format: format.unwrap_or_default(),
+            timings,
             schema_dir,
         }),
         (None, Some(config)) => Ok(Mode::Module { config, schema_dir }),
@@ -111,8 +119,14 @@ mod tests {
             Ok(Mode::File {
                 path: "a.xodr".into(),
                 format: Format::Json,
+                timings: false,
                 schema_dir: None
             })
+        );
+        let timed = of(&["a.xodr", "--timings"]);
+        assert!(
+            matches!(timed, Ok(Mode::File { timings: true, .. })),
+            "{timed:?}"
         );
         assert_eq!(
             of(&["--schema-dir", "own", "-c", "c.xml"]),
@@ -136,6 +150,8 @@ mod tests {
             &["-c"],
             &["--schema-dir"],
             &["--launch", "x"],
+            &["--timings"],
+            &["--timings", "-c", "b"],
             &["a", "b"],
             &["a", "-c", "b"],
         ] {

@@ -2,12 +2,13 @@
 
 use std::io::{self, Write as _};
 use std::path::Path;
+use std::time::Instant;
 
 use qcbus_formats::pool::{BundleOutcome, CheckerOutcome};
 use qcbus_formats::xqar::{Issue, Level, Location, Status};
 use qcbus_messages::Verdict;
 
-use super::Exit;
+use super::{Exit, Timings};
 use crate::pages::level_name;
 use crate::{BUILD_DATE, Bundle, Listener, Loaded, Outcome, Plan, UserFiles, check};
 
@@ -34,7 +35,7 @@ impl Format {
 pub(super) fn run(
     bundle: &'static Bundle,
     path: &Path,
-    format: Format,
+    (format, timings): (Format, bool),
     given: Option<&UserFiles>,
 ) -> Exit {
     let boundary = path
@@ -55,8 +56,11 @@ pub(super) fn run(
         ));
         return Exit::Usage;
     }
-    match examine(&Plan::by_default(bundle).with_files(given), &loaded) {
-        Ok(outcome) => {
+    match examine_timed(&Plan::by_default(bundle).with_files(given), &loaded) {
+        Ok((outcome, took)) => {
+            if timings {
+                complain(&took.to_string());
+            }
             let verdict = verdict(&outcome);
             print(&match format {
                 Format::Text => as_text(path, &outcome),
@@ -76,15 +80,30 @@ pub(super) fn run(
 /// # Errors
 /// When the image that was built cannot be opened.
 pub fn examine(plan: &Plan, loaded: &Loaded) -> Result<BundleOutcome, crate::LoadError> {
+    examine_timed(plan, loaded).map(|(outcome, _)| outcome)
+}
+
+/// The same as [`examine`], with what every checker took.
+///
+/// # Errors
+/// When the image that was built cannot be opened.
+pub fn examine_timed(
+    plan: &Plan,
+    loaded: &Loaded,
+) -> Result<(BundleOutcome, Timings), crate::LoadError> {
     let bundle = plan.bundle();
+    let start = Instant::now();
     let subject = loaded.subject(bundle)?;
     let mut collected = Collected {
         plan,
         checkers: Vec::new(),
+        timings: Timings::default(),
     };
     check(plan, &subject, &mut collected);
+    let mut timings = collected.timings;
+    timings.whole = start.elapsed();
     collected.checkers.sort_by_key(|(index, _)| *index);
-    Ok(BundleOutcome {
+    let outcome = BundleOutcome {
         name: bundle.name.to_owned(),
         alias: bundle.alias.to_owned(),
         version: bundle.version.to_owned(),
@@ -96,12 +115,14 @@ pub fn examine(plan: &Plan, loaded: &Loaded) -> Result<BundleOutcome, crate::Loa
             .into_iter()
             .map(|(_, checker)| checker)
             .collect(),
-    })
+    };
+    Ok((outcome, timings))
 }
 
 struct Collected<'p> {
     plan: &'p Plan,
     checkers: Vec<(usize, CheckerOutcome)>,
+    timings: Timings,
 }
 
 impl Listener for Collected<'_> {
@@ -109,6 +130,8 @@ impl Listener for Collected<'_> {
         let Some(checker) = self.plan.checkers().get(index) else {
             return;
         };
+        let timings = &mut self.timings.checkers;
+        timings.push((checker.id.clone(), outcome.took));
         self.checkers.push((
             index,
             CheckerOutcome {

@@ -5,6 +5,7 @@ mod bus;
 mod exit;
 mod file;
 mod module;
+mod timings;
 mod worker;
 
 use std::path::{Path, PathBuf};
@@ -14,7 +15,8 @@ pub use args::{USAGE, UsageError};
 pub use bus::BusOptions;
 pub use exit::Exit;
 pub(crate) use file::complain;
-pub use file::{Format, examine};
+pub use file::{Format, examine, examine_timed};
+pub use timings::Timings;
 
 use crate::{Bundle, UserFiles};
 
@@ -29,6 +31,8 @@ pub enum Mode {
         path: PathBuf,
         /// How findings are printed.
         format: Format,
+        /// Whether what every checker took goes to stderr.
+        timings: bool,
         /// Schemas of the user.
         schema_dir: Option<PathBuf>,
     },
@@ -68,9 +72,10 @@ pub fn run(bundle: &'static Bundle, mode: Mode) -> Exit {
         Mode::File {
             path,
             format,
+            timings,
             schema_dir,
         } => with_files(bundle, schema_dir.as_deref(), |given| {
-            file::run(bundle, &path, format, given)
+            file::run(bundle, &path, (format, timings), given)
         }),
         Mode::Module { config, schema_dir } => with_files(bundle, schema_dir.as_deref(), |given| {
             module::run(bundle, &config, given)

@@ -43,12 +43,31 @@ impl List<'_> {
         equal: Equal,
         found: &mut Sink<'_>,
     ) {
+        let start = |node: &Node<'a>| node.f64(self.start).ok().filter(|start| start.is_finite());
+        // Nothing to compare: so it is with nearly all lists.
+        let mut records = records.peekable();
+        let Some(first) = records.next() else { return };
+        if records.peek().is_none() {
+            return;
+        }
+        let records = std::iter::once(first).chain(records);
+        self.check_starts(
+            records.filter_map(|node| Some((node, start(&node)?))),
+            equal,
+            found,
+        );
+    }
+
+    /// [`List::check`] of records with their starts.
+    fn check_starts<'a>(
+        &self,
+        records: impl Iterator<Item = (Node<'a>, f64)>,
+        equal: Equal,
+        found: &mut Sink<'_>,
+    ) {
         let tolerance = found.number(&TOLERANCE);
         let mut last: Option<(Node<'a>, f64)> = None;
-        for node in records {
-            let Some(start) = node.f64(self.start).ok().filter(|start| start.is_finite()) else {
-                continue;
-            };
+        for (node, start) in records {
             if let Some((before, ahead)) = last {
                 if start < ahead - tolerance {
                     self.descends((node, start), (before, ahead), found);
@@ -150,6 +169,6 @@ pub(crate) fn lane_records_under(
             from: lane.at.s(),
             uid,
         };
-        list.check(lane.node().children_named(element), equal, found);
+        list.check(lane.elements(element), equal, found);
     }
 }

@@ -7,7 +7,7 @@ use qcbus_sdk::Sink;
 /// element `width`, but ".
 pub(crate) fn has_no(map: &RoadMap<'_>, element: &str, why: &str, found: &mut Sink<'_>) {
     for lane in map.lanes().filter(|lane| lane.group() == LaneGroup::Center) {
-        for child in lane.node().children_named(element) {
+        for child in lane.elements(element) {
             let text = format!("the center lane has an element `{element}`, but {why}");
             let finding = found.issue(child, text);
             if let Some(s) = lane.at.s() {

@@ -202,8 +202,8 @@ impl Kind {
             .iter()
             .flat_map(|name| document.elements(name))
             .filter(|node| {
-                let parent = node.parent().map_or("", |parent| parent.name());
-                self.parents.is_empty() || self.parents.contains(&parent)
+                let fits = |parent: Node<'d>| self.parents.iter().any(|name| parent.is(name));
+                self.parents.is_empty() || node.parent().is_some_and(fits)
             })
             .collect();
         if self.elements.len() > 1 {

@@ -6,8 +6,7 @@
 //! edge. Edges are told apart by t, which also does for a lane that changes its side of the center. A
 //! link between lanes that have no width in common is wrong by itself and forms no group.
 
-use std::collections::{BTreeMap, BTreeSet};
-
+use foldhash::{HashMap, HashSet};
 use qcbus_opendrive::geometry::Point3;
 use qcbus_opendrive::{ContactPoint, Edge, LaneEnd, LaneJoint, LaneRef, RoadMap};
 
@@ -30,8 +29,8 @@ pub(crate) fn lane_gaps<'m, 'a>(
     limit: f64,
     zero: f64,
 ) -> Vec<LaneGap<'m, 'a>> {
-    let mut boundaries: BTreeMap<_, Vec<Touch<'m, 'a>>> = BTreeMap::new();
-    let mut astray = BTreeSet::new();
+    let (mut touches, mut boundaries) = (Vec::new(), Vec::new());
+    let mut astray = HashSet::default();
     let mut gaps = Vec::new();
     for joint in map.lane_joints() {
         let Some(touch) = Touch::of(map, joint, zero) else {
@@ -39,14 +38,18 @@ pub(crate) fn lane_gaps<'m, 'a>(
         };
         let [low, high] = touch.in_order();
         if touch.overlaps(limit) {
-            let boundary = boundaries.entry((section(low), section(high)));
-            boundary.or_default().push(touch);
+            boundaries.push(((section(low), section(high)), touches.len()));
+            touches.push(touch);
         } else if astray.insert((low, high)) {
             gaps.extend(gaps_of(&[touch], limit));
         }
     }
-    let groups = boundaries.into_values().flat_map(hanging_together);
-    gaps.extend(groups.flat_map(|group| gaps_of(&group, limit)));
+    boundaries.sort_unstable();
+    for boundary in boundaries.chunk_by(|(one, _), (next, _)| one == next) {
+        let touches = boundary.iter().filter_map(|(_, at)| touches.get(*at));
+        let groups = hanging_together(touches.copied()).into_iter();
+        gaps.extend(groups.flat_map(|group| gaps_of(&group, limit)));
+    }
     gaps
 }
 
@@ -116,9 +119,11 @@ fn section(at: LaneEnd) -> (u32, u32, u32, ContactPoint) {
 }
 
 /// Splits the joints of a boundary into groups that have no lane in common.
-fn hanging_together<'m, 'a>(touches: Vec<Touch<'m, 'a>>) -> Vec<Vec<Touch<'m, 'a>>> {
+fn hanging_together<'m, 'a: 'm>(
+    touches: impl Iterator<Item = Touch<'m, 'a>>,
+) -> Vec<Vec<Touch<'m, 'a>>> {
     // Group of each lane end; merging renames the smaller number, so that chains stay short.
-    let mut group_of: BTreeMap<LaneEnd, usize> = BTreeMap::new();
+    let mut group_of: HashMap<LaneEnd, usize> = HashMap::default();
     let mut groups: Vec<Vec<Touch<'m, 'a>>> = Vec::new();
     for touch in touches {
         let joint = touch.joint;

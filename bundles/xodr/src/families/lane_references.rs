@@ -1,7 +1,6 @@
 //! Lane numbers as references: lane links between sections and roads, lane links of junctions.
 
-use std::collections::HashMap;
-
+use foldhash::HashMap;
 use qcbus_document::{Document, Node};
 use qcbus_sdk::{Place, Sink};
 
@@ -12,42 +11,90 @@ enum End {
     End,
 }
 
+/// The roads of a file with their lane sections.
+struct Roads<'d> {
+    roads: Vec<Road<'d>>,
+    by_id: HashMap<&'d str, usize>,
+}
+
+struct Road<'d> {
+    node: Node<'d>,
+    sections: Vec<Section<'d>>,
+}
+
+struct Section<'d> {
+    node: Node<'d>,
+    lanes: Vec<Lane<'d>>,
+}
+
+struct Lane<'d> {
+    id: Option<&'d str>,
+    link: Option<Node<'d>>,
+}
+
+impl<'d> Roads<'d> {
+    fn of(document: &Document<'d>) -> Roads<'d> {
+        let roads = document
+            .elements("road")
+            .filter(|road| road.parent().is_some_and(|p| p.is("OpenDRIVE")));
+        let roads = roads.map(|node| Road {
+            node,
+            sections: sections(node).into_iter().map(Section::of).collect(),
+        });
+        let roads: Vec<Road<'d>> = roads.collect();
+        let ids = roads.iter().enumerate();
+        let ids = ids.filter_map(|(at, road)| Some((road.node.attr("id")?, at)));
+        let by_id = ids.collect();
+        Roads { roads, by_id }
+    }
+
+    fn get(&self, id: &str) -> Option<&Road<'d>> {
+        self.roads.get(*self.by_id.get(id)?)
+    }
+}
+
+impl<'d> Section<'d> {
+    fn of(node: Node<'d>) -> Section<'d> {
+        let lanes = node
+            .children()
+            .flat_map(|side| side.children_named("lane"))
+            .map(|lane| Lane {
+                id: lane.attr("id"),
+                link: lane.child("link"),
+            });
+        Section {
+            node,
+            lanes: lanes.collect(),
+        }
+    }
+}
+
 /// Reports lane numbers that lead to no lane. Where the road that is linked does not exist either,
 /// that is reported elsewhere.
 pub(crate) fn check(document: &Document<'_>, found: &mut Sink<'_>) {
-    let roads = document
-        .elements("road")
-        .filter(|road| road.parent().is_some_and(|p| p.is("OpenDRIVE")));
-    let roads: Vec<Node<'_>> = roads.collect();
-    let by_id = roads
-        .iter()
-        .filter_map(|road| Some((road.attr("id")?, *road)));
-    let by_id: HashMap<&str, Node<'_>> = by_id.collect();
-    for road in &roads {
-        lanes_of_road(*road, &by_id, found);
+    let roads = Roads::of(document);
+    for road in &roads.roads {
+        lanes_of_road(road, &roads, found);
     }
     for link in document.elements("laneLink") {
-        lane_link(link, &by_id, found);
+        lane_link(link, &roads, found);
     }
 }
 
 /// Links between the lanes of neighbouring sections, and over the ends of the road.
-fn lanes_of_road(road: Node<'_>, by_id: &HashMap<&str, Node<'_>>, found: &mut Sink<'_>) {
-    let sections = sections(road);
+fn lanes_of_road(road: &Road<'_>, roads: &Roads<'_>, found: &mut Sink<'_>) {
+    let sections = &road.sections;
     for (index, section) in sections.iter().enumerate() {
         for (name, end) in [("predecessor", End::Start), ("successor", End::End)] {
             let neighbour = match end {
-                End::Start => index
-                    .checked_sub(1)
-                    .and_then(|before| sections.get(before))
-                    .copied(),
-                End::End => sections.get(index + 1).copied(),
+                End::Start => index.checked_sub(1).and_then(|before| sections.get(before)),
+                End::End => sections.get(index + 1),
             };
-            let neighbour = neighbour.or_else(|| linked_section(road, name, by_id));
+            let neighbour = neighbour.or_else(|| linked_section(road.node, name, roads));
             let Some(neighbour) = neighbour else { continue };
-            for lane in lanes(*section) {
+            for lane in &section.lanes {
                 let links = lane
-                    .child("link")
+                    .link
                     .into_iter()
                     .flat_map(|link| link.children_named(name));
                 for link in links {
@@ -59,30 +106,25 @@ fn lanes_of_road(road: Node<'_>, by_id: &HashMap<&str, Node<'_>>, found: &mut Si
 }
 
 /// The lane section of the linked road at which a link of `road` arrives, if it is a road.
-fn linked_section<'d>(
+fn linked_section<'r, 'd>(
     road: Node<'d>,
     name: &str,
-    by_id: &HashMap<&str, Node<'d>>,
-) -> Option<Node<'d>> {
+    roads: &'r Roads<'d>,
+) -> Option<&'r Section<'d>> {
     let link = road.child("link")?.child(name)?;
-    let other = by_id.get(
+    let other = roads.get(
         link.attr("elementId")
             .filter(|_| link.attr("elementType") == Some("road"))?,
     )?;
-    section_at(*other, end_of(link.attr("contactPoint")?)?)
+    section_at(other, end_of(link.attr("contactPoint")?)?)
 }
 
 /// `from` must be a lane of the incoming road, `to` one of the connecting or linked road.
-fn lane_link(link: Node<'_>, by_id: &HashMap<&str, Node<'_>>, found: &mut Sink<'_>) {
+fn lane_link(link: Node<'_>, roads: &Roads<'_>, found: &mut Sink<'_>) {
     let Some(connection) = link.parent().filter(|parent| parent.is("connection")) else {
         return;
     };
-    let named = |attribute: &str| {
-        connection
-            .attr(attribute)
-            .and_then(|id| by_id.get(id))
-            .copied()
-    };
+    let named = |attribute: &str| connection.attr(attribute).and_then(|id| roads.get(id));
     let junction = connection.parent().and_then(|junction| junction.attr("id"));
     if let Some(other) = named("connectingRoad").or_else(|| named("linkedRoad"))
         && let Some(section) = connection
@@ -94,7 +136,7 @@ fn lane_link(link: Node<'_>, by_id: &HashMap<&str, Node<'_>>, found: &mut Sink<'
     }
     if let Some(incoming) = named("incomingRoad")
         && let Some(section) =
-            end_at_junction(incoming, junction).and_then(|end| section_at(incoming, end))
+            end_at_junction(incoming.node, junction).and_then(|end| section_at(incoming, end))
     {
         demand_lane(link, "from", section, found);
     }
@@ -115,14 +157,16 @@ fn end_at_junction(road: Node<'_>, junction: Option<&str>) -> Option<End> {
     }
 }
 
-fn demand_lane(link: Node<'_>, attribute: &str, section: Node<'_>, found: &mut Sink<'_>) {
+fn demand_lane(link: Node<'_>, attribute: &str, section: &Section<'_>, found: &mut Sink<'_>) {
     let Some(id) = link.attr(attribute) else {
         return;
     };
-    let mut ids = lanes(section).filter_map(|lane| lane.attr("id"));
+    let mut ids = section.lanes.iter().filter_map(|lane| lane.id);
     // Lane ids are whole numbers: `-1` and ` -01` are one lane.
     let number = |text: &str| text.trim().parse::<i64>().ok();
-    if ids.any(|other| other == id || (number(id).is_some() && number(other) == number(id))) {
+    let is_there = ids.clone().any(|other| other == id)
+        || number(id).is_some_and(|id| ids.any(|other| number(other) == Some(id)));
+    if is_there {
         return;
     }
     let text = format!(
@@ -131,7 +175,7 @@ fn demand_lane(link: Node<'_>, attribute: &str, section: Node<'_>, found: &mut S
     );
     found
         .issue(Place::attribute_or_node(link, attribute), text)
-        .at(section, "the lane section without such a lane");
+        .at(section.node, "the lane section without such a lane");
 }
 
 fn end_of(contact_point: &str) -> Option<End> {
@@ -142,11 +186,10 @@ fn end_of(contact_point: &str) -> Option<End> {
     }
 }
 
-fn section_at(road: Node<'_>, end: End) -> Option<Node<'_>> {
-    let sections = sections(road);
+fn section_at<'r, 'd>(road: &'r Road<'d>, end: End) -> Option<&'r Section<'d>> {
     match end {
-        End::Start => sections.first().copied(),
-        End::End => sections.last().copied(),
+        End::Start => road.sections.first(),
+        End::End => road.sections.last(),
     }
 }
 
@@ -178,10 +221,4 @@ fn sections(road: Node<'_>) -> Vec<Node<'_>> {
         sections.sort_by(|one, other| start(one).total_cmp(&start(other)));
     }
     sections
-}
-
-fn lanes(section: Node<'_>) -> impl Iterator<Item = Node<'_>> {
-    section
-        .children()
-        .flat_map(|side| side.children_named("lane"))
 }

@@ -1,7 +1,6 @@
 //! Whether the two sides of a road link agree.
 
-use std::collections::HashSet;
-
+use foldhash::HashSet;
 use qcbus_opendrive::{ContactPoint, Junction, JunctionType, Road, RoadLink, RoadMap};
 
 /// Whether a road belongs to a virtual junction. Such junctions cut no road, so that the roads
@@ -41,7 +40,7 @@ pub(crate) struct Known<'a>(HashSet<(usize, &'a str, Option<ContactPoint>)>);
 impl<'a> Known<'a> {
     /// Looks at the connections and cross paths of all junctions.
     pub fn by(map: &RoadMap<'a>) -> Known<'a> {
-        let mut known = HashSet::new();
+        let mut known = HashSet::default();
         for junction in map.junctions() {
             let at = junction.index();
             for connection in junction.connections() {

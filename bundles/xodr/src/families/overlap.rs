@@ -3,10 +3,9 @@
 //! Roads are cut into pieces a few metres long: quadrangles as wide as the lanes for vehicles.
 //! A grid tells which pieces may overlap; the work is bounded, whatever the map says.
 
-use std::collections::{HashMap, HashSet};
-
+use foldhash::{HashMap, HashSet};
 use qcbus_opendrive::geometry::Point;
-use qcbus_opendrive::{LaneRef, Place, Road, RoadMap, Side};
+use qcbus_opendrive::{LaneLayer, LaneRef, Place, Road, RoadMap, SectionRef, Side};
 
 use super::driving::is_drivable;
 
@@ -27,6 +26,27 @@ pub(crate) struct Slice {
     pub width: f64,
     z: f64,
     corners: [Point; 4],
+    bounds: Bounds,
+}
+
+/// The rectangle around a piece: the least and the greatest x, then y.
+#[derive(Clone, Copy)]
+struct Bounds([f64; 2], [f64; 2]);
+
+impl Bounds {
+    fn of(corners: &[Point; 4]) -> Bounds {
+        let range = |part: fn(&Point) -> f64| {
+            let values = corners.iter().map(part);
+            let low = values.clone().fold(f64::INFINITY, f64::min);
+            [low, values.fold(f64::NEG_INFINITY, f64::max)]
+        };
+        Bounds(range(|point| point.x), range(|point| point.y))
+    }
+
+    fn meets(&self, other: &Bounds) -> bool {
+        let meets = |one: [f64; 2], other: [f64; 2]| one[0] <= other[1] && other[0] <= one[1];
+        meets(self.0, other.0) && meets(self.1, other.1)
+    }
 }
 
 /// Two pieces that cover the same ground.
@@ -62,9 +82,14 @@ pub(crate) fn slices(map: &RoadMap<'_>, limits: &Limits) -> Vec<Slice> {
         };
         let count = (length / step).ceil().clamp(1.0, MOST_PIECES) as usize;
         let at = |index: usize| length * index as f64 / count as f64;
-        let mut before = edge(road, Place::at(0.0), limits);
+        let Some(layer) = road.permanent() else {
+            continue;
+        };
+        let lanes: Vec<[Vec<bool>; 2]> = layer.sections(road).map(travelled).collect();
+        let edge = |place| edge(road, layer, &lanes, place, limits);
+        let mut before = edge(Place::at(0.0));
         for index in 0..count {
-            let after = edge(road, Place::before(at(index + 1)), limits);
+            let after = edge(Place::before(at(index + 1)));
             if let (Some(start), Some(end)) = (before, after) {
                 slices.extend(slice(road, [at(index), at(index + 1)], start, end));
             }
@@ -81,15 +106,41 @@ fn is_travelled(lane: LaneRef<'_, '_>) -> bool {
     is_drivable(lane) && !aside
 }
 
-/// The left and the right end of the lanes for vehicles at s, and the elevation.
-fn edge(road: &Road<'_>, s: Place, limits: &Limits) -> Option<(Point, Point, f64)> {
+/// Which lanes of a section are for vehicles, left and right, outward up to the last that is.
+fn travelled(section: SectionRef<'_, '_>) -> [Vec<bool>; 2] {
+    Side::BOTH.map(|side| {
+        let mut lanes: Vec<bool> = section.side(side).map(is_travelled).collect();
+        lanes.truncate(
+            lanes
+                .iter()
+                .rposition(|lane| *lane)
+                .map_or(0, |last| last + 1),
+        );
+        lanes
+    })
+}
+
+/// The left and the right end of the lanes for vehicles at s, and the elevation. `lanes` are those
+/// of each section of the layer.
+fn edge<'a>(
+    road: &Road<'a>,
+    layer: &LaneLayer<'a>,
+    lanes: &[[Vec<bool>; 2]],
+    s: Place,
+    limits: &Limits,
+) -> Option<(Point, Point, f64)> {
     let mut extent: Option<(f64, f64)> = None;
-    for side in Side::BOTH {
-        let Some(section) = road.permanent()?.section_at(road, side, s) else {
+    for (slot, side) in Side::BOTH.into_iter().enumerate() {
+        let Some(section) = layer.section_at(road, side, s) else {
             continue;
         };
-        for span in section.spans(side, s.shifted(-section.s()?)) {
-            if is_travelled(span.lane) {
+        let of_vehicles = &lanes.get(section.index())?[slot];
+        if of_vehicles.is_empty() {
+            continue;
+        }
+        let spans = section.each_span(side, s.shifted(-section.s()?));
+        for (is_for_vehicles, span) in of_vehicles.iter().zip(spans) {
+            if *is_for_vehicles {
                 let (low, high) = extent.unwrap_or((f64::INFINITY, f64::NEG_INFINITY));
                 let (one, other) = (span.inner.min(span.outer), span.inner.max(span.outer));
                 extent = Some((low.min(one), high.max(other)));
@@ -99,9 +150,11 @@ fn edge(road: &Road<'_>, s: Place, limits: &Limits) -> Option<(Point, Point, f64
     let (right, left) = extent.map(|(low, high)| (low + limits.shrink, high - limits.shrink))?;
     let pose = road.pose(s)?;
     let proper = left - right > 0.1;
+    let (sin, cos) = pose.hdg.sin_cos();
+    let beside = |t: f64| Point::finite(pose.x - sin * t, pose.y + cos * t);
     proper.then_some((
-        pose.beside(left)?,
-        pose.beside(right)?,
+        beside(left)?,
+        beside(right)?,
         road.elevation().at_or_zero(s)?,
     ))
 }
@@ -120,6 +173,7 @@ fn slice(
         width: start.0.distance(start.1).max(end.0.distance(end.1)),
         z: 0.5 * (start.2 + end.2),
         corners,
+        bounds: Bounds::of(&corners),
     };
     // Where a border turns back the corners are not in order, and nothing can be said.
     let convex = (0..4).all(|at| {
@@ -142,8 +196,8 @@ pub(crate) fn overlaps<'p>(
     wanted: impl Fn(&Slice, &Slice) -> bool,
     mut found: impl FnMut(Overlap<'p>),
 ) {
-    let mut cells: HashMap<(i64, i64), Vec<u32>> = HashMap::new();
-    let mut reported: HashSet<(usize, usize)> = HashSet::new();
+    let mut cells: HashMap<(i64, i64), Vec<u32>> = HashMap::default();
+    let mut reported: HashSet<(usize, usize)> = HashSet::default();
     // Enough for every map that is one; pieces heaped up at one place are not compared for ever.
     let mut budget = 10_000_000 + 100 * slices.len();
     for (one, at) in slices.iter().zip(0_u32..) {
@@ -156,7 +210,8 @@ pub(crate) fn overlaps<'p>(
                 }
                 let pair = (other.road.min(one.road), other.road.max(one.road));
                 let level = (one.z - other.z).abs() <= limits.clearance;
-                if !level || !wanted(other, one) || reported.contains(&pair) {
+                let near = level && one.bounds.meets(&other.bounds);
+                if !near || !wanted(other, one) || reported.contains(&pair) {
                     continue;
                 }
                 if let Some((area, point)) =
@@ -180,13 +235,9 @@ pub(crate) fn overlaps<'p>(
 
 /// The cells that a piece touches; none when it is too large to be a piece of a road.
 fn cells_of(slice: &Slice) -> impl Iterator<Item = (i64, i64)> + use<> {
-    let range = |part: fn(&Point) -> f64| {
-        let values = slice.corners.iter().map(part);
-        let low = values.clone().fold(f64::INFINITY, f64::min) / CELL;
-        let high = values.fold(f64::NEG_INFINITY, f64::max) / CELL;
-        (low.floor(), high.floor())
-    };
-    let ((left, right), (bottom, top)) = (range(|point| point.x), range(|point| point.y));
+    let Bounds(x, y) = slice.bounds;
+    let [left, right] = x.map(|x| (x / CELL).floor());
+    let [bottom, top] = y.map(|y| (y / CELL).floor());
     let fits = (right - left + 1.0) * (top - bottom + 1.0) <= MOST_CELLS
         && [left, right, bottom, top]
             .iter()

@@ -19,6 +19,9 @@ pub(crate) fn in_profile<'p, 'a>(
     end: f64,
     tolerance: f64,
 ) -> Vec<Repeated<'p, 'a>> {
+    if profile.records().len() < 2 {
+        return Vec::new();
+    }
     let records: Vec<&Record<'a>> = profile.in_order().collect();
     let pairs = (1..records.len()).filter_map(|index| {
         let (first, second) = (records[index - 1], records[index]);
@@ -58,6 +61,9 @@ pub(crate) fn in_lines<'p, 'a>(
     gap: f64,
     turn: f64,
 ) -> Vec<[&'p Geometry<'a>; 2]> {
+    if plan_view.geometries().len() < 2 {
+        return Vec::new();
+    }
     let lines: Vec<&Geometry<'a>> = plan_view.in_order().collect();
     let one_line = |one: &Geometry<'_>, next: &Geometry<'_>| {
         let both = one.kind() == Some(ShapeKind::Line) && next.kind() == Some(ShapeKind::Line);

@@ -1,7 +1,6 @@
 //! Lanes that have no width where they are linked (OpenDRIVE 1.9, 11.6).
 
-use std::collections::BTreeMap;
-
+use foldhash::HashMap;
 use qcbus_document::Node;
 use qcbus_opendrive::{ContactPoint, LaneEnd, LaneJoint, LaneRef, RoadMap};
 use qcbus_sdk::{Param, Sink};
@@ -83,8 +82,8 @@ fn report(
 /// The lane links of junctions by the lane ends that they join.
 #[derive(Default)]
 struct LaneLinks<'a> {
-    from: BTreeMap<LaneEnd, Vec<Node<'a>>>,
-    to: BTreeMap<LaneEnd, Vec<Node<'a>>>,
+    from: HashMap<LaneEnd, Vec<Node<'a>>>,
+    to: HashMap<LaneEnd, Vec<Node<'a>>>,
 }
 
 impl<'a> LaneLinks<'a> {

@@ -1,5 +1,4 @@
-use std::collections::HashMap;
-
+use foldhash::HashMap;
 use qcbus_document::{Document, Node};
 use qcbus_sdk::{Level, Place, Rule, Sink};
 
@@ -22,8 +21,8 @@ fn run(document: &Document<'_>, found: &mut Sink<'_>) {
 }
 
 fn check<'d>(kind: &Kind, document: &Document<'d>, found: &mut Sink<'_>) {
-    let mut exact: HashMap<(Option<Node<'d>>, &str), Node<'d>> = HashMap::new();
-    let mut numeric: HashMap<u64, Node<'d>> = HashMap::new();
+    let mut exact: HashMap<(Option<Node<'d>>, &str), Node<'d>> = HashMap::default();
+    let mut numeric: HashMap<u64, Node<'d>> = HashMap::default();
     for node in kind.nodes(document) {
         let Some(id) = node.attr("id") else { continue };
         let place = Place::attribute_or_node(node, "id");

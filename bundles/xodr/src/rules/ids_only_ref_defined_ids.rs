@@ -1,5 +1,4 @@
-use std::collections::{HashMap, HashSet};
-
+use foldhash::{HashMap, HashSet};
 use qcbus_document::{Document, Node};
 use qcbus_sdk::{Place, Rule, Sink};
 
@@ -133,7 +132,7 @@ const REFERENCES: &[Reference] = &[
 
 /// The ids that are defined: in the file by class, and in each object by class.
 struct Defined<'d> {
-    anywhere: HashMap<Class, HashSet<&'d str>>,
+    anywhere: Vec<(Class, HashSet<&'d str>)>,
     in_object: HashMap<(Node<'d>, Class), HashSet<&'d str>>,
 }
 
@@ -141,8 +140,8 @@ fn run(document: &Document<'_>, found: &mut Sink<'_>) {
     let defined = Defined::of(document);
     for reference in REFERENCES {
         for node in document.elements(reference.element) {
-            let parent = node.parent().map_or("", |parent| parent.name());
-            if reference.parent.is_empty() || reference.parent == parent {
+            let parent = node.parent();
+            if reference.parent.is_empty() || parent.is_some_and(|it| it.is(reference.parent)) {
                 check(reference, node, &defined, found);
             }
         }
@@ -193,13 +192,14 @@ fn check(reference: &Reference, node: Node<'_>, defined: &Defined<'_>, found: &m
 impl<'d> Defined<'d> {
     fn of(document: &Document<'d>) -> Defined<'d> {
         let mut defined = Defined {
-            anywhere: HashMap::new(),
-            in_object: HashMap::new(),
+            anywhere: Vec::with_capacity(KINDS.len()),
+            in_object: HashMap::default(),
         };
         for kind in KINDS {
+            let mut ids = HashSet::default();
             for node in kind.nodes(document) {
                 let Some(id) = node.attr("id") else { continue };
-                defined.anywhere.entry(kind.class).or_default().insert(id);
+                ids.insert(id);
                 if matches!(kind.class, Class::Outline | Class::Corner)
                     && let Some(object) = node.ancestors().find(|ancestor| ancestor.is("object"))
                 {
@@ -210,13 +210,13 @@ impl<'d> Defined<'d> {
                         .insert(id);
                 }
             }
+            defined.anywhere.push((kind.class, ids));
         }
         defined
     }
 
     fn anywhere(&self, class: Class, id: &str) -> bool {
-        self.anywhere
-            .get(&class)
-            .is_some_and(|ids| ids.contains(id))
+        let mut of_class = self.anywhere.iter().filter(|(other, _)| *other == class);
+        of_class.any(|(_, ids)| ids.contains(id))
     }
 }

@@ -21,7 +21,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     for road in map.roads() {
         for layer in road.layers() {
             let mut lanes = layer.sections(road).flat_map(SectionRef::lanes);
-            let border = lanes.find_map(|lane| lane.node().child("border"));
+            let border = lanes.find_map(|lane| lane.elements("border").next());
             let offsets = layer.offset().records();
             let (Some(border), Some(offset)) = (border, offsets.first()) else {
                 continue;

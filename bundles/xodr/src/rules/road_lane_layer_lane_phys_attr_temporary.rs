@@ -19,7 +19,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             continue;
         }
         for element in ["height", "material"] {
-            for child in lane.node().children_named(element) {
+            for child in lane.elements(element) {
                 let text = format!(
                     "a lane of the temporary layer has a `{element}`; height and material of the surface \
                      are given by the permanent layer alone"

@@ -1,5 +1,6 @@
-use std::collections::{BTreeSet, HashSet};
+use std::collections::BTreeSet;
 
+use foldhash::HashSet;
 use qcbus_opendrive::{ContactPoint, Junction, JunctionType, Road, RoadEnd, RoadMap};
 use qcbus_sdk::{Param, Rule, Sink};
 
@@ -78,7 +79,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
 /// Roads that may overlap by the kind of junction that they share: direct junctions, crossings,
 /// and whatever has to do with virtual junctions.
 fn friends(map: &RoadMap<'_>) -> HashSet<(usize, usize)> {
-    let mut friends = HashSet::new();
+    let mut friends = HashSet::default();
     let mut add = |one: Option<&str>, other: Option<&str>| {
         if let (Some(a), Some(b)) = (
             one.and_then(|id| map.road(id)),

@@ -1,5 +1,5 @@
 use qcbus_document::Node;
-use qcbus_opendrive::{RoadMap, SectionRef};
+use qcbus_opendrive::{LaneRef, RoadMap, SectionRef};
 use qcbus_sdk::{Level, Param, Place, Rule, Sink};
 
 use crate::families::ascending;
@@ -25,6 +25,7 @@ const LANE_RECORDS: [&str; 8] = [
 ];
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let tolerance = found.number(&TOLERANCE);
     for road in map.roads() {
         let Some(length) = road.length() else {
             continue;
@@ -32,6 +33,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let whole = Extent {
             start: "s",
             length,
+            limit: length + tolerance,
             what: "the road",
             from: 0.0,
             road: road.id(),
@@ -47,7 +49,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             .iter()
             .map(|layer| (Some(layer.node()), "laneOffset"));
         for (parent, name) in lists.into_iter().chain(layers) {
-            whole.check(parent, name, found);
+            whole.check(ascending::children(parent, name), name, found);
         }
         for lane in road.sections().flat_map(SectionRef::lanes) {
             // A section without length has a rule of its own.
@@ -58,15 +60,30 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             let section = Extent {
                 start: "sOffset",
                 length,
+                limit: length + tolerance,
                 what: "its lane section",
                 from,
                 road: road.id(),
             };
             for name in LANE_RECORDS {
-                section.check(Some(lane.node()), name, found);
+                if !all_start_by(lane, name, section.limit) {
+                    section.check(lane.elements(name), name, found);
+                }
             }
         }
     }
+}
+
+/// Whether the records of a lane are known already to start no later than `limit`.
+fn all_start_by(lane: LaneRef<'_, '_>, name: &str, limit: f64) -> bool {
+    let fits = |start: Option<f64>| start.is_some_and(|start| start <= limit);
+    let profile = match name {
+        "width" => lane.widths(),
+        "border" => lane.borders(),
+        "height" => return lane.heights().iter().all(|one| fits(one.s_offset())),
+        _ => return false,
+    };
+    profile.records().iter().all(|record| fits(record.start()))
 }
 
 /// What records lie in.
@@ -75,6 +92,8 @@ struct Extent<'m> {
     start: &'static str,
     /// In metres, counted like the records' starts.
     length: f64,
+    /// Up to where they may start.
+    limit: f64,
     what: &'static str,
     /// Where it starts on the road, in metres.
     from: f64,
@@ -83,11 +102,16 @@ struct Extent<'m> {
 
 impl Extent<'_> {
     /// Reports the first record of this name that starts beyond the end.
-    fn check(&self, parent: Option<Node<'_>>, name: &'static str, found: &mut Sink<'_>) {
-        let limit = self.length + found.number(&TOLERANCE);
+    fn check<'a>(
+        &self,
+        mut records: impl Iterator<Item = Node<'a>>,
+        name: &'static str,
+        found: &mut Sink<'_>,
+    ) {
+        let limit = self.limit;
         let (by, what, length) = (self.start, self.what, self.length);
         let beyond = |node: Node<'_>| node.f64(self.start).is_ok_and(|start| start > limit);
-        let Some(node) = ascending::children(parent, name).find(|node| beyond(*node)) else {
+        let Some(node) = records.find(|node| beyond(*node)) else {
             return;
         };
         let Ok(start) = node.f64(self.start) else {

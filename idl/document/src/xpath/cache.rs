@@ -1,8 +1,9 @@
 //! Printing the XPaths of many elements without walking their siblings each time.
 
-use std::collections::{HashMap, HashSet};
+use foldhash::{HashMap, HashSet};
 
 use super::print::{self, Step, id_attributes, usable_id};
+use crate::attribute::Attribute;
 use crate::document::Document;
 use crate::node::Node;
 
@@ -57,8 +58,8 @@ impl XPaths {
         XPaths {
             document: document.address().addr(),
             ids: id_attributes(document),
-            known: HashSet::new(),
-            steps: HashMap::new(),
+            known: HashSet::default(),
+            steps: HashMap::default(),
         }
     }
 
@@ -107,34 +108,35 @@ impl XPaths {
     }
 
     fn learn_children(&mut self, parent: Node<'_>) {
-        let mut totals: HashMap<&str, u64> = HashMap::new();
-        let mut values: HashMap<(&str, &str, &str), u32> = HashMap::new();
+        let mut totals: HashMap<u16, u64> = HashMap::default();
+        let mut values: HashMap<(u16, u16, &str), u32> = HashMap::default();
         for child in parent.children() {
-            *totals.entry(child.name()).or_default() += 1;
+            *totals.entry(child.name_number()).or_default() += 1;
             for id in self.ids.iter().filter_map(|name| usable_id(child, name)) {
-                *values
-                    .entry((child.name(), id.name(), id.value()))
-                    .or_default() += 1;
+                *values.entry(key(child, id)).or_default() += 1;
             }
         }
-        let mut numbers: HashMap<&str, u64> = HashMap::new();
+        let mut numbers: HashMap<u16, u64> = HashMap::default();
         for child in parent.children() {
-            let number = numbers.entry(child.name()).or_default();
+            let number = numbers.entry(child.name_number()).or_default();
             *number += 1;
-            let unique = |(_, id): &(&str, crate::Attribute<'_>)| {
-                values.get(&(child.name(), id.name(), id.value())) == Some(&1)
-            };
+            let unique = |(_, id): &(&str, Attribute<'_>)| values.get(&key(child, *id)) == Some(&1);
             let ids = self.ids.iter().copied();
             let id = ids
                 .filter_map(|name| Some((name, usable_id(child, name)?)))
                 .find(unique);
             let by = match id {
                 Some((name, _)) => By::Id(name),
-                None if totals.get(child.name()) == Some(&1) => By::Nothing,
+                None if totals.get(&child.name_number()) == Some(&1) => By::Nothing,
                 None => By::Number,
             };
             let number = *number;
             self.steps.insert(child.index(), Known { number, by });
         }
     }
+}
+
+/// What tells elements apart among all children of one parent.
+fn key<'n>(child: Node<'n>, id: Attribute<'n>) -> (u16, u16, &'n str) {
+    (child.name_number(), id.name_number(), id.value())
 }

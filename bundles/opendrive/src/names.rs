@@ -1,0 +1,84 @@
+//! What the elements of lanes are called, looked up once per document.
+
+use qcbus_document::{Document, Node};
+
+/// An element name that decides where something belongs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Name {
+    /// Any that is not below.
+    Other,
+    Left,
+    Center,
+    Right,
+    Lane,
+    LaneSection,
+    Link,
+    Width,
+    Border,
+    Height,
+    RoadMark,
+    Material,
+    Speed,
+    Access,
+    Rule,
+    UserData,
+}
+
+impl Name {
+    fn of(name: &str) -> Name {
+        match name {
+            "left" => Name::Left,
+            "center" => Name::Center,
+            "right" => Name::Right,
+            "lane" => Name::Lane,
+            "laneSection" => Name::LaneSection,
+            "link" => Name::Link,
+            "width" => Name::Width,
+            "border" => Name::Border,
+            "height" => Name::Height,
+            "roadMark" => Name::RoadMark,
+            "material" => Name::Material,
+            "speed" => Name::Speed,
+            "access" => Name::Access,
+            "rule" => Name::Rule,
+            "userData" => Name::UserData,
+            _ => Name::Other,
+        }
+    }
+
+    /// Its place in a set of names.
+    pub(crate) fn bit(self) -> u16 {
+        1 << (self as u16)
+    }
+
+    /// The set that has only this name; the one of all others when it is not listed above.
+    pub(crate) fn bit_of(name: &str) -> u16 {
+        Name::of(name).bit()
+    }
+}
+
+/// The names of a document by their numbers.
+#[derive(Debug)]
+pub(crate) struct Names(Vec<Name>);
+
+impl Names {
+    pub(crate) fn of(document: Document<'_>) -> Names {
+        Names(document.names().map(Name::of).collect())
+    }
+
+    /// The name of an element.
+    pub(crate) fn name(&self, node: Node<'_>) -> Name {
+        let name = self.0.get(usize::from(node.name_number())).copied();
+        name.unwrap_or(Name::Other)
+    }
+
+    /// The children of an element that have this name.
+    pub(crate) fn children<'a>(
+        &self,
+        node: Node<'a>,
+        name: Name,
+    ) -> impl Iterator<Item = Node<'a>> {
+        node.children()
+            .filter(move |child| self.name(*child) == name)
+    }
+}

@@ -1,0 +1,72 @@
+//! How long every checker took, for people who write rules. No result depends on it.
+
+use std::fmt;
+use std::time::Duration;
+
+/// What the checkers of one run took.
+#[derive(Debug, Clone, Default)]
+pub struct Timings {
+    /// Each checker that was demanded, with the time from its begin to its end. What several of
+    /// them need is found out by the first, and counts as its time.
+    pub checkers: Vec<(String, Duration)>,
+    /// The whole check.
+    pub whole: Duration,
+}
+
+impl Timings {
+    /// All checkers together.
+    pub fn sum(&self) -> Duration {
+        self.checkers.iter().map(|(_, took)| *took).sum()
+    }
+}
+
+impl fmt::Display for Timings {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut line = |took: Duration, what: &str| {
+            let milliseconds = took.as_secs_f64() * 1e3;
+            writeln!(f, "{milliseconds:10.3} ms  {what}")
+        };
+        let mut checkers: Vec<&(String, Duration)> = self.checkers.iter().collect();
+        checkers.sort_by(|one, next| next.1.cmp(&one.1).then_with(|| one.0.cmp(&next.0)));
+        for (id, took) in checkers {
+            line(*took, id)?;
+        }
+        line(self.sum(), "all checkers")?;
+        line(
+            self.whole.saturating_sub(self.sum()),
+            "models, preconditions, results",
+        )?;
+        line(self.whole, "altogether")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_slowest_comes_first_and_the_sums_follow() {
+        let millis = Duration::from_millis;
+        let checkers = [("quick", 1), ("slow", 30), ("idle", 0)];
+        let timings = Timings {
+            checkers: checkers
+                .map(|(id, took)| (id.to_owned(), millis(took)))
+                .into(),
+            whole: millis(40),
+        };
+        let text = timings.to_string();
+        let lines: Vec<Vec<&str>> = text
+            .lines()
+            .map(|line| line.split_whitespace().collect())
+            .collect();
+        let column = |at: usize| -> Vec<&str> { lines.iter().map(|line| line[at]).collect() };
+        assert_eq!(
+            column(2),
+            ["slow", "quick", "idle", "all", "models,", "altogether"]
+        );
+        assert_eq!(
+            column(0),
+            ["30.000", "1.000", "0.000", "31.000", "9.000", "40.000"]
+        );
+    }
+}

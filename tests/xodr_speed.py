@@ -1,0 +1,193 @@
+#!/usr/bin/env python3
+"""Times all OpenDRIVE rules on maps of four sizes, and ASAM's own bundle on the same maps.
+
+    python3 tests/xodr_speed.py [--cases DIR] [--maps DIR] [--runs N] [--no-asam]
+
+Takes two maps of the corpus (`../shared/cases` unless told otherwise), makes large ones of them by
+repeating their roads and junctions with fresh ids, and prints a table in Markdown: the CPU time of
+our rules from the image of the document, in one thread; that of ASAM's bundle (from PyPI, if this
+Python has it: `pip install asam-qc-opendrive`), a process per map, start included; and the ratio.
+Not part of CI: it measures.
+"""
+
+import argparse
+import os
+import pathlib
+import re
+import resource
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+SMALL = "real/esmini/resources/xodr/straight_500m.xodr"
+TOWN = "real/esmini/resources/xodr/multi_intersections.xodr"
+MOTORWAY = "real/qc-framework/.github/workflows/linux-files/UC_Motorway-Exit-Entry.xodr"
+MEGABYTE = 1_000_000
+# Copies lie so far apart, in metres, that no road of one comes near those of another.
+APART = 5000.0
+
+# Attributes that hold ids of the whole file, by element.
+IDS = {
+    "road": ("id", "junction"),
+    "predecessor": ("elementId",),
+    "successor": ("elementId",),
+    "junction": ("id", "mainRoad"),
+    "connection": ("incomingRoad", "connectingRoad", "linkedRoad"),
+    "priority": ("high", "low"),
+    "signal": ("id",),
+    "signalReference": ("id",),
+    "object": ("id",),
+    "objectReference": ("id",),
+    "controller": ("id",),
+    "control": ("signalId",),
+    "dependency": ("id",),
+    "reference": ("elementId",),
+}
+TAG = re.compile(r"<(" + "|".join(sorted(IDS, key=len, reverse=True)) + r")\b([^>]*)>")
+ATTRIBUTE = re.compile(r'([\w:]+)(\s*=\s*")([^"]*)"')
+X = re.compile(r'(<geometry\b[^>]*?\sx\s*=\s*")([^"]*)"')
+
+
+def copied(text, copy):
+    """The elements under fresh ids (numbers stay numbers) and moved to the east."""
+    if copy == 0:
+        return text
+
+    def fresh(value):
+        return str(int(value) + copy * 100_000) if value.isdigit() else f"{value}-{copy}"
+
+    def attribute(names, match):
+        name, between, value = match.groups()
+        if name in names and value not in ("", "-1"):
+            value = fresh(value)
+        return f'{name}{between}{value}"'
+
+    def tag(match):
+        names = IDS[match[1]]
+        return f"<{match[1]}{ATTRIBUTE.sub(lambda one: attribute(names, one), match[2])}>"
+
+    def moved(match):
+        return f'{match[1]}{float(match[2]) + copy * APART!r}"'
+
+    return X.sub(moved, TAG.sub(tag, text))
+
+
+def repeated(text, size=0, copies=0):
+    """The map with all that follows its header repeated, until it has that size or so many copies."""
+    start = text.index("<road ")
+    end = text.rindex("</OpenDRIVE>")
+    head, body, tail = text[:start], text[start:end], text[end:]
+    parts, length, copy = [head], len(head) + len(tail), 0
+    while copy < copies or length < size:
+        parts.append(copied(body, copy))
+        length += len(parts[-1])
+        copy += 1
+    return "".join(parts) + tail
+
+
+def make_maps(cases, directory):
+    """The maps to measure: name and path, small ones first."""
+    read = lambda path: (cases / path).read_text(encoding="utf-8")
+    town, motorway = read(TOWN), read(MOTORWAY)
+    made = {
+        "motorway-x4.xodr": lambda: repeated(motorway, copies=4),
+        "town-10MB.xodr": lambda: repeated(town, size=10 * MEGABYTE),
+        "town-20MB.xodr": lambda: repeated(town, size=20 * MEGABYTE),
+        "motorway-10MB.xodr": lambda: repeated(motorway, size=10 * MEGABYTE),
+        "motorway-20MB.xodr": lambda: repeated(motorway, size=20 * MEGABYTE),
+    }
+    maps = [cases / SMALL, cases / TOWN, cases / MOTORWAY]
+    for name, make in made.items():
+        path = directory / name
+        if not path.exists():
+            path.write_text(make(), encoding="utf-8")
+        maps.append(path)
+    return maps
+
+
+def ours(maps, runs):
+    """Best and median CPU milliseconds per map."""
+    command = ["cargo", "run", "--quiet", "--release", "-p", "qcbus-xodr", "--example", "rule_times"]
+    command += ["--", "--runs", str(runs), *map(str, maps)]
+    lines = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    words = [line.split() for line in lines.splitlines()]
+    return [(float(line[0]), float(line[3])) for line in words]
+
+
+CONFIG = """<?xml version="1.0" encoding="UTF-8"?>
+<Config><Param name="InputFile" value="{map}"/>
+<CheckerBundle application="xodrBundle"><Param name="resultFile" value="{result}"/>
+{checkers}</CheckerBundle></Config>
+"""
+
+
+def asam_checkers():
+    """The ids of all checkers of ASAM's bundle that is installed, or none."""
+    code = (
+        "import pathlib, re, qc_opendrive\n"
+        "for file in sorted(pathlib.Path(qc_opendrive.__file__).parent.rglob('*.py')):\n"
+        "    print(*re.findall(r'CHECKER_ID\\s*=[\\s(]*\"([^\"]+)\"', file.read_text()), sep='\\n')\n"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    return sorted(set(run.stdout.split())) if run.returncode == 0 else []
+
+
+def asam(path, checkers, limit):
+    """CPU milliseconds of a whole process that checks one map, and whether it came to its end."""
+    with tempfile.TemporaryDirectory() as directory:
+        config = pathlib.Path(directory) / "config.xml"
+        result = pathlib.Path(directory) / "result.xqar"
+        listed = "".join(f'<Checker checkerId="{one}" minLevel="1" maxLevel="3"/>' for one in checkers)
+        config.write_text(CONFIG.format(map=path, result=result, checkers=listed))
+        command = [sys.executable, "-m", "qc_opendrive.main", "-c", str(config)]
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        ended = True
+        try:
+            subprocess.run(command, check=True, capture_output=True, cwd=directory, timeout=limit)
+        except subprocess.TimeoutExpired:
+            ended = False
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        if ended and not result.exists():
+            sys.exit(f"ASAM's bundle wrote no result for {path}")
+        used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        return 1e3 * used, ended
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--cases", type=pathlib.Path, default=ROOT.parent / "shared/cases")
+    parser.add_argument("--maps", type=pathlib.Path, default=ROOT / "target/xodr-speed")
+    parser.add_argument("--runs", type=int, default=9)
+    parser.add_argument("--asam-limit", type=float, default=120.0, help="seconds per map")
+    parser.add_argument("--no-asam", action="store_true")
+    parser.add_argument("--only-maps", action="store_true", help="make the maps and stop")
+    args = parser.parse_args()
+    args.maps.mkdir(parents=True, exist_ok=True)
+    maps = make_maps(args.cases.resolve(), args.maps.resolve())
+    if args.only_maps:
+        return
+    checkers = [] if args.no_asam else asam_checkers()
+    print(f"load {os.getloadavg()[0]:.1f}; ASAM: {len(checkers)} checkers\n")
+    print("| map | size | ours, best ms | median ms | ms/MB | ASAM, ms | ratio |")
+    print("|---|---|---|---|---|---|---|")
+    medians = {}
+    for path in maps:
+        [(best, median)] = ours([path], args.runs)
+        medians[path.name] = median
+        size = path.stat().st_size
+        compared = "- | -"
+        if checkers:
+            theirs, ended = asam(path, checkers, args.asam_limit)
+            more = "" if ended else "> "
+            compared = f"{more}{theirs:,.0f} | {more}{theirs / median:,.0f}"
+        row = f"| {path.name} | {size:,} | {best:.2f} | {median:.2f} | {1e6 * median / size:.1f}"
+        print(f"{row} | {compared} |", flush=True)
+    print()
+    for kind in ("town", "motorway"):
+        growth = medians[f"{kind}-20MB.xodr"] / medians[f"{kind}-10MB.xodr"]
+        print(f"{kind}: 20 MB against 10 MB: {growth:.2f}")
+
+
+if __name__ == "__main__":
+    main()
