@@ -246,6 +246,30 @@ impl Farm {
     }
 }
 
+impl Farm {
+    /// What killed processes leave is swept by the next broker of their instance; here none comes.
+    fn clear_shared_memory(&self) {
+        let Ok(prefix) = std::fs::read_to_string(self.instance().join("id")) else {
+            return;
+        };
+        if prefix.is_empty() {
+            return;
+        }
+        for entry in std::fs::read_dir("/dev/shm")
+            .into_iter()
+            .flatten()
+            .flatten()
+        {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            if name.starts_with(&prefix) {
+                let _ = std::fs::remove_file(entry.path());
+            } else if name.starts_with(&format!("d{prefix}")) {
+                let _ = std::fs::remove_dir_all(entry.path());
+            }
+        }
+    }
+}
+
 impl Drop for Farm {
     fn drop(&mut self) {
         // What dies may have been about to start something.
@@ -254,6 +278,7 @@ impl Drop for Farm {
                 process.signal(Signal::KILL);
             }
         }
+        self.clear_shared_memory();
     }
 }
 
