@@ -201,6 +201,7 @@ fn real_maps_whole_and_truncated_break_no_rule() {
     let plan = Plan::by_default(&BUNDLE);
     // A hundred places take an hour without optimisation: QCBUS_FUZZ_PLACES=100 in a release build.
     let places = setting("QCBUS_FUZZ_PLACES", 2);
+    println!("{} files, each cut at {places} places", files.len());
     for file in files {
         let bytes = std::fs::read(&file).unwrap();
         let what = file.display().to_string();
