@@ -24,6 +24,7 @@ mod junctions_connection_connect_road_no_incoming_road;
 mod junctions_connection_end_opposite_linkage;
 mod junctions_connection_one_connection_element;
 mod junctions_connection_one_link_to_incoming;
+mod junctions_connection_required_attributes;
 mod junctions_connection_smooth_fit;
 mod junctions_connection_start_along_linkage;
 mod junctions_cross_path_correct_junction_id;
@@ -65,6 +66,7 @@ mod lane_smoothness_contact_point_no_horizontal_kinks;
 mod lane_smoothness_contact_point_no_vertical_gaps;
 mod lane_smoothness_contact_point_no_vertical_kinks;
 mod lane_smoothness_no_vertical_jumps_t;
+mod lane_smoothness_profile_no_horizontal_gaps;
 mod lane_smoothness_profile_no_vertical_gaps;
 mod performance_avoid_redundant_info;
 mod road_corner_local_first_id_zero;
@@ -130,6 +132,7 @@ mod road_lane_layer_layer_mandatory_permanent;
 mod road_lane_layer_length_only_temporary;
 mod road_lane_level_true_one_side;
 mod road_lane_link_lanes_across_lane_sections;
+mod road_lane_link_lanes_across_roads;
 mod road_lane_link_multiple_connections;
 mod road_lane_link_new_lane_appear;
 mod road_lane_link_no_link;
@@ -480,4 +483,7 @@ pub static RULES: &[&dyn AnyRule] = &[
     &lane_smoothness_no_vertical_jumps_t::RULE,
     &road_object_surface_no_bounding_box_overlap::RULE,
     &road_object_surface_object_reference_on_overlap::RULE,
+    &junctions_connection_required_attributes::RULE,
+    &lane_smoothness_profile_no_horizontal_gaps::RULE,
+    &road_lane_link_lanes_across_roads::RULE,
 ];
