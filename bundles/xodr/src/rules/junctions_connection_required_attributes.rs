@@ -32,7 +32,7 @@ fn check(junction: &Junction<'_>, connection: Connection<'_>, found: &mut Sink<'
     let wanted = ["incomingRoad", to, "contactPoint"];
     let missing: Vec<&str> = wanted
         .into_iter()
-        .filter(|name| !has(name) && !(*name == to && other))
+        .filter(|name| !(has(name) || *name == to && other))
         .collect();
     if !missing.is_empty() {
         let text = format!(

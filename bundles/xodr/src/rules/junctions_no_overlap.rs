@@ -1,3 +1,6 @@
+use std::cell::OnceCell;
+use std::collections::BTreeSet;
+
 use qcbus_opendrive::geometry::Point;
 use qcbus_opendrive::{Junction, Place, Road, RoadMap};
 use qcbus_sdk::{Level, Param, Rule, Sink};
@@ -30,7 +33,7 @@ const CLEARANCE: Param = Param::number(
 const STEP: f64 = 2.0;
 const SHRINK: f64 = 0.05;
 
-/// No more pieces are compared, and no more points are taken along a straight side of a boundary.
+/// No more pairs of roads and pieces are compared, and no more points are taken along a straight side of a boundary.
 const BUDGET: usize = 10_000_000;
 const MOST_POINTS: f64 = 64.0;
 
@@ -45,102 +48,167 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// A junction with its roads and the box that holds it all.
-struct Site<'m, 'a> {
+/// A part of a junction: its boundary, or a road that belongs to it.
+struct Part<'m, 'a> {
     junction: &'m Junction<'a>,
-    roads: Vec<&'m Road<'a>>,
-    ring: Option<Vec<Point>>,
-    /// Least and greatest x, least and greatest y.
-    extent: [f64; 4],
+    shape: Shape<'m, 'a>,
+    extent: Extent,
+    /// The least and the greatest height, as far as they are known.
+    heights: [f64; 2],
+    pieces: OnceCell<Vec<Patch>>,
 }
 
+enum Shape<'m, 'a> {
+    Ring(Vec<Point>),
+    Road {
+        road: &'m Road<'a>,
+        /// The junction has a boundary, which counts against other boundaries.
+        bounded: bool,
+    },
+}
+
+/// Least and greatest x, least and greatest y.
+type Extent = [f64; 4];
+
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    let mut sites = sites(map);
-    sites.sort_by(|one, other| one.extent[0].total_cmp(&other.extent[0]));
-    let mut budget = BUDGET;
-    for (at, one) in sites.iter().enumerate() {
-        let beside = sites[at + 1..].iter();
-        for other in beside.take_while(|other| other.extent[0] <= one.extent[1]) {
+    let mut parts = parts(map);
+    // Along the longer side of the map fewer parts lie beside each other.
+    let whole = parts
+        .iter()
+        .fold(NOWHERE, |all, part| joined(all, part.extent));
+    let axis = if whole[1] - whole[0] >= whole[3] - whole[2] {
+        0
+    } else {
+        2
+    };
+    parts.sort_by(|one, other| one.extent[axis].total_cmp(&other.extent[axis]));
+    let (mut budget, mut told) = (BUDGET, BTreeSet::new());
+    for (at, one) in parts.iter().enumerate() {
+        let beside = parts[at + 1..].iter();
+        for other in beside.take_while(|other| other.extent[axis] <= one.extent[axis + 1]) {
             budget = budget.saturating_sub(1);
             if budget == 0 {
                 return;
             }
-            if one.extent[2] <= other.extent[3] && other.extent[2] <= one.extent[3] {
-                let (one, other) = if one.junction.index() < other.junction.index() {
-                    (one, other)
-                } else {
-                    (other, one)
-                };
-                check(one, other, &mut budget, found);
+            let (one, other) = if one.junction.index() < other.junction.index() {
+                (one, other)
+            } else {
+                (other, one)
+            };
+            let pair = (one.junction.index(), other.junction.index());
+            if one.junction.id() != other.junction.id()
+                && meet(one.extent, other.extent)
+                && !told.contains(&pair)
+                && check(one, other, &mut budget, found)
+            {
+                told.insert(pair);
             }
         }
     }
 }
 
-fn sites<'m, 'a>(map: &'m RoadMap<'a>) -> Vec<Site<'m, 'a>> {
-    let mut roads: Vec<Vec<&Road<'_>>> = map.junctions().iter().map(|_| Vec::new()).collect();
-    for road in map.roads() {
-        let junction = road.junction().and_then(|id| map.junction(id));
-        if let Some(own) = junction.and_then(|one| roads.get_mut(one.index())) {
-            own.push(road);
-        }
-    }
-    let sites = map.junctions().iter().zip(roads).map(|(junction, roads)| {
-        let ring = boundary(map, junction).map(|stretches| ring(&stretches));
-        let outline = roads.iter().filter_map(|road| reach(road)).chain(
-            ring.iter()
-                .flatten()
-                .map(|point| [point.x, point.x, point.y, point.y]),
-        );
-        let nothing = [
-            f64::INFINITY,
-            f64::NEG_INFINITY,
-            f64::INFINITY,
-            f64::NEG_INFINITY,
-        ];
-        let extent = outline.fold(nothing, |all, one| {
-            [
-                all[0].min(one[0]),
-                all[1].max(one[1]),
-                all[2].min(one[2]),
-                all[3].max(one[3]),
-            ]
-        });
-        Site {
-            junction,
-            roads,
-            ring,
-            extent,
-        }
-    });
-    sites.filter(|site| site.extent[0].is_finite()).collect()
+const NOWHERE: Extent = [
+    f64::INFINITY,
+    f64::NEG_INFINITY,
+    f64::INFINITY,
+    f64::NEG_INFINITY,
+];
+
+fn joined(one: Extent, other: Extent) -> Extent {
+    [
+        one[0].min(other[0]),
+        one[1].max(other[1]),
+        one[2].min(other[2]),
+        one[3].max(other[3]),
+    ]
 }
 
-/// A box that a road cannot leave: no point of it is farther from either end than its length.
-fn reach(road: &Road<'_>) -> Option<[f64; 4]> {
+fn meet(one: Extent, other: Extent) -> bool {
+    one[0] <= other[1] && other[0] <= one[1] && one[2] <= other[3] && other[2] <= one[3]
+}
+
+fn parts<'m, 'a>(map: &'m RoadMap<'a>) -> Vec<Part<'m, 'a>> {
+    let mut parts = Vec::new();
+    let mut bounded: Vec<Option<[f64; 2]>> = vec![None; map.junctions().len()];
+    let rings: Vec<_> = map
+        .junctions()
+        .iter()
+        .map(|junction| boundary(map, junction).map(|stretches| ring(&stretches)))
+        .collect();
+    for road in map.roads() {
+        let Some(junction) = road.junction().and_then(|id| map.junction(id)) else {
+            continue;
+        };
+        let height = road.elevation().at_or_zero(0.0);
+        let ring = rings.get(junction.index()).and_then(Option::as_ref);
+        if let (Some(_), Some(slot)) = (ring, bounded.get_mut(junction.index())) {
+            let [low, high] = slot.unwrap_or([f64::INFINITY, f64::NEG_INFINITY]);
+            *slot = height
+                .map(|height| [low.min(height), high.max(height)])
+                .or(*slot);
+        }
+        if let Some(extent) = reach(road) {
+            let height = height.unwrap_or(0.0);
+            parts.push(Part {
+                junction,
+                shape: Shape::Road {
+                    road,
+                    bounded: ring.is_some(),
+                },
+                extent,
+                heights: [height, height],
+                pieces: OnceCell::new(),
+            });
+        }
+    }
+    for ((junction, ring), heights) in map.junctions().iter().zip(rings).zip(bounded) {
+        let Some(ring) = ring else { continue };
+        let points = ring
+            .iter()
+            .map(|point| [point.x, point.x, point.y, point.y]);
+        parts.push(Part {
+            junction,
+            extent: points.fold(NOWHERE, joined),
+            shape: Shape::Ring(ring),
+            heights: heights.unwrap_or([0.0, 0.0]),
+            pieces: OnceCell::new(),
+        });
+    }
+    parts
+}
+
+/// A box that a road cannot leave: no point of it is farther from both ends together than its length.
+fn reach(road: &Road<'_>) -> Option<Extent> {
     let length = road.length().filter(|length| *length > 0.0)?;
     let [start, end] = [road.pose(0.0)?, road.pose(Place::before(length))?];
-    let width = [Place::at(0.0), Place::before(length)]
+    let edges = [Place::at(0.0), Place::before(length)].map(|place| traffic_edges(road, place));
+    let width = edges
         .into_iter()
-        .filter_map(|place| traffic_edges(road, place))
+        .flatten()
         .fold(0.0_f64, |widest, (right, left)| {
             widest.max(right.abs()).max(left.abs())
         });
-    // Half of what the detour adds to the way from end to end, on either side.
     let around = 0.5 * length + width + 1.0;
     let (x, y) = (0.5 * (start.x + end.x), 0.5 * (start.y + end.y));
     Some([x - around, x + around, y - around, y + around])
 }
 
-fn check(one: &Site<'_, '_>, other: &Site<'_, '_>, budget: &mut usize, found: &mut Sink<'_>) {
-    if one.junction.id() == other.junction.id() {
-        return;
-    }
-    if let (Some(here), Some(there)) = (&one.ring, &other.ring) {
-        let depth = found.number(&DEPTH);
-        let level = heights_meet(one, other, found.number(&CLEARANCE));
-        if let Some((deep, point)) = deepest(here, there).filter(|(deep, _)| level && *deep > depth)
-        {
+/// Whether two parts overlap; then they are reported.
+fn check(
+    one: &Part<'_, '_>,
+    other: &Part<'_, '_>,
+    budget: &mut usize,
+    found: &mut Sink<'_>,
+) -> bool {
+    let clearance = found.number(&CLEARANCE);
+    let apart = (one.heights[0] - other.heights[1]).max(other.heights[0] - one.heights[1]);
+    match (&one.shape, &other.shape) {
+        (Shape::Ring(_), Shape::Ring(_)) if apart > clearance => false,
+        (Shape::Ring(here), Shape::Ring(there)) => {
+            let deepest = deepest(here, there).filter(|(deep, _)| *deep > found.number(&DEPTH));
+            let Some((deep, point)) = deepest else {
+                return false;
+            };
             let text = format!(
                 "the boundaries of junctions `{}` and `{}` overlap by {deep:.2} m; the areas of junctions must not",
                 one.junction.id(),
@@ -150,24 +218,20 @@ fn check(one: &Site<'_, '_>, other: &Site<'_, '_>, budget: &mut usize, found: &m
                 .issue(other.junction.node(), text)
                 .point(point.x, point.y, 0.0)
                 .at(one.junction.node(), "the other junction");
+            true
         }
-        return;
+        (
+            Shape::Road {
+                road: here,
+                bounded,
+            },
+            Shape::Road {
+                road: there,
+                bounded: also,
+            },
+        ) if !(*bounded && *also) => roads_overlap((one, here), (other, there), budget, found),
+        _ => false,
     }
-    roads_overlap(one, other, budget, found);
-}
-
-fn heights_meet(one: &Site<'_, '_>, other: &Site<'_, '_>, clearance: f64) -> bool {
-    let range = |site: &Site<'_, '_>| {
-        let heights = site
-            .roads
-            .iter()
-            .filter_map(|road| road.elevation().at_or_zero(0.0));
-        heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| {
-            (low.min(z), high.max(z))
-        })
-    };
-    let (here, there) = (range(one), range(other));
-    here.0 - there.1 <= clearance && there.0 - here.1 <= clearance
 }
 
 /// The point of either ring that lies deepest in the other one.
@@ -198,67 +262,58 @@ fn fine(ring: &[Point]) -> impl Iterator<Item = Point> {
     })
 }
 
+/// The pieces of a road.
+fn pieces(road: &Road<'_>) -> Vec<Patch> {
+    let range = [0.0, road.length().unwrap_or(0.0)];
+    strip(road, range, STEP, SHRINK, |place| {
+        traffic_edges(road, place)
+    })
+}
+
 fn roads_overlap(
-    one: &Site<'_, '_>,
-    other: &Site<'_, '_>,
+    (one, a): (&Part<'_, '_>, &Road<'_>),
+    (other, b): (&Part<'_, '_>, &Road<'_>),
     budget: &mut usize,
     found: &mut Sink<'_>,
-) {
-    let pieces = |road: &Road<'_>| -> Vec<Patch> {
-        let range = [0.0, road.length().unwrap_or(0.0)];
-        strip(road, range, STEP, SHRINK, |place| {
-            traffic_edges(road, place)
-        })
-    };
+) -> bool {
+    let ones = one.pieces.get_or_init(|| pieces(a));
+    let others = other.pieces.get_or_init(|| pieces(b));
+    *budget = budget.saturating_sub(ones.len() * others.len());
     let clearance = found.number(&CLEARANCE);
-    for a in &one.roads {
-        for b in other.roads.iter().filter(|b| near(a, b)) {
-            let (ones, others) = (pieces(a), pieces(b));
-            *budget = budget.saturating_sub(ones.len() * others.len());
-            if *budget == 0 {
-                return;
-            }
-            let mut total = 0.0;
-            let mut place = None;
-            for here in &ones {
-                for there in &others {
-                    let Some(shape) = common(&here.corners, &there.corners) else {
-                        continue;
-                    };
-                    let heights = [
-                        a.elevation().at_or_zero(here.from),
-                        b.elevation().at_or_zero(there.from),
-                    ];
-                    if matches!(heights, [Some(one), Some(other)] if (one - other).abs() <= clearance)
-                    {
-                        total += area(&shape);
-                        place = place.or_else(|| Some((middle(&shape)?, here.from, there.from)));
-                    }
-                }
-            }
-            if let Some((point, s, at)) = place.filter(|_| total > found.number(&AREA)) {
-                let text = format!(
-                    "junctions `{}` and `{}` overlap: their roads `{}` around s = {s:.1} and `{}` around s = {at:.1} \
-                     cover the same ground ({total:.1} m²); the areas of junctions must not overlap",
-                    one.junction.id(),
-                    other.junction.id(),
-                    a.id(),
-                    b.id()
-                );
-                found
-                    .issue(other.junction.node(), text)
-                    .level(Level::Warning)
-                    .point(point.x, point.y, 0.0)
-                    .at(one.junction.node(), "the other junction")
-                    .at(a.node(), "the one road")
-                    .at(b.node(), "the other road");
-                return;
+    let mut total = 0.0;
+    let mut place = None;
+    for here in ones {
+        for there in others {
+            let Some(shape) = common(&here.corners, &there.corners) else {
+                continue;
+            };
+            let heights = [
+                a.elevation().at_or_zero(here.from),
+                b.elevation().at_or_zero(there.from),
+            ];
+            if matches!(heights, [Some(one), Some(other)] if (one - other).abs() <= clearance) {
+                total += area(&shape);
+                place = place.or_else(|| Some((middle(&shape)?, here.from, there.from)));
             }
         }
     }
-}
-
-fn near(one: &Road<'_>, other: &Road<'_>) -> bool {
-    let boxes = reach(one).zip(reach(other));
-    boxes.is_some_and(|(a, b)| a[0] <= b[1] && b[0] <= a[1] && a[2] <= b[3] && b[2] <= a[3])
+    let Some((point, s, at)) = place.filter(|_| total > found.number(&AREA)) else {
+        return false;
+    };
+    let text = format!(
+        "junctions `{}` and `{}` overlap: their roads `{}` around s = {s:.1} and `{}` around s = {at:.1} cover the \
+         same ground ({total:.1} m²); the areas of junctions must not overlap",
+        one.junction.id(),
+        other.junction.id(),
+        a.id(),
+        b.id()
+    );
+    found
+        .issue(other.junction.node(), text)
+        .level(Level::Warning)
+        .point(point.x, point.y, 0.0)
+        .at(one.junction.node(), "the other junction")
+        .at(a.node(), "the one road")
+        .at(b.node(), "the other road");
+    true
 }

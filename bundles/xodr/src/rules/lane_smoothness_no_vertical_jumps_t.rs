@@ -48,7 +48,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
 /// second one.
 fn check<'m, 'a>(one: LaneRef<'m, 'a>, edge: Edge, other: LaneRef<'m, 'a>, found: &mut Sink<'_>) {
     let raised = |lane: LaneRef<'m, 'a>| !lane.heights().is_empty() || lane.level() == Some(true);
-    if !(raised(one) || raised(other)) || !is_drivable(one) || !is_drivable(other) {
+    if !is_drivable(one) || !is_drivable(other) || !(raised(one) || raised(other)) {
         return;
     }
     let limit = found.number(&STEP);
