@@ -145,6 +145,9 @@ fn elevation() {
     crate::run(&rows);
 }
 
+/// Another way to write a file.
+type Spell = Box<dyn Fn(&str) -> Vec<u8>>;
+
 #[test]
 fn a_file_may_be_written_in_many_ways() {
     let plan = qcbus_sdk::Plan::by_default(&qcbus_xodr::BUNDLE);
@@ -160,7 +163,7 @@ fn a_file_may_be_written_in_many_ways() {
             .replace("<o:?", "<?")
             .replace("<o:OpenDRIVE>", "<o:OpenDRIVE xmlns:o=\"urn:o\">")
     };
-    let spellings: [(&str, Box<dyn Fn(&str) -> Vec<u8>>); 6] = [
+    let spellings: [(&str, Spell); 6] = [
         (
             "byte order mark",
             Box::new(|text| [b"\xEF\xBB\xBF", text.as_bytes()].concat()),
