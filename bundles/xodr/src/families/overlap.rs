@@ -184,7 +184,7 @@ fn slice(
 }
 
 /// Twice the signed area of a triangle.
-fn turn(a: Point, b: Point, c: Point) -> f64 {
+pub(crate) fn turn(a: Point, b: Point, c: Point) -> f64 {
     (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y)
 }
 
@@ -272,7 +272,7 @@ fn common(one: &Slice, other: &Slice) -> Option<(f64, Point)> {
 }
 
 /// What of a convex polygon lies to the left of a line.
-fn cut(shape: &[Point], a: Point, b: Point) -> Vec<Point> {
+pub(crate) fn cut(shape: &[Point], a: Point, b: Point) -> Vec<Point> {
     let mut kept = Vec::with_capacity(shape.len() + 2);
     for (one, next) in super::polygons::sides(shape) {
         let (here, there) = (turn(a, b, one), turn(a, b, next));

@@ -56,8 +56,13 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
 fn within(road: &Road<'_>, found: &mut Sink<'_>) {
     let limit = found.number(&PITCH);
     let profile = road.elevation();
+    let mut last = None;
     for record in profile.in_order().skip(1) {
-        let Some(s) = record.start() else { continue };
+        // Of several records at one place only the last one holds.
+        let Some(s) = record.start().filter(|s| last != Some(*s)) else {
+            continue;
+        };
+        last = Some(s);
         let before = Place::before(s);
         let slopes = profile.slope_at(before).zip(profile.slope_at(s));
         let heights = profile.at(before).zip(profile.at(s));

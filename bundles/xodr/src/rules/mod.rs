@@ -24,6 +24,7 @@ mod junctions_connection_connect_road_no_incoming_road;
 mod junctions_connection_end_opposite_linkage;
 mod junctions_connection_one_connection_element;
 mod junctions_connection_one_link_to_incoming;
+mod junctions_connection_required_attributes;
 mod junctions_connection_smooth_fit;
 mod junctions_connection_start_along_linkage;
 mod junctions_cross_path_correct_junction_id;
@@ -33,16 +34,21 @@ mod junctions_cross_path_start_end_contained;
 mod junctions_cross_path_within_junction_area;
 mod junctions_crossing_only_one_high_prio;
 mod junctions_crossing_only_road_sections;
+mod junctions_crossing_s_start_end_coverage;
+mod junctions_direct_flat_exits_entries;
 mod junctions_direct_linked_lane_smoothness;
+mod junctions_direct_overlap_zone_coverage;
 mod junctions_direct_overlap_zone_exclusivity;
 mod junctions_direct_road_connectivity;
 mod junctions_direct_road_ramp_heading;
 mod junctions_direct_split_or_merge;
+mod junctions_elevation_grid_entry_exit_smoothness;
 mod junctions_elevation_grid_only_one_elev_grid;
 mod junctions_elevation_grid_valid_for_entire_boundry;
 mod junctions_geometry_correct_junction_boundry;
 mod junctions_geometry_only_one_line_element;
 mod junctions_geometry_ref_line_definition;
+mod junctions_no_overlap;
 mod junctions_priority_high_and_low_attr;
 mod junctions_priority_no_signals;
 mod junctions_type_default_no_linked_road;
@@ -59,6 +65,8 @@ mod lane_smoothness_contact_point_no_horizontal_gaps;
 mod lane_smoothness_contact_point_no_horizontal_kinks;
 mod lane_smoothness_contact_point_no_vertical_gaps;
 mod lane_smoothness_contact_point_no_vertical_kinks;
+mod lane_smoothness_no_vertical_jumps_t;
+mod lane_smoothness_profile_no_horizontal_gaps;
 mod lane_smoothness_profile_no_vertical_gaps;
 mod performance_avoid_redundant_info;
 mod road_corner_local_first_id_zero;
@@ -124,6 +132,7 @@ mod road_lane_layer_layer_mandatory_permanent;
 mod road_lane_layer_length_only_temporary;
 mod road_lane_level_true_one_side;
 mod road_lane_link_lanes_across_lane_sections;
+mod road_lane_link_lanes_across_roads;
 mod road_lane_link_multiple_connections;
 mod road_lane_link_new_lane_appear;
 mod road_lane_link_no_link;
@@ -188,6 +197,8 @@ mod road_object_skeleton_use_radius_or_width_length;
 mod road_object_skeleton_vertex_local_no_mixing_road_local;
 mod road_object_surface_avoid_skewed_crg_surfacees;
 mod road_object_surface_crg_hidden_on_object_overlap;
+mod road_object_surface_no_bounding_box_overlap;
+mod road_object_surface_object_reference_on_overlap;
 mod road_object_surface_only_for_angular_boxes;
 mod road_object_surface_only_one_crg_file;
 mod road_object_surface_repeat_discretely_not_continously;
@@ -464,4 +475,15 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_signal_gantry_all_variable_boards_same_gantry::RULE,
     &road_signal_gantry_vmsgroup_at_least_one_reference::RULE,
     &road_no_overlap_outside_junction::RULE,
+    &junctions_crossing_s_start_end_coverage::RULE,
+    &junctions_direct_flat_exits_entries::RULE,
+    &junctions_direct_overlap_zone_coverage::RULE,
+    &junctions_elevation_grid_entry_exit_smoothness::RULE,
+    &junctions_no_overlap::RULE,
+    &lane_smoothness_no_vertical_jumps_t::RULE,
+    &road_object_surface_no_bounding_box_overlap::RULE,
+    &road_object_surface_object_reference_on_overlap::RULE,
+    &junctions_connection_required_attributes::RULE,
+    &lane_smoothness_profile_no_horizontal_gaps::RULE,
+    &road_lane_link_lanes_across_roads::RULE,
 ];

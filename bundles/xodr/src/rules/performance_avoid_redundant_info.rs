@@ -90,6 +90,12 @@ fn of_lane(lane: LaneRef<'_, '_>, found: &mut Sink<'_>) {
 }
 
 fn text(repeated: &Repeated<'_, '_>) -> String {
+    if repeated.to <= repeated.from {
+        return format!(
+            "this `{}` says the same as the one before it, and never applies; it should be left out",
+            repeated.second.node().name()
+        );
+    }
     format!(
         "this `{}` says the same as the one before it, from {} to {} m; it should be left out",
         repeated.second.node().name(),

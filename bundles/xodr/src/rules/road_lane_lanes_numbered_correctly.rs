@@ -1,20 +1,38 @@
-use qcbus_opendrive::{RoadMap, Side};
-use qcbus_sdk::{Place, Rule, Sink};
+use qcbus_opendrive::{RoadMap, SectionRef, Side};
+use qcbus_sdk::{Param, Place, Rule, Sink};
 
 use crate::families::lane_numbers::word;
+use crate::families::on_road::{OnRoad, lane_name};
 use crate::model::Roads;
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    0.001,
+    "m",
+    "how far the border of a lane may lie on the other side of the center lane",
+);
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_lanes_numbered_correctly",
     uids: &["asam.net:xodr:1.4.0:road.lane.lanes_numbered_correctly"],
     versions: "1.4.0..",
     after: super::READABLE,
+    params: &[TOLERANCE],
     page: include_str!("road_lane_lanes_numbered_correctly.md"),
     run,
     ..Rule::DEFAULTS
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for section in map.sections() {
+        // Borders count from the reference line; with an offset, which is not allowed beside them,
+        // nobody knows where the center is.
+        if section.layer.offset().is_empty() {
+            for side in Side::BOTH {
+                on_wrong_side(section, side, found);
+            }
+        }
+    }
     for lane in map.lanes() {
         let (Some(side), Some(id)) = (lane.side(), lane.id()) else {
             continue;
@@ -32,5 +50,39 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             word(side)
         );
         found.issue(Place::attribute_or_node(lane.node(), "id"), text);
+    }
+}
+
+/// The innermost lane of a side whose outer border lies beyond the center lane. Further out, a border
+/// that crosses an inner one is the business of the rule about that.
+fn on_wrong_side(section: SectionRef<'_, '_>, side: Side, found: &mut Sink<'_>) {
+    let first = section.side(side).next();
+    let by_border = !section.has_widths(side) && section.is_numbered(side);
+    let Some((lane, length)) = first
+        .filter(|_| by_border)
+        .and_then(|lane| lane.length().map(|it| (lane, it)))
+    else {
+        return;
+    };
+    let lowest = lane.borders().stretches(length).filter_map(|stretch| {
+        let least = stretch
+            .cubic
+            .scaled(side.sign())
+            .minimum(0.0, stretch.length())?;
+        Some((least.value, stretch.from + least.at))
+    });
+    let worst = lowest.min_by(|one, other| one.0.total_cmp(&other.0));
+    if let Some((value, ds)) = worst.filter(|(value, _)| *value < -found.number(&TOLERANCE)) {
+        let text = format!(
+            "the border of {} lies at t = {:.3} m, {ds:.3} m after the start of the lane section: on the other side \
+             of the center lane; lanes to the {} must lie there",
+            lane_name(lane),
+            value * side.sign(),
+            word(side)
+        );
+        let s = section.s().unwrap_or(0.0) + ds;
+        found
+            .issue(lane.node(), text)
+            .on(section.road, s, value * side.sign());
     }
 }

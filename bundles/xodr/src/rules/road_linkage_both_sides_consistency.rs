@@ -1,7 +1,7 @@
 use std::collections::BTreeSet;
 
-use qcbus_opendrive::{ContactPoint, Junction, Road, RoadLink, RoadMap};
-use qcbus_sdk::{Backport, Rule, Sink};
+use qcbus_opendrive::{ContactPoint, Junction, JunctionType, Road, RoadLink, RoadMap};
+use qcbus_sdk::{Backport, Place, Rule, Sink};
 
 use crate::families::link_sides::{Known, agrees, in_virtual_junction};
 use crate::model::Roads;
@@ -18,6 +18,7 @@ pub static RULE: Rule<Roads> = Rule {
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    direct_junctions(map, found);
     let known = Known::by(map);
     let mut told = BTreeSet::new();
     for road in map.roads() {
@@ -30,6 +31,54 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                 let Some(contact) = contact else { continue };
                 to_road(map, (road, end), link, (id, contact), &mut told, found);
             }
+        }
+    }
+}
+
+/// What a direct junction links must name the junction in turn. At common junctions it is the connecting
+/// roads that lead to the roads around.
+fn direct_junctions(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for (junction, connection) in map.connections() {
+        if junction.kind() != Some(JunctionType::Direct) {
+            continue;
+        }
+        let names = |road: &Road<'_>, end: ContactPoint| {
+            road.link(end).and_then(|link| link.junction_id()) == Some(junction.id())
+        };
+        let incoming = connection.incoming_road().and_then(|id| map.road(id));
+        if let Some(road) = incoming
+            && !ContactPoint::BOTH.iter().any(|end| names(road, *end))
+        {
+            let text = format!(
+                "road `{}` comes into direct junction `{}`, but neither its predecessor nor its successor is that \
+                 junction; the link must be defined on both sides",
+                road.id(),
+                junction.id()
+            );
+            found
+                .issue(
+                    Place::attribute_or_node(connection.node(), "incomingRoad"),
+                    text,
+                )
+                .at(road.node(), "the road");
+        }
+        let linked = connection.linked_road().and_then(|id| map.road(id));
+        if let Some((road, end)) = linked.zip(connection.contact_point())
+            && !names(road, end)
+        {
+            let text = format!(
+                "direct junction `{}` links to the {end} of road `{}`, but the {} of that road is not the junction; \
+                 the link must be defined on both sides",
+                junction.id(),
+                road.id(),
+                end.link_name()
+            );
+            found
+                .issue(
+                    Place::attribute_or_node(connection.node(), "linkedRoad"),
+                    text,
+                )
+                .at(road.node(), "the road");
         }
     }
 }

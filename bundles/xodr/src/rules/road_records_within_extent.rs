@@ -3,6 +3,7 @@ use qcbus_opendrive::{LaneRef, RoadMap, SectionRef};
 use qcbus_sdk::{Level, Param, Place, Rule, Sink};
 
 use crate::families::ascending;
+use crate::families::object_parts::{named, number};
 use crate::model::Roads;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -50,6 +51,16 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             .map(|layer| (Some(layer.node()), "laneOffset"));
         for (parent, name) in lists.into_iter().chain(layers) {
             whole.check(ascending::children(parent, name), name, found);
+        }
+        for (parent, name) in [
+            (road.signals_node(), "signal"),
+            (road.signals_node(), "signalReference"),
+            (road.objects_node(), "objectReference"),
+        ] {
+            whole.stands(parent, name, found);
+        }
+        for name in ["tunnel", "bridge"] {
+            whole.ends(road.objects_node(), name, found);
         }
         for lane in road.sections().flat_map(SectionRef::lanes) {
             // A section without length has a rule of its own.
@@ -101,6 +112,47 @@ struct Extent<'m> {
 }
 
 impl Extent<'_> {
+    /// Reports each element of this name that stands beyond the end.
+    fn stands(&self, parent: Option<Node<'_>>, name: &'static str, found: &mut Sink<'_>) {
+        let limit = self.length + found.number(&TOLERANCE);
+        for node in ascending::children(parent, name) {
+            let Some(s) = node.f64(self.start).ok().filter(|s| *s > limit) else {
+                continue;
+            };
+            let text = format!(
+                "{} stands at s = {s}, but {} is {} m long; it should stand on the road",
+                named(node),
+                self.what,
+                self.length
+            );
+            found
+                .issue(Place::attribute_or_node(node, self.start), text)
+                .road(self.road, s, number(node, "t").unwrap_or(0.0));
+        }
+    }
+
+    /// Reports each element of this name that reaches beyond the end.
+    fn ends(&self, parent: Option<Node<'_>>, name: &'static str, found: &mut Sink<'_>) {
+        let limit = self.length + found.number(&TOLERANCE);
+        for node in ascending::children(parent, name) {
+            let Some((s, length)) = number(node, self.start).zip(number(node, "length")) else {
+                continue;
+            };
+            if s + length > limit {
+                let text = format!(
+                    "{} reaches from s = {s} to s = {}, but {} is {} m long; it should end on the road",
+                    named(node),
+                    s + length,
+                    self.what,
+                    self.length
+                );
+                found
+                    .issue(Place::attribute_or_node(node, "length"), text)
+                    .road(self.road, self.length, 0.0);
+            }
+        }
+    }
+
     /// Reports the first record of this name that starts beyond the end.
     fn check<'a>(
         &self,

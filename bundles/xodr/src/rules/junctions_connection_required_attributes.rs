@@ -1,0 +1,46 @@
+use qcbus_opendrive::{Connection, Junction, JunctionType, RoadMap};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::object_parts::listed;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_junctions_connection_required_attributes",
+    uids: &["qcbus.dev:xodr:1.4.0:junctions.connection.required_attributes"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("junctions_connection_required_attributes.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for (junction, connection) in map.connections() {
+        check(junction, connection, found);
+    }
+}
+
+fn check(junction: &Junction<'_>, connection: Connection<'_>, found: &mut Sink<'_>) {
+    let to = match junction.kind() {
+        Some(JunctionType::Common) if !connection.is_virtual() => "connectingRoad",
+        Some(JunctionType::Direct) => "linkedRoad",
+        _ => return,
+    };
+    // With the other kind of road at the far side, its own rule has been broken.
+    let has = |name: &str| connection.node().attribute(name).is_some();
+    let other = has("connectingRoad") || has("linkedRoad");
+    let wanted = ["incomingRoad", to, "contactPoint"];
+    let missing: Vec<&str> = wanted
+        .into_iter()
+        .filter(|name| !(has(name) || *name == to && other))
+        .collect();
+    if !missing.is_empty() {
+        let text = format!(
+            "connection `{}` of junction `{}` has no {}; without it nobody can tell which road ends it joins",
+            connection.id().unwrap_or_default(),
+            junction.id(),
+            listed(&missing)
+        );
+        found.issue(connection.node(), text);
+    }
+}

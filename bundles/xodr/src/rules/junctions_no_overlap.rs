@@ -1,0 +1,319 @@
+use std::cell::OnceCell;
+use std::collections::BTreeSet;
+
+use qcbus_opendrive::geometry::Point;
+use qcbus_opendrive::{Junction, Place, Road, RoadMap};
+use qcbus_sdk::{Level, Param, Rule, Sink};
+
+use crate::families::junction_area::{boundary, ring};
+use crate::families::polygons::{contains, distance_to_boundary, sides};
+use crate::families::strips::{Patch, area, common, middle, strip, traffic_edges};
+use crate::model::Roads;
+
+const AREA: Param = Param::number(
+    "area",
+    1.0,
+    "m²",
+    "largest common area of roads of two junctions that is accepted",
+);
+const DEPTH: Param = Param::number(
+    "depth",
+    0.1,
+    "m",
+    "how far the boundary of one junction may reach into that of another",
+);
+const CLEARANCE: Param = Param::number(
+    "clearance",
+    3.0,
+    "m",
+    "junctions that are farther apart in height lie over each other",
+);
+
+/// Length of the pieces of roads that are compared, in metres, and by how much they are narrower.
+const STEP: f64 = 2.0;
+const SHRINK: f64 = 0.05;
+
+/// No more pairs of roads and pieces are compared, and no more points are taken along a straight side of a boundary.
+const BUDGET: usize = 10_000_000;
+const MOST_POINTS: f64 = 64.0;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_asam_xodr_junctions_no_overlap",
+    uids: &["asam.net:xodr:1.4.0:junctions.no_overlap"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[AREA, DEPTH, CLEARANCE],
+    page: include_str!("junctions_no_overlap.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// A part of a junction: its boundary, or a road that belongs to it.
+struct Part<'m, 'a> {
+    junction: &'m Junction<'a>,
+    shape: Shape<'m, 'a>,
+    extent: Extent,
+    /// The least and the greatest height, as far as they are known.
+    heights: [f64; 2],
+    pieces: OnceCell<Vec<Patch>>,
+}
+
+enum Shape<'m, 'a> {
+    Ring(Vec<Point>),
+    Road {
+        road: &'m Road<'a>,
+        /// The junction has a boundary, which counts against other boundaries.
+        bounded: bool,
+    },
+}
+
+/// Least and greatest x, least and greatest y.
+type Extent = [f64; 4];
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let mut parts = parts(map);
+    // Along the longer side of the map fewer parts lie beside each other.
+    let whole = parts
+        .iter()
+        .fold(NOWHERE, |all, part| joined(all, part.extent));
+    let axis = if whole[1] - whole[0] >= whole[3] - whole[2] {
+        0
+    } else {
+        2
+    };
+    parts.sort_by(|one, other| one.extent[axis].total_cmp(&other.extent[axis]));
+    let (mut budget, mut told) = (BUDGET, BTreeSet::new());
+    for (at, one) in parts.iter().enumerate() {
+        let beside = parts[at + 1..].iter();
+        for other in beside.take_while(|other| other.extent[axis] <= one.extent[axis + 1]) {
+            budget = budget.saturating_sub(1);
+            if budget == 0 {
+                return;
+            }
+            let (one, other) = if one.junction.index() < other.junction.index() {
+                (one, other)
+            } else {
+                (other, one)
+            };
+            let pair = (one.junction.index(), other.junction.index());
+            if one.junction.id() != other.junction.id()
+                && meet(one.extent, other.extent)
+                && !told.contains(&pair)
+                && check(one, other, &mut budget, found)
+            {
+                told.insert(pair);
+            }
+        }
+    }
+}
+
+const NOWHERE: Extent = [
+    f64::INFINITY,
+    f64::NEG_INFINITY,
+    f64::INFINITY,
+    f64::NEG_INFINITY,
+];
+
+fn joined(one: Extent, other: Extent) -> Extent {
+    [
+        one[0].min(other[0]),
+        one[1].max(other[1]),
+        one[2].min(other[2]),
+        one[3].max(other[3]),
+    ]
+}
+
+fn meet(one: Extent, other: Extent) -> bool {
+    one[0] <= other[1] && other[0] <= one[1] && one[2] <= other[3] && other[2] <= one[3]
+}
+
+fn parts<'m, 'a>(map: &'m RoadMap<'a>) -> Vec<Part<'m, 'a>> {
+    let mut parts = Vec::new();
+    let mut bounded: Vec<Option<[f64; 2]>> = vec![None; map.junctions().len()];
+    let rings: Vec<_> = map
+        .junctions()
+        .iter()
+        .map(|junction| boundary(map, junction).map(|stretches| ring(&stretches)))
+        .collect();
+    for road in map.roads() {
+        let Some(junction) = road.junction().and_then(|id| map.junction(id)) else {
+            continue;
+        };
+        let height = road.elevation().at_or_zero(0.0);
+        let ring = rings.get(junction.index()).and_then(Option::as_ref);
+        if let (Some(_), Some(slot)) = (ring, bounded.get_mut(junction.index())) {
+            let [low, high] = slot.unwrap_or([f64::INFINITY, f64::NEG_INFINITY]);
+            *slot = height
+                .map(|height| [low.min(height), high.max(height)])
+                .or(*slot);
+        }
+        if let Some(extent) = reach(road) {
+            let height = height.unwrap_or(0.0);
+            parts.push(Part {
+                junction,
+                shape: Shape::Road {
+                    road,
+                    bounded: ring.is_some(),
+                },
+                extent,
+                heights: [height, height],
+                pieces: OnceCell::new(),
+            });
+        }
+    }
+    for ((junction, ring), heights) in map.junctions().iter().zip(rings).zip(bounded) {
+        let Some(ring) = ring else { continue };
+        let points = ring
+            .iter()
+            .map(|point| [point.x, point.x, point.y, point.y]);
+        parts.push(Part {
+            junction,
+            extent: points.fold(NOWHERE, joined),
+            shape: Shape::Ring(ring),
+            heights: heights.unwrap_or([0.0, 0.0]),
+            pieces: OnceCell::new(),
+        });
+    }
+    parts
+}
+
+/// A box that a road cannot leave: no point of it is farther from both ends together than its length.
+fn reach(road: &Road<'_>) -> Option<Extent> {
+    let length = road.length().filter(|length| *length > 0.0)?;
+    let [start, end] = [road.pose(0.0)?, road.pose(Place::before(length))?];
+    let edges = [Place::at(0.0), Place::before(length)].map(|place| traffic_edges(road, place));
+    let width = edges
+        .into_iter()
+        .flatten()
+        .fold(0.0_f64, |widest, (right, left)| {
+            widest.max(right.abs()).max(left.abs())
+        });
+    let around = 0.5 * length + width + 1.0;
+    let (x, y) = (0.5 * (start.x + end.x), 0.5 * (start.y + end.y));
+    Some([x - around, x + around, y - around, y + around])
+}
+
+/// Whether two parts overlap; then they are reported.
+fn check(
+    one: &Part<'_, '_>,
+    other: &Part<'_, '_>,
+    budget: &mut usize,
+    found: &mut Sink<'_>,
+) -> bool {
+    let clearance = found.number(&CLEARANCE);
+    let apart = (one.heights[0] - other.heights[1]).max(other.heights[0] - one.heights[1]);
+    match (&one.shape, &other.shape) {
+        (Shape::Ring(_), Shape::Ring(_)) if apart > clearance => false,
+        (Shape::Ring(here), Shape::Ring(there)) => {
+            let deepest = deepest(here, there).filter(|(deep, _)| *deep > found.number(&DEPTH));
+            let Some((deep, point)) = deepest else {
+                return false;
+            };
+            let text = format!(
+                "the boundaries of junctions `{}` and `{}` overlap by {deep:.2} m; the areas of junctions must not",
+                one.junction.id(),
+                other.junction.id()
+            );
+            found
+                .issue(other.junction.node(), text)
+                .point(point.x, point.y, 0.0)
+                .at(one.junction.node(), "the other junction");
+            true
+        }
+        (
+            Shape::Road {
+                road: here,
+                bounded,
+            },
+            Shape::Road {
+                road: there,
+                bounded: also,
+            },
+        ) if !(*bounded && *also) => roads_overlap((one, here), (other, there), budget, found),
+        _ => false,
+    }
+}
+
+/// The point of either ring that lies deepest in the other one.
+fn deepest(one: &[Point], other: &[Point]) -> Option<(f64, Point)> {
+    let inside = |points: &[Point], ring: &[Point]| {
+        let inner = fine(points)
+            .filter(|point| contains(ring, *point))
+            .map(|point| (distance_to_boundary(point, ring), point));
+        inner.max_by(|one, other| one.0.total_cmp(&other.0))
+    };
+    let both = [inside(one, other), inside(other, one)];
+    both.into_iter()
+        .flatten()
+        .max_by(|one, other| one.0.total_cmp(&other.0))
+}
+
+/// The points of a ring, with more of them along its straight sides.
+fn fine(ring: &[Point]) -> impl Iterator<Item = Point> {
+    sides(ring).flat_map(|(one, other)| {
+        let count = one.distance(other).ceil().clamp(1.0, MOST_POINTS);
+        (0..count as usize).map(move |index| {
+            let share = index as f64 / count;
+            Point {
+                x: one.x + share * (other.x - one.x),
+                y: one.y + share * (other.y - one.y),
+            }
+        })
+    })
+}
+
+/// The pieces of a road.
+fn pieces(road: &Road<'_>) -> Vec<Patch> {
+    let range = [0.0, road.length().unwrap_or(0.0)];
+    strip(road, range, STEP, SHRINK, |place| {
+        traffic_edges(road, place)
+    })
+}
+
+fn roads_overlap(
+    (one, a): (&Part<'_, '_>, &Road<'_>),
+    (other, b): (&Part<'_, '_>, &Road<'_>),
+    budget: &mut usize,
+    found: &mut Sink<'_>,
+) -> bool {
+    let ones = one.pieces.get_or_init(|| pieces(a));
+    let others = other.pieces.get_or_init(|| pieces(b));
+    *budget = budget.saturating_sub(ones.len() * others.len());
+    let clearance = found.number(&CLEARANCE);
+    let mut total = 0.0;
+    let mut place = None;
+    for here in ones {
+        for there in others {
+            let Some(shape) = common(&here.corners, &there.corners) else {
+                continue;
+            };
+            let heights = [
+                a.elevation().at_or_zero(here.from),
+                b.elevation().at_or_zero(there.from),
+            ];
+            if matches!(heights, [Some(one), Some(other)] if (one - other).abs() <= clearance) {
+                total += area(&shape);
+                place = place.or_else(|| Some((middle(&shape)?, here.from, there.from)));
+            }
+        }
+    }
+    let Some((point, s, at)) = place.filter(|_| total > found.number(&AREA)) else {
+        return false;
+    };
+    let text = format!(
+        "junctions `{}` and `{}` overlap: their roads `{}` around s = {s:.1} and `{}` around s = {at:.1} cover the \
+         same ground ({total:.1} m²); the areas of junctions must not overlap",
+        one.junction.id(),
+        other.junction.id(),
+        a.id(),
+        b.id()
+    );
+    found
+        .issue(other.junction.node(), text)
+        .level(Level::Warning)
+        .point(point.x, point.y, 0.0)
+        .at(one.junction.node(), "the other junction")
+        .at(a.node(), "the one road")
+        .at(b.node(), "the other road");
+    true
+}

@@ -1,0 +1,114 @@
+use qcbus_opendrive::{Edge, LaneRef, Place, RoadMap, SectionRef, Side};
+use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
+
+use crate::families::driving::is_drivable;
+use crate::families::on_road::lane_name;
+use crate::model::Roads;
+
+const STEP: Param = Param::number(
+    "step",
+    0.02,
+    "m",
+    "largest step between neighbouring lanes that is accepted",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_lane_smoothness_no_vertical_jumps_t",
+    uids: &["qcbus.dev:xodr:1.8.0:lane_smoothness.no_vertical_jumps_t"],
+    level: Level::Warning,
+    versions: "1.8.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    params: &[STEP],
+    page: include_str!("lane_smoothness_no_vertical_jumps_t.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for section in map.sections() {
+        for side in Side::BOTH {
+            let mut inner: Option<LaneRef<'_, '_>> = None;
+            for lane in section.side(side) {
+                if let Some(inner) = inner {
+                    check(inner, Edge::Outer, lane, found);
+                }
+                inner = Some(lane);
+            }
+        }
+        // Over the center, which has no width.
+        let [left, right] = [Side::Left, Side::Right].map(|side| section.side(side).next());
+        if let (Some(left), Some(right)) = (left, right) {
+            check(left, Edge::Inner, right, found);
+        }
+    }
+}
+
+/// Reports the greatest step between two lanes, at this edge of the first one and the inner edge of the
+/// second one.
+fn check<'m, 'a>(one: LaneRef<'m, 'a>, edge: Edge, other: LaneRef<'m, 'a>, found: &mut Sink<'_>) {
+    let raised = |lane: LaneRef<'m, 'a>| !lane.heights().is_empty() || lane.level() == Some(true);
+    if !is_drivable(one) || !is_drivable(other) || !(raised(one) || raised(other)) {
+        return;
+    }
+    let limit = found.number(&STEP);
+    let steps = places(one.at, [one, other]).filter_map(|ds| {
+        let wide = |lane: LaneRef<'m, 'a>| lane.width(ds).is_some_and(|width| width > limit);
+        let (here, there) = (one.border(edge, ds)?, other.border(Edge::Inner, ds)?);
+        let step = there.point.z - here.point.z;
+        (wide(one) && wide(other)).then_some((step, ds, there))
+    });
+    // The first of the greatest ones.
+    let worst = steps.fold(None, |worst: Option<(f64, Place, _)>, next| match worst {
+        Some(worst) if worst.0.abs() + 1e-9 >= next.0.abs() => Some(worst),
+        _ => Some(next),
+    });
+    if let Some((step, ds, border)) = worst.filter(|(step, ..)| step.abs() > limit) {
+        let s = one.at.s().unwrap_or(0.0) + ds.x();
+        let text = format!(
+            "{} lies {:.3} m {} than its neighbour `{}` where they meet at s = {s:.2}; between drivable lanes there \
+             should be no step (at most {limit} m)",
+            lane_name(other),
+            step.abs(),
+            if step > 0.0 { "higher" } else { "lower" },
+            one.id_text().unwrap_or_default(),
+        );
+        found
+            .issue(other.node(), text)
+            .road(one.at.road.id(), s, border.t)
+            .point(border.point.x, border.point.y, border.point.z)
+            .at(one.node(), "the neighbour");
+    }
+}
+
+/// Where heights may change: at both ends of the section, and before and after every height record; and
+/// halfway between them.
+fn places<'m, 'a>(
+    section: SectionRef<'m, 'a>,
+    lanes: [LaneRef<'m, 'a>; 2],
+) -> impl Iterator<Item = Place> {
+    let length = lanes[0].length().unwrap_or(0.0);
+    let mut starts: Vec<f64> = lanes
+        .iter()
+        .flat_map(|lane| lane.heights().iter().filter_map(|height| height.s_offset()))
+        .chain([0.0, length])
+        .filter(|ds| *ds >= 0.0 && *ds <= length && section.s().is_some())
+        .collect();
+    starts.sort_by(f64::total_cmp);
+    starts.dedup();
+    let halves: Vec<f64> = starts
+        .windows(2)
+        .map(|pair| 0.5 * (pair[0] + pair[1]))
+        .collect();
+    let mut all: Vec<Place> = Vec::with_capacity(3 * starts.len());
+    for (at, start) in starts.iter().enumerate() {
+        if at > 0 {
+            all.push(Place::before(*start));
+        }
+        if at + 1 < starts.len() {
+            all.push(Place::at(*start));
+        }
+        all.extend(halves.get(at).map(|half| Place::at(*half)));
+    }
+    all.into_iter()
+}

@@ -1,0 +1,108 @@
+use std::collections::BTreeMap;
+
+use qcbus_document::Node;
+use qcbus_opendrive::{LaneRef, LaneSpan, Place, Profile, RoadMap, SectionRef, Side};
+use qcbus_sdk::{Level, Param, Rule, Sink};
+
+use crate::families::driving::is_drivable;
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::model::Roads;
+
+const GAP: Param = Param::number(
+    "gap",
+    0.01,
+    "m",
+    "largest step of a lane's edge within its lane section that is accepted",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_lane_smoothness_profile_no_horizontal_gaps",
+    uids: &["qcbus.dev:xodr:1.4.0:lane_smoothness.profile_no_horizontal_gaps"],
+    level: Level::Warning,
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[GAP],
+    page: include_str!("lane_smoothness_profile_no_horizontal_gaps.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for section in map.sections() {
+        for side in Side::BOTH {
+            check(section, side, found);
+        }
+    }
+}
+
+fn check(section: SectionRef<'_, '_>, side: Side, found: &mut Sink<'_>) {
+    let limit = found.number(&GAP);
+    let Some((start, length)) = section.s().zip(section.length(side)) else {
+        return;
+    };
+    let lanes = section.side(side).map(|lane| lane.lane());
+    let profiles = lanes.flat_map(|lane| [(lane.widths(), 0.0), (lane.borders(), 0.0)]);
+    // By place, in nanometres from the section's start: the first record that steps there.
+    let mut steps: BTreeMap<i64, (f64, Node<'_>)> = BTreeMap::new();
+    for (profile, from) in std::iter::once((section.layer.offset(), start)).chain(profiles) {
+        for (x, node) in stepping(profile, limit) {
+            let ds = x - from;
+            if ds > 1e-6 && ds < length - 1e-6 {
+                steps.entry((ds * 1e9) as i64).or_insert((ds, node));
+            }
+        }
+    }
+    for (ds, node) in steps.into_values() {
+        let [before, after] = [Place::before(ds), Place::at(ds)].map(|at| section.spans(side, at));
+        if let Some((lane, gap)) = jump(&before, &after, limit) {
+            report(lane, ds, gap, node, found);
+        }
+    }
+}
+
+/// The starts of records, other than the first, at which a profile steps; with the records.
+fn stepping<'p, 'a>(
+    profile: &'p Profile<'a>,
+    limit: f64,
+) -> impl Iterator<Item = (f64, Node<'a>)> + use<'p, 'a> {
+    profile.in_order().skip(1).filter_map(move |record| {
+        let start = record.start()?;
+        let step = profile.at(start)? - profile.at(Place::before(start))?;
+        (step.abs() > limit).then_some((start, record.node()))
+    })
+}
+
+/// The first drivable lane one of whose edges jumps, and by how much.
+fn jump<'m, 'a>(
+    before: &[LaneSpan<'m, 'a>],
+    after: &[LaneSpan<'m, 'a>],
+    limit: f64,
+) -> Option<(LaneRef<'m, 'a>, f64)> {
+    let pairs = before.iter().zip(after);
+    let mut drivable = pairs.filter(|(one, _)| is_drivable(one.lane));
+    drivable.find_map(|(one, next)| {
+        let [inner, outer] = [next.inner - one.inner, next.outer - one.outer];
+        let gap = if outer.abs() > inner.abs() {
+            outer
+        } else {
+            inner
+        };
+        (gap.abs() > limit).then_some((one.lane, gap))
+    })
+}
+
+fn report(lane: LaneRef<'_, '_>, ds: f64, gap: f64, node: Node<'_>, found: &mut Sink<'_>) {
+    let s = lane.at.s().unwrap_or(0.0) + ds;
+    let text = format!(
+        "an edge of {} jumps sideways by {:.3} m at s = {s}, where this `{}` begins; within a lane section drivable \
+         lanes should have no gaps (at most {} m)",
+        lane_name(lane),
+        gap.abs(),
+        node.name(),
+        found.number(&GAP)
+    );
+    found
+        .issue(node, text)
+        .in_lane(lane, ds)
+        .at(lane.node(), "the lane");
+}

@@ -1,0 +1,77 @@
+//! Maps that lie in wait for rules: valid ones that look wrong, and wrong ones that look valid. Each row
+//! of a table says which rules find something in its map, and nothing else may.
+//!
+//! The pages show the plain cases; here are those that a hurried implementation gets wrong.
+
+#![expect(clippy::unwrap_used, reason = "in a test it is a finding")]
+
+#[path = "tricky/build.rs"]
+mod build;
+#[path = "tricky/junctions.rs"]
+mod junctions;
+#[path = "tricky/lane_links.rs"]
+mod lane_links;
+#[path = "tricky/lanes.rs"]
+mod lanes;
+#[path = "tricky/reference_lines.rs"]
+mod reference_lines;
+#[path = "tricky/road_links.rs"]
+mod road_links;
+#[path = "tricky/roadside.rs"]
+mod roadside;
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use qcbus_sdk::{Issue, Level, Listener, Loaded, Outcome, Plan, check};
+use qcbus_xodr::BUNDLE;
+
+/// What it is, the map after its header, and `error NAME` or `warning NAME` for every rule that finds
+/// something of that level.
+type Row = (&'static str, String, &'static [&'static str]);
+
+struct Heard<'p> {
+    plan: &'p Plan,
+    findings: BTreeSet<String>,
+}
+
+impl Listener for Heard<'_> {
+    fn ended(&mut self, checker: usize, issues: Vec<Issue>, _: Outcome) {
+        let id = self.plan.checkers()[checker].facts.id;
+        let name = id.split_once("_xodr_").map_or(id, |(_, name)| name);
+        // The schemas have tests of their own.
+        for issue in issues.iter().filter(|_| name != "xml_valid_schema") {
+            let level = match issue.level {
+                Level::Error => "error",
+                Level::Warning => "warning",
+                Level::Information => continue,
+            };
+            self.findings.insert(format!("{level} {name}"));
+        }
+    }
+}
+
+/// The rules that find something in a file.
+fn findings(plan: &Plan, file: &[u8]) -> BTreeSet<String> {
+    let loaded = Loaded::from_bytes(Path::new("map.xodr"), file.to_vec()).unwrap();
+    let mut heard = Heard {
+        plan,
+        findings: BTreeSet::new(),
+    };
+    check(plan, &loaded.subject(&BUNDLE).unwrap(), &mut heard);
+    heard.findings
+}
+
+/// Runs a table over maps of version 1.9.
+fn run(rows: &[Row]) {
+    let plan = Plan::by_default(&BUNDLE);
+    let mut faults = Vec::new();
+    for (what, map, expected) in rows {
+        let found = findings(&plan, build::file("9", map).as_bytes());
+        let expected: BTreeSet<String> = expected.iter().map(|it| (*it).to_owned()).collect();
+        if found != expected {
+            faults.push(format!("{what}: found {found:?}, expected {expected:?}"));
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}

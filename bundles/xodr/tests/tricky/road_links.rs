@@ -1,0 +1,224 @@
+//! Links between roads, in all combinations of contact points.
+
+use crate::Row;
+use crate::build::{PI, Road, lane, link, section};
+
+/// Two roads of 100 m with a lane to either side, end to end.
+struct Pair<'a> {
+    links: [&'a str; 2],
+    /// x of the second road, and its heading.
+    second: [&'a str; 2],
+    /// Links of the lanes 1 and -1, in the first and in the second road.
+    lanes: [[&'a str; 2]; 2],
+    profiles: [&'a str; 2],
+}
+
+/// End to start.
+const ALONG: Pair<'_> = Pair {
+    links: ["s2 start", "p1 end"],
+    second: ["100", "0"],
+    lanes: [["s1", "s-1"], ["p1", "p-1"]],
+    profiles: ["", ""],
+};
+
+/// End to end.
+const HEAD_ON: Pair<'_> = Pair {
+    links: ["s2 end", "s1 end"],
+    second: ["200", PI],
+    lanes: [["s-1", "s1"], ["s-1", "s1"]],
+    profiles: ["", ""],
+};
+
+impl Pair<'_> {
+    fn text(&self) -> String {
+        let lanes = self
+            .lanes
+            .map(|[left, right]| section("\"0\"", &lane("1", left), &lane("-1", right)));
+        let links = self.links.map(|one| match one {
+            "" => String::new(),
+            one => link(&[one]),
+        });
+        let first = Road {
+            link: &links[0],
+            lanes: &lanes[0],
+            profiles: self.profiles[0],
+            ..Road::default()
+        };
+        let second = Road {
+            id: "2",
+            pose: [self.second[0], "0", self.second[1]],
+            link: &links[1],
+            lanes: &lanes[1],
+            profiles: self.profiles[1],
+            ..Road::default()
+        };
+        format!("{}{}", first.text(), second.text())
+    }
+}
+
+const RISING: &str =
+    r#"<elevationProfile><elevation s="0" a="0" b="0.1" c="0" d="0"/></elevationProfile>"#;
+const FALLING: &str =
+    r#"<elevationProfile><elevation s="0" a="20" b="-0.1" c="0" d="0"/></elevationProfile>"#;
+const LEFT_UP: &str =
+    r#"<lateralProfile><superelevation s="0" a="0.05" b="0" c="0" d="0"/></lateralProfile>"#;
+const RIGHT_UP: &str =
+    r#"<lateralProfile><superelevation s="0" a="-0.05" b="0" c="0" d="0"/></lateralProfile>"#;
+
+#[test]
+fn between_two_roads() {
+    let rows: Vec<Row> = vec![
+        ("end to start", ALONG.text(), &[]),
+        ("end to end", HEAD_ON.text(), &[]),
+        (
+            "start to start",
+            Pair {
+                links: ["p2 start", "p1 start"],
+                second: ["0", PI],
+                lanes: [["p-1", "p1"], ["p-1", "p1"]],
+                ..ALONG
+            }
+            .text(),
+            &[],
+        ),
+        (
+            "end to end with the signs of end to start",
+            Pair {
+                lanes: [["s1", "s-1"], ["s1", "s-1"]],
+                ..HEAD_ON
+            }
+            .text(),
+            &["error lane_smoothness_contact_point_no_horizontal_gaps"],
+        ),
+        (
+            "a slope goes on against s",
+            Pair {
+                profiles: [RISING, FALLING],
+                ..HEAD_ON
+            }
+            .text(),
+            &[],
+        ),
+        (
+            "a hill with a sharp top",
+            Pair {
+                profiles: [RISING, RISING],
+                ..HEAD_ON
+            }
+            .text(),
+            &["warning lane_smoothness_contact_point_no_vertical_kinks"],
+        ),
+        (
+            "a crossfall goes on against s",
+            Pair {
+                profiles: [LEFT_UP, RIGHT_UP],
+                ..HEAD_ON
+            }
+            .text(),
+            &[],
+        ),
+        (
+            "a crossfall that turns over",
+            Pair {
+                profiles: [LEFT_UP, LEFT_UP],
+                ..HEAD_ON
+            }
+            .text(),
+            &["error lane_smoothness_contact_point_no_vertical_gaps"],
+        ),
+        (
+            "one side only",
+            Pair {
+                links: ["s2 start", ""],
+                lanes: [["", ""], ["", ""]],
+                ..ALONG
+            }
+            .text(),
+            &[
+                "error road_linkage_both_sides_consistency",
+                "warning road_lane_link_lanes_across_roads",
+            ],
+        ),
+        (
+            "lanes that nobody links",
+            Pair {
+                lanes: [["", ""], ["", ""]],
+                ..ALONG
+            }
+            .text(),
+            &["warning road_lane_link_lanes_across_roads"],
+        ),
+        (
+            "lanes that nobody links, end to end",
+            Pair {
+                lanes: [["", ""], ["", ""]],
+                ..HEAD_ON
+            }
+            .text(),
+            &["warning road_lane_link_lanes_across_roads"],
+        ),
+        (
+            "a metre in between",
+            Pair {
+                second: ["101", "0"],
+                ..ALONG
+            }
+            .text(),
+            &[
+                "error lane_smoothness_contact_point_no_horizontal_gaps",
+                "error road_geometry_contact_point",
+            ],
+        ),
+        (
+            "the wrong end",
+            Pair {
+                links: ["s2 end", "p1 end"],
+                ..ALONG
+            }
+            .text(),
+            &[
+                "error lane_smoothness_contact_point_no_horizontal_gaps",
+                "error road_geometry_contact_point",
+                "error road_lane_link_lanes_across_lane_sections",
+                "error road_linkage_both_sides_consistency",
+            ],
+        ),
+    ];
+    crate::run(&rows);
+}
+
+#[test]
+fn a_road_that_follows_itself() {
+    let lanes = section("\"0\"", "", &lane("-1", "p-1 s-1"));
+    let ring = Road {
+        length: "62.83185307179586",
+        link: &link(&["p1 end", "s1 start"]),
+        lanes: &lanes,
+        ..Road::default()
+    };
+    let circle = crate::build::geometry(
+        "0",
+        "0",
+        "0",
+        "0",
+        "62.83185307179586",
+        r#"<arc curvature="0.1"/>"#,
+    );
+    let straight = Road {
+        link: &link(&["p1 end", "s1 start"]),
+        lanes: &lanes,
+        ..Road::default()
+    };
+    let rows: Vec<Row> = vec![
+        ("a circle", ring.with_plan_view(&circle), &[]),
+        (
+            "a straight line",
+            straight.text(),
+            &[
+                "error lane_smoothness_contact_point_no_horizontal_gaps",
+                "error road_geometry_contact_point",
+            ],
+        ),
+    ];
+    crate::run(&rows);
+}
