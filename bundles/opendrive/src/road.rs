@@ -33,6 +33,7 @@ pub struct Road<'a> {
     id: &'a str,
     length: f64,
     junction: Option<&'a str>,
+    rule: Option<TrafficRule>,
     parts: Parts<'a>,
     plan_view: OnceLock<PlanView<'a>>,
     elevation: OnceLock<Profile<'a>>,
@@ -85,6 +86,11 @@ impl<'a> Road<'a> {
             id: node.attr("id").unwrap_or(""),
             length: number(node, "length").unwrap_or(f64::NAN),
             junction: node.attr("junction"),
+            rule: match node.attr("rule") {
+                None | Some("RHT") => Some(TrafficRule::RightHand),
+                Some("LHT") => Some(TrafficRule::LeftHand),
+                Some(_) => None,
+            },
             parts: Parts::of(node),
             plan_view: OnceLock::new(),
             elevation: OnceLock::new(),
@@ -127,12 +133,9 @@ impl<'a> Road<'a> {
     }
 
     /// `@rule`; `None` when it is a word that the standard does not know.
+    #[inline]
     pub fn traffic_rule(&self) -> Option<TrafficRule> {
-        match self.node.attr("rule") {
-            None | Some("RHT") => Some(TrafficRule::RightHand),
-            Some("LHT") => Some(TrafficRule::LeftHand),
-            Some(_) => None,
-        }
+        self.rule
     }
 
     /// The `<link>` element.

@@ -82,9 +82,9 @@ pub(crate) fn numbers<const N: usize>(node: Node<'_>, names: [&str; N]) -> [f64;
     // Most files list them in the order of the standard: the next one is looked for first.
     let mut next = 0;
     for attribute in node.attributes() {
-        let slots = (next..N).chain(0..next.min(N));
-        let mut slots = slots.filter(|slot| attribute.is(names[*slot]));
-        if let Some(slot) = slots.next() {
+        let is = |slot: &usize| names.get(*slot).is_some_and(|name| attribute.is(name));
+        let slot = Some(next).filter(is).or_else(|| (0..N).find(is));
+        if let Some(slot) = slot {
             found[slot] = parse_number(attribute.value()).unwrap_or(f64::NAN);
             next = slot + 1;
         }

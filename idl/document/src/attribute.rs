@@ -1,73 +1,82 @@
 //! One attribute and where it stands.
 
 use crate::document::Document;
-use crate::layout::{AttributeRecord, Section};
+use crate::layout::{AttributeRecord, NodeRecord, Section};
 use crate::node::Node;
 use crate::source::Position;
 
 /// An attribute of an element.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy)]
 pub struct Attribute<'a> {
     node: Node<'a>,
-    index: u32,
+    record: &'a AttributeRecord,
 }
 
+impl PartialEq for Attribute<'_> {
+    /// Attributes are equal when they are the same one, not when they look alike.
+    fn eq(&self, other: &Self) -> bool {
+        self.node == other.node && std::ptr::eq(self.record, other.record)
+    }
+}
+
+impl Eq for Attribute<'_> {}
+
 impl<'a> Attribute<'a> {
+    #[inline]
+    pub(crate) fn new(node: Node<'a>, record: &'a AttributeRecord) -> Attribute<'a> {
+        Attribute { node, record }
+    }
+
     /// The name as written, prefix included (`xsi:type`).
     #[inline]
     pub fn name(&self) -> &'a str {
-        self.record()
-            .map_or("", |record| self.node.document().name(record.name.get()))
+        self.node.document().name(self.record.name.get())
     }
 
     /// The number of its name within this image, as [`Node::name_number`].
     #[inline]
     pub fn name_number(&self) -> u16 {
-        self.record().map_or(u16::MAX, |record| record.name.get())
+        self.record.name.get()
     }
 
     /// Whether its name as written is this.
     #[inline]
     pub fn is(&self, name: &str) -> bool {
-        let document = self.node.document();
-        self.record()
-            .is_some_and(|record| document.is_name(record.name.get(), name))
+        self.node.document().is_name(self.record.name.get(), name)
     }
 
     /// The value, entities resolved and white space normalised as XML demands.
     pub fn value(&self) -> &'a str {
-        let document = self.node.document();
-        let value = self
-            .record()
-            .and_then(|record| match record.value_delta.get() {
-                0 => document
-                    .heap_value(record.value_len.get())
-                    .map(|(value, _, _)| value),
-                delta => {
-                    let offset = record.offset.get().checked_add(u32::from(delta))?;
-                    document.text_at(offset, record.value_len.get())
-                }
-            });
+        let (document, record) = (self.node.document(), self.record);
+        let value = match record.value_delta.get() {
+            0 => document
+                .heap_value(record.value_len.get())
+                .map(|(value, _, _)| value),
+            delta => record
+                .offset
+                .get()
+                .checked_add(u32::from(delta))
+                .and_then(|offset| document.text_at(offset, record.value_len.get())),
+        };
         value.unwrap_or("")
     }
 
     /// Offset of the name in the image's text.
     pub fn offset(&self) -> u32 {
-        self.record().map_or(0, |record| record.offset.get())
+        self.record.offset.get()
     }
 
     /// Offset of the value's first byte (after the quote) in the image's text.
     pub fn value_offset(&self) -> u32 {
-        let offset = self
-            .record()
-            .and_then(|record| match record.value_delta.get() {
-                0 => self
-                    .node
-                    .document()
-                    .heap_value(record.value_len.get())
-                    .map(|(_, offset, _)| offset),
-                delta => record.offset.get().checked_add(u32::from(delta)),
-            });
+        let record = self.record;
+        let offset = match record.value_delta.get() {
+            0 => self
+                .node
+                .document()
+                .heap_value(record.value_len.get())
+                .map(|(_, offset, _)| offset),
+            delta => record.offset.get().checked_add(u32::from(delta)),
+        };
         offset.unwrap_or(0)
     }
 
@@ -77,15 +86,9 @@ impl<'a> Attribute<'a> {
     }
 
     /// The element that bears it.
+    #[inline]
     pub fn node(&self) -> Node<'a> {
         self.node
-    }
-
-    #[inline]
-    fn record(&self) -> Option<&'a AttributeRecord> {
-        self.node
-            .document()
-            .record(Section::Attributes, self.index as usize)
     }
 }
 
@@ -96,21 +99,25 @@ impl std::fmt::Debug for Attribute<'_> {
 }
 
 /// The attributes of an element; made by [`Node::attributes`].
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Attributes<'a> {
     node: Node<'a>,
-    next: u32,
-    stop: u32,
+    records: std::slice::Iter<'a, AttributeRecord>,
 }
 
 impl<'a> Attributes<'a> {
     #[inline]
-    pub(crate) fn new(node: Node<'a>, first: u32, stop: u32) -> Attributes<'a> {
+    pub(crate) fn new(node: Node<'a>, records: &'a [AttributeRecord]) -> Attributes<'a> {
         Attributes {
             node,
-            next: first,
-            stop: stop.min(node.document().attributes_len()),
+            records: records.iter(),
         }
+    }
+}
+
+impl std::fmt::Debug for Attributes<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_list().entries(self.clone()).finish()
     }
 }
 
@@ -119,52 +126,54 @@ impl<'a> Iterator for Attributes<'a> {
 
     #[inline]
     fn next(&mut self) -> Option<Attribute<'a>> {
-        (self.next < self.stop).then(|| {
-            self.next += 1;
-            Attribute {
-                node: self.node,
-                index: self.next - 1,
-            }
-        })
+        let record = self.records.next()?;
+        Some(Attribute::new(self.node, record))
     }
 
     #[inline]
     fn nth(&mut self, n: usize) -> Option<Attribute<'a>> {
-        let n = u32::try_from(n).unwrap_or(u32::MAX);
-        self.next = self.next.saturating_add(n).min(self.stop);
-        self.next()
+        let record = self.records.nth(n)?;
+        Some(Attribute::new(self.node, record))
     }
 
+    #[inline]
     fn size_hint(&self) -> (usize, Option<usize>) {
-        let left = self.stop.saturating_sub(self.next) as usize;
-        (left, Some(left))
+        self.records.size_hint()
     }
 }
 
 impl ExactSizeIterator for Attributes<'_> {}
 
 impl<'a> Document<'a> {
-    /// The records of those attributes that are still to come.
+    /// The records of the attributes of the node with this index: from its first one up to that of
+    /// the next node, or to the last of all.
     #[inline]
-    pub(crate) fn attribute_records(&self, of: &Attributes<'_>) -> &'a [AttributeRecord] {
+    pub(crate) fn attribute_records(&self, node: u32) -> &'a [AttributeRecord] {
         let size = size_of::<AttributeRecord>();
-        let range = of.next as usize * size..of.stop as usize * size;
-        let bytes = self.section(Section::Attributes).get(range);
-        bytes
+        let at = node as usize * size_of::<NodeRecord>();
+        let nodes = self.section(Section::Nodes).get(at..).unwrap_or(&[]);
+        let Some((own, rest)) = split_record::<NodeRecord>(nodes) else {
+            return &[];
+        };
+        let all = self.section(Section::Attributes);
+        let first = own.first_attribute.get() as usize * size;
+        let stop = split_record::<NodeRecord>(rest).map_or(all.len(), |(next, _)| {
+            (next.first_attribute.get() as usize * size).min(all.len())
+        });
+        all.get(first..stop)
             .and_then(|bytes| bytemuck::try_cast_slice(bytes).ok())
             .unwrap_or(&[])
-    }
-
-    #[inline]
-    pub(crate) fn attributes_len(&self) -> u32 {
-        let bytes = self.header().extents[Section::Attributes as usize]
-            .len
-            .get();
-        u32::try_from(bytes / size_of::<AttributeRecord>() as u64).unwrap_or(0)
     }
 
     /// The text from `offset` on, as bytes.
     pub(crate) fn text_from(&self, offset: u32) -> Option<&'a [u8]> {
         self.section(Section::Text).get(offset as usize..)
     }
+}
+
+/// The first record, and the bytes after it.
+#[inline]
+fn split_record<T: bytemuck::Pod>(bytes: &[u8]) -> Option<(&T, &[u8])> {
+    let (head, rest) = bytes.split_at_checked(size_of::<T>())?;
+    Some((bytemuck::try_from_bytes(head).ok()?, rest))
 }

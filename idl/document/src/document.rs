@@ -328,10 +328,6 @@ impl<'a> Document<'a> {
     pub(crate) fn address(&self) -> *const u8 {
         self.bytes.as_ptr()
     }
-
-    pub(crate) fn header(&self) -> &'a Header {
-        self.header
-    }
 }
 
 impl std::fmt::Debug for Document<'_> {
@@ -343,7 +339,34 @@ impl std::fmt::Debug for Document<'_> {
 #[inline]
 fn str_at(bytes: &[u8], offset: u32, len: u32) -> Option<&str> {
     let bytes = bytes.get(offset as usize..)?.get(..len as usize)?;
+    if bytes.len() <= SHORT && is_ascii(bytes) {
+        #[expect(
+            unsafe_code,
+            reason = "the standard library looks at short texts for four times as long"
+        )]
+        // SAFETY: every byte was seen to be ASCII, which is UTF-8.
+        return Some(unsafe { std::str::from_utf8_unchecked(bytes) });
+    }
     std::str::from_utf8(bytes).ok()
+}
+
+/// Up to this length, in bytes, texts are looked at word by word: names, ids, numbers.
+const SHORT: usize = 64;
+
+/// Whether all bytes are ASCII; quick for a few of them.
+#[inline]
+fn is_ascii(bytes: &[u8]) -> bool {
+    const HIGH: u64 = 0x8080_8080_8080_8080;
+    let low = |word: &[u8; 8]| u64::from_le_bytes(*word) & HIGH == 0;
+    if let Some(last) = bytes.last_chunk::<8>() {
+        return low(last) && bytes.as_chunks::<8>().0.iter().all(low);
+    }
+    match (bytes.first_chunk::<4>(), bytes.last_chunk::<4>()) {
+        (Some(first), Some(last)) => {
+            (u32::from_le_bytes(*first) | u32::from_le_bytes(*last)) & (HIGH as u32) == 0
+        }
+        _ => bytes.iter().all(u8::is_ascii),
+    }
 }
 
 /// Names as short as these are told apart faster here than by a call of `memcmp`.
@@ -397,5 +420,29 @@ impl<'a> Iterator for Elements<'a> {
 
     fn size_hint(&self) -> (usize, Option<usize>) {
         (0, Some(self.postings.len()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn short_texts_are_read_as_long_ones_are() {
+        for len in 0..=SHORT + 8 {
+            let text = vec![b'a'; len];
+            assert_eq!(str_at(&text, 0, len as u32).map(str::len), Some(len));
+            for at in 0..len {
+                let mut broken = text.clone();
+                broken[at] = 0x80;
+                assert_eq!(str_at(&broken, 0, len as u32), None, "{len} bytes, {at}");
+            }
+            for at in 1..len {
+                let mut umlaut = text.clone();
+                umlaut[at - 1..=at].copy_from_slice("ä".as_bytes());
+                let expected = std::str::from_utf8(&umlaut).ok();
+                assert!(expected.is_some() && str_at(&umlaut, 0, len as u32) == expected);
+            }
+        }
     }
 }

@@ -6,7 +6,7 @@ use std::hash::{Hash, Hasher};
 
 use crate::attribute::{Attribute, Attributes};
 use crate::document::{Document, NameMatcher};
-use crate::layout::{ELEMENT, NodeRecord, RESOLVED_TEXT, TEXT};
+use crate::layout::{ELEMENT, NodeRecord, RESOLVED_TEXT, Section, TEXT};
 use crate::source::Position;
 use crate::value::{self, ValueError};
 
@@ -53,6 +53,7 @@ impl<'a> Node<'a> {
     }
 
     /// The characters of a run of character data, entities resolved; empty for an element.
+    #[inline]
     pub fn character_run(&self) -> &'a str {
         self.record()
             .map_or("", |record| self.document.character_data(record))
@@ -113,26 +114,16 @@ impl<'a> Node<'a> {
 
     /// An attribute by its name as written.
     pub fn attribute(&self, name: &str) -> Option<Attribute<'a>> {
-        let mut attributes = self.attributes();
+        let mut records = self.document.attribute_records(self.index).iter();
         let matcher = self.document.matcher(name);
-        let records = self.document.attribute_records(&attributes);
-        let at = records
-            .iter()
-            .position(|record| matcher.is(record.name.get()))?;
-        attributes.nth(at)
+        let record = records.find(|record| matcher.is(record.name.get()))?;
+        Some(Attribute::new(*self, record))
     }
 
     /// All attributes in the order in which they are written, `xmlns` declarations included.
     #[inline]
     pub fn attributes(&self) -> Attributes<'a> {
-        let first = self
-            .record()
-            .map_or(0, |record| record.first_attribute.get());
-        let stop = match self.document.node_record(self.index.saturating_add(1)) {
-            Some(next) => next.first_attribute.get(),
-            None => self.document.attributes_len(),
-        };
-        Attributes::new(*self, first, stop)
+        Attributes::new(*self, self.document.attribute_records(self.index))
     }
 
     /// The attribute's value as a double, in XML Schema's spelling (`INF`, not `inf`), XML white
@@ -171,17 +162,18 @@ impl<'a> Node<'a> {
     /// The elements directly within it.
     #[inline]
     pub fn children(&self) -> Children<'a> {
-        match self.record() {
-            Some(record) if record.kind.get() == ELEMENT => Children {
-                document: self.document,
-                next: self.index + 1,
-                end: record.end.get(),
-            },
-            _ => Children {
-                document: self.document,
-                next: 0,
-                end: 0,
-            },
+        let records = self.document.records(Section::Nodes);
+        let children = |next, end| Children {
+            document: self.document,
+            records,
+            next,
+            end,
+        };
+        match records.get(self.index as usize) {
+            Some(record) if record.kind.get() == ELEMENT => {
+                children(self.index + 1, record.end.get())
+            }
+            _ => children(0, 0),
         }
     }
 
@@ -234,6 +226,7 @@ impl<'a> Node<'a> {
         let parent_end = self.parent()?.end();
         Children {
             document: self.document,
+            records: self.document.records(Section::Nodes),
             next: self.end(),
             end: parent_end,
         }
@@ -361,9 +354,11 @@ impl std::fmt::Debug for Node<'_> {
 }
 
 /// Child elements; made by [`Node::children`].
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Children<'a> {
     document: Document<'a>,
+    /// All of the document: looked up once and not again for every child.
+    records: &'a [NodeRecord],
     next: u32,
     end: u32,
 }
@@ -374,13 +369,19 @@ impl<'a> Children<'a> {
     fn advance(&mut self) -> Option<(u32, &'a NodeRecord)> {
         while self.next < self.end {
             let index = self.next;
-            let record = self.document.node_record(index)?;
+            let record = self.records.get(index as usize)?;
             self.next = record.end.get().max(index.saturating_add(1));
             if record.kind.get() == ELEMENT {
                 return Some((index, record));
             }
         }
         None
+    }
+}
+
+impl std::fmt::Debug for Children<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_list().entries(self.clone()).finish()
     }
 }
 

@@ -212,7 +212,13 @@ impl Facets {
     }
 
     fn accept_range(&self, builtin: Builtin, text: &str) -> bool {
+        // Most ranges are `at least 0`, for which nothing needs to be read but the sign.
+        let unsigned = matches!(builtin, Builtin::Float | Builtin::Double)
+            && matches!(text.as_bytes().first(), Some(b'0'..=b'9' | b'.'));
         let above = |bound: &Bound| {
+            if unsigned && bound.value <= 0.0 && !bound.exclusive {
+                return true;
+            }
             ordered(
                 builtin,
                 &bound.text,

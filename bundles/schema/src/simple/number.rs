@@ -54,18 +54,30 @@ fn unsigned(text: &str) -> &str {
 
 /// Length of `[0-9]+(\.[0-9]*)?|\.[0-9]+` at the start of `bytes`.
 fn mantissa(bytes: &[u8]) -> Option<usize> {
-    let whole = bytes
-        .iter()
-        .take_while(|byte| byte.is_ascii_digit())
-        .count();
+    let whole = digits(bytes);
     if bytes.get(whole) != Some(&b'.') {
         return (whole > 0).then_some(whole);
     }
-    let fraction = bytes[whole + 1..]
-        .iter()
-        .take_while(|byte| byte.is_ascii_digit())
-        .count();
+    let fraction = digits(&bytes[whole + 1..]);
     (whole + fraction > 0).then_some(whole + 1 + fraction)
+}
+
+/// How many digits `bytes` begins with; exporters write up to 17, so eight are looked at at once.
+fn digits(bytes: &[u8]) -> usize {
+    let (words, _) = bytes.as_chunks::<8>();
+    let eights = words.iter().take_while(|word| are_digits(**word)).count();
+    let rest = bytes[8 * eights..].iter();
+    8 * eights + rest.take_while(|byte| byte.is_ascii_digit()).count()
+}
+
+/// Whether eight bytes are digits: their upper halves are 3, and still are when 6 is added. No sum is
+/// carried into the next byte, since what begins with 3 does not overflow.
+fn are_digits(word: [u8; 8]) -> bool {
+    const UPPER: u64 = 0xF0F0_F0F0_F0F0_F0F0;
+    const THREES: u64 = 0x3030_3030_3030_3030;
+    const SIXES: u64 = 0x0606_0606_0606_0606;
+    let word = u64::from_le_bytes(word);
+    word & UPPER == THREES && word.wrapping_add(SIXES) & UPPER == THREES
 }
 
 /// A decimal number as its significant digits: sign, digits before and after the point.
@@ -142,6 +154,21 @@ mod tests {
             assert!(!is_float(bad, Edition::V1_0), "{bad}");
         }
         assert!(is_float("+INF", Edition::V1_1));
+    }
+
+    #[test]
+    fn eight_digits_are_told_from_other_bytes() {
+        for at in 0..8 {
+            for byte in 0..=u8::MAX {
+                let mut word = *b"90817263";
+                word[at] = byte;
+                let expected = word.iter().all(u8::is_ascii_digit);
+                assert_eq!(are_digits(word), expected, "{byte} at {at}");
+            }
+        }
+        assert_eq!(digits(b"12345678901234567e"), 17);
+        assert_eq!(digits(b"1234567/90"), 7);
+        assert_eq!(digits(b""), 0);
     }
 
     #[test]

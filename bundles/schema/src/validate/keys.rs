@@ -3,10 +3,9 @@
 //! Each open element knows where in the selectors of the enclosing scopes it stands; almost always
 //! that is nowhere, and costs nothing. Values are compared as values of their types.
 
-use std::borrow::Cow;
-use std::collections::HashSet;
-
+use foldhash::HashSet;
 use qcbus_document::{Attribute, Node};
+use std::borrow::Cow;
 
 use super::names::{AttributeName, NameMap};
 use super::reporter::Reporter;
@@ -103,7 +102,7 @@ impl<'a, 's> Keys<'a, 's> {
             });
             let fresh = || Scope {
                 constraints,
-                values: HashSet::new(),
+                values: HashSet::default(),
                 references: Vec::new(),
             };
             let mut scope = self.spare.pop().unwrap_or_else(fresh);
@@ -157,7 +156,7 @@ impl<'a, 's> Keys<'a, 's> {
         }
         // Emptying a set costs its capacity: a large one is not kept for scopes that may be small.
         if scope.values.capacity() > SMALL_SET {
-            scope.values = HashSet::new();
+            scope.values = HashSet::default();
         }
         steps(scope.values.capacity());
         scope.values.clear();

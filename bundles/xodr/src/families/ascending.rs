@@ -162,6 +162,11 @@ pub(crate) fn lane_records_under(
     equal: Equal,
     found: &mut Sink<'_>,
 ) {
+    // No lane has two of them if the whole file has not.
+    let several = |root: Node<'_>| root.document().elements(element).nth(1).is_some();
+    if !map.root().is_some_and(several) {
+        return;
+    }
     for lane in map.lanes() {
         let list = List {
             start: "sOffset",

@@ -58,6 +58,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         clearance: found.number(&CLEARANCE),
     };
     let friends = friends(map);
+    let mouths = mouths(map);
     let slices = slices(map, &limits);
     let wanted = |one: &Slice, other: &Slice| {
         if one.road == other.road {
@@ -69,7 +70,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let same_junction = a.junction().is_some() && a.junction() == b.junction();
         !same_junction
             && !friends.contains(&(one.road.min(other.road), one.road.max(other.road)))
-            && !meet(map, one, other)
+            && !meet(map, &mouths, one, other)
     };
     overlaps(&slices, &limits, wanted, |overlap| {
         report(map, &overlap, found);
@@ -141,8 +142,17 @@ fn is_far(map: &RoadMap<'_>, one: &Slice, other: &Slice) -> bool {
     gap.min(around) > NEAR_CONTACT.max(2.0 * one.width.max(other.width))
 }
 
+/// The junctions that the start and the end of each road are linked to.
+fn mouths<'a>(map: &RoadMap<'a>) -> Vec<[Option<&'a str>; 2]> {
+    let linked = |road: &Road<'a>, end| road.link(end).and_then(|link| link.junction_id());
+    let roads = map.roads().iter();
+    roads
+        .map(|road| ContactPoint::BOTH.map(|end| linked(road, end)))
+        .collect()
+}
+
 /// Whether both pieces lie at an end where the file says that their roads touch.
-fn meet(map: &RoadMap<'_>, one: &Slice, other: &Slice) -> bool {
+fn meet(map: &RoadMap<'_>, mouths: &[[Option<&str>; 2]], one: &Slice, other: &Slice) -> bool {
     let near = |slice: &Slice, end: ContactPoint| {
         let length = map
             .road_at(slice.road)
@@ -173,13 +183,18 @@ fn meet(map: &RoadMap<'_>, one: &Slice, other: &Slice) -> bool {
     // Roads that lie side by side at the mouth of one junction share its corners.
     let junction_near = |slice: &Slice| {
         let road = map.road_at(slice.road)?;
-        let end = ContactPoint::BOTH
-            .into_iter()
-            .find(|end| near(slice, *end))?;
-        let linked = road.link(end).and_then(|link| link.junction_id());
+        let [at_start, at_end] = *mouths.get(slice.road)?;
+        let linked = if near(slice, ContactPoint::Start) {
+            at_start
+        } else if near(slice, ContactPoint::End) {
+            at_end
+        } else {
+            return None;
+        };
         linked.or(road.junction())
     };
-    let at_junction = junction_near(one).is_some() && junction_near(one) == junction_near(other);
+    let here = junction_near(one);
+    let at_junction = here.is_some() && here == junction_near(other);
     at_junction || ContactPoint::BOTH.into_iter().any(touches)
 }
 

@@ -110,23 +110,28 @@ impl XPaths {
     fn learn_children(&mut self, parent: Node<'_>) {
         let mut totals: HashMap<u16, u64> = HashMap::default();
         let mut values: HashMap<(u16, u16, &str), u32> = HashMap::default();
+        let mut named: Vec<(&'static str, Attribute<'_>)> = Vec::new();
         for child in parent.children() {
             *totals.entry(child.name_number()).or_default() += 1;
-            for id in self.ids.iter().filter_map(|name| usable_id(child, name)) {
-                *values.entry(key(child, id)).or_default() += 1;
+            for name in self.ids {
+                if let Some(id) = usable_id(child, name) {
+                    *values.entry(key(child, id)).or_default() += 1;
+                    named.push((name, id));
+                }
             }
         }
+        let mut named = named.into_iter().peekable();
         let mut numbers: HashMap<u16, u64> = HashMap::default();
         for child in parent.children() {
             let number = numbers.entry(child.name_number()).or_default();
             *number += 1;
-            let unique = |(_, id): &(&str, Attribute<'_>)| values.get(&key(child, *id)) == Some(&1);
-            let ids = self.ids.iter().copied();
-            let id = ids
-                .filter_map(|name| Some((name, usable_id(child, name)?)))
-                .find(unique);
-            let by = match id {
-                Some((name, _)) => By::Id(name),
+            let mut unique = None;
+            while let Some((name, id)) = named.next_if(|(_, id)| id.node() == child) {
+                let alone = || values.get(&key(child, id)) == Some(&1);
+                unique = unique.or_else(|| alone().then_some(name));
+            }
+            let by = match unique {
+                Some(name) => By::Id(name),
                 None if totals.get(&child.name_number()) == Some(&1) => By::Nothing,
                 None => By::Number,
             };
