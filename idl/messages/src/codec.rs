@@ -64,7 +64,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::{DocId, FromPeer, JobId, ToPeer};
+    use crate::{DocId, FromPeer, JobId, PROTOCOL_VERSION, ToPeer};
 
     #[test]
     fn a_message_comes_back_as_it_went() {
@@ -74,6 +74,15 @@ mod tests {
         };
         let bytes = encode(&message).unwrap();
         assert_eq!(decode::<FromPeer>(&bytes), Ok(message));
+    }
+
+    #[test]
+    fn whoever_moves_a_message_raises_the_version() {
+        // A message put in before the last one moves its number, and old peers read another one.
+        let drain = encode(&ToPeer::Drain).unwrap();
+        let leaving = encode(&FromPeer::Leaving).unwrap();
+        let numbers = (drain.first().copied(), leaving.first().copied());
+        assert_eq!((PROTOCOL_VERSION, numbers), (2, (Some(6), Some(8))));
     }
 
     #[test]

@@ -48,7 +48,7 @@ fn unique<'s>(tree: &mut Tree<'s>, constraint: &Constraint, next: &mut u32, sche
                 return true;
             };
             let value = &mut found.attributes[at].2;
-            if value != "0" && value.parse::<f64>().is_ok() || value.parse::<f64>().is_err() {
+            if value != "0" {
                 *next += 1;
                 *value = if value.starts_with('-') {
                     format!("-{next}")
