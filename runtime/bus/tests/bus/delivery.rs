@@ -5,7 +5,7 @@ use std::time::Duration;
 use qcbus_bus::{
     Host, HostEvent, HostOptions, Instance, JoinError, Peer, PeerEvent, PeerOptions, StartError,
 };
-use qcbus_messages::{Digest, FromPeer, JobId, ToPeer};
+use qcbus_messages::{Digest, FromPeer, JobId, PROTOCOL_VERSION, ToPeer};
 
 use crate::helper::Helper;
 use crate::support::{
@@ -349,13 +349,17 @@ fn another_version_is_refused_by_name() {
         let _host = place.host();
         let current = place.instance.dir().join("current");
         let text = std::fs::read_to_string(&current).unwrap();
-        let newer = text.replace("\"protocol\":1", "\"protocol\":2");
+        let (ours, theirs) = (PROTOCOL_VERSION, PROTOCOL_VERSION + 1);
+        let newer = text.replace(
+            &format!("\"protocol\":{ours}"),
+            &format!("\"protocol\":{theirs}"),
+        );
         assert_ne!(newer, text);
         std::fs::write(&current, newer).unwrap();
         let joined = Peer::join(&place.instance, hello("old"), PeerOptions::default()).await;
         assert_eq!(
             joined.err(),
-            Some(JoinError::ProtocolMismatch { ours: 1, theirs: 2 })
+            Some(JoinError::ProtocolMismatch { ours, theirs })
         );
         let other = text.replace("\"0.10.0\"", "\"0.11.0\"");
         assert_ne!(other, text);
