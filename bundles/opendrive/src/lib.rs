@@ -21,6 +21,7 @@ mod map;
 mod names;
 mod objects;
 mod outlines;
+mod part;
 mod plan_view;
 mod profile;
 mod railroad;
@@ -50,6 +51,7 @@ pub use objects::{
     Structure, Validity,
 };
 pub use outlines::{Corner, CornerKind, CurveLocal, ObjectPoint, Outline, Polyline};
+pub use part::MapPart;
 pub use plan_view::{Geometry, Located, PlanView, ShapeKind};
 pub use profile::{Profile, Record, Stretch, Valid};
 pub use railroad::{

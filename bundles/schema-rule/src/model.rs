@@ -11,6 +11,7 @@ pub struct Validated;
 
 impl Model for Validated {
     type Of<'d> = Checked<'d>;
+    type Part = ();
 
     fn build<'d>(subject: &'d Subject<'d>) -> Result<Checked<'d>, Skip> {
         let brought = subject.brought::<Overrides>();
@@ -22,6 +23,10 @@ impl Model for Validated {
             Outcome::Checked(checked) => Ok(checked),
             Outcome::Skipped(reason) => Err(Skip(reason.to_string())),
         }
+    }
+
+    fn parts(_: &Checked<'_>) -> Vec<()> {
+        vec![()]
     }
 }
 

@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 use qcbus_formats::xqar::{Issue, Level, Metadata, Param, Status};
 
 use crate::plan::{Entry, Plan};
-use crate::rule::Apply;
-use crate::{Backport, Checker, Sink, Skip, Subject, Values, Version};
+use crate::rule::Built;
+use crate::{AnyRule, Backport, Checker, Sink, Skip, Subject, Values, Version};
 
 /// How a checker ended.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,7 +31,7 @@ pub trait Listener {
         false
     }
 
-    /// A checker begins.
+    /// A checker begins, or goes on with another part of the document.
     fn begins(&mut self, checker: usize) {
         let _ = checker;
     }
@@ -73,6 +73,8 @@ struct Run<'r> {
 /// What matters of a checker to those that come after it.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Ending {
+    /// Not yet at its end: it waits for its turn.
+    Waits,
     Clean,
     FoundErrors,
     Skipped,
@@ -83,6 +85,29 @@ enum Ending {
 struct Pass<'r> {
     values: &'r Values,
     not_normative: Option<String>,
+}
+
+/// A checker at work.
+struct Turn<'r> {
+    index: usize,
+    rule: &'static dyn AnyRule,
+    values: &'r Values,
+    sink: Sink<'r>,
+    took: Duration,
+    /// What its panic said; it is not asked again.
+    failed: Option<String>,
+}
+
+impl<'r> Turn<'r> {
+    /// Has it look at something. `clock` is when that began, and then when it ended.
+    fn look(&mut self, clock: &mut Instant, at: impl FnOnce(&dyn AnyRule, &mut Sink<'r>)) {
+        if self.failed.is_none() {
+            self.failed = catch(|| at(self.rule, &mut self.sink)).err();
+        }
+        let now = Instant::now();
+        self.took += now.duration_since(*clock);
+        *clock = now;
+    }
 }
 
 impl<'r> Run<'r> {
@@ -103,19 +128,10 @@ impl<'r> Run<'r> {
         let mut first = Some(builder);
         let mut open: Vec<usize> = members.to_vec();
         let built = catch(|| {
-            rule.with_model(subject, &mut |apply| {
+            rule.with_model(subject, &mut |built| {
                 open.clear();
-                if let Some((index, pass)) = first.take() {
-                    self.one(index, pass, apply);
-                }
-                for index in rest.by_ref() {
-                    if self.stops() {
-                        return;
-                    }
-                    match self.gate(index) {
-                        Ok(pass) => self.one(index, pass, apply),
-                        Err(outcome) => self.end(index, Vec::new(), outcome),
-                    }
+                if let Some(first) = first.take() {
+                    self.on_model(first, &mut rest, built);
                 }
             })
         });
@@ -136,36 +152,95 @@ impl<'r> Run<'r> {
         }
     }
 
+    /// Runs checkers on the model that was built. As many as possible look at a part in turn: they
+    /// wait until one comes that needs to know how one of them ended.
+    fn on_model(
+        &mut self,
+        first: (usize, Pass<'r>),
+        rest: &mut dyn Iterator<Item = usize>,
+        built: &dyn Built<'r>,
+    ) {
+        let mut waiting = Vec::with_capacity(self.plan.checkers.len());
+        waiting.push(self.turn(first.0, first.1));
+        for index in rest {
+            let after = self.plan.entries[index].after.as_deref().unwrap_or(&[]);
+            let mut endings = after.iter().map(|before| self.endings[*before]);
+            if endings.any(|ending| ending == Some(Ending::Waits)) {
+                self.take(&mut waiting, built);
+                waiting.clear();
+            }
+            if self.stops() {
+                return;
+            }
+            match self.gate(index) {
+                Ok(pass) => waiting.push(self.turn(index, pass)),
+                Err(outcome) => self.end(index, Vec::new(), outcome),
+            }
+        }
+        self.take(&mut waiting, built);
+    }
+
+    fn turn(&mut self, index: usize, pass: Pass<'r>) -> Turn<'r> {
+        self.endings[index] = Some(Ending::Waits);
+        let checker = &self.plan.checkers[index];
+        let Pass {
+            values,
+            not_normative,
+        } = pass;
+        Turn {
+            index,
+            rule: checker.rule,
+            values,
+            sink: Sink::new(self.subject, &checker.facts, values, not_normative),
+            took: Duration::ZERO,
+            failed: None,
+        }
+    }
+
+    /// Has checkers look at one part of the model after the other, and then at the whole.
+    fn take(&mut self, turns: &mut [Turn<'r>], built: &dyn Built<'r>) {
+        for part in 0..built.parts() {
+            if self.stops() {
+                return;
+            }
+            let mut clock = Instant::now();
+            let asked = |turn: &&mut Turn<'r>| turn.rule.goes_by_parts() && turn.failed.is_none();
+            for turn in turns.iter_mut().filter(asked) {
+                self.listener.begins(turn.index);
+                turn.look(&mut clock, |rule, sink| built.each(part, rule, sink));
+            }
+        }
+        let mut clock = Instant::now();
+        for turn in turns {
+            if self.stops() {
+                return;
+            }
+            self.listener.begins(turn.index);
+            turn.look(&mut clock, |rule, sink| built.run(rule, sink));
+            self.close(turn);
+        }
+    }
+
     fn stops(&mut self) -> bool {
         self.cancelled = self.cancelled || self.listener.is_cancelled();
         self.cancelled
     }
 
-    fn one(&mut self, index: usize, pass: Pass<'r>, apply: Apply<'_, 'r>) {
-        let checker = &self.plan.checkers[index];
-        self.listener.begins(index);
-        let start = Instant::now();
-        let params = pass.values.listed();
-        let mut sink = Sink::new(self.subject, checker.facts, pass.values, pass.not_normative);
-        let ran = catch(|| apply(checker.rule, &mut sink));
+    fn close(&mut self, turn: &mut Turn<'r>) {
         // What was found before a panic is still true.
-        let (issues, metadata) = sink.finish();
-        let (status, reason) = match ran {
-            Ok(()) => (Status::Completed, String::new()),
-            Err(panic) => (Status::Error, format!("the rule panicked: {panic}")),
+        let (issues, metadata) = turn.sink.finish();
+        let (status, reason) = match turn.failed.take() {
+            None => (Status::Completed, String::new()),
+            Some(panic) => (Status::Error, format!("the rule panicked: {panic}")),
         };
-        let took = start.elapsed();
-        self.end(
-            index,
-            issues,
-            Outcome {
-                status,
-                reason,
-                params,
-                metadata,
-                took,
-            },
-        );
+        let outcome = Outcome {
+            status,
+            reason,
+            params: turn.values.listed(),
+            metadata,
+            took: turn.took,
+        };
+        self.end(turn.index, issues, outcome);
     }
 
     fn end(&mut self, index: usize, issues: Vec<Issue>, outcome: Outcome) {
@@ -207,7 +282,7 @@ impl<'r> Run<'r> {
                 Some(Ending::FoundErrors) => "found errors",
                 Some(Ending::Skipped) => "was skipped",
                 Some(Ending::Failed) => "failed",
-                None => "did not run before it",
+                Some(Ending::Waits) | None => "did not run before it",
             };
             let reason = format!("`{}` {what}", self.plan.checkers[index].id);
             return Err(Outcome::without_run(Status::Skipped, reason));

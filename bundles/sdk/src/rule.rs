@@ -14,11 +14,18 @@ pub trait Model: 'static {
     /// The model of a document that lives for `'d`.
     type Of<'d>;
 
+    /// Names a part of the model at which several rules look in turn before they go on to the next
+    /// part: small enough to stay in the processor's caches meanwhile.
+    type Part;
+
     /// Builds the model. It should be lazy: most documents need little of it.
     ///
     /// # Errors
     /// [`Skip`] when rules about this model cannot say anything about the document.
     fn build<'d>(subject: &'d Subject<'d>) -> Result<Self::Of<'d>, Skip>;
+
+    /// The parts of a model, in document order.
+    fn parts(model: &Self::Of<'_>) -> Vec<Self::Part>;
 }
 
 /// Why checkers do not apply, as a sentence fragment: `the road network could not be loaded`.
@@ -28,9 +35,14 @@ pub struct Skip(pub String);
 /// The document itself, for rules that need no more: `Rule<Document>`.
 impl Model for Document<'static> {
     type Of<'d> = Document<'d>;
+    type Part = ();
 
     fn build<'d>(subject: &'d Subject<'d>) -> Result<Document<'d>, Skip> {
         Ok(subject.root())
+    }
+
+    fn parts(_: &Document<'_>) -> Vec<()> {
+        vec![()]
     }
 }
 
@@ -68,7 +80,10 @@ pub struct Rule<M: Model> {
     pub default_on: bool,
     /// Its page: `include_str!` of the Markdown file beside it.
     pub page: &'static str,
-    /// Looks at the document and says what it found.
+    /// Looks at a part of the document and says what it found, one part after the other: for
+    /// rules that need to know nothing of one part to judge the next.
+    pub each: Option<fn(&M::Of<'_>, &M::Part, &mut Sink<'_>)>,
+    /// Looks at the document and says what it found, after `each` has seen all parts.
     pub run: fn(&M::Of<'_>, &mut Sink<'_>),
 }
 
@@ -104,15 +119,47 @@ impl<M: Model> Rule<M> {
         resource: None,
         default_on: true,
         page: "",
+        each: None,
         run: finds_nothing::<M>,
     };
 }
 
 fn finds_nothing<M: Model>(_: &M::Of<'_>, _: &mut Sink<'_>) {}
 
-/// Runs a rule on the model that was built for its kind.
+/// A model that was built, on which every rule of its kind can be run.
 #[doc(hidden)]
-pub type Apply<'a, 'd> = &'a mut dyn FnMut(&dyn AnyRule, &mut Sink<'d>);
+pub trait Built<'d> {
+    /// How many parts the model has.
+    fn parts(&self) -> usize;
+    /// Has a rule look at one part.
+    fn each(&self, part: usize, rule: &dyn AnyRule, found: &mut Sink<'d>);
+    /// Has a rule look at the whole.
+    fn run(&self, rule: &dyn AnyRule, found: &mut Sink<'d>);
+}
+
+struct Divided<'m, 'd, M: Model> {
+    whole: &'m M::Of<'d>,
+    parts: Vec<M::Part>,
+}
+
+impl<'d, M: Model> Built<'d> for Divided<'_, 'd, M> {
+    fn parts(&self) -> usize {
+        self.parts.len()
+    }
+
+    fn each(&self, part: usize, rule: &dyn AnyRule, found: &mut Sink<'d>) {
+        let rule = rule.as_any().downcast_ref::<Rule<M>>();
+        if let (Some(each), Some(part)) = (rule.and_then(|rule| rule.each), self.parts.get(part)) {
+            each(self.whole, part, found);
+        }
+    }
+
+    fn run(&self, rule: &dyn AnyRule, found: &mut Sink<'d>) {
+        if let Some(rule) = rule.as_any().downcast_ref::<Rule<M>>() {
+            (rule.run)(self.whole, found);
+        }
+    }
+}
 
 /// A rule of whatever model, as a bundle lists them.
 pub trait AnyRule: Sync {
@@ -120,12 +167,14 @@ pub trait AnyRule: Sync {
     fn facts(&self) -> Facts;
     /// Tells apart the models that rules look at.
     fn model(&self) -> TypeId;
-    /// Builds this rule's model and hands it to `each` with every rule of the same model.
+    /// Whether it looks at one part of the model after the other.
+    fn goes_by_parts(&self) -> bool;
+    /// Builds this rule's model and hands it on, for every rule of the same model.
     #[doc(hidden)]
     fn with_model<'d>(
         &self,
         subject: &'d Subject<'d>,
-        each: &mut dyn FnMut(Apply<'_, 'd>),
+        hand: &mut dyn FnMut(&dyn Built<'d>),
     ) -> Result<(), Skip>;
     /// The rule, to find out its type.
     #[doc(hidden)]
@@ -168,17 +217,18 @@ impl<M: Model> AnyRule for Rule<M> {
         TypeId::of::<M>()
     }
 
+    fn goes_by_parts(&self) -> bool {
+        self.each.is_some()
+    }
+
     fn with_model<'d>(
         &self,
         subject: &'d Subject<'d>,
-        each: &mut dyn FnMut(Apply<'_, 'd>),
+        hand: &mut dyn FnMut(&dyn Built<'d>),
     ) -> Result<(), Skip> {
-        let model = M::build(subject)?;
-        each(&mut |rule, found| {
-            if let Some(rule) = rule.as_any().downcast_ref::<Rule<M>>() {
-                (rule.run)(&model, found);
-            }
-        });
+        let whole = &M::build(subject)?;
+        let parts = M::parts(whole);
+        hand(&Divided::<M> { whole, parts });
         Ok(())
     }
 

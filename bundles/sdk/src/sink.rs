@@ -17,15 +17,16 @@ use crate::{Param, Subject, Values, Version};
 /// ```
 pub struct Sink<'d> {
     subject: &'d Subject<'d>,
-    facts: Facts,
+    facts: &'d Facts,
     values: &'d Values,
     /// Said on every issue of a rule that is not normative for the document's version.
     not_normative: Option<String>,
     kept: Vec<((usize, u32), Issue)>,
     suppressed: Option<Suppressed>,
     metadata: Vec<Metadata>,
-    /// Takes what is said about a finding that is not kept.
-    scratch: Issue,
+    /// Takes what is said about findings that are not kept. In a box, because most checkers keep
+    /// all of theirs, and many are at work at the same time.
+    scratch: Option<Box<Issue>>,
 }
 
 /// The findings beyond the limit.
@@ -41,11 +42,10 @@ struct Suppressed {
 impl<'d> Sink<'d> {
     pub(crate) fn new(
         subject: &'d Subject<'d>,
-        facts: Facts,
+        facts: &'d Facts,
         values: &'d Values,
         not_normative: Option<String>,
     ) -> Sink<'d> {
-        let scratch = issue(String::new(), facts.level, "");
         Sink {
             subject,
             facts,
@@ -54,7 +54,7 @@ impl<'d> Sink<'d> {
             kept: Vec::new(),
             suppressed: None,
             metadata: Vec::new(),
-            scratch,
+            scratch: None,
         }
     }
 
@@ -75,13 +75,13 @@ impl<'d> Sink<'d> {
         let full = self.kept.len() >= self.limit();
         let issue = if full {
             self.suppress(&place, level);
-            &mut self.scratch
+            scratch(&mut self.scratch)
         } else {
             let issue = self.complete(&place, text.into(), level);
             self.kept.push(issue);
             match self.kept.last_mut() {
                 Some((_, issue)) => issue,
-                None => &mut self.scratch,
+                None => scratch(&mut self.scratch),
             }
         };
         let unlisted = self
@@ -92,7 +92,7 @@ impl<'d> Sink<'d> {
         Finding {
             issue,
             subject: self.subject,
-            facts: &self.facts,
+            facts: self.facts,
             lowered,
             unlisted,
         }
@@ -141,14 +141,16 @@ impl<'d> Sink<'d> {
                 .map_or(0, |suppressed| suppressed.count)
     }
 
-    /// The findings in document order, and facts about those that are not listed.
-    pub(crate) fn finish(mut self) -> (Vec<Issue>, Vec<Metadata>) {
-        self.kept.sort_by_key(|(order, _)| *order);
-        let limit = self.limit();
-        let mut issues: Vec<Issue> = self.kept.into_iter().map(|(_, issue)| issue).collect();
-        let Some(suppressed) = self.suppressed else {
-            return (issues, self.metadata);
+    /// Takes out the findings in document order, and facts about those that are not listed.
+    pub(crate) fn finish(&mut self) -> (Vec<Issue>, Vec<Metadata>) {
+        let mut kept = std::mem::take(&mut self.kept);
+        kept.sort_by_key(|(order, _)| *order);
+        let mut issues: Vec<Issue> = kept.into_iter().map(|(_, issue)| issue).collect();
+        let mut facts = std::mem::take(&mut self.metadata);
+        let Some(suppressed) = self.suppressed.take() else {
+            return (issues, facts);
         };
+        let limit = self.limit();
         let count = suppressed.count;
         let text = format!(
             "{count} further findings of this checker are not listed, because it lists {limit} \
@@ -166,8 +168,8 @@ impl<'d> Sink<'d> {
             value: count.to_string(),
             description: "findings beyond the number that this checker lists".to_owned(),
         };
-        self.metadata.push(metadata);
-        (issues, self.metadata)
+        facts.push(metadata);
+        (issues, facts)
     }
 
     fn limit(&self) -> usize {
@@ -186,8 +188,9 @@ impl<'d> Sink<'d> {
         suppressed.count += 1;
         suppressed.worst = suppressed.worst.min(suppressed.last);
         suppressed.last = level;
-        self.scratch.locations.clear();
-        self.scratch.domain_info.clear();
+        let scratch = scratch(&mut self.scratch);
+        scratch.locations.clear();
+        scratch.domain_info.clear();
     }
 
     fn complete(&self, place: &Place<'_>, mut text: String, level: Level) -> ((usize, u32), Issue) {
@@ -304,6 +307,10 @@ fn lower(level: Level) -> Level {
 
 fn first(uids: &[&'static str]) -> &'static str {
     uids.first().copied().unwrap_or("")
+}
+
+fn scratch(slot: &mut Option<Box<Issue>>) -> &mut Issue {
+    slot.get_or_insert_with(|| Box::new(issue(String::new(), Level::Information, "")))
 }
 
 fn issue(description: String, level: Level, uid: &str) -> Issue {

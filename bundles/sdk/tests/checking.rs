@@ -88,9 +88,14 @@ struct Unavailable;
 
 impl Model for Unavailable {
     type Of<'d> = ();
+    type Part = ();
 
     fn build<'d>(_: &'d Subject<'d>) -> Result<(), Skip> {
         Err(Skip("there is nothing to look at".to_owned()))
+    }
+
+    fn parts((): &()) -> Vec<()> {
+        Vec::new()
     }
 }
 

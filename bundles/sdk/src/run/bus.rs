@@ -17,7 +17,7 @@ use tokio::sync::mpsc;
 use super::Exit;
 use super::file::complain;
 use super::module::configured;
-use super::worker::{self, LinkedHeld, Progress, Work};
+use super::worker::{self, CheckerAtWork, LinkedHeld, Progress, Work};
 use crate::{Bundle, Outcome, Plan, UserFiles};
 
 /// How a bundle joins the bus.
@@ -172,7 +172,6 @@ async fn serve(
         plans: BTreeMap::new(),
         waiting: VecDeque::new(),
         running: None,
-        checker: None,
         draining: false,
         stopped: false,
     };
@@ -206,8 +205,6 @@ struct Daemon {
     plans: BTreeMap<Digest, (Option<Config>, Arc<Plan>)>,
     waiting: VecDeque<Job>,
     running: Option<Running>,
-    /// The checker at work.
-    checker: Option<u32>,
     draining: bool,
     /// Told to stop by a person.
     stopped: bool,
@@ -217,6 +214,7 @@ struct Running {
     job: Job,
     plan: Arc<Plan>,
     cancelled: Arc<AtomicBool>,
+    checker: Arc<CheckerAtWork>,
 }
 
 impl Daemon {
@@ -293,10 +291,10 @@ impl Daemon {
     }
 
     fn tick(&mut self) {
-        let job = self.running.as_ref().map(|running| running.job.job);
+        let running = self.running.as_ref();
         self.peer.send(&FromPeer::Heartbeat {
-            job,
-            checker: self.checker.filter(|_| job.is_some()),
+            job: running.map(|running| running.job.job),
+            checker: running.and_then(|running| running.checker.get()),
         });
         if let Some(job) = self.waiting.front() {
             let missing = self.missing_documents(job);
@@ -342,6 +340,7 @@ impl Daemon {
                 job,
                 plan,
                 cancelled: work.cancelled.clone(),
+                checker: work.checker.clone(),
             });
             if self.works.send(work).is_err() {
                 tracing::error!("the checking thread has ended");
@@ -376,6 +375,7 @@ impl Daemon {
             linked,
             missing: job.missing.clone(),
             cancelled: Arc::default(),
+            checker: Arc::default(),
         };
         Some((plan, work))
     }
@@ -411,7 +411,6 @@ impl Daemon {
 
     fn progress(&mut self, event: Progress) {
         match event {
-            Progress::Begins { checker } => self.checker = Some(checker),
             Progress::Ended {
                 job,
                 checker,
@@ -508,7 +507,6 @@ impl Daemon {
                 self.peer.forget(document.doc);
             }
         }
-        self.checker = None;
     }
 
     fn is_idle(&self) -> bool {

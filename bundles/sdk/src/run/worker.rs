@@ -1,7 +1,7 @@
 //! The thread that checks, so that the loop on the bus stays free to talk.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::Instant;
 
 use qcbus_bus::Held;
@@ -21,6 +21,7 @@ pub(super) struct Work {
     pub linked: Vec<LinkedHeld>,
     pub missing: Vec<MissingDocument>,
     pub cancelled: Arc<AtomicBool>,
+    pub checker: Arc<CheckerAtWork>,
 }
 
 /// A document that the root refers to, as it is held.
@@ -31,11 +32,24 @@ pub(super) struct LinkedHeld {
     pub image: Held,
 }
 
+/// Which checker the thread is at.
+pub(super) struct CheckerAtWork(AtomicU32);
+
+impl CheckerAtWork {
+    /// Its index; `None` before the first one begins.
+    pub fn get(&self) -> Option<u32> {
+        Some(self.0.load(Ordering::Relaxed)).filter(|index| *index != u32::MAX)
+    }
+}
+
+impl Default for CheckerAtWork {
+    fn default() -> CheckerAtWork {
+        CheckerAtWork(AtomicU32::new(u32::MAX))
+    }
+}
+
 /// What the thread has to say.
 pub(super) enum Progress {
-    Begins {
-        checker: u32,
-    },
     Ended {
         job: JobId,
         checker: u32,
@@ -114,9 +128,7 @@ impl Listener for Reporter<'_> {
     }
 
     fn begins(&mut self, checker: usize) {
-        let _ = self.progress.send(Progress::Begins {
-            checker: index(checker),
-        });
+        self.work.checker.0.store(index(checker), Ordering::Relaxed);
     }
 
     fn ended(&mut self, checker: usize, issues: Vec<Issue>, outcome: Outcome) {

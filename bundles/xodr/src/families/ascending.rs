@@ -1,7 +1,7 @@
 //! Records in ascending order of where they start.
 
 use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
+use qcbus_opendrive::MapPart;
 use qcbus_sdk::{Level, Param, Place, Sink};
 
 /// What still counts as the same place.
@@ -150,13 +150,18 @@ pub(crate) fn children<'a>(
 }
 
 /// Checks the records of this name in every lane.
-pub(crate) fn lane_records(map: &RoadMap<'_>, element: &str, equal: Equal, found: &mut Sink<'_>) {
-    lane_records_under(map, element, None, equal, found);
+pub(crate) fn lane_records(
+    part: MapPart<'_, '_>,
+    element: &str,
+    equal: Equal,
+    found: &mut Sink<'_>,
+) {
+    lane_records_under(part, element, None, equal, found);
 }
 
 /// [`lane_records`], whose findings bear `uid` if it is given.
 pub(crate) fn lane_records_under(
-    map: &RoadMap<'_>,
+    part: MapPart<'_, '_>,
     element: &str,
     uid: Option<&'static str>,
     equal: Equal,
@@ -164,10 +169,10 @@ pub(crate) fn lane_records_under(
 ) {
     // No lane has two of them if the whole file has not.
     let several = |root: Node<'_>| root.document().elements(element).nth(1).is_some();
-    if !map.root().is_some_and(several) {
+    if !part.map().root().is_some_and(several) {
         return;
     }
-    for lane in map.lanes() {
+    for lane in part.lanes() {
         let list = List {
             start: "sOffset",
             road: lane.at.road.id(),

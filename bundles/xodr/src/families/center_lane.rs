@@ -1,12 +1,15 @@
 //! The center lane: what it must not have.
 
-use qcbus_opendrive::{LaneGroup, RoadMap};
+use qcbus_opendrive::{LaneGroup, MapPart};
 use qcbus_sdk::Sink;
 
 /// Reports children of this name of center lanes. `why` completes "the center lane has an
 /// element `width`, but ".
-pub(crate) fn has_no(map: &RoadMap<'_>, element: &str, why: &str, found: &mut Sink<'_>) {
-    for lane in map.lanes().filter(|lane| lane.group() == LaneGroup::Center) {
+pub(crate) fn has_no(part: MapPart<'_, '_>, element: &str, why: &str, found: &mut Sink<'_>) {
+    for lane in part
+        .lanes()
+        .filter(|lane| lane.group() == LaneGroup::Center)
+    {
         for child in lane.elements(element) {
             let text = format!("the center lane has an element `{element}`, but {why}");
             let finding = found.issue(child, text);

@@ -1,7 +1,7 @@
 //! Parametric curves whose length is not the one that their geometry says (OpenDRIVE 1.9, 9.6).
 
 use qcbus_opendrive::geometry::{ParamPoly3, ParamRange};
-use qcbus_opendrive::{Geometry, Road, RoadMap};
+use qcbus_opendrive::{Geometry, MapPart, Road};
 use qcbus_sdk::{Param, Place, Sink};
 
 use super::on_road::OnRoad;
@@ -16,8 +16,8 @@ pub(crate) const LENGTH_TOLERANCE: Param = Param::number(
 
 /// Reports curves of this range whose parameter does not run as far as `@pRange` says: integrated
 /// over the range, the curve is not `@length` long.
-pub(crate) fn range_fits(map: &RoadMap<'_>, range: ParamRange, found: &mut Sink<'_>) {
-    for_each_mismatch(map, found, |curve, mismatch, found| {
+pub(crate) fn range_fits(part: MapPart<'_, '_>, range: ParamRange, found: &mut Sink<'_>) {
+    for_each_mismatch(part, found, |curve, mismatch, found| {
         if curve.range != range
             || mismatch
                 .geometry
@@ -45,8 +45,8 @@ pub(crate) fn range_fits(map: &RoadMap<'_>, range: ParamRange, found: &mut Sink<
 
 /// Reports curves with a normalized parameter, said or by default, whose length is not `@length`.
 /// Those with `arcLength` are said to have the wrong range instead.
-pub(crate) fn length_matches(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for_each_mismatch(map, found, |curve, mismatch, found| {
+pub(crate) fn length_matches(part: MapPart<'_, '_>, found: &mut Sink<'_>) {
+    for_each_mismatch(part, found, |curve, mismatch, found| {
         if curve.range == ParamRange::Normalized {
             let text = format!(
                 "the curve is {:.6} m long, but `length` says {} m; they should agree within {} m",
@@ -67,12 +67,12 @@ struct Mismatch<'m, 'a> {
 }
 
 fn for_each_mismatch<'d>(
-    map: &RoadMap<'_>,
+    part: MapPart<'_, '_>,
     found: &mut Sink<'d>,
     mut report: impl FnMut(ParamPoly3, Mismatch<'_, '_>, &mut Sink<'d>),
 ) {
     let tolerance = found.number(&LENGTH_TOLERANCE);
-    for road in map.roads() {
+    for road in part.roads() {
         for geometry in road.plan_view().geometries() {
             let lengths = geometry.length().zip(geometry.true_length());
             let (Some(curve), Some((length, true_length))) = (geometry.param_poly3(), lengths)

@@ -3,7 +3,7 @@ use std::collections::HashMap;
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Place, Rule, Sink, Version};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_ids_id_unique_in_lane_section",
@@ -14,16 +14,16 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.4.0..",
     after: super::READABLE,
     page: include_str!("ids_id_unique_in_lane_section.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
 /// Since this version another UID says the same.
 const BY_LAYER: Version = Version::new(1, 9);
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let by_layer = found.version().is_some_and(|version| version >= BY_LAYER);
-    for section in map.sections() {
+    for section in map.part(part).sections() {
         let mut seen = HashMap::new();
         for lane in section.lanes() {
             let Some(id) = lane.id() else { continue };

@@ -4,7 +4,7 @@ use qcbus_sdk::{Backport, Param, Rule, Sink};
 use crate::families::lane_gaps::{LaneGap, lane_gaps};
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::zero_width::ZERO_WIDTH;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 const GAP: Param = Param::number(
     "gap",
@@ -21,14 +21,18 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[GAP, ZERO_WIDTH],
     page: include_str!("lane_smoothness_contact_point_no_horizontal_gaps.md"),
+    each: Some(each),
     run,
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         reference_line(road, found);
     }
+}
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     for gap in lane_gaps(map, found.number(&GAP), found.number(&ZERO_WIDTH)) {
         report(&gap, found);
     }

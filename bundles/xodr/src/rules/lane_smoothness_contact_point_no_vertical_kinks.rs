@@ -3,7 +3,7 @@ use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
 
 use crate::families::on_road::OnRoad;
 use crate::families::touching::{GAP, STEP, Where, pairs};
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 const PITCH: Param = Param::number(
     "pitch",
@@ -21,6 +21,7 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[PITCH, GAP, STEP],
     page: include_str!("lane_smoothness_contact_point_no_vertical_kinks.md"),
+    each: Some(each),
     run,
     ..Rule::DEFAULTS
 };
@@ -47,7 +48,10 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             pair.report(&text, edge.point, found);
         }
     }
-    for road in map.roads() {
+}
+
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         within(road, found);
     }
 }

@@ -3,7 +3,7 @@ use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
 
 use crate::families::driving::is_drivable;
 use crate::families::on_road::lane_name;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 const STEP: Param = Param::number(
     "step",
@@ -21,12 +21,12 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[STEP],
     page: include_str!("lane_smoothness_no_vertical_jumps_t.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for section in map.sections() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for section in map.part(part).sections() {
         for side in Side::BOTH {
             let mut inner: Option<LaneRef<'_, '_>> = None;
             for lane in section.side(side) {

@@ -6,7 +6,7 @@ use qcbus_sdk::{Level, Param, Rule, Sink};
 
 use crate::families::driving::is_drivable;
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 const GAP: Param = Param::number(
     "gap",
@@ -23,12 +23,12 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[GAP],
     page: include_str!("lane_smoothness_profile_no_horizontal_gaps.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for section in map.sections() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for section in map.part(part).sections() {
         for side in Side::BOTH {
             check(section, side, found);
         }

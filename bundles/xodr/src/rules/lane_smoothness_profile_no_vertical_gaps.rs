@@ -3,7 +3,7 @@ use qcbus_sdk::{Backport, Rule, Sink};
 
 use crate::families::profile_steps::{elevation, lateral};
 use crate::families::touching::STEP;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_lane_smoothness_profile_no_vertical_gaps",
@@ -13,12 +13,12 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[STEP],
     page: include_str!("lane_smoothness_profile_no_vertical_gaps.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         elevation(road, found);
         lateral(road, found);
     }

@@ -3,7 +3,7 @@ use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
 
 use crate::families::on_road::OnRoad;
 use crate::families::redundancy::{Repeated, in_lines, in_profile};
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 const TOLERANCE: Param = Param::number(
     "tolerance",
@@ -37,12 +37,12 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[TOLERANCE, TURN, GAP],
     page: include_str!("performance_avoid_redundant_info.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         of_lines(road, found);
         let Some(length) = road.length() else {
             continue;
@@ -53,7 +53,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             of_road(road, layer.offset(), length, found);
         }
     }
-    for lane in map.lanes() {
+    for lane in map.part(part).lanes() {
         of_lane(lane, found);
     }
 }

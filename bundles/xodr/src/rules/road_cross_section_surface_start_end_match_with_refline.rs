@@ -1,7 +1,7 @@
 use qcbus_opendrive::{Profile, Road, RoadMap};
 use qcbus_sdk::{Param, Place, Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_cross_section_surface_start_end_match_with_refline",
@@ -10,7 +10,7 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_cross_section_surface_start_end_match_with_refline.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
@@ -21,8 +21,8 @@ const TOLERANCE: Param = Param::number(
     "largest distance from the ends of the road that is accepted",
 );
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         let Some(surface) = &road.lateral().cross_section_surface else {
             continue;
         };

@@ -3,7 +3,7 @@ use std::collections::HashMap;
 use qcbus_opendrive::{RoadMap, Side, Strip};
 use qcbus_sdk::{Level, Place, Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_cross_section_surface_use_strip",
@@ -11,12 +11,12 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
     after: super::READABLE,
     page: include_str!("road_cross_section_surface_use_strip.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         let Some(surface) = &road.lateral().cross_section_surface else {
             continue;
         };

@@ -1,7 +1,7 @@
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_geometry_arc_no_zero_curvature",
@@ -12,7 +12,7 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[LEAST],
     page: include_str!("road_geometry_arc_no_zero_curvature.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
@@ -23,9 +23,9 @@ const LEAST: Param = Param::number(
     "a curvature up to this counts as zero",
 );
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let least = found.number(&LEAST);
-    for road in map.roads() {
+    for road in map.part(part).roads() {
         for geometry in road.plan_view().geometries() {
             for arc in geometry.shapes().filter(|shape| shape.is("arc")) {
                 let curvature = arc.f64("curvature").ok();

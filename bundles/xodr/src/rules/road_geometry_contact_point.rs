@@ -3,7 +3,7 @@ use qcbus_opendrive::{ContactPoint, Road, RoadEnd, RoadMap};
 use qcbus_sdk::{Backport, Param, Rule, Sink};
 
 use crate::families::on_road::OnRoad;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 const GAP: Param = Param::number(
     "gap",
@@ -20,12 +20,12 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[GAP],
     page: include_str!("road_geometry_contact_point.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         for end in ContactPoint::BOTH {
             check(map, road, end, found);
         }

@@ -3,7 +3,7 @@ use qcbus_opendrive::geometry::ParamRange;
 use qcbus_sdk::{Backport, Rule, Sink};
 
 use crate::families::curve_length::{self, LENGTH_TOLERANCE};
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_geometry_parampoly3_arclength_range",
@@ -17,10 +17,10 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[LENGTH_TOLERANCE],
     page: include_str!("road_geometry_parampoly3_arclength_range.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    curve_length::range_fits(map, ParamRange::ArcLength, found);
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    curve_length::range_fits(map.part(part), ParamRange::ArcLength, found);
 }

@@ -3,7 +3,7 @@ use qcbus_opendrive::{Geometry, Road, RoadMap};
 use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
 
 use crate::families::on_road::OnRoad;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 const TOLERANCE: Param = Param::number(
     "tolerance",
@@ -26,12 +26,12 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[TOLERANCE, HARMFUL],
     page: include_str!("road_geometry_parampoly3_valid_parameters.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         for geometry in road.plan_view().geometries() {
             if let Some(curve) = geometry.param_poly3() {
                 check(road, geometry, &curve, found);

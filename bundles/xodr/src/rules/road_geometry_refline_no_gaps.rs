@@ -3,7 +3,7 @@ use qcbus_sdk::{Param, Rule, Sink};
 
 use crate::families::on_road::OnRoad;
 use crate::families::refline::{joints, shape_name};
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 const GAP: Param = Param::number(
     "gap",
@@ -22,12 +22,12 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[GAP],
     page: include_str!("road_geometry_refline_no_gaps.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         for (one, next) in joints(road) {
             check(road, one, next, found);
         }

@@ -4,7 +4,7 @@ use qcbus_sdk::{Level, Param, Rule, Sink};
 
 use crate::families::on_road::OnRoad;
 use crate::families::refline::{joints, shape_name, standstill};
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 const KINK: Param = Param::number(
     "kink",
@@ -24,12 +24,12 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[KINK],
     page: include_str!("road_geometry_refline_no_kinks.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         for (one, next) in joints(road) {
             check(road, one, next, found);
         }

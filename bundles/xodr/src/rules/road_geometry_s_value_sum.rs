@@ -1,7 +1,7 @@
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Backport, Param, Place, Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_geometry_s_value_sum",
@@ -11,7 +11,7 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_geometry_s_value_sum.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
@@ -24,9 +24,9 @@ const TOLERANCE: Param = Param::number(
 /// What a sum of lengths written with few digits may be off, as a share of it.
 const RELATIVE: f64 = 1e-6;
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let tolerance = found.number(&TOLERANCE);
-    for road in map.roads() {
+    for road in map.part(part).roads() {
         let mut sum = 0.0;
         let mut first = None;
         let mut further = 0;

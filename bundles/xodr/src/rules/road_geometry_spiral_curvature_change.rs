@@ -1,7 +1,7 @@
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_geometry_spiral_curvature_change",
@@ -12,7 +12,7 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[LEAST],
     page: include_str!("road_geometry_spiral_curvature_change.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
@@ -23,9 +23,9 @@ const LEAST: Param = Param::number(
     "a difference of curvatures up to this counts as none",
 );
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let least = found.number(&LEAST);
-    for road in map.roads() {
+    for road in map.part(part).roads() {
         for geometry in road.plan_view().geometries() {
             for spiral in geometry.shapes().filter(|shape| shape.is("spiral")) {
                 let (Ok(start), Ok(end)) = (spiral.f64("curvStart"), spiral.f64("curvEnd")) else {

@@ -3,7 +3,7 @@ use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Level, Rule, Sink, Version};
 
 use crate::families::ascending;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_access_elem_asc_order",
@@ -12,14 +12,14 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[ascending::TOLERANCE],
     page: include_str!("road_lane_access_elem_asc_order.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
 /// The first version in which one element holds all restrictions of a place.
 const RESTRICTION_ELEMENTS: Version = Version::new(1, 8);
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let lists_are_legal = found
         .version()
         .is_none_or(|version| version < RESTRICTION_ELEMENTS);
@@ -28,7 +28,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     } else {
         replaced
     };
-    ascending::lane_records(map, "access", equal, found);
+    ascending::lane_records(map.part(part), "access", equal, found);
 }
 
 fn replaced(before: Node<'_>, node: Node<'_>) -> Option<Level> {

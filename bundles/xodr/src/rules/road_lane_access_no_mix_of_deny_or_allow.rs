@@ -2,7 +2,7 @@ use qcbus_opendrive::{LaneRecord, LaneRef, RoadMap};
 use qcbus_sdk::{Backport, Param, Place, Rule, Sink};
 
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 const SAME_PLACE: Param = Param::number(
     "same_place",
@@ -22,12 +22,12 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[SAME_PLACE],
     page: include_str!("road_lane_access_no_mix_of_deny_or_allow.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for lane in map.lanes() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for lane in map.part(part).lanes() {
         let records: Vec<LaneRecord<'_>> = lane.records_named("access").collect();
         for (index, record) in records.iter().enumerate() {
             for before in &records[index.saturating_sub(LOOK_BACK)..index] {

@@ -2,7 +2,7 @@ use qcbus_opendrive::geometry::Cubic;
 use qcbus_opendrive::{Record, RoadMap, SectionRef};
 use qcbus_sdk::{Level, Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_border_exclusive_offset_border",
@@ -13,12 +13,12 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.4.0..",
     after: super::READABLE,
     page: include_str!("road_lane_border_exclusive_offset_border.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         for layer in road.layers() {
             let mut lanes = layer.sections(road).flat_map(SectionRef::lanes);
             let border = lanes.find_map(|lane| lane.elements("border").next());

@@ -2,7 +2,7 @@ use qcbus_opendrive::{RoadMap, Side};
 use qcbus_sdk::{Rule, Sink};
 
 use crate::families::lane_numbers::word;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_border_exclusive_width_border",
@@ -13,12 +13,12 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.4.0..",
     after: super::READABLE,
     page: include_str!("road_lane_border_exclusive_width_border.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for section in map.sections() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for section in map.part(part).sections() {
         for side in Side::BOTH {
             let first = |name: &str| section.side(side).find_map(|lane| lane.node().child(name));
             let (Some(width), Some(border)) = (first("width"), first("border")) else {

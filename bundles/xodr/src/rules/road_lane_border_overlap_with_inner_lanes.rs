@@ -3,7 +3,7 @@ use qcbus_opendrive::{LaneRef, RoadMap, Side, Stretch};
 use qcbus_sdk::{Param, Rule, Sink};
 
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 const TOLERANCE: Param = Param::number(
     "tolerance",
@@ -19,12 +19,12 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_lane_border_overlap_with_inner_lanes.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for section in map.sections() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for section in map.part(part).sections() {
         for side in Side::BOTH {
             // Where a side has widths, its borders do not count.
             if section.has_widths(side) || !section.is_numbered(side) {

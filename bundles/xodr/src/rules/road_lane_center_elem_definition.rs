@@ -2,7 +2,7 @@ use qcbus_document::Node;
 use qcbus_opendrive::{LayerKind, Road, RoadMap, SectionRef};
 use qcbus_sdk::{Level, Rule, Sink, Version};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_center_elem_definition",
@@ -15,7 +15,7 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.4.0..",
     after: super::READABLE,
     page: include_str!("road_lane_center_elem_definition.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
@@ -25,11 +25,11 @@ const CENTER_LANE: &str = "asam.net:xodr:1.9.0:road.lane.center_lane";
 const SINGULAR: &str = "asam.net:xodr:1.9.0:road.lane.center_lane_singular";
 const PERMANENT: &str = "asam.net:xodr:1.9.0:road.lane.layer.center_lane_permanent";
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let is_new = found
         .version()
         .is_some_and(|version| version >= CENTER_LANE_RULES);
-    for road in map.roads() {
+    for road in map.part(part).roads() {
         let mut sections = road.sections().peekable();
         if sections.peek().is_some() && sections.all(|section| section.center().is_none()) {
             no_center_at_all(road, is_new, found);

@@ -1,7 +1,7 @@
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Place, Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_center_lane_id",
@@ -9,12 +9,12 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.4.0..",
     after: super::READABLE,
     page: include_str!("road_lane_center_lane_id.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for lane in map.lanes() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for lane in map.part(part).lanes() {
         let Some(id) = lane.id() else { continue };
         let text = match lane.side() {
             None if id != 0 => format!("the center lane has id {id}; it must have id 0"),

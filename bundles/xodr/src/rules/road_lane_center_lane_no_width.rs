@@ -2,7 +2,7 @@ use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Rule, Sink};
 
 use crate::families::center_lane;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_center_lane_no_width",
@@ -10,12 +10,17 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.4.0..",
     after: super::READABLE,
     page: include_str!("road_lane_center_lane_no_width.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     for element in ["width", "border"] {
-        center_lane::has_no(map, element, "it is a line without any extent", found);
+        center_lane::has_no(
+            map.part(part),
+            element,
+            "it is a line without any extent",
+            found,
+        );
     }
 }

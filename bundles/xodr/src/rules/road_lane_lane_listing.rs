@@ -1,7 +1,7 @@
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Level, Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_lane_listing",
@@ -10,12 +10,12 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.4.0..",
     after: super::READABLE,
     page: include_str!("road_lane_lane_listing.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for section in map.sections() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for section in map.part(part).sections() {
         let numbered = section.lanes().filter_map(|lane| Some((lane.id()?, lane)));
         let lanes: Vec<_> = numbered.collect();
         let rising = lanes.windows(2).find(|pair| pair[1].0 > pair[0].0);

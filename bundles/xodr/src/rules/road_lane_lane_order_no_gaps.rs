@@ -2,7 +2,7 @@ use qcbus_opendrive::{RoadMap, Side};
 use qcbus_sdk::{Place, Rule, Sink};
 
 use crate::families::lane_numbers::{number, outward};
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_lane_order_no_gaps",
@@ -10,12 +10,12 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.4.0..",
     after: super::READABLE,
     page: include_str!("road_lane_lane_order_no_gaps.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for section in map.sections() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for section in map.part(part).sections() {
         for side in Side::BOTH {
             for pair in outward(section, side).windows(2) {
                 let ((inner, inner_lane), (outer, lane)) = (pair[0], pair[1]);

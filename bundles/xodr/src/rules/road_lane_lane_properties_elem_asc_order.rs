@@ -2,7 +2,7 @@ use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Rule, Sink};
 
 use crate::families::ascending;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_lane_properties_elem_asc_order",
@@ -16,11 +16,11 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[ascending::TOLERANCE],
     page: include_str!("road_lane_lane_properties_elem_asc_order.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     for (element, uid) in [
         (
             "width",
@@ -35,6 +35,6 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             "asam.net:xodr:1.4.0:road.lane.height.elem_asc_order",
         ),
     ] {
-        ascending::lane_records_under(map, element, Some(uid), ascending::VOID, found);
+        ascending::lane_records_under(map.part(part), element, Some(uid), ascending::VOID, found);
     }
 }

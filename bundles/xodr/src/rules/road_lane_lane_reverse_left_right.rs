@@ -2,7 +2,7 @@ use qcbus_opendrive::{LaneRef, RoadMap, Side};
 use qcbus_sdk::{Level, Place, Rule, Sink};
 
 use crate::families::on_road::OnRoad;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 /// Types of lane on which traffic runs in one direction.
 const DIRECTED: &[&str] = &[
@@ -25,12 +25,12 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.4.0..",
     after: super::READABLE,
     page: include_str!("road_lane_lane_reverse_left_right.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for section in map.sections() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for section in map.part(part).sections() {
         let directed =
             |lane: &LaneRef<'_, '_>| lane.kind().is_some_and(|kind| DIRECTED.contains(&kind));
         let mut lanes = section.lanes().filter(directed);

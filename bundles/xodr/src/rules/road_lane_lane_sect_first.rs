@@ -1,7 +1,7 @@
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Backport, Param, Place, Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_lane_sect_first",
@@ -11,7 +11,7 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_lane_lane_sect_first.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
@@ -22,9 +22,9 @@ const TOLERANCE: Param = Param::number(
     "largest distance from 0 that is accepted",
 );
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let tolerance = found.number(&TOLERANCE);
-    for road in map.roads() {
+    for road in map.part(part).roads() {
         let first = road
             .permanent()
             .and_then(|layer| layer.in_order(road).next());

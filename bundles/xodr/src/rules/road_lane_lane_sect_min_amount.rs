@@ -1,7 +1,7 @@
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_lane_sect_min_amount",
@@ -12,14 +12,14 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.4.0..",
     after: super::READABLE,
     page: include_str!("road_lane_lane_sect_min_amount.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
 const PER_ROAD: &str = "asam.net:xodr:1.4.0:road.lane_section.lane_sect_req";
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         if road.layers().is_empty() {
             let text = format!(
                 "road `{}` has no `lanes`; each road must have at least one lane section",

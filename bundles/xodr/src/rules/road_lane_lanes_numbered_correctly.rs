@@ -3,7 +3,7 @@ use qcbus_sdk::{Param, Place, Rule, Sink};
 
 use crate::families::lane_numbers::word;
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 const TOLERANCE: Param = Param::number(
     "tolerance",
@@ -19,12 +19,12 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_lane_lanes_numbered_correctly.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for section in map.sections() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for section in map.part(part).sections() {
         // Borders count from the reference line; with an offset, which is not allowed beside them,
         // nobody knows where the center is.
         if section.layer.offset().is_empty() {
@@ -33,7 +33,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             }
         }
     }
-    for lane in map.lanes() {
+    for lane in map.part(part).lanes() {
         let (Some(side), Some(id)) = (lane.side(), lane.id()) else {
             continue;
         };

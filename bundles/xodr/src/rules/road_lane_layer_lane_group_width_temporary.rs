@@ -4,7 +4,7 @@ use qcbus_sdk::{Param, Rule, Sink};
 
 use crate::families::edges::{Piece, border, combine, sum};
 use crate::families::on_road::OnRoad;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 const TOLERANCE: Param = Param::number(
     "tolerance",
@@ -20,12 +20,12 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_lane_layer_lane_group_width_temporary.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         let layers = road.layer(LayerKind::Temporary).zip(road.permanent());
         let Some((temporary, permanent)) = layers else {
             continue;

@@ -1,7 +1,7 @@
 use qcbus_opendrive::{LayerKind, RoadMap};
 use qcbus_sdk::{Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_layer_layer_limits",
@@ -9,12 +9,12 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
     after: super::READABLE,
     page: include_str!("road_lane_layer_layer_limits.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         let of = |kind| {
             road.layers()
                 .iter()

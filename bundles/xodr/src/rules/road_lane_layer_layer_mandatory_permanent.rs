@@ -1,7 +1,7 @@
 use qcbus_opendrive::{RoadMap, SectionRef};
 use qcbus_sdk::{Param, Place, Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_layer_layer_mandatory_permanent",
@@ -10,15 +10,15 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_lane_layer_layer_mandatory_permanent.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
 const TOLERANCE: Param = Param::number("tolerance", 1e-6, "m", "largest gap that is accepted");
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let tolerance = found.number(&TOLERANCE);
-    for road in map.roads() {
+    for road in map.part(part).roads() {
         let Some(layer) = road.permanent() else {
             continue;
         };

@@ -1,7 +1,7 @@
 use qcbus_opendrive::{LayerKind, RoadMap};
 use qcbus_sdk::{Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_layer_length_only_temporary",
@@ -9,12 +9,12 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
     after: super::READABLE,
     page: include_str!("road_lane_layer_length_only_temporary.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for section in map.sections() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for section in map.part(part).sections() {
         if section.layer.kind() != LayerKind::Permanent {
             continue;
         }

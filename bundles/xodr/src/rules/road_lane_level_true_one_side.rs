@@ -2,7 +2,7 @@ use qcbus_opendrive::{LaneJoint, LaneRef, RoadMap, SectionRef, Side};
 use qcbus_sdk::{Backport, Level, Place, Rule, Sink};
 
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_level_true_one_side",
@@ -11,16 +11,20 @@ pub static RULE: Rule<Roads> = Rule {
     backport: Backport::Separate { since: "" },
     after: super::READABLE,
     page: include_str!("road_lane_level_true_one_side.md"),
+    each: Some(each),
     run,
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for section in map.sections() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for section in map.part(part).sections() {
         for side in Side::BOTH {
             outward(section, side, found);
         }
     }
+}
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     for joint in map.lane_joints() {
         along(map, joint, found);
     }

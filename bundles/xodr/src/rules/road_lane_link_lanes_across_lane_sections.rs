@@ -5,7 +5,7 @@ use qcbus_sdk::{Level, Param, Rule, Sink};
 
 use crate::families::driving::is_drivable;
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 const OVERLAP: Param = Param::number(
     "overlap",
@@ -31,13 +31,13 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[OVERLAP],
     page: include_str!("road_lane_link_lanes_across_lane_sections.md"),
+    each: Some(each),
     run,
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    not_returned(map, found);
-    for section in map.sections() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for section in map.part(part).sections() {
         for side in Side::BOTH {
             not_linked_at_all(section, side, found);
         }
@@ -89,7 +89,7 @@ fn overlap(one: &LaneSpan<'_, '_>, other: &LaneSpan<'_, '_>) -> f64 {
     (high.min(to) - low.max(from)) / narrower
 }
 
-fn not_returned(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     for joint in map
         .lane_joints()
         .iter()

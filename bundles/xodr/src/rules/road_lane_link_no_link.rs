@@ -1,7 +1,7 @@
 use qcbus_opendrive::{ContactPoint, Junction, JunctionType, Road, RoadEnd, RoadMap, Side};
 use qcbus_sdk::{Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_link_no_link",
@@ -9,12 +9,12 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.4.0..",
     after: super::READABLE,
     page: include_str!("road_lane_link_no_link.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         for end in ContactPoint::BOTH {
             if let Some(why) = nothing_to_link(map, road, end) {
                 check(road, end, &why, found);

@@ -4,7 +4,7 @@ use qcbus_sdk::{Rule, Sink};
 use crate::families::driving::is_drivable;
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::zero_stretches::NO_WIDTH;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_link_temporary_layer_section_link_permanent",
@@ -12,12 +12,12 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
     after: super::READABLE,
     page: include_str!("road_lane_link_temporary_layer_section_link_permanent.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         let Some(layer) = road.layer(LayerKind::Temporary) else {
             continue;
         };

@@ -2,7 +2,7 @@ use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Rule, Sink};
 
 use crate::families::center_lane;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_material_center_lane_no_material",
@@ -10,13 +10,13 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.4.0..",
     after: super::READABLE,
     page: include_str!("road_lane_material_center_lane_no_material.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     center_lane::has_no(
-        map,
+        map.part(part),
         "material",
         "it has no area; materials belong to the lanes beside it",
         found,

@@ -2,7 +2,7 @@ use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Rule, Sink};
 
 use crate::families::ascending;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_road_mark_elem_asc_order",
@@ -11,10 +11,10 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[ascending::TOLERANCE],
     page: include_str!("road_lane_road_mark_elem_asc_order.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    ascending::lane_records(map, "roadMark", ascending::PARALLEL, found);
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    ascending::lane_records(map.part(part), "roadMark", ascending::PARALLEL, found);
 }

@@ -2,7 +2,7 @@ use qcbus_opendrive::{LaneRecord, LaneRef, RoadMap};
 use qcbus_sdk::{Backport, Level, Rule, Sink};
 
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_road_mark_only_outer",
@@ -12,12 +12,12 @@ pub static RULE: Rule<Roads> = Rule {
     backport: Backport::Lower { since: "" },
     after: super::READABLE,
     page: include_str!("road_lane_road_mark_only_outer.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for lane in map.lanes().filter(|lane| lane.side().is_some()) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for lane in map.part(part).lanes().filter(|lane| lane.side().is_some()) {
         for mark in lane.records_named("roadMark") {
             check(lane, &mark, found);
         }

@@ -5,7 +5,7 @@ use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
 
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::zero_stretches::zero_stretches;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 const LENGTH: Param = Param::number(
     "length",
@@ -23,12 +23,12 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[LENGTH],
     page: include_str!("road_lane_section_lane_long_zero_width.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         let Some(layer) = road.permanent() else {
             continue;
         };

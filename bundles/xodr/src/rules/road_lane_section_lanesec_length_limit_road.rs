@@ -1,7 +1,7 @@
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Param, Place, Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_section_lanesec_length_limit_road",
@@ -10,7 +10,7 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_lane_section_lanesec_length_limit_road.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
@@ -21,9 +21,9 @@ const TOLERANCE: Param = Param::number(
     "how far beyond the end of the road is accepted",
 );
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let tolerance = found.number(&TOLERANCE);
-    for section in map.sections() {
+    for section in map.part(part).sections() {
         let length = section.node().f64("length").ok();
         let (Some(s), Some(length)) = (section.s(), length.filter(|length| length.is_finite()))
         else {

@@ -3,7 +3,7 @@ use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::zero_stretches::zero_stretches;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_section_lanesec_usage_lane_num",
@@ -12,12 +12,12 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.4.0..",
     after: super::READABLE,
     page: include_str!("road_lane_section_lanesec_usage_lane_num.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for lane in map.lanes() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for lane in map.part(part).lanes() {
         let Some((zero, length)) = zero_stretches(lane).zip(lane.length()) else {
             continue;
         };

@@ -1,7 +1,7 @@
 use qcbus_opendrive::{ContactPoint, LayerKind, RoadMap, SectionRef, Side};
 use qcbus_sdk::{Param, Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_section_new_lanesec_link_temp_to_perm",
@@ -10,7 +10,7 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_lane_section_new_lanesec_link_temp_to_perm.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
@@ -21,8 +21,8 @@ const TOLERANCE: Param = Param::number(
     "largest distance between link and start of a section",
 );
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         let Some(permanent) = road.permanent() else {
             continue;
         };

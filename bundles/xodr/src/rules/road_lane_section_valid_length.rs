@@ -1,7 +1,7 @@
 use qcbus_opendrive::{RoadMap, SectionRef, Side};
 use qcbus_sdk::{Level, Param, Place, Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_section_valid_length",
@@ -10,17 +10,17 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[LEAST, SHORT],
     page: include_str!("road_lane_section_valid_length.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
 const LEAST: Param = Param::number("least", 1e-6, "m", "a length up to this counts as none");
 const SHORT: Param = Param::number("short", 0.01, "m", "a length up to this is a warning");
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let least = found.number(&LEAST);
     let short = found.number(&SHORT);
-    for section in map.sections() {
+    for section in map.part(part).sections() {
         // One finding per section, although both sides may say the same.
         let mut sides = Side::BOTH.into_iter().filter(|side| section.covers(*side));
         let bad = sides.find_map(|side| {

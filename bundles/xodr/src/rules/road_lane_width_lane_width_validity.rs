@@ -2,7 +2,7 @@ use qcbus_opendrive::{LaneRef, RoadMap, Stretch};
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 const TOLERANCE: Param = Param::number(
     "tolerance",
@@ -21,12 +21,12 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_lane_width_lane_width_validity.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for lane in map.lanes() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for lane in map.part(part).lanes() {
         let Some(length) = lane.length() else {
             continue;
         };

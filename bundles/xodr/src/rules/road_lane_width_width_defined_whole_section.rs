@@ -1,7 +1,7 @@
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Backport, Param, Place, Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_width_width_defined_whole_section",
@@ -11,7 +11,7 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_lane_width_width_defined_whole_section.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
@@ -22,9 +22,9 @@ const TOLERANCE: Param = Param::number(
     "largest sOffset of the first record that is accepted",
 );
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let tolerance = found.number(&TOLERANCE);
-    for lane in map.lanes() {
+    for lane in map.part(part).lanes() {
         let (Some(_), Some(id)) = (lane.side(), lane.id_text()) else {
             continue;
         };

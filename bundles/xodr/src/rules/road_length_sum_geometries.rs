@@ -1,7 +1,7 @@
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_length_sum_geometries",
@@ -12,7 +12,7 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_length_sum_geometries.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
@@ -25,9 +25,9 @@ const TOLERANCE: Param = Param::number(
 /// What a sum of lengths written with few digits may be off, as a share of it.
 const RELATIVE: f64 = 1e-6;
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let tolerance = found.number(&TOLERANCE);
-    for road in map.roads() {
+    for road in map.part(part).roads() {
         let geometries = road.plan_view().geometries();
         let sum: Option<f64> = geometries.iter().map(|geometry| geometry.length()).sum();
         let (Some(length), Some(sum)) = (road.length(), sum.filter(|_| !geometries.is_empty()))

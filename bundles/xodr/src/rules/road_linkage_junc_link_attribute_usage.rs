@@ -1,7 +1,7 @@
 use qcbus_opendrive::{ContactPoint, Junction, JunctionType, RoadLink, RoadMap};
 use qcbus_sdk::{Backport, Level, Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_linkage_junc_link_attribute_usage",
@@ -10,12 +10,12 @@ pub static RULE: Rule<Roads> = Rule {
     backport: Backport::Lower { since: "1.4.0" },
     after: super::READABLE,
     page: include_str!("road_linkage_junc_link_attribute_usage.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         for link in ContactPoint::BOTH
             .into_iter()
             .filter_map(|end| road.link(end))

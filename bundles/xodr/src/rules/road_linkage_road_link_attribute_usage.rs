@@ -2,7 +2,7 @@ use qcbus_opendrive::{ContactPoint, RoadLink, RoadMap};
 use qcbus_sdk::{Rule, Sink};
 
 use crate::families::virtual_links;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_linkage_road_link_attribute_usage",
@@ -10,12 +10,12 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.4.0..",
     after: super::READABLE,
     page: include_str!("road_linkage_road_link_attribute_usage.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         for end in ContactPoint::BOTH {
             let Some(link) = road.link(end) else { continue };
             let missing = missing(link);

@@ -2,7 +2,7 @@ use qcbus_opendrive::{ContactPoint, JunctionType, Road, RoadLink, RoadMap};
 use qcbus_sdk::{Backport, Param, Place, Rule, Sink};
 
 use crate::families::virtual_links;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_linkage_virtjunc_link_attribute_usage",
@@ -12,7 +12,7 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_linkage_virtjunc_link_attribute_usage.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
@@ -26,8 +26,8 @@ const TOLERANCE: Param = Param::number(
 const DEMAND: &str = "a link into the middle of a main road must have `elementType`, `elementId`, `elementS` and \
                       `elementDir`";
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         for link in ContactPoint::BOTH
             .into_iter()
             .filter_map(|end| road.link(end))

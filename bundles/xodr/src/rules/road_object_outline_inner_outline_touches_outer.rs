@@ -5,7 +5,7 @@ use qcbus_sdk::{Backport, Param, Rule, Sink};
 use crate::families::object_frame::ObjectFrame;
 use crate::families::on_road::OnRoad;
 use crate::families::polygons::{contains, distance_to_boundary};
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 const TOUCH: Param = Param::number(
     "touch",
@@ -28,12 +28,12 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[TOUCH],
     page: include_str!("road_object_outline_inner_outline_touches_outer.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for (road, object) in map.objects() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for (road, object) in map.part(part).objects() {
         let (inner, outer): (Vec<_>, Vec<_>) = object
             .outlines()
             .partition(|outline| outline.outer() == Some(false));

@@ -2,7 +2,7 @@ use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Backport, Level, Rule, Sink};
 
 use crate::families::object_frame::{ObjectFrame, TOLERANCE, report_too_large};
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_object_outline_points_inside_box",
@@ -13,12 +13,12 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_object_outline_points_inside_box.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for (road, object) in map.objects() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for (road, object) in map.part(part).objects() {
         let Some(frame) = ObjectFrame::of(road, &object) else {
             continue;
         };

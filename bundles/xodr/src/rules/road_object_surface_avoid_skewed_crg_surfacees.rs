@@ -2,7 +2,7 @@ use qcbus_opendrive::{Road, RoadMap};
 use qcbus_sdk::{Backport, Level, Place, Rule, Sink};
 
 use crate::families::on_road::OnRoad;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_object_surface_avoid_skewed_crg_surfacees",
@@ -12,12 +12,12 @@ pub static RULE: Rule<Roads> = Rule {
     backport: Backport::Lower { since: "1.7.0" },
     after: super::READABLE,
     page: include_str!("road_object_surface_avoid_skewed_crg_surfacees.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for (road, object) in map.objects() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for (road, object) in map.part(part).objects() {
         let has_surface = object.crgs().next().is_some();
         let sizes = object.length().zip(object.width());
         let (Some((length, width)), Some(s)) = (sizes, object.s()) else {

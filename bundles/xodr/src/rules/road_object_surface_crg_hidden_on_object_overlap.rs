@@ -2,7 +2,7 @@ use qcbus_opendrive::{Crg, Object, Road, RoadMap};
 use qcbus_sdk::{Place, Rule, Sink};
 
 use crate::families::on_road::OnRoad;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_object_surface_crg_hidden_on_object_overlap",
@@ -10,12 +10,13 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     after: super::READABLE,
     page: include_str!("road_object_surface_crg_hidden_on_object_overlap.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     for road in map
+        .part(part)
         .roads()
         .iter()
         .filter(|road| road.surface_node().is_some())

@@ -1,7 +1,7 @@
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Backport, Place, Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_railroad_one_rail_per_road",
@@ -10,12 +10,12 @@ pub static RULE: Rule<Roads> = Rule {
     backport: Backport::Lower { since: "" },
     after: super::READABLE,
     page: include_str!("road_railroad_one_rail_per_road.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for section in map.sections() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for section in map.part(part).sections() {
         let mut rails = section
             .lanes()
             .filter(|lane| matches!(lane.kind(), Some("tram" | "rail")));

@@ -4,7 +4,7 @@ use qcbus_sdk::{Level, Param, Place, Rule, Sink};
 
 use crate::families::ascending;
 use crate::families::object_parts::{named, number};
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_records_within_extent",
@@ -13,7 +13,7 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_records_within_extent.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
@@ -25,14 +25,14 @@ const LANE_RECORDS: [&str; 8] = [
     "width", "border", "height", "roadMark", "material", "speed", "access", "rule",
 ];
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let tolerance = found.number(&TOLERANCE);
     let written = |name: &&str| {
         let document = map.root().map(|root| root.document());
         document.is_some_and(|document| document.elements(name).next().is_some())
     };
     let lane_records: Vec<&'static str> = LANE_RECORDS.iter().copied().filter(written).collect();
-    for road in map.roads() {
+    for road in map.part(part).roads() {
         let Some(length) = road.length() else {
             continue;
         };

@@ -3,7 +3,7 @@ use qcbus_opendrive::{Road, RoadMap};
 use qcbus_sdk::{Level, Place, Rule, Sink};
 
 use crate::families::ascending::TOLERANCE;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_shape_elem_asc_order",
@@ -12,12 +12,12 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_shape_elem_asc_order.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         if let Some(lateral) = road.lateral_node() {
             check(road, lateral, found);
         }

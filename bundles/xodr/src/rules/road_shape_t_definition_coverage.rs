@@ -4,7 +4,7 @@ use qcbus_sdk::{Param, Place, Rule, Sink, Version};
 
 use crate::families::edges::border;
 use crate::families::on_road::OnRoad;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 const TOLERANCE: Param = Param::number(
     "tolerance",
@@ -25,12 +25,13 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_shape_t_definition_coverage.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     for road in map
+        .part(part)
         .roads()
         .iter()
         .filter(|road| !road.lateral().shape.is_empty())

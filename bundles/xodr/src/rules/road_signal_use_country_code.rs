@@ -3,7 +3,7 @@ use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Level, Place, Rule, Sink};
 
 use crate::families::object_parts::{Stands, below, is_blank, named, owner};
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_signal_use_country_code",
@@ -12,12 +12,13 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     after: super::READABLE,
     page: include_str!("road_signal_use_country_code.md"),
+    each: Some(each),
     run,
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         let signals: Vec<Node<'_>> = road.signals().map(|signal| signal.node()).collect();
         let lacking: Vec<Node<'_>> = signals
             .iter()
@@ -39,6 +40,9 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             report(map, node, found);
         }
     }
+}
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     for sign in below(map, "sign", "staticBoard").filter(|sign| lacks(*sign)) {
         report(map, sign, found);
     }

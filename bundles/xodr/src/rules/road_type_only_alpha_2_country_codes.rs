@@ -1,7 +1,7 @@
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Backport, Rule, Sink};
 
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_type_only_alpha_2_country_codes",
@@ -10,7 +10,7 @@ pub static RULE: Rule<Roads> = Rule {
     backport: Backport::Lower { since: "1.4.0" },
     after: super::READABLE,
     page: include_str!("road_type_only_alpha_2_country_codes.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
@@ -78,8 +78,8 @@ const ALPHA_2: &[(&str, &str)] = &[
     ("Switzerland", "CH"),
 ];
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for road in map.roads() {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
         for record in road.types() {
             let Some(country) = record.node().attribute("country") else {
                 continue;

@@ -1,0 +1,91 @@
+//! A few roads of a map at a time.
+
+use std::ops::Range;
+
+use crate::lane_ref::LaneRef;
+use crate::map::RoadMap;
+use crate::objects::Object;
+use crate::road::Road;
+use crate::section_ref::SectionRef;
+use crate::signals::Signal;
+
+/// How many bytes of the file a part holds, if it has more than one road: so many that the image
+/// and the model of them stay in a processor's second cache (1 MiB and less) while rules look at
+/// them one after the other. Of 32 KiB to 1 MiB this was the quickest; in builds with debug
+/// assertions every road is a part of its own, so that tests notice what a rule overlooks.
+const PART: u32 = if cfg!(debug_assertions) {
+    1
+} else {
+    128 * 1024
+};
+
+/// Some roads that follow each other in a map.
+///
+/// What lies in them goes by the names that it has in [`RoadMap`]; what they refer to is found in
+/// the whole [`map`](MapPart::map).
+#[derive(Debug, Clone, Copy)]
+pub struct MapPart<'m, 'a> {
+    map: &'m RoadMap<'a>,
+    roads: &'m [Road<'a>],
+}
+
+impl<'a> RoadMap<'a> {
+    /// The places of all roads, in parts of a size that is quick to go through several times.
+    pub fn parts(&self) -> impl Iterator<Item = Range<usize>> {
+        let mut next = 0;
+        std::iter::from_fn(move || {
+            let rest = self.roads().get(next..)?;
+            let begin = rest.first()?.node().offset();
+            let fills = |road: &Road<'a>| road.node().end_offset().saturating_sub(begin) >= PART;
+            let count = rest.iter().position(fills).map_or(rest.len(), |at| at + 1);
+            let part = next..next + count;
+            next = part.end;
+            Some(part)
+        })
+    }
+
+    /// The roads at these places.
+    #[inline]
+    pub fn part(&self, places: &Range<usize>) -> MapPart<'_, 'a> {
+        let roads = self.roads().get(places.clone()).unwrap_or(&[]);
+        MapPart { map: self, roads }
+    }
+}
+
+impl<'m, 'a> MapPart<'m, 'a> {
+    /// The map that it is a part of.
+    #[inline]
+    pub fn map(self) -> &'m RoadMap<'a> {
+        self.map
+    }
+
+    /// The roads in document order.
+    #[inline]
+    pub fn roads(self) -> &'m [Road<'a>] {
+        self.roads
+    }
+
+    /// The lane sections of these roads, in document order.
+    #[inline]
+    pub fn sections(self) -> impl Iterator<Item = SectionRef<'m, 'a>> {
+        self.roads.iter().flat_map(Road::sections)
+    }
+
+    /// The lanes of these roads, in document order.
+    #[inline]
+    pub fn lanes(self) -> impl Iterator<Item = LaneRef<'m, 'a>> {
+        self.sections().flat_map(SectionRef::lanes)
+    }
+
+    /// The objects of these roads with their road, in document order.
+    pub fn objects(self) -> impl Iterator<Item = (&'m Road<'a>, Object<'a>)> {
+        let of = |road: &'m Road<'a>| road.objects().map(move |object| (road, object));
+        self.roads.iter().flat_map(of)
+    }
+
+    /// The signals of these roads with their road, in document order.
+    pub fn signals(self) -> impl Iterator<Item = (&'m Road<'a>, Signal<'a>)> {
+        let of = |road: &'m Road<'a>| road.signals().map(move |signal| (road, signal));
+        self.roads.iter().flat_map(of)
+    }
+}

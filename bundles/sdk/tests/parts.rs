@@ -1,0 +1,178 @@
+//! Rules that look at one part of a model after the other.
+
+#![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+
+use std::path::Path;
+
+use qcbus_document::{FileKind, Node};
+use qcbus_formats::xqar::{Issue, Status};
+use qcbus_sdk::{
+    AnyRule, Bundle, Listener, Loaded, Model, Outcome, Plan, Rule, Sink, Skip, Subject, Version,
+    basic, check,
+};
+
+/// The roads of a file, each of which is a part.
+struct Roads;
+
+impl Model for Roads {
+    type Of<'d> = Vec<Node<'d>>;
+    type Part = usize;
+
+    fn build<'d>(subject: &'d Subject<'d>) -> Result<Vec<Node<'d>>, Skip> {
+        Ok(subject.root().elements("road").collect())
+    }
+
+    fn parts(roads: &Vec<Node<'_>>) -> Vec<usize> {
+        (0..roads.len()).collect()
+    }
+}
+
+static FINDS: Rule<Roads> = Rule {
+    id: "finds",
+    uids: &["x:xodr:1.0.0:a.a"],
+    each: Some(report),
+    run: |_, found| found.fact("seen", found.count().to_string(), "roads before the whole"),
+    ..Rule::DEFAULTS
+};
+static PANICS: Rule<Roads> = Rule {
+    id: "panics",
+    uids: &["x:xodr:1.0.0:a.b"],
+    each: Some(|roads, part, found| {
+        report(roads, part, found);
+        assert!(*part != 1, "on purpose");
+    }),
+    ..Rule::DEFAULTS
+};
+static WHOLE: Rule<Roads> = Rule {
+    id: "whole",
+    uids: &["x:xodr:1.0.0:a.c"],
+    run: |roads, found| found.fact("all", roads.len().to_string(), "roads"),
+    ..Rule::DEFAULTS
+};
+static AFTER_CLEAN: Rule<Roads> = Rule {
+    id: "after_clean",
+    uids: &["x:xodr:1.0.0:a.d"],
+    after: &["whole"],
+    each: Some(report),
+    ..Rule::DEFAULTS
+};
+static AFTER_ERRORS: Rule<Roads> = Rule {
+    id: "after_errors",
+    uids: &["x:xodr:1.0.0:a.e"],
+    after: &["finds"],
+    each: Some(report),
+    ..Rule::DEFAULTS
+};
+
+fn report(roads: &Vec<Node<'_>>, part: &usize, found: &mut Sink<'_>) {
+    found.issue(roads[*part], format!("road {part}"));
+}
+
+static BUNDLE: Bundle = Bundle {
+    name: "testBundle",
+    alias: "test",
+    version: "0",
+    description: "rules for tests",
+    standard: "OpenDRIVE",
+    kinds: &[FileKind::Xodr],
+    versions: &[Version::new(1, 4)],
+    version_of: |document| basic::version_of(document, "header"),
+    rules: &[
+        &FINDS as &dyn AnyRule,
+        &PANICS,
+        &WHOLE,
+        &AFTER_CLEAN,
+        &AFTER_ERRORS,
+    ],
+    templates: &[],
+};
+
+/// What was heard: who began in which order, and how each ended.
+#[derive(Default)]
+struct Heard {
+    begun: Vec<usize>,
+    ended: Vec<(usize, Vec<Issue>, Outcome)>,
+    /// Cancel before this many have begun.
+    patience: Option<usize>,
+}
+
+impl Listener for Heard {
+    fn is_cancelled(&mut self) -> bool {
+        self.patience.is_some_and(|most| self.begun.len() >= most)
+    }
+
+    fn begins(&mut self, checker: usize) {
+        self.begun.push(checker);
+    }
+
+    fn ended(&mut self, checker: usize, issues: Vec<Issue>, outcome: Outcome) {
+        self.ended.push((checker, issues, outcome));
+    }
+}
+
+fn heard(patience: Option<usize>) -> (bool, Heard) {
+    let map = "<OpenDRIVE><header revMajor='1' revMinor='4'/>\n<road/><road/><road/></OpenDRIVE>";
+    let loaded = Loaded::from_bytes(Path::new("a.xodr"), map.as_bytes().to_vec()).unwrap();
+    let subject = loaded.subject(&BUNDLE).unwrap();
+    let mut heard = Heard {
+        patience,
+        ..Heard::default()
+    };
+    let complete = check(&Plan::by_default(&BUNDLE), &subject, &mut heard);
+    (complete, heard)
+}
+
+fn texts(issues: &[Issue]) -> Vec<&str> {
+    issues
+        .iter()
+        .map(|issue| issue.description.as_str())
+        .collect()
+}
+
+#[test]
+fn rules_look_at_a_part_in_turn_and_then_at_the_whole() {
+    let (complete, heard) = heard(None);
+    assert!(complete);
+    let parts = [[0, 1].as_slice(), &[0, 1], &[0]].concat();
+    let whole = [0, 1, 2];
+    let dependent = [3, 3, 3, 3];
+    assert_eq!(heard.begun, [parts.as_slice(), &whole, &dependent].concat());
+    let order: Vec<usize> = heard.ended.iter().map(|(checker, ..)| *checker).collect();
+    assert_eq!(order, [0, 1, 2, 4, 3]);
+    let (_, issues, outcome) = &heard.ended[0];
+    assert_eq!(texts(issues), ["road 0", "road 1", "road 2"]);
+    assert_eq!(outcome.metadata[0].value, "3", "the whole comes last");
+}
+
+#[test]
+fn who_panics_at_a_part_is_not_asked_again_and_keeps_what_was_found() {
+    let (_, heard) = heard(None);
+    let (_, issues, outcome) = &heard.ended[1];
+    assert_eq!(outcome.status, Status::Error);
+    assert!(outcome.reason.contains("on purpose"), "{}", outcome.reason);
+    assert_eq!(texts(issues), ["road 0", "road 1"]);
+}
+
+#[test]
+fn preconditions_end_before_what_depends_on_them_begins() {
+    let (_, heard) = heard(None);
+    let of = |wanted: usize| {
+        let mut all = heard.ended.iter();
+        all.find(|(checker, ..)| *checker == wanted).unwrap()
+    };
+    assert_eq!(of(4).2.status, Status::Skipped);
+    assert_eq!(of(4).2.reason, "`finds` found errors");
+    assert_eq!(of(3).2.status, Status::Completed);
+    assert_eq!(of(3).1.len(), 3);
+}
+
+#[test]
+fn a_check_can_be_cancelled_between_parts() {
+    let (complete, heard) = heard(Some(2));
+    assert!(!complete);
+    assert_eq!(heard.begun, [0, 1], "one part and no more");
+    assert!(
+        heard.ended.is_empty(),
+        "what is not at its end is not reported"
+    );
+}
