@@ -4,7 +4,6 @@ use std::sync::OnceLock;
 
 use qcbus_document::Node;
 
-use crate::lane_ref::Edge;
 use crate::names::{Name, Names};
 use crate::profile::Profile;
 use crate::steps::{Place, Starts, Steps};
@@ -56,11 +55,45 @@ pub struct Lane<'a> {
     kind: Option<&'a str>,
     level: Option<bool>,
     link: Option<Node<'a>>,
+    /// What it is linked to at its start and at its end.
+    linked: [Linked<'a>; 2],
     /// Which elements it has, by [`Name::bit`].
-    has: u16,
+    has: u32,
     records: OnceLock<Box<LaneRecords<'a>>>,
     /// Its borders at the start and at the end, once somebody has asked.
     borders: [OnceLock<Box<Borders>>; 2],
+}
+
+/// The links of a lane at an end, of which there mostly is one at most.
+#[derive(Debug, Clone, Copy, Default)]
+enum Linked<'a> {
+    #[default]
+    Nowhere,
+    Once(Node<'a>),
+    /// They are looked up when somebody asks.
+    Several,
+}
+
+impl<'a> Linked<'a> {
+    fn with(self, link: Node<'a>) -> Linked<'a> {
+        match self {
+            Linked::Nowhere => Linked::Once(link),
+            Linked::Once(_) | Linked::Several => Linked::Several,
+        }
+    }
+
+    fn read(link: Node<'a>, names: &Names) -> [Linked<'a>; 2] {
+        let mut linked = [Linked::Nowhere; 2];
+        for child in link.children() {
+            let slot = match names.name(child) {
+                Name::Predecessor => &mut linked[0],
+                Name::Successor => &mut linked[1],
+                _ => continue,
+            };
+            *slot = slot.with(child);
+        }
+        linked
+    }
 }
 
 /// The inner and the outer border of a lane at an end.
@@ -103,6 +136,7 @@ impl<'a> Lane<'a> {
             kind,
             level: level.map_or(Some(false), parse_flag),
             link,
+            linked: link.map_or_else(Default::default, |link| Linked::read(link, names)),
             has,
             records: OnceLock::new(),
             borders: [OnceLock::new(), OnceLock::new()],
@@ -169,10 +203,18 @@ impl<'a> Lane<'a> {
     /// The linked lanes at an end: `<predecessor>` or `<successor>` elements, of any number.
     #[inline]
     pub fn links(&self, end: ContactPoint) -> impl Iterator<Item = LaneLink<'a>> + use<'a> {
-        let links = self.link_node().into_iter();
-        links
-            .flat_map(move |link| link.children_named(end.link_name()))
-            .map(LaneLink::of)
+        let linked = match end {
+            ContactPoint::Start => self.linked[0],
+            ContactPoint::End => self.linked[1],
+        };
+        let (once, several) = match linked {
+            Linked::Nowhere => (None, None),
+            Linked::Once(link) => (Some(link), None),
+            Linked::Several => (None, self.link),
+        };
+        let several = several.into_iter();
+        let several = several.flat_map(move |link| link.children_named(end.link_name()));
+        once.into_iter().chain(several).map(LaneLink::of)
     }
 
     #[inline]
@@ -222,16 +264,12 @@ impl<'a> Lane<'a> {
     }
 
     /// Its borders at an end, as `find` finds them when it is asked for the first time.
-    pub(crate) fn borders_or(
-        &self,
-        end: ContactPoint,
-        find: impl Fn(Edge) -> Option<BorderPoint>,
-    ) -> &Borders {
+    pub(crate) fn borders_or(&self, end: ContactPoint, find: impl FnOnce() -> Borders) -> &Borders {
         let slot = match end {
             ContactPoint::Start => &self.borders[0],
             ContactPoint::End => &self.borders[1],
         };
-        slot.get_or_init(|| Box::new(Edge::BOTH.map(find)))
+        slot.get_or_init(|| Box::new(find()))
     }
 
     /// How far the height record that is valid at `ds` lifts the lane's borders above the road

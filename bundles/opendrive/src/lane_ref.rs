@@ -147,12 +147,14 @@ impl<'m, 'a> LaneRef<'m, 'a> {
     /// t of a border at `ds` metres from the section's start; `None` when a width further in is
     /// not defined or the ids do not tell the order of the lanes.
     pub fn t(self, edge: Edge, ds: impl Into<Place>) -> Option<f64> {
-        self.sum(
+        let center = |section: SectionRef<'m, 'a>, place| section.center_t(place).map(|t| [t]);
+        let [t] = self.sum(
             edge,
             ds.into(),
-            |profile, place| profile.at(place),
-            |section, place| section.center_t(place),
-        )
+            |profile, at| Some([profile.at(at)?]),
+            center,
+        )?;
+        Some(t)
     }
 
     /// t of the inner border.
@@ -167,25 +169,28 @@ impl<'m, 'a> LaneRef<'m, 'a> {
 
     /// The slope dt/ds of a border.
     pub fn t_slope(self, edge: Edge, ds: impl Into<Place>) -> Option<f64> {
-        self.sum(
-            edge,
-            ds.into(),
-            |profile, place| profile.slope_at(place),
-            |section, place| {
-                let offset = section.layer.offset();
-                offset.slope_or_zero(place.shifted(section.s()?))
-            },
-        )
+        let part = |profile: &Profile<'a>, place| Some([profile.slope_at(place)?]);
+        let [slope] = self.sum(edge, ds.into(), part, |section, place| {
+            Some([section.center_slope(place)?])
+        })?;
+        Some(slope)
+    }
+
+    /// t of a border and its slope dt/ds.
+    pub(crate) fn t_and_slope(self, edge: Edge, ds: Place) -> Option<[f64; 2]> {
+        self.sum(edge, ds, Profile::both_at, |section, place| {
+            Some([section.center_t(place)?, section.center_slope(place)?])
+        })
     }
 
     /// Adds up what `part` takes from the profiles from the center to this lane's border.
-    fn sum(
+    fn sum<const N: usize>(
         self,
         edge: Edge,
         ds: Place,
-        part: impl Fn(&Profile<'a>, Place) -> Option<f64>,
-        center: impl Fn(SectionRef<'m, 'a>, Place) -> Option<f64>,
-    ) -> Option<f64> {
+        part: impl Fn(&Profile<'a>, Place) -> Option<[f64; N]>,
+        center: impl Fn(SectionRef<'m, 'a>, Place) -> Option<[f64; N]>,
+    ) -> Option<[f64; N]> {
         let Some(side) = self.side() else {
             return center(self.at, ds);
         };
@@ -201,11 +206,13 @@ impl<'m, 'a> LaneRef<'m, 'a> {
             let lane = self.at.side(side).nth(count - 1)?;
             return part(lane.borders(), ds);
         }
-        let mut t = center(self.at, ds)?;
+        let mut sum = center(self.at, ds)?;
         for lane in self.at.side(side).take(count) {
-            t += side.sign() * part(lane.widths(), ds)?;
+            for (sum, more) in sum.iter_mut().zip(part(lane.widths(), ds)?) {
+                *sum += side.sign() * more;
+            }
         }
-        finite(t)
+        sum.iter().all(|value| value.is_finite()).then_some(sum)
     }
 
     /// The next lane towards the center on the same side; `None` for the innermost one.

@@ -22,6 +22,8 @@ pub(crate) enum Name {
     Access,
     Rule,
     UserData,
+    Predecessor,
+    Successor,
 }
 
 impl Name {
@@ -42,17 +44,19 @@ impl Name {
             "access" => Name::Access,
             "rule" => Name::Rule,
             "userData" => Name::UserData,
+            "predecessor" => Name::Predecessor,
+            "successor" => Name::Successor,
             _ => Name::Other,
         }
     }
 
     /// Its place in a set of names.
-    pub(crate) fn bit(self) -> u16 {
-        1 << (self as u16)
+    pub(crate) fn bit(self) -> u32 {
+        1 << (self as u32)
     }
 
     /// The set that has only this name; the one of all others when it is not listed above.
-    pub(crate) fn bit_of(name: &str) -> u16 {
+    pub(crate) fn bit_of(name: &str) -> u32 {
         Name::of(name).bit()
     }
 }

@@ -152,6 +152,13 @@ impl<'a> Profile<'a> {
         finite(valid.cubic.slope(valid.ds))
     }
 
+    /// The value and the slope at a place; see [`Profile::valid_at`].
+    pub(crate) fn both_at(&self, place: Place) -> Option<[f64; 2]> {
+        let valid = self.valid_at(place)?;
+        let (ds, cubic) = (valid.ds, valid.cubic);
+        Some([cubic.eval(ds)?, finite(cubic.slope(ds))?])
+    }
+
     /// The value at a place, and zero where the profile does not say anything: without records
     /// and before the first one, as for elevation, superelevation and lane offset.
     #[inline]

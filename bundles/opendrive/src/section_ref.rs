@@ -121,6 +121,11 @@ impl<'m, 'a> SectionRef<'m, 'a> {
         self.layer.offset().at_or_zero(ds.into().shifted(self.s()?))
     }
 
+    /// The slope dt/ds of the center lane at `ds`.
+    pub(crate) fn center_slope(self, ds: Place) -> Option<f64> {
+        self.layer.offset().slope_or_zero(ds.shifted(self.s()?))
+    }
+
     /// The cross section of a side at `ds` metres from the section's start: each lane with t of
     /// its inner and its outer border, from the center outward, as far as they are defined.
     pub fn spans(self, side: Side, ds: impl Into<Place>) -> Vec<LaneSpan<'m, 'a>> {

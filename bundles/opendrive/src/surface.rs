@@ -27,8 +27,17 @@ impl Frame {
     /// How far a place with these t and h lies to the left of the reference line in the plan
     /// view, and how high above it, in metres: t and h turn with the superelevation (8.3).
     pub fn tilted(&self, t: f64, h: f64) -> (f64, f64) {
-        let (sin, cos) = self.roll.sin_cos();
+        let (sin, cos) = self.tilt();
         (t * cos - h * sin, t * sin + h * cos)
+    }
+
+    /// Sine and cosine of the superelevation, which most roads do not have.
+    fn tilt(&self) -> (f64, f64) {
+        if self.roll == 0.0 {
+            (0.0, 1.0)
+        } else {
+            self.roll.sin_cos()
+        }
     }
 
     /// The point `lateral` metres to the left in the plan view and `up` metres above the
@@ -139,7 +148,12 @@ impl<'m, 'a> LaneRef<'m, 'a> {
     }
 
     fn end_borders(self, end: ContactPoint) -> &'m Borders {
-        let find = |edge| self.border_in(self.frame_at(end)?, edge, self.end_place(end)?);
+        let find = || {
+            let Some((frame, place)) = self.frame_at(end).zip(self.end_place(end)) else {
+                return [None; 2];
+            };
+            Edge::BOTH.map(|edge| self.border_in(frame, edge, place))
+        };
         self.lane().borders_or(end, find)
     }
 
@@ -180,8 +194,8 @@ impl<'m, 'a> LaneRef<'m, 'a> {
     }
 
     fn border_in(self, frame: Frame, edge: Edge, ds: Place) -> Option<BorderPoint> {
-        let t = self.t(edge, ds)?;
-        let lay = self.lay(frame, t, self.t_slope(edge, ds)?, ds)?;
+        let [t, t_slope] = self.t_and_slope(edge, ds)?;
+        let lay = self.lay(frame, t, t_slope, ds)?;
         let (inner, outer) = self.lift(ds)?;
         let lift = match edge {
             Edge::Inner => inner,
@@ -214,7 +228,7 @@ impl<'m, 'a> LaneRef<'m, 'a> {
         {
             hinge = inner;
         }
-        let (hinge_t, hinge_slope) = (hinge.inner_t(ds)?, hinge.t_slope(Edge::Inner, ds)?);
+        let [hinge_t, hinge_slope] = hinge.t_and_slope(Edge::Inner, ds)?;
         let lay = self.tilted_lay(frame, hinge_t, hinge_slope, ds)?;
         Some(Lay {
             lateral: lay.lateral + (t - hinge_t),
@@ -226,7 +240,7 @@ impl<'m, 'a> LaneRef<'m, 'a> {
     fn tilted_lay(self, frame: Frame, t: f64, t_slope: f64, ds: Place) -> Option<Lay> {
         let height = self.at.road.lateral().height(ds.shifted(self.at.s()?), t)?;
         let (lateral, up) = frame.tilted(t, height);
-        let (sin, cos) = frame.roll.sin_cos();
+        let (sin, cos) = frame.tilt();
         Some(Lay {
             lateral,
             up,

@@ -18,6 +18,11 @@ fn trim(text: &str) -> &str {
 
 /// A finite number, or `None`.
 pub(crate) fn parse_number(text: &str) -> Option<f64> {
+    // More than half of the coefficients of real maps are zero: as people write it, and as `%.16e`
+    // of C does.
+    if matches!(text, "0" | "0.0" | "0.0000000000000000e+00") {
+        return Some(0.0);
+    }
     let value: f64 = trim(text).parse().ok()?;
     value.is_finite().then_some(value)
 }

@@ -58,10 +58,10 @@ impl Builtin {
     pub fn order(self) -> Order {
         use Builtin::{Boolean, Decimal, Double, Float, Integer};
         match self {
-            Decimal | Integer => Order::Decimal,
-            _ if self.range().is_some() => Order::Decimal,
             Float | Double => Order::Float,
             Boolean => Order::Boolean,
+            Decimal | Integer => Order::Decimal,
+            _ if self.range().is_some() => Order::Decimal,
             _ => Order::Text,
         }
     }

@@ -6,18 +6,19 @@ use crate::model::Edition;
 
 /// `[+-]?[0-9]+`
 pub(crate) fn is_integer(text: &str) -> bool {
-    let digits = unsigned(text).as_bytes();
+    let digits = unsigned(text);
     !digits.is_empty() && digits.iter().all(u8::is_ascii_digit)
 }
 
 /// `[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)`
 pub(crate) fn is_decimal(text: &str) -> bool {
-    mantissa(unsigned(text).as_bytes()) == Some(unsigned(text).len())
+    let bytes = unsigned(text);
+    mantissa(bytes) == Some(bytes.len())
 }
 
 /// A decimal with an optional exponent, or `INF`, `-INF`, `NaN` (and `+INF` since XSD 1.1).
 pub(crate) fn is_float(text: &str, edition: Edition) -> bool {
-    let bytes = unsigned(text).as_bytes();
+    let bytes = unsigned(text);
     let Some(end) = mantissa(bytes) else {
         return is_special(text, edition);
     };
@@ -48,8 +49,12 @@ pub(crate) fn float_value(text: &str) -> Option<f64> {
     }
 }
 
-fn unsigned(text: &str) -> &str {
-    text.strip_prefix(['+', '-']).unwrap_or(text)
+/// What follows the sign.
+fn unsigned(text: &str) -> &[u8] {
+    match text.as_bytes() {
+        [b'+' | b'-', rest @ ..] => rest,
+        bytes => bytes,
+    }
 }
 
 /// Length of `[0-9]+(\.[0-9]*)?|\.[0-9]+` at the start of `bytes`.
@@ -91,7 +96,7 @@ pub(crate) struct Digits<'a> {
 impl<'a> Digits<'a> {
     /// Reads a text that passed [`is_decimal`] or [`is_integer`].
     pub(crate) fn of(text: &'a str) -> Self {
-        let bare = unsigned(text);
+        let bare = text.strip_prefix(['+', '-']).unwrap_or(text);
         let (whole, fraction) = bare.split_once('.').unwrap_or((bare, ""));
         let whole = whole.trim_start_matches('0');
         let fraction = fraction.trim_end_matches('0');

@@ -115,7 +115,7 @@ impl<'a, 's> Walk<'a, 's> {
         } else if !self.is_surplus(node, name, key.0, |memo| memo.most(model, name)) {
             self.stack.last_mut()?.troubles.push(name);
             self.reporter.add(Code::MisplacedElement, key, node, || {
-                wording::misplaced(node, parent, model, state, self.schema)
+                wording::misplaced(node, parent, (model, state), self.schema, &mut self.memo)
             });
         }
         model.children.get(index)

@@ -2,7 +2,7 @@
 
 use qcbus_document::{Attribute, Node};
 
-use super::children::way_to;
+use super::memo::Memo;
 use super::types::XSI;
 use crate::assertion::Assertion;
 use crate::defects;
@@ -182,14 +182,15 @@ enum Obstacle<'a> {
     Instead(&'a str),
 }
 
-fn obstacle<'a>(
+fn obstacle<'a, 's>(
     node: Node<'a>,
     parent: Node<'a>,
-    model: &Model,
+    model: &'s Model,
     schema: &Schema,
+    memo: &mut Memo<'s>,
 ) -> Option<Obstacle<'a>> {
     let name = schema.names.find(node.name())?;
-    let way = |state, name| way_to(model, state, |edge, _| edge == Some(name));
+    let mut way = |state, name| memo.way(model, state, Some(name)).map(|way| way.0);
     let (mut state, mut obstacle) = (0, None);
     for sibling in parent
         .children()
@@ -200,11 +201,11 @@ fn obstacle<'a>(
             continue;
         };
         // As the walk went: what should have come before a sibling counts as if it had.
-        let Some((to, _)) = way(state, known).filter(|(to, _)| *to != state) else {
+        let Some(to) = way(state, known).filter(|to| *to != state) else {
             continue;
         };
         match (way(state, name), way(to, name)) {
-            (Some((after, _)), None) => {
+            (Some(after), None) => {
                 obstacle = Some(match way(after, known) {
                     Some(_) => Obstacle::Before(sibling.name()),
                     None => Obstacle::Instead(sibling.name()),
@@ -218,16 +219,16 @@ fn obstacle<'a>(
     obstacle
 }
 
-pub(super) fn misplaced(
+pub(super) fn misplaced<'s>(
     node: Node<'_>,
     parent: Node<'_>,
-    model: &Model,
-    state: u16,
+    (model, state): (&'s Model, u16),
     schema: &Schema,
+    memo: &mut Memo<'s>,
 ) -> Wording {
     let (expected, words) = expected_here(model, state, parent, schema);
     let (name, parent_name) = (node.name(), parent.name());
-    let text = match obstacle(node, parent, model, schema) {
+    let text = match obstacle(node, parent, model, schema, memo) {
         Some(Obstacle::Before(later)) => {
             format!("<{name}> in <{parent_name}> comes too late: it must come before <{later}>")
         }

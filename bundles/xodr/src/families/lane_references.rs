@@ -1,7 +1,9 @@
 //! Lane numbers as references: lane links between sections and roads, lane links of junctions.
 
-use foldhash::HashMap;
-use qcbus_document::{Document, Node};
+use std::cell::OnceCell;
+
+use qcbus_document::Node;
+use qcbus_opendrive::{ContactPoint, RoadMap};
 use qcbus_sdk::{Place, Sink};
 
 /// Which end of a road or of a link.
@@ -11,15 +13,17 @@ enum End {
     End,
 }
 
-/// The roads of a file with their lane sections.
-struct Roads<'d> {
-    roads: Vec<Road<'d>>,
-    by_id: HashMap<&'d str, usize>,
+/// The roads of a file with their lane sections, which are read when somebody asks.
+struct Roads<'m, 'd> {
+    map: &'m RoadMap<'d>,
+    sections: Vec<OnceCell<Vec<Section<'d>>>>,
 }
 
+/// A road by its place in the map.
+#[derive(Clone, Copy)]
 struct Road<'d> {
+    place: usize,
     node: Node<'d>,
-    sections: Vec<Section<'d>>,
 }
 
 struct Section<'d> {
@@ -32,24 +36,24 @@ struct Lane<'d> {
     link: Option<Node<'d>>,
 }
 
-impl<'d> Roads<'d> {
-    fn of(document: &Document<'d>) -> Roads<'d> {
-        let roads = document
-            .elements("road")
-            .filter(|road| road.parent().is_some_and(|p| p.is("OpenDRIVE")));
-        let roads = roads.map(|node| Road {
-            node,
-            sections: sections(node).into_iter().map(Section::of).collect(),
-        });
-        let roads: Vec<Road<'d>> = roads.collect();
-        let ids = roads.iter().enumerate();
-        let ids = ids.filter_map(|(at, road)| Some((road.node.attr("id")?, at)));
-        let by_id = ids.collect();
-        Roads { roads, by_id }
+impl<'m, 'd> Roads<'m, 'd> {
+    fn of(map: &'m RoadMap<'d>) -> Roads<'m, 'd> {
+        let sections = map.roads().iter().map(|_| OnceCell::new()).collect();
+        Roads { map, sections }
     }
 
-    fn get(&self, id: &str) -> Option<&Road<'d>> {
-        self.roads.get(*self.by_id.get(id)?)
+    fn get(&self, id: &str) -> Option<Road<'d>> {
+        let road = self.map.roads_with_id(id).last()?;
+        Some(Road {
+            place: road.index(),
+            node: road.node(),
+        })
+    }
+
+    fn sections(&self, road: Road<'d>) -> &[Section<'d>] {
+        let read = || sections(road.node).into_iter().map(Section::of).collect();
+        let slot = self.sections.get(road.place);
+        slot.map_or(&[], |slot| slot.get_or_init(read).as_slice())
     }
 }
 
@@ -71,19 +75,39 @@ impl<'d> Section<'d> {
 
 /// Reports lane numbers that lead to no lane. Where the road that is linked does not exist either,
 /// that is reported elsewhere.
-pub(crate) fn check(document: &Document<'_>, found: &mut Sink<'_>) {
-    let roads = Roads::of(document);
-    for road in &roads.roads {
-        lanes_of_road(road, &roads, found);
+pub(crate) fn check(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let roads = Roads::of(map);
+    // Links that lead to a lane are known, which are most; the others are looked at.
+    let mut known: Vec<u32> = map
+        .lane_joints()
+        .iter()
+        .map(|one| one.node.index())
+        .collect();
+    known.sort_unstable();
+    let is_known = |link: Node<'_>| known.binary_search(&link.index()).is_ok();
+    for road in map.roads() {
+        let lanes = || road.sections().flat_map(|section| section.lanes());
+        let mut links = lanes().flat_map(|lane| ContactPoint::BOTH.map(|end| lane.links(end)));
+        if links.any(|mut links| links.any(|link| !is_known(link.node()))) {
+            let place = road.index();
+            let node = road.node();
+            lanes_of_road(Road { place, node }, &roads, found);
+        }
     }
-    for link in document.elements("laneLink") {
-        lane_link(link, &roads, found);
+    let document = map.root().map(|root| root.document());
+    for link in document
+        .iter()
+        .flat_map(|document| document.elements("laneLink"))
+    {
+        if !is_known(link) {
+            lane_link(link, &roads, found);
+        }
     }
 }
 
 /// Links between the lanes of neighbouring sections, and over the ends of the road.
-fn lanes_of_road(road: &Road<'_>, roads: &Roads<'_>, found: &mut Sink<'_>) {
-    let sections = &road.sections;
+fn lanes_of_road<'d>(road: Road<'d>, roads: &Roads<'_, 'd>, found: &mut Sink<'_>) {
+    let sections = roads.sections(road);
     for (index, section) in sections.iter().enumerate() {
         for (name, end) in [("predecessor", End::Start), ("successor", End::End)] {
             let neighbour = match end {
@@ -109,18 +133,18 @@ fn lanes_of_road(road: &Road<'_>, roads: &Roads<'_>, found: &mut Sink<'_>) {
 fn linked_section<'r, 'd>(
     road: Node<'d>,
     name: &str,
-    roads: &'r Roads<'d>,
+    roads: &'r Roads<'_, 'd>,
 ) -> Option<&'r Section<'d>> {
     let link = road.child("link")?.child(name)?;
     let other = roads.get(
         link.attr("elementId")
             .filter(|_| link.attr("elementType") == Some("road"))?,
     )?;
-    section_at(other, end_of(link.attr("contactPoint")?)?)
+    section_at(roads.sections(other), end_of(link.attr("contactPoint")?)?)
 }
 
 /// `from` must be a lane of the incoming road, `to` one of the connecting or linked road.
-fn lane_link(link: Node<'_>, roads: &Roads<'_>, found: &mut Sink<'_>) {
+fn lane_link<'d>(link: Node<'d>, roads: &Roads<'_, 'd>, found: &mut Sink<'_>) {
     let Some(connection) = link.parent().filter(|parent| parent.is("connection")) else {
         return;
     };
@@ -130,13 +154,13 @@ fn lane_link(link: Node<'_>, roads: &Roads<'_>, found: &mut Sink<'_>) {
         && let Some(section) = connection
             .attr("contactPoint")
             .and_then(end_of)
-            .and_then(|end| section_at(other, end))
+            .and_then(|end| section_at(roads.sections(other), end))
     {
         demand_lane(link, "to", section, found);
     }
     if let Some(incoming) = named("incomingRoad")
-        && let Some(section) =
-            end_at_junction(incoming.node, junction).and_then(|end| section_at(incoming, end))
+        && let Some(section) = end_at_junction(incoming.node, junction)
+            .and_then(|end| section_at(roads.sections(incoming), end))
     {
         demand_lane(link, "from", section, found);
     }
@@ -186,10 +210,10 @@ fn end_of(contact_point: &str) -> Option<End> {
     }
 }
 
-fn section_at<'r, 'd>(road: &'r Road<'d>, end: End) -> Option<&'r Section<'d>> {
+fn section_at<'r, 'd>(sections: &'r [Section<'d>], end: End) -> Option<&'r Section<'d>> {
     match end {
-        End::Start => road.sections.first(),
-        End::End => road.sections.last(),
+        End::Start => sections.first(),
+        End::End => sections.last(),
     }
 }
 

@@ -1,11 +1,13 @@
 use foldhash::{HashMap, HashSet};
 use qcbus_document::{Document, Node};
+use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Place, Rule, Sink};
 
 use crate::families::ids::{Class, KINDS, Kind};
 use crate::families::lane_references;
+use crate::model::Roads;
 
-pub static RULE: Rule<Document> = Rule {
+pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_ids_only_ref_defined_ids",
     uids: &["asam.net:xodr:1.4.0:ids.only_ref_defined_ids"],
     versions: "1.4.0..",
@@ -136,7 +138,9 @@ struct Defined<'d> {
     in_object: HashMap<(Node<'d>, Class), HashSet<&'d str>>,
 }
 
-fn run(document: &Document<'_>, found: &mut Sink<'_>) {
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let Some(root) = map.root() else { return };
+    let document = &root.document();
     let defined = Defined::of(document);
     for reference in REFERENCES {
         for node in document.elements(reference.element) {
@@ -146,7 +150,7 @@ fn run(document: &Document<'_>, found: &mut Sink<'_>) {
             }
         }
     }
-    lane_references::check(document, found);
+    lane_references::check(map, found);
 }
 
 fn check(reference: &Reference, node: Node<'_>, defined: &Defined<'_>, found: &mut Sink<'_>) {
