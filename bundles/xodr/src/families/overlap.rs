@@ -3,6 +3,8 @@
 //! Roads are cut into pieces a few metres long: quadrangles as wide as the lanes for vehicles.
 //! A grid tells which pieces may overlap; the work is bounded, whatever the map says.
 
+use std::collections::hash_map::Entry;
+
 use foldhash::{HashMap, HashSet};
 use qcbus_opendrive::geometry::Point;
 use qcbus_opendrive::{LaneLayer, LaneRef, Place, Road, RoadMap, SectionRef, Side};
@@ -196,14 +198,14 @@ pub(crate) fn overlaps<'p>(
     wanted: impl Fn(&Slice, &Slice) -> bool,
     mut found: impl FnMut(Overlap<'p>),
 ) {
-    let mut cells: HashMap<(i64, i64), Vec<u32>> = HashMap::default();
+    let mut cells = Cells::default();
     let mut reported: HashSet<(usize, usize)> = HashSet::default();
     // Enough for every map that is one; pieces heaped up at one place are not compared for ever.
     let mut budget = 10_000_000 + 100 * slices.len();
     for (one, at) in slices.iter().zip(0_u32..) {
         for cell in cells_of(one) {
-            let here = cells.entry(cell).or_default();
-            for other in here.iter().filter_map(|other| slices.get(*other as usize)) {
+            let here = cells.put(cell, at);
+            for other in here.filter_map(|other| slices.get(other as usize)) {
                 budget = budget.saturating_sub(1);
                 if budget == 0 {
                     return;
@@ -228,8 +230,45 @@ pub(crate) fn overlaps<'p>(
                     });
                 }
             }
-            here.push(at);
         }
+    }
+}
+
+/// Which pieces touch which cell, in the order in which they were put there. All lists share their
+/// memory: there are as many cells as pieces.
+#[derive(Default)]
+struct Cells {
+    /// The first and the last entry of each cell.
+    ends: HashMap<(i64, i64), (u32, u32)>,
+    /// Pieces, each with the next entry of its cell.
+    entries: Vec<(u32, Option<u32>)>,
+}
+
+impl Cells {
+    /// Puts a piece into a cell; those that were there before.
+    fn put(&mut self, cell: (i64, i64), piece: u32) -> impl Iterator<Item = u32> {
+        let place = u32::try_from(self.entries.len()).unwrap_or(u32::MAX);
+        self.entries.push((piece, None));
+        let mut next = match self.ends.entry(cell) {
+            Entry::Vacant(free) => {
+                free.insert((place, place));
+                None
+            }
+            Entry::Occupied(mut taken) => {
+                let (first, last) = taken.get_mut();
+                if let Some((_, next)) = self.entries.get_mut(*last as usize) {
+                    *next = Some(place);
+                }
+                *last = place;
+                Some(*first)
+            }
+        };
+        std::iter::from_fn(move || {
+            let at = next.filter(|at| *at != place)?;
+            let (piece, after) = *self.entries.get(at as usize)?;
+            next = after;
+            Some(piece)
+        })
     }
 }
 
