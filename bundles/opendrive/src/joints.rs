@@ -10,11 +10,13 @@ use crate::junction::{Connection, Junction, JunctionLaneLink};
 use crate::lane_ref::{LaneKey, LaneRef};
 use crate::map::RoadMap;
 use crate::road::Road;
+use crate::section_ref::SectionRef;
 use crate::value::{ContactPoint, LayerKind, Side};
 
 /// What is found out about links when first asked for.
 #[derive(Debug, Default)]
 pub(crate) struct Caches<'a> {
+    /// What junctions say; what lanes say is kept with their roads.
     joints: OnceLock<Vec<LaneJoint<'a>>>,
     pub(crate) touching: OnceLock<Vec<crate::TouchingLanes<'a>>>,
     /// What each road's own links say about its start and its end.
@@ -253,14 +255,29 @@ impl<'a> RoadMap<'a> {
     ///
     /// Left out are links to lanes that do not exist, and those whose other side is unknown
     /// because a road link or a contact point is missing.
-    pub fn lane_joints(&self) -> &[LaneJoint<'a>] {
-        self.caches.joints.get_or_init(|| {
+    pub fn lane_joints(&self) -> impl Iterator<Item = &LaneJoint<'a>> + Clone {
+        let roads = self.roads().iter();
+        let of_lanes = roads.flat_map(|road| self.joints_of(road));
+        of_lanes.chain(self.junction_joints())
+    }
+
+    /// The statements of the lanes of one road; see [`RoadMap::lane_joints`].
+    pub fn joints_of<'m>(&'m self, road: &'m Road<'a>) -> &'m [LaneJoint<'a>] {
+        road.joints.get_or_init(|| {
             let mut joints = Vec::new();
-            for lane in self.lanes() {
+            for lane in road.sections().flat_map(SectionRef::lanes) {
                 for end in ContactPoint::BOTH {
                     self.collect_links(lane, end, &mut joints);
                 }
             }
+            joints
+        })
+    }
+
+    /// The statements of junctions; see [`RoadMap::lane_joints`].
+    pub fn junction_joints(&self) -> &[LaneJoint<'a>] {
+        self.caches.joints.get_or_init(|| {
+            let mut joints = Vec::new();
             for (junction, connection) in self.connections() {
                 self.collect_lane_links(junction, connection, &mut joints);
             }

@@ -2,12 +2,14 @@
 
 use std::ops::Range;
 
+use crate::joints::LaneJoint;
 use crate::lane_ref::LaneRef;
 use crate::map::RoadMap;
 use crate::objects::Object;
 use crate::road::Road;
 use crate::section_ref::SectionRef;
 use crate::signals::Signal;
+use crate::touching::TouchingLanes;
 
 /// How many bytes of the file a part holds, if it has more than one road: so many that the image
 /// and the model of them stay in a processor's second cache (1 MiB and less) while rules look at
@@ -75,6 +77,33 @@ impl<'m, 'a> MapPart<'m, 'a> {
     #[inline]
     pub fn lanes(self) -> impl Iterator<Item = LaneRef<'m, 'a>> {
         self.sections().flat_map(SectionRef::lanes)
+    }
+
+    /// What the lanes of these roads say about which lanes touch; with the last part also what
+    /// junctions say. See [`RoadMap::lane_joints`].
+    pub fn lane_joints(self) -> impl Iterator<Item = &'m LaneJoint<'a>> {
+        let of_lanes = self
+            .roads
+            .iter()
+            .flat_map(move |road| self.map.joints_of(road));
+        let last = self.is_last().then(|| self.map.junction_joints());
+        of_lanes.chain(last.into_iter().flatten())
+    }
+
+    /// The pairs of lanes that touch as these roads say; with the last part also those that only
+    /// junctions name. See [`RoadMap::touching_lanes`].
+    pub fn touching_lanes(self) -> impl Iterator<Item = &'m TouchingLanes<'a>> {
+        let by_lanes = self
+            .roads
+            .iter()
+            .flat_map(move |road| self.map.touching_by(road));
+        let last = self.is_last().then(|| self.map.touching_by_junctions());
+        by_lanes.chain(last.into_iter().flatten())
+    }
+
+    fn is_last(self) -> bool {
+        let last = |road: &Road<'a>| road.index() + 1 == self.map.roads().len();
+        self.roads.last().is_some_and(last)
     }
 
     /// The objects of these roads with their road, in document order.

@@ -5,6 +5,7 @@ use std::sync::{Arc, OnceLock};
 use qcbus_document::Node;
 
 use crate::geometry::Pose;
+use crate::joints::LaneJoint;
 use crate::lanes::LaneLayer;
 use crate::lateral::LateralProfile;
 use crate::names::Names;
@@ -13,6 +14,7 @@ use crate::profile::Profile;
 use crate::section_ref::SectionRef;
 use crate::steps::Place;
 use crate::surface::Frame;
+use crate::touching::TouchingLanes;
 use crate::value::{ContactPoint, LayerKind, known, number};
 use crate::view::view;
 
@@ -42,6 +44,9 @@ pub struct Road<'a> {
     names: Arc<Names>,
     /// The cross sections at the start and at the end, once somebody has asked.
     end_frames: [OnceLock<Option<Frame>>; 2],
+    /// What the links of its lanes say, and which lanes touch therefore, once somebody has asked.
+    pub(crate) joints: OnceLock<Vec<LaneJoint<'a>>>,
+    pub(crate) touching: OnceLock<Vec<TouchingLanes<'a>>>,
 }
 
 /// The elements directly within a road, found in one pass; of several equals the first.
@@ -98,6 +103,8 @@ impl<'a> Road<'a> {
             layers: OnceLock::new(),
             names: Arc::clone(names),
             end_frames: [OnceLock::new(), OnceLock::new()],
+            joints: OnceLock::new(),
+            touching: OnceLock::new(),
         }
     }
 

@@ -4,6 +4,7 @@ use foldhash::HashSet;
 
 use crate::joints::{LaneEnd, LaneJoint};
 use crate::map::RoadMap;
+use crate::road::Road;
 use crate::surface::BorderPoint;
 use crate::value::Side;
 
@@ -32,23 +33,63 @@ impl TouchingLanes<'_> {
     }
 }
 
+/// Links of one lane end that are looked through for one that says the same. No real lane has as
+/// many; of one that has, a pair may be found twice.
+const MOST_LINKS: usize = 64;
+
 impl<'a> RoadMap<'a> {
     /// Every pair of linked lanes whose edges can be evaluated, once, in document order of the
     /// statements. Found once and kept.
-    pub fn touching_lanes(&self) -> &[TouchingLanes<'a>] {
+    pub fn touching_lanes(&self) -> impl Iterator<Item = &TouchingLanes<'a>> {
+        let roads = self.roads().iter();
+        let by_lanes = roads.flat_map(|road| self.touching_by(road));
+        by_lanes.chain(self.touching_by_junctions())
+    }
+
+    /// The pairs that lanes of one road name first.
+    pub(crate) fn touching_by<'m>(&'m self, road: &'m Road<'a>) -> &'m [TouchingLanes<'a>] {
+        road.touching.get_or_init(|| {
+            let (mut from, mut seen) = (None, HashSet::default());
+            let first = |joint: &&LaneJoint<'a>| {
+                if from != Some(joint.from) {
+                    from = Some(joint.from);
+                    seen.clear();
+                }
+                let returned = joint.to < joint.from && self.says(joint.to, joint.from);
+                seen.insert(joint.to) && !returned
+            };
+            let pairs = self.joints_of(road).iter().filter(first);
+            pairs.filter_map(|joint| self.touching(joint)).collect()
+        })
+    }
+
+    /// The pairs that only junctions name.
+    pub(crate) fn touching_by_junctions(&self) -> &[TouchingLanes<'a>] {
         self.caches.touching.get_or_init(|| {
-            let joints = self.lane_joints();
-            let mut seen = HashSet::with_capacity_and_hasher(
-                joints.len(),
-                foldhash::fast::RandomState::default(),
-            );
+            let mut seen = HashSet::default();
             let first = |joint: &&LaneJoint<'a>| {
                 let (one, other) = (joint.from, joint.to);
                 seen.insert((one.min(other), one.max(other)))
+                    && !self.says(one, other)
+                    && !self.says(other, one)
             };
-            let pairs = joints.iter().filter(first);
+            let pairs = self.junction_joints().iter().filter(first);
             pairs.filter_map(|joint| self.touching(joint)).collect()
         })
+    }
+
+    /// Whether a lane itself names another one at an end.
+    fn says(&self, from: LaneEnd, to: LaneEnd) -> bool {
+        let road = self.roads().get(from.lane.road as usize);
+        let joints = road.map_or(&[][..], |road| self.joints_of(road));
+        debug_assert!(
+            joints.is_sorted_by_key(|joint| joint.from),
+            "lanes and their ends come in order"
+        );
+        let begin = joints.partition_point(|joint| joint.from < from);
+        let own = joints.get(begin..).unwrap_or(&[]).iter();
+        let mut own = own.take(MOST_LINKS).take_while(|joint| joint.from == from);
+        own.any(|joint| joint.to == to)
     }
 
     fn touching(&self, joint: &LaneJoint<'a>) -> Option<TouchingLanes<'a>> {

@@ -81,7 +81,8 @@ fn fill(template: &str, mut values: impl Iterator<Item = String>) -> String {
 
 /// Asks everything that rules may ask; returns how many answers there were.
 fn ask_everything(map: &RoadMap<'_>) -> usize {
-    let mut answers = map.lane_joints().len() + map.road_contacts().len();
+    let mut answers =
+        map.lane_joints().count() + map.touching_lanes().count() + map.road_contacts().len();
     for road in map.roads() {
         for s in [0.0, 0.5, 1.0, 50.0, 1e308, f64::NAN, f64::INFINITY, -1.0] {
             for place in [Place::at(s), Place::before(s)] {

@@ -193,7 +193,7 @@ fn lanes_lie_on_the_road_and_above_it() {
 #[test]
 fn links_become_joints_in_both_directions() {
     with_map(ROAD, |map| {
-        let joints = map.lane_joints();
+        let joints: Vec<_> = map.lane_joints().collect();
         assert_eq!(joints.len(), 2);
         assert_eq!(joints[0].from, joints[1].to);
         assert_eq!(joints[0].to, joints[1].from);

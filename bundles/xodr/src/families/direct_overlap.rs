@@ -58,7 +58,7 @@ pub(crate) fn shared_spaces<'m, 'a>(map: &'m RoadMap<'a>) -> Vec<SharedSpace<'m,
     };
     // By the lane that they begin or end in: the lanes with their links.
     let mut groups: BTreeMap<LaneEnd, Vec<(LaneEnd, Node<'a>)>> = BTreeMap::new();
-    for joint in map.lane_joints().iter().filter(direct) {
+    for joint in map.junction_joints().iter().filter(direct) {
         for (one, other) in [(joint.from, joint.to), (joint.to, joint.from)] {
             let group = groups.entry(one).or_default();
             let known = group

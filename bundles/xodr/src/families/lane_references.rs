@@ -3,7 +3,7 @@
 use std::cell::OnceCell;
 
 use qcbus_document::Node;
-use qcbus_opendrive::{ContactPoint, RoadMap};
+use qcbus_opendrive::{ContactPoint, LaneJoint, MapPart, RoadMap};
 use qcbus_sdk::{Place, Sink};
 
 /// Which end of a road or of a link.
@@ -73,27 +73,29 @@ impl<'d> Section<'d> {
     }
 }
 
-/// Reports lane numbers that lead to no lane. Where the road that is linked does not exist either,
-/// that is reported elsewhere.
-pub(crate) fn check(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    let roads = Roads::of(map);
-    // Links that lead to a lane are known, which are most; the others are looked at.
-    let mut known: Vec<u32> = map
-        .lane_joints()
-        .iter()
-        .map(|one| one.node.index())
-        .collect();
-    known.sort_unstable();
-    let is_known = |link: Node<'_>| known.binary_search(&link.index()).is_ok();
-    for road in map.roads() {
+/// Reports numbers in the links of lanes that lead to no lane. Where the road that is linked does
+/// not exist either, that is reported elsewhere.
+pub(crate) fn of_lanes(part: MapPart<'_, '_>, found: &mut Sink<'_>) {
+    let map = part.map();
+    let all = OnceCell::new();
+    for road in part.roads() {
+        // Links that lead to a lane are known, which are most; the others are looked at.
+        let is_known = among(map.joints_of(road));
         let lanes = || road.sections().flat_map(|section| section.lanes());
         let mut links = lanes().flat_map(|lane| ContactPoint::BOTH.map(|end| lane.links(end)));
         if links.any(|mut links| links.any(|link| !is_known(link.node()))) {
             let place = road.index();
             let node = road.node();
-            lanes_of_road(Road { place, node }, &roads, found);
+            let roads = all.get_or_init(|| Roads::of(map));
+            lanes_of_road(Road { place, node }, roads, found);
         }
     }
+}
+
+/// The same for the lane links of junctions.
+pub(crate) fn of_junctions(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let roads = Roads::of(map);
+    let is_known = among(map.junction_joints());
     let document = map.root().map(|root| root.document());
     for link in document
         .iter()
@@ -103,6 +105,13 @@ pub(crate) fn check(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             lane_link(link, &roads, found);
         }
     }
+}
+
+/// Whether a link is one of those that lead to a lane.
+fn among(joints: &[LaneJoint<'_>]) -> impl Fn(Node<'_>) -> bool {
+    let mut known: Vec<u32> = joints.iter().map(|one| one.node.index()).collect();
+    known.sort_unstable();
+    move |link| known.binary_search(&link.index()).is_ok()
 }
 
 /// Links between the lanes of neighbouring sections, and over the ends of the road.

@@ -3,7 +3,9 @@
 use std::f64::consts::PI;
 
 use qcbus_opendrive::geometry::heading_difference;
-use qcbus_opendrive::{BorderPoint, JunctionType, LaneJoint, LaneRef, RoadMap, TouchingLanes};
+use qcbus_opendrive::{
+    BorderPoint, JunctionType, LaneJoint, LaneRef, MapPart, RoadMap, TouchingLanes,
+};
 use qcbus_sdk::{Finding, Param, Sink};
 
 use super::driving::is_drivable;
@@ -57,8 +59,15 @@ pub(crate) struct Pair<'m, 'a> {
 }
 
 /// The drivable lanes that touch, once per pair.
-pub(crate) fn pairs<'m, 'a>(map: &'m RoadMap<'a>) -> impl Iterator<Item = Pair<'m, 'a>> {
-    map.touching_lanes().iter().filter_map(|touching| {
+pub(crate) fn pairs<'m, 'a>(part: MapPart<'m, 'a>) -> impl Iterator<Item = Pair<'m, 'a>> {
+    pairs_of(part.map(), part.touching_lanes())
+}
+
+fn pairs_of<'m, 'a>(
+    map: &'m RoadMap<'a>,
+    touching: impl Iterator<Item = &'m TouchingLanes<'a>>,
+) -> impl Iterator<Item = Pair<'m, 'a>> {
+    touching.filter_map(|touching| {
         let from = map.lane(touching.joint.from.lane)?;
         let to = map.lane(touching.joint.to.lane)?;
         let wide = touching.narrower() > NO_WIDTH;
@@ -238,7 +247,7 @@ pub(crate) fn report_misfits(
 ) {
     let gap = found.number(&GAP);
     let mut apart = false;
-    for pair in pairs(map).filter(|pair| mine(pair.at)) {
+    for pair in pairs_of(map, map.touching_lanes()).filter(|pair| mine(pair.at)) {
         let edges = pair.touching.edges().into_iter();
         apart |= edges
             .map(|[here, there]| distance(here, there))

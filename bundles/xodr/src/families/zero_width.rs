@@ -2,7 +2,7 @@
 
 use foldhash::HashMap;
 use qcbus_document::Node;
-use qcbus_opendrive::{ContactPoint, LaneEnd, LaneJoint, LaneRef, RoadMap};
+use qcbus_opendrive::{ContactPoint, LaneEnd, LaneRef, RoadMap};
 use qcbus_sdk::{Param, Sink};
 
 use super::on_road::{MAX_PLACES, OnRoad, lane_name};
@@ -89,8 +89,7 @@ struct LaneLinks<'a> {
 impl<'a> LaneLinks<'a> {
     fn of(map: &RoadMap<'a>, end: ContactPoint) -> LaneLinks<'a> {
         let mut links = LaneLinks::default();
-        let of_junctions = |joint: &&LaneJoint<'_>| joint.junction.is_some();
-        for joint in map.lane_joints().iter().filter(of_junctions) {
+        for joint in map.junction_joints() {
             for (side, at) in [(&mut links.from, joint.from), (&mut links.to, joint.to)] {
                 if at.end == end {
                     side.entry(at).or_default().push(joint.node);

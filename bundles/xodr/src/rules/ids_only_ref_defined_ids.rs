@@ -5,7 +5,7 @@ use qcbus_sdk::{Place, Rule, Sink};
 
 use crate::families::ids::{Class, KINDS, Kind};
 use crate::families::lane_references;
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_ids_only_ref_defined_ids",
@@ -13,6 +13,7 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.4.0..",
     after: super::READABLE,
     page: include_str!("ids_only_ref_defined_ids.md"),
+    each: Some(each),
     run,
     ..Rule::DEFAULTS
 };
@@ -138,6 +139,10 @@ struct Defined<'d> {
     in_object: HashMap<(Node<'d>, Class), HashSet<&'d str>>,
 }
 
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    lane_references::of_lanes(map.part(part), found);
+}
+
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let Some(root) = map.root() else { return };
     let document = &root.document();
@@ -150,7 +155,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             }
         }
     }
-    lane_references::check(map, found);
+    lane_references::of_junctions(map, found);
 }
 
 fn check(reference: &Reference, node: Node<'_>, defined: &Defined<'_>, found: &mut Sink<'_>) {

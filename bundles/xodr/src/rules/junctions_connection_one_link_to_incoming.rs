@@ -30,11 +30,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             report_repeated(map, text, &connections, found);
         }
     }
-    for joint in map
-        .lane_joints()
-        .iter()
-        .filter(|joint| joint.junction.is_some())
-    {
+    for joint in map.junction_joints() {
         against_traffic(map, joint, found);
     }
 }

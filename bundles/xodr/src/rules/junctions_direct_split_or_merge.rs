@@ -27,7 +27,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     };
     // The lane links of a junction that start at one end of one road.
     let mut fans: BTreeMap<_, Vec<Path<'_>>> = BTreeMap::new();
-    for joint in map.lane_joints().iter().filter(direct) {
+    for joint in map.junction_joints().iter().filter(direct) {
         for turned in [false, true] {
             if let Some((end, path)) = Path::of(map, joint, turned) {
                 fans.entry((joint.junction, end)).or_default().push(path);

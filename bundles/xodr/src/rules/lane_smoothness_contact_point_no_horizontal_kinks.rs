@@ -2,7 +2,7 @@ use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Backport, Rule, Sink};
 
 use crate::families::touching::{GAP, KINK, Where, pairs, report_kink};
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_lane_smoothness_contact_point_no_horizontal_kinks",
@@ -12,13 +12,13 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[GAP, KINK],
     page: include_str!("lane_smoothness_contact_point_no_horizontal_kinks.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     // In junctions it is a rule of its own: `junctions.connection.smooth_fit` and the like.
-    for pair in pairs(map).filter(|pair| pair.at == Where::Roads) {
+    for pair in pairs(map.part(part)).filter(|pair| pair.at == Where::Roads) {
         report_kink(&pair, found);
     }
 }

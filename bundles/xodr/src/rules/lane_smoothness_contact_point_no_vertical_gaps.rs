@@ -2,7 +2,7 @@ use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Backport, Param, Rule, Sink};
 
 use crate::families::touching::{Pair, STEP, Where, pairs, report_step};
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 const ROLL: Param = Param::number(
     "roll",
@@ -22,13 +22,13 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[STEP, ROLL],
     page: include_str!("lane_smoothness_contact_point_no_vertical_gaps.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     // In junctions it is a rule of its own: `junctions.connection.smooth_fit` and the like.
-    for pair in pairs(map).filter(|pair| pair.at == Where::Roads) {
+    for pair in pairs(map.part(part)).filter(|pair| pair.at == Where::Roads) {
         if !report_step(&pair, found) {
             report_roll(&pair, found);
         }

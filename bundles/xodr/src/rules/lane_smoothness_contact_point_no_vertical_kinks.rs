@@ -22,13 +22,12 @@ pub static RULE: Rule<Roads> = Rule {
     params: &[PITCH, GAP, STEP],
     page: include_str!("lane_smoothness_contact_point_no_vertical_kinks.md"),
     each: Some(each),
-    run,
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let limit = found.number(&PITCH);
-    for pair in pairs(map) {
+    for pair in pairs(map.part(part)) {
         if pair.at
             == (Where::Connection {
                 elevation_grid: true,
@@ -48,9 +47,6 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             pair.report(&text, edge.point, found);
         }
     }
-}
-
-fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     for road in map.part(part).roads() {
         within(road, found);
     }

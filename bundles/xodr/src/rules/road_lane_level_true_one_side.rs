@@ -12,7 +12,6 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     page: include_str!("road_lane_level_true_one_side.md"),
     each: Some(each),
-    run,
     ..Rule::DEFAULTS
 };
 
@@ -22,10 +21,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             outward(section, side, found);
         }
     }
-}
-
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for joint in map.lane_joints() {
+    for joint in map.part(part).lane_joints() {
         along(map, joint, found);
     }
 }

@@ -1,5 +1,5 @@
 use qcbus_opendrive::{
-    ContactPoint, LaneJoint, LaneRef, LaneSpan, Place, RoadMap, SectionRef, Side,
+    ContactPoint, LaneJoint, LaneRef, LaneSpan, MapPart, Place, RoadMap, SectionRef, Side,
 };
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
@@ -32,11 +32,11 @@ pub static RULE: Rule<Roads> = Rule {
     params: &[OVERLAP],
     page: include_str!("road_lane_link_lanes_across_lane_sections.md"),
     each: Some(each),
-    run,
     ..Rule::DEFAULTS
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    not_returned(map.part(part), found);
     for section in map.part(part).sections() {
         for side in Side::BOTH {
             not_linked_at_all(section, side, found);
@@ -89,12 +89,9 @@ fn overlap(one: &LaneSpan<'_, '_>, other: &LaneSpan<'_, '_>) -> f64 {
     (high.min(to) - low.max(from)) / narrower
 }
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for joint in map
-        .lane_joints()
-        .iter()
-        .filter(|joint| joint.junction.is_none())
-    {
+fn not_returned(part: MapPart<'_, '_>, found: &mut Sink<'_>) {
+    let map = part.map();
+    for joint in part.roads().iter().flat_map(|road| map.joints_of(road)) {
         let (Some(from), Some(to)) = (map.lane(joint.from.lane), map.lane(joint.to.lane)) else {
             continue;
         };

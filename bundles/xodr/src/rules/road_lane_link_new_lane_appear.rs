@@ -3,7 +3,7 @@ use qcbus_sdk::{Rule, Sink};
 
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::zero_width::{ZERO_WIDTH, is_zero_at, opens};
-use crate::model::Roads;
+use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_link_new_lane_appear",
@@ -12,13 +12,13 @@ pub static RULE: Rule<Roads> = Rule {
     after: super::READABLE,
     params: &[ZERO_WIDTH],
     page: include_str!("road_lane_link_new_lane_appear.md"),
-    run,
+    each: Some(each),
     ..Rule::DEFAULTS
 };
 
-fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let zero = found.number(&ZERO_WIDTH);
-    for joint in map.lane_joints() {
+    for joint in map.part(part).lane_joints() {
         let (Some(from), Some(to)) = (map.lane(joint.from.lane), map.lane(joint.to.lane)) else {
             continue;
         };

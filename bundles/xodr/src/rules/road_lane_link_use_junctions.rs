@@ -19,11 +19,7 @@ pub static RULE: Rule<Roads> = Rule {
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     // Who is linked to which lane end, across roads that belong to no junction.
     let mut named: BTreeMap<LaneEnd, Vec<(LaneRef<'_, '_>, &LaneJoint<'_>)>> = BTreeMap::new();
-    for joint in map
-        .lane_joints()
-        .iter()
-        .filter(|joint| joint.junction.is_none())
-    {
+    for joint in map.roads().iter().flat_map(|road| map.joints_of(road)) {
         let lanes = map.lane(joint.from.lane).zip(map.lane(joint.to.lane));
         let Some((from, to)) = lanes else { continue };
         let across = from.at.road.index() != to.at.road.index();
