@@ -164,3 +164,30 @@ fn what_the_journal_remembers_is_said_after_a_restart() {
     let told = |it: &Action| matches!(it, Action::Void { path, .. } if *path == gone);
     assert!(actions.iter().any(told), "{actions:?}");
 }
+
+#[test]
+fn a_newer_result_waits_until_the_one_before_it_has_arrived() {
+    let mut desk = Desk::new(false);
+    let (session, actions) = desk.join();
+    let sent = |actions: &[Action]| {
+        let of = |it: &Action| match it {
+            Action::Deliver { delivery, .. } => Some(delivery.job),
+            _ => None,
+        };
+        actions.iter().filter_map(of).collect::<Vec<_>>()
+    };
+    assert_eq!(sent(&actions), [JobId(7)]);
+    let (id, _) = desk.state.files.iter().next().unwrap();
+    let entry = desk.state.files.get_mut(id).unwrap();
+    Arc::make_mut(entry.judged.as_mut().unwrap()).job = JobId(8);
+    let mut actions = Actions::default();
+    desk.state.deliver_to_all(id, &mut actions);
+    assert_eq!(sent(&actions), [], "both would be read back side by side");
+    let done = |job| FromPeer::ResultDone {
+        job,
+        report: PeerReport::Written,
+    };
+    assert_eq!(sent(&desk.say(session, done(JobId(7)))), [JobId(8)]);
+    assert_eq!(sent(&desk.say(session, done(JobId(8)))), []);
+    assert!(desk.state.all_delivered());
+}

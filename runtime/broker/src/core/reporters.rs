@@ -53,6 +53,14 @@ impl Reporter {
         !self.active.is_empty() || !self.voiding.is_empty()
     }
 
+    /// Takes the next file out of the queue. A file of which a result is under way waits for its
+    /// turn: results are read back side by side, and the older one must not come last.
+    fn next_in_queue(&mut self) -> Option<FileId> {
+        let under_way = |file: &FileId| self.active.values().any(|sent| sent.file == *file);
+        let at = self.queue.iter().position(|file| !under_way(file))?;
+        self.queue.remove(at)
+    }
+
     /// A session is over: what was said in it counts no more.
     fn forget_session(&mut self) {
         self.active.clear();
@@ -213,7 +221,7 @@ impl State {
                 });
                 continue;
             }
-            let Some(file) = reporter.queue.pop_front() else {
+            let Some(file) = reporter.next_in_queue() else {
                 return;
             };
             let Some(entry) = self.files.get(file) else {
