@@ -82,10 +82,13 @@ pub struct Rule<M: Model> {
     pub page: &'static str,
     /// Looks at a part of the document and says what it found, one part after the other: for
     /// rules that need to know nothing of one part to judge the next.
-    pub each: Option<fn(&M::Of<'_>, &M::Part, &mut Sink<'_>)>,
+    pub each: Option<Each<M>>,
     /// Looks at the document and says what it found, after `each` has seen all parts.
     pub run: fn(&M::Of<'_>, &mut Sink<'_>),
 }
+
+/// Looks at a part of a model and says what it found there.
+pub type Each<M> = fn(&<M as Model>::Of<'_>, &<M as Model>::Part, &mut Sink<'_>);
 
 /// What a rule does with documents of versions before its range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

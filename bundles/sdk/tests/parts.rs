@@ -12,18 +12,18 @@ use qcbus_sdk::{
 };
 
 /// The roads of a file, each of which is a part.
-struct Roads;
+struct Roads<'d>(Vec<Node<'d>>);
 
-impl Model for Roads {
-    type Of<'d> = Vec<Node<'d>>;
+impl Model for Roads<'static> {
+    type Of<'d> = Roads<'d>;
     type Part = usize;
 
-    fn build<'d>(subject: &'d Subject<'d>) -> Result<Vec<Node<'d>>, Skip> {
-        Ok(subject.root().elements("road").collect())
+    fn build<'d>(subject: &'d Subject<'d>) -> Result<Roads<'d>, Skip> {
+        Ok(Roads(subject.root().elements("road").collect()))
     }
 
-    fn parts(roads: &Vec<Node<'_>>) -> Vec<usize> {
-        (0..roads.len()).collect()
+    fn parts(roads: &Roads<'_>) -> Vec<usize> {
+        (0..roads.0.len()).collect()
     }
 }
 
@@ -46,7 +46,7 @@ static PANICS: Rule<Roads> = Rule {
 static WHOLE: Rule<Roads> = Rule {
     id: "whole",
     uids: &["x:xodr:1.0.0:a.c"],
-    run: |roads, found| found.fact("all", roads.len().to_string(), "roads"),
+    run: |roads, found| found.fact("all", roads.0.len().to_string(), "roads"),
     ..Rule::DEFAULTS
 };
 static AFTER_CLEAN: Rule<Roads> = Rule {
@@ -64,8 +64,8 @@ static AFTER_ERRORS: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-fn report(roads: &Vec<Node<'_>>, part: &usize, found: &mut Sink<'_>) {
-    found.issue(roads[*part], format!("road {part}"));
+fn report(roads: &Roads<'_>, part: &usize, found: &mut Sink<'_>) {
+    found.issue(roads.0[*part], format!("road {part}"));
 }
 
 static BUNDLE: Bundle = Bundle {
