@@ -71,7 +71,8 @@ impl LaneJoint<'_> {
 
     /// Whether both lanes belong to the same road.
     pub fn is_within_road(&self) -> bool {
-        self.from.lane.road == self.to.lane.road && self.from.lane.section != self.to.lane.section
+        let (from, to) = (self.from.lane, self.to.lane);
+        from.road == to.road && (from.layer, from.section) != (to.layer, to.section)
     }
 }
 
@@ -179,6 +180,14 @@ impl<'a> RoadMap<'a> {
         })
     }
 
+    /// Which ends of a road, start and end, have a junction as their link says.
+    pub fn ends_at(&self, junction: &Junction<'a>, road: &Road<'a>) -> [bool; 2] {
+        ContactPoint::BOTH.map(|end| {
+            let link = road.link(end);
+            link.is_some_and(|link| link.junction_id() == Some(junction.id()))
+        })
+    }
+
     /// The end of the incoming road at which a junction lies. It follows from the incoming
     /// road's own links; where both its ends meet the junction, from the target road's link back,
     /// else from what lies nearer. Virtual junctions touch their main road somewhere within.
@@ -189,11 +198,7 @@ impl<'a> RoadMap<'a> {
         target: &Road<'a>,
         contact: ContactPoint,
     ) -> Option<ContactPoint> {
-        let meets = |end: ContactPoint| {
-            let link = incoming.link(end);
-            link.is_some_and(|link| link.junction_id() == Some(junction.id()))
-        };
-        match ContactPoint::BOTH.map(meets) {
+        match self.ends_at(junction, incoming) {
             [true, false] => Some(ContactPoint::Start),
             [false, true] => Some(ContactPoint::End),
             [both, _] => {
@@ -310,8 +315,8 @@ impl<'a> RoadMap<'a> {
         }
     }
 
-    /// The lane that a link of `lane` at `end` with this id and layer leads to: in the next
-    /// section of the same road, or in the road that is linked there.
+    /// The lane that a link of `lane` at `end` with this id and layer leads to; see
+    /// [`RoadMap::linked_section`].
     pub fn linked_lane(
         &self,
         lane: LaneRef<'_, 'a>,
@@ -319,20 +324,41 @@ impl<'a> RoadMap<'a> {
         id: i64,
         layer: LayerKind,
     ) -> Option<LaneEnd> {
-        let side = lane.side().unwrap_or(Side::Right);
-        let same_layer = layer == lane.at.layer.kind();
-        if !same_layer {
-            return other_layer_lane(lane, end, id, layer);
+        let (section, end) = self.linked_section(lane, end, Some(id), layer)?;
+        Some(LaneEnd {
+            lane: section.lane(id)?.key(),
+            end,
+        })
+    }
+
+    /// The section that a link of `lane` at `end` with this layer leads to, and which of its ends
+    /// lies there: the next section of the same road, on the other layer the one that is there, and
+    /// at the end of a road the one of the road that is linked. `id` tells the side.
+    pub fn linked_section<'m>(
+        &'m self,
+        lane: LaneRef<'m, 'a>,
+        end: ContactPoint,
+        id: Option<i64>,
+        layer: LayerKind,
+    ) -> Option<(SectionRef<'m, 'a>, ContactPoint)> {
+        let own_side = lane.side().unwrap_or(Side::Right);
+        let side = id.and_then(Side::of_lane_id).unwrap_or(own_side);
+        let own_layer = lane.at.layer.kind();
+        if layer == own_layer
+            && let Some(next) = lane.at.neighbour(own_side, end)
+        {
+            return Some((next, end.other()));
         }
-        if let Some(next) = lane.at.neighbour(side, end) {
-            let to = next.lane(id)?;
-            return Some(LaneEnd {
-                lane: to.key(),
-                end: end.other(),
-            });
+        // Temporary lanes may begin and end anywhere, permanent ones with the road.
+        let always = layer == own_layer && layer == LayerKind::Permanent;
+        if always || lane.is_at_road_end(end) {
+            let to = self.linked_end(lane.at.road, end)?.to;
+            let road = self.road_at(to.road)?;
+            let section = road.layer(layer)?.end_section(road, side, to.end)?;
+            return Some((section, to.end));
         }
-        let contact = self.linked_end(lane.at.road, end)?;
-        self.lane_at_road_end(contact.to, id, layer)
+        let other = (layer != own_layer).then(|| other_layer(lane, end, side, layer));
+        Some((other??, end.other()))
     }
 
     /// The lane with an id in the section at an end of a road.
@@ -378,24 +404,19 @@ impl<'a> RoadMap<'a> {
     }
 }
 
-/// A link to the other layer of the same road: to the lane of the section that touches the end.
-fn other_layer_lane(
-    lane: LaneRef<'_, '_>,
+/// The section of another layer of the same road that touches an end of a lane.
+fn other_layer<'m, 'a>(
+    lane: LaneRef<'m, 'a>,
     end: ContactPoint,
-    id: i64,
+    side: Side,
     layer: LayerKind,
-) -> Option<LaneEnd> {
+) -> Option<SectionRef<'m, 'a>> {
     let road = lane.at.road;
-    let side = Side::of_lane_id(id)?;
     let place = match end {
         ContactPoint::Start => crate::Place::before(lane.at.s()?),
         ContactPoint::End => crate::Place::at(lane.at.end(side)?),
     };
-    let to = road.layer(layer)?.section_at(road, side, place)?.lane(id)?;
-    Some(LaneEnd {
-        lane: to.key(),
-        end: end.other(),
-    })
+    road.layer(layer)?.section_at(road, side, place)
 }
 
 /// The end of the incoming road that lies nearer to the contact point of the target road.

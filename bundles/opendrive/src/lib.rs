@@ -67,4 +67,4 @@ pub use steps::Place;
 pub use strips::{CrossSectionSurface, Strip, StripMode};
 pub use surface::{BorderPoint, Frame};
 pub use touching::TouchingLanes;
-pub use value::{ContactPoint, Direction, LayerKind, Side};
+pub use value::{ContactPoint, Direction, LayerKind, Side, is_user_data};

@@ -13,7 +13,7 @@ use crate::railroad::{JunctionGroup, Station};
 use crate::road::Road;
 use crate::section_ref::SectionRef;
 use crate::signals::{Controller, Signal, VmsGroup};
-use crate::value::integer;
+use crate::value::{integer, is_user_data};
 
 /// The version that a file says it is written for (`header@revMajor`, `@revMinor`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -169,7 +169,8 @@ impl<'a> RoadMap<'a> {
     /// The groups of boards with variable messages (14.7), within a road's signals or a junction.
     pub fn vms_groups(&self) -> impl Iterator<Item = VmsGroup<'a>> + use<'a> {
         let all = self.root.map(|root| root.descendants_named("vmsGroup"));
-        all.into_iter().flatten().map(VmsGroup::of)
+        let all = all.into_iter().flatten();
+        all.filter(|node| !is_user_data(*node)).map(VmsGroup::of)
     }
 
     /// The objects of all roads with their road, in document order.
@@ -230,7 +231,7 @@ impl<'a> RoadMap<'a> {
                 .is_some_and(|parent| parents.contains(&parent.name()))
         };
         let ids = elements
-            .filter(placed)
+            .filter(|node| placed(node) && !is_user_data(*node))
             .filter_map(|node| Some((node.attr("id")?, node.index())));
         IdIndex::of(ids.collect())
     }

@@ -4,6 +4,7 @@
 use crate::geometry::{Point, Point3, Pose, finite};
 use crate::lane::Borders;
 use crate::lane_ref::{Edge, LaneRef};
+use crate::plan_view::END_TOLERANCE;
 use crate::road::Road;
 use crate::steps::Place;
 use crate::value::ContactPoint;
@@ -172,11 +173,11 @@ impl<'m, 'a> LaneRef<'m, 'a> {
         let beside = self.at.neighbour(side, end).is_none();
         let place = match end {
             ContactPoint::Start => self.at.s().map(|s| s <= 1e-9),
-            ContactPoint::End => self
-                .at
-                .end(side)
-                .zip(self.at.road.length())
-                .map(|(one, other)| one == other),
+            ContactPoint::End => {
+                let ends = self.at.end(side).zip(self.at.road.length());
+                // The end of a temporary section is a sum.
+                ends.map(|(one, other)| (one - other).abs() <= END_TOLERANCE)
+            }
         };
         beside && place == Some(true)
     }

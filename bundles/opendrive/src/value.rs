@@ -4,6 +4,12 @@ use std::fmt;
 
 use qcbus_document::Node;
 
+/// Whether an element lies within a `<userData>`: what is in there means whatever its author likes,
+/// whatever it is called (7.2).
+pub fn is_user_data(node: Node<'_>) -> bool {
+    node.ancestors().any(|above| above.is("userData"))
+}
+
 /// The text without white space around it, as XML defines that.
 #[inline]
 fn trim(text: &str) -> &str {

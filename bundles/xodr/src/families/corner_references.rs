@@ -3,6 +3,7 @@
 use qcbus_document::Node;
 use qcbus_opendrive::RoadMap;
 
+use crate::families::ids::plain;
 use crate::families::object_parts::{corners, objects, outlines};
 
 /// A `<marking>` where it stands.
@@ -57,10 +58,10 @@ impl<'a> Marking<'a> {
         };
         let points: Vec<Node<'a>> = corners(outline).collect();
         let steps = self.references().map(|reference| {
-            let id = reference.attr("id")?;
+            let id = plain(reference.attr("id")?);
             let index = points
                 .iter()
-                .position(|point| point.attr("id") == Some(id))?;
+                .position(|point| point.attr("id").map(plain) == Some(id))?;
             Some((reference, index))
         });
         let steps = steps.collect::<Option<Vec<_>>>()?;

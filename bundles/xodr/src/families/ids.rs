@@ -1,6 +1,7 @@
 //! What has an id, and what refers to it.
 
 use qcbus_document::{Document, Node};
+use qcbus_opendrive::is_user_data;
 
 /// A kind of element that carries an id.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -22,6 +23,7 @@ pub(crate) enum Class {
     RoadSection,
     Outline,
     Corner,
+    Polyline,
     Vertex,
 }
 
@@ -178,6 +180,13 @@ pub(crate) const KINDS: &[Kind] = &[
         Scope::Within("outline"),
     ),
     kind(
+        Class::Polyline,
+        "polyline",
+        &["polyline"],
+        &["skeleton"],
+        Scope::Within("object"),
+    ),
+    kind(
         Class::Vertex,
         "vertex",
         &["vertexRoad", "vertexLocal"],
@@ -185,6 +194,17 @@ pub(crate) const KINDS: &[Kind] = &[
         Scope::Within("polyline"),
     ),
 ];
+
+/// A number as it is: outlines and their points have whole numbers for ids, of which `0` and `00`
+/// are the same.
+pub(crate) fn plain(id: &str) -> &str {
+    let id = id.trim();
+    if id.is_empty() || !id.bytes().all(|byte| byte.is_ascii_digit()) {
+        return id;
+    }
+    let digits = id.trim_start_matches('0');
+    if digits.is_empty() { "0" } else { digits }
+}
 
 impl Kind {
     /// The kind of a class.
@@ -205,6 +225,7 @@ impl Kind {
                 let fits = |parent: Node<'d>| self.parents.iter().any(|name| parent.is(name));
                 self.parents.is_empty() || node.parent().is_some_and(fits)
             })
+            .filter(|node| !is_user_data(*node))
             .collect();
         if self.elements.len() > 1 {
             nodes.sort();

@@ -1,7 +1,7 @@
 //! Objects of roads and junctions, and what they are made of (OpenDRIVE 1.9, chapter 13).
 
 use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
+use qcbus_opendrive::{RoadMap, is_user_data};
 use qcbus_sdk::Finding;
 
 /// The points of an outline.
@@ -12,7 +12,7 @@ pub(crate) fn objects<'a>(map: &RoadMap<'a>) -> impl Iterator<Item = Node<'a>> +
     below(map, "object", "objects")
 }
 
-/// The elements of one name that lie directly within elements of another.
+/// The elements of one name that lie directly within elements of another, outside of user data.
 pub(crate) fn below<'a>(
     map: &RoadMap<'a>,
     name: &'static str,
@@ -22,6 +22,7 @@ pub(crate) fn below<'a>(
     all.into_iter()
         .flatten()
         .filter(move |node| node.parent().is_some_and(|above| above.is(parent)))
+        .filter(|node| !is_user_data(*node))
 }
 
 /// The outlines of an object: within `<outlines>`, or directly within it as before 1.5.

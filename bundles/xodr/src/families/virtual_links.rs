@@ -11,3 +11,13 @@ pub(crate) fn leads_to_main_road(map: &RoadMap<'_>, road: &Road<'_>, link: RoadL
             && link.road_id() == junction.main_road()
     })
 }
+
+/// Whether a road may be linked to a place within another: it belongs to a virtual junction, or to
+/// one of which the file does not say what it is.
+pub(crate) fn may_be_within(map: &RoadMap<'_>, road: &Road<'_>) -> bool {
+    let Some(id) = road.junction() else {
+        return false;
+    };
+    let kind = map.junction(id).map(|junction| junction.kind());
+    !matches!(kind, Some(Some(kind)) if kind != JunctionType::Virtual)
+}

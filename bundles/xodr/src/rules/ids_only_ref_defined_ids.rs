@@ -1,10 +1,11 @@
 use foldhash::{HashMap, HashSet};
 use qcbus_document::{Document, Node};
-use qcbus_opendrive::RoadMap;
+use qcbus_opendrive::{RoadMap, is_user_data};
 use qcbus_sdk::{Place, Rule, Sink};
 
-use crate::families::ids::{Class, KINDS, Kind};
+use crate::families::ids::{Class, KINDS, Kind, plain};
 use crate::families::lane_references;
+use crate::families::object_parts::outlines;
 use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
@@ -150,6 +151,9 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     for reference in REFERENCES {
         for node in document.elements(reference.element) {
             let parent = node.parent();
+            if is_user_data(node) {
+                continue;
+            }
             if reference.parent.is_empty() || parent.is_some_and(|it| it.is(reference.parent)) {
                 check(reference, node, &defined, found);
             }
@@ -179,12 +183,14 @@ fn check(reference: &Reference, node: Node<'_>, defined: &Defined<'_>, found: &m
             let Some(object) = node.ancestors().find(|ancestor| ancestor.is("object")) else {
                 return;
             };
-            let ids = defined.in_object.get(&(object, class));
-            (
-                class,
-                ids.is_some_and(|ids| ids.contains(id)),
-                " in this object",
-            )
+            let home = outline_of_border(node, object).unwrap_or(object);
+            let ids = defined.in_object.get(&(home, class));
+            let place = if home == object {
+                " in this object"
+            } else {
+                " in the outline of this border"
+            };
+            (class, ids.is_some_and(|ids| ids.contains(plain(id))), place)
         }
     };
     if !exists {
@@ -196,6 +202,14 @@ fn check(reference: &Reference, node: Node<'_>, defined: &Defined<'_>, found: &m
         );
         found.issue(Place::attribute_or_node(node, reference.attribute), text);
     }
+}
+
+/// The outline that the border around a corner reference names.
+fn outline_of_border<'d>(reference: Node<'d>, object: Node<'d>) -> Option<Node<'d>> {
+    let border = reference.parent().filter(|parent| parent.is("border"))?;
+    let id = plain(border.attr("outlineId")?);
+    let named = |outline: &Node<'_>| outline.attr("id").is_some_and(|it| plain(it) == id);
+    outlines(object).find(named)
 }
 
 impl<'d> Defined<'d> {
@@ -212,11 +226,11 @@ impl<'d> Defined<'d> {
                 if matches!(kind.class, Class::Outline | Class::Corner)
                     && let Some(object) = node.ancestors().find(|ancestor| ancestor.is("object"))
                 {
-                    defined
-                        .in_object
-                        .entry((object, kind.class))
-                        .or_default()
-                        .insert(id);
+                    let outline = node.parent().filter(|_| kind.class == Class::Corner);
+                    for home in [Some(object), outline].into_iter().flatten() {
+                        let ids = defined.in_object.entry((home, kind.class)).or_default();
+                        ids.insert(plain(id));
+                    }
                 }
             }
             defined.anywhere.push((kind.class, ids));

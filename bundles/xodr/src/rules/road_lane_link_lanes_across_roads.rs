@@ -43,7 +43,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let Some((one, other)) = roads.filter(|(one, other)| outside(one) && outside(other)) else {
             continue;
         };
-        if told.insert((from.min(to), from.max(to))) {
+        // An end that is linked to itself goes on nowhere.
+        if from != to && told.insert((from.min(to), from.max(to))) {
             let theirs: Vec<Open<'_, '_>> = open_lanes(other, to.end).collect();
             for lane in open_lanes(one, from.end) {
                 check(&lane, from.end, &theirs, found);

@@ -1,4 +1,4 @@
-use qcbus_opendrive::{ContactPoint, RoadLink, RoadMap};
+use qcbus_opendrive::{ContactPoint, Road, RoadLink, RoadMap};
 use qcbus_sdk::{Rule, Sink};
 
 use crate::families::virtual_links;
@@ -18,7 +18,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     for road in map.part(part).roads() {
         for end in ContactPoint::BOTH {
             let Some(link) = road.link(end) else { continue };
-            let missing = missing(link);
+            let missing = missing(map, road, link);
             if missing.is_empty() || virtual_links::leads_to_main_road(map, road, link) {
                 continue;
             }
@@ -35,10 +35,14 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
 }
 
 /// The attributes that a link to a road lacks; without a type, it may lead to a junction.
-fn missing(link: RoadLink<'_>) -> Vec<&'static str> {
+fn missing(map: &RoadMap<'_>, road: &Road<'_>, link: RoadLink<'_>) -> Vec<&'static str> {
     let has = |name: &str| link.node().attribute(name).is_some();
+    let is_within = has("elementS") || has("elementDir");
     let wanted: &[(&str, &'static str)] = match link.element_type() {
-        Some("road") if has("elementS") || has("elementDir") => &[("elementId", "`elementId`")],
+        // The main road is touched somewhere within.
+        Some("road") if is_within && virtual_links::may_be_within(map, road) => {
+            &[("elementId", "`elementId`")]
+        }
         Some("road") => &[
             ("elementId", "`elementId`"),
             ("contactPoint", "`contactPoint`"),
