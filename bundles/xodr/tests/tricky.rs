@@ -5,6 +5,8 @@
 
 #![expect(clippy::unwrap_used, reason = "in a test it is a finding")]
 
+#[path = "tricky/beyond.rs"]
+mod beyond;
 #[path = "tricky/build.rs"]
 mod build;
 #[path = "tricky/junctions.rs"]

@@ -86,14 +86,23 @@ fn date(header: Node<'_>, found: &mut Sink<'_>) {
     {
         return;
     }
-    let level = match (is_iso_8601(date), is_iso_8601(&date.replacen(' ', "T", 1))) {
+    let (level, fault) = match (is_iso_8601(date), is_iso_8601(&date.replacen(' ', "T", 1))) {
         (true, _) => return,
-        (false, true) => Level::Information,
-        (false, false) => Level::Warning,
+        // The standard prefers one form and allows all of ISO 8601.
+        (false, _) if is_other_iso_8601(date) => (
+            Level::Information,
+            "is written in a form of ISO 8601 that readers may not know; preferred is",
+        ),
+        (false, true) => (
+            Level::Information,
+            "is not written as ISO 8601 demands, such as",
+        ),
+        (false, false) => (
+            Level::Warning,
+            "is not written as ISO 8601 demands, such as",
+        ),
     };
-    let text = format!(
-        "the date `{date}` is not written as ISO 8601 demands, such as `2026-01-31T12:30:00`"
-    );
+    let text = format!("the date `{date}` {fault} `2026-01-31T12:30:00`");
     found
         .issue(Place::attribute_or_node(header, "date"), text)
         .level(level);
@@ -106,6 +115,45 @@ fn is_iso_8601(text: &str) -> bool {
         None => (text, None),
     };
     is_day(day) && time.is_none_or(is_time)
+}
+
+/// The forms of ISO 8601 beside the preferred one: without separators, by week, by day of the year, and
+/// of less precision.
+fn is_other_iso_8601(text: &str) -> bool {
+    let (day, time) = text
+        .split_once('T')
+        .map_or((text, None), |(day, time)| (day, Some(time)));
+    let shape: String = day
+        .chars()
+        .map(|c| if c.is_ascii_digit() { 'd' } else { c })
+        .collect();
+    let known = [
+        "dddd",
+        "dddd-dd",
+        "dddddddd",
+        "dddd-ddd",
+        "ddddddd",
+        "dddd-Wdd",
+        "dddd-Wdd-d",
+        "ddddWdd",
+        "ddddWddd",
+        "dddd-dd-dd",
+    ];
+    let is_whole = !matches!(shape.as_str(), "dddd" | "dddd-dd" | "dddd-Wdd" | "ddddWdd");
+    let plain_time = |time: &str| {
+        let end = time.find(['Z', '+', '-', '.', ',']).unwrap_or(time.len());
+        let digits = time.get(..end).unwrap_or_default();
+        matches!(digits.len(), 2 | 4 | 6) && digits.bytes().all(|byte| byte.is_ascii_digit())
+    };
+    let exists = match (day.get(..4), day.get(4..6), day.get(6..)) {
+        (Some(year), Some(month), Some(day)) if shape == "dddddddd" => {
+            is_day(&format!("{year}-{month}-{day}"))
+        }
+        _ => shape != "dddd-dd-dd" || is_day(day),
+    };
+    exists
+        && known.contains(&shape.as_str())
+        && time.is_none_or(|time| is_whole && (plain_time(time) || is_time(time)))
 }
 
 fn is_day(text: &str) -> bool {

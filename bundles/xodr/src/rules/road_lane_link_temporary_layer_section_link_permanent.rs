@@ -1,4 +1,4 @@
-use qcbus_opendrive::{ContactPoint, LaneRef, LayerKind, RoadMap};
+use qcbus_opendrive::{ContactPoint, LaneRef, LayerKind, RoadMap, SectionRef};
 use qcbus_sdk::{Rule, Sink};
 
 use crate::families::driving::is_drivable;
@@ -23,7 +23,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         };
         for lane in layer.in_order(road).flat_map(|section| section.lanes()) {
             for end in ContactPoint::BOTH {
-                if begins_or_ends(lane, end) {
+                if begins_or_ends(lane, end) || is_alone_at_end(map, lane, end) {
                     check(lane, end, found);
                 }
             }
@@ -59,6 +59,28 @@ fn begins_or_ends(lane: LaneRef<'_, '_>, end: ContactPoint) -> bool {
         }
     };
     inside && !touches
+}
+
+/// Whether the temporary lane reaches the end of its road, and the road that is linked there has no
+/// temporary lanes on which it could go on.
+fn is_alone_at_end<'a>(map: &RoadMap<'a>, lane: LaneRef<'_, 'a>, end: ContactPoint) -> bool {
+    let (Some(side), Some(contact)) = (lane.side(), map.linked_end(lane.at.road, end)) else {
+        return false;
+    };
+    let Some(road) = map.road_at(contact.to.road) else {
+        return false;
+    };
+    let section = road
+        .layer(LayerKind::Temporary)
+        .and_then(|layer| layer.end_section(road, side, contact.to.end));
+    let reaches = |section: SectionRef<'_, '_>| match contact.to.end {
+        ContactPoint::Start => section.s().is_some_and(|s| s <= 1e-3),
+        ContactPoint::End => {
+            let ends = section.end(side).zip(road.length());
+            ends.is_some_and(|(stop, length)| stop >= length - 1e-3)
+        }
+    };
+    lane.is_at_road_end(end) && !section.is_some_and(reaches)
 }
 
 fn check(lane: LaneRef<'_, '_>, end: ContactPoint, found: &mut Sink<'_>) {

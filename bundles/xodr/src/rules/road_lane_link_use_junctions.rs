@@ -52,8 +52,11 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether two lanes may merge: they lie in one lane section on one side.
+/// Whether two lanes may merge: they lie in one lane section on one side, or on the two layers of one
+/// road, of which one is valid at a time.
 fn together(one: LaneRef<'_, '_>, other: LaneRef<'_, '_>) -> bool {
     let (one_road, other_road) = (one.at.road.index(), other.at.road.index());
-    one_road == other_road && one.at.index() == other.at.index() && one.side() == other.side()
+    let layers = one.at.layer.kind() != other.at.layer.kind();
+    let beside = one.at.index() == other.at.index() && one.side() == other.side();
+    one_road == other_road && (layers || beside)
 }

@@ -92,6 +92,14 @@ fn to_road(
     found: &mut Sink<'_>,
 ) {
     let Some(other) = map.road(id) else { return };
+    if other.index() == road.index() && contact == end {
+        let text = format!(
+            "the {} of road `{id}` is its own {end}; an end of a road cannot lie at itself",
+            end.link_name()
+        );
+        found.issue(link.node(), text);
+        return;
+    }
     let mut namesakes = map.roads_with_id(id);
     if in_virtual_junction(map, road)
         || namesakes.any(|other| agrees(map, (road, end), (other, contact)))
