@@ -266,6 +266,28 @@ fn a_deleted_file_takes_its_result_along() {
     assert!(farm.out().join("stays.xodr.xqar").exists());
 }
 
+#[test]
+fn a_file_to_come_is_awaited_through_a_link() {
+    let farm = Farm::new();
+    let broker = farm.serve_ready();
+    let link = farm.root().with_file_name("link");
+    std::os::unix::fs::symlink(farm.root(), &link).unwrap();
+    let wait = |name: &str, limit: &str| {
+        let file = link.join(name);
+        farm.qcbus(&["wait", &file.to_string_lossy(), "--timeout", limit])
+    };
+    let said = wait("later.xodr", "100ms");
+    assert_eq!(
+        said.status.code(),
+        Some(3),
+        "watched, but not there: {said:?}"
+    );
+    farm.write("later.xodr", &Content::Good(1).bytes());
+    let said = wait("later.xodr", "60s");
+    assert_eq!(said.status.code(), Some(0), "{said:?}");
+    drop(broker);
+}
+
 fn is_unwatched(farm: &Farm, name: &str) -> bool {
     let request = Request::Wait {
         file: farm.root().join(name),

@@ -7,6 +7,7 @@ use qcbus_formats::config::Config;
 use qcbus_formats::xqar::Param;
 
 use crate::loaded::{LoadError, load};
+use crate::output::asked;
 use crate::{FileSources, ReportError, Reporter, param};
 
 /// The result file that ASAM's runtime writes, meant when a configuration names none.
@@ -63,7 +64,7 @@ pub fn report_once(
     let xqar = what.xqar.clone().or(named);
     let mut result = load(&xqar.unwrap_or_else(|| PathBuf::from(DEFAULT_RESULT)))?;
     // Who asks for one report wants to see it.
-    if param(&params, "OutputFile").is_none() {
+    if asked(&params).is_none() {
         params.push(Param {
             name: "OutputFile".into(),
             value: "__stdout__".into(),

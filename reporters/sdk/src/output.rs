@@ -7,7 +7,7 @@ use qcbus_formats::xqar::Param;
 
 use crate::{ReportError, Subject};
 
-/// Where reports go: the parameter `OutputFile`.
+/// Where reports go: the parameter `OutputFile`, or what ASAM's C++ reports call `strReportFile`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Output {
     /// No parameter: one report per result, beside it. `a.xodr.xqar` gets `a.xodr.txt`.
@@ -26,7 +26,7 @@ pub enum Output {
 impl Output {
     /// What `OutputFile` asks for. Relative names are meant from the current directory.
     pub fn of(params: &[Param]) -> Output {
-        match param(params, "OutputFile") {
+        match asked(params) {
             None | Some("") => Output::BesideResult,
             Some("__stdout__") => Output::Stdout,
             Some("__stderr__") => Output::Stderr,
@@ -52,6 +52,11 @@ impl Output {
             Output::File(_) | Output::Stdout | Output::Stderr => None,
         }
     }
+}
+
+/// What the parameters say about where reports go; `None` when they say nothing.
+pub(crate) fn asked(params: &[Param]) -> Option<&str> {
+    param(params, "OutputFile").or_else(|| param(params, "strReportFile"))
 }
 
 /// The value of a parameter; the last one wins, as the more specific are written later.
@@ -114,6 +119,21 @@ mod tests {
             name: "OutputFile".into(),
             value: value.into(),
         }]
+    }
+
+    #[test]
+    fn the_name_of_the_older_reports_is_known_too() {
+        let named = |name: &str, value: &str| Param {
+            name: name.into(),
+            value: value.into(),
+        };
+        let old = named("strReportFile", "rep.txt");
+        assert_eq!(
+            Output::of(std::slice::from_ref(&old)),
+            Output::File(PathBuf::from("rep.txt"))
+        );
+        let both = [named("OutputFile", "own.txt"), old];
+        assert_eq!(Output::of(&both), Output::File(PathBuf::from("own.txt")));
     }
 
     #[test]

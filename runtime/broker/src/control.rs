@@ -147,7 +147,10 @@ pub enum AskError {
         /// The socket looked for.
         path: PathBuf,
     },
-    /// The broker went away, or said something else than an answer.
+    /// The broker went away before it answered.
+    #[error("the broker left before it answered ({0}); see its log, and ask again when it runs")]
+    Left(String),
+    /// The broker said something else than an answer.
     #[error("the broker did not answer: {0}")]
     NoAnswer(String),
 }
@@ -161,7 +164,7 @@ pub fn ask_broker(directory: &Path, request: &Request) -> Result<Response, AskEr
     let path = directory.join(SOCKET);
     let mut stream =
         std::os::unix::net::UnixStream::connect(&path).map_err(|_| AskError::NoBroker { path })?;
-    let lost = |error: std::io::Error| AskError::NoAnswer(error.to_string());
+    let lost = |error: std::io::Error| AskError::Left(error.to_string());
     let mut text =
         serde_json::to_vec(request).map_err(|error| AskError::NoAnswer(error.to_string()))?;
     text.push(b'\n');
@@ -171,7 +174,7 @@ pub fn ask_broker(directory: &Path, request: &Request) -> Result<Response, AskEr
         .read_line(&mut line)
         .map_err(lost)?;
     if read == 0 {
-        return Err(AskError::NoAnswer("it closed the connection".to_owned()));
+        return Err(AskError::Left("it closed the connection".to_owned()));
     }
     serde_json::from_str(&line).map_err(|error| AskError::NoAnswer(error.to_string()))
 }

@@ -38,7 +38,7 @@ pub fn prepare_bytes(path: &Path, bytes: Vec<u8>, limits: &Limits) -> Prepared {
 
 /// Parts `archive.mosc!member!member` into the file on disk and the members. A `!` that follows
 /// no archive is an ordinary character.
-fn split_members(path: &Path) -> (PathBuf, Vec<String>) {
+pub(crate) fn split_members(path: &Path) -> (PathBuf, Vec<String>) {
     let Some(text) = path.to_str() else {
         return (path.to_path_buf(), Vec::new());
     };

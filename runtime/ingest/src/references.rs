@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use qcbus_document::{Document, Node};
 
-use crate::prepare::normal;
+use crate::prepare::{normal, split_members};
 
 /// What a referenced file is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -207,16 +207,20 @@ fn percent_decoded(text: &str) -> String {
 /// Relative to the referring file. What a member of an archive refers to is looked for in the
 /// archive first, then beside it.
 fn places(role: Role, from: &Path, text: &str) -> Vec<PathBuf> {
-    let name = from.to_string_lossy();
     let mut places = Vec::new();
-    let mut base = from.to_path_buf();
-    if let Some((archive, _)) = name.rsplit_once('!') {
-        if role == Role::ScenarioReference || role == Role::ScenarioFile {
-            places.push(PathBuf::from(format!("{archive}!{text}")));
+    // A `!` that follows no archive is an ordinary character of a name.
+    let (file, members) = split_members(from);
+    if let Some((_, around)) = members.split_last()
+        && (role == Role::ScenarioReference || role == Role::ScenarioFile)
+    {
+        let mut place = file.display().to_string();
+        for member in around.iter().map(String::as_str).chain([text]) {
+            place.push('!');
+            place.push_str(member);
         }
-        base = PathBuf::from(archive.split(".mosc!").next().unwrap_or(archive));
+        places.push(PathBuf::from(place));
     }
-    let folder = base.parent().unwrap_or(Path::new(""));
+    let folder = file.parent().unwrap_or(Path::new(""));
     let joined = folder.join(text);
     places.push(normal(&std::path::absolute(&joined).unwrap_or(joined)));
     places

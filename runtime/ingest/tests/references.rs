@@ -54,6 +54,14 @@ fn maps_are_relative_to_the_scenario() {
 }
 
 #[test]
+fn an_exclamation_mark_alone_makes_no_archive() {
+    let text =
+        "<OpenSCENARIO><RoadNetwork><LogicFile filepath='map.xodr'/></RoadNetwork></OpenSCENARIO>";
+    let found = of(Path::new("/farm/NEW!/s.xosc"), text);
+    assert_eq!(found[0].candidates, [PathBuf::from("/farm/NEW!/map.xodr")]);
+}
+
+#[test]
 fn what_names_no_file_says_why() {
     for (filepath, part) in [
         ("Town05", "the name of a map that the simulator knows"),

@@ -1,5 +1,7 @@
 //! Commands that ask a running broker: `down`, `wait`, `reload`.
 
+use std::path::{Path, PathBuf};
+
 use qcbus_broker::control::{AskError, ask_broker};
 use qcbus_messages::Exit;
 use qcbus_messages::control::{FileVerdict, Request, Response};
@@ -17,7 +19,7 @@ pub fn ask(args: &InstanceArgs, request: &Request) -> Result<Response, Exit> {
     ask_broker(instance.dir(), request).map_err(|error| {
         talk::fail(&error.to_string());
         match error {
-            AskError::NoBroker { .. } => Exit::NoBroker,
+            AskError::NoBroker { .. } | AskError::Left(_) => Exit::NoBroker,
             AskError::NoAnswer(_) => Exit::Internal,
         }
     })
@@ -53,7 +55,7 @@ pub fn reload(args: &InstanceArgs) -> Exit {
 
 /// `qcbus wait`.
 pub fn wait(args: &WaitArgs) -> Exit {
-    let file = std::fs::canonicalize(&args.file).unwrap_or_else(|_| absolute(&args.file));
+    let file = really(&args.file);
     let timeout_ms = args
         .timeout
         .map(|it| u64::try_from(it.as_millis()).unwrap_or(u64::MAX));
@@ -115,5 +117,25 @@ fn unexpected(response: &Response) -> Exit {
     match response {
         Response::Failed { .. } => Exit::Usage,
         _ => Exit::Internal,
+    }
+}
+
+/// The path as the broker knows it, without symbolic links, also of a file that is still to come.
+fn really(path: &Path) -> PathBuf {
+    let path = absolute(path);
+    let known = path.ancestors().find_map(|above| {
+        let real = std::fs::canonicalize(above).ok()?;
+        Some((above, real))
+    });
+    match known {
+        Some((above, mut real)) => {
+            real.extend(
+                path.strip_prefix(above)
+                    .unwrap_or(Path::new(""))
+                    .components(),
+            );
+            real
+        }
+        None => path,
     }
 }
