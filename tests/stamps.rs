@@ -10,14 +10,17 @@
 mod support;
 
 use std::fs::File;
-use std::os::unix::fs::MetadataExt;
+use std::io::Write;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use qcbus_messages::Verdict;
 use sha2::{Digest, Sha256};
 use support::content::Content;
+use support::desk::Desk;
 use support::farm::{Farm, tail};
+use support::judge::verdicts_in_journal;
 use support::watchdog::{until_or, until_so};
 
 const HOUR: Duration = Duration::from_secs(3600);
@@ -186,4 +189,91 @@ fn an_old_scenario_is_judged_again_when_its_map_or_catalogs_appear_or_change() {
     std::fs::rename(&outside, farm.root().join("catalogs")).unwrap();
     let catalog = farm.root().join("catalogs/c.xosc");
     rests_on_becomes(&farm, "s.xosc", &catalog, Some(CATALOG.as_bytes()));
+}
+
+/// Writes over the bytes of a file that is there and gives it its time back, as `rsync --inplace
+/// --times` does.
+fn write_over(farm: &Farm, name: &str, bytes: &[u8]) {
+    let path = farm.root().join(name);
+    let before = std::fs::metadata(&path).unwrap();
+    let mut file = File::options().write(true).open(&path).unwrap();
+    file.write_all(bytes).unwrap();
+    file.set_modified(before.modified().unwrap()).unwrap();
+    drop(file);
+    let after = std::fs::metadata(&path).unwrap();
+    let key = |it: &std::fs::Metadata| (it.len(), it.modified().unwrap(), it.ino());
+    assert_eq!(key(&after), key(&before));
+}
+
+/// A good file, and a bad one of the same size.
+fn good_and_bad() -> (Vec<u8>, Vec<u8>) {
+    let good = Content::Good(1).bytes();
+    let bad = String::from_utf8(good.clone())
+        .unwrap()
+        .replace("<header ", "<heeder ");
+    (good, bad.into_bytes())
+}
+
+#[test]
+fn a_file_that_is_rewritten_with_its_size_and_time_kept_is_judged_again() {
+    let farm = farm_with_gate();
+    let (good, bad) = good_and_bad();
+    put_old(&farm, "a.xodr", &good);
+    rest(&farm);
+    let _broker = farm.serve_ready();
+    farm.settle(1);
+    verdict_becomes(&farm, "a.xodr", Verdict::Accepted);
+    write_over(&farm, "a.xodr", &bad);
+    verdict_becomes(&farm, "a.xodr", Verdict::Rejected);
+    rest(&farm);
+    assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Rejected);
+    write_over(&farm, "a.xodr", &good);
+    assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Accepted);
+    verdict_becomes(&farm, "a.xodr", Verdict::Accepted);
+}
+
+#[test]
+fn another_link_or_other_rights_cost_no_new_verdict() {
+    let farm = farm_with_gate();
+    let (outer, view) = road_in_two_parts();
+    put_old(&farm, "a.xodr", outer.as_bytes());
+    put_old(&farm, "view.xml", view.as_bytes());
+    rest(&farm);
+    let _broker = farm.serve_ready();
+    farm.settle(1);
+    for name in ["a.xodr", "view.xml"] {
+        let path = farm.root().join(name);
+        std::fs::hard_link(&path, farm.base().join(name)).unwrap();
+        assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Accepted);
+        let rights = std::fs::Permissions::from_mode(0o600);
+        std::fs::set_permissions(&path, rights).unwrap();
+        assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Accepted);
+    }
+    farm.settle(1);
+    let verdicts = verdicts_in_journal(&farm.journal());
+    assert_eq!(verdicts.into_values().collect::<Vec<_>>(), [1]);
+    verdict_becomes(&farm, "a.xodr", Verdict::Accepted);
+}
+
+#[test]
+fn files_from_before_1970_are_judged() {
+    let farm = farm_with_gate();
+    let (outer, view) = road_in_two_parts();
+    for (name, bytes) in [("a.xodr", &outer), ("view.xml", &view)] {
+        farm.write(name, bytes.as_bytes());
+        set_modified(&farm.root().join(name), UNIX_EPOCH - HOUR);
+    }
+    // A single run comes to its end.
+    let desk = Desk::new();
+    let map = farm.root().join("a.xodr").to_string_lossy().into_owned();
+    let said = desk.qcbus(&["check", &map, "--out", "out"]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let _broker = farm.serve_ready();
+    assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Accepted);
+    farm.settle(1);
+    verdict_becomes(&farm, "a.xodr", Verdict::Accepted);
+    let bad = outer.replace("<header ", "<heeder ");
+    write_over(&farm, "a.xodr", bad.as_bytes());
+    verdict_becomes(&farm, "a.xodr", Verdict::Rejected);
+    farm.settle(1);
 }

@@ -4,17 +4,16 @@ use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use qcbus_bus::{Documents, Held, Loan, LoanError};
 use qcbus_document::{Document, FileKind};
-use qcbus_ingest::{BuildError, Content, IngestError, Limits, Prepared, Reference, Role};
+use qcbus_ingest::{BuildError, IngestError, Limits, Prepared, Reference, Role};
 use qcbus_messages::{Digest, DocId, DocumentRole, JobDocument, JobId, MissingDocument};
 use sha2::{Digest as _, Sha256};
 
-use crate::core::{Input, PrepareFailure, PreparedJob, Stamp};
+use crate::core::{Input, PrepareFailure, PreparedJob};
 use crate::stages::reached;
-use crate::stamp::{stamp_of, stamp_through_links};
+use crate::stamp::{from_content, is_racy, stamp_of, stamp_through_links};
 
 /// Reads files and publishes their images. Shared by the threads that do so.
 pub struct Intake {
@@ -58,9 +57,6 @@ const CACHED: usize = 8;
 
 /// Ended jobs whose root document reporters may still find on the bus.
 const RECENT: usize = 256;
-
-/// A file that was written to this recently may change again without its stamp telling.
-const RACY: Duration = Duration::from_secs(2);
 
 impl Intake {
     /// An intake that publishes through `documents`. `roots` are the watched or given directories:
@@ -392,7 +388,8 @@ impl Gathered {
     fn listing(&mut self, directory: &Path) {
         let stamp = stamp_through_links(directory);
         let content = stamp.map(|stamp| {
-            let digest = Sha256::digest(format!("{} {}", stamp.size, stamp.mtime_ns));
+            let digest =
+                Sha256::digest(format!("{} {}", stamp.size, stamp.mtime_ns.unsigned_abs()));
             (stamp, Digest(digest.into()))
         });
         self.inputs.insert(
@@ -470,27 +467,9 @@ fn inputs_of(prepared: &Prepared) -> Vec<Input> {
             content: file
                 .content
                 .as_ref()
-                .map(|it| (stamp_as_read(&file.path, it), Digest(it.digest))),
+                .map(|it| (from_content(it), Digest(it.digest))),
         })
         .collect()
-}
-
-/// The stamp of a file as it was read. The inode is taken from a second look: when that sees
-/// another size or time, the file has changed since, and no stamp will ever match this one.
-fn stamp_as_read(path: &Path, content: &Content) -> Stamp {
-    let since_1970 = content
-        .modified
-        .and_then(|time| time.duration_since(UNIX_EPOCH).ok());
-    let mtime_ns = since_1970
-        .and_then(|it| i128::try_from(it.as_nanos()).ok())
-        .unwrap_or_default();
-    let now =
-        stamp_through_links(path).filter(|it| it.size == content.size && it.mtime_ns == mtime_ns);
-    now.unwrap_or(Stamp {
-        size: content.size,
-        mtime_ns,
-        inode: 0,
-    })
 }
 
 fn is_unchanged(input: &Input) -> bool {
@@ -498,14 +477,6 @@ fn is_unchanged(input: &Input) -> bool {
         Some((stamp, _)) => !is_racy(stamp) && stamp_through_links(&input.path) == Some(stamp),
         None => stamp_through_links(&input.path).is_none(),
     }
-}
-
-fn is_racy(stamp: Stamp) -> bool {
-    let now = SystemTime::now()
-        .duration_since(UNIX_EPOCH)
-        .unwrap_or_default();
-    let age = i128::try_from(now.as_nanos()).unwrap_or(i128::MAX) - stamp.mtime_ns;
-    age < i128::try_from(RACY.as_nanos()).unwrap_or(0)
 }
 
 fn unreadable(path: &Path, reason: String) -> PrepareFailure {

@@ -112,6 +112,7 @@ fn stamp(number: u64) -> Stamp {
     Stamp {
         size: number,
         mtime_ns: i128::from(number),
+        ctime_ns: i128::from(number),
         inode: 1,
     }
 }

@@ -29,10 +29,25 @@ pub struct Ticket(pub u64);
 pub struct Stamp {
     /// Size in bytes.
     pub size: u64,
-    /// Modification time in nanoseconds since 1970.
+    /// Modification time in nanoseconds since 1970; negative before.
     pub mtime_ns: i128,
+    /// Time of the last change of anything, because the modification time can be set at will.
+    pub ctime_ns: i128,
     /// Inode, because a rename can keep size and time.
     pub inode: u64,
+}
+
+impl Stamp {
+    /// Whether only the time of change differs: the bytes may be the same (another link to the
+    /// file, other rights) or not (rewritten in place, with the time put back).
+    pub fn differs_in_ctime_only(&self, other: &Stamp) -> bool {
+        self.ctime_ns != other.ctime_ns
+            && *self
+                == Stamp {
+                    ctime_ns: self.ctime_ns,
+                    ..*other
+                }
+    }
 }
 
 /// A file that a verdict depends on, as it was when it was read.
