@@ -277,3 +277,29 @@ fn files_from_before_1970_are_judged() {
     verdict_becomes(&farm, "a.xodr", Verdict::Rejected);
     farm.settle(1);
 }
+
+#[test]
+fn what_is_there_and_cannot_be_read_does_not_keep_a_file_from_its_verdict() {
+    let farm = farm_with_gate();
+    for name in ["map.xodr", "view.xml"] {
+        std::fs::create_dir(farm.root().join(name)).unwrap();
+    }
+    let (outer, view) = road_in_two_parts();
+    put_old(&farm, "a.xodr", outer.as_bytes());
+    put_old(&farm, "s.xosc", SCENARIO.as_bytes());
+    let _broker = farm.serve_ready();
+    farm.settle(2);
+    verdict_becomes(&farm, "a.xodr", Verdict::Rejected);
+    let map = farm.root().join("map.xodr");
+    rests_on_becomes(&farm, "s.xosc", &map, None);
+
+    let view_path = farm.root().join("view.xml");
+    std::fs::remove_dir(&view_path).unwrap();
+    put_old(&farm, "view.xml", view.as_bytes());
+    verdict_becomes(&farm, "a.xodr", Verdict::Accepted);
+    std::fs::remove_dir(&map).unwrap();
+    let bytes = Content::Good(2).bytes();
+    put_old(&farm, "map.xodr", &bytes);
+    rests_on_becomes(&farm, "s.xosc", &map, Some(&bytes));
+    farm.settle(3);
+}

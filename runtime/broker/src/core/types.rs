@@ -55,8 +55,20 @@ impl Stamp {
 pub struct Input {
     /// Absolute path.
     pub path: Arc<Path>,
-    /// Its stamp and digest; `None` when it was looked for and not there.
+    /// Its stamp and digest; `None` when it was looked for and not there. Where something is there
+    /// that could not be read (a directory, say), the digest is [`Input::UNREAD`].
     pub content: Option<(Stamp, Digest)>,
+}
+
+impl Input {
+    /// The digest of what is there and could not be read.
+    pub const UNREAD: Digest = Digest([0; 32]);
+
+    /// The digest of the bytes that were read, if any were.
+    pub fn digest(&self) -> Option<Digest> {
+        let digest = self.content.map(|(_, digest)| digest);
+        digest.filter(|digest| *digest != Input::UNREAD)
+    }
 }
 
 /// What reading a file and its dependencies gave.
