@@ -1,7 +1,7 @@
 //! The driver: it knows what is in every file, and what it has done to whom.
 
-use std::path::PathBuf;
-use std::time::Instant;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, UNIX_EPOCH};
 
 use rustix::process::Signal;
 
@@ -20,6 +20,8 @@ use crate::support::watchdog::{pause, until_or};
 const FILES: usize = 80;
 /// Longest pause between two deeds, in milliseconds.
 const PAUSE: u64 = 90;
+/// Before and after 1970: times that some files say they are from.
+const LONG_AGO: Duration = Duration::from_secs(1_000_000);
 /// What the filler leaves of the shared memory, in bytes.
 const LEFT: u64 = 2 << 20;
 /// Where the filler lies.
@@ -292,8 +294,22 @@ impl Driver {
 
     fn put(&mut self, name: &str, content: Content, kind: &'static str) {
         self.farm.write(name, &content.bytes());
+        let path = self.path(name);
+        self.age(&path);
         self.tally.note(kind, name);
         self.files.insert(name.to_owned(), content);
+    }
+
+    /// One file in three says that it was last written to long ago, as a copy may; all these say the
+    /// same, some that it was before 1970.
+    fn age(&mut self, path: &Path) {
+        let time = match self.dice.below(6) {
+            0 => UNIX_EPOCH - LONG_AGO,
+            1 => UNIX_EPOCH + LONG_AGO,
+            _ => return,
+        };
+        let file = std::fs::File::options().write(true).open(path).unwrap();
+        file.set_modified(time).unwrap();
     }
 
     fn new_name(&mut self) -> String {
@@ -333,6 +349,7 @@ impl Driver {
         let content = Content::any(&mut self.dice);
         let unfinished = self.path(&format!("{name}.part"));
         std::fs::write(&unfinished, content.bytes()).unwrap();
+        self.age(&unfinished);
         std::fs::rename(&unfinished, self.path(&name)).unwrap();
         self.tally.note("rename into place", &name);
         self.files.insert(name, content);

@@ -1,20 +1,20 @@
 //! From a path to published document images: the only place where the broker reads what it checks.
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use qcbus_bus::{Documents, Held, Loan, LoanError};
 use qcbus_document::{Document, FileKind};
-use qcbus_ingest::{BuildError, Content, IngestError, Limits, Prepared, Reference, Role};
+use qcbus_ingest::{BuildError, IngestError, Limits, Prepared, Reference, Role};
 use qcbus_messages::{Digest, DocId, DocumentRole, JobDocument, JobId, MissingDocument};
 use sha2::{Digest as _, Sha256};
 
 use crate::core::{Input, PrepareFailure, PreparedJob, Stamp};
 use crate::stages::reached;
-use crate::stamp::{stamp_of, stamp_through_links};
+use crate::stamp::{from_content, is_racy, stamp_of, stamp_through_links};
 
 /// Reads files and publishes their images. Shared by the threads that do so.
 pub struct Intake {
@@ -58,9 +58,6 @@ const CACHED: usize = 8;
 
 /// Ended jobs whose root document reporters may still find on the bus.
 const RECENT: usize = 256;
-
-/// A file that was written to this recently may change again without its stamp telling.
-const RACY: Duration = Duration::from_secs(2);
 
 impl Intake {
     /// An intake that publishes through `documents`. `roots` are the watched or given directories:
@@ -201,17 +198,25 @@ impl Intake {
             return Ok(None);
         }
         if gathered.documents.len() >= self.max_documents {
+            gathered.unread(path, stamp_through_links(path));
             return Ok(Some(format!(
                 "more than {} documents belong to this file",
                 self.max_documents
             )));
         }
+        // Looked at before: when it changes while it is tried, this stamp fits no more.
+        let before = stamp_through_links(path);
         match self.publish_shared(path) {
             Ok(published) => {
                 gathered.push(path, role, reference.offset, &published);
                 Ok(None)
             }
-            Err(Failure::Ingest(error)) => Ok(Some(error.to_string())),
+            Err(Failure::Ingest(error)) => {
+                if !matches!(error, IngestError::Missing { .. }) {
+                    gathered.unread(path, before);
+                }
+                Ok(Some(error.to_string()))
+            }
             Err(failure) => Err(self.explain(failure, path)),
         }
     }
@@ -245,7 +250,7 @@ impl Intake {
         let prepared = qcbus_ingest::prepare(path, self.boundary(path), &self.limits)?;
         reached("read", path);
         let digest = Digest(prepared.digest());
-        let inputs = inputs_of(&prepared);
+        let inputs = inputs_of(&prepared, &self.limits);
         let kind = FileKind::of_path(path).unwrap_or(FileKind::Xosc);
         let (loan, used) = self.build(&prepared)?;
         reached("built", path);
@@ -256,6 +261,7 @@ impl Intake {
         reached("published", path);
         let bytes = inputs
             .iter()
+            .filter(|it| it.digest().is_some())
             .filter_map(|it| it.content)
             .map(|(stamp, _)| stamp.size)
             .sum();
@@ -378,6 +384,18 @@ impl Gathered {
             .any(|document| Path::new(&document.path) == path)
     }
 
+    /// Something that is there and could not be had: when it changes, the verdict is void.
+    fn unread(&mut self, path: &Path, stamp: Option<Stamp>) {
+        if let Some(stamp) = stamp {
+            self.inputs
+                .entry(path.to_path_buf())
+                .or_insert_with(|| Input {
+                    path: path.into(),
+                    content: Some((stamp, Input::UNREAD)),
+                });
+        }
+    }
+
     /// A file that was looked for and not found: when it appears, the verdict is void.
     fn absent(&mut self, path: &Path) {
         self.inputs
@@ -392,7 +410,8 @@ impl Gathered {
     fn listing(&mut self, directory: &Path) {
         let stamp = stamp_through_links(directory);
         let content = stamp.map(|stamp| {
-            let digest = Sha256::digest(format!("{} {}", stamp.size, stamp.mtime_ns));
+            let digest =
+                Sha256::digest(format!("{} {}", stamp.size, stamp.mtime_ns.unsigned_abs()));
             (stamp, Digest(digest.into()))
         });
         self.inputs.insert(
@@ -461,36 +480,28 @@ fn basis(inputs: &[Input]) -> Digest {
     Digest(hash.finalize().into())
 }
 
-fn inputs_of(prepared: &Prepared) -> Vec<Input> {
+fn inputs_of(prepared: &Prepared, limits: &Limits) -> Vec<Input> {
     prepared
         .files()
         .iter()
         .map(|file| Input {
             path: file.path.as_path().into(),
-            content: file
-                .content
-                .as_ref()
-                .map(|it| (stamp_as_read(&file.path, it), Digest(it.digest))),
+            content: match &file.content {
+                Some(it) => Some((from_content(it), Digest(it.digest))),
+                None => unreadable_now(&file.path, limits).map(|stamp| (stamp, Input::UNREAD)),
+            },
         })
         .collect()
 }
 
-/// The stamp of a file as it was read. The inode is taken from a second look: when that sees
-/// another size or time, the file has changed since, and no stamp will ever match this one.
-fn stamp_as_read(path: &Path, content: &Content) -> Stamp {
-    let since_1970 = content
-        .modified
-        .and_then(|time| time.duration_since(UNIX_EPOCH).ok());
-    let mtime_ns = since_1970
-        .and_then(|it| i128::try_from(it.as_nanos()).ok())
-        .unwrap_or_default();
-    let now =
-        stamp_through_links(path).filter(|it| it.size == content.size && it.mtime_ns == mtime_ns);
-    now.unwrap_or(Stamp {
-        size: content.size,
-        mtime_ns,
-        inode: 0,
-    })
+/// The stamp of something that could not be read and still cannot. What can be read by now is
+/// taken for missing, as it was; that it has come is noticed before the result is stored.
+fn unreadable_now(path: &Path, limits: &Limits) -> Option<Stamp> {
+    let stamp = stamp_through_links(path)?;
+    let is_readable = std::fs::metadata(path).is_ok_and(|data| data.is_file())
+        && stamp.size <= limits.max_file
+        && File::open(path).is_ok();
+    (!is_readable).then_some(stamp)
 }
 
 fn is_unchanged(input: &Input) -> bool {
@@ -498,14 +509,6 @@ fn is_unchanged(input: &Input) -> bool {
         Some((stamp, _)) => !is_racy(stamp) && stamp_through_links(&input.path) == Some(stamp),
         None => stamp_through_links(&input.path).is_none(),
     }
-}
-
-fn is_racy(stamp: Stamp) -> bool {
-    let now = SystemTime::now()
-        .duration_since(UNIX_EPOCH)
-        .unwrap_or_default();
-    let age = i128::try_from(now.as_nanos()).unwrap_or(i128::MAX) - stamp.mtime_ns;
-    age < i128::try_from(RACY.as_nanos()).unwrap_or(0)
 }
 
 fn unreadable(path: &Path, reason: String) -> PrepareFailure {

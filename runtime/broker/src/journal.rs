@@ -11,7 +11,7 @@ use rusqlite::{Connection, OpenFlags, Transaction, params};
 use crate::core::{Input, Judged, Stamp};
 
 /// Version of the schema, kept in SQLite's `user_version`.
-pub const SCHEMA_VERSION: i64 = 1;
+pub const SCHEMA_VERSION: i64 = 2;
 
 const SCHEMA: &str = include_str!("journal.sql");
 
@@ -414,14 +414,24 @@ fn put_history(
     Ok(())
 }
 
-type InputRow = (String, Option<(u64, i128, u64, String)>);
+/// A path, and of its content size, time of modification, inode, digest, time of change.
+type InputRow = (String, Option<(u64, i128, u64, String, i128)>);
+
+/// The same in schema 1, which knew no time of change.
+type InputRowOfSchema1 = (String, Option<(u64, i128, u64, String)>);
 
 fn inputs_to_text(inputs: &[Input]) -> String {
     let rows: Vec<InputRow> = inputs
         .iter()
         .map(|input| {
             let content = input.content.map(|(stamp, digest)| {
-                (stamp.size, stamp.mtime_ns, stamp.inode, digest.to_string())
+                (
+                    stamp.size,
+                    stamp.mtime_ns,
+                    stamp.inode,
+                    digest.to_string(),
+                    stamp.ctime_ns,
+                )
             });
             (text(&input.path), content)
         })
@@ -430,14 +440,16 @@ fn inputs_to_text(inputs: &[Input]) -> String {
 }
 
 fn inputs_from_text(text: &str) -> Option<Vec<Input>> {
-    let rows: Vec<InputRow> = serde_json::from_str(text).ok()?;
+    let rows = serde_json::from_str(text).ok();
+    let rows: Vec<InputRow> = rows.or_else(|| rows_of_schema_1(text))?;
     let input = |(path, content): InputRow| {
         let content = match content {
             None => None,
-            Some((size, mtime_ns, inode, digest)) => Some((
+            Some((size, mtime_ns, inode, digest, ctime_ns)) => Some((
                 Stamp {
                     size,
                     mtime_ns,
+                    ctime_ns,
                     inode,
                 },
                 digest.parse().ok()?,
@@ -449,6 +461,17 @@ fn inputs_from_text(text: &str) -> Option<Vec<Input>> {
         })
     };
     rows.into_iter().map(input).collect()
+}
+
+/// Without a time of change a stamp fits no file, which is then read once more and found to be the
+/// same, or not.
+fn rows_of_schema_1(text: &str) -> Option<Vec<InputRow>> {
+    let rows: Vec<InputRowOfSchema1> = serde_json::from_str(text).ok()?;
+    let row = |(path, content): InputRowOfSchema1| {
+        let content = content.map(|(size, mtime, inode, digest)| (size, mtime, inode, digest, 0));
+        (path, content)
+    };
+    Some(rows.into_iter().map(row).collect())
 }
 
 fn judged_of(row: &rusqlite::Row<'_>) -> rusqlite::Result<Option<Judged>> {
@@ -528,7 +551,8 @@ mod tests {
                     content: Some((
                         Stamp {
                             size: 1,
-                            mtime_ns: 1 << 70,
+                            mtime_ns: -(1 << 70),
+                            ctime_ns: 1 << 71,
                             inode: 3,
                         },
                         Digest([1; 32]),
@@ -590,6 +614,40 @@ mod tests {
         journal.write(&[Entry::Voided { path, reporter }]).unwrap();
         assert_eq!(journal.voids().unwrap(), [text]);
         assert_eq!(Journal::examine(dir.path()), None);
+    }
+
+    #[test]
+    fn a_journal_of_schema_1_opens_and_its_stamps_fit_nothing() {
+        let dir = tempfile::tempdir().unwrap();
+        let path: Arc<Path> = Path::new("/a.xosc").into();
+        let written = judged(5);
+        let mut journal = Journal::open(dir.path()).unwrap();
+        journal
+            .write(&[Entry::Judged {
+                path,
+                judged: Arc::new(written.clone()),
+                history: None,
+            }])
+            .unwrap();
+        let digest = Digest([1; 32]);
+        let inputs = format!("[[\"/a.xosc\",[1,7,3,\"{digest}\"]],[\"/a.xodr\",null]]");
+        journal
+            .connection
+            .execute("UPDATE files SET inputs = ?1", params![inputs])
+            .unwrap();
+        journal
+            .connection
+            .execute_batch("PRAGMA user_version = 1")
+            .unwrap();
+        drop(journal);
+        let all = Journal::open(dir.path()).unwrap().remembered().unwrap();
+        assert_eq!(all.len(), 1);
+        let (stamp, known) = all[0].judged.inputs[0].content.unwrap();
+        assert_eq!((stamp.size, stamp.mtime_ns, stamp.inode), (1, 7, 3));
+        assert_eq!(stamp.ctime_ns, 0);
+        assert_eq!(known, digest);
+        assert_eq!(all[0].judged.inputs[1], written.inputs[1]);
+        assert_eq!(all[0].judged.basis, written.basis);
     }
 
     #[test]

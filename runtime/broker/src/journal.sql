@@ -15,7 +15,7 @@ CREATE TABLE IF NOT EXISTS files (
     information INTEGER NOT NULL,
     why      TEXT NOT NULL,         -- JSON list: for undetermined, the checkers that failed
     xqar     TEXT NOT NULL,         -- where the result lies
-    inputs   TEXT NOT NULL,         -- JSON list of [path, size, mtime_ns, inode, digest]; null: absent
+    inputs   TEXT NOT NULL,         -- JSON list of [path, [size, mtime_ns, inode, digest, ctime_ns]]; null: absent
     racy     INTEGER NOT NULL,      -- 1: read so soon after a write that the stamps prove nothing
     at       INTEGER NOT NULL
 ) WITHOUT ROWID;

@@ -4,8 +4,10 @@ use std::fs::Metadata;
 use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use qcbus_document::FileKind;
+use qcbus_ingest::{Content, Stat};
 
 use crate::core::Stamp;
 
@@ -52,16 +54,129 @@ fn listing(directory: &Path, inode: u64) -> Option<Stamp> {
     });
     Some(Stamp {
         size: names.len() as u64,
-        mtime_ns: hash.into(),
+        // Not after 1970, so that nobody takes it for a time that is still young.
+        mtime_ns: -i128::from(hash),
+        ctime_ns: 0,
         inode,
     })
 }
 
 /// The stamp in what `stat` returned.
 pub fn from_metadata(data: &Metadata) -> Stamp {
+    from_stat(data.len(), Stat::of(data))
+}
+
+/// The stamp of a file as it was read.
+pub fn from_content(content: &Content) -> Stamp {
+    // Bytes that are of no file have the stamp of none.
+    content
+        .stat
+        .map_or_else(Stamp::default, |stat| from_stat(content.size, stat))
+}
+
+fn from_stat(size: u64, stat: Stat) -> Stamp {
     Stamp {
-        size: data.len(),
-        mtime_ns: i128::from(data.mtime()) * 1_000_000_000 + i128::from(data.mtime_nsec()),
-        inode: data.ino(),
+        size,
+        mtime_ns: stat.modified_ns,
+        ctime_ns: stat.changed_ns,
+        inode: stat.inode,
+    }
+}
+
+/// A file that was changed this recently may change again without its stamp telling.
+const RACY: Duration = Duration::from_secs(2);
+
+/// Whether a file has changed so recently that its stamp proves nothing. Its time of change counts
+/// too: a copy may carry an old modification time.
+pub fn is_racy(stamp: Stamp) -> bool {
+    age_of(stamp.mtime_ns.max(stamp.ctime_ns)) < nanoseconds(RACY)
+}
+
+/// Nanoseconds since then; negative for times to come.
+pub fn age_of(time_ns: i128) -> i128 {
+    let now = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default();
+    nanoseconds(now) - time_ns
+}
+
+fn nanoseconds(time: Duration) -> i128 {
+    i128::try_from(time.as_nanos()).unwrap_or(i128::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::File;
+    use std::io::Write;
+
+    use super::*;
+
+    const HOUR: Duration = Duration::from_secs(3600);
+
+    fn put(path: &Path, bytes: &[u8], modified: SystemTime) -> Stamp {
+        // In place: the file stays the same one.
+        let mut file = File::options()
+            .create(true)
+            .write(true)
+            .truncate(false)
+            .open(path)
+            .unwrap();
+        file.write_all(bytes).unwrap();
+        file.set_modified(modified).unwrap();
+        drop(file);
+        stamp_of(path).unwrap().unwrap()
+    }
+
+    #[test]
+    fn a_file_has_the_same_stamp_however_it_is_looked_at() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.xodr");
+        let half = Duration::from_nanos(500_000_001);
+        let times = [
+            (SystemTime::now() - HOUR, None),
+            (UNIX_EPOCH, Some(0)),
+            (UNIX_EPOCH - HOUR - half, Some(-3_600_500_000_001)),
+        ];
+        for (time, expected) in times {
+            let stamp = put(&path, b"<OpenDRIVE/>", time);
+            assert_eq!(stamp_through_links(&path), Some(stamp));
+            let limits = qcbus_ingest::Limits::default();
+            let read = qcbus_ingest::prepare(&path, dir.path(), &limits).unwrap();
+            let content = read.files()[0].content.as_ref().unwrap();
+            assert_eq!(from_content(content), stamp);
+            assert!(expected.is_none_or(|it| it == stamp.mtime_ns), "{stamp:?}");
+        }
+    }
+
+    #[test]
+    fn size_and_time_put_back_do_not_give_the_stamp_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.xodr");
+        let time = SystemTime::now() - HOUR;
+        let before = put(&path, b"one", time);
+        // The clock of the file system moves in steps: only a later change is told apart.
+        let after = std::iter::repeat_with(|| put(&path, b"two", time))
+            .find(|after| *after != before)
+            .unwrap();
+        assert!(after.differs_in_ctime_only(&before));
+        assert!(!before.differs_in_ctime_only(&before));
+        let grown = Stamp { size: 9, ..after };
+        assert!(!grown.differs_in_ctime_only(&before));
+    }
+
+    #[test]
+    fn a_young_file_is_racy_however_old_it_says_that_it_is() {
+        let dir = tempfile::tempdir().unwrap();
+        let stamp = put(&dir.path().join("a.xodr"), b"", UNIX_EPOCH - HOUR);
+        assert!(is_racy(Stamp {
+            ctime_ns: stamp.ctime_ns + nanoseconds(HOUR),
+            ..stamp
+        }));
+        assert!(!is_racy(Stamp {
+            ctime_ns: stamp.ctime_ns - nanoseconds(HOUR),
+            ..stamp
+        }));
+        let listing = stamp_through_links(dir.path()).unwrap();
+        assert!(!is_racy(listing), "it has no time: {listing:?}");
     }
 }

@@ -59,7 +59,7 @@ pub fn render(
         .prepared
         .as_ref()
         .map_or(&[], |prepared| &prepared.inputs);
-    let sha256 = |input: &Input| input.content.map(|(_, digest)| digest.to_string());
+    let sha256 = |input: &Input| input.digest().map(|digest| digest.to_string());
     let depends_on = inputs.iter().skip(1).map(|input| Dependency {
         path: input.path.to_string_lossy().into_owned(),
         sha256: sha256(input),

@@ -25,5 +25,5 @@ pub use limits::{Exceeded, Limits};
 pub use prepare::{prepare, prepare_bytes};
 pub use prepared::Prepared;
 pub use qcbus_document::BuildError;
-pub use read::{Content, FileStamp};
+pub use read::{Content, FileStamp, Stat};
 pub use references::{Reference, Role, references};

@@ -3,7 +3,6 @@
 use std::fs::{self, File, Metadata};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
 
 use sha2::{Digest, Sha256};
 
@@ -25,10 +24,57 @@ pub struct FileStamp {
 pub struct Content {
     /// Size on disk in bytes.
     pub size: u64,
-    /// Time of the last modification; `None` where bytes came from memory.
-    pub modified: Option<SystemTime>,
+    /// What the system says of the file besides; `None` where bytes came from memory.
+    pub stat: Option<Stat>,
     /// SHA-256 of the bytes on disk.
     pub digest: [u8; 32],
+}
+
+/// What `stat` says of a file besides its size. It is of the very moment at which the bytes were
+/// read: nothing in it moved between the first byte and the last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stat {
+    /// Number in the file system.
+    pub inode: u64,
+    /// Time of the last modification, in nanoseconds since 1970; negative before.
+    pub modified_ns: i128,
+    /// Time of the last change of anything, which nobody can set at will.
+    pub changed_ns: i128,
+}
+
+#[cfg(unix)]
+impl Stat {
+    /// What the metadata says.
+    pub fn of(metadata: &Metadata) -> Stat {
+        use std::os::unix::fs::MetadataExt;
+        let nanoseconds =
+            |seconds: i64, rest: i64| i128::from(seconds) * 1_000_000_000 + i128::from(rest);
+        Stat {
+            inode: metadata.ino(),
+            modified_ns: nanoseconds(metadata.mtime(), metadata.mtime_nsec()),
+            changed_ns: nanoseconds(metadata.ctime(), metadata.ctime_nsec()),
+        }
+    }
+}
+
+#[cfg(not(unix))]
+impl Stat {
+    /// What the metadata says, where there are neither inodes nor times of change.
+    pub fn of(metadata: &Metadata) -> Stat {
+        use std::time::UNIX_EPOCH;
+        let modified_ns = metadata.modified().map_or(0, |time| {
+            let since = |time: Result<std::time::Duration, _>| {
+                time.map(|it| i128::try_from(it.as_nanos()).unwrap_or(i128::MAX))
+            };
+            since(time.duration_since(UNIX_EPOCH))
+                .unwrap_or_else(|_| since(UNIX_EPOCH.duration_since(time)).map_or(0, |it| -it))
+        });
+        Stat {
+            inode: 0,
+            modified_ns,
+            changed_ns: 0,
+        }
+    }
 }
 
 /// What was read from one file.
@@ -64,7 +110,7 @@ pub(crate) fn read_file(path: &Path, limits: &Limits) -> Result<RawFile, IngestE
 pub(crate) fn stamp_of_bytes(path: &Path, bytes: &[u8]) -> FileStamp {
     let content = Content {
         size: bytes.len() as u64,
-        modified: None,
+        stat: None,
         digest: sha256(bytes),
     };
     FileStamp {
@@ -121,7 +167,7 @@ fn read_once(
     }
     let content = Content {
         size: after.len(),
-        modified: after.modified().ok(),
+        stat: Some(Stat::of(&after)),
         digest: sha256(&bytes),
     };
     let stamp = FileStamp {
@@ -154,13 +200,13 @@ fn unreadable(path: &Path, source: io::Error) -> IngestError {
 #[cfg(unix)]
 fn same_file(before: &Metadata, after: &Metadata) -> bool {
     use std::os::unix::fs::MetadataExt;
-    let key = |m: &Metadata| (m.dev(), m.ino(), m.size(), m.mtime(), m.mtime_nsec());
-    key(before) == key(after)
+    let key = |m: &Metadata| (m.dev(), m.size());
+    key(before) == key(after) && Stat::of(before) == Stat::of(after)
 }
 
 #[cfg(not(unix))]
 fn same_file(before: &Metadata, after: &Metadata) -> bool {
-    before.len() == after.len() && before.modified().ok() == after.modified().ok()
+    before.len() == after.len() && Stat::of(before) == Stat::of(after)
 }
 
 #[cfg(test)]

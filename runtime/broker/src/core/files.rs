@@ -47,7 +47,8 @@ pub struct FileEntry {
     /// Whether it is there; a file that has gone stays in the table until its job has ended.
     pub present: bool,
     stage: Stage,
-    /// It changed while it was being checked.
+    /// It changed while it was being checked, or something that it depends on changed at any time:
+    /// its verdict must not be taken to stand because its stamp is the same.
     pub dirty: bool,
     /// Not before then, after something failed for want of room or disk.
     pub not_before: Duration,

@@ -203,7 +203,7 @@ impl State {
                     judged.racy || input.and_then(|it| it.content).map(|it| it.0) != Some(stamp)
                 });
             if differs {
-                self.changed(dependent);
+                self.doubt(dependent);
             }
         }
         let Some(kind) = FileKind::of_path(path) else {
@@ -232,6 +232,15 @@ impl State {
         }
     }
 
+    /// Something that the verdict on a file depends on is not what it was. The file's own stamp
+    /// does not tell, so the verdict is marked: it stands only after everything was read again.
+    fn doubt(&mut self, id: FileId) {
+        if let Some(entry) = self.files.get_mut(id) {
+            entry.dirty = true;
+        }
+        self.changed(id);
+    }
+
     /// The file, or something it depends on, is not what it was.
     fn changed(&mut self, id: FileId) {
         let Some(entry) = self.files.get_mut(id) else {
@@ -249,7 +258,7 @@ impl State {
 
     fn vanished(&mut self, path: &Arc<Path>, actions: &mut Actions) {
         for dependent in self.files.dependents(path) {
-            self.changed(dependent);
+            self.doubt(dependent);
         }
         if let Some(id) = self.files.id(path) {
             self.vanished_file(id, actions);

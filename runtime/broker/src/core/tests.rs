@@ -1,7 +1,7 @@
 //! The state machine against a world that it cannot foresee: files come, change and go, bundles
 //! answer, lie, hang and die in any order, and still every file that is there gets one verdict.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -9,6 +9,7 @@ use std::time::Duration;
 use proptest::prelude::*;
 use qcbus_document::FileKind;
 use qcbus_formats::xqar::{Issue, Level, Status};
+use qcbus_messages::control::Response;
 use qcbus_messages::{
     Catalogue, CheckerInfo, Digest, DocId, DocumentRole, FromPeer, Hello, JobDocument, JobId,
     PROTOCOL_VERSION, Role, ToPeer, Verdict,
@@ -17,21 +18,28 @@ use qcbus_messages::{
 use super::*;
 use crate::InForce;
 
+mod parts;
+
 const CAPACITY: usize = 2;
 
 /// A world around the state machine: it answers actions when it pleases.
 struct World {
     state: State,
     now: Duration,
-    files: BTreeMap<u8, u64>,
+    /// What is there, each with the number of its stamp.
+    there: HashMap<Arc<Path>, u64>,
+    /// The bytes behind each stamp: a file that is touched has the same under a new one.
+    contents: HashMap<u64, u64>,
     stamps: u64,
     preparing: Vec<(JobId, u8)>,
     storing: Vec<FinishedJob>,
-    stored: Vec<(u8, u64)>,
+    stored: Vec<u8>,
     peers: BTreeMap<Session, Bundle>,
     sessions: u64,
-    judged: BTreeMap<u8, (u64, Verdict)>,
+    judged: BTreeMap<u8, (Vec<Input>, Verdict)>,
     released: BTreeSet<JobId>,
+    tickets: u64,
+    waiting: BTreeMap<Ticket, u8>,
 }
 
 struct Bundle {
@@ -42,7 +50,9 @@ struct Bundle {
 #[derive(Debug, Clone)]
 enum Step {
     Write(u8),
+    Touch(u8),
     Delete(u8),
+    Wait(u8),
     Join(bool),
     Kill(u8),
     Answer(u8),
@@ -57,8 +67,10 @@ enum Step {
 
 fn steps() -> impl Strategy<Value = Vec<Step>> {
     let step = prop_oneof![
-        4 => (0..6_u8).prop_map(Step::Write),
-        1 => (0..6_u8).prop_map(Step::Delete),
+        4 => (0..8_u8).prop_map(Step::Write),
+        1 => (0..8_u8).prop_map(Step::Touch),
+        2 => (0..8_u8).prop_map(Step::Delete),
+        1 => (0..6_u8).prop_map(Step::Wait),
         2 => any::<bool>().prop_map(Step::Join),
         2 => any::<u8>().prop_map(Step::Kill),
         6 => any::<u8>().prop_map(Step::Answer),
@@ -73,8 +85,22 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
     prop::collection::vec(step, 1..120)
 }
 
+/// The first six are checked, the others are only parts of them.
 fn path_of(file: u8) -> Arc<Path> {
-    Path::new(&format!("/farm/{file}.xodr")).into()
+    let ending = if file < 6 { "xodr" } else { "part" };
+    Path::new(&format!("/farm/{file}.{ending}")).into()
+}
+
+/// What a verdict depends on besides the file: on another that has a verdict itself, on a part of
+/// its own, on a part that it shares, on all of these, or on nothing.
+fn dependencies_of(file: u8) -> &'static [u8] {
+    match file {
+        1 => &[0, 6],
+        2 => &[6],
+        3 => &[4],
+        5 => &[4, 6, 7],
+        _ => &[],
+    }
 }
 
 fn file_of(path: &Path) -> u8 {
@@ -88,6 +114,7 @@ fn stamp(number: u64) -> Stamp {
     Stamp {
         size: number,
         mtime_ns: i128::from(number),
+        ctime_ns: i128::from(number),
         inode: 1,
     }
 }
@@ -96,6 +123,16 @@ fn digest(number: u64) -> Digest {
     let mut digest = Digest::default();
     digest.0[..8].copy_from_slice(&number.to_le_bytes());
     digest
+}
+
+fn basis(inputs: &[Input]) -> Digest {
+    let mut basis = Digest::default();
+    for (at, input) in inputs.iter().enumerate() {
+        if let Some((_, digest)) = input.content {
+            basis.0[at * 8..][..8].copy_from_slice(&digest.0[..8]);
+        }
+    }
+    basis
 }
 
 fn catalogue(name: &str) -> Catalogue {
@@ -144,7 +181,8 @@ impl World {
         let mut world = World {
             state: State::new(settings, in_force.digest, in_force.demand()),
             now: Duration::ZERO,
-            files: BTreeMap::new(),
+            there: HashMap::new(),
+            contents: HashMap::new(),
             stamps: 0,
             preparing: Vec::new(),
             storing: Vec::new(),
@@ -153,6 +191,8 @@ impl World {
             sessions: 0,
             judged: BTreeMap::new(),
             released: BTreeSet::new(),
+            tickets: 0,
+            waiting: BTreeMap::new(),
         };
         world.event(Event::Scanned);
         world
@@ -208,8 +248,15 @@ impl World {
                 self.storing.push(*job);
             }
             Action::Judged { path, judged, .. } => {
-                let number = judged.inputs[0].content.unwrap().0.size;
-                self.judged.insert(file_of(&path), (number, judged.verdict));
+                let verdict = (judged.inputs.clone(), judged.verdict);
+                self.judged.insert(file_of(&path), verdict);
+            }
+            Action::Answer { ticket, response } => {
+                let file = self.waiting.remove(&ticket).expect("one answer for each");
+                if matches!(response, Response::Verdict(_)) {
+                    let told = self.state.inputs_of(&path_of(file));
+                    assert_eq!(told, self.inputs(file), "the answer is true at that moment");
+                }
             }
             Action::Withdraw { path, .. } => {
                 self.judged.remove(&file_of(&path));
@@ -219,8 +266,20 @@ impl World {
     }
 
     fn write(&mut self, file: u8) {
+        self.put(file, self.stamps + 1);
+    }
+
+    /// The same bytes under a new stamp.
+    fn touch(&mut self, file: u8) {
+        if let Some(number) = self.there.get(&path_of(file)) {
+            self.put(file, self.contents[number]);
+        }
+    }
+
+    fn put(&mut self, file: u8, content: u64) {
         self.stamps += 1;
-        self.files.insert(file, self.stamps);
+        self.contents.insert(self.stamps, content);
+        self.there.insert(path_of(file), self.stamps);
         let stamp = stamp(self.stamps);
         self.event(Event::Settled {
             path: path_of(file),
@@ -229,11 +288,40 @@ impl World {
     }
 
     fn delete(&mut self, file: u8) {
-        if self.files.remove(&file).is_some() {
+        if self.there.remove(&path_of(file)).is_some() {
             self.event(Event::Vanished {
                 path: path_of(file),
             });
         }
+    }
+
+    fn wait(&mut self, file: u8) {
+        self.tickets += 1;
+        self.waiting.insert(Ticket(self.tickets), file);
+        let path = path_of(file);
+        self.event(Event::Wait {
+            ticket: Ticket(self.tickets),
+            stamp: self.there.get(&path).map(|number| stamp(*number)),
+            path,
+            unwatched: None,
+            timeout: None,
+        });
+    }
+
+    fn input(&self, file: u8) -> Input {
+        let path = path_of(file);
+        let number = self.there.get(&path);
+        Input {
+            content: number.map(|it| (stamp(*it), digest(self.contents[it]))),
+            path,
+        }
+    }
+
+    /// What reading a file now would give.
+    fn inputs(&self, file: u8) -> Vec<Input> {
+        let others = dependencies_of(file).iter();
+        let all = std::iter::once(&file).chain(others);
+        all.map(|it| self.input(*it)).collect()
     }
 
     fn join(&mut self, name: &'static str) {
@@ -323,24 +411,21 @@ impl World {
             return;
         }
         let (job, file) = self.preparing.remove(usize::from(n) % self.preparing.len());
-        let result = match self.files.get(&file) {
+        let inputs = self.inputs(file);
+        let result = match inputs[0].content {
             None => Err(PrepareFailure::Vanished),
             Some(_) if !room => Err(PrepareFailure::NoRoom("full".to_owned())),
-            Some(number) => {
-                let input = Input {
-                    path: path_of(file),
-                    content: Some((stamp(*number), digest(*number))),
-                };
+            Some((_, digest)) => {
                 let document = JobDocument {
                     doc: DocId(job.0),
                     role: DocumentRole::Root,
                     path: String::new(),
-                    digest: digest(*number),
+                    digest,
                     referred_at: 0,
                 };
                 Ok(Box::new(PreparedJob {
-                    inputs: vec![input],
-                    basis: digest(*number),
+                    basis: basis(&inputs),
+                    inputs,
                     racy: false,
                     documents: vec![document],
                     missing: Vec::new(),
@@ -357,14 +442,13 @@ impl World {
         }
         let job = self.storing.remove(usize::from(n) % self.storing.len());
         let file = file_of(&job.path);
-        let input = job.prepared.as_ref().unwrap().inputs[0].clone();
-        let number = input.content.unwrap().0.size;
-        let outcome = if self.files.get(&file) != Some(&number) {
+        let prepared = job.prepared.as_ref().unwrap();
+        let outcome = if prepared.inputs != self.inputs(file) {
             StoreOutcome::Stale
         } else if !room {
             StoreOutcome::Failed("full".to_owned())
         } else {
-            self.stored.push((file, number));
+            self.stored.push(file);
             let failed = job.bundles.iter().any(|bundle| bundle.failure.is_some());
             StoreOutcome::Stored(Box::new(Judged {
                 job: job.job,
@@ -373,11 +457,11 @@ impl World {
                 } else {
                     Verdict::Accepted
                 },
-                digest: digest(number),
-                basis: digest(number),
+                digest: prepared.root().unwrap().1,
+                basis: prepared.basis,
                 config: job.config,
                 bundles: job.signature,
-                inputs: vec![input],
+                inputs: prepared.inputs.clone(),
                 racy: false,
                 counts: [0; 3],
                 why: Vec::new(),
@@ -393,7 +477,9 @@ impl World {
     fn step(&mut self, step: &Step) {
         match *step {
             Step::Write(file) => self.write(file),
+            Step::Touch(file) => self.touch(file),
             Step::Delete(file) => self.delete(file),
+            Step::Wait(file) => self.wait(file),
             Step::Join(first) => self.join(if first { "First" } else { "Second" }),
             Step::Kill(n) => self.kill(n),
             Step::Answer(n) => self.answer(n),
@@ -450,7 +536,8 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
     /// Whatever happens in whatever order: once the world calms down, every file that is there has
-    /// a verdict on its present bytes, none that has gone has one, and nothing is left in flight.
+    /// a verdict on its present bytes and those of all that it depends on, none that has gone has
+    /// one, whoever waits has an answer, and nothing is left in flight.
     #[test]
     fn every_file_gets_its_verdict_whatever_happens(steps in steps()) {
         let mut world = World::new();
@@ -458,10 +545,13 @@ proptest! {
             world.step(step);
         }
         world.settle();
-        let present: BTreeMap<u8, u64> = world.files.clone();
-        let judged: BTreeMap<u8, u64> =
-            world.judged.iter().map(|(file, (number, _))| (*file, *number)).collect();
+        let there = |file: &u8| world.there.contains_key(&path_of(*file));
+        let present: BTreeMap<u8, Vec<Input>> =
+            (0..6).filter(there).map(|file| (file, world.inputs(file))).collect();
+        let judged: BTreeMap<u8, Vec<Input>> =
+            world.judged.iter().map(|(file, (inputs, _))| (*file, inputs.clone())).collect();
         prop_assert_eq!(judged, present);
+        prop_assert!(!world.waiting.values().any(there), "{:?}", world.waiting);
         prop_assert_eq!(world.state.preparing, 0);
         prop_assert_eq!(world.state.storing, 0);
     }
@@ -479,7 +569,7 @@ fn judged_world() -> World {
 fn a_file_that_has_not_changed_is_not_judged_again() {
     let mut world = judged_world();
     let before = world.stored.len();
-    let stamp = stamp(world.files[&1]);
+    let stamp = stamp(world.there[&path_of(1)]);
     world.event(Event::Settled {
         path: path_of(1),
         stamp,

@@ -29,10 +29,25 @@ pub struct Ticket(pub u64);
 pub struct Stamp {
     /// Size in bytes.
     pub size: u64,
-    /// Modification time in nanoseconds since 1970.
+    /// Modification time in nanoseconds since 1970; negative before.
     pub mtime_ns: i128,
+    /// Time of the last change of anything, because the modification time can be set at will.
+    pub ctime_ns: i128,
     /// Inode, because a rename can keep size and time.
     pub inode: u64,
+}
+
+impl Stamp {
+    /// Whether only the time of change differs: the bytes may be the same (another link to the
+    /// file, other rights) or not (rewritten in place, with the time put back).
+    pub fn differs_in_ctime_only(&self, other: &Stamp) -> bool {
+        self.ctime_ns != other.ctime_ns
+            && *self
+                == Stamp {
+                    ctime_ns: self.ctime_ns,
+                    ..*other
+                }
+    }
 }
 
 /// A file that a verdict depends on, as it was when it was read.
@@ -40,8 +55,20 @@ pub struct Stamp {
 pub struct Input {
     /// Absolute path.
     pub path: Arc<Path>,
-    /// Its stamp and digest; `None` when it was looked for and not there.
+    /// Its stamp and digest; `None` when it was looked for and not there. Where something is there
+    /// that could not be read (a directory, say), the digest is [`Input::UNREAD`].
     pub content: Option<(Stamp, Digest)>,
+}
+
+impl Input {
+    /// The digest of what is there and could not be read.
+    pub const UNREAD: Digest = Digest([0; 32]);
+
+    /// The digest of the bytes that were read, if any were.
+    pub fn digest(&self) -> Option<Digest> {
+        let digest = self.content.map(|(_, digest)| digest);
+        digest.filter(|digest| *digest != Input::UNREAD)
+    }
 }
 
 /// What reading a file and its dependencies gave.

@@ -23,7 +23,7 @@ use qcbus_document::FileKind;
 use self::ignore::{IGNORE_FILE, IgnoreRules, is_ignored_file};
 use self::settle::Settling;
 use crate::core::Stamp;
-use crate::stamp::{stamp_of, stamp_through_links};
+use crate::stamp::{age_of, stamp_of, stamp_through_links};
 
 use self::scan::scan;
 
@@ -505,11 +505,7 @@ fn is_only_reading(kind: EventKind) -> bool {
 
 /// Whether a file was last written to long enough ago.
 fn is_quiet(stamp: Stamp) -> bool {
-    let now = std::time::SystemTime::now()
-        .duration_since(std::time::UNIX_EPOCH)
-        .unwrap_or_default();
-    let age = i128::try_from(now.as_nanos()).unwrap_or(i128::MAX) - stamp.mtime_ns;
-    age > i128::try_from(settle::QUIET.as_nanos()).unwrap_or(0)
+    age_of(stamp.mtime_ns) > i128::try_from(settle::QUIET.as_nanos()).unwrap_or(0)
 }
 
 #[cfg(test)]

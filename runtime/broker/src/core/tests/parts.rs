@@ -1,0 +1,96 @@
+//! Files that a verdict depends on: they change, go, come back, and come late.
+
+use super::*;
+
+/// A file with all that it depends on, judged. `known` is a file whose verdict is looked at.
+fn world_with_parts(known: u8) -> World {
+    let mut world = World::new();
+    world.join("First");
+    world.join("Second");
+    for file in [0, 4, 6, 7, known] {
+        world.write(file);
+    }
+    world.settle();
+    assert_eq!(world.judged[&known].0, world.inputs(known));
+    world
+}
+
+#[test]
+fn a_changed_part_has_its_file_judged_again() {
+    for (file, part) in [(1, 0), (1, 6), (2, 6), (3, 4), (5, 7)] {
+        let mut world = world_with_parts(file);
+        // It changes, goes, stays away, comes back: each time there is a new verdict.
+        let deeds: [fn(&mut World, u8); 3] = [World::write, World::delete, World::write];
+        for deed in deeds {
+            let before = world.stored.iter().filter(|it| **it == file).count();
+            deed(&mut world, part);
+            world.wait(file);
+            assert_eq!(
+                world.waiting.len(),
+                1,
+                "whoever asks waits for the new verdict"
+            );
+            world.settle();
+            assert_eq!(world.judged[&file].0, world.inputs(file));
+            let after = world.stored.iter().filter(|it| **it == file).count();
+            assert_eq!(after, before + 1, "{file} depends on {part}");
+            assert!(world.waiting.is_empty());
+        }
+    }
+}
+
+#[test]
+fn a_part_that_is_looked_for_and_comes_later_has_its_file_judged_again() {
+    let mut world = World::new();
+    world.join("First");
+    world.write(2);
+    world.settle();
+    assert_eq!(world.judged[&2].0[1].content, None);
+    world.write(6);
+    world.settle();
+    assert_eq!(world.judged[&2].0, world.inputs(2));
+}
+
+#[test]
+fn a_part_that_has_only_a_new_stamp_costs_no_new_verdict() {
+    for touched in [5, 7, 4] {
+        let mut world = world_with_parts(5);
+        let before = world.stored.len();
+        world.touch(touched);
+        world.settle();
+        assert_eq!(
+            world.judged[&5].0,
+            world.inputs(5),
+            "the new stamp is known"
+        );
+        assert_eq!(world.stored.len(), before);
+        // From then on nothing is read any more when the same is said again.
+        let stamp = stamp(world.there[&path_of(touched)]);
+        let path = path_of(touched);
+        world.event(Event::Settled { path, stamp });
+        assert!(world.preparing.is_empty());
+    }
+}
+
+#[test]
+fn a_part_that_changes_before_the_first_scan_sees_its_file_is_not_forgotten() {
+    let known = world_with_parts(2);
+    let judged = known
+        .state
+        .files
+        .get(known.state.files.id(&path_of(2)).unwrap());
+    let judged = judged.unwrap().judged.clone().unwrap();
+    let mut world = World::new();
+    world.join("First");
+    world.join("Second");
+    world.there.clone_from(&known.there);
+    world.contents.clone_from(&known.contents);
+    world.stamps = known.stamps;
+    world.state.remember(&path_of(2), (*judged).clone(), &[]);
+    world.write(6);
+    let stamp = stamp(world.there[&path_of(2)]);
+    let path = path_of(2);
+    world.event(Event::Settled { path, stamp });
+    world.settle();
+    assert_eq!(world.judged[&2].0, world.inputs(2));
+}

@@ -1,0 +1,305 @@
+//! Times of files prove little: old ones, ones that were put back, ones from before 1970. What
+//! counts is the bytes, of a file and of everything that its verdict depends on.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::fs::File;
+use std::io::Write;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use qcbus_messages::Verdict;
+use sha2::{Digest, Sha256};
+use support::content::Content;
+use support::desk::Desk;
+use support::farm::{Farm, tail};
+use support::judge::verdicts_in_journal;
+use support::watchdog::{until_or, until_so};
+
+const HOUR: Duration = Duration::from_secs(3600);
+
+/// For so long a file counts as young, and whatever was read of it is looked at once more anyway.
+const YOUNG: Duration = Duration::from_secs(3);
+
+/// A farm with a gate.
+fn farm_with_gate() -> Farm {
+    let mut farm = Farm::new();
+    let gate = gate(&farm).to_string_lossy().into_owned();
+    farm.arguments.extend(["--gate".to_owned(), gate]);
+    farm
+}
+
+fn gate(farm: &Farm) -> PathBuf {
+    farm.base().join("gate")
+}
+
+fn set_modified(path: &Path, time: SystemTime) {
+    let file = File::options().write(true).open(path).unwrap();
+    file.set_modified(time).unwrap();
+}
+
+/// Puts a file there at once that was last written to an hour ago.
+fn put_old(farm: &Farm, name: &str, bytes: &[u8]) {
+    let outside = farm.base().join("outside");
+    std::fs::write(&outside, bytes).unwrap();
+    set_modified(&outside, SystemTime::now() - HOUR);
+    std::fs::rename(&outside, farm.root().join(name)).unwrap();
+}
+
+/// Waits until nothing in the farm counts as young.
+fn rest(farm: &Farm) {
+    let youngest = || {
+        let files = std::fs::read_dir(farm.root()).unwrap().flatten();
+        let changed = files.filter_map(|it| it.metadata().ok()?.ctime().try_into().ok());
+        changed.max().map(|it| UNIX_EPOCH + Duration::from_secs(it))
+    };
+    until_so("all files have come to rest", || {
+        youngest().is_none_or(|it| it.elapsed().is_ok_and(|age| age > YOUNG))
+    });
+}
+
+fn verdict_becomes(farm: &Farm, name: &str, verdict: Verdict) {
+    until_or(
+        "the file is judged again",
+        || (farm.verdict_file(name)["verdict"] == verdict.as_str()).then_some(()),
+        || {
+            let result = farm.verdict_file(name);
+            format!("not {verdict:?}\n{result:#}\n{}", tail(&farm.log()))
+        },
+    );
+    until_so("the gate follows", || {
+        gate(farm).join(name).exists() == (verdict == Verdict::Accepted)
+    });
+}
+
+/// A road whose plan view is included from `view.xml`, and what must be in there.
+fn road_in_two_parts() -> (String, String) {
+    let whole = String::from_utf8(Content::Good(1).bytes()).unwrap();
+    let (begin, end) = (
+        whole.find("<planView>").unwrap(),
+        whole.find("<lanes>").unwrap(),
+    );
+    let (before, view, after) = (&whole[..begin], &whole[begin..end], &whole[end..]);
+    (
+        format!("{before}<include file=\"view.xml\"/>{after}"),
+        format!("<road>{view}</road>"),
+    )
+}
+
+#[test]
+fn an_old_map_is_judged_again_when_its_include_changes_goes_and_comes_back() {
+    let farm = farm_with_gate();
+    let (outer, view) = road_in_two_parts();
+    put_old(&farm, "a.xodr", outer.as_bytes());
+    put_old(&farm, "view.xml", view.as_bytes());
+    rest(&farm);
+    let _broker = farm.serve_ready();
+    farm.settle(1);
+    verdict_becomes(&farm, "a.xodr", Verdict::Accepted);
+    put_old(&farm, "view.xml", b"<road><planView></road>");
+    verdict_becomes(&farm, "a.xodr", Verdict::Rejected);
+
+    // Once more, and now somebody asks at once; before, all is read again at rest.
+    rest(&farm);
+    assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Rejected);
+    put_old(&farm, "view.xml", view.as_bytes());
+    assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Accepted);
+    verdict_becomes(&farm, "a.xodr", Verdict::Accepted);
+
+    rest(&farm);
+    assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Accepted);
+    std::fs::remove_file(farm.root().join("view.xml")).unwrap();
+    verdict_becomes(&farm, "a.xodr", Verdict::Rejected);
+
+    rest(&farm);
+    assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Rejected);
+    put_old(&farm, "view.xml", view.as_bytes());
+    verdict_becomes(&farm, "a.xodr", Verdict::Accepted);
+}
+
+fn sha256(bytes: &[u8]) -> String {
+    let digest = Sha256::digest(bytes);
+    digest.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// The hash of a file that a verdict rests on; `None` when it rests on there being none.
+fn rests_on(farm: &Farm, name: &str, other: &Path) -> Option<String> {
+    let told = farm.verdict_file(name);
+    let all = told["depends_on"].as_array().unwrap();
+    let found = all.iter().find(|it| it["path"].as_str() == other.to_str());
+    found?["sha256"].as_str().map(str::to_owned)
+}
+
+fn rests_on_becomes(farm: &Farm, name: &str, other: &Path, expected: Option<&[u8]>) {
+    let expected = expected.map(sha256);
+    until_or(
+        "the file is judged again",
+        || (rests_on(farm, name, other) == expected).then_some(()),
+        || {
+            let result = farm.verdict_file(name);
+            format!("{expected:?}\n{result:#}\n{}", tail(&farm.log()))
+        },
+    );
+}
+
+const SCENARIO: &str = "<OpenSCENARIO>\n<FileHeader revMajor=\"1\" revMinor=\"2\" \
+    date=\"2026-01-31T12:00:00\" description=\"d\" author=\"a\"/>\n<CatalogLocations>\
+    <VehicleCatalog><Directory path=\"catalogs\"/></VehicleCatalog></CatalogLocations>\n\
+    <RoadNetwork><LogicFile filepath=\"map.xodr\"/></RoadNetwork>\n<Entities/>\n\
+    <Storyboard><Init><Actions/></Init><StopTrigger/></Storyboard>\n</OpenSCENARIO>\n";
+
+const CATALOG: &str = "<OpenSCENARIO>\n<FileHeader revMajor=\"1\" revMinor=\"2\" \
+    date=\"2026-01-31T12:00:00\" description=\"d\" author=\"a\"/>\n<Catalog name=\"c\"/>\n\
+    </OpenSCENARIO>\n";
+
+#[test]
+fn an_old_scenario_is_judged_again_when_its_map_or_catalogs_appear_or_change() {
+    let farm = farm_with_gate();
+    put_old(&farm, "s.xosc", SCENARIO.as_bytes());
+    rest(&farm);
+    let _broker = farm.serve_ready();
+    farm.settle(1);
+    let map = farm.root().join("map.xodr");
+    rests_on_becomes(&farm, "s.xosc", &map, None);
+    for number in 0..2 {
+        let bytes = Content::Good(number).bytes();
+        put_old(&farm, "map.xodr", &bytes);
+        rests_on_becomes(&farm, "s.xosc", &map, Some(&bytes));
+        rest(&farm);
+        farm.verdict("s.xosc");
+    }
+    // Asked at once, the answer rests on the map that is there.
+    let bytes = Content::NoHeader(3).bytes();
+    put_old(&farm, "map.xodr", &bytes);
+    farm.verdict("s.xosc");
+    assert_eq!(rests_on(&farm, "s.xosc", &map), Some(sha256(&bytes)));
+
+    rest(&farm);
+    farm.verdict("s.xosc");
+    let outside = farm.base().join("catalogs");
+    std::fs::create_dir(&outside).unwrap();
+    std::fs::write(outside.join("c.xosc"), CATALOG).unwrap();
+    std::fs::rename(&outside, farm.root().join("catalogs")).unwrap();
+    let catalog = farm.root().join("catalogs/c.xosc");
+    rests_on_becomes(&farm, "s.xosc", &catalog, Some(CATALOG.as_bytes()));
+}
+
+/// Writes over the bytes of a file that is there and gives it its time back, as `rsync --inplace
+/// --times` does.
+fn write_over(farm: &Farm, name: &str, bytes: &[u8]) {
+    let path = farm.root().join(name);
+    let before = std::fs::metadata(&path).unwrap();
+    let mut file = File::options().write(true).open(&path).unwrap();
+    file.write_all(bytes).unwrap();
+    file.set_modified(before.modified().unwrap()).unwrap();
+    drop(file);
+    let after = std::fs::metadata(&path).unwrap();
+    let key = |it: &std::fs::Metadata| (it.len(), it.modified().unwrap(), it.ino());
+    assert_eq!(key(&after), key(&before));
+}
+
+/// A good file, and a bad one of the same size.
+fn good_and_bad() -> (Vec<u8>, Vec<u8>) {
+    let good = Content::Good(1).bytes();
+    let bad = String::from_utf8(good.clone())
+        .unwrap()
+        .replace("<header ", "<heeder ");
+    (good, bad.into_bytes())
+}
+
+#[test]
+fn a_file_that_is_rewritten_with_its_size_and_time_kept_is_judged_again() {
+    let farm = farm_with_gate();
+    let (good, bad) = good_and_bad();
+    put_old(&farm, "a.xodr", &good);
+    rest(&farm);
+    let _broker = farm.serve_ready();
+    farm.settle(1);
+    verdict_becomes(&farm, "a.xodr", Verdict::Accepted);
+    write_over(&farm, "a.xodr", &bad);
+    verdict_becomes(&farm, "a.xodr", Verdict::Rejected);
+    rest(&farm);
+    assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Rejected);
+    write_over(&farm, "a.xodr", &good);
+    assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Accepted);
+    verdict_becomes(&farm, "a.xodr", Verdict::Accepted);
+}
+
+#[test]
+fn another_link_or_other_rights_cost_no_new_verdict() {
+    let farm = farm_with_gate();
+    let (outer, view) = road_in_two_parts();
+    put_old(&farm, "a.xodr", outer.as_bytes());
+    put_old(&farm, "view.xml", view.as_bytes());
+    rest(&farm);
+    let _broker = farm.serve_ready();
+    farm.settle(1);
+    for name in ["a.xodr", "view.xml"] {
+        let path = farm.root().join(name);
+        std::fs::hard_link(&path, farm.base().join(name)).unwrap();
+        assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Accepted);
+        let rights = std::fs::Permissions::from_mode(0o600);
+        std::fs::set_permissions(&path, rights).unwrap();
+        assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Accepted);
+    }
+    farm.settle(1);
+    let verdicts = verdicts_in_journal(&farm.journal());
+    assert_eq!(verdicts.into_values().collect::<Vec<_>>(), [1]);
+    verdict_becomes(&farm, "a.xodr", Verdict::Accepted);
+}
+
+#[test]
+fn files_from_before_1970_are_judged() {
+    let farm = farm_with_gate();
+    let (outer, view) = road_in_two_parts();
+    for (name, bytes) in [("a.xodr", &outer), ("view.xml", &view)] {
+        farm.write(name, bytes.as_bytes());
+        set_modified(&farm.root().join(name), UNIX_EPOCH - HOUR);
+    }
+    // A single run comes to its end.
+    let desk = Desk::new();
+    let map = farm.root().join("a.xodr").to_string_lossy().into_owned();
+    let said = desk.qcbus(&["check", &map, "--out", "out"]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let _broker = farm.serve_ready();
+    assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Accepted);
+    farm.settle(1);
+    verdict_becomes(&farm, "a.xodr", Verdict::Accepted);
+    let bad = outer.replace("<header ", "<heeder ");
+    write_over(&farm, "a.xodr", bad.as_bytes());
+    verdict_becomes(&farm, "a.xodr", Verdict::Rejected);
+    farm.settle(1);
+}
+
+#[test]
+fn what_is_there_and_cannot_be_read_does_not_keep_a_file_from_its_verdict() {
+    let farm = farm_with_gate();
+    for name in ["map.xodr", "view.xml"] {
+        std::fs::create_dir(farm.root().join(name)).unwrap();
+    }
+    let (outer, view) = road_in_two_parts();
+    put_old(&farm, "a.xodr", outer.as_bytes());
+    put_old(&farm, "s.xosc", SCENARIO.as_bytes());
+    let _broker = farm.serve_ready();
+    farm.settle(2);
+    verdict_becomes(&farm, "a.xodr", Verdict::Rejected);
+    let map = farm.root().join("map.xodr");
+    rests_on_becomes(&farm, "s.xosc", &map, None);
+
+    let view_path = farm.root().join("view.xml");
+    std::fs::remove_dir(&view_path).unwrap();
+    put_old(&farm, "view.xml", view.as_bytes());
+    verdict_becomes(&farm, "a.xodr", Verdict::Accepted);
+    std::fs::remove_dir(&map).unwrap();
+    let bytes = Content::Good(2).bytes();
+    put_old(&farm, "map.xodr", &bytes);
+    rests_on_becomes(&farm, "s.xosc", &map, Some(&bytes));
+    farm.settle(3);
+}
