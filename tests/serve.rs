@@ -371,6 +371,7 @@ fn map_of(farm: &Farm, name: &str, map: &Path) -> Option<String> {
 
 /// A scenario's map appears, changes and goes: each time the scenario is judged again.
 fn follows_its_map(farm: &Farm, reference: &str, map: &Path) {
+    let is_watched = map.starts_with(farm.root());
     farm.write("s.xosc", scenario(reference).as_bytes());
     farm.verdict("s.xosc");
     let rests_on = |expected: Option<String>| {
@@ -391,6 +392,15 @@ fn follows_its_map(farm: &Farm, reference: &str, map: &Path) {
         let bytes = Content::Good(number).bytes();
         std::fs::write(map, &bytes).unwrap();
         rests_on(Some(sha256(&bytes)));
+    }
+    if !is_watched {
+        farm.settle(1);
+        let of_map = |file: &PathBuf| file.to_string_lossy().contains(".xodr");
+        let of_map: Vec<PathBuf> = files_below(&farm.out())
+            .into_iter()
+            .filter(of_map)
+            .collect();
+        assert!(of_map.is_empty(), "it is not watched: {of_map:?}");
     }
     std::fs::remove_file(map).unwrap();
     rests_on(None);

@@ -149,6 +149,7 @@ impl State {
         let mut actions = Vec::new();
         match event {
             Event::Settled { path, stamp } => self.settled(&path, stamp),
+            Event::Touched { path, stamp } => self.touched(&path, stamp),
             Event::Vanished { path } => self.vanished(&path, &mut actions),
             Event::Scanned => self.scanned(&mut actions),
             Event::Prepared { job, result } => self.prepared(job, result, &mut actions),
@@ -191,8 +192,14 @@ impl State {
         actions
     }
 
-    /// A file is there and quiet.
-    fn settled(&mut self, path: &Arc<Path>, stamp: Stamp) {
+    /// Whether verdicts depend on a file that is not there for a verdict of its own.
+    pub fn is_only_a_part(&self, path: &Path) -> bool {
+        let entry = self.files.id(path).and_then(|id| self.files.get(id));
+        !entry.is_some_and(|it| it.present) && !self.files.dependents(path).is_empty()
+    }
+
+    /// A file is there and quiet: whose verdict depends on it?
+    fn touched(&mut self, path: &Arc<Path>, stamp: Stamp) {
         for dependent in self.files.dependents(path) {
             let differs = self
                 .files
@@ -206,6 +213,11 @@ impl State {
                 self.doubt(dependent);
             }
         }
+    }
+
+    /// A file is there and quiet.
+    fn settled(&mut self, path: &Arc<Path>, stamp: Stamp) {
+        self.touched(path, stamp);
         let Some(kind) = FileKind::of_path(path) else {
             return;
         };

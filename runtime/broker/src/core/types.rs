@@ -256,6 +256,13 @@ pub enum Event {
         /// What `stat` says.
         stamp: Stamp,
     },
+    /// A file that has no verdict of its own is there and quiet: verdicts may depend on it.
+    Touched {
+        /// Absolute path.
+        path: Arc<Path>,
+        /// What `stat` says.
+        stamp: Stamp,
+    },
     /// A file has gone.
     Vanished {
         /// Absolute path.

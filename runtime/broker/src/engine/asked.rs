@@ -75,10 +75,23 @@ impl Broker {
                 continue;
             }
             let path = input.path;
-            self.handle(match stamp {
-                Some(stamp) => Event::Settled { path, stamp },
+            let event = match stamp {
+                Some(stamp) => self.settled(path, stamp),
                 None => Event::Vanished { path },
-            });
+            };
+            self.handle(event);
+        }
+    }
+
+    /// What it means that a file is there and quiet. One outside of the watched directories, or that
+    /// is to be left alone, gets no verdict; it may be a part of one.
+    pub(super) fn settled(&self, path: Arc<Path>, stamp: Stamp) -> Event {
+        let unwatched =
+            self.state.is_only_a_part(&path) && self.why_unwatched(&path, Some(stamp)).is_some();
+        if unwatched {
+            Event::Touched { path, stamp }
+        } else {
+            Event::Settled { path, stamp }
         }
     }
 

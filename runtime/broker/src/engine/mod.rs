@@ -301,7 +301,8 @@ impl Broker {
         match seen {
             Seen::Settled(path, stamp) => {
                 reached("settled", &path);
-                self.handle(Event::Settled { path, stamp })
+                let event = self.settled(path, stamp);
+                self.handle(event)
             }
             Seen::Vanished(path) => self.handle(Event::Vanished { path }),
             Seen::Scanned => {
