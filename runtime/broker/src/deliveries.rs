@@ -31,6 +31,10 @@ pub fn message(
             judged.xqar.display()
         )
     };
+    if !judged.is_written() {
+        let (path, why) = (delivery.path.display(), judged.why.join("; "));
+        return Err(format!("{path} has no result for {reporter}: {why}"));
+    }
     let bytes = std::fs::read(&judged.xqar).map_err(|error| fail(&error))?;
     let mut results = xqar::read(&bytes).map_err(|error| fail(&error))?;
     drop(bytes);

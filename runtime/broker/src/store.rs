@@ -11,7 +11,7 @@ use qcbus_formats::xqar::{self, Dialect, Status};
 use qcbus_messages::{Digest, Verdict};
 
 use crate::core::{BundleOutcome, FinishedJob, Input, Judged, StoreOutcome};
-use crate::disk::{remove, write_both, write_whole};
+use crate::disk::{is_for_good, remove, write_both, write_whole};
 use crate::journal::{Entry, History, Journal};
 use crate::places::Places;
 use crate::stages::reached;
@@ -28,6 +28,8 @@ pub struct Store {
     pub durable: bool,
     /// Whether `NAME.verdict.json` is written.
     pub verdict_files: bool,
+    /// Whether what cannot be written now is tried again.
+    pub retries: bool,
     /// Where accepted files are published.
     pub gate: Option<PathBuf>,
     /// What is remembered.
@@ -62,15 +64,37 @@ impl Store {
         let verdict = verdict_of(&pooled, nothing_checked || job.unreadable.is_some());
         let why = reasons(job, &pooled, nothing_checked);
         let judged = judged(job, &pooled, verdict, why, self.places.xqar(&job.path));
-        match self.write(job, &pooled, &judged) {
-            Ok(()) => {}
-            Err(error) => return StoreOutcome::Failed(error),
+        if let Err(failed) = self.write(job, &pooled, &judged) {
+            return self.not_written(job, judged, failed);
         }
         // The file may have gone between the look and the rename: nothing may lie there then.
         if stamp_through_links(&job.path).is_none() {
             let _ = self.withdraw_files(&job.path);
             return StoreOutcome::Stale;
         }
+        StoreOutcome::Stored(Box::new(judged))
+    }
+
+    /// A result that can never be written leaves its file undetermined: nobody may take what is
+    /// not there for an acceptance, and nobody should wait for it.
+    fn not_written(
+        &self,
+        job: &FinishedJob,
+        mut judged: Judged,
+        failed: Unwritten,
+    ) -> StoreOutcome {
+        let inputs = job.prepared.as_ref().map(|it| it.inputs.as_slice());
+        if has_changed(inputs.unwrap_or_default()) {
+            return StoreOutcome::Stale;
+        }
+        if self.retries && !failed.for_good {
+            return StoreOutcome::Failed(format!("{}; it is tried again", failed.what));
+        }
+        // As far as it goes: what lies there is not of these bytes.
+        let _ = self.withdraw(&job.path, &[]);
+        judged.verdict = Verdict::Undetermined;
+        judged.why.insert(0, failed.what);
+        judged.xqar = PathBuf::new();
         StoreOutcome::Stored(Box::new(judged))
     }
 
@@ -96,12 +120,10 @@ impl Store {
         }
     }
 
-    fn write(&self, job: &FinishedJob, pooled: &Pooled, judged: &Judged) -> Result<(), String> {
-        let fail = |path: &Path, error: &io::Error| {
-            format!(
-                "cannot write {}: {error}; it is tried again",
-                path.display()
-            )
+    fn write(&self, job: &FinishedJob, pooled: &Pooled, judged: &Judged) -> Result<(), Unwritten> {
+        let fail = |path: &Path, error: &io::Error| Unwritten {
+            what: format!("cannot write {}: {error}", path.display()),
+            for_good: is_for_good(error),
         };
         let text = xqar::write(&pooled.results, self.dialect);
         let verdict_path = self.places.verdict(&job.path);
@@ -133,7 +155,10 @@ impl Store {
             judged: Arc::new(judged.clone()),
             history,
         };
-        self.record(&[entry])
+        self.record(&[entry]).map_err(|what| Unwritten {
+            what,
+            for_good: false,
+        })
     }
 
     /// Whether everything that a verdict brings with it lies where it belongs.
@@ -178,15 +203,18 @@ impl Store {
     /// report about it.
     ///
     /// # Errors
-    /// What a person should know.
-    pub fn withdraw(&self, path: &Arc<Path>, reporters: &[String]) -> Result<(), String> {
-        let fail =
-            |error: io::Error| format!("cannot withdraw the result of {}: {error}", path.display());
+    /// What a person should know; it is to be tried again.
+    pub fn withdraw(&self, path: &Arc<Path>, reporters: &[String]) -> Result<(), Trouble> {
+        let fail = |error: io::Error| Trouble {
+            what: format!("cannot withdraw the result of {}: {error}", path.display()),
+            concerns_all: false,
+        };
         self.withdraw_files(path).map_err(fail)?;
-        self.record(&[Entry::Withdrawn {
+        let entry = Entry::Withdrawn {
             path: path.clone(),
             reporters: reporters.to_vec(),
-        }])
+        };
+        self.record(&[entry]).map_err(Trouble::of_all)
     }
 
     fn withdraw_files(&self, path: &Path) -> io::Result<()> {
@@ -220,6 +248,33 @@ impl Store {
             None => Ok(()),
         }
     }
+}
+
+/// Why something that is to be tried again could not be done.
+#[derive(Debug)]
+pub struct Trouble {
+    /// For a person.
+    pub what: String,
+    /// It is not about one file: the journal cannot be written.
+    pub concerns_all: bool,
+}
+
+impl Trouble {
+    /// The journal cannot be written.
+    pub fn of_all(what: String) -> Trouble {
+        Trouble {
+            what,
+            concerns_all: true,
+        }
+    }
+}
+
+/// Why a result is not there.
+struct Unwritten {
+    /// For a person.
+    what: String,
+    /// No waiting helps.
+    for_good: bool,
 }
 
 /// The date of the commit or release that this was built from, fixed so that equal input gives

@@ -171,6 +171,7 @@ fn store(options: &Options, journal: Journal) -> Store {
         dialect: options.dialect,
         durable: options.durable,
         verdict_files: options.verdict_files,
+        retries: options.watch,
         gate: options.gate.clone(),
         journal: Mutex::new(journal),
     }
