@@ -2,7 +2,7 @@
 
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
 use qcbus_document::Document;
 use qcbus_formats::config::Config;
@@ -13,7 +13,7 @@ use qcbus_messages::{Digest, Verdict};
 use crate::core::{BundleOutcome, FinishedJob, Input, Judged, StoreOutcome};
 use crate::disk::{is_for_good, remove, write_both, write_whole};
 use crate::journal::{Entry, History, Journal};
-use crate::places::Places;
+use crate::places::{Places, with_suffix};
 use crate::stages::reached;
 use crate::stamp::stamp_through_links;
 
@@ -34,6 +34,9 @@ pub struct Store {
     pub gate: Option<PathBuf>,
     /// What is remembered.
     pub journal: Mutex<Journal>,
+    /// Shared by those who write results where they belong; alone has it who removes one that lies
+    /// where another file's may belong today.
+    pub moving: RwLock<()>,
 }
 
 impl Store {
@@ -126,6 +129,7 @@ impl Store {
             for_good: is_for_good(error),
         };
         let text = xqar::write(&pooled.results, self.dialect);
+        let _others = self.moving.read().unwrap_or_else(PoisonError::into_inner);
         let verdict_path = self.places.verdict(&job.path);
         if self.gate.is_some() && judged.verdict != Verdict::Accepted {
             self.close_gate(&job.path)
@@ -166,7 +170,8 @@ impl Store {
         let published = |gate: &PathBuf| {
             judged.verdict != Verdict::Accepted || gate.join(self.places.display(path)).exists()
         };
-        judged.xqar == self.places.xqar(path)
+        self.places.contains(path)
+            && judged.xqar == self.places.xqar(path)
             && judged.xqar.exists()
             && (!self.verdict_files || self.places.verdict(path).exists())
             && self.gate.as_ref().is_none_or(published)
@@ -177,11 +182,8 @@ impl Store {
     /// # Errors
     /// What a person should know; the entries are not written then.
     pub fn record(&self, entries: &[Entry]) -> Result<(), String> {
-        let mut journal = self
-            .journal
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
-        journal.write(entries).map_err(|error| error.to_string())
+        let written = self.journal().write(entries);
+        written.map_err(|error| error.to_string())
     }
 
     /// Forgets the history of jobs older than `keep`.
@@ -189,14 +191,8 @@ impl Store {
     /// # Errors
     /// What a person should know.
     pub fn prune(&self, keep: std::time::Duration) -> Result<(), String> {
-        let mut journal = self
-            .journal
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
-        journal
-            .prune(keep)
-            .map(|_| ())
-            .map_err(|error| error.to_string())
+        let pruned = self.journal().prune(keep);
+        pruned.map(|_| ()).map_err(|error| error.to_string())
     }
 
     /// Removes what was written for a file that has gone, and remembers who is to take back a
@@ -209,12 +205,48 @@ impl Store {
             what: format!("cannot withdraw the result of {}: {error}", path.display()),
             concerns_all: false,
         };
-        self.withdraw_files(path).map_err(fail)?;
         let entry = Entry::Withdrawn {
             path: path.clone(),
             reporters: reporters.to_vec(),
         };
+        let alone = match self.place_elsewhere(path)? {
+            Some(_) => Some(self.moving.write().unwrap_or_else(PoisonError::into_inner)),
+            None => None,
+        };
+        // Meanwhile another file may have taken it.
+        if alone.is_some()
+            && let Some(xqar) = self.place_elsewhere(path)?
+        {
+            self.withdraw_at(&xqar).map_err(fail)?;
+        }
+        if self.places.contains(path) {
+            self.withdraw_files(path).map_err(fail)?;
+        }
         self.record(&[entry]).map_err(Trouble::of_all)
+    }
+
+    /// Where the result of a file was written, if that is not where it would be written today.
+    fn place_elsewhere(&self, path: &Path) -> Result<Option<PathBuf>, Trouble> {
+        let place = self.journal().place(path);
+        let place = place.map_err(|error| Trouble::of_all(error.to_string()))?;
+        let today = |xqar: &PathBuf| self.places.contains(path) && *xqar == self.places.xqar(path);
+        Ok(place.filter(|xqar| !today(xqar)))
+    }
+
+    /// Removes a result that was written when other directories were watched, and what belongs
+    /// to it.
+    fn withdraw_at(&self, xqar: &Path) -> io::Result<()> {
+        if let Some(shown) = self.places.shown_at(xqar) {
+            if let Some(gate) = &self.gate {
+                remove(&gate.join(&shown))?;
+            }
+            remove(&with_suffix(&self.places.out.join(shown), ".verdict.json"))?;
+        }
+        remove(xqar)
+    }
+
+    fn journal(&self) -> MutexGuard<'_, Journal> {
+        self.journal.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn withdraw_files(&self, path: &Path) -> io::Result<()> {

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use qcbus_broker::journal::JournalError;
 use qcbus_broker::{Broker, Options, StartError, Told};
 use qcbus_bus::{HostOptions, StartError as BusError};
 use qcbus_messages::Exit;
@@ -43,9 +44,9 @@ async fn serve(options: Options) -> Exit {
         Err(error) => {
             talk::fail(&explain(&error));
             return match error {
-                StartError::Load(_) | StartError::Bus(BusError::AlreadyRunning { .. }) => {
-                    Exit::Usage
-                }
+                StartError::Load(_)
+                | StartError::Bus(BusError::AlreadyRunning { .. })
+                | StartError::Journal(JournalError::Held { .. }) => Exit::Usage,
                 _ => Exit::Internal,
             };
         }
