@@ -475,9 +475,8 @@ fn served(farm: &Farm, directories: &[&Path], there: &[&str], gone: &[&str]) {
         let all = [out("xqar"), out("verdict.json"), out("json"), gate];
         all.map(|path| (path.exists(), path))
     };
-    let checkable =
-        |it: &&Path| files_below(it).iter().filter(|it| is_checkable(it)).count() as u64;
-    let total: u64 = directories.iter().map(|it| checkable(&it)).sum();
+    let files = directories.iter().flat_map(|it| files_below(it));
+    let total = files.filter(|it| is_checkable(it)).count() as u64;
     let wrong = || -> Vec<PathBuf> {
         let missing = there.iter().flat_map(|of| traces(of)).filter(|it| !it.0);
         let left = gone.iter().flat_map(|of| traces(of)).filter(|it| it.0);
