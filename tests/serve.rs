@@ -493,7 +493,7 @@ fn served(farm: &Farm, directories: &[&Path], there: &[&str], gone: &[&str]) {
     });
     assert_eq!(farm.qcbus(&["down"]).status.code(), Some(0));
     assert!(broker.wait().success());
-    assert_eq!(wrong(), [PathBuf::new(); 0], "also after the end");
+    assert_eq!(wrong(), Vec::<PathBuf>::new(), "also after the end");
 }
 
 #[test]

@@ -427,24 +427,7 @@ fn deliver(
         .map(|_| ())
 }
 
-/// What was written last lies at a place: another file whose result lay there has none any more.
-fn oust(transaction: &Transaction<'_>, path: &str, xqar: &str) -> rusqlite::Result<()> {
-    let mut others =
-        transaction.prepare_cached("SELECT path FROM files WHERE xqar = ?1 AND path <> ?2")?;
-    let others: Vec<String> = others
-        .query_map(params![xqar, path], |row| row.get(0))?
-        .collect::<rusqlite::Result<_>>()?;
-    for other in others {
-        transaction.execute("DELETE FROM files WHERE path = ?1", params![other])?;
-        transaction.execute("DELETE FROM deliveries WHERE path = ?1", params![other])?;
-    }
-    Ok(())
-}
-
 fn put_file(transaction: &Transaction<'_>, path: &Path, judged: &Judged) -> rusqlite::Result<()> {
-    if judged.is_written() {
-        oust(transaction, &text(path), &text(&judged.xqar))?;
-    }
     let mut statement = transaction.prepare_cached(
         "INSERT OR REPLACE INTO files (path, job, verdict, digest, basis, config, bundles, errors, \
          warnings, information, why, xqar, inputs, racy, at) \
@@ -693,30 +676,6 @@ mod tests {
         journal.write(&[Entry::Voided { path, reporter }]).unwrap();
         assert_eq!(journal.voids().unwrap(), [text]);
         assert_eq!(Journal::examine(dir.path()), None);
-    }
-
-    #[test]
-    fn a_place_is_of_the_file_that_was_written_there_last() {
-        let mut journal = Journal::in_memory().unwrap();
-        let [first, second]: [Arc<Path>; 2] =
-            ["/one/a.xosc", "/two/a.xosc"].map(|path| Path::new(path).into());
-        let mut put = |path: &Arc<Path>, job| {
-            let judged = Arc::new(judged(job));
-            let path = path.clone();
-            let history = None;
-            let entry = Entry::Judged {
-                path,
-                judged,
-                history,
-            };
-            journal.write(&[entry]).unwrap();
-        };
-        put(&first, 1);
-        put(&second, 2);
-        let all = journal.remembered().unwrap();
-        assert_eq!(all.len(), 1);
-        assert_eq!(all[0].path, second);
-        assert_eq!(journal.place(&first).unwrap(), None);
     }
 
     #[test]

@@ -20,8 +20,6 @@ CREATE TABLE IF NOT EXISTS files (
     at       INTEGER NOT NULL
 ) WITHOUT ROWID;
 
-CREATE INDEX IF NOT EXISTS files_by_xqar ON files (xqar);
-
 -- Where the result lay of a file that has gone, while a reporter has not yet taken back its report.
 CREATE TABLE IF NOT EXISTS gone (
     path     TEXT PRIMARY KEY,

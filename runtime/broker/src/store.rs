@@ -1,5 +1,6 @@
 //! From outcomes to files on disk: pooling, the result, the verdict file, the gate.
 
+use std::collections::HashMap;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
@@ -37,6 +38,8 @@ pub struct Store {
     /// Shared by those who write results where they belong; alone has it who removes one that lies
     /// where another file's may belong today.
     pub moving: RwLock<()>,
+    /// Results that were written when other directories were watched, and the files they are of.
+    pub elsewhere: Mutex<HashMap<PathBuf, Vec<Arc<Path>>>>,
 }
 
 impl Store {
@@ -91,7 +94,7 @@ impl Store {
             return StoreOutcome::Stale;
         }
         if self.retries && !failed.for_good {
-            return StoreOutcome::Failed(format!("{}; it is tried again", failed.what));
+            return StoreOutcome::Failed(failed.what + failed.further);
         }
         // As far as it goes: what lies there is not of these bytes.
         let _ = self.withdraw(&job.path, &[]);
@@ -126,6 +129,7 @@ impl Store {
     fn write(&self, job: &FinishedJob, pooled: &Pooled, judged: &Judged) -> Result<(), Unwritten> {
         let fail = |path: &Path, error: &io::Error| Unwritten {
             what: format!("cannot write {}: {error}", path.display()),
+            further: "; it is tried again",
             for_good: is_for_good(error),
         };
         let text = xqar::write(&pooled.results, self.dialect);
@@ -159,10 +163,44 @@ impl Store {
             judged: Arc::new(judged.clone()),
             history,
         };
-        self.record(&[entry]).map_err(|what| Unwritten {
+        // What was written last lies at a place: files whose result lay there have none any more.
+        let mut entries: Vec<Entry> = self.ousted(&judged.xqar);
+        entries.push(entry);
+        self.record(&entries).map_err(|what| Unwritten {
             what,
+            further: "",
             for_good: false,
-        })
+        })?;
+        self.elsewhere().remove(&judged.xqar);
+        Ok(())
+    }
+
+    fn ousted(&self, xqar: &Path) -> Vec<Entry> {
+        let elsewhere = self.elsewhere();
+        let ousted = elsewhere.get(xqar).into_iter().flatten();
+        let withdrawn = |path: &Arc<Path>| Entry::Withdrawn {
+            path: path.clone(),
+            reporters: Vec::new(),
+        };
+        ousted.map(withdrawn).collect()
+    }
+
+    /// Whether the result of a file lies where it would not be written today.
+    pub fn has_moved(&self, path: &Path, judged: &Judged) -> bool {
+        !self.places.contains(path) || judged.xqar != self.places.xqar(path)
+    }
+
+    /// Remembers that the result of a file lies where it would not be written today.
+    pub fn lies_elsewhere(&self, path: &Arc<Path>, judged: &Judged) {
+        let mut elsewhere = self.elsewhere();
+        let there = elsewhere.entry(judged.xqar.clone()).or_default();
+        there.push(path.clone());
+    }
+
+    fn elsewhere(&self) -> MutexGuard<'_, HashMap<PathBuf, Vec<Arc<Path>>>> {
+        self.elsewhere
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Whether everything that a verdict brings with it lies where it belongs.
@@ -170,8 +208,7 @@ impl Store {
         let published = |gate: &PathBuf| {
             judged.verdict != Verdict::Accepted || gate.join(self.places.display(path)).exists()
         };
-        self.places.contains(path)
-            && judged.xqar == self.places.xqar(path)
+        !self.has_moved(path, judged)
             && judged.xqar.exists()
             && (!self.verdict_files || self.places.verdict(path).exists())
             && self.gate.as_ref().is_none_or(published)
@@ -209,10 +246,10 @@ impl Store {
             path: path.clone(),
             reporters: reporters.to_vec(),
         };
-        let alone = match self.place_elsewhere(path)? {
-            Some(_) => Some(self.moving.write().unwrap_or_else(PoisonError::into_inner)),
-            None => None,
-        };
+        let moved = self.place_elsewhere(path)?;
+        let alone = moved
+            .as_ref()
+            .map(|_| self.moving.write().unwrap_or_else(PoisonError::into_inner));
         // Meanwhile another file may have taken it.
         if alone.is_some()
             && let Some(xqar) = self.place_elsewhere(path)?
@@ -222,7 +259,12 @@ impl Store {
         if self.places.contains(path) {
             self.withdraw_files(path).map_err(fail)?;
         }
-        self.record(&[entry]).map_err(Trouble::of_all)
+        self.record(&[entry]).map_err(Trouble::of_all)?;
+        let mut elsewhere = self.elsewhere();
+        if let Some(others) = moved.and_then(|xqar| elsewhere.get_mut(&xqar)) {
+            others.retain(|other| other != path);
+        }
+        Ok(())
     }
 
     /// Where the result of a file was written, if that is not where it would be written today.
@@ -305,6 +347,8 @@ impl Trouble {
 struct Unwritten {
     /// For a person.
     what: String,
+    /// What is said besides when it is tried again.
+    further: &'static str,
     /// No waiting helps.
     for_good: bool,
 }

@@ -172,14 +172,14 @@ impl Lane {
         if !self.stopped && !self.held_up.contains(order.path()) {
             match self.carry_out(&mut order) {
                 Ok(()) => return,
-                Err(trouble) => self.hold_up(trouble),
+                Err(trouble) => self.hold_up(&trouble),
             }
         }
         self.held_up.insert(order.path().clone());
         self.waiting.push_back(order);
     }
 
-    fn hold_up(&mut self, trouble: Trouble) {
+    fn hold_up(&mut self, trouble: &Trouble) {
         self.stopped |= trouble.concerns_all;
         if !self.told {
             self.told = true;

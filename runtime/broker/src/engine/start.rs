@@ -110,6 +110,9 @@ impl Broker {
     fn remember(&mut self, files: Vec<Remembered>) -> Vec<(Arc<Path>, Option<Stamp>)> {
         let mut stamps: BTreeMap<Arc<Path>, Option<Stamp>> = BTreeMap::new();
         for mut file in files {
+            if self.store.has_moved(&file.path, &file.judged) {
+                self.store.lies_elsewhere(&file.path, &file.judged);
+            }
             if stamp_of(&file.path).is_err() {
                 // It cannot be looked at now, which says nothing about it: its result is kept.
                 continue;
@@ -136,11 +139,10 @@ impl Broker {
     /// directories that are watched today is left alone until its file has gone.
     fn forget_incomplete(&mut self, file: Remembered) {
         let gone = !file.path.exists();
-        let watched = self.store.places.contains(&file.path);
-        if !watched && !gone {
+        if !self.store.places.contains(&file.path) && !gone {
             return;
         }
-        let moved = !watched || file.judged.xqar != self.store.places.xqar(&file.path);
+        let moved = self.store.has_moved(&file.path, &file.judged);
         let reporters: Vec<String> = file.delivered.into_iter().map(|(name, _)| name).collect();
         for reporter in &reporters {
             let left = moved.then(|| file.judged.xqar.clone());
@@ -197,6 +199,7 @@ fn store(options: &Options, journal: Journal) -> Store {
         gate: options.gate.clone(),
         journal: Mutex::new(journal),
         moving: RwLock::new(()),
+        elsewhere: Mutex::default(),
     }
 }
 

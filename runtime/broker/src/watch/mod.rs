@@ -558,7 +558,7 @@ mod tests {
         std::fs::rename(&below, &aside).unwrap();
         std::os::unix::fs::symlink(&below, &below).unwrap();
         looker.scan_all(false);
-        assert_eq!(vanished(&told), [PathBuf::new(); 0]);
+        assert_eq!(vanished(&told), Vec::<PathBuf>::new());
         std::fs::remove_file(&below).unwrap();
         looker.scan_all(false);
         assert_eq!(vanished(&told), [below.join("a.xodr")]);
@@ -572,7 +572,7 @@ mod tests {
         let (mut looker, told) = looker(dir.path());
         looker.look(&file);
         looker.scan_all(false);
-        assert_eq!(vanished(&told), [PathBuf::new(); 0]);
+        assert_eq!(vanished(&told), Vec::<PathBuf>::new());
         std::fs::write(dir.path().join(IGNORE_FILE), "*.xodr\n").unwrap();
         looker.scan_all(false);
         assert_eq!(vanished(&told), [file]);
