@@ -160,3 +160,62 @@ fn quiet_and_json_say_no_more_than_asked() {
         let _: serde_json::Value = serde_json::from_str(line).unwrap();
     }
 }
+
+/// What the manifest of a bundle says is to be run.
+fn command_of(desk: &Desk, name: &str) -> String {
+    let path = desk.path().join(format!("bundles/{name}.json"));
+    let manifest: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
+    manifest["module"][0]["exec_command"]
+        .as_str()
+        .unwrap()
+        .to_owned()
+}
+
+#[test]
+fn a_bundle_is_added_where_the_options_say_and_gets_what_follows_two_dashes() {
+    let desk = Desk::new();
+    let add = |name: &str, further: &[&str]| {
+        let mut arguments = vec!["bundle", "add", name, "/opt/mine/bundle"];
+        arguments.extend(further);
+        desk.qcbus(&arguments)
+    };
+    let said = add("mine", &["--bundles-d", "bundles"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    assert_eq!(command_of(&desk, "mine"), "/opt/mine/bundle");
+    let own = ["a", "--bundles-d", "bundles", "--", "--bundles-d", "x"];
+    assert_eq!(add("other", &own).code, Some(0));
+    let command = "/opt/mine/bundle a --bundles-d x";
+    assert_eq!(command_of(&desk, "other"), command);
+    let unclear = add("third", &["--bundles-d", "bundles", "--its-own-flag"]);
+    assert_eq!(unclear.code, Some(2));
+    assert!(
+        unclear.stderr.contains("'-- --its-own-flag'"),
+        "{}",
+        unclear.whole(&desk)
+    );
+    assert!(!desk.path().join("bundles/third.json").exists());
+    assert!(!desk.path().join("qcbus-out").exists());
+}
+
+#[test]
+fn a_gate_that_is_watched_is_refused_whatever_the_way_to_it() {
+    let desk = Desk::new();
+    desk.write("in/a.xodr", "");
+    std::os::unix::fs::symlink("in", desk.path().join("farm")).unwrap();
+    for (gate, words) in [
+        ("farm/accepted", "lies inside the watched directory"),
+        ("in/new/accepted", "lies inside the watched directory"),
+        (
+            "other/../farm/accepted",
+            "lies inside the watched directory",
+        ),
+        ("farm", "lies inside the watched directory"),
+        (".", "lies inside the gate"),
+    ] {
+        let said = desk.qcbus(&["serve", "farm", "--gate", gate]);
+        assert_eq!(said.code, Some(2), "{gate}: {}", said.whole(&desk));
+        assert!(said.stderr.contains(words), "{gate}: {}", said.whole(&desk));
+    }
+    assert!(!desk.path().join("in/accepted").exists());
+}

@@ -371,3 +371,94 @@ fn large_map(bytes: usize) -> Vec<u8> {
     large.push_str("</OpenDRIVE>\n");
     large.into_bytes()
 }
+
+/// As long as names may be: there is no room for `.xqar` behind it.
+fn long_name(length: usize) -> String {
+    let name = "x".repeat(length - ".xodr".len());
+    format!("{name}.xodr")
+}
+
+#[test]
+fn a_name_too_long_for_a_result_holds_up_nobody() {
+    let farm = Farm::new();
+    let mut broker = farm.serve_ready();
+    let long = long_name(255);
+    farm.write(&long, &Content::Good(1).bytes());
+    let verdict = farm.verdict(&long);
+    assert_eq!(verdict.verdict, Verdict::Undetermined);
+    assert_eq!(verdict.xqar, Path::new(""), "there is no result");
+    let why = verdict.why.join("\n");
+    assert!(why.contains("cannot write "), "{why}");
+    assert!(why.contains("File name too long"), "{why}");
+    let said = farm.qcbus(&["wait", &farm.root().join(&long).to_string_lossy()]);
+    assert_eq!(said.status.code(), Some(3));
+    assert!(String::from_utf8_lossy(&said.stdout).contains("no result\n  cannot write "));
+    let notices = farm.status().unwrap().notices;
+    assert!(
+        notices.iter().any(|it| it.contains("stays undetermined")),
+        "{notices:#?}"
+    );
+    // Withdrawing what could never be written is done at once, and nothing waits behind it.
+    std::fs::remove_file(farm.root().join(&long)).unwrap();
+    farm.settle(0);
+    for number in 0..60 {
+        farm.write(&format!("{number}.xodr"), &Content::Good(number).bytes());
+    }
+    farm.settle(60);
+    assert_eq!(farm.qcbus(&["down"]).status.code(), Some(0));
+    assert!(broker.wait().success());
+    let written = files_below(&farm.out());
+    let of_long = written.iter().filter(|it| it.starts_with(&long));
+    assert_eq!(of_long.count(), 0);
+}
+
+#[test]
+fn a_directory_where_the_result_belongs_holds_up_nobody() {
+    let farm = Farm::new();
+    let in_the_way = farm.out().join("a.xodr.xqar");
+    std::fs::create_dir_all(&in_the_way).unwrap();
+    let _broker = farm.serve_ready();
+    farm.write("a.xodr", &Content::Good(1).bytes());
+    let verdict = farm.verdict("a.xodr");
+    assert_eq!(verdict.verdict, Verdict::Undetermined);
+    assert!(!farm.out().join("a.xodr.verdict.json").exists());
+    std::fs::remove_file(farm.root().join("a.xodr")).unwrap();
+    farm.settle(0);
+    // With room there, the file is judged like any other.
+    std::fs::remove_dir(in_the_way).unwrap();
+    farm.write("a.xodr", &Content::Good(2).bytes());
+    assert_eq!(farm.verdict("a.xodr").verdict, Content::Good(2).verdict());
+}
+
+#[test]
+fn a_check_ends_when_its_result_cannot_be_written() {
+    let desk = Desk::new();
+    let long = long_name(251);
+    desk.write(&format!("in/{long}"), Content::Good(1).bytes());
+    desk.write("in/a.xodr", Content::NoHeader(1).bytes());
+    let said = desk.qcbus(&["check", "in", "--out", "out"]);
+    assert_eq!(said.code, Some(5), "{}", said.whole(&desk));
+    let told = format!("error: {long} has no result: cannot write ");
+    assert!(said.stderr.contains(&told), "{}", said.whole(&desk));
+    assert!(
+        said.stderr.contains("1 rejected, 1 undetermined"),
+        "{}",
+        said.whole(&desk)
+    );
+    assert!(said.stdout.contains("rejected: a.xodr: "));
+    assert!(desk.path().join("out/a.xodr.xqar").exists());
+}
+
+#[test]
+fn a_check_begins_nothing_where_no_result_can_be_written() {
+    let desk = Desk::new();
+    desk.write("file", "");
+    desk.write("in/a.xodr", Content::Good(1).bytes());
+    let said = desk.qcbus(&["check", "in/a.xodr", "--out", "file/x"]);
+    assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
+    assert_eq!(
+        desk.tidy(&said.stderr),
+        "error: cannot write results into [DESK]/file/x: [DESK]/file: Not a directory (os error \
+         20); choose another directory with --out\n"
+    );
+}

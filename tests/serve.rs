@@ -10,12 +10,16 @@ mod support;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
+use qcbus_broker::control::ask_broker;
+use qcbus_bus::Instance;
 use qcbus_document::FileKind;
 use qcbus_formats::xqar::Results;
 use qcbus_messages::Verdict;
 use qcbus_messages::control::{Request, Response};
 use sha2::{Digest, Sha256};
+use support::broker::Broker;
 use support::content::Content;
 use support::desk::{Desk, files_below, issues, sample_farm};
 use support::farm::{Farm, tail};
@@ -473,4 +477,125 @@ fn faults_of_form(results: &Results) -> usize {
     issues(results)
         .filter(|(checker, _)| checker.id.ends_with("xml_valid_xml_document"))
         .count()
+}
+
+/// `qcbus serve` of any directories, with the farm's output and gate.
+fn serve_of(farm: &Farm, instance: &str, directories: &[&Path]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+    command.arg("serve").args(directories);
+    for (option, place) in [
+        ("--instance-dir", instance),
+        ("--out", "out"),
+        ("--bundles-d", "bundles.d"),
+        ("--gate", "gate"),
+    ] {
+        command.arg(option).arg(farm.base().join(place));
+    }
+    command.args(["--report", "json"]).env("NO_COLOR", "1");
+    command
+}
+
+/// Serves these directories until everything about some files is there, and ends.
+fn served(farm: &Farm, directories: &[&Path], there: &[&str], gone: &[&str]) {
+    let mut broker = Broker::start(
+        &mut serve_of(farm, "instance", directories),
+        &farm.log_path(),
+    );
+    let traces = |of: &str| {
+        let out = |suffix: &str| farm.out().join(format!("{of}.{suffix}"));
+        let gate = farm.base().join("gate").join(of);
+        let all = [out("xqar"), out("verdict.json"), out("json"), gate];
+        all.map(|path| (path.exists(), path))
+    };
+    let files = directories.iter().flat_map(|it| files_below(it));
+    let total = files.filter(|it| is_checkable(it)).count() as u64;
+    let wrong = || -> Vec<PathBuf> {
+        let missing = there.iter().flat_map(|of| traces(of)).filter(|it| !it.0);
+        let left = gone.iter().flat_map(|of| traces(of)).filter(|it| it.0);
+        missing.chain(left).map(|it| it.1).collect()
+    };
+    let quiet = || {
+        let (queue, files) = farm.status().map(|it| (it.queue, it.files))?;
+        let left = queue.waiting + queue.background + queue.active;
+        let judged = files.judged == files.total && files.total == total;
+        (left == 0 && judged && wrong().is_empty()).then_some(())
+    };
+    until_or("everything is where it belongs", quiet, || {
+        format!("{:?}\n{}", wrong(), tail(&farm.log()))
+    });
+    assert_eq!(farm.qcbus(&["down"]).status.code(), Some(0));
+    assert!(broker.wait().success());
+    assert_eq!(wrong(), Vec::<PathBuf>::new(), "also after the end");
+}
+
+#[test]
+fn results_move_with_the_directories_that_are_watched() {
+    let farm = Farm::new();
+    let second = farm.base().join("second");
+    std::fs::create_dir(&second).unwrap();
+    farm.write("a.xodr", &Content::Good(1).bytes());
+    std::fs::write(second.join("b.xodr"), Content::Good(2).bytes()).unwrap();
+    let root = farm.root();
+    served(&farm, &[&root], &["a.xodr"], &[]);
+    let both = [&*root, &*second];
+    let moved = ["farm/a.xodr", "second/b.xodr"];
+    served(&farm, &both, &moved, &["a.xodr"]);
+    std::fs::remove_file(root.join("a.xodr")).unwrap();
+    served(&farm, &[&second], &["b.xodr"], &moved);
+}
+
+#[test]
+fn what_has_gone_takes_no_other_files_result_with_it() {
+    let farm = Farm::new();
+    let (one, other) = (farm.base().join("z1"), farm.base().join("a2"));
+    std::fs::create_dir_all(one.join("sub")).unwrap();
+    std::fs::create_dir(&other).unwrap();
+    for file in [one.join("sub/a.xodr"), one.join("a.xodr")] {
+        std::fs::write(file, Content::Good(1).bytes()).unwrap();
+    }
+    std::fs::write(other.join("a.xodr"), Content::Good(2).bytes()).unwrap();
+    served(&farm, &[&one], &["sub/a.xodr", "a.xodr"], &[]);
+    // What nobody watches now is left alone, as while no broker runs.
+    served(&farm, &[&other], &["a.xodr", "sub/a.xodr"], &[]);
+    let of_other = std::fs::read_to_string(farm.out().join("a.xodr.xqar")).unwrap();
+    assert!(of_other.contains(&*other.to_string_lossy()));
+    std::fs::remove_dir_all(&one).unwrap();
+    served(&farm, &[&other], &["a.xodr"], &["sub/a.xodr"]);
+    let after = std::fs::read_to_string(farm.out().join("a.xodr.xqar")).unwrap();
+    assert_eq!(after, of_other);
+}
+
+#[test]
+fn a_second_broker_on_the_same_results_is_refused() {
+    let farm = Farm::new();
+    farm.write("a.xodr", &Content::Good(1).bytes());
+    let other = farm.base().join("other");
+    std::fs::create_dir(&other).unwrap();
+    let mut first = Broker::start(
+        &mut serve_of(&farm, "instance", &[&farm.root()]),
+        &farm.log_path(),
+    );
+    farm.verdict("a.xodr");
+    let mut second = serve_of(&farm, "second", &[&other]);
+    let refused = second.output().unwrap();
+    assert_eq!(refused.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    let state = farm.out().join(".qcbus");
+    let holder = format!("(instance `instance`, process {})", first.pid());
+    for words in [&*state.to_string_lossy(), &holder, "qcbus down", "--out"] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    assert!(farm.out().join("a.xodr.xqar").exists());
+    assert!(farm.base().join("gate/a.xodr").exists());
+    // Looking does no harm and is allowed.
+    let doctor = farm.qcbus(&["doctor", "--state", &state.to_string_lossy()]);
+    let found = String::from_utf8_lossy(&doctor.stdout).into_owned();
+    assert!(found.contains("ok   journal"), "{found}");
+    // Whoever is killed holds nothing.
+    first.kill();
+    let mut second = Broker::start(&mut second, &farm.log_path());
+    let instance = Instance::at(farm.base().join("second"));
+    let ready = || ask_broker(instance.dir(), &Request::Status).ok();
+    until_or("the second is there", ready, || farm.log());
+    second.kill();
 }

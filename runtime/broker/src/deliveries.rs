@@ -31,6 +31,10 @@ pub fn message(
             judged.xqar.display()
         )
     };
+    if !judged.is_written() {
+        let (path, why) = (delivery.path.display(), judged.why.join("; "));
+        return Err(format!("{path} has no result for {reporter}: {why}"));
+    }
     let bytes = std::fs::read(&judged.xqar).map_err(|error| fail(&error))?;
     let mut results = xqar::read(&bytes).map_err(|error| fail(&error))?;
     drop(bytes);
@@ -53,17 +57,22 @@ pub fn message(
     })
 }
 
-/// What one reporter is told when a file has gone.
+/// What one reporter is told when a file has gone. `left` says where its result lay, if that is
+/// not where it would lie today.
 pub fn withdrawn(
     reporter: &str,
     path: &Path,
+    left: Option<&Path>,
     places: &Places,
     config: Option<&Arc<Config>>,
 ) -> Withdrawn {
+    let shown = left.and_then(|xqar| places.shown_at(xqar));
+    let shown = shown.unwrap_or_else(|| places.display(path));
+    let xqar = left.map_or_else(|| places.xqar(path), Path::to_path_buf);
     Withdrawn {
         input: path.to_string_lossy().into_owned(),
-        display_path: places.display(path).to_string_lossy().into_owned(),
-        xqar: places.xqar(path).to_string_lossy().into_owned(),
+        display_path: shown.to_string_lossy().into_owned(),
+        xqar: xqar.to_string_lossy().into_owned(),
         params: params_of(reporter, config),
     }
 }

@@ -96,12 +96,28 @@ fn without_path(error: io::Error) -> io::Error {
 /// Removes a file if it is there.
 ///
 /// # Errors
-/// Whatever the file system says, other than that there is no such file.
+/// Whatever the file system says, other than that there is no such file, or can be none.
 pub fn remove(path: &Path) -> io::Result<()> {
     match std::fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        Err(error) if error.kind() != io::ErrorKind::NotFound && !is_for_good(&error) => Err(error),
         _ => Ok(()),
     }
+}
+
+/// Whether an error is about the path itself, so that no file of that name can be there and no
+/// waiting helps: the name is too long, or something else is in the way.
+pub fn is_for_good(error: &io::Error) -> bool {
+    use io::ErrorKind::{
+        AlreadyExists, InvalidFilename, InvalidInput, IsADirectory, NotADirectory,
+    };
+    let in_the_way = [
+        AlreadyExists,
+        InvalidFilename,
+        InvalidInput,
+        IsADirectory,
+        NotADirectory,
+    ];
+    in_the_way.contains(&error.kind()) || error.raw_os_error() == Some(libc::ELOOP)
 }
 
 /// Removes what processes that were killed left half-written below a directory. To be called
@@ -164,6 +180,19 @@ mod tests {
         sweep(dir.path());
         assert!(!dead.exists());
         assert!(living.exists() && result.exists());
+    }
+
+    #[test]
+    fn what_cannot_be_there_is_removed_already() {
+        let dir = tempfile::TempDir::new().unwrap();
+        let file = dir.path().join("file");
+        std::fs::write(&file, "").unwrap();
+        remove(&dir.path().join("x".repeat(256))).unwrap();
+        remove(&file.join("below")).unwrap();
+        remove(dir.path()).unwrap();
+        assert!(file.exists(), "a directory is nothing that was written");
+        remove(&file).unwrap();
+        assert!(!file.exists());
     }
 
     #[test]

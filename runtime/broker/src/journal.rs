@@ -6,9 +6,10 @@ use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use qcbus_messages::{Digest, JobId, Verdict};
-use rusqlite::{Connection, OpenFlags, Transaction, params};
+use rusqlite::{Connection, OpenFlags, OptionalExtension, Transaction, params};
 
 use crate::core::{Input, Judged, Stamp};
+use crate::hold::Hold;
 
 /// Version of the schema, kept in SQLite's `user_version`.
 pub const SCHEMA_VERSION: i64 = 2;
@@ -27,6 +28,25 @@ pub enum JournalError {
         path: PathBuf,
         /// What SQLite says.
         source: rusqlite::Error,
+    },
+    /// Another broker works with this state directory.
+    #[error(
+        "{} is the state of another broker that runs ({holder}); stop that one with `qcbus down`, or give this one another directory with --out or --state",
+        state.display()
+    )]
+    Held {
+        /// The state directory.
+        state: PathBuf,
+        /// Who.
+        holder: String,
+    },
+    /// The state directory cannot be taken.
+    #[error("cannot write {path}: {source}; choose another state directory with --state")]
+    Lock {
+        /// The file to be locked.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
     },
     /// Its disk is full.
     #[error(
@@ -75,6 +95,17 @@ pub struct Remembered {
     pub judged: Judged,
     /// The reporters that have it, each with the job whose result it has.
     pub delivered: Vec<(String, JobId)>,
+}
+
+/// A file that has gone, and a reporter that has not yet taken back what it said of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Void {
+    /// Absolute path of the file.
+    pub path: Arc<Path>,
+    /// The reporter.
+    pub reporter: String,
+    /// Where the result lay, if that is known.
+    pub xqar: Option<PathBuf>,
 }
 
 /// What one job did, for the history.
@@ -132,18 +163,22 @@ pub enum Entry {
 pub struct Journal {
     connection: Connection,
     path: PathBuf,
+    /// Kept as long as the journal is.
+    _hold: Option<Hold>,
 }
 
 impl Journal {
-    /// Opens or makes the journal in a state directory.
+    /// Opens or makes the journal in a state directory, which is this instance's alone as long as
+    /// the journal is open.
     ///
     /// # Errors
     /// See [`JournalError`]; each says what to do.
-    pub fn open(state: &Path) -> Result<Journal, JournalError> {
+    pub fn open(state: &Path, instance: &str) -> Result<Journal, JournalError> {
         std::fs::create_dir_all(state).map_err(|source| JournalError::Directory {
             path: state.to_path_buf(),
             source,
         })?;
+        let hold = Hold::take(state, instance)?;
         let path = state.join("journal.sqlite");
         let fail = |source| classify(&path, source);
         let connection = Connection::open(&path).map_err(fail)?;
@@ -151,7 +186,11 @@ impl Journal {
             .busy_timeout(Duration::from_secs(5))
             .map_err(fail)?;
         prepare(&connection, &path)?;
-        Ok(Journal { connection, path })
+        Ok(Journal {
+            connection,
+            path,
+            _hold: Some(hold),
+        })
     }
 
     /// A journal that is forgotten with the process, for a single run.
@@ -162,7 +201,11 @@ impl Journal {
         let path = PathBuf::from(":memory:");
         let connection = Connection::open_in_memory().map_err(|source| classify(&path, source))?;
         prepare(&connection, &path)?;
-        Ok(Journal { connection, path })
+        Ok(Journal {
+            connection,
+            path,
+            _hold: None,
+        })
     }
 
     /// Looks a journal through without changing it: `None` when it is sound, else what is wrong.
@@ -226,19 +269,40 @@ impl Journal {
     ///
     /// # Errors
     /// When the journal cannot be read.
-    pub fn voids(&self) -> Result<Vec<(Arc<Path>, String)>, JournalError> {
-        let read = || -> rusqlite::Result<Vec<(Arc<Path>, String)>> {
+    pub fn voids(&self) -> Result<Vec<Void>, JournalError> {
+        let read = || -> rusqlite::Result<Vec<Void>> {
             let mut query = self.connection.prepare(
-                "SELECT path, reporter FROM deliveries WHERE job = 0 \
-                 AND path NOT IN (SELECT path FROM files)",
+                "SELECT path, reporter, xqar FROM deliveries LEFT JOIN gone USING (path) \
+                 WHERE job = 0 AND path NOT IN (SELECT path FROM files)",
             )?;
             let rows = query.query_map([], |row| {
                 let path: String = row.get(0)?;
-                Ok((Path::new(&path).into(), row.get(1)?))
+                Ok(Void {
+                    path: Path::new(&path).into(),
+                    reporter: row.get(1)?,
+                    xqar: row.get::<_, Option<String>>(2)?.map(PathBuf::from),
+                })
             })?;
             rows.collect()
         };
         read().map_err(|source| classify(&self.path, source))
+    }
+
+    /// Where the result of a file was written.
+    ///
+    /// # Errors
+    /// When the journal cannot be read.
+    pub fn place(&self, path: &Path) -> Result<Option<PathBuf>, JournalError> {
+        let read = || -> rusqlite::Result<Option<String>> {
+            let mut query = self
+                .connection
+                .prepare_cached("SELECT xqar FROM files WHERE path = ?1")?;
+            query
+                .query_row(params![text(path)], |row| row.get(0))
+                .optional()
+        };
+        let place = read().map_err(|source| classify(&self.path, source))?;
+        Ok(place.filter(|it| !it.is_empty()).map(PathBuf::from))
     }
 
     /// Writes entries in one transaction: all of them or none.
@@ -314,6 +378,13 @@ fn put(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> {
         }
         Entry::Withdrawn { path, reporters } => {
             let path = text(path);
+            if !reporters.is_empty() {
+                transaction.execute(
+                    "INSERT OR REPLACE INTO gone (path, xqar) \
+                     SELECT path, xqar FROM files WHERE path = ?1",
+                    params![path],
+                )?;
+            }
             transaction.execute("DELETE FROM files WHERE path = ?1", params![path])?;
             transaction.execute("DELETE FROM deliveries WHERE path = ?1", params![path])?;
             for reporter in reporters {
@@ -324,6 +395,11 @@ fn put(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> {
             transaction.execute(
                 "DELETE FROM deliveries WHERE path = ?1 AND reporter = ?2 AND job = 0",
                 params![text(path), reporter],
+            )?;
+            transaction.execute(
+                "DELETE FROM gone WHERE path = ?1 AND path NOT IN \
+                 (SELECT path FROM deliveries WHERE path = ?1 AND job = 0)",
+                params![text(path)],
             )?;
         }
         Entry::Delivered {
@@ -576,7 +652,7 @@ mod tests {
         let path: Arc<Path> = Path::new("/a.xosc").into();
         let expected = Arc::new(judged(5));
         {
-            let mut journal = Journal::open(dir.path()).unwrap();
+            let mut journal = Journal::open(dir.path(), "test").unwrap();
             let history = Some(Box::new(History::default()));
             journal
                 .write(&[
@@ -593,7 +669,11 @@ mod tests {
                 ])
                 .unwrap();
         }
-        let mut journal = Journal::open(dir.path()).unwrap();
+        let mut journal = Journal::open(dir.path(), "test").unwrap();
+        assert_eq!(
+            journal.place(&path).unwrap(),
+            Some("/out/a.xosc.xqar".into())
+        );
         let all = journal.remembered().unwrap();
         assert_eq!(all.len(), 1);
         assert_eq!(all[0].judged, *expected);
@@ -607,10 +687,16 @@ mod tests {
             }])
             .unwrap();
         assert!(journal.remembered().unwrap().is_empty());
-        let json = (path.clone(), "json".to_owned());
-        let text = (path.clone(), "text".to_owned());
+        let void = |reporter: &str| Void {
+            path: path.clone(),
+            reporter: reporter.to_owned(),
+            xqar: Some("/out/a.xosc.xqar".into()),
+        };
+        let (json, text) = (void("json"), void("text"));
+        assert_eq!(journal.place(&path).unwrap(), None);
         assert_eq!(journal.voids().unwrap(), [json, text.clone()]);
         let reporter = "json".to_owned();
+        let path = path.clone();
         journal.write(&[Entry::Voided { path, reporter }]).unwrap();
         assert_eq!(journal.voids().unwrap(), [text]);
         assert_eq!(Journal::examine(dir.path()), None);
@@ -658,7 +744,7 @@ mod tests {
             "this is no database at all, is it?",
         )
         .unwrap();
-        let error = Journal::open(dir.path()).unwrap_err().to_string();
+        let error = Journal::open(dir.path(), "test").unwrap_err().to_string();
         assert!(error.contains("move it away"), "{error}");
         assert!(Journal::examine(dir.path()).is_some());
     }
@@ -666,14 +752,14 @@ mod tests {
     #[test]
     fn a_newer_journal_is_left_alone() {
         let dir = tempfile::tempdir().unwrap();
-        drop(Journal::open(dir.path()).unwrap());
+        drop(Journal::open(dir.path(), "test").unwrap());
         let connection = Connection::open(dir.path().join("journal.sqlite")).unwrap();
         connection
             .execute_batch("PRAGMA user_version = 99")
             .unwrap();
         drop(connection);
         assert!(matches!(
-            Journal::open(dir.path()),
+            Journal::open(dir.path(), "test"),
             Err(JournalError::Newer { found: 99, .. })
         ));
     }

@@ -20,6 +20,12 @@ CREATE TABLE IF NOT EXISTS files (
     at       INTEGER NOT NULL
 ) WITHOUT ROWID;
 
+-- Where the result lay of a file that has gone, while a reporter has not yet taken back its report.
+CREATE TABLE IF NOT EXISTS gone (
+    path     TEXT PRIMARY KEY,
+    xqar     TEXT NOT NULL
+) WITHOUT ROWID;
+
 -- Every job that gave a verdict, for statistics; pruned after the retention time.
 CREATE TABLE IF NOT EXISTS jobs (
     job      INTEGER PRIMARY KEY,

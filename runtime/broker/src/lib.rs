@@ -2,9 +2,9 @@
 //!
 //! `core` decides and does nothing; `engine` does and decides nothing. Everything else is a pair
 //! of hands: `watch` sees files, `intake` reads and publishes them, `store` and `writers` put
-//! results on the disk, `journal` remembers, `supervise` starts and kills, `control` answers
-//! commands, `reload` reads configuration and manifests, `memory` gives back what was
-//! taken.
+//! results on the disk, `journal` remembers and `hold` keeps others from it, `supervise` starts
+//! and kills, `control` answers commands, `reload` reads configuration and manifests, `memory`
+//! gives back what was taken.
 
 pub mod control;
 pub mod core;
@@ -12,6 +12,7 @@ pub mod deliveries;
 mod demand;
 mod disk;
 mod engine;
+mod hold;
 mod intake;
 pub mod journal;
 pub mod memory;

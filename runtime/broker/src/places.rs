@@ -1,6 +1,8 @@
 //! Where the result of a file goes.
 
 use std::collections::{BTreeMap, HashMap};
+use std::ffi::OsStr;
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Component, Path, PathBuf};
 
 /// Maps checked files to their results.
@@ -45,7 +47,7 @@ impl Places {
         }
     }
 
-    /// The path for people: relative to the directory given or watched, a file's name otherwise.
+    /// The path for people: relative to the directory given or watched, or a given file's name.
     pub fn display(&self, path: &Path) -> PathBuf {
         if let Some(name) = self.files.get(path) {
             return name.clone();
@@ -56,8 +58,21 @@ impl Places {
                 // Several directories: their own names keep their files apart.
                 below(path, &common_ancestor(&roots.iter().collect::<Vec<_>>()))
             }
-            _ => path.file_name().map(PathBuf::from).unwrap_or_default(),
+            // Nobody's place: a bare name might be that of another file.
+            _ => below(path, Path::new("/")),
         }
+    }
+
+    /// Whether the file is among those given or watched.
+    pub fn contains(&self, path: &Path) -> bool {
+        self.files.contains_key(path) || self.roots.iter().any(|root| path.starts_with(root))
+    }
+
+    /// The path for people of the file whose result lies there; `None` when it lies elsewhere.
+    pub fn shown_at(&self, xqar: &Path) -> Option<PathBuf> {
+        let shown = xqar.strip_prefix(&self.out).ok()?;
+        let name = shown.file_name()?.as_bytes().strip_suffix(b".xqar")?;
+        Some(shown.with_file_name(OsStr::from_bytes(name)))
     }
 
     /// Where the result of this file goes.
@@ -120,6 +135,17 @@ mod tests {
         );
         let verdict = places.verdict(Path::new("/farm/a.xodr"));
         assert_eq!(verdict, Path::new("/out/a.xodr.verdict.json"));
+    }
+
+    #[test]
+    fn what_is_not_watched_has_nobodys_place() {
+        let places = Places::new("/out".into(), paths(&["/farm"]), &[]);
+        let (inside, outside) = (Path::new("/farm/a.xodr"), Path::new("/old/a.xodr"));
+        assert!(places.contains(inside) && !places.contains(outside));
+        assert_ne!(places.xqar(inside), places.xqar(outside));
+        let shown = places.shown_at(Path::new("/out/maps/a.xodr.xqar"));
+        assert_eq!(shown.as_deref(), Some(Path::new("maps/a.xodr")));
+        assert_eq!(places.shown_at(Path::new("/elsewhere/a.xodr.xqar")), None);
     }
 
     #[test]

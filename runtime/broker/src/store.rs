@@ -1,8 +1,9 @@
 //! From outcomes to files on disk: pooling, the result, the verdict file, the gate.
 
+use std::collections::HashMap;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
 use qcbus_document::Document;
 use qcbus_formats::config::Config;
@@ -11,9 +12,9 @@ use qcbus_formats::xqar::{self, Dialect, Status};
 use qcbus_messages::{Digest, Verdict};
 
 use crate::core::{BundleOutcome, FinishedJob, Input, Judged, StoreOutcome};
-use crate::disk::{remove, write_both, write_whole};
+use crate::disk::{is_for_good, remove, write_both, write_whole};
 use crate::journal::{Entry, History, Journal};
-use crate::places::Places;
+use crate::places::{Places, with_suffix};
 use crate::stages::reached;
 use crate::stamp::stamp_through_links;
 
@@ -28,10 +29,17 @@ pub struct Store {
     pub durable: bool,
     /// Whether `NAME.verdict.json` is written.
     pub verdict_files: bool,
+    /// Whether what cannot be written now is tried again.
+    pub retries: bool,
     /// Where accepted files are published.
     pub gate: Option<PathBuf>,
     /// What is remembered.
     pub journal: Mutex<Journal>,
+    /// Shared by those who write results where they belong; alone has it who removes one that lies
+    /// where another file's may belong today.
+    pub moving: RwLock<()>,
+    /// Results that were written when other directories were watched, and the files they are of.
+    pub elsewhere: Mutex<HashMap<PathBuf, Vec<Arc<Path>>>>,
 }
 
 impl Store {
@@ -58,15 +66,37 @@ impl Store {
         let verdict = verdict_of(&pooled, nothing_checked || job.unreadable.is_some());
         let why = reasons(job, &pooled, nothing_checked);
         let judged = judged(job, &pooled, verdict, why, self.places.xqar(&job.path));
-        match self.write(job, &pooled, &judged) {
-            Ok(()) => {}
-            Err(error) => return StoreOutcome::Failed(error),
+        if let Err(failed) = self.write(job, &pooled, &judged) {
+            return self.not_written(job, judged, failed);
         }
         // The file may have gone between the look and the rename: nothing may lie there then.
         if stamp_through_links(&job.path).is_none() {
             let _ = self.withdraw_files(&job.path);
             return StoreOutcome::Stale;
         }
+        StoreOutcome::Stored(Box::new(judged))
+    }
+
+    /// A result that can never be written leaves its file undetermined: nobody may take what is
+    /// not there for an acceptance, and nobody should wait for it.
+    fn not_written(
+        &self,
+        job: &FinishedJob,
+        mut judged: Judged,
+        failed: Unwritten,
+    ) -> StoreOutcome {
+        let inputs = job.prepared.as_ref().map(|it| it.inputs.as_slice());
+        if has_changed(inputs.unwrap_or_default()) {
+            return StoreOutcome::Stale;
+        }
+        if self.retries && !failed.for_good {
+            return StoreOutcome::Failed(failed.what + failed.further);
+        }
+        // As far as it goes: what lies there is not of these bytes.
+        let _ = self.withdraw(&job.path, &[]);
+        judged.verdict = Verdict::Undetermined;
+        judged.why.insert(0, failed.what);
+        judged.xqar = PathBuf::new();
         StoreOutcome::Stored(Box::new(judged))
     }
 
@@ -92,14 +122,14 @@ impl Store {
         }
     }
 
-    fn write(&self, job: &FinishedJob, pooled: &Pooled, judged: &Judged) -> Result<(), String> {
-        let fail = |path: &Path, error: &io::Error| {
-            format!(
-                "cannot write {}: {error}; it is tried again",
-                path.display()
-            )
+    fn write(&self, job: &FinishedJob, pooled: &Pooled, judged: &Judged) -> Result<(), Unwritten> {
+        let fail = |path: &Path, error: &io::Error| Unwritten {
+            what: format!("cannot write {}: {error}", path.display()),
+            further: "; it is tried again",
+            for_good: is_for_good(error),
         };
         let text = xqar::write(&pooled.results, self.dialect);
+        let _others = self.moving.read().unwrap_or_else(PoisonError::into_inner);
         let verdict_path = self.places.verdict(&job.path);
         if self.gate.is_some() && judged.verdict != Verdict::Accepted {
             self.close_gate(&job.path)
@@ -129,7 +159,44 @@ impl Store {
             judged: Arc::new(judged.clone()),
             history,
         };
-        self.record(&[entry])
+        // What was written last lies at a place: files whose result lay there have none any more.
+        let mut entries: Vec<Entry> = self.ousted(&judged.xqar);
+        entries.push(entry);
+        self.record(&entries).map_err(|what| Unwritten {
+            what,
+            further: "",
+            for_good: false,
+        })?;
+        self.elsewhere().remove(&judged.xqar);
+        Ok(())
+    }
+
+    fn ousted(&self, xqar: &Path) -> Vec<Entry> {
+        let elsewhere = self.elsewhere();
+        let ousted = elsewhere.get(xqar).into_iter().flatten();
+        let withdrawn = |path: &Arc<Path>| Entry::Withdrawn {
+            path: path.clone(),
+            reporters: Vec::new(),
+        };
+        ousted.map(withdrawn).collect()
+    }
+
+    /// Whether the result of a file lies where it would not be written today.
+    pub fn has_moved(&self, path: &Path, judged: &Judged) -> bool {
+        !self.places.contains(path) || judged.xqar != self.places.xqar(path)
+    }
+
+    /// Remembers that the result of a file lies where it would not be written today.
+    pub fn lies_elsewhere(&self, path: &Arc<Path>, judged: &Judged) {
+        let mut elsewhere = self.elsewhere();
+        let there = elsewhere.entry(judged.xqar.clone()).or_default();
+        there.push(path.clone());
+    }
+
+    fn elsewhere(&self) -> MutexGuard<'_, HashMap<PathBuf, Vec<Arc<Path>>>> {
+        self.elsewhere
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Whether everything that a verdict brings with it lies where it belongs.
@@ -137,7 +204,7 @@ impl Store {
         let published = |gate: &PathBuf| {
             judged.verdict != Verdict::Accepted || gate.join(self.places.display(path)).exists()
         };
-        judged.xqar == self.places.xqar(path)
+        !self.has_moved(path, judged)
             && judged.xqar.exists()
             && (!self.verdict_files || self.places.verdict(path).exists())
             && self.gate.as_ref().is_none_or(published)
@@ -148,11 +215,8 @@ impl Store {
     /// # Errors
     /// What a person should know; the entries are not written then.
     pub fn record(&self, entries: &[Entry]) -> Result<(), String> {
-        let mut journal = self
-            .journal
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
-        journal.write(entries).map_err(|error| error.to_string())
+        let written = self.journal().write(entries);
+        written.map_err(|error| error.to_string())
     }
 
     /// Forgets the history of jobs older than `keep`.
@@ -160,29 +224,67 @@ impl Store {
     /// # Errors
     /// What a person should know.
     pub fn prune(&self, keep: std::time::Duration) -> Result<(), String> {
-        let mut journal = self
-            .journal
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
-        journal
-            .prune(keep)
-            .map(|_| ())
-            .map_err(|error| error.to_string())
+        let pruned = self.journal().prune(keep);
+        pruned.map(|_| ()).map_err(|error| error.to_string())
     }
 
     /// Removes what was written for a file that has gone, and remembers who is to take back a
     /// report about it.
     ///
     /// # Errors
-    /// What a person should know.
-    pub fn withdraw(&self, path: &Arc<Path>, reporters: &[String]) -> Result<(), String> {
-        let fail =
-            |error: io::Error| format!("cannot withdraw the result of {}: {error}", path.display());
-        self.withdraw_files(path).map_err(fail)?;
-        self.record(&[Entry::Withdrawn {
+    /// What a person should know; it is to be tried again.
+    pub fn withdraw(&self, path: &Arc<Path>, reporters: &[String]) -> Result<(), Trouble> {
+        let fail = |error: io::Error| Trouble {
+            what: format!("cannot withdraw the result of {}: {error}", path.display()),
+            concerns_all: false,
+        };
+        let entry = Entry::Withdrawn {
             path: path.clone(),
             reporters: reporters.to_vec(),
-        }])
+        };
+        let moved = self.place_elsewhere(path)?;
+        let alone = moved
+            .as_ref()
+            .map(|_| self.moving.write().unwrap_or_else(PoisonError::into_inner));
+        // Meanwhile another file may have taken it.
+        if alone.is_some()
+            && let Some(xqar) = self.place_elsewhere(path)?
+        {
+            self.withdraw_at(&xqar).map_err(fail)?;
+        }
+        if self.places.contains(path) {
+            self.withdraw_files(path).map_err(fail)?;
+        }
+        self.record(&[entry]).map_err(Trouble::of_all)?;
+        let mut elsewhere = self.elsewhere();
+        if let Some(others) = moved.and_then(|xqar| elsewhere.get_mut(&xqar)) {
+            others.retain(|other| other != path);
+        }
+        Ok(())
+    }
+
+    /// Where the result of a file was written, if that is not where it would be written today.
+    fn place_elsewhere(&self, path: &Path) -> Result<Option<PathBuf>, Trouble> {
+        let place = self.journal().place(path);
+        let place = place.map_err(|error| Trouble::of_all(error.to_string()))?;
+        let today = |xqar: &PathBuf| self.places.contains(path) && *xqar == self.places.xqar(path);
+        Ok(place.filter(|xqar| !today(xqar)))
+    }
+
+    /// Removes a result that was written when other directories were watched, and what belongs
+    /// to it.
+    fn withdraw_at(&self, xqar: &Path) -> io::Result<()> {
+        if let Some(shown) = self.places.shown_at(xqar) {
+            if let Some(gate) = &self.gate {
+                remove(&gate.join(&shown))?;
+            }
+            remove(&with_suffix(&self.places.out.join(shown), ".verdict.json"))?;
+        }
+        remove(xqar)
+    }
+
+    fn journal(&self) -> MutexGuard<'_, Journal> {
+        self.journal.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn withdraw_files(&self, path: &Path) -> io::Result<()> {
@@ -216,6 +318,35 @@ impl Store {
             None => Ok(()),
         }
     }
+}
+
+/// Why something that is to be tried again could not be done.
+#[derive(Debug)]
+pub struct Trouble {
+    /// For a person.
+    pub what: String,
+    /// It is not about one file: the journal cannot be written.
+    pub concerns_all: bool,
+}
+
+impl Trouble {
+    /// The journal cannot be written.
+    pub fn of_all(what: String) -> Trouble {
+        Trouble {
+            what,
+            concerns_all: true,
+        }
+    }
+}
+
+/// Why a result is not there.
+struct Unwritten {
+    /// For a person.
+    what: String,
+    /// What is said besides when it is tried again.
+    further: &'static str,
+    /// No waiting helps.
+    for_good: bool,
 }
 
 /// The date of the commit or release that this was built from, fixed so that equal input gives

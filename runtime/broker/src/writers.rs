@@ -1,7 +1,7 @@
 //! The threads that write. What concerns one path is done by one thread, in order, so that a
 //! result can never be withdrawn by an order that is older than the result.
 
-use std::collections::VecDeque;
+use std::collections::{HashSet, VecDeque};
 use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
 use std::path::Path;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use tokio::sync::mpsc::UnboundedSender;
 
 use crate::core::{Event, FinishedJob, StoreOutcome};
 use crate::journal::Entry;
-use crate::store::Store;
+use crate::store::{Store, Trouble};
 
 /// An order for a writer.
 #[derive(Debug)]
@@ -69,6 +69,9 @@ impl Writers {
                 events: events.clone(),
                 notices: notices.clone(),
                 waiting: VecDeque::new(),
+                held_up: HashSet::new(),
+                stopped: false,
+                told: false,
             };
             let thread = std::thread::Builder::new().name(format!("write-{number}"));
             writers
@@ -98,12 +101,35 @@ impl Writers {
     }
 }
 
+impl Order {
+    /// The file that it is about.
+    fn path(&self) -> &Arc<Path> {
+        match self {
+            Order::Store { job, .. } => &job.path,
+            Order::Withdraw { path, .. } => path,
+            Order::Record(
+                Entry::Judged { path, .. }
+                | Entry::Withdrawn { path, .. }
+                | Entry::Voided { path, .. }
+                | Entry::Delivered { path, .. },
+            ) => path,
+        }
+    }
+}
+
 struct Lane {
     store: Arc<Store>,
     events: UnboundedSender<Event>,
     notices: UnboundedSender<String>,
-    /// Orders that failed and are tried again, with everything that came after them.
+    /// Orders that failed and are tried again, with everything that came after them for the same
+    /// files, in order.
     waiting: VecDeque<Order>,
+    /// The files that those are about.
+    held_up: HashSet<Arc<Path>>,
+    /// The journal cannot be written, which concerns every file.
+    stopped: bool,
+    /// Since the last try a failure was told; there may be thousands of the kind.
+    told: bool,
 }
 
 /// Pause before a failed order is tried again.
@@ -125,48 +151,83 @@ impl Lane {
                     Err(RecvTimeoutError::Disconnected) => break,
                 },
             };
-            self.waiting.extend(order);
-            if retry_at.is_none_or(|at| at <= Instant::now()) {
-                retry_at = (!self.work()).then(|| Instant::now() + RETRY);
+            if let Some(order) = order {
+                self.take(order);
+            }
+            if retry_at.is_some_and(|at| at <= Instant::now()) {
+                self.retry();
+                retry_at = None;
+            }
+            if self.waiting.is_empty() {
+                retry_at = None;
+            } else {
+                retry_at = retry_at.or_else(|| Some(Instant::now() + RETRY));
             }
         }
-        self.work();
+        self.retry();
     }
 
-    /// Does what waits, up to the first order that fails.
-    fn work(&mut self) -> bool {
-        while let Some(mut order) = self.waiting.pop_front() {
-            let done = match &mut order {
-                Order::Store { job, config, root } => {
-                    let root = root.as_deref();
-                    let outcome = self.store.store(job, config.as_deref(), root);
-                    self.tell(job, outcome);
-                    Ok(())
-                }
-                Order::Withdraw { path, reporters } => self.store.withdraw(path, reporters),
-                Order::Record(_) => self.record(&order),
-            };
-            if let Err(why) = done {
-                let _ = self.notices.send(format!("{why}; it is tried again"));
-                self.waiting.push_front(order);
-                return false;
+    /// Does an order now, or puts it behind those that must be done before it.
+    fn take(&mut self, mut order: Order) {
+        if !self.stopped && !self.held_up.contains(order.path()) {
+            match self.carry_out(&mut order) {
+                Ok(()) => return,
+                Err(trouble) => self.hold_up(&trouble),
             }
         }
-        true
+        self.held_up.insert(order.path().clone());
+        self.waiting.push_back(order);
+    }
+
+    fn hold_up(&mut self, trouble: &Trouble) {
+        self.stopped |= trouble.concerns_all;
+        if !self.told {
+            self.told = true;
+            let _ = self
+                .notices
+                .send(format!("{}; it is tried again", trouble.what));
+        }
+    }
+
+    fn retry(&mut self) {
+        self.held_up.clear();
+        self.stopped = false;
+        self.told = false;
+        for order in std::mem::take(&mut self.waiting) {
+            self.take(order);
+        }
+    }
+
+    fn carry_out(&self, order: &mut Order) -> Result<(), Trouble> {
+        match order {
+            Order::Store { job, config, root } => {
+                let root = root.as_deref();
+                let outcome = self.store.store(job, config.as_deref(), root);
+                self.tell(job, outcome);
+                Ok(())
+            }
+            Order::Withdraw { path, reporters } => self.store.withdraw(path, reporters),
+            Order::Record(entry) => {
+                let recorded = self.store.record(std::slice::from_ref(entry));
+                recorded.map_err(Trouble::of_all)
+            }
+        }
     }
 
     fn tell(&self, job: &FinishedJob, outcome: StoreOutcome) {
+        if let StoreOutcome::Stored(judged) = &outcome
+            && !judged.is_written()
+            && self.store.retries
+        {
+            let (path, why) = (job.path.display(), judged.why.join("; "));
+            let _ = self.notices.send(format!(
+                "{path} stays undetermined until it changes or qcbus is started anew: {why}"
+            ));
+        }
         // After the end of the loop nobody waits for this.
         let _ = self.events.send(Event::Stored {
             job: job.job,
             outcome,
         });
-    }
-
-    fn record(&self, order: &Order) -> Result<(), String> {
-        match order {
-            Order::Record(entry) => self.store.record(std::slice::from_ref(entry)),
-            Order::Store { .. } | Order::Withdraw { .. } => Ok(()),
-        }
     }
 }

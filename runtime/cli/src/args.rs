@@ -296,11 +296,13 @@ pub struct BusArgs {
 
 /// `qcbus bundle add`.
 #[derive(Debug, ClapArgs)]
+#[command(after_help = "Example:\n  \
+qcbus bundle add mine /opt/mine/bundle --bundles-d DIR -- --its-own-flag")]
 pub struct BundleAddArgs {
     /// The bundle's name, as it says it itself
     pub name: String,
-    /// The program and its arguments
-    #[arg(required = true, trailing_var_arg = true, allow_hyphen_values = true)]
+    /// The program and its arguments; put `--` before arguments that begin with `-`
+    #[arg(required = true)]
     pub command: Vec<String>,
     /// Directory of bundle manifests of the broker (default: qcbus-out/.qcbus/bundles.d)
     #[arg(long, value_name = "DIR")]

@@ -136,8 +136,15 @@ pub struct Judged {
     pub counts: [u64; 3],
     /// For undetermined: which checkers failed and why.
     pub why: Vec<String>,
-    /// Where the result lies.
+    /// Where the result lies; empty when it could not be written anywhere.
     pub xqar: PathBuf,
+}
+
+impl Judged {
+    /// Whether there is a result.
+    pub fn is_written(&self) -> bool {
+        !self.xqar.as_os_str().is_empty()
+    }
 }
 
 /// What one checker of one bundle said.

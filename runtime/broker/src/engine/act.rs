@@ -1,6 +1,6 @@
 //! What the state machine wants done.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use qcbus_messages::{JobId, ToPeer};
@@ -59,6 +59,7 @@ impl Broker {
                 path,
             } => self.void(session, &reporter, &path),
             Action::Voided { reporter, path } => {
+                self.left.remove(&(reporter.clone(), path.clone()));
                 let at = path.clone();
                 self.writers
                     .order(&at, Order::Record(Entry::Voided { path, reporter }));
@@ -164,9 +165,11 @@ impl Broker {
     }
 
     /// Tells a reporter that a file has gone.
-    fn void(&mut self, session: Session, reporter: &str, path: &Path) {
+    fn void(&mut self, session: Session, reporter: &str, path: &Arc<Path>) {
         let config = self.in_force.config.as_ref();
-        let gone = crate::deliveries::withdrawn(reporter, path, &self.store.places, config);
+        let left = self.left.get(&(reporter.to_owned(), path.clone()));
+        let left = left.map(PathBuf::as_path);
+        let gone = crate::deliveries::withdrawn(reporter, path, left, &self.store.places, config);
         if let Some(peer) = self.sessions.peers.get(&session) {
             self.host.send(*peer, &ToPeer::Withdrawn(gone));
         }

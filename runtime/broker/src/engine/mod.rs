@@ -6,7 +6,7 @@ mod start;
 mod systemd;
 
 use std::collections::{BTreeMap, HashMap};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -103,6 +103,9 @@ pub struct Broker {
     tickets: HashMap<Ticket, oneshot::Sender<Response>>,
     downs: Vec<oneshot::Sender<Response>>,
     next_ticket: u64,
+    /// Where results lay when other directories were watched, by reporter and file, until the
+    /// reporter has taken back its report.
+    left: HashMap<(String, Arc<Path>), PathBuf>,
     /// Results were stored or delivered since free memory was last given back.
     untrimmed: bool,
     inbox: Inbox,

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, RwLock};
 use std::time::Instant;
 
 use qcbus_bus::Host;
@@ -44,7 +44,7 @@ impl Broker {
         let mut host = Host::start(&options.instance, options.host)?;
         options.settings.generation = host.generation();
         let journal = match &options.state {
-            Some(state) => Journal::open(state)?,
+            Some(state) => Journal::open(state, options.instance.name())?,
             None => Journal::in_memory()?,
         };
         let remembered = journal.remembered()?;
@@ -86,14 +86,15 @@ impl Broker {
             tickets: HashMap::new(),
             downs: Vec::new(),
             next_ticket: 0,
+            left: HashMap::new(),
             untrimmed: false,
             inbox,
             tell: Box::new(tell),
             control,
             options,
         };
-        for (path, reporter) in &voids {
-            broker.state.remember_void(path, reporter);
+        for void in voids {
+            broker.remember_void(&void.path, &void.reporter, void.xqar);
         }
         let dependencies = broker.remember(remembered);
         broker.look(senders.seen)?;
@@ -109,6 +110,13 @@ impl Broker {
     fn remember(&mut self, files: Vec<Remembered>) -> Vec<(Arc<Path>, Option<Stamp>)> {
         let mut stamps: BTreeMap<Arc<Path>, Option<Stamp>> = BTreeMap::new();
         for mut file in files {
+            if self.store.has_moved(&file.path, &file.judged) {
+                self.store.lies_elsewhere(&file.path, &file.judged);
+            }
+            if stamp_of(&file.path).is_err() {
+                // It cannot be looked at now, which says nothing about it: its result is kept.
+                continue;
+            }
             if !self.store.is_complete(&file.path, &file.judged) {
                 self.forget_incomplete(file);
                 continue;
@@ -126,16 +134,32 @@ impl Broker {
         stamps.into_iter().collect()
     }
 
-    /// A result that is not all there counts for nothing, nor does what was reported of it.
+    /// A result that is not all there counts for nothing, nor does what was reported of it; one
+    /// that lies where it would not be written today is withdrawn from there. What lies outside the
+    /// directories that are watched today is left alone until its file has gone.
     fn forget_incomplete(&mut self, file: Remembered) {
+        let gone = !file.path.exists();
+        if !self.store.places.contains(&file.path) && !gone {
+            return;
+        }
+        let moved = self.store.has_moved(&file.path, &file.judged);
         let reporters: Vec<String> = file.delivered.into_iter().map(|(name, _)| name).collect();
         for reporter in &reporters {
-            self.state.remember_void(&file.path, reporter);
+            let left = moved.then(|| file.judged.xqar.clone());
+            self.remember_void(&file.path, reporter, left);
         }
-        if !file.path.exists() {
+        if gone || moved {
             let (at, path) = (file.path.clone(), file.path);
             self.writers.order(&at, Order::Withdraw { path, reporters });
         }
+    }
+
+    /// A reporter is to take back its report; `left` says where the result lay.
+    fn remember_void(&mut self, path: &Arc<Path>, reporter: &str, left: Option<PathBuf>) {
+        if let Some(xqar) = left.filter(|it| !it.as_os_str().is_empty()) {
+            self.left.insert((reporter.to_owned(), path.clone()), xqar);
+        }
+        self.state.remember_void(path, reporter);
     }
 
     /// Begins to look at the files: by watching, or once.
@@ -171,8 +195,11 @@ fn store(options: &Options, journal: Journal) -> Store {
         dialect: options.dialect,
         durable: options.durable,
         verdict_files: options.verdict_files,
+        retries: options.watch,
         gate: options.gate.clone(),
         journal: Mutex::new(journal),
+        moving: RwLock::new(()),
+        elsewhere: Mutex::default(),
     }
 }
 

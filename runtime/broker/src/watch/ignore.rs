@@ -28,9 +28,14 @@ impl IgnoreRules {
         }
     }
 
-    /// Forgets what was read, because a rule file has changed.
+    /// Forgets what was read, because a rule file may have changed.
     pub fn forget(&mut self) {
         self.by_directory.clear();
+    }
+
+    /// Forgets what was read in a directory and below it, because it came or went as a whole.
+    pub fn forget_below(&mut self, directory: &Path) {
+        self.by_directory.retain(|at, _| !at.starts_with(directory));
     }
 
     /// Whether a path below the root is left alone.
@@ -133,5 +138,23 @@ mod tests {
         assert!(!rules.ignores(&root.join("maps/keep_draft.xodr"), false));
         assert!(!rules.ignores(&root.join("maps/a.xodr"), false));
         assert!(rules.ignores(Path::new("/elsewhere/a.xodr"), false));
+    }
+
+    #[test]
+    fn the_rules_of_a_directory_go_with_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let (old, beside) = (dir.path().join("maps"), dir.path().join("other"));
+        for directory in [&old, &beside] {
+            std::fs::create_dir(directory).unwrap();
+            std::fs::write(directory.join(IGNORE_FILE), "*.xodr\n").unwrap();
+        }
+        let mut rules = IgnoreRules::new(dir.path());
+        assert!(rules.ignores(&old.join("a.xodr"), false));
+        assert!(rules.ignores(&beside.join("a.xodr"), false));
+        std::fs::rename(&old, dir.path().join("aside")).unwrap();
+        std::fs::create_dir(&old).unwrap();
+        rules.forget_below(&old);
+        assert!(!rules.ignores(&old.join("a.xodr"), false));
+        assert!(rules.ignores(&beside.join("a.xodr"), false));
     }
 }

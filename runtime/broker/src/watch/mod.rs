@@ -302,7 +302,6 @@ impl Looker {
             return;
         }
         if path.file_name().is_some_and(|name| name == IGNORE_FILE) {
-            self.rules.iter_mut().for_each(IgnoreRules::forget);
             return self.scan_all(false);
         }
         if self.options.roots.iter().any(|root| root == path) {
@@ -395,6 +394,7 @@ impl Looker {
     }
 
     fn scan_below(&mut self, directory: &Path) {
+        self.forget_rules_below(directory);
         for index in 0..self.rules.len() {
             if !directory.starts_with(&self.options.roots[index])
                 || self.rules[index].ignores(directory, true)
@@ -410,7 +410,14 @@ impl Looker {
         }
     }
 
+    fn forget_rules_below(&mut self, directory: &Path) {
+        for rules in &mut self.rules {
+            rules.forget_below(directory);
+        }
+    }
+
     fn gone_below(&mut self, directory: &Path) {
+        self.forget_rules_below(directory);
         let gone: Vec<Arc<Path>> = self
             .known
             .keys()
@@ -425,6 +432,8 @@ impl Looker {
     /// Looks through everything. What is new since the last look may still be written to, unless
     /// this is the first look and it is older than the quiet time.
     fn scan_all(&mut self, first: bool) {
+        // Events may have been lost, those of rule files, too.
+        self.rules.iter_mut().for_each(IgnoreRules::forget);
         let mut present = BTreeSet::new();
         for index in 0..self.options.roots.len() {
             let root = self.options.roots[index].clone();
@@ -454,7 +463,8 @@ impl Looker {
             .cloned()
             .collect();
         for path in gone {
-            if self.dependencies.contains_key(&path) || !path.exists() || self.ignored(&path) {
+            // One that cannot be looked at may still be there.
+            if matches!(stamp_of(&path), Ok(None)) || self.ignored(&path) {
                 self.known.remove(&path);
                 (self.tell)(Seen::Vanished(path));
             }
@@ -511,6 +521,58 @@ fn is_quiet(stamp: Stamp) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A looker around one directory, and what it says.
+    fn looker(root: &Path) -> (Looker, Receiver<Seen>) {
+        let (tell, told) = channel();
+        let options = WatchOptions {
+            roots: vec![root.to_path_buf()],
+            poll: None,
+            rescan: Duration::MAX,
+        };
+        let tell = Box::new(move |seen| tell.send(seen).unwrap());
+        (Looker::new(options, tell), told)
+    }
+
+    fn vanished(told: &Receiver<Seen>) -> Vec<PathBuf> {
+        let path = |seen| match seen {
+            Seen::Vanished(path) => Some(path.to_path_buf()),
+            _ => None,
+        };
+        told.try_iter().filter_map(path).collect()
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_looked_at_has_not_gone() {
+        let dir = tempfile::tempdir().unwrap();
+        let (below, aside) = (dir.path().join("maps"), dir.path().join("aside.d"));
+        std::fs::create_dir(&below).unwrap();
+        std::fs::write(below.join("a.xodr"), "").unwrap();
+        let (mut looker, told) = looker(dir.path());
+        looker.look(&below.join("a.xodr"));
+        // Root may look into every directory, but through a link to itself nobody sees anything.
+        std::fs::rename(&below, &aside).unwrap();
+        std::os::unix::fs::symlink(&below, &below).unwrap();
+        looker.scan_all(false);
+        assert_eq!(vanished(&told), Vec::<PathBuf>::new());
+        std::fs::remove_file(&below).unwrap();
+        looker.scan_all(false);
+        assert_eq!(vanished(&told), [below.join("a.xodr")]);
+    }
+
+    #[test]
+    fn looking_through_everything_reads_the_rules_afresh() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("a.xodr");
+        std::fs::write(&file, "").unwrap();
+        let (mut looker, told) = looker(dir.path());
+        looker.look(&file);
+        looker.scan_all(false);
+        assert_eq!(vanished(&told), Vec::<PathBuf>::new());
+        std::fs::write(dir.path().join(IGNORE_FILE), "*.xodr\n").unwrap();
+        looker.scan_all(false);
+        assert_eq!(vanished(&told), [file]);
+    }
 
     #[test]
     fn reading_a_file_is_no_change_of_it() {

@@ -58,6 +58,7 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
     } else {
         "qcbus-out"
     })));
+    writable(&out)?;
     let program = program().map_err(|why| (Exit::Internal, why))?;
     let (kinds, config_named) = (kinds(&roots, &files), parsed.is_some());
     let kinds = if config_named {
@@ -98,6 +99,25 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
     Ok(Prepared {
         options,
         config: parsed.map(Arc::new),
+    })
+}
+
+/// Refuses a place for results where nothing can be written, before anything is checked for it.
+fn writable(out: &Path) -> Result<(), Refusal> {
+    use rustix::fs::{Access, access};
+    let mut above = out.ancestors();
+    let there = above.find(|path| path.symlink_metadata().is_ok());
+    let there = there.unwrap_or(Path::new("/"));
+    let refused = if there.is_dir() {
+        access(there, Access::WRITE_OK | Access::EXEC_OK)
+    } else {
+        Err(rustix::io::Errno::NOTDIR)
+    };
+    refused.map_err(|error| {
+        let (out, there) = (out.display(), there.display());
+        usage(format!(
+            "cannot write results into {out}: {there}: {error}; choose another directory with --out"
+        ))
     })
 }
 
@@ -218,6 +238,7 @@ fn check(args: &CheckArgs, prepared: Prepared) -> Exit {
         printed: 0,
         judged: BTreeMap::new(),
         verdicts: Vec::new(),
+        unwritten: 0,
         notices: BTreeSet::new(),
     };
     let directory = prepared.options.instance.dir().to_path_buf();
@@ -273,6 +294,8 @@ struct Printer {
     printed: usize,
     judged: BTreeMap<Arc<Path>, Arc<Judged>>,
     verdicts: Vec<Verdict>,
+    /// Files whose result could not be written.
+    unwritten: usize,
     notices: BTreeSet<String>,
 }
 
@@ -314,6 +337,11 @@ impl Printer {
         self.progress.clear();
         self.verdicts.push(judged.verdict);
         let shown = self.places.display(path);
+        if !judged.is_written() {
+            self.unwritten += 1;
+            let why = judged.why.join("; ");
+            talk::fail(&format!("{} has no result: {why}", shown.display()));
+        }
         if self.quiet && self.format == Format::Text {
             talk::print(&format!("{}: {}\n", shown.display(), judged.verdict));
             return;
@@ -344,6 +372,8 @@ impl Printer {
                 Ok(text) => talk::print(&text),
                 Err(error) => talk::fail(&error.to_string()),
             },
+            // That has been said.
+            (Err(_), _) if !delivery.judged.is_written() => {}
             (Err(why), _) => talk::fail(&why),
         }
     }
@@ -379,7 +409,9 @@ impl Printer {
             ));
         }
         let exit = Exit::of_verdicts(self.verdicts.iter().copied());
-        if exit == Exit::Accepted && total < self.expected.len() {
+        if self.unwritten > 0 {
+            Exit::Internal
+        } else if exit == Exit::Accepted && total < self.expected.len() {
             Exit::Undetermined
         } else {
             exit

@@ -95,7 +95,11 @@ fn tell(args: &WaitArgs, verdict: &FileVerdict) -> Exit {
             verdict.verdict,
             count(verdict.errors, "error"),
             count(verdict.warnings, "warning"),
-            verdict.xqar.display()
+            if verdict.xqar.as_os_str().is_empty() {
+                "no result".into()
+            } else {
+                verdict.xqar.to_string_lossy()
+            }
         ));
         for why in &verdict.why {
             talk::print(&format!("  {why}\n"));

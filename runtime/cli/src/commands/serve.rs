@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use qcbus_broker::journal::JournalError;
 use qcbus_broker::{Broker, Options, StartError, Told};
 use qcbus_bus::{HostOptions, StartError as BusError};
 use qcbus_messages::Exit;
 
-use super::settings::{absolute, dialect, instance, limits, memory_limit, program, settings};
+use super::settings::{absolute, dialect, instance, limits, memory_limit, program, real, settings};
 use crate::args::{ReportArg, ServeArgs};
 use crate::{standard, talk};
 
@@ -43,9 +44,9 @@ async fn serve(options: Options) -> Exit {
         Err(error) => {
             talk::fail(&explain(&error));
             return match error {
-                StartError::Load(_) | StartError::Bus(BusError::AlreadyRunning { .. }) => {
-                    Exit::Usage
-                }
+                StartError::Load(_)
+                | StartError::Bus(BusError::AlreadyRunning { .. })
+                | StartError::Journal(JournalError::Held { .. }) => Exit::Usage,
                 _ => Exit::Internal,
             };
         }
@@ -106,6 +107,26 @@ fn tell(told: Told) {
     }
 }
 
+/// Refuses a gate whose files would be checked, or that would have checked files for its own.
+fn keep_apart(gate: &Path, roots: &[PathBuf]) -> Result<(), String> {
+    let shown = gate.display();
+    if let Some(root) = roots.iter().find(|root| gate.starts_with(root)) {
+        return Err(format!(
+            "the gate {shown} lies inside the watched directory {}: what is published there would \
+             be checked and published again; choose a directory outside",
+            root.display()
+        ));
+    }
+    if let Some(root) = roots.iter().find(|root| root.starts_with(gate)) {
+        return Err(format!(
+            "the watched directory {} lies inside the gate {shown}: what is published there might \
+             replace what is to be checked; choose a directory of its own",
+            root.display()
+        ));
+    }
+    Ok(())
+}
+
 fn options(args: &ServeArgs) -> Result<Options, String> {
     let mut roots = Vec::new();
     for directory in &args.directories {
@@ -127,15 +148,9 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         .cloned()
         .collect();
     roots.retain(|root| !nested.contains(root));
-    if let Some(gate) = args.gate.as_deref().map(absolute)
-        && let Some(root) = roots.iter().find(|root| gate.starts_with(root))
-    {
-        return Err(format!(
-            "the gate {} lies inside the watched directory {}: what is published there would be \
-             checked and published again; choose a directory outside",
-            gate.display(),
-            root.display()
-        ));
+    let gate = args.gate.as_deref().map(real);
+    if let Some(gate) = &gate {
+        keep_apart(gate, &roots)?;
     }
     let out = absolute(args.output.out.as_deref().unwrap_or(Path::new("qcbus-out")));
     let state = args
@@ -176,7 +191,7 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         dialect: dialect(args.output.xqar_dialect),
         durable: true,
         verdict_files: true,
-        gate: args.gate.as_deref().map(absolute),
+        gate,
         config: args.config.as_deref().map(absolute),
         standard: children,
         reporters,

@@ -1,6 +1,6 @@
 //! From the command line to what a broker is told.
 
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use qcbus_broker::core::Settings;
 use qcbus_bus::Instance;
@@ -20,6 +20,22 @@ pub fn instance(args: &InstanceArgs) -> Result<Instance, String> {
 /// A path from the root, as far as possible without looking at the disk.
 pub fn absolute(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf())
+}
+
+/// Where a path leads, through links as far as it is there already.
+pub fn real(path: &Path) -> PathBuf {
+    let mut real = PathBuf::new();
+    for part in absolute(path).components() {
+        if part == Component::ParentDir {
+            real.pop();
+            continue;
+        }
+        real.push(part);
+        if let Ok(there) = std::fs::canonicalize(&real) {
+            real = there;
+        }
+    }
+    real
 }
 
 /// The form of results.
