@@ -707,7 +707,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path: Arc<Path> = Path::new("/a.xosc").into();
         let written = judged(5);
-        let mut journal = Journal::open(dir.path()).unwrap();
+        let mut journal = Journal::open(dir.path(), "default").unwrap();
         journal
             .write(&[Entry::Judged {
                 path,
@@ -726,7 +726,10 @@ mod tests {
             .execute_batch("PRAGMA user_version = 1")
             .unwrap();
         drop(journal);
-        let all = Journal::open(dir.path()).unwrap().remembered().unwrap();
+        let all = Journal::open(dir.path(), "default")
+            .unwrap()
+            .remembered()
+            .unwrap();
         assert_eq!(all.len(), 1);
         let (stamp, known) = all[0].judged.inputs[0].content.unwrap();
         assert_eq!((stamp.size, stamp.mtime_ns, stamp.inode), (1, 7, 3));

@@ -81,12 +81,11 @@ impl Store {
     /// not there for an acceptance, and nobody should wait for it.
     fn not_written(
         &self,
-        job: &FinishedJob,
+        job: &mut FinishedJob,
         mut judged: Judged,
         failed: Unwritten,
     ) -> StoreOutcome {
-        let inputs = job.prepared.as_ref().map(|it| it.inputs.as_slice());
-        if has_changed(inputs.unwrap_or_default()) {
+        if !refresh(job) {
             return StoreOutcome::Stale;
         }
         if self.retries && !failed.for_good {
