@@ -17,6 +17,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use qcbus_messages::Verdict;
 use sha2::{Digest, Sha256};
+use support::broker::Broker;
 use support::content::Content;
 use support::desk::Desk;
 use support::farm::{Farm, tail};
@@ -93,15 +94,21 @@ fn road_in_two_parts() -> (String, String) {
     )
 }
 
-#[test]
-fn an_old_map_is_judged_again_when_its_include_changes_goes_and_comes_back() {
+/// A farm whose broker has judged an old map with an old include; and the bytes of the latter.
+fn old_map_that_was_judged() -> (Farm, Broker, String) {
     let farm = farm_with_gate();
     let (outer, view) = road_in_two_parts();
     put_old(&farm, "a.xodr", outer.as_bytes());
     put_old(&farm, "view.xml", view.as_bytes());
     rest(&farm);
-    let _broker = farm.serve_ready();
+    let broker = farm.serve_ready();
     farm.settle(1);
+    (farm, broker, view)
+}
+
+#[test]
+fn an_old_map_is_judged_again_when_its_include_changes_goes_and_comes_back() {
+    let (farm, _broker, view) = old_map_that_was_judged();
     verdict_becomes(&farm, "a.xodr", Verdict::Accepted);
     put_old(&farm, "view.xml", b"<road><planView></road>");
     verdict_becomes(&farm, "a.xodr", Verdict::Rejected);
@@ -234,13 +241,7 @@ fn a_file_that_is_rewritten_with_its_size_and_time_kept_is_judged_again() {
 
 #[test]
 fn another_link_or_other_rights_cost_no_new_verdict() {
-    let farm = farm_with_gate();
-    let (outer, view) = road_in_two_parts();
-    put_old(&farm, "a.xodr", outer.as_bytes());
-    put_old(&farm, "view.xml", view.as_bytes());
-    rest(&farm);
-    let _broker = farm.serve_ready();
-    farm.settle(1);
+    let (farm, _broker, _) = old_map_that_was_judged();
     for name in ["a.xodr", "view.xml"] {
         let path = farm.root().join(name);
         std::fs::hard_link(&path, farm.base().join(name)).unwrap();

@@ -357,8 +357,11 @@ impl<'a> RoadMap<'a> {
             let section = road.layer(layer)?.end_section(road, side, to.end)?;
             return Some((section, to.end));
         }
-        let other = (layer != own_layer).then(|| other_layer(lane, end, side, layer));
-        Some((other??, end.other()))
+        if layer == own_layer {
+            return None;
+        }
+        let other = other_layer(lane, end, side, layer)?;
+        Some((other, end.other()))
     }
 
     /// The lane with an id in the section at an end of a road.

@@ -8,7 +8,6 @@ use crate::map::RoadMap;
 use crate::objects::Object;
 use crate::road::Road;
 use crate::section_ref::SectionRef;
-use crate::signals::Signal;
 use crate::touching::TouchingLanes;
 
 /// How many bytes of the file a part holds, if it has more than one road: so many that the image
@@ -109,12 +108,6 @@ impl<'m, 'a> MapPart<'m, 'a> {
     /// The objects of these roads with their road, in document order.
     pub fn objects(self) -> impl Iterator<Item = (&'m Road<'a>, Object<'a>)> {
         let of = |road: &'m Road<'a>| road.objects().map(move |object| (road, object));
-        self.roads.iter().flat_map(of)
-    }
-
-    /// The signals of these roads with their road, in document order.
-    pub fn signals(self) -> impl Iterator<Item = (&'m Road<'a>, Signal<'a>)> {
-        let of = |road: &'m Road<'a>| road.signals().map(move |signal| (road, signal));
         self.roads.iter().flat_map(of)
     }
 }

@@ -6,6 +6,8 @@
     reason = "tests fail by panicking, their helpers too"
 )]
 
+mod common;
+
 use std::path::Path;
 use std::time::Duration;
 
@@ -17,7 +19,7 @@ use qcbus_messages::{
     Digest, DocId, DocumentRole, FromPeer, Job, JobDocument, JobId, ToPeer, codec,
 };
 use qcbus_sdk::run::BusOptions;
-use qcbus_sdk::{Bundle, Exit, Mode, Rule, Sink, Version, basic};
+use qcbus_sdk::{Bundle, Exit, Mode, Rule, Sink};
 
 static ROADS: Rule<Document> = Rule {
     id: "roads",
@@ -27,16 +29,8 @@ static ROADS: Rule<Document> = Rule {
 };
 
 static BUNDLE: Bundle = Bundle {
-    name: "testBundle",
-    alias: "test",
-    version: "0",
-    description: "rules for tests",
-    standard: "OpenDRIVE",
-    kinds: &[FileKind::Xodr],
-    versions: &[Version::new(1, 4)],
-    version_of: |document| basic::version_of(document, "header"),
     rules: &[&ROADS],
-    templates: &[],
+    ..common::BUNDLE
 };
 
 fn every_road(document: &Document<'_>, found: &mut Sink<'_>) {

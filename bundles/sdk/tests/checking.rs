@@ -6,14 +6,16 @@
     reason = "tests fail by panicking, their helpers too"
 )]
 
+mod common;
+
 use std::path::Path;
 
-use qcbus_document::{Document, FileKind};
+use qcbus_document::Document;
 use qcbus_formats::pool::CheckerOutcome;
 use qcbus_formats::xqar::Status;
 use qcbus_sdk::{
     AnyRule, Backport, Bundle, Checker, Level, Loaded, Model, Param, Plan, Rule, Sink, Skip,
-    Subject, Version, basic, examine, examine_timed,
+    Subject, examine, examine_timed,
 };
 
 const LIMIT: Param = Param::number("limit", 0.0, "m", "a limit");
@@ -112,16 +114,8 @@ static RULES: &[&dyn AnyRule] = &[
 ];
 
 static BUNDLE: Bundle = Bundle {
-    name: "testBundle",
-    alias: "test",
-    version: "0",
-    description: "rules for tests",
-    standard: "OpenDRIVE",
-    kinds: &[FileKind::Xodr],
-    versions: &[Version::new(1, 4)],
-    version_of: |document| basic::version_of(document, "header"),
     rules: RULES,
-    templates: &[],
+    ..common::BUNDLE
 };
 
 fn every_road(document: &Document<'_>, found: &mut Sink<'_>) {

@@ -2,13 +2,14 @@
 
 #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
+mod common;
+
 use std::path::Path;
 
-use qcbus_document::{FileKind, Node};
+use qcbus_document::Node;
 use qcbus_formats::xqar::{Issue, Status};
 use qcbus_sdk::{
-    AnyRule, Bundle, Listener, Loaded, Model, Outcome, Plan, Rule, Sink, Skip, Subject, Version,
-    basic, check,
+    AnyRule, Bundle, Listener, Loaded, Model, Outcome, Plan, Rule, Sink, Skip, Subject, check,
 };
 
 /// The roads of a file, each of which is a part.
@@ -69,14 +70,6 @@ fn report(roads: &Roads<'_>, part: &usize, found: &mut Sink<'_>) {
 }
 
 static BUNDLE: Bundle = Bundle {
-    name: "testBundle",
-    alias: "test",
-    version: "0",
-    description: "rules for tests",
-    standard: "OpenDRIVE",
-    kinds: &[FileKind::Xodr],
-    versions: &[Version::new(1, 4)],
-    version_of: |document| basic::version_of(document, "header"),
     rules: &[
         &FINDS as &dyn AnyRule,
         &PANICS,
@@ -84,7 +77,7 @@ static BUNDLE: Bundle = Bundle {
         &AFTER_CLEAN,
         &AFTER_ERRORS,
     ],
-    templates: &[],
+    ..common::BUNDLE
 };
 
 /// What was heard: who began in which order, and how each ended.

@@ -105,7 +105,7 @@ fn nanoseconds(time: Duration) -> i128 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use std::fs::File;
     use std::io::Write;
 
@@ -113,8 +113,8 @@ mod tests {
 
     const HOUR: Duration = Duration::from_secs(3600);
 
-    fn put(path: &Path, bytes: &[u8], modified: SystemTime) -> Stamp {
-        // In place: the file stays the same one.
+    /// Writes a file in place, so that it stays the same one, and sets its time.
+    pub(crate) fn put(path: &Path, bytes: &[u8], modified: SystemTime) -> Stamp {
         let mut file = File::options()
             .create(true)
             .write(true)

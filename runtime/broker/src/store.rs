@@ -534,23 +534,14 @@ impl Resolver for DocumentPlaces<'_> {
 
 #[cfg(test)]
 mod tests {
-    use std::fs::File;
-    use std::io::Write;
     use std::time::{Duration, UNIX_EPOCH};
 
     use super::*;
+    use crate::stamp::tests::put;
 
     fn rewrite(path: &Path, bytes: &[u8]) {
-        let mut file = File::options()
-            .create(true)
-            .write(true)
-            .truncate(false)
-            .open(path)
-            .unwrap();
-        file.write_all(bytes).unwrap();
         // Before 1970, for good measure.
-        let time = UNIX_EPOCH - Duration::from_secs(1);
-        file.set_modified(time).unwrap();
+        put(path, bytes, UNIX_EPOCH - Duration::from_secs(1));
     }
 
     #[test]

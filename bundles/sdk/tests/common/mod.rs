@@ -1,0 +1,18 @@
+//! What the tests' bundles have in common.
+
+use qcbus_document::FileKind;
+use qcbus_sdk::{Bundle, Version, basic};
+
+/// A bundle for OpenDRIVE without any rule.
+pub const BUNDLE: Bundle = Bundle {
+    name: "testBundle",
+    alias: "test",
+    version: "0",
+    description: "rules for tests",
+    standard: "OpenDRIVE",
+    kinds: &[FileKind::Xodr],
+    versions: &[Version::new(1, 4)],
+    version_of: |document| basic::version_of(document, "header"),
+    rules: &[],
+    templates: &[],
+};
