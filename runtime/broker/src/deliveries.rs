@@ -11,7 +11,7 @@ use qcbus_messages::codec::MAX_MESSAGE;
 use qcbus_messages::{DocId, ResultMessage, Withdrawn};
 
 use crate::core::{Delivery, weight};
-use crate::places::Places;
+use crate::result_paths::ResultPaths;
 
 /// Builds the message for one reporter.
 ///
@@ -21,7 +21,7 @@ pub fn message(
     reporter: &str,
     delivery: &Delivery,
     document: Option<DocId>,
-    places: &Places,
+    places: &ResultPaths,
     config: Option<&Arc<Config>>,
 ) -> Result<ResultMessage, String> {
     let judged = &delivery.judged;
@@ -63,7 +63,7 @@ pub fn withdrawn(
     reporter: &str,
     path: &Path,
     left: Option<&Path>,
-    places: &Places,
+    places: &ResultPaths,
     config: Option<&Arc<Config>>,
 ) -> Withdrawn {
     let shown = left.and_then(|xqar| places.shown_at(xqar));

@@ -9,7 +9,7 @@ use qcbus_messages::{Digest, JobId, Verdict};
 use rusqlite::{Connection, OpenFlags, OptionalExtension, Transaction, params};
 
 use crate::core::{Input, Judged, Stamp};
-use crate::hold::Hold;
+use crate::state_lock::StateLock;
 
 /// Version of the schema, kept in SQLite's `user_version`.
 pub const SCHEMA_VERSION: i64 = 2;
@@ -164,7 +164,7 @@ pub struct Journal {
     connection: Connection,
     path: PathBuf,
     /// Kept as long as the journal is.
-    _hold: Option<Hold>,
+    _lock: Option<StateLock>,
 }
 
 impl Journal {
@@ -178,7 +178,7 @@ impl Journal {
             path: state.to_path_buf(),
             source,
         })?;
-        let hold = Hold::take(state, instance)?;
+        let lock = StateLock::take(state, instance)?;
         let path = state.join("journal.sqlite");
         let fail = |source| classify(&path, source);
         let connection = Connection::open(&path).map_err(fail)?;
@@ -189,7 +189,7 @@ impl Journal {
         Ok(Journal {
             connection,
             path,
-            _hold: Some(hold),
+            _lock: Some(lock),
         })
     }
 
@@ -204,7 +204,7 @@ impl Journal {
         Ok(Journal {
             connection,
             path,
-            _hold: None,
+            _lock: None,
         })
     }
 

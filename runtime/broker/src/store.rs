@@ -14,7 +14,7 @@ use qcbus_messages::{Digest, Verdict};
 use crate::core::{BundleOutcome, FinishedJob, Input, Judged, StoreOutcome};
 use crate::disk::{is_for_good, remove, write_both, write_whole};
 use crate::journal::{Entry, History, Journal};
-use crate::places::{Places, with_suffix};
+use crate::result_paths::{ResultPaths, with_suffix};
 use crate::stages::reached;
 use crate::stamp::stamp_through_links;
 
@@ -22,7 +22,7 @@ use crate::stamp::stamp_through_links;
 #[derive(Debug)]
 pub struct Store {
     /// Where results go.
-    pub places: Places,
+    pub places: ResultPaths,
     /// The form of the results.
     pub dialect: Dialect,
     /// Whether results are on the disk before they are announced.
@@ -116,7 +116,7 @@ impl Store {
             build_date: BUILD_DATE,
         };
         match root.and_then(|bytes| Document::open(bytes).ok()) {
-            Some(document) => pool::pool(input, &mut DocumentPlaces { document }),
+            Some(document) => pool::pool(input, &mut InDocument { document }),
             None => pool::pool(input, &mut NoPlaces),
         }
     }
@@ -516,11 +516,11 @@ fn history(job: &FinishedJob, pooled: &Pooled) -> History {
 }
 
 /// Finds the row and column of an XPath in the image.
-struct DocumentPlaces<'a> {
+struct InDocument<'a> {
     document: Document<'a>,
 }
 
-impl Resolver for DocumentPlaces<'_> {
+impl Resolver for InDocument<'_> {
     fn resolve(&mut self, xpath: &str) -> Option<pool::XPathPlace> {
         let nodes = self.document.evaluate(xpath).ok()?;
         let position = nodes.first()?.position();

@@ -42,7 +42,7 @@ pub enum Order {
 /// The writers. They end when this is dropped and everything ordered is done.
 #[derive(Debug)]
 pub struct Writers {
-    lanes: Vec<Sender<Order>>,
+    writers: Vec<Sender<Order>>,
     threads: Vec<std::thread::JoinHandle<()>>,
 }
 
@@ -59,12 +59,12 @@ impl Writers {
         notices: &UnboundedSender<String>,
     ) -> std::io::Result<Writers> {
         let mut writers = Writers {
-            lanes: Vec::new(),
+            writers: Vec::new(),
             threads: Vec::new(),
         };
         for number in 0..count.max(1) {
             let (sender, receiver) = channel();
-            let mut lane = Lane {
+            let mut writer = Writer {
                 store: store.clone(),
                 events: events.clone(),
                 notices: notices.clone(),
@@ -76,8 +76,8 @@ impl Writers {
             let thread = std::thread::Builder::new().name(format!("write-{number}"));
             writers
                 .threads
-                .push(thread.spawn(move || lane.run(&receiver))?);
-            writers.lanes.push(sender);
+                .push(thread.spawn(move || writer.run(&receiver))?);
+            writers.writers.push(sender);
         }
         Ok(writers)
     }
@@ -85,16 +85,16 @@ impl Writers {
     /// Gives an order that concerns `path`.
     pub fn order(&self, path: &Path, order: Order) {
         let hash = BuildHasherDefault::<DefaultHasher>::new().hash_one(path);
-        let lane = usize::try_from(hash % self.lanes.len() as u64).unwrap_or(0);
-        if let Some(lane) = self.lanes.get(lane) {
+        let writer = usize::try_from(hash % self.writers.len() as u64).unwrap_or(0);
+        if let Some(writer) = self.writers.get(writer) {
             // A writer only ends after its sender, so somebody is there.
-            let _ = lane.send(order);
+            let _ = writer.send(order);
         }
     }
 
     /// Waits until everything ordered is done, or cannot be.
     pub fn finish(mut self) {
-        self.lanes.clear();
+        self.writers.clear();
         for thread in self.threads.drain(..) {
             let _ = thread.join();
         }
@@ -117,7 +117,7 @@ impl Order {
     }
 }
 
-struct Lane {
+struct Writer {
     store: Arc<Store>,
     events: UnboundedSender<Event>,
     notices: UnboundedSender<String>,
@@ -135,7 +135,7 @@ struct Lane {
 /// Pause before a failed order is tried again.
 const RETRY: Duration = Duration::from_secs(1);
 
-impl Lane {
+impl Writer {
     fn run(&mut self, orders: &Receiver<Order>) {
         let mut retry_at = None::<Instant>;
         loop {

@@ -7,18 +7,19 @@ use std::time::Duration;
 use qcbus_document::FileKind;
 use qcbus_messages::{Catalogue, FromPeer, Hello, JobId, Role, ToPeer};
 
+use super::action::Action;
 use super::children::LEAVE_LIMIT;
-use super::files::Lane;
-use super::jobs::{Part, PartState};
+use super::files::Priority;
+use super::jobs::{Share, ShareState};
 use super::outcome::signature;
-use super::types::{Action, Judged, Launch, Session};
+use super::types::{Judged, Launch, SessionId};
 use super::{Actions, State};
 
 /// A bundle by name: it outlives its processes.
 #[derive(Debug, Default)]
 pub(super) struct Bundle {
     pub version: String,
-    pub session: Option<Session>,
+    pub session: Option<SessionId>,
     pub incarnation: u64,
     pub pid: u32,
     pub launch: Option<Launch>,
@@ -57,7 +58,7 @@ const STRIKES: u8 = 2;
 
 impl State {
     /// A process says hello.
-    pub(super) fn hello(&mut self, session: Session, hello: &Hello, actions: &mut Actions) {
+    pub(super) fn hello(&mut self, session: SessionId, hello: &Hello, actions: &mut Actions) {
         if self.draining() {
             // Nobody's fault and of no interest to anyone: it came as the broker went.
             let reason = "this broker is stopping".to_owned();
@@ -115,7 +116,7 @@ impl State {
             .then(|| format!("`{}` has already joined, as process {pid}", hello.name))
     }
 
-    fn bundle_joins(&mut self, session: Session, hello: &Hello, actions: &mut Actions) {
+    fn bundle_joins(&mut self, session: SessionId, hello: &Hello, actions: &mut Actions) {
         let launch = hello.launch.map(Launch);
         if let Some(old) = self
             .bundles
@@ -254,7 +255,7 @@ impl State {
         };
         bundle.catalogue = Some(Arc::new(catalogue));
         bundle.ready = true;
-        self.adapt_parts(name);
+        self.adapt_shares(name);
         self.requeue_outdated();
         self.dispatch(name, actions);
         self.fail_absent(actions);
@@ -262,21 +263,21 @@ impl State {
     }
 
     /// Parts that wait for this bundle are measured against what it offers now.
-    fn adapt_parts(&mut self, name: &str) {
+    fn adapt_shares(&mut self, name: &str) {
         let Some(bundle) = self.bundles.get(name) else {
             return;
         };
         let (catalogue, version) = (bundle.catalogue.clone(), bundle.version.clone());
         for job in self.jobs.values_mut() {
             let kind = job.kind;
-            if let Some(part) = job.parts.get_mut(name)
-                && part.state == PartState::Queued
+            if let Some(share) = job.shares.get_mut(name)
+                && share.state == ShareState::Queued
             {
-                part.demanded = catalogue
+                share.demanded = catalogue
                     .as_deref()
                     .map_or_else(Vec::new, |it| self.demand.checkers(name, it, kind));
-                part.catalogue.clone_from(&catalogue);
-                part.version.clone_from(&version);
+                share.catalogue.clone_from(&catalogue);
+                share.version.clone_from(&version);
             }
         }
     }
@@ -304,11 +305,11 @@ impl State {
         let ids: Vec<JobId> = self.jobs.keys().copied().collect();
         for id in ids {
             if let Some(job) = self.jobs.get_mut(&id)
-                && let Some(part) = job.parts.get_mut(name)
-                && !matches!(part.state, PartState::Done | PartState::Failed(_))
+                && let Some(share) = job.shares.get_mut(name)
+                && !matches!(share.state, ShareState::Done | ShareState::Failed(_))
             {
                 // It is not demanded any more, so the job goes on without it.
-                job.parts.remove(name);
+                job.shares.remove(name);
                 self.finish_if_over(id, actions);
             }
         }
@@ -363,20 +364,20 @@ impl State {
             let Some(job) = self.jobs.get_mut(&id) else {
                 continue;
             };
-            let Some(part) = job.parts.get_mut(name) else {
+            let Some(share) = job.shares.get_mut(name) else {
                 continue;
             };
-            if let PartState::Sent {
+            if let ShareState::Sent {
                 alone_and_fresh, ..
-            } = part.state
+            } = share.state
                 && died
             {
-                part.strikes += u8::from(alone_and_fresh);
-                part.suspect = true;
+                share.strikes += u8::from(alone_and_fresh);
+                share.suspect = true;
             }
-            part.unstage();
-            part.state = PartState::Queued;
-            if part.suspect {
+            share.unstage();
+            share.state = ShareState::Queued;
+            if share.suspect {
                 bundle.suspects.push_front(id);
             } else {
                 bundle.queue.push_front(id);
@@ -391,13 +392,13 @@ impl State {
         };
         let mut over = Vec::new();
         for id in bundle.suspects.iter().copied() {
-            if let Some(part) = self
+            if let Some(share) = self
                 .jobs
                 .get_mut(&id)
-                .and_then(|job| job.parts.get_mut(name))
-                && part.strikes >= STRIKES
+                .and_then(|job| job.shares.get_mut(name))
+                && share.strikes >= STRIKES
             {
-                part.state = PartState::Failed(format!(
+                share.state = ShareState::Failed(format!(
                     "{name} failed {STRIKES} times on this file alone in a fresh process: {why}"
                 ));
                 over.push(id);
@@ -410,9 +411,9 @@ impl State {
     }
 
     /// The bundles that must check a file of this kind, each with its checkers.
-    pub(super) fn parts_for(&self, kind: FileKind) -> BTreeMap<String, Part> {
-        let part = |version: &str, catalogue: Option<Arc<Catalogue>>, demanded| Part {
-            state: PartState::Queued,
+    pub(super) fn shares_for(&self, kind: FileKind) -> BTreeMap<String, Share> {
+        let share = |version: &str, catalogue: Option<Arc<Catalogue>>, demanded| Share {
+            state: ShareState::Queued,
             version: version.to_owned(),
             catalogue,
             demanded,
@@ -423,23 +424,23 @@ impl State {
             strikes: 0,
             absent: false,
         };
-        let mut parts = BTreeMap::new();
+        let mut shares = BTreeMap::new();
         for (name, bundle) in &self.bundles {
             let Some(catalogue) = &bundle.catalogue else {
                 continue;
             };
             let demanded = self.demand.checkers(name, catalogue, kind);
             if self.takes(name, bundle, catalogue, kind) && !demanded.is_empty() {
-                parts.insert(
+                shares.insert(
                     name.clone(),
-                    part(&bundle.version, Some(catalogue.clone()), demanded),
+                    share(&bundle.version, Some(catalogue.clone()), demanded),
                 );
             }
         }
         for named in self.absent_by_name() {
-            parts.insert(named, part("", None, Vec::new()));
+            shares.insert(named, share("", None, Vec::new()));
         }
-        parts
+        shares
     }
 
     fn takes(&self, name: &str, bundle: &Bundle, catalogue: &Catalogue, kind: FileKind) -> bool {
@@ -465,12 +466,12 @@ impl State {
 
     /// What [`Judged::bundles`] is when a file of this kind is judged now with everybody there.
     pub(super) fn signature(&self, kind: FileKind) -> u64 {
-        let parts = self.parts_for(kind);
-        signature(parts.iter().map(|(name, part)| {
+        let shares = self.shares_for(kind);
+        signature(shares.iter().map(|(name, share)| {
             (
                 name.as_str(),
-                part.version.as_str(),
-                part.catalogue.as_deref(),
+                share.version.as_str(),
+                share.catalogue.as_deref(),
             )
         }))
     }
@@ -504,17 +505,17 @@ impl State {
             .map(|(id, _)| id)
             .collect();
         for id in ids {
-            self.files.enqueue(id, Lane::Background, self.now);
+            self.files.enqueue(id, Priority::Background, self.now);
         }
     }
 
-    /// Fails the parts of bundles that are not there and will not come in time.
+    /// Fails the shares of bundles that are not there and will not come in time.
     pub(super) fn fail_absent(&mut self, actions: &mut Actions) {
         let names: BTreeSet<String> = self
             .jobs
             .values()
-            .flat_map(|job| job.parts.iter())
-            .filter(|(_, part)| part.state == PartState::Queued)
+            .flat_map(|job| job.shares.iter())
+            .filter(|(_, share)| share.state == ShareState::Queued)
             .map(|(name, _)| name.clone())
             .collect();
         for name in names {
@@ -552,14 +553,14 @@ impl State {
         }
         let ids: Vec<JobId> = self.jobs.keys().copied().collect();
         for id in ids {
-            if let Some(part) = self
+            if let Some(share) = self
                 .jobs
                 .get_mut(&id)
-                .and_then(|job| job.parts.get_mut(name))
-                && part.state == PartState::Queued
+                .and_then(|job| job.shares.get_mut(name))
+                && share.state == ShareState::Queued
             {
-                part.state = PartState::Failed(why.to_owned());
-                part.absent = true;
+                share.state = ShareState::Failed(why.to_owned());
+                share.absent = true;
                 self.finish_if_over(id, actions);
             }
         }

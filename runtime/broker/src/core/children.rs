@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use qcbus_messages::{Role, ToPeer};
 
-use super::types::{Action, ChildSpec, Launch, Restart, Session};
+use super::action::Action;
+use super::types::{ChildSpec, Launch, Restart, SessionId};
 use super::{Actions, State};
 
 /// A child by name.
@@ -178,7 +179,7 @@ impl State {
     }
 
     /// A process that should go: it is killed when it does not.
-    pub(super) fn retire(&mut self, session: Session, launch: Option<Launch>, pid: u32) {
+    pub(super) fn retire(&mut self, session: SessionId, launch: Option<Launch>, pid: u32) {
         self.retired.insert(
             session,
             Retired {

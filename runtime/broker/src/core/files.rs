@@ -17,7 +17,7 @@ pub type FileId = u32;
 
 /// Which queue a file waits in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Lane {
+pub enum Priority {
     /// New or changed: somebody waits for the verdict.
     Fresh,
     /// Judged already, to be judged again because bundles or configuration changed.
@@ -30,7 +30,7 @@ pub enum Stage {
     /// Nothing to do.
     Idle,
     /// In a queue since then.
-    Waiting(Lane, Duration),
+    Waiting(Priority, Duration),
     /// Being checked.
     Active(JobId),
 }
@@ -88,8 +88,8 @@ impl Counts {
     fn of(&mut self, stage: &Stage) -> &mut u64 {
         match stage {
             Stage::Idle => &mut self.idle,
-            Stage::Waiting(Lane::Fresh, _) => &mut self.fresh,
-            Stage::Waiting(Lane::Background, _) => &mut self.background,
+            Stage::Waiting(Priority::Fresh, _) => &mut self.fresh,
+            Stage::Waiting(Priority::Background, _) => &mut self.background,
             Stage::Active(_) => &mut self.active,
         }
     }
@@ -167,14 +167,16 @@ impl Files {
 
     /// Puts an idle file into a queue; one that waits in the background moves up when fresh.
     /// An active one is marked as changed by the caller, not here.
-    pub fn enqueue(&mut self, id: FileId, lane: Lane, now: Duration) {
+    pub fn enqueue(&mut self, id: FileId, priority: Priority, now: Duration) {
         match self.entries.get(&id).map(|entry| &entry.stage) {
-            Some(Stage::Idle | Stage::Waiting(Lane::Background, _)) if lane == Lane::Fresh => {
-                self.set_stage(id, Stage::Waiting(Lane::Fresh, now));
+            Some(Stage::Idle | Stage::Waiting(Priority::Background, _))
+                if priority == Priority::Fresh =>
+            {
+                self.set_stage(id, Stage::Waiting(Priority::Fresh, now));
                 self.fresh.push_back(id);
             }
             Some(Stage::Idle) => {
-                self.set_stage(id, Stage::Waiting(Lane::Background, now));
+                self.set_stage(id, Stage::Waiting(Priority::Background, now));
                 self.background.push_back(id);
             }
             _ => {}
@@ -196,19 +198,19 @@ impl Files {
     pub fn dequeue(&mut self, now: Duration) -> Option<FileId> {
         let background_first = self.since_background >= BACKGROUND_SHARE;
         let order = if background_first {
-            [Lane::Background, Lane::Fresh]
+            [Priority::Background, Priority::Fresh]
         } else {
-            [Lane::Fresh, Lane::Background]
+            [Priority::Fresh, Priority::Background]
         };
         order
             .into_iter()
-            .find_map(|lane| self.dequeue_from(lane, now))
+            .find_map(|priority| self.dequeue_from(priority, now))
     }
 
-    fn dequeue_from(&mut self, lane: Lane, now: Duration) -> Option<FileId> {
-        let queue = match lane {
-            Lane::Fresh => &mut self.fresh,
-            Lane::Background => &mut self.background,
+    fn dequeue_from(&mut self, priority: Priority, now: Duration) -> Option<FileId> {
+        let queue = match priority {
+            Priority::Fresh => &mut self.fresh,
+            Priority::Background => &mut self.background,
         };
         for _ in 0..queue.len() {
             let id = queue.pop_front()?;
@@ -216,15 +218,15 @@ impl Files {
                 continue;
             };
             match entry.stage {
-                Stage::Waiting(at, _) if at == lane && entry.not_before <= now => {
+                Stage::Waiting(at, _) if at == priority && entry.not_before <= now => {
                     self.set_stage(id, Stage::Idle);
-                    self.since_background = match lane {
-                        Lane::Fresh => self.since_background.saturating_add(1),
-                        Lane::Background => 0,
+                    self.since_background = match priority {
+                        Priority::Fresh => self.since_background.saturating_add(1),
+                        Priority::Background => 0,
                     };
                     return Some(id);
                 }
-                Stage::Waiting(at, _) if at == lane => queue.push_back(id),
+                Stage::Waiting(at, _) if at == priority => queue.push_back(id),
                 // It moved to the other queue, or was taken from it: this place is void.
                 _ => {}
             }
@@ -245,7 +247,7 @@ impl Files {
     /// How long the file at the head of the fresh queue has waited.
     pub fn oldest_wait(&self, now: Duration) -> Duration {
         let waiting = |id: &FileId| match self.entries.get(id)?.stage {
-            Stage::Waiting(Lane::Fresh, since) => Some(now.saturating_sub(since)),
+            Stage::Waiting(Priority::Fresh, since) => Some(now.saturating_sub(since)),
             _ => None,
         };
         self.fresh.iter().find_map(waiting).unwrap_or_default()
@@ -296,8 +298,8 @@ mod tests {
     fn a_file_waits_once_however_often_it_is_queued() {
         let mut files = files(1);
         for _ in 0..3 {
-            files.enqueue(0, Lane::Background, Duration::ZERO);
-            files.enqueue(0, Lane::Fresh, Duration::ZERO);
+            files.enqueue(0, Priority::Background, Duration::ZERO);
+            files.enqueue(0, Priority::Fresh, Duration::ZERO);
         }
         assert_eq!(files.dequeue(Duration::ZERO), Some(0));
         assert_eq!(files.dequeue(Duration::ZERO), None);
@@ -307,9 +309,9 @@ mod tests {
     #[test]
     fn the_background_gets_its_share() {
         let mut files = files(60);
-        files.enqueue(59, Lane::Background, Duration::ZERO);
+        files.enqueue(59, Priority::Background, Duration::ZERO);
         for id in 0..59 {
-            files.enqueue(id, Lane::Fresh, Duration::ZERO);
+            files.enqueue(id, Priority::Fresh, Duration::ZERO);
         }
         let order: Vec<_> = std::iter::from_fn(|| files.dequeue(Duration::ZERO)).collect();
         let place = order.iter().position(|id| *id == 59);
@@ -320,8 +322,8 @@ mod tests {
     #[test]
     fn a_file_that_must_rest_lets_others_pass() {
         let mut files = files(2);
-        files.enqueue(0, Lane::Fresh, Duration::ZERO);
-        files.enqueue(1, Lane::Fresh, Duration::ZERO);
+        files.enqueue(0, Priority::Fresh, Duration::ZERO);
+        files.enqueue(1, Priority::Fresh, Duration::ZERO);
         if let Some(entry) = files.get_mut(0) {
             entry.not_before = Duration::from_secs(1);
         }

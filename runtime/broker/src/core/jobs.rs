@@ -9,11 +9,12 @@ use qcbus_document::FileKind;
 use qcbus_formats::xqar::Status;
 use qcbus_messages::{Catalogue, DocId, JobId, ToPeer};
 
-use super::files::{FileId, Lane, Stage};
+use super::action::Action;
+use super::files::{FileId, Priority, Stage};
 use super::outcome::{outcome, signature};
 use super::staging::Staged;
 use super::types::{
-    Action, BundleOutcome, CheckerOutcome, FinishedJob, PrepareFailure, PreparedJob, StoreOutcome,
+    BundleOutcome, CheckerOutcome, FinishedJob, PrepareFailure, PreparedJob, StoreOutcome,
 };
 use super::{Actions, State};
 
@@ -31,7 +32,7 @@ pub(super) struct ActiveJob {
     pub prepared: Option<Arc<PreparedJob>>,
     pub unreadable: Option<String>,
     /// By bundle name.
-    pub parts: BTreeMap<String, Part>,
+    pub shares: BTreeMap<String, Share>,
 }
 
 /// How far a job is.
@@ -39,15 +40,15 @@ pub(super) struct ActiveJob {
 pub(super) enum JobStage {
     Preparing,
     Checking,
-    /// All parts are there; waits for a place among the writers, not before the given time.
+    /// All shares are there; waits for a place among the writers, not before the given time.
     Finished(Duration),
     Storing,
 }
 
 /// One bundle's share of a job.
 #[derive(Debug)]
-pub(super) struct Part {
-    pub state: PartState,
+pub(super) struct Share {
+    pub state: ShareState,
     pub version: String,
     /// As it was when the job was given out; `None` for a bundle that was never seen.
     pub catalogue: Option<Arc<Catalogue>>,
@@ -64,7 +65,7 @@ pub(super) struct Part {
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum PartState {
+pub(super) enum ShareState {
     Queued,
     Sent {
         since: Duration,
@@ -74,9 +75,9 @@ pub(super) enum PartState {
     Failed(String),
 }
 
-impl Part {
+impl Share {
     fn over(&self) -> bool {
-        matches!(self.state, PartState::Done | PartState::Failed(_))
+        matches!(self.state, ShareState::Done | ShareState::Failed(_))
     }
 
     /// Forgets what a session that has ended said.
@@ -153,7 +154,7 @@ impl State {
                 stage: JobStage::Preparing,
                 prepared: None,
                 unreadable: None,
-                parts: BTreeMap::new(),
+                shares: BTreeMap::new(),
             },
         );
         actions.push(Action::Prepare { job, path });
@@ -299,24 +300,24 @@ impl State {
         }
     }
 
-    /// Makes a part for every bundle that must check this file and hands them out.
+    /// Makes a share for every bundle that must check this file and hands them out.
     fn give_out(&mut self, id: JobId, actions: &mut Actions) {
         let Some(job) = self.jobs.get(&id) else {
             return;
         };
         let kind = job.kind;
         let readable = job.unreadable.is_none();
-        let mut parts = self.parts_for(kind);
+        let mut shares = self.shares_for(kind);
         if !readable {
             let why = job.unreadable.clone().unwrap_or_default();
-            for part in parts.values_mut() {
-                part.state = PartState::Failed(why.clone());
+            for share in shares.values_mut() {
+                share.state = ShareState::Failed(why.clone());
             }
         }
-        let names: Vec<String> = parts.keys().cloned().collect();
+        let names: Vec<String> = shares.keys().cloned().collect();
         if let Some(job) = self.jobs.get_mut(&id) {
             job.stage = JobStage::Checking;
-            job.parts = parts;
+            job.shares = shares;
         }
         for name in names {
             if let Some(bundle) = self.bundles.get_mut(&name) {
@@ -353,16 +354,16 @@ impl State {
             let Some(job) = self.jobs.get_mut(&id) else {
                 continue;
             };
-            let Some(part) = job.parts.get_mut(name) else {
+            let Some(share) = job.shares.get_mut(name) else {
                 continue;
             };
-            if part.state != PartState::Queued {
+            if share.state != ShareState::Queued {
                 continue;
             }
             let Some(prepared) = job.prepared.clone() else {
                 continue;
             };
-            part.state = PartState::Sent {
+            share.state = ShareState::Sent {
                 since: self.now,
                 alone_and_fresh: suspect && fresh,
             };
@@ -411,18 +412,18 @@ impl State {
         micros: u64,
         actions: &mut Actions,
     ) -> bool {
-        let Some(part) = self
+        let Some(share) = self
             .jobs
             .get_mut(&id)
-            .and_then(|job| job.parts.get_mut(name))
+            .and_then(|job| job.shares.get_mut(name))
         else {
             return false;
         };
-        if !matches!(part.state, PartState::Sent { .. }) {
+        if !matches!(share.state, ShareState::Sent { .. }) {
             return false;
         }
-        part.state = PartState::Done;
-        part.micros = micros;
+        share.state = ShareState::Done;
+        share.micros = micros;
         if let Some(bundle) = self.bundles.get_mut(name) {
             bundle.active.remove(&id);
             bundle.done += 1;
@@ -434,12 +435,12 @@ impl State {
         true
     }
 
-    /// When every part is there, the job is ready to be stored.
+    /// When every share is there, the job is ready to be stored.
     pub(super) fn finish_if_over(&mut self, id: JobId, actions: &mut Actions) {
         let Some(job) = self.jobs.get_mut(&id) else {
             return;
         };
-        if job.stage == JobStage::Checking && job.parts.values().all(Part::over) {
+        if job.stage == JobStage::Checking && job.shares.values().all(Share::over) {
             job.stage = JobStage::Finished(Duration::ZERO);
             self.store_finished(actions);
         }
@@ -477,14 +478,14 @@ impl State {
             prepared: job.prepared.clone().filter(|_| job.unreadable.is_none()),
             unreadable: job.unreadable.clone(),
             bundles: job
-                .parts
+                .shares
                 .iter()
-                .map(|(name, part)| outcome(name, part))
+                .map(|(name, share)| outcome(name, share))
                 .chain(self.inapplicable(job.kind))
                 .collect(),
-            signature: signature(job.parts.iter().map(|(name, part)| {
-                let offer = part.catalogue.as_deref().filter(|_| !part.absent);
-                (name.as_str(), part.version.as_str(), offer)
+            signature: signature(job.shares.iter().map(|(name, share)| {
+                let offer = share.catalogue.as_deref().filter(|_| !share.absent);
+                (name.as_str(), share.version.as_str(), offer)
             })),
             elapsed: self.now.saturating_sub(job.since),
         })
@@ -573,7 +574,7 @@ impl State {
         match job.stage {
             JobStage::Preparing => {}
             JobStage::Storing | JobStage::Finished(_) => {}
-            JobStage::Checking => self.cancel_parts(id, &job, actions),
+            JobStage::Checking => self.cancel_shares(id, &job, actions),
         }
         actions.push(Action::Release { job: id });
         self.files.set_stage(job.file, Stage::Idle);
@@ -583,20 +584,20 @@ impl State {
         if !entry.present {
             self.vanished_file(job.file, actions);
         } else if entry.dirty || entry.judged.is_none() {
-            self.files.enqueue(job.file, Lane::Fresh, self.now);
+            self.files.enqueue(job.file, Priority::Fresh, self.now);
         } else if !self.is_current(job.file) {
-            self.files.enqueue(job.file, Lane::Background, self.now);
+            self.files.enqueue(job.file, Priority::Background, self.now);
         } else {
             self.settle_waits(job.file, actions);
         }
     }
 
-    fn cancel_parts(&mut self, id: JobId, job: &ActiveJob, actions: &mut Actions) {
-        for (name, part) in &job.parts {
+    fn cancel_shares(&mut self, id: JobId, job: &ActiveJob, actions: &mut Actions) {
+        for (name, share) in &job.shares {
             let Some(bundle) = self.bundles.get_mut(name) else {
                 continue;
             };
-            if matches!(part.state, PartState::Sent { .. }) {
+            if matches!(share.state, ShareState::Sent { .. }) {
                 bundle.active.remove(&id);
                 bundle.forgiven = Some(id);
                 if let Some(session) = bundle.session {

@@ -4,12 +4,15 @@
 //! around it (`crate::engine`) turns the world into events and carries the actions out. Nothing
 //! in here can block, fail or panic on input, and everything can be tested as a table.
 
+mod action;
 mod bundles;
 mod children;
+mod event;
 mod files;
 mod jobs;
 mod outcome;
 mod reporters;
+mod settings;
 mod staging;
 mod status;
 mod types;
@@ -28,8 +31,11 @@ use std::time::Duration;
 use qcbus_document::FileKind;
 use qcbus_messages::{Digest, JobId, Role, ToPeer};
 
-pub use files::{FileId, Lane, Stage};
+pub use action::Action;
+pub use event::Event;
+pub use files::{FileId, Priority, Stage};
 pub(crate) use outcome::weight;
+pub use settings::Settings;
 pub use types::*;
 
 use bundles::Bundle;
@@ -52,9 +58,9 @@ pub struct State {
     jobs: BTreeMap<JobId, ActiveJob>,
     bundles: BTreeMap<String, Bundle>,
     reporters: Vec<Reporter>,
-    sessions: BTreeMap<Session, (Role, String)>,
+    sessions: BTreeMap<SessionId, (Role, String)>,
     children: BTreeMap<String, Child>,
-    retired: BTreeMap<Session, Retired>,
+    retired: BTreeMap<SessionId, Retired>,
     waiters: Vec<Waiter>,
     config: Digest,
     demand: Arc<dyn Demand>,
@@ -149,6 +155,7 @@ impl State {
         let mut actions = Vec::new();
         match event {
             Event::Settled { path, stamp } => self.settled(&path, stamp),
+            Event::Present { path } => self.present(&path),
             Event::Touched { path, stamp } => self.touched(&path, stamp),
             Event::Vanished { path } => self.vanished(&path, &mut actions),
             Event::Scanned => self.scanned(&mut actions),
@@ -192,8 +199,16 @@ impl State {
         actions
     }
 
+    /// A file is there and may still be written to.
+    fn present(&mut self, path: &Arc<Path>) {
+        let known = self.files.id(path).and_then(|id| self.files.get_mut(id));
+        if let Some(entry) = known {
+            entry.present = true;
+        }
+    }
+
     /// Whether verdicts depend on a file that is not there for a verdict of its own.
-    pub fn is_only_a_part(&self, path: &Path) -> bool {
+    pub fn is_only_a_dependency(&self, path: &Path) -> bool {
         let entry = self.files.id(path).and_then(|id| self.files.get(id));
         !entry.is_some_and(|it| it.present) && !self.files.dependents(path).is_empty()
     }
@@ -264,7 +279,7 @@ impl State {
         entry.not_before = Duration::ZERO;
         match entry.stage() {
             Stage::Active(_) => entry.dirty = true,
-            Stage::Idle | Stage::Waiting(..) => self.files.enqueue(id, Lane::Fresh, self.now),
+            Stage::Idle | Stage::Waiting(..) => self.files.enqueue(id, Priority::Fresh, self.now),
         }
     }
 
@@ -319,7 +334,7 @@ impl State {
         }
     }
 
-    fn garbage(&mut self, session: Session, what: &str, actions: &mut Actions) {
+    fn garbage(&mut self, session: SessionId, what: &str, actions: &mut Actions) {
         match self.sessions.get(&session).cloned() {
             Some((Role::Bundle, name)) => {
                 self.bundle_fails(
@@ -339,7 +354,7 @@ impl State {
         }
     }
 
-    fn gone(&mut self, session: Session, why: &str, actions: &mut Actions) {
+    fn gone(&mut self, session: SessionId, why: &str, actions: &mut Actions) {
         self.retired.remove(&session);
         match self.sessions.get(&session).cloned() {
             Some((Role::Bundle, name)) => self.bundle_died(&name, why, actions),
@@ -350,7 +365,7 @@ impl State {
 
     fn retired_says(
         &mut self,
-        session: Session,
+        session: SessionId,
         message: &qcbus_messages::FromPeer,
         actions: &mut Actions,
     ) {

@@ -4,7 +4,7 @@ use qcbus_formats::xqar::{DomainInfo, InfoElement, Issue, Location, Locations, S
 use qcbus_messages::Catalogue;
 use sha2::{Digest as _, Sha256};
 
-use super::jobs::{Part, PartState};
+use super::jobs::{Share, ShareState};
 use super::types::{BundleOutcome, CheckerOutcome};
 
 /// A number that changes when another set of bundles, versions or checkers would take part.
@@ -36,14 +36,14 @@ pub(super) fn signature<'a>(
         .fold(0, |number, byte| (number << 8) | u64::from(*byte))
 }
 
-/// What one part says in the result.
-pub(super) fn outcome(name: &str, part: &Part) -> BundleOutcome {
-    let failure = match &part.state {
-        PartState::Failed(why) => Some(why.clone()),
+/// What one share says in the result.
+pub(super) fn outcome(name: &str, share: &Share) -> BundleOutcome {
+    let failure = match &share.state {
+        ShareState::Failed(why) => Some(why.clone()),
         _ => None,
     };
-    let said = |checker: u32| part.staged.get(&checker).filter(|_| failure.is_none());
-    let checkers = part.demanded.iter().map(|checker| {
+    let said = |checker: u32| share.staged.get(&checker).filter(|_| failure.is_none());
+    let checkers = share.demanded.iter().map(|checker| {
         let staged = said(*checker);
         let done = staged.and_then(|staged| staged.done.clone());
         let withheld = staged.map_or(0, |staged| staged.withheld);
@@ -66,10 +66,10 @@ pub(super) fn outcome(name: &str, part: &Part) -> BundleOutcome {
     });
     BundleOutcome {
         name: name.to_owned(),
-        version: part.version.clone(),
-        catalogue: part.catalogue.clone(),
+        version: share.version.clone(),
+        catalogue: share.catalogue.clone(),
         checkers: checkers.collect(),
-        micros: part.micros,
+        micros: share.micros,
         failure: failure.clone(),
     }
 }

@@ -50,9 +50,9 @@ impl Desk {
         self.state.handle(Duration::from_secs(1), event)
     }
 
-    fn join(&mut self) -> (Session, Vec<Action>) {
+    fn join(&mut self) -> (SessionId, Vec<Action>) {
         self.sessions += 1;
-        let session = Session(self.sessions);
+        let session = SessionId(self.sessions);
         let hello = Hello {
             protocol: PROTOCOL_VERSION,
             role: Role::Reporter,
@@ -71,7 +71,7 @@ impl Desk {
         self.event(Event::Vanished { path })
     }
 
-    fn say(&mut self, session: Session, message: FromPeer) -> Vec<Action> {
+    fn say(&mut self, session: SessionId, message: FromPeer) -> Vec<Action> {
         self.event(Event::Message { session, message })
     }
 }

@@ -7,8 +7,9 @@ use std::time::Duration;
 
 use qcbus_messages::{FromPeer, Hello, JobId, PeerReport, Role};
 
+use super::action::Action;
 use super::files::FileId;
-use super::types::{Action, Delivery, Launch, Session};
+use super::types::{Delivery, Launch, SessionId};
 use super::{Actions, State};
 
 /// Findings under way to one reporter. A result with more of them travels alone: otherwise a bundle
@@ -27,7 +28,7 @@ pub(super) struct Sent {
 pub(super) struct Reporter {
     pub name: String,
     pub version: String,
-    pub session: Option<Session>,
+    pub session: Option<SessionId>,
     pub incarnation: u64,
     pub pid: u32,
     pub launch: Option<Launch>,
@@ -92,7 +93,7 @@ impl State {
 
     pub(super) fn reporter_joins(
         &mut self,
-        session: Session,
+        session: SessionId,
         hello: &Hello,
         actions: &mut Actions,
     ) {
@@ -177,7 +178,7 @@ impl State {
 
     /// Whether a result that was read back for a reporter is still to be sent: its file may have
     /// gone meanwhile.
-    pub fn awaits_result(&self, session: Session, job: JobId) -> bool {
+    pub fn awaits_result(&self, session: SessionId, job: JobId) -> bool {
         let mut reporters = self.reporters.iter();
         reporters.any(|it| it.session == Some(session) && it.active.contains_key(&job))
     }
@@ -324,7 +325,7 @@ impl State {
     /// A result could not be read back: it was withdrawn or replaced, or the disk is in trouble.
     pub(super) fn undeliverable(
         &mut self,
-        session: Session,
+        session: SessionId,
         job: JobId,
         why: String,
         actions: &mut Actions,

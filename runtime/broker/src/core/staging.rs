@@ -5,7 +5,7 @@ use qcbus_messages::JobId;
 
 use super::State;
 use super::bundles::Bundle;
-use super::jobs::{JobStage, Part, PartState};
+use super::jobs::{JobStage, Share, ShareState};
 use super::outcome::{clip, clip_text, weight};
 
 /// What one checker has said so far.
@@ -29,8 +29,8 @@ pub(super) enum Room {
 impl State {
     /// While findings take up all the room that they may have, younger jobs stay queued.
     pub(super) fn room_for_findings(&self) -> Room {
-        let staged = self.jobs.values().flat_map(|job| job.parts.values());
-        let bytes: usize = staged.map(|part| part.staged_bytes).sum();
+        let staged = self.jobs.values().flat_map(|job| job.shares.values());
+        let bytes: usize = staged.map(|share| share.staged_bytes).sum();
         if bytes < self.settings.max_findings_bytes {
             return Room::Free;
         }
@@ -54,19 +54,19 @@ impl State {
             self.settings.max_staged_bytes,
             self.settings.max_text,
         );
-        let Some(part) = self.sent_part(name, id, checker) else {
+        let Some(share) = self.sent_share(name, id, checker) else {
             return false;
         };
         for mut issue in issues {
             clip(&mut issue, max_text);
             let size = weight(&issue);
-            let full = part.staged_bytes + size > max_bytes;
-            let staged = part.staged.entry(checker).or_default();
+            let full = share.staged_bytes + size > max_bytes;
+            let staged = share.staged.entry(checker).or_default();
             if full || staged.issues.len() >= max_issues {
                 staged.withheld += 1;
             } else {
                 staged.issues.push(issue);
-                part.staged_bytes += size;
+                share.staged_bytes += size;
             }
         }
         true
@@ -85,20 +85,20 @@ impl State {
         metadata: Vec<Metadata>,
     ) -> bool {
         let max_text = self.settings.max_text;
-        let Some(part) = self.sent_part(name, id, checker) else {
+        let Some(share) = self.sent_share(name, id, checker) else {
             return false;
         };
         let mut reason = reason;
         clip_text(&mut reason, max_text);
-        part.staged.entry(checker).or_default().done = Some((status, reason, params, metadata));
+        share.staged.entry(checker).or_default().done = Some((status, reason, params, metadata));
         true
     }
 
-    fn sent_part(&mut self, name: &str, id: JobId, checker: u32) -> Option<&mut Part> {
-        let part = self.jobs.get_mut(&id)?.parts.get_mut(name)?;
-        let offered = part.catalogue.as_ref().map_or(0, |it| it.checkers.len());
+    fn sent_share(&mut self, name: &str, id: JobId, checker: u32) -> Option<&mut Share> {
+        let share = self.jobs.get_mut(&id)?.shares.get_mut(name)?;
+        let offered = share.catalogue.as_ref().map_or(0, |it| it.checkers.len());
         let known = usize::try_from(checker).is_ok_and(|index| index < offered);
-        (known && matches!(part.state, PartState::Sent { .. })).then_some(part)
+        (known && matches!(share.state, ShareState::Sent { .. })).then_some(share)
     }
 }
 

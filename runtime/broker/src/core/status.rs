@@ -85,7 +85,7 @@ impl State {
             counts.total += 1;
             let idle = matches!(
                 entry.stage(),
-                super::Stage::Idle | super::Stage::Waiting(super::Lane::Background, _)
+                super::Stage::Idle | super::Stage::Waiting(super::Priority::Background, _)
             );
             let Some(judged) = entry.judged.as_ref().filter(|_| idle) else {
                 continue;

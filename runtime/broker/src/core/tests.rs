@@ -34,7 +34,7 @@ struct World {
     preparing: Vec<(JobId, u8)>,
     storing: Vec<FinishedJob>,
     stored: Vec<u8>,
-    peers: BTreeMap<Session, Bundle>,
+    peers: BTreeMap<SessionId, Bundle>,
     sessions: u64,
     judged: BTreeMap<u8, (Vec<Input>, Verdict)>,
     released: BTreeSet<JobId>,
@@ -329,7 +329,7 @@ impl World {
             return;
         }
         self.sessions += 1;
-        let session = Session(self.sessions);
+        let session = SessionId(self.sessions);
         self.peers.insert(
             session,
             Bundle {
@@ -351,13 +351,13 @@ impl World {
         self.say(session, FromPeer::Catalogue(Box::new(catalogue(name))));
     }
 
-    fn say(&mut self, session: Session, message: FromPeer) {
+    fn say(&mut self, session: SessionId, message: FromPeer) {
         if self.peers.contains_key(&session) {
             self.event(Event::Message { session, message });
         }
     }
 
-    fn nth_peer(&self, n: u8) -> Option<Session> {
+    fn nth_peer(&self, n: u8) -> Option<SessionId> {
         let count = self.peers.len();
         (count > 0).then(|| *self.peers.keys().nth(usize::from(n) % count).unwrap())
     }
@@ -672,10 +672,10 @@ fn files_are_judged_again_without_a_bundle_that_has_left() {
 }
 
 /// A bundle that a former broker started (it has a launch) and that no manifest names any more.
-fn world_with_an_unwanted_bundle() -> (World, Session) {
+fn world_with_an_unwanted_bundle() -> (World, SessionId) {
     let mut world = World::new();
     world.join("First");
-    let session = Session(77);
+    let session = SessionId(77);
     world.peers.insert(
         session,
         Bundle {
@@ -758,8 +758,8 @@ fn jobs_wait_while_findings_take_up_the_room() {
     }
     let held = |world: &World| -> usize {
         let jobs = world.state.jobs.values();
-        let parts = jobs.flat_map(|job| job.parts.values());
-        parts.map(|part| part.staged_bytes).sum()
+        let shares = jobs.flat_map(|job| job.shares.values());
+        shares.map(|share| share.staged_bytes).sum()
     };
     // Both given jobs are answered with more than there is room for, and nothing is stored.
     world.answer(2);

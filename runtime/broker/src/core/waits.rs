@@ -7,8 +7,9 @@ use std::time::Duration;
 use qcbus_document::FileKind;
 use qcbus_messages::control::Response;
 
+use super::action::Action;
 use super::files::{FileId, Stage};
-use super::types::{Action, Stamp, Ticket, file_verdict};
+use super::types::{Stamp, Ticket, file_verdict};
 use super::{Actions, State};
 
 /// One client.
@@ -59,7 +60,10 @@ impl State {
         let Some(entry) = self.files.get(id) else {
             return;
         };
-        let background = matches!(entry.stage(), Stage::Waiting(super::Lane::Background, _));
+        let background = matches!(
+            entry.stage(),
+            Stage::Waiting(super::Priority::Background, _)
+        );
         let settled = *entry.stage() == Stage::Idle || background;
         let Some(judged) = entry.judged.clone().filter(|_| settled && entry.present) else {
             return;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use qcbus_messages::{JobId, ToPeer};
 
 use super::{Announcement, Broker, Ready, Told};
-use crate::core::{Action, Delivery, Event, Session};
+use crate::core::{Action, Delivery, Event, SessionId};
 use crate::journal::Entry;
 use crate::stages::reached;
 use crate::writers::Order;
@@ -103,6 +103,8 @@ impl Broker {
                     watcher.depend(files);
                 }
             }
+            // There is nothing to do before the gate holds claims.
+            Action::Undepend { .. } | Action::CloseGate { .. } | Action::OpenGate { .. } => {}
             Action::Judged {
                 path,
                 judged,
@@ -121,7 +123,7 @@ impl Broker {
         true
     }
 
-    pub(super) fn accept(&mut self, session: Session) {
+    pub(super) fn accept(&mut self, session: SessionId) {
         if let Some(peer) = self.sessions.peers.get(&session) {
             let welcome = ToPeer::Welcome {
                 generation: self.host.generation(),
@@ -141,7 +143,7 @@ impl Broker {
         });
     }
 
-    pub(super) fn deliver(&self, session: Session, reporter: String, delivery: Delivery) {
+    pub(super) fn deliver(&self, session: SessionId, reporter: String, delivery: Delivery) {
         let job = delivery.job;
         let document = self.intake.recent_root(job);
         let (store, config) = (self.store.clone(), self.in_force.config.clone());
@@ -165,7 +167,7 @@ impl Broker {
     }
 
     /// Tells a reporter that a file has gone.
-    fn void(&mut self, session: Session, reporter: &str, path: &Arc<Path>) {
+    fn void(&mut self, session: SessionId, reporter: &str, path: &Arc<Path>) {
         let config = self.in_force.config.as_ref();
         let left = self.left.get(&(reporter.to_owned(), path.clone()));
         let left = left.map(PathBuf::as_path);

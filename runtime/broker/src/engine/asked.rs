@@ -86,8 +86,8 @@ impl Broker {
     /// What it means that a file is there and quiet. One outside of the watched directories, or that
     /// is to be left alone, gets no verdict; it may be a part of one.
     pub(super) fn settled(&self, path: Arc<Path>, stamp: Stamp) -> Event {
-        let unwatched =
-            self.state.is_only_a_part(&path) && self.why_unwatched(&path, Some(stamp)).is_some();
+        let unwatched = self.state.is_only_a_dependency(&path)
+            && self.why_unwatched(&path, Some(stamp)).is_some();
         if unwatched {
             Event::Touched { path, stamp }
         } else {

@@ -16,7 +16,7 @@ use qcbus_messages::{JobId, ToPeer};
 use tokio::sync::{mpsc, oneshot};
 
 use crate::control::{Asked, ControlSocket};
-use crate::core::{Event, Judged, Session, State, Ticket};
+use crate::core::{Event, Judged, SessionId, State, Ticket};
 use crate::demand::InForce;
 use crate::intake::Intake;
 use crate::journal::JournalError;
@@ -134,7 +134,7 @@ struct Inbox {
 
 /// A result read back for a reporter, or why it could not be.
 struct Ready {
-    session: Session,
+    session: SessionId,
     job: JobId,
     message: Result<Box<ToPeer>, String>,
 }
@@ -142,21 +142,21 @@ struct Ready {
 /// Sessions as the state machine and the bus number them.
 #[derive(Debug, Default)]
 struct Sessions {
-    peers: BTreeMap<Session, PeerId>,
-    sessions: BTreeMap<PeerId, Session>,
+    peers: BTreeMap<SessionId, PeerId>,
+    sessions: BTreeMap<PeerId, SessionId>,
     next: u64,
 }
 
 impl Sessions {
-    fn add(&mut self, peer: PeerId) -> Session {
+    fn add(&mut self, peer: PeerId) -> SessionId {
         self.next += 1;
-        let session = Session(self.next);
+        let session = SessionId(self.next);
         self.peers.insert(session, peer);
         self.sessions.insert(peer, session);
         session
     }
 
-    fn remove(&mut self, session: Session) -> Option<PeerId> {
+    fn remove(&mut self, session: SessionId) -> Option<PeerId> {
         let peer = self.peers.remove(&session)?;
         self.sessions.remove(&peer);
         Some(peer)

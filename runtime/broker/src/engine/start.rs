@@ -16,8 +16,8 @@ use crate::disk::sweep;
 use crate::intake::Intake;
 use crate::journal::{Journal, Remembered};
 use crate::options::Options;
-use crate::places::Places;
 use crate::reload::{LoadError, Loaded, Sources};
+use crate::result_paths::ResultPaths;
 use crate::stamp::{stamp_of, stamp_through_links};
 use crate::store::Store;
 use crate::supervise::{Children, Surroundings};
@@ -188,7 +188,7 @@ pub(super) fn in_force(loaded: &Loaded) -> Result<InForce, LoadError> {
 }
 
 fn store(options: &Options, journal: Journal) -> Store {
-    let mut places = Places::new(options.out.clone(), options.roots.clone(), &options.files);
+    let mut places = ResultPaths::new(options.out.clone(), options.roots.clone(), &options.files);
     places.single.clone_from(&options.single_result);
     Store {
         places,

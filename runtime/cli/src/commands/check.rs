@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use qcbus_broker::core::{Delivery, Judged, Settings};
-use qcbus_broker::{Broker, Options, Places, Told};
+use qcbus_broker::{Broker, Options, ResultPaths, Told};
 use qcbus_bus::{HostOptions, Instance};
 use qcbus_document::FileKind;
 use qcbus_formats::config::Config;
@@ -224,7 +224,8 @@ fn random_bytes() -> Result<[u8; 8], String> {
 fn check(args: &CheckArgs, prepared: Prepared) -> Exit {
     let places = {
         let options = &prepared.options;
-        let mut places = Places::new(options.out.clone(), options.roots.clone(), &options.files);
+        let mut places =
+            ResultPaths::new(options.out.clone(), options.roots.clone(), &options.files);
         places.single.clone_from(&options.single_result);
         places
     };
@@ -285,7 +286,7 @@ fn drive(options: Options, printer: &Arc<Mutex<Printer>>) -> Result<(), Refusal>
 
 /// Prints results in the order of their paths, each as soon as those before it are there.
 struct Printer {
-    places: Places,
+    places: ResultPaths,
     config: Option<Arc<Config>>,
     format: Format,
     quiet: bool,

@@ -11,16 +11,16 @@ const LOCK: &str = "lock";
 
 /// A state directory that is ours until this is dropped, or the process ends in whatever way.
 #[derive(Debug)]
-pub struct Hold {
+pub struct StateLock {
     _file: File,
 }
 
-impl Hold {
+impl StateLock {
     /// Takes a state directory for the broker of an instance.
     ///
     /// # Errors
     /// [`JournalError::Held`] when another broker has it.
-    pub fn take(state: &Path, instance: &str) -> Result<Hold, JournalError> {
+    pub fn take(state: &Path, instance: &str) -> Result<StateLock, JournalError> {
         let path = state.join(LOCK);
         let fail = |source| JournalError::Lock {
             path: path.clone(),
@@ -49,7 +49,7 @@ impl Hold {
         // Only for whoever is refused: on a full disk the lock holds without it.
         let said = file.set_len(0);
         let _ = said.and_then(|()| writeln!(file, "{} {instance}", std::process::id()));
-        Ok(Hold { _file: file })
+        Ok(StateLock { _file: file })
     }
 }
 
@@ -69,13 +69,17 @@ mod tests {
     #[test]
     fn one_has_it_and_says_who() {
         let dir = tempfile::tempdir().unwrap();
-        let first = Hold::take(dir.path(), "first").unwrap();
-        let refused = Hold::take(dir.path(), "second").unwrap_err().to_string();
+        let first = StateLock::take(dir.path(), "first").unwrap();
+        let refused = StateLock::take(dir.path(), "second")
+            .unwrap_err()
+            .to_string();
         let holder = format!("instance `first`, process {}", std::process::id());
         assert!(refused.contains(&holder), "{refused}");
         drop(first);
-        let _second = Hold::take(dir.path(), "second").unwrap();
-        let refused = Hold::take(dir.path(), "third").unwrap_err().to_string();
+        let _second = StateLock::take(dir.path(), "second").unwrap();
+        let refused = StateLock::take(dir.path(), "third")
+            .unwrap_err()
+            .to_string();
         assert!(refused.contains("instance `second`"), "{refused}");
     }
 }

@@ -7,7 +7,7 @@ use std::path::{Component, Path, PathBuf};
 
 /// Maps checked files to their results.
 #[derive(Debug, Clone)]
-pub struct Places {
+pub struct ResultPaths {
     /// Directory of the results, absolute.
     pub out: PathBuf,
     /// Watched or given directories, absolute.
@@ -18,10 +18,10 @@ pub struct Places {
     pub single: Option<PathBuf>,
 }
 
-impl Places {
-    /// Places for directories and single files. Files with equal names get their path below the
+impl ResultPaths {
+    /// ResultPaths for directories and single files. Files with equal names get their path below the
     /// common ancestor, so that no result hides another.
-    pub fn new(out: PathBuf, roots: Vec<PathBuf>, files: &[PathBuf]) -> Places {
+    pub fn new(out: PathBuf, roots: Vec<PathBuf>, files: &[PathBuf]) -> ResultPaths {
         let mut by_name: BTreeMap<PathBuf, Vec<&PathBuf>> = BTreeMap::new();
         for file in files {
             let name = file.file_name().map(PathBuf::from).unwrap_or_default();
@@ -39,7 +39,7 @@ impl Places {
                 names.insert((*file).clone(), below);
             }
         }
-        Places {
+        ResultPaths {
             out,
             roots,
             files: names,
@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     fn results_mirror_the_watched_directory() {
-        let places = Places::new("/out".into(), paths(&["/farm"]), &[]);
+        let places = ResultPaths::new("/out".into(), paths(&["/farm"]), &[]);
         assert_eq!(
             places.xqar(Path::new("/farm/maps/a.xodr")),
             Path::new("/out/maps/a.xodr.xqar")
@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn what_is_not_watched_has_nobodys_place() {
-        let places = Places::new("/out".into(), paths(&["/farm"]), &[]);
+        let places = ResultPaths::new("/out".into(), paths(&["/farm"]), &[]);
         let (inside, outside) = (Path::new("/farm/a.xodr"), Path::new("/old/a.xodr"));
         assert!(places.contains(inside) && !places.contains(outside));
         assert_ne!(places.xqar(inside), places.xqar(outside));
@@ -151,7 +151,7 @@ mod tests {
     #[test]
     fn equal_names_do_not_collide() {
         let files = paths(&["/x/a/m.xodr", "/x/b/m.xodr", "/x/b/n.xodr"]);
-        let places = Places::new("/out".into(), vec![], &files);
+        let places = ResultPaths::new("/out".into(), vec![], &files);
         assert_eq!(places.xqar(&files[0]), Path::new("/out/a/m.xodr.xqar"));
         assert_eq!(places.xqar(&files[1]), Path::new("/out/b/m.xodr.xqar"));
         assert_eq!(places.xqar(&files[2]), Path::new("/out/n.xodr.xqar"));
@@ -159,7 +159,7 @@ mod tests {
 
     #[test]
     fn two_directories_keep_their_files_apart() {
-        let places = Places::new("/out".into(), paths(&["/x/a", "/x/b"]), &[]);
+        let places = ResultPaths::new("/out".into(), paths(&["/x/a", "/x/b"]), &[]);
         assert_eq!(
             places.xqar(Path::new("/x/a/m.xodr")),
             Path::new("/out/a/m.xodr.xqar")
@@ -172,7 +172,7 @@ mod tests {
 
     #[test]
     fn a_directory_inside_another_does_not_move_results() {
-        let places = Places::new("/out".into(), paths(&["/x", "/x/b"]), &[]);
+        let places = ResultPaths::new("/out".into(), paths(&["/x", "/x/b"]), &[]);
         assert_eq!(
             places.xqar(Path::new("/x/b/m.xodr")),
             Path::new("/out/x/b/m.xodr.xqar")

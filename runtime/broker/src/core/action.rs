@@ -1,0 +1,164 @@
+//! Everything that the state machine wants done.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use qcbus_messages::control::Response;
+use qcbus_messages::{JobId, ToPeer};
+
+use super::types::{ChildSpec, Delivery, FinishedJob, Judged, Launch, SessionId, Stamp, Ticket};
+
+/// Everything that the state machine wants done.
+#[derive(Debug)]
+pub enum Action {
+    /// Read the file and its dependencies, publish the images.
+    Prepare {
+        /// The job.
+        job: JobId,
+        /// The file.
+        path: Arc<Path>,
+    },
+    /// Let go of a job's documents.
+    Release {
+        /// The job.
+        job: JobId,
+    },
+    /// Publish a document once more.
+    PublishAgain {
+        /// The job that needs it.
+        job: JobId,
+        /// The document.
+        doc: qcbus_messages::DocId,
+    },
+    /// Say something to a peer.
+    Send {
+        /// Its session.
+        session: SessionId,
+        /// The words.
+        message: ToPeer,
+    },
+    /// Open a session.
+    Accept {
+        /// The session.
+        session: SessionId,
+    },
+    /// Turn a peer away.
+    Refuse {
+        /// The session.
+        session: SessionId,
+        /// For a person.
+        reason: String,
+    },
+    /// Close a session.
+    Disconnect {
+        /// The session.
+        session: SessionId,
+    },
+    /// Start a child.
+    Spawn {
+        /// Which start.
+        launch: Launch,
+        /// What to start.
+        spec: ChildSpec,
+    },
+    /// Kill a process that does not answer.
+    Kill {
+        /// The child's start, if it is one of ours.
+        launch: Option<Launch>,
+        /// Its process id.
+        pid: u32,
+    },
+    /// Pool, write, record.
+    Store(Box<FinishedJob>),
+    /// Remove the result of a file that has gone.
+    Withdraw {
+        /// The file.
+        path: Arc<Path>,
+        /// Who has reported about it and is to take that back.
+        reporters: Vec<String>,
+    },
+    /// Tell a reporter that a file has gone.
+    Void {
+        /// The reporter's session.
+        session: SessionId,
+        /// The reporter.
+        reporter: String,
+        /// The file.
+        path: Arc<Path>,
+    },
+    /// Remember that a reporter has taken back what it said of a file that has gone.
+    Voided {
+        /// The reporter.
+        reporter: String,
+        /// The file.
+        path: Arc<Path>,
+    },
+    /// Remember that a file was looked at and found unchanged.
+    Restamp {
+        /// The file.
+        path: Arc<Path>,
+        /// Its verdict with fresh stamps.
+        judged: Arc<Judged>,
+    },
+    /// Send a result to a reporter.
+    Deliver {
+        /// Its session.
+        session: SessionId,
+        /// Its name.
+        reporter: String,
+        /// The result.
+        delivery: Delivery,
+    },
+    /// Remember that a reporter has a result.
+    Delivered {
+        /// Its name.
+        reporter: String,
+        /// The file.
+        path: Arc<Path>,
+        /// The job.
+        job: JobId,
+    },
+    /// Answer a client.
+    Answer {
+        /// The client.
+        ticket: Ticket,
+        /// The answer.
+        response: Response,
+    },
+    /// Watch these paths for changes though nobody asked for a check of them.
+    Depend {
+        /// The paths, each with the stamp under which it was read.
+        files: Vec<(Arc<Path>, Option<Stamp>)>,
+    },
+    /// No verdict depends on these any more.
+    Undepend {
+        /// The paths.
+        paths: Vec<Arc<Path>>,
+    },
+    /// Something that an acceptance rests on is not what it was: the file goes from behind the
+    /// gate, at once, with everything that rests on it.
+    CloseGate {
+        /// The file.
+        path: Arc<Path>,
+    },
+    /// The acceptance stands after all.
+    OpenGate {
+        /// The file.
+        path: Arc<Path>,
+        /// Its verdict.
+        judged: Arc<Judged>,
+    },
+    /// A verdict stands: tell whoever listens.
+    Judged {
+        /// The file.
+        path: Arc<Path>,
+        /// Its verdict.
+        judged: Arc<Judged>,
+        /// `false` when the verdict stood already.
+        fresh: bool,
+    },
+    /// Something that a person should read.
+    Notice(String),
+    /// Everything is drained: leave the loop.
+    Stop,
+}

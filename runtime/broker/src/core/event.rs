@@ -1,0 +1,130 @@
+//! Everything that can happen to the broker.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use qcbus_messages::{Digest, FromPeer, Hello, JobId};
+
+use super::types::{
+    ChildSpec, Demand, Launch, PrepareFailure, PreparedJob, SessionId, Stamp, StoreOutcome, Ticket,
+};
+
+/// Everything that can happen to the broker.
+#[derive(Debug)]
+pub enum Event {
+    /// A file is there and quiet: new, changed, or seen in a scan.
+    Settled {
+        /// Absolute path.
+        path: Arc<Path>,
+        /// What `stat` says.
+        stamp: Stamp,
+    },
+    /// A file was seen in the first look at everything, and may still be written to: it is there,
+    /// and [`Event::Settled`] follows.
+    Present {
+        /// Absolute path.
+        path: Arc<Path>,
+    },
+    /// A file that has no verdict of its own is there and quiet: verdicts may depend on it.
+    Touched {
+        /// Absolute path.
+        path: Arc<Path>,
+        /// What `stat` says.
+        stamp: Stamp,
+    },
+    /// A file has gone.
+    Vanished {
+        /// Absolute path.
+        path: Arc<Path>,
+    },
+    /// The first scan is complete.
+    Scanned,
+    /// Reading a file is over.
+    Prepared {
+        /// The job.
+        job: JobId,
+        /// What it gave.
+        result: Result<Box<PreparedJob>, PrepareFailure>,
+    },
+    /// Storing a result is over.
+    Stored {
+        /// The job.
+        job: JobId,
+        /// What it gave.
+        outcome: StoreOutcome,
+    },
+    /// A peer says hello.
+    Hello {
+        /// Its session.
+        session: SessionId,
+        /// Its words.
+        hello: Hello,
+    },
+    /// A peer says something.
+    Message {
+        /// Its session.
+        session: SessionId,
+        /// Its words.
+        message: FromPeer,
+    },
+    /// A peer sends what is no message.
+    Garbage {
+        /// Its session.
+        session: SessionId,
+        /// What is wrong.
+        what: String,
+    },
+    /// A peer's process is dead.
+    Gone {
+        /// Its session.
+        session: SessionId,
+    },
+    /// A result could not be read back for a reporter.
+    Undeliverable {
+        /// The reporter's session.
+        session: SessionId,
+        /// The job.
+        job: JobId,
+        /// Why.
+        why: String,
+    },
+    /// A child could not be started or has ended.
+    Exited {
+        /// Which start.
+        launch: Launch,
+        /// How: for a person.
+        how: String,
+        /// Exit status 0.
+        success: bool,
+    },
+    /// A configuration is in force from now on.
+    Configured {
+        /// Its digest.
+        digest: Digest,
+        /// What it demands.
+        demand: Arc<dyn Demand>,
+    },
+    /// The children that should run from now on.
+    Children {
+        /// All of them.
+        specs: Vec<ChildSpec>,
+    },
+    /// A client waits for a verdict.
+    Wait {
+        /// The client.
+        ticket: Ticket,
+        /// The file.
+        path: Arc<Path>,
+        /// What `stat` says of it now.
+        stamp: Option<Stamp>,
+        /// Why nobody will ever check it, if so.
+        unwatched: Option<String>,
+        /// When to give up.
+        timeout: Option<Duration>,
+    },
+    /// Stop taking files, finish what is there, stop.
+    Drain,
+    /// Time has passed.
+    Tick,
+}

@@ -1,0 +1,82 @@
+//! Numbers that shape the state machine.
+
+use std::time::Duration;
+
+/// Numbers that shape the state machine. All have defaults.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// Number of this broker's start; the upper half of every job number.
+    pub generation: u64,
+    /// Jobs between being read and being stored.
+    pub max_active: usize,
+    /// Files being read at once.
+    pub max_preparing: usize,
+    /// Results being stored at once.
+    pub max_storing: usize,
+    /// Documents of active jobs on the bus.
+    pub max_documents: usize,
+    /// A bundle must end a job within this time.
+    pub job_deadline: Duration,
+    /// A bundle with work that says nothing for this long is taken for dead.
+    pub silence_limit: Duration,
+    /// A demanded bundle that is not there is waited for this long.
+    pub absence_limit: Duration,
+    /// At the start, how long hellos are collected before missing children are started.
+    pub collect: Duration,
+    /// First pause before a child is started again; doubles up to `backoff_max`.
+    pub backoff: Duration,
+    /// Longest pause.
+    pub backoff_max: Duration,
+    /// A child that has run this long is taken for healthy and its pauses start anew.
+    pub healthy_after: Duration,
+    /// More restarts than this within `restart_window` and the broker gives up on a child.
+    pub max_restarts: u32,
+    /// See `max_restarts`.
+    pub restart_window: Duration,
+    /// Issues kept per checker and job.
+    pub max_issues: usize,
+    /// Bytes of texts kept per bundle and job.
+    pub max_staged_bytes: usize,
+    /// Bytes of findings of all jobs that are not stored yet, beyond which no further job is given
+    /// out: what a bundle that reports far too much can make the broker hold.
+    pub max_findings_bytes: usize,
+    /// Longest text kept of anything a bundle says, in bytes.
+    pub max_text: usize,
+    /// Pause before something that failed for want of room or disk is tried again.
+    pub retry_after: Duration,
+    /// Pause before a file is tried again for which the bus had no place.
+    pub busy_pause: Duration,
+    /// Drain limit after which unfinished work is given up.
+    pub drain_limit: Duration,
+    /// Stop by itself once the scan is complete and everything has a verdict.
+    pub once: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings {
+            generation: 1,
+            max_active: 24,
+            max_preparing: 4,
+            max_storing: 8,
+            max_documents: 48,
+            job_deadline: Duration::from_secs(60),
+            silence_limit: Duration::from_secs(10),
+            absence_limit: Duration::from_secs(20),
+            collect: Duration::from_millis(500),
+            backoff: Duration::from_millis(100),
+            backoff_max: Duration::from_secs(30),
+            healthy_after: Duration::from_secs(10),
+            max_restarts: 20,
+            restart_window: Duration::from_secs(60),
+            max_issues: 10_000,
+            max_staged_bytes: 16 << 20,
+            max_findings_bytes: 16 << 20,
+            max_text: 8 << 10,
+            retry_after: Duration::from_secs(1),
+            busy_pause: Duration::from_millis(20),
+            drain_limit: Duration::from_secs(30),
+            once: false,
+        }
+    }
+}
