@@ -395,7 +395,9 @@ fn a_name_too_long_for_a_result_holds_up_nobody() {
     assert!(String::from_utf8_lossy(&said.stdout).contains("no result\n  cannot write "));
     let notices = farm.status().unwrap().notices;
     assert!(
-        notices.iter().any(|it| it.contains("stays undetermined")),
+        notices
+            .iter()
+            .any(|it| it.text.contains("stays undetermined")),
         "{notices:#?}"
     );
     // Withdrawing what could never be written is done at once, and nothing waits behind it.

@@ -93,7 +93,9 @@ fn is_known(farm: &Farm, animal: &str) -> Option<()> {
     let status = farm.status()?;
     let named =
         |it: &qcbus_messages::control::PeerStatus| it.name == animal && it.state != "starting";
-    let told = |notice: &String| notice.contains(animal) && !notice.contains("reloaded");
+    let told = |notice: &qcbus_messages::control::Notice| {
+        notice.kind != "loading" && notice.text.contains(animal)
+    };
     (status.peers.iter().any(named) || status.notices.iter().any(told)).then_some(())
 }
 
@@ -111,7 +113,13 @@ fn reasons_of(farm: &Farm, name: &str, animal: &str) -> Vec<String> {
 
 fn notices(farm: &Farm) -> String {
     farm.status()
-        .map(|status| status.notices.join("\n"))
+        .map(|status| {
+            status
+                .notices
+                .iter()
+                .map(|it| format!("{}\n", it.text))
+                .collect()
+        })
         .unwrap_or_default()
 }
 

@@ -102,8 +102,21 @@ pub struct Status {
     pub queue: QueueStatus,
     /// Bundles and reporters.
     pub peers: Vec<PeerStatus>,
+    /// Counts up with every change of who must judge, or of what is demanded of them.
+    pub epoch: u64,
     /// Things a person should look at, newest last.
-    pub notices: Vec<String>,
+    pub notices: Vec<Notice>,
+}
+
+/// Something that a person should look at.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Notice {
+    /// What kind of thing happened, for programs: `ended`, `killed`, `no-room` and so on.
+    pub kind: String,
+    /// The bundle or reporter that it is about.
+    pub about: Option<String>,
+    /// For a person.
+    pub text: String,
 }
 
 /// How many files are in which state.

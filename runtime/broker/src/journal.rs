@@ -8,11 +8,11 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use qcbus_messages::{Digest, JobId, Verdict};
 use rusqlite::{Connection, OpenFlags, OptionalExtension, Transaction, params};
 
-use crate::core::{Input, Judged, Stamp};
+use crate::core::{Epoch, Input, Judged, Juror, Jury, Mark, Member, Origin, Stamp};
 use crate::state_lock::StateLock;
 
 /// Version of the schema, kept in SQLite's `user_version`.
-pub const SCHEMA_VERSION: i64 = 2;
+pub const SCHEMA_VERSION: i64 = 3;
 
 const SCHEMA: &str = include_str!("journal.sql");
 
@@ -147,6 +147,13 @@ pub enum Entry {
         /// The reporter.
         reporter: String,
     },
+    /// A bundle must judge from now on.
+    Enrolled(Member),
+    /// A bundle need not judge any more.
+    Struck {
+        /// Its name.
+        name: String,
+    },
     /// A reporter has a result.
     Delivered {
         /// The file.
@@ -246,8 +253,8 @@ impl Journal {
             delivered.entry(row.get(0)?).or_default().push(entry);
         }
         let mut query = self.connection.prepare(
-            "SELECT path, job, verdict, digest, basis, config, bundles, errors, warnings, \
-             information, why, xqar, inputs, racy FROM files ORDER BY path",
+            "SELECT path, job, verdict, digest, basis, config, jury, errors, warnings, \
+             information, why, xqar, inputs, racy, epoch FROM files ORDER BY path",
         )?;
         let mut rows = query.query([])?;
         let mut all = Vec::new();
@@ -281,6 +288,32 @@ impl Journal {
                     path: Path::new(&path).into(),
                     reporter: row.get(1)?,
                     xqar: row.get::<_, Option<String>>(2)?.map(PathBuf::from),
+                })
+            })?;
+            rows.collect()
+        };
+        read().map_err(|source| classify(&self.path, source))
+    }
+
+    /// The bundles that must judge. One whose catalogue cannot be read any more is among them: it
+    /// must judge nevertheless.
+    ///
+    /// # Errors
+    /// When the journal cannot be read.
+    pub fn members(&self) -> Result<Vec<Member>, JournalError> {
+        let read = || -> rusqlite::Result<Vec<Member>> {
+            let mut query = self
+                .connection
+                .prepare("SELECT name, version, origin, catalogue FROM members ORDER BY name")?;
+            let rows = query.query_map([], |row| {
+                let origin: String = row.get(2)?;
+                Ok(Member {
+                    name: row.get(0)?,
+                    version: row.get(1)?,
+                    catalogue: serde_json::from_str(&row.get::<_, String>(3)?)
+                        .ok()
+                        .map(Arc::new),
+                    origin: Origin::of(&origin).unwrap_or(Origin::Joined),
                 })
             })?;
             rows.collect()
@@ -344,6 +377,13 @@ fn prepare(connection: &Connection, path: &Path) -> Result<(), JournalError> {
             found,
         });
     }
+    if found == 1 || found == 2 {
+        // What is in the old column is no jury, so that every verdict is looked at again.
+        let newer = "BEGIN; ALTER TABLE files RENAME COLUMN bundles TO jury; \
+                     ALTER TABLE files ADD COLUMN epoch INTEGER NOT NULL DEFAULT 0; \
+                     PRAGMA user_version = 3; COMMIT;";
+        connection.execute_batch(newer).map_err(fail)?;
+    }
     // WAL with synchronous=NORMAL survives a killed process; after a power cut the last verdicts
     // may be missing, and their files are judged anew.
     connection
@@ -402,6 +442,10 @@ fn put(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> {
                 params![text(path)],
             )?;
         }
+        Entry::Enrolled(member) => put_member(transaction, member)?,
+        Entry::Struck { name } => {
+            transaction.execute("DELETE FROM members WHERE name = ?1", params![name])?;
+        }
         Entry::Delivered {
             path,
             reporter,
@@ -429,9 +473,9 @@ fn deliver(
 
 fn put_file(transaction: &Transaction<'_>, path: &Path, judged: &Judged) -> rusqlite::Result<()> {
     let mut statement = transaction.prepare_cached(
-        "INSERT OR REPLACE INTO files (path, job, verdict, digest, basis, config, bundles, errors, \
-         warnings, information, why, xqar, inputs, racy, at) \
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15)",
+        "INSERT OR REPLACE INTO files (path, job, verdict, digest, basis, config, jury, errors, \
+         warnings, information, why, xqar, inputs, racy, at, epoch) \
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16)",
     )?;
     statement.execute(params![
         text(path),
@@ -440,7 +484,7 @@ fn put_file(transaction: &Transaction<'_>, path: &Path, judged: &Judged) -> rusq
         judged.digest.to_string(),
         judged.basis.to_string(),
         judged.config.to_string(),
-        format!("{:016x}", judged.bundles),
+        jury_to_text(&judged.jury),
         signed(judged.counts[0]),
         signed(judged.counts[1]),
         signed(judged.counts[2]),
@@ -449,8 +493,51 @@ fn put_file(transaction: &Transaction<'_>, path: &Path, judged: &Judged) -> rusq
         inputs_to_text(&judged.inputs),
         judged.racy,
         millis(),
+        signed(judged.epoch.0),
     ])?;
     Ok(())
+}
+
+fn put_member(transaction: &Transaction<'_>, member: &Member) -> rusqlite::Result<()> {
+    let catalogue = serde_json::to_string(&member.catalogue.as_deref()).unwrap_or_default();
+    transaction.execute(
+        "INSERT OR REPLACE INTO members (name, version, origin, catalogue, at) \
+         VALUES (?1, ?2, ?3, ?4, ?5)",
+        params![
+            member.name,
+            member.version,
+            member.origin.as_str(),
+            catalogue,
+            millis()
+        ],
+    )?;
+    Ok(())
+}
+
+fn jury_to_text(jury: &Jury) -> String {
+    let row = |juror: &Juror| {
+        (
+            juror.name.clone(),
+            juror.mark.map(|it| format!("{:016x}", it.0)),
+        )
+    };
+    let rows: Vec<(String, Option<String>)> = jury.0.iter().map(row).collect();
+    serde_json::to_string(&rows).unwrap_or_default()
+}
+
+fn jury_from_text(text: &str) -> Jury {
+    let read = || -> Option<Vec<Juror>> {
+        let rows: Vec<(String, Option<String>)> = serde_json::from_str(text).ok()?;
+        let juror = |(name, mark): (String, Option<String>)| {
+            let mark = match mark {
+                Some(mark) => Some(Mark(u64::from_str_radix(&mark, 16).ok()?)),
+                None => None,
+            };
+            Some(Juror { name, mark })
+        };
+        rows.into_iter().map(juror).collect()
+    };
+    read().map_or_else(Jury::unknown, Jury)
 }
 
 fn put_history(
@@ -561,10 +648,8 @@ fn judged_of(row: &rusqlite::Row<'_>) -> rusqlite::Result<Option<Judged>> {
         _ => return Ok(None),
     };
     let (own, basis, config) = (digest(3)?, digest(4)?, digest(5)?);
-    let bundles = u64::from_str_radix(&row.get::<_, String>(6)?, 16).ok();
     let inputs = inputs_from_text(&row.get::<_, String>(12)?);
-    let (Some(digest), Some(basis), Some(config), Some(bundles), Some(inputs)) =
-        (own, basis, config, bundles, inputs)
+    let (Some(digest), Some(basis), Some(config), Some(inputs)) = (own, basis, config, inputs)
     else {
         return Ok(None);
     };
@@ -574,7 +659,8 @@ fn judged_of(row: &rusqlite::Row<'_>) -> rusqlite::Result<Option<Judged>> {
         digest,
         basis,
         config,
-        bundles,
+        jury: Arc::new(jury_from_text(&row.get::<_, String>(6)?)),
+        epoch: Epoch(number(row.get(14)?)),
         inputs,
         racy: row.get(13)?,
         counts: [
@@ -611,6 +697,8 @@ fn millis() -> i64 {
 
 #[cfg(test)]
 mod tests {
+    use qcbus_messages::Catalogue;
+
     use super::*;
 
     fn judged(job: u64) -> Judged {
@@ -620,7 +708,17 @@ mod tests {
             digest: Digest([1; 32]),
             basis: Digest([2; 32]),
             config: Digest([3; 32]),
-            bundles: u64::MAX,
+            jury: Arc::new(Jury(vec![
+                Juror {
+                    name: "mine".to_owned(),
+                    mark: None,
+                },
+                Juror {
+                    name: "xodrBundle".to_owned(),
+                    mark: Some(Mark(u64::MAX)),
+                },
+            ])),
+            epoch: Epoch(1 << 40),
             inputs: vec![
                 Input {
                     path: Path::new("/a.xosc").into(),
@@ -723,7 +821,11 @@ mod tests {
             .unwrap();
         journal
             .connection
-            .execute_batch("PRAGMA user_version = 1")
+            .execute_batch(
+                "ALTER TABLE files RENAME COLUMN jury TO bundles; \
+                 ALTER TABLE files DROP COLUMN epoch; \
+                 UPDATE files SET bundles = 'ffffffffffffffff'; PRAGMA user_version = 1",
+            )
             .unwrap();
         drop(journal);
         let all = Journal::open(dir.path(), "default")
@@ -737,6 +839,36 @@ mod tests {
         assert_eq!(known, digest);
         assert_eq!(all[0].judged.inputs[1], written.inputs[1]);
         assert_eq!(all[0].judged.basis, written.basis);
+        assert_eq!(*all[0].judged.jury, Jury::unknown());
+    }
+
+    #[test]
+    fn who_must_judge_is_remembered_until_struck() {
+        let dir = tempfile::tempdir().unwrap();
+        let catalogue = Catalogue {
+            alias: "mine".to_owned(),
+            kinds: vec![qcbus_document::FileKind::Xodr],
+            ..Catalogue::default()
+        };
+        let member = |version: &str| Member {
+            name: "mine".to_owned(),
+            version: version.to_owned(),
+            catalogue: Some(Arc::new(catalogue.clone())),
+            origin: Origin::Joined,
+        };
+        let mut journal = Journal::open(dir.path(), "test").unwrap();
+        journal.write(&[Entry::Enrolled(member("1"))]).unwrap();
+        journal.write(&[Entry::Enrolled(member("2"))]).unwrap();
+        drop(journal);
+        let mut journal = Journal::open(dir.path(), "test").unwrap();
+        assert_eq!(journal.members().unwrap(), [member("2")]);
+        // Of another version of qcbus, perhaps: it must judge nevertheless.
+        let spoilt = "UPDATE members SET catalogue = '{\"kinds\": 7}'";
+        journal.connection.execute_batch(spoilt).unwrap();
+        assert_eq!(journal.members().unwrap()[0].catalogue, None);
+        let name = "mine".to_owned();
+        journal.write(&[Entry::Struck { name }]).unwrap();
+        assert_eq!(journal.members().unwrap(), []);
     }
 
     #[test]

@@ -9,7 +9,7 @@ CREATE TABLE IF NOT EXISTS files (
     digest   TEXT NOT NULL,         -- of the file's bytes
     basis    TEXT NOT NULL,         -- digest over everything that the verdict depends on
     config   TEXT NOT NULL,         -- digest of the configuration
-    bundles  TEXT NOT NULL,         -- signature of the bundles that took part
+    jury     TEXT NOT NULL,         -- JSON list of [bundle, mark]: those who had to judge; null: not there
     errors   INTEGER NOT NULL,
     warnings INTEGER NOT NULL,
     information INTEGER NOT NULL,
@@ -17,7 +17,17 @@ CREATE TABLE IF NOT EXISTS files (
     xqar     TEXT NOT NULL,         -- where the result lies
     inputs   TEXT NOT NULL,         -- JSON list of [path, [size, mtime_ns, inode, digest, ctime_ns]]; null: absent
     racy     INTEGER NOT NULL,      -- 1: read so soon after a write that the stamps prove nothing
-    at       INTEGER NOT NULL
+    at       INTEGER NOT NULL,
+    epoch    INTEGER NOT NULL DEFAULT 0 -- of who had to judge
+) WITHOUT ROWID;
+
+-- The roster: the bundles that must judge until somebody removes them, whether they are there or not.
+CREATE TABLE IF NOT EXISTS members (
+    name      TEXT PRIMARY KEY,
+    version   TEXT NOT NULL,        -- that joined last
+    origin    TEXT NOT NULL,        -- supervised: by manifest, or it comes with qcbus; joined: by hand
+    catalogue TEXT NOT NULL,        -- JSON: what it offered then
+    at        INTEGER NOT NULL
 ) WITHOUT ROWID;
 
 -- Where the result lay of a file that has gone, while a reporter has not yet taken back its report.

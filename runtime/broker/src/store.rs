@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
 use qcbus_document::Document;
@@ -40,6 +41,8 @@ pub struct Store {
     pub moving: RwLock<()>,
     /// Results that were written when other directories were watched, and the files they are of.
     pub elsewhere: Mutex<HashMap<PathBuf, Vec<Arc<Path>>>>,
+    /// The epoch of who must judge: what was judged in an earlier one is not stored.
+    pub epoch: AtomicU64,
 }
 
 impl Store {
@@ -66,6 +69,10 @@ impl Store {
         let verdict = verdict_of(&pooled, nothing_checked || job.unreadable.is_some());
         let why = reasons(job, &pooled, nothing_checked);
         let judged = judged(job, &pooled, verdict, why, self.places.xqar(&job.path));
+        // At the last moment: from here on a verdict is on its way to where others see it.
+        if self.epoch.load(Ordering::Acquire) != job.epoch.0 {
+            return StoreOutcome::Outdated;
+        }
         if let Err(failed) = self.write(job, &pooled, &judged) {
             return self.not_written(job, judged, failed);
         }
@@ -443,7 +450,8 @@ fn judged(
         digest: root.map(|(_, digest)| digest).unwrap_or_default(),
         basis: prepared.map(|it| it.basis).unwrap_or_default(),
         config: job.config,
-        bundles: job.signature,
+        jury: job.jury.clone(),
+        epoch: job.epoch,
         inputs: prepared.map(|it| it.inputs.clone()).unwrap_or_default(),
         racy: prepared.is_none_or(|it| it.racy),
         counts: [

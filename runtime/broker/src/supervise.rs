@@ -7,7 +7,7 @@ use std::process::Stdio;
 use tokio::process::{Child, Command};
 use tokio::sync::mpsc::UnboundedSender;
 
-use crate::core::{ChildSpec, Event, Launch};
+use crate::core::{ChildEnd, ChildSpec, Event, Launch};
 
 /// What every child is given.
 #[derive(Debug, Clone)]
@@ -51,13 +51,9 @@ impl Children {
             }
             Err(error) => {
                 let program = spec.command.first().map_or("", String::as_str);
-                let how = format!("cannot start {program}: {error}");
+                let end = ChildEnd::NotStarted(format!("cannot start {program}: {error}"));
                 // The loop that receives this is the one that called; it is there.
-                let _ = self.events.send(Event::Exited {
-                    launch,
-                    how,
-                    success: false,
-                });
+                let _ = self.events.send(Event::Exited { launch, end });
             }
         }
     }
@@ -127,27 +123,29 @@ fn is_ours(pid: i32) -> bool {
 }
 
 async fn watch(launch: Launch, mut child: Child, events: UnboundedSender<Event>) {
-    let (how, success) = match child.wait().await {
-        Ok(status) => (describe(status), status.success()),
-        Err(error) => (format!("its end could not be learned: {error}"), false),
+    let end = match child.wait().await {
+        Ok(status) => end_of(status),
+        Err(error) => ChildEnd::Failed(format!("its end could not be learned: {error}")),
     };
     // The broker may have stopped meanwhile.
-    let _ = events.send(Event::Exited {
-        launch,
-        how,
-        success,
-    });
+    let _ = events.send(Event::Exited { launch, end });
 }
 
-fn describe(status: std::process::ExitStatus) -> String {
+fn end_of(status: std::process::ExitStatus) -> ChildEnd {
     use std::os::unix::process::ExitStatusExt;
+    let manifest = "see its manifest";
     match (status.code(), status.signal()) {
         // What the shell says when it cannot start a command.
-        (Some(127), _) => "its command was not found (exit code 127); see its manifest".to_owned(),
-        (Some(126), _) => "its command cannot be run (exit code 126); see its manifest".to_owned(),
-        (Some(code), _) => format!("it ended with exit code {code}"),
-        (None, Some(signal)) => format!("it was killed by signal {signal}"),
-        (None, None) => "it ended".to_owned(),
+        (Some(code @ 127), _) => ChildEnd::NotStarted(format!(
+            "its command was not found (exit code {code}); {manifest}"
+        )),
+        (Some(code @ 126), _) => ChildEnd::NotStarted(format!(
+            "its command cannot be run (exit code {code}); {manifest}"
+        )),
+        (Some(0), _) => ChildEnd::Done("it ended with exit code 0".to_owned()),
+        (Some(code), _) => ChildEnd::Failed(format!("it ended with exit code {code}")),
+        (None, Some(signal)) => ChildEnd::Failed(format!("it was killed by signal {signal}")),
+        (None, None) => ChildEnd::Failed("it ended".to_owned()),
     }
 }
 

@@ -102,17 +102,18 @@ impl Writers {
 }
 
 impl Order {
-    /// The file that it is about.
-    fn path(&self) -> &Arc<Path> {
+    /// The file that it is about; `None` when it is about a bundle.
+    fn path(&self) -> Option<&Arc<Path>> {
         match self {
-            Order::Store { job, .. } => &job.path,
-            Order::Withdraw { path, .. } => path,
+            Order::Store { job, .. } => Some(&job.path),
+            Order::Withdraw { path, .. } => Some(path),
             Order::Record(
                 Entry::Judged { path, .. }
                 | Entry::Withdrawn { path, .. }
                 | Entry::Voided { path, .. }
                 | Entry::Delivered { path, .. },
-            ) => path,
+            ) => Some(path),
+            Order::Record(Entry::Enrolled(_) | Entry::Struck { .. }) => None,
         }
     }
 }
@@ -169,13 +170,14 @@ impl Writer {
 
     /// Does an order now, or puts it behind those that must be done before it.
     fn take(&mut self, mut order: Order) {
-        if !self.stopped && !self.held_up.contains(order.path()) {
+        let held_up = order.path().is_some_and(|path| self.held_up.contains(path));
+        if !self.stopped && !held_up {
             match self.carry_out(&mut order) {
                 Ok(()) => return,
                 Err(trouble) => self.hold_up(&trouble),
             }
         }
-        self.held_up.insert(order.path().clone());
+        self.held_up.extend(order.path().cloned());
         self.waiting.push_back(order);
     }
 

@@ -6,6 +6,8 @@ use std::sync::Arc;
 use qcbus_messages::control::Response;
 use qcbus_messages::{JobId, ToPeer};
 
+use super::jury::Member;
+use super::notice::Notice;
 use super::types::{ChildSpec, Delivery, FinishedJob, Judged, Launch, SessionId, Stamp, Ticket};
 
 /// Everything that the state machine wants done.
@@ -125,6 +127,13 @@ pub enum Action {
         /// The answer.
         response: Response,
     },
+    /// Remember that a bundle must judge, before any verdict that it takes part in.
+    Enrol(Member),
+    /// Remember that a bundle need not judge any more.
+    Strike {
+        /// Its name.
+        name: String,
+    },
     /// Watch these paths for changes though nobody asked for a check of them.
     Depend {
         /// The paths, each with the stamp under which it was read.
@@ -158,7 +167,7 @@ pub enum Action {
         fresh: bool,
     },
     /// Something that a person should read.
-    Notice(String),
+    Notice(Notice),
     /// Everything is drained: leave the loop.
     Stop,
 }

@@ -1,12 +1,13 @@
 //! Children: the bundles and reporters that the broker itself keeps running.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 use qcbus_messages::{Role, ToPeer};
 
 use super::action::Action;
-use super::types::{ChildSpec, Launch, Restart, SessionId};
+use super::notice::Notice;
+use super::types::{ChildEnd, ChildSpec, Launch, Restart, SessionId};
 use super::{Actions, State};
 
 /// A child by name.
@@ -18,9 +19,11 @@ pub(super) struct Child {
     starts: VecDeque<Duration>,
     /// Failures in a row.
     failures: u32,
+    /// Why it does not get as far as to join; nobody waits for it meanwhile.
+    stuck: Option<String>,
     pub restarts: u32,
-    /// A newer one that will take over once it has joined.
-    successor: Option<Launch>,
+    /// A newer process that will take over once it has joined.
+    upgrade: Option<Upgrade>,
 }
 
 /// Where a child stands.
@@ -38,6 +41,15 @@ pub(super) enum ChildState {
     Ended,
 }
 
+/// How far the newer process of a child is, beside the older that goes on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Upgrade {
+    /// To be started then.
+    Due(Duration),
+    /// Started, has not said hello.
+    Starting(Launch, Duration),
+}
+
 /// A process that has been told to go.
 #[derive(Debug)]
 pub(super) struct Retired {
@@ -52,19 +64,54 @@ const START_LIMIT: Duration = Duration::from_secs(15);
 /// How long a process may take to leave after it was told to drain.
 pub(super) const LEAVE_LIMIT: Duration = Duration::from_secs(10);
 
+/// Failures in a row, without ever having joined, after which nobody waits for a child.
+const STUCK_AFTER: u32 = 3;
+
+impl Child {
+    fn new(spec: ChildSpec, due: Duration) -> Child {
+        Child {
+            spec,
+            state: ChildState::Due(due),
+            starts: VecDeque::new(),
+            failures: 0,
+            stuck: None,
+            restarts: 0,
+            upgrade: None,
+        }
+    }
+
+    /// Takes a new manifest. A process that runs goes on until a newer one has joined.
+    fn respecify(&mut self, spec: ChildSpec, now: Duration) {
+        self.spec = spec;
+        self.failures = 0;
+        self.stuck = None;
+        self.starts.clear();
+        match self.state {
+            ChildState::Joined => self.upgrade = Some(Upgrade::Due(now)),
+            _ => self.state = ChildState::Due(now),
+        }
+    }
+
+    fn is_upgraded_by(&self, launch: Launch) -> bool {
+        matches!(self.upgrade, Some(Upgrade::Starting(it, _)) if it == launch)
+    }
+
+    /// The pause before the next start; children that fell together should not get up together.
+    fn pause(&self, backoff: Duration, most: Duration) -> Duration {
+        let doubled = backoff * 2_u32.saturating_pow(self.failures.saturating_sub(1).min(16));
+        let pause = doubled.min(most);
+        pause + pause.mul_f64(f64::from(jitter_of(&self.spec.name, self.restarts)) / 1024.0)
+    }
+}
+
 impl State {
     /// The children that should run: starts what is new, replaces what has changed, drains what
     /// is no longer wanted.
     pub(super) fn set_children(&mut self, specs: Vec<ChildSpec>, actions: &mut Actions) {
-        let gone: Vec<String> = self
-            .children
-            .keys()
-            .filter(|name| specs.iter().all(|it| &it.name != *name))
-            .cloned()
-            .collect();
+        let unwanted = |name: &&String| specs.iter().all(|it| it.name != **name);
+        let gone: Vec<String> = self.children.keys().filter(unwanted).cloned().collect();
         for name in gone {
-            self.children.remove(&name);
-            self.drain_peer(&name, actions);
+            self.dismiss(&name, actions);
         }
         for spec in specs.iter().filter(|it| it.role == Role::Reporter) {
             // Known from now on, so that it hears of files that go before it has joined.
@@ -74,40 +121,38 @@ impl State {
         for spec in specs {
             match self.children.get_mut(&spec.name) {
                 Some(child) if child.spec == spec => {}
-                Some(child) => {
-                    let running = matches!(child.state, ChildState::Joined);
-                    child.spec = spec;
-                    child.failures = 0;
-                    child.starts.clear();
-                    if running {
-                        let launch = Launch(self.next_launch);
-                        self.next_launch += 1;
-                        child.successor = Some(launch);
-                        actions.push(Action::Spawn {
-                            launch,
-                            spec: child.spec.clone(),
-                        });
-                    } else {
-                        child.state = ChildState::Due(self.now);
-                    }
-                }
+                Some(child) => child.respecify(spec, self.now),
                 None => {
-                    let child = Child {
-                        spec: spec.clone(),
-                        state: ChildState::Due(due),
-                        starts: VecDeque::new(),
-                        failures: 0,
-                        restarts: 0,
-                        successor: None,
-                    };
-                    self.children.insert(spec.name, child);
+                    let name = spec.name.clone();
+                    self.children.insert(name, Child::new(spec, due));
                 }
             }
         }
+        self.enrol_children(actions);
+        self.watch_children(actions);
+    }
+
+    /// A child is no longer wanted: what runs of it is told to go.
+    fn dismiss(&mut self, name: &str, actions: &mut Actions) {
+        let Some(child) = self.children.remove(name) else {
+            return;
+        };
+        let starting = match (child.state, child.upgrade) {
+            (ChildState::Starting(launch, _), _) | (_, Some(Upgrade::Starting(launch, _))) => {
+                Some(launch)
+            }
+            _ => None,
+        };
+        if let Some(launch) = starting {
+            // It has not joined, so there is nothing that it could finish.
+            let (launch, pid) = (Some(launch), 0);
+            actions.push(Action::Kill { launch, pid });
+        }
+        self.drain_peer(name, actions);
     }
 
     /// Tells a peer to finish and go, and forgets that it was wanted.
-    fn drain_peer(&mut self, name: &str, actions: &mut Actions) {
+    pub(super) fn drain_peer(&mut self, name: &str, actions: &mut Actions) {
         let now = self.now;
         if let Some(bundle) = self.bundles.get_mut(name) {
             bundle.leaving = true;
@@ -117,11 +162,9 @@ impl State {
                     session,
                     message: ToPeer::Drain,
                 }),
-                None => {
-                    self.drop_bundle(name, actions);
-                    self.requeue_outdated();
-                }
+                None => self.drop_bundle(name, actions),
             }
+            self.begin_epoch();
             return;
         }
         let reporter = self.reporter_named(name);
@@ -149,9 +192,8 @@ impl State {
 
     /// Whether this launch is the newer one of a child that runs.
     pub(super) fn is_successor(&self, name: &str, launch: Launch) -> bool {
-        self.children
-            .get(name)
-            .is_some_and(|child| child.successor == Some(launch))
+        let child = self.children.get(name);
+        child.is_some_and(|child| child.is_upgraded_by(launch))
     }
 
     /// A child has said hello.
@@ -159,10 +201,11 @@ impl State {
         let Some(child) = self.children.get_mut(name) else {
             return;
         };
-        if child.successor == launch {
-            child.successor = None;
+        if launch.is_some_and(|launch| child.is_upgraded_by(launch)) {
+            child.upgrade = None;
         }
         child.state = ChildState::Joined;
+        child.stuck = None;
     }
 
     /// A child has left as it was told, or of its own will.
@@ -171,6 +214,7 @@ impl State {
         let Some(child) = self.children.get_mut(name) else {
             return;
         };
+        child.upgrade = None;
         child.state = if child.spec.restart == Restart::Always && !draining {
             ChildState::Due(self.now + self.settings.backoff)
         } else {
@@ -203,82 +247,57 @@ impl State {
         let Some(child) = self.children.get_mut(name) else {
             return;
         };
+        // The next start is of the newest manifest anyway.
+        if let Some(Upgrade::Starting(launch, _)) = child.upgrade.take() {
+            let (launch, pid) = (Some(launch), 0);
+            actions.push(Action::Kill { launch, pid });
+        }
         if child.spec.restart == Restart::Never || draining {
             child.state = ChildState::Ended;
             return;
         }
         child.failures = if proved { 1 } else { child.failures + 1 };
-        while child
-            .starts
-            .front()
-            .is_some_and(|at| now.saturating_sub(*at) > settings.restart_window)
-        {
+        let window = settings.restart_window;
+        let old = |at: &Duration| now.saturating_sub(*at) > window;
+        while child.starts.front().is_some_and(old) {
             child.starts.pop_front();
         }
-        if child.starts.len() > settings.max_restarts as usize && !proved {
-            let pause = settings.restart_window;
-            child.state = ChildState::GaveUp(now + pause);
-            let text = format!(
-                "{name} failed {} times within {} s and is tried again in {} s: {why}",
-                child.starts.len(),
-                settings.restart_window.as_secs(),
-                pause.as_secs()
-            );
-            self.notice(text, actions);
-            self.fail_absent(actions);
+        if child.starts.len() <= settings.max_restarts as usize || proved {
+            let pause = child.pause(settings.backoff, settings.backoff_max);
+            child.state = ChildState::Due(now + pause);
             return;
         }
-        let doubled =
-            settings.backoff * 2_u32.saturating_pow(child.failures.saturating_sub(1).min(16));
-        let pause = doubled.min(settings.backoff_max);
-        // Children that fell together should not get up together.
-        let jitter = pause.mul_f64(f64::from(jitter_of(name, child.restarts)) / 1024.0);
-        child.state = ChildState::Due(now + pause + jitter);
+        child.state = ChildState::GaveUp(now + window);
+        let (times, seconds) = (child.starts.len(), window.as_secs());
+        let name = name.to_owned();
+        let why = format!(
+            "failed {times} times within {seconds} s and is tried again in {seconds} s: {why}"
+        );
+        self.notice(Notice::GaveUp { name, why }, actions);
+        self.fail_absent(actions);
     }
 
     /// A child process has ended or could not be started.
-    pub(super) fn exited(
-        &mut self,
-        launch: Launch,
-        how: &str,
-        success: bool,
-        actions: &mut Actions,
-    ) {
+    pub(super) fn exited(&mut self, launch: Launch, end: &ChildEnd, actions: &mut Actions) {
         self.retired
             .retain(|_, retired| retired.launch != Some(launch));
-        let starting = self.children.iter_mut().find_map(|(name, child)| {
-            if child.successor == Some(launch) {
-                child.successor = None;
-                return None;
-            }
-            matches!(child.state, ChildState::Starting(it, _) if it == launch).then(|| name.clone())
-        });
-        if let Some(name) = starting {
-            if success
-                && self
-                    .children
-                    .get(&name)
-                    .is_some_and(|it| it.spec.restart != Restart::Always)
-            {
-                // It was turned away because another process bears its name, or had nothing to do.
-                if let Some(child) = self.children.get_mut(&name) {
-                    child.state = ChildState::Due(self.now + self.settings.backoff_max);
-                }
-                return;
-            }
-            if !self.draining() {
-                self.notice(format!("{name}: {how}"), actions);
-            }
-            self.child_down(&name, false, how, actions);
-            self.fail_absent(actions);
-            return;
+        let is_it =
+            |child: &Child| matches!(child.state, ChildState::Starting(it, _) if it == launch);
+        let mut children = self.children.iter();
+        if let Some(name) = children.find_map(|(name, it)| is_it(it).then(|| name.clone())) {
+            return self.ended_before_joining(&name, end, actions);
+        }
+        let mut children = self.children.iter();
+        let upgrade = children.find(|(_, child)| child.is_upgraded_by(launch));
+        if let Some(name) = upgrade.map(|(name, _)| name.clone()) {
+            return self.upgrade_failed(&name, end.how(), actions);
         }
         let bundle = self
             .bundles
             .iter()
             .find(|(_, it)| it.launch == Some(launch) && it.session.is_some());
         if let Some(name) = bundle.map(|(name, _)| name.clone()) {
-            self.bundle_died(&name, how, actions);
+            self.bundle_died(&name, end.how(), actions);
             return;
         }
         let reporter = self
@@ -286,50 +305,127 @@ impl State {
             .iter()
             .find(|it| it.launch == Some(launch) && it.session.is_some());
         if let Some(name) = reporter.map(|it| it.name.clone()) {
-            self.reporter_died(&name, how, actions);
+            self.reporter_died(&name, end.how(), actions);
         }
+    }
+
+    /// A child did not get as far as to join. Nobody waits for one that cannot be started, has
+    /// nothing to do here, or has failed again and again.
+    fn ended_before_joining(&mut self, name: &str, end: &ChildEnd, actions: &mut Actions) {
+        let there = self
+            .bundles
+            .get(name)
+            .is_some_and(|it| it.session.is_some());
+        let (now, most) = (self.now, self.settings.backoff_max);
+        let Some(child) = self.children.get_mut(name) else {
+            return;
+        };
+        let gives_up = match end {
+            ChildEnd::NotStarted(_) => true,
+            // It was turned away because another process bears its name, or had nothing to do.
+            ChildEnd::Done(_) => !there,
+            ChildEnd::Failed(_) => child.failures + 1 >= STUCK_AFTER,
+        };
+        if gives_up {
+            child.stuck = Some(end.how().to_owned());
+        }
+        if matches!(end, ChildEnd::Done(_)) && child.spec.restart != Restart::Always {
+            child.state = ChildState::Due(now + most);
+        } else {
+            if !self.draining() {
+                self.notice(Notice::ended(name, end.how()), actions);
+            }
+            self.child_down(name, false, end.how(), actions);
+        }
+        self.fail_absent(actions);
+    }
+
+    /// The newer process of a child has ended, or hangs, before it joined: it is tried again.
+    fn upgrade_failed(&mut self, name: &str, why: &str, actions: &mut Actions) {
+        let (now, draining, settings) = (self.now, self.draining(), &self.settings);
+        let Some(child) = self.children.get_mut(name) else {
+            return;
+        };
+        child.failures += 1;
+        let pause = child.pause(settings.backoff, settings.backoff_max);
+        let again = child.spec.restart != Restart::Never && !draining;
+        child.upgrade = again.then(|| Upgrade::Due(now + pause));
+        let (name, why) = (name.to_owned(), why.to_owned());
+        self.notice(Notice::NotUpgraded { name, why }, actions);
     }
 
     /// Starts what is due, and kills what does not get going or does not go.
     pub(super) fn watch_children(&mut self, actions: &mut Actions) {
+        if self.draining() {
+            return self.kill_overdue(actions);
+        }
         let now = self.now;
         let mut late = Vec::new();
         for (name, child) in &mut self.children {
             match child.state {
                 ChildState::Due(at) | ChildState::GaveUp(at) if at <= now => {
-                    let launch = Launch(self.next_launch);
-                    self.next_launch += 1;
+                    let launch = next_launch(&mut self.next_launch);
                     child.restarts += u32::from(!child.starts.is_empty());
                     child.starts.push_back(now);
                     child.state = ChildState::Starting(launch, now);
-                    actions.push(Action::Spawn {
-                        launch,
-                        spec: child.spec.clone(),
-                    });
+                    let spec = child.spec.clone();
+                    actions.push(Action::Spawn { launch, spec });
                 }
                 ChildState::Starting(launch, since) if now.saturating_sub(since) > START_LIMIT => {
                     late.push((name.clone(), launch));
                 }
                 _ => {}
             }
+            match child.upgrade {
+                Some(Upgrade::Due(at)) if at <= now => {
+                    let launch = next_launch(&mut self.next_launch);
+                    child.upgrade = Some(Upgrade::Starting(launch, now));
+                    let spec = child.spec.clone();
+                    actions.push(Action::Spawn { launch, spec });
+                }
+                Some(Upgrade::Starting(launch, since))
+                    if now.saturating_sub(since) > START_LIMIT =>
+                {
+                    late.push((name.clone(), launch));
+                }
+                _ => {}
+            }
         }
         for (name, launch) in late {
-            actions.push(Action::Kill {
-                launch: Some(launch),
-                pid: 0,
-            });
-            self.child_down(&name, false, "it was started and did not join", actions);
+            self.does_not_join(&name, launch, actions);
         }
-        self.retired.retain(|_, retired| {
-            let overdue = now.saturating_sub(retired.since) > LEAVE_LIMIT;
-            if overdue {
-                actions.push(Action::Kill {
-                    launch: retired.launch,
-                    pid: retired.pid,
-                });
-            }
-            !overdue
+        self.kill_overdue(actions);
+    }
+
+    fn does_not_join(&mut self, name: &str, launch: Launch, actions: &mut Actions) {
+        let why = "it was started and did not join";
+        let (killed, pid) = (Some(launch), 0);
+        actions.push(Action::Kill {
+            launch: killed,
+            pid,
         });
+        if self.is_successor(name, launch) {
+            return self.upgrade_failed(name, why, actions);
+        }
+        self.notice(Notice::killed(name, why), actions);
+        if let Some(child) = self.children.get_mut(name) {
+            child.stuck = Some(why.to_owned());
+        }
+        self.child_down(name, false, why, actions);
+        self.fail_absent(actions);
+    }
+
+    fn kill_overdue(&mut self, actions: &mut Actions) {
+        let now = self.now;
+        let overdue = |it: &Retired| now.saturating_sub(it.since) > LEAVE_LIMIT;
+        let (over, rest): (BTreeMap<_, _>, BTreeMap<_, _>) = std::mem::take(&mut self.retired)
+            .into_iter()
+            .partition(|(_, retired)| overdue(retired));
+        self.retired = rest;
+        for (session, Retired { launch, pid, .. }) in over {
+            actions.push(Action::Kill { launch, pid });
+            self.retired_has_gone(session, actions);
+        }
     }
 
     /// Whether a child of this name is being started, or will be soon.
@@ -346,19 +442,26 @@ impl State {
             .is_some_and(|child| matches!(child.state, ChildState::GaveUp(_) | ChildState::Ended))
     }
 
+    /// Why nobody should wait for a child that has not joined, if nobody should.
+    pub(super) fn child_cannot_start(&self, name: &str) -> Option<&str> {
+        let child = self.children.get(name)?;
+        child.stuck.as_deref()
+    }
+
     /// Whether every bundle that was to be started has joined, or has had its chance.
     pub(super) fn children_settled(&self) -> bool {
-        self.children
-            .iter()
-            .filter(|(_, child)| child.spec.role == Role::Bundle)
-            .all(|(name, child)| match child.state {
-                ChildState::Joined => self.bundles.get(name).is_some_and(|it| it.ready),
-                ChildState::Due(_) | ChildState::Starting(..) => {
-                    self.now > self.settings.collect + self.settings.absence_limit
-                }
-                ChildState::GaveUp(_) | ChildState::Ended => true,
-            })
+        let children = self.children.iter();
+        let mut bundles = children.filter(|(_, child)| child.spec.role == Role::Bundle);
+        bundles.all(|(name, _)| {
+            let ready = self.bundles.get(name).is_some_and(|it| it.ready);
+            ready || self.hopeless(name).is_some()
+        })
     }
+}
+
+fn next_launch(next: &mut u64) -> Launch {
+    *next += 1;
+    Launch(*next - 1)
 }
 
 /// A number below 256 that differs from child to child and from start to start, yet is the same

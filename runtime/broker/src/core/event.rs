@@ -7,7 +7,8 @@ use std::time::Duration;
 use qcbus_messages::{Digest, FromPeer, Hello, JobId};
 
 use super::types::{
-    ChildSpec, Demand, Launch, PrepareFailure, PreparedJob, SessionId, Stamp, StoreOutcome, Ticket,
+    ChildEnd, ChildSpec, Demand, Launch, PrepareFailure, PreparedJob, SessionId, Stamp,
+    StoreOutcome, Ticket,
 };
 
 /// Everything that can happen to the broker.
@@ -93,10 +94,8 @@ pub enum Event {
     Exited {
         /// Which start.
         launch: Launch,
-        /// How: for a person.
-        how: String,
-        /// Exit status 0.
-        success: bool,
+        /// How.
+        end: ChildEnd,
     },
     /// A configuration is in force from now on.
     Configured {
@@ -122,6 +121,13 @@ pub enum Event {
         unwatched: Option<String>,
         /// When to give up.
         timeout: Option<Duration>,
+    },
+    /// Somebody wants a bundle off the roster that is there by joining.
+    RemoveBundle {
+        /// The client.
+        ticket: Ticket,
+        /// The bundle.
+        name: String,
     },
     /// Stop taking files, finish what is there, stop.
     Drain,

@@ -2,7 +2,7 @@
 //! wait. A path is in the queue at most once, so a file that changes a hundred times while it
 //! waits is checked once, with its newest bytes.
 
-use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -49,7 +49,9 @@ pub struct FileEntry {
     stage: Stage,
     /// It changed while it was being checked, or something that it depends on changed at any time:
     /// its verdict must not be taken to stand because its stamp is the same.
-    pub dirty: bool,
+    pub doubted: bool,
+    /// What it is accepted for was taken from behind the gate, until it is known to stand.
+    pub shut: bool,
     /// Not before then, after something failed for want of room or disk.
     pub not_before: Duration,
     /// The verdict on some bytes, not always the present ones.
@@ -64,6 +66,8 @@ pub struct Files {
     entries: BTreeMap<FileId, FileEntry>,
     by_path: HashMap<Arc<Path>, FileId>,
     dependents: HashMap<Arc<Path>, Vec<FileId>>,
+    /// Paths that nobody depends on any more, until somebody asks.
+    forgotten: BTreeSet<Arc<Path>>,
     next: FileId,
     fresh: VecDeque<FileId>,
     background: VecDeque<FileId>,
@@ -141,7 +145,8 @@ impl Files {
                 stamp,
                 present: true,
                 stage: Stage::Idle,
-                dirty: false,
+                doubted: false,
+                shut: false,
                 not_before: Duration::ZERO,
                 judged: None,
                 delivered: Vec::new(),
@@ -259,6 +264,7 @@ impl Files {
             self.forget_dependent(path, id);
         }
         for path in new {
+            self.forgotten.remove(path);
             let ids = self.dependents.entry(path.clone()).or_default();
             if !ids.contains(&id) {
                 ids.push(id);
@@ -269,10 +275,17 @@ impl Files {
     fn forget_dependent(&mut self, path: &Path, id: FileId) {
         if let Some(ids) = self.dependents.get_mut(path) {
             ids.retain(|other| *other != id);
-            if ids.is_empty() {
-                self.dependents.remove(path);
+            if ids.is_empty()
+                && let Some((path, _)) = self.dependents.remove_entry(path)
+            {
+                self.forgotten.insert(path);
             }
         }
+    }
+
+    /// The paths that nobody depends on any more, since this was last asked.
+    pub fn take_forgotten(&mut self) -> Vec<Arc<Path>> {
+        std::mem::take(&mut self.forgotten).into_iter().collect()
     }
 
     /// The files whose verdict depends on this path (other than the file itself).

@@ -1,4 +1,4 @@
-//! Jobs: from the queue through reading and checking to a stored result.
+//! Jobs: from the queue through reading to the shares that bundles are given.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -6,16 +6,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use qcbus_document::FileKind;
-use qcbus_formats::xqar::Status;
-use qcbus_messages::{Catalogue, DocId, JobId, ToPeer};
+use qcbus_messages::{Catalogue, Digest, JobId};
 
 use super::action::Action;
-use super::files::{FileId, Priority, Stage};
-use super::outcome::{outcome, signature};
+use super::files::{FileId, Stage};
+use super::jury::{Epoch, Mark, Seat};
+use super::notice::Notice;
 use super::staging::Staged;
-use super::types::{
-    BundleOutcome, CheckerOutcome, FinishedJob, PrepareFailure, PreparedJob, StoreOutcome,
-};
+use super::types::{Input, Judged, PrepareFailure, PreparedJob};
 use super::{Actions, State};
 
 /// Between two notices that there is no room.
@@ -31,6 +29,10 @@ pub(super) struct ActiveJob {
     pub stage: JobStage,
     pub prepared: Option<Arc<PreparedJob>>,
     pub unreadable: Option<String>,
+    /// In which its jury was called.
+    pub epoch: Epoch,
+    /// The configuration under which it is checked.
+    pub config: Digest,
     /// By bundle name.
     pub shares: BTreeMap<String, Share>,
 }
@@ -45,6 +47,13 @@ pub(super) enum JobStage {
     Storing,
 }
 
+impl JobStage {
+    /// Whether bundles are at work on it, or have just ended.
+    pub fn is_before_storing(self) -> bool {
+        matches!(self, JobStage::Checking | JobStage::Finished(_))
+    }
+}
+
 /// One bundle's share of a job.
 #[derive(Debug)]
 pub(super) struct Share {
@@ -52,6 +61,7 @@ pub(super) struct Share {
     pub version: String,
     /// As it was when the job was given out; `None` for a bundle that was never seen.
     pub catalogue: Option<Arc<Catalogue>>,
+    pub mark: Option<Mark>,
     pub demanded: Vec<u32>,
     pub staged: BTreeMap<u32, Staged>,
     pub staged_bytes: usize,
@@ -67,16 +77,32 @@ pub(super) struct Share {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum ShareState {
     Queued,
-    Sent {
-        since: Duration,
-        alone_and_fresh: bool,
-    },
+    Sent { alone_and_fresh: bool },
     Done,
     Failed(String),
 }
 
 impl Share {
-    fn over(&self) -> bool {
+    /// The share of who sits there. Nobody can check a file that cannot be read; who was never
+    /// seen is waited for nevertheless.
+    pub fn of(seat: &Seat, unreadable: Option<&str>) -> Share {
+        let why = unreadable.filter(|_| seat.catalogue.is_some());
+        Share {
+            state: why.map_or(ShareState::Queued, |why| ShareState::Failed(why.to_owned())),
+            version: seat.version.clone(),
+            catalogue: seat.catalogue.clone(),
+            mark: seat.mark,
+            demanded: seat.demanded.clone(),
+            staged: BTreeMap::new(),
+            staged_bytes: 0,
+            micros: 0,
+            suspect: false,
+            strikes: 0,
+            absent: false,
+        }
+    }
+
+    pub fn is_over(&self) -> bool {
         matches!(self.state, ShareState::Done | ShareState::Failed(_))
     }
 
@@ -116,23 +142,16 @@ impl State {
 
     /// Begins with one file, unless its verdict still stands.
     fn take(&mut self, id: FileId, actions: &mut Actions) {
-        let Some(entry) = self.files.get(id) else {
+        let Some(entry) = self.files.get(id).filter(|it| it.present) else {
             return;
         };
-        if !entry.present {
-            return;
-        }
         if let Some(judged) = &entry.judged {
             let known = judged.inputs.first().and_then(|root| root.content);
             let same_bytes =
-                !judged.racy && !entry.dirty && known.map(|it| it.0) == Some(entry.stamp);
+                !judged.racy && !entry.doubted && known.map(|it| it.0) == Some(entry.stamp);
             if same_bytes && self.stands(entry.kind, judged) {
-                let (path, judged) = (entry.path.clone(), judged.clone());
-                actions.push(Action::Judged {
-                    path,
-                    judged,
-                    fresh: false,
-                });
+                let judged = judged.clone();
+                self.confirm(id, &judged, actions);
                 self.settle_waits(id, actions);
                 return;
             }
@@ -141,7 +160,7 @@ impl State {
         let job = self.next_job();
         self.files.set_stage(id, Stage::Active(job));
         if let Some(entry) = self.files.get_mut(id) {
-            entry.dirty = false;
+            entry.doubted = false;
         }
         self.preparing += 1;
         self.jobs.insert(
@@ -154,6 +173,8 @@ impl State {
                 stage: JobStage::Preparing,
                 prepared: None,
                 unreadable: None,
+                epoch: self.epoch,
+                config: self.config,
                 shares: BTreeMap::new(),
             },
         );
@@ -184,7 +205,7 @@ impl State {
                 // Every file in the queue would say the same and push out all other notices.
                 if self.now >= self.mute_room_until {
                     self.mute_room_until = self.now + ROOM_NOTICE_PAUSE;
-                    self.notice(why, actions);
+                    self.notice(Notice::NoRoom(why), actions);
                 }
                 self.requeue_later(id, self.settings.retry_after, actions);
             }
@@ -194,14 +215,14 @@ impl State {
             Err(PrepareFailure::Unreadable { reason, stamp }) => {
                 if let Some(job) = self.jobs.get_mut(&id) {
                     job.unreadable = Some(reason);
-                    let stamp = stamp.map(|stamp| (stamp, qcbus_messages::Digest::default()));
-                    let input = super::types::Input {
+                    let stamp = stamp.map(|stamp| (stamp, Digest::default()));
+                    let input = Input {
                         path: job.path.clone(),
                         content: stamp,
                     };
                     job.prepared = Some(Arc::new(PreparedJob {
                         inputs: vec![input],
-                        basis: qcbus_messages::Digest::default(),
+                        basis: Digest::default(),
                         racy: true,
                         documents: Vec::new(),
                         missing: Vec::new(),
@@ -226,7 +247,7 @@ impl State {
         if let Some((stamp, _)) = prepared.root() {
             entry.stamp = stamp;
         }
-        if entry.dirty || !entry.present {
+        if entry.doubted || !entry.present {
             self.end_job(id, actions);
             return;
         }
@@ -237,7 +258,7 @@ impl State {
             &prepared.inputs,
             actions,
         );
-        let same = |judged: &super::types::Judged| judged.basis == prepared.basis;
+        let same = |judged: &Judged| judged.basis == prepared.basis;
         match old {
             Some(judged) if same(&judged) && self.stands(kind, &judged) => {
                 self.restamp(file, &judged, prepared, actions);
@@ -251,7 +272,7 @@ impl State {
     fn restamp(
         &mut self,
         file: FileId,
-        judged: &super::types::Judged,
+        judged: &Judged,
         prepared: &PreparedJob,
         actions: &mut Actions,
     ) {
@@ -263,350 +284,51 @@ impl State {
             entry.judged = Some(judged.clone());
             let path = entry.path.clone();
             actions.push(Action::Restamp {
-                path: path.clone(),
+                path,
                 judged: judged.clone(),
             });
-            actions.push(Action::Judged {
-                path,
-                judged,
-                fresh: false,
-            });
+            self.confirm(file, &judged, actions);
         }
     }
 
-    fn depend(
-        &mut self,
-        file: FileId,
-        old: &[super::types::Input],
-        inputs: &[super::types::Input],
-        actions: &mut Actions,
-    ) {
-        let paths = |inputs: &[super::types::Input]| -> Vec<Arc<Path>> {
-            inputs
-                .iter()
-                .skip(1)
-                .map(|input| input.path.clone())
-                .collect()
+    /// A verdict stands after all.
+    fn confirm(&mut self, file: FileId, judged: &Arc<Judged>, actions: &mut Actions) {
+        let Some(entry) = self.files.get_mut(file) else {
+            return;
         };
-        let new = paths(inputs);
-        self.files.set_dependencies(file, &paths(old), &new);
+        let path = entry.path.clone();
+        if std::mem::take(&mut entry.shut) {
+            let (path, judged) = (path.clone(), judged.clone());
+            actions.push(Action::OpenGate { path, judged });
+        }
+        actions.push(Action::Judged {
+            path,
+            judged: judged.clone(),
+            fresh: false,
+        });
+    }
+
+    fn depend(&mut self, file: FileId, old: &[Input], inputs: &[Input], actions: &mut Actions) {
+        let others = |inputs: &[Input]| -> Vec<Arc<Path>> {
+            let others = inputs.iter().skip(1);
+            others.map(|input| input.path.clone()).collect()
+        };
+        let new = others(inputs);
+        self.files.set_dependencies(file, &others(old), &new);
+        self.forget_dependencies(actions);
         if !new.is_empty() {
-            let stamps = inputs
-                .iter()
-                .skip(1)
-                .map(|it| it.content.map(|content| content.0));
+            let stamps = inputs.iter().skip(1);
+            let stamps = stamps.map(|it| it.content.map(|content| content.0));
             let files = new.into_iter().zip(stamps).collect();
             actions.push(Action::Depend { files });
         }
     }
 
-    /// Makes a share for every bundle that must check this file and hands them out.
-    fn give_out(&mut self, id: JobId, actions: &mut Actions) {
-        let Some(job) = self.jobs.get(&id) else {
-            return;
-        };
-        let kind = job.kind;
-        let readable = job.unreadable.is_none();
-        let mut shares = self.shares_for(kind);
-        if !readable {
-            let why = job.unreadable.clone().unwrap_or_default();
-            for share in shares.values_mut() {
-                share.state = ShareState::Failed(why.clone());
-            }
-        }
-        let names: Vec<String> = shares.keys().cloned().collect();
-        if let Some(job) = self.jobs.get_mut(&id) {
-            job.stage = JobStage::Checking;
-            job.shares = shares;
-        }
-        for name in names {
-            if let Some(bundle) = self.bundles.get_mut(&name) {
-                bundle.queue.push_back(id);
-            }
-            self.dispatch(&name, actions);
-        }
-        self.fail_absent(actions);
-        self.finish_if_over(id, actions);
-    }
-
-    /// Gives a bundle its next jobs: suspects one at a time and alone, others up to its capacity.
-    pub(super) fn dispatch(&mut self, name: &str, actions: &mut Actions) {
-        loop {
-            let findings = self.room_for_findings();
-            let Some(bundle) = self.bundles.get_mut(name) else {
-                return;
-            };
-            let (Some(session), true) = (bundle.session, bundle.ready && !bundle.leaving) else {
-                return;
-            };
-            let room = if bundle.suspects.is_empty() {
-                bundle.capacity
-            } else {
-                1
-            };
-            if bundle.active.len() >= room {
-                return;
-            }
-            let Some((id, suspect)) = bundle.next_job(findings) else {
-                return;
-            };
-            let fresh = bundle.fresh_process;
-            let Some(job) = self.jobs.get_mut(&id) else {
-                continue;
-            };
-            let Some(share) = job.shares.get_mut(name) else {
-                continue;
-            };
-            if share.state != ShareState::Queued {
-                continue;
-            }
-            let Some(prepared) = job.prepared.clone() else {
-                continue;
-            };
-            share.state = ShareState::Sent {
-                since: self.now,
-                alone_and_fresh: suspect && fresh,
-            };
-            let message = super::types::job_message(id, self.config, job.kind, &prepared);
-            bundle.active.insert(id);
-            bundle.fresh_process = false;
-            bundle.moved = self.now;
-            actions.push(Action::Send {
-                session,
-                message: ToPeer::Job(message),
-            });
-        }
-    }
-
-    /// Gives every bundle that has room its next jobs: room also comes from jobs that are cancelled.
-    pub(super) fn dispatch_all(&mut self, actions: &mut Actions) {
-        let waiting = self
-            .bundles
-            .iter()
-            .filter(|(_, it)| it.ready && !(it.queue.is_empty() && it.suspects.is_empty()));
-        let names: Vec<String> = waiting.map(|(name, _)| name.clone()).collect();
-        for name in names {
-            self.dispatch(&name, actions);
-        }
-    }
-
-    /// A bundle lacks a document of a job that it has.
-    pub(super) fn need_document(&mut self, name: &str, doc: DocId, actions: &mut Actions) {
-        let Some(bundle) = self.bundles.get(name) else {
-            return;
-        };
-        let has = |id: &&JobId| {
-            let prepared = self.jobs.get(id).and_then(|job| job.prepared.as_ref());
-            prepared.is_some_and(|it| it.documents.iter().any(|document| document.doc == doc))
-        };
-        if let Some(job) = bundle.active.iter().find(has) {
-            actions.push(Action::PublishAgain { job: *job, doc });
-        }
-    }
-
-    /// A bundle is through with a job.
-    pub(super) fn job_done(
-        &mut self,
-        name: &str,
-        id: JobId,
-        micros: u64,
-        actions: &mut Actions,
-    ) -> bool {
-        let Some(share) = self
-            .jobs
-            .get_mut(&id)
-            .and_then(|job| job.shares.get_mut(name))
-        else {
-            return false;
-        };
-        if !matches!(share.state, ShareState::Sent { .. }) {
-            return false;
-        }
-        share.state = ShareState::Done;
-        share.micros = micros;
-        if let Some(bundle) = self.bundles.get_mut(name) {
-            bundle.active.remove(&id);
-            bundle.done += 1;
-            bundle.moved = self.now;
-            bundle.proved = true;
-        }
-        self.finish_if_over(id, actions);
-        self.dispatch(name, actions);
-        true
-    }
-
-    /// When every share is there, the job is ready to be stored.
-    pub(super) fn finish_if_over(&mut self, id: JobId, actions: &mut Actions) {
-        let Some(job) = self.jobs.get_mut(&id) else {
-            return;
-        };
-        if job.stage == JobStage::Checking && job.shares.values().all(Share::over) {
-            job.stage = JobStage::Finished(Duration::ZERO);
-            self.store_finished(actions);
-        }
-    }
-
-    fn store_finished(&mut self, actions: &mut Actions) {
-        let now = self.now;
-        let due = |job: &ActiveJob| matches!(job.stage, JobStage::Finished(at) if at <= now);
-        let ids: Vec<JobId> = self
-            .jobs
-            .iter()
-            .filter(|(_, job)| due(job))
-            .map(|(id, _)| *id)
-            .collect();
-        for id in ids {
-            if self.storing >= self.settings.max_storing {
-                return;
-            }
-            let finished = self.finished(id);
-            if let (Some(finished), Some(job)) = (finished, self.jobs.get_mut(&id)) {
-                job.stage = JobStage::Storing;
-                self.storing += 1;
-                actions.push(Action::Store(Box::new(finished)));
-            }
-        }
-    }
-
-    fn finished(&self, id: JobId) -> Option<FinishedJob> {
-        let job = self.jobs.get(&id)?;
-        Some(FinishedJob {
-            job: id,
-            path: job.path.clone(),
-            kind: job.kind,
-            config: self.config,
-            prepared: job.prepared.clone().filter(|_| job.unreadable.is_none()),
-            unreadable: job.unreadable.clone(),
-            bundles: job
-                .shares
-                .iter()
-                .map(|(name, share)| outcome(name, share))
-                .chain(self.inapplicable(job.kind))
-                .collect(),
-            signature: signature(job.shares.iter().map(|(name, share)| {
-                let offer = share.catalogue.as_deref().filter(|_| !share.absent);
-                (name.as_str(), share.version.as_str(), offer)
-            })),
-            elapsed: self.now.saturating_sub(job.since),
-        })
-    }
-
-    /// Configured bundles that do not take files of this kind: their checkers are listed as
-    /// skipped, so that nobody takes them for lost.
-    fn inapplicable(&self, kind: FileKind) -> Vec<BundleOutcome> {
-        let mut outcomes = Vec::new();
-        let named = self.demand.named();
-        for (name, bundle) in &self.bundles {
-            let Some(catalogue) = &bundle.catalogue else {
-                continue;
-            };
-            let wanted = named
-                .iter()
-                .any(|it| self.demand.means(it, name, &catalogue.alias));
-            if !wanted || catalogue.kinds.contains(&kind) {
-                continue;
-            }
-            let skipped = |checker| CheckerOutcome {
-                checker,
-                status: Status::Skipped,
-                reason: format!("{name} does not check .{} files", kind.as_str()),
-                params: Vec::new(),
-                issues: Vec::new(),
-                metadata: Vec::new(),
-            };
-            let checkers = self.demand.checkers(name, catalogue, kind);
-            outcomes.push(BundleOutcome {
-                name: name.clone(),
-                version: bundle.version.clone(),
-                catalogue: Some(catalogue.clone()),
-                failure: None,
-                checkers: checkers.into_iter().map(skipped).collect(),
-                micros: 0,
-            });
-        }
-        outcomes
-    }
-
-    /// Storing is over.
-    pub(super) fn stored(&mut self, id: JobId, outcome: StoreOutcome, actions: &mut Actions) {
-        let Some(job) = self.jobs.get_mut(&id) else {
-            return;
-        };
-        if job.stage != JobStage::Storing {
-            return;
-        }
-        self.storing -= 1;
-        let file = job.file;
-        match outcome {
-            StoreOutcome::Stored(judged) => {
-                let judged = Arc::new(*judged);
-                self.rate.note(self.now);
-                if let Some(entry) = self.files.get_mut(file) {
-                    entry.judged = Some(judged.clone());
-                    let path = entry.path.clone();
-                    actions.push(Action::Judged {
-                        path,
-                        judged: judged.clone(),
-                        fresh: true,
-                    });
-                }
-                self.deliver_to_all(file, actions);
-                self.end_job(id, actions);
-            }
-            StoreOutcome::Stale => {
-                if let Some(entry) = self.files.get_mut(file) {
-                    entry.dirty = true;
-                }
-                self.end_job(id, actions);
-            }
-            StoreOutcome::Failed(why) => {
-                job.stage = JobStage::Finished(self.now + self.settings.retry_after);
-                self.notice(why, actions);
-            }
-        }
-    }
-
-    /// The job is over, whatever came of it; the file waits again if it changed meanwhile.
-    pub(super) fn end_job(&mut self, id: JobId, actions: &mut Actions) {
-        let Some(job) = self.jobs.remove(&id) else {
-            return;
-        };
-        match job.stage {
-            JobStage::Preparing => {}
-            JobStage::Storing | JobStage::Finished(_) => {}
-            JobStage::Checking => self.cancel_shares(id, &job, actions),
-        }
-        actions.push(Action::Release { job: id });
-        self.files.set_stage(job.file, Stage::Idle);
-        let Some(entry) = self.files.get_mut(job.file) else {
-            return;
-        };
-        if !entry.present {
-            self.vanished_file(job.file, actions);
-        } else if entry.dirty || entry.judged.is_none() {
-            self.files.enqueue(job.file, Priority::Fresh, self.now);
-        } else if !self.is_current(job.file) {
-            self.files.enqueue(job.file, Priority::Background, self.now);
-        } else {
-            self.settle_waits(job.file, actions);
-        }
-    }
-
-    fn cancel_shares(&mut self, id: JobId, job: &ActiveJob, actions: &mut Actions) {
-        for (name, share) in &job.shares {
-            let Some(bundle) = self.bundles.get_mut(name) else {
-                continue;
-            };
-            if matches!(share.state, ShareState::Sent { .. }) {
-                bundle.active.remove(&id);
-                bundle.forgiven = Some(id);
-                if let Some(session) = bundle.session {
-                    actions.push(Action::Send {
-                        session,
-                        message: ToPeer::Cancel { job: id },
-                    });
-                }
-            }
+    /// What no verdict depends on any more need not be watched.
+    pub(super) fn forget_dependencies(&mut self, actions: &mut Actions) {
+        let paths = self.files.take_forgotten();
+        if !paths.is_empty() {
+            actions.push(Action::Undepend { paths });
         }
     }
 
@@ -616,7 +338,7 @@ impl State {
             return;
         };
         if let Some(entry) = self.files.get_mut(file) {
-            entry.dirty = true;
+            entry.doubted = true;
             entry.not_before = self.now + pause;
         }
         self.end_job(id, actions);

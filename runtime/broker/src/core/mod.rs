@@ -4,17 +4,26 @@
 //! around it (`crate::engine`) turns the world into events and carries the actions out. Nothing
 //! in here can block, fail or panic on input, and everything can be tested as a table.
 
+mod absent;
 mod action;
 mod bundles;
+mod changes;
+mod checking;
 mod children;
+mod ending;
 mod event;
 mod files;
+mod finishing;
 mod jobs;
+mod jury;
+mod notice;
 mod outcome;
 mod reporters;
+mod roster;
 mod settings;
 mod staging;
 mod status;
+mod suspects;
 mod types;
 mod waits;
 
@@ -29,11 +38,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use qcbus_document::FileKind;
-use qcbus_messages::{Digest, JobId, Role, ToPeer};
+use qcbus_messages::{Digest, JobId, Role};
 
 pub use action::Action;
 pub use event::Event;
-pub use files::{FileId, Priority, Stage};
+pub use jury::{Epoch, Juror, Jury, Mark, Member, Origin};
+pub use notice::Notice;
 pub(crate) use outcome::weight;
 pub use settings::Settings;
 pub use types::*;
@@ -43,6 +53,7 @@ use children::{Child, Retired};
 use files::Files;
 use jobs::ActiveJob;
 use reporters::Reporter;
+use roster::Seats;
 use status::Rate;
 use waits::Waiter;
 
@@ -64,13 +75,17 @@ pub struct State {
     waiters: Vec<Waiter>,
     config: Digest,
     demand: Arc<dyn Demand>,
+    epoch: Epoch,
+    seats: Seats,
+    /// The roster has changed, or somebody on it has come back: jobs under way follow.
+    reseat: bool,
     phase: Phase,
     scanned: bool,
     preparing: usize,
     storing: usize,
     next_job: u64,
     next_launch: u64,
-    notices: VecDeque<String>,
+    notices: VecDeque<Notice>,
     rate: Rate,
     judged_once: bool,
     /// Until then nobody need be told again that there is no room.
@@ -87,9 +102,6 @@ enum Phase {
     Stopped,
 }
 
-/// How long peers may take to leave at the end.
-const GOODBYE_LIMIT: Duration = Duration::from_secs(3);
-
 /// Notices kept for `status`.
 const NOTICES: usize = 50;
 
@@ -98,7 +110,8 @@ impl State {
     pub fn new(settings: Settings, config: Digest, demand: Arc<dyn Demand>) -> State {
         // Launch numbers differ from those of earlier generations, whose children may be adopted.
         let next_launch = (settings.generation << 20) + 1;
-        State {
+        let epoch = Epoch::first_of(settings.generation);
+        let mut state = State {
             settings,
             now: Duration::ZERO,
             files: Files::default(),
@@ -111,6 +124,9 @@ impl State {
             waiters: Vec::new(),
             config,
             demand,
+            epoch,
+            seats: Seats::new(),
+            reseat: false,
             phase: Phase::Running,
             scanned: false,
             preparing: 0,
@@ -121,7 +137,9 @@ impl State {
             rate: Rate::default(),
             judged_once: false,
             mute_room_until: Duration::ZERO,
-        }
+        };
+        state.begin_epoch();
+        state
     }
 
     /// Puts in what the journal knows of a file. It counts as present only once a scan has seen it.
@@ -154,9 +172,9 @@ impl State {
         self.now = self.now.max(now);
         let mut actions = Vec::new();
         match event {
-            Event::Settled { path, stamp } => self.settled(&path, stamp),
+            Event::Settled { path, stamp } => self.settled(&path, stamp, &mut actions),
             Event::Present { path } => self.present(&path),
-            Event::Touched { path, stamp } => self.touched(&path, stamp),
+            Event::Touched { path, stamp } => self.touched(&path, stamp, &mut actions),
             Event::Vanished { path } => self.vanished(&path, &mut actions),
             Event::Scanned => self.scanned(&mut actions),
             Event::Prepared { job, result } => self.prepared(job, result, &mut actions),
@@ -172,13 +190,7 @@ impl State {
             Event::Undeliverable { session, job, why } => {
                 self.undeliverable(session, job, why, &mut actions);
             }
-            Event::Exited {
-                launch,
-                how,
-                success,
-            } => {
-                self.exited(launch, &how, success, &mut actions);
-            }
+            Event::Exited { launch, end } => self.exited(launch, &end, &mut actions),
             Event::Configured { digest, demand } => self.configured(digest, demand, &mut actions),
             Event::Children { specs } => self.set_children(specs, &mut actions),
             Event::Wait {
@@ -190,148 +202,17 @@ impl State {
             } => {
                 self.wait(ticket, &path, stamp, unwatched, timeout, &mut actions);
             }
+            Event::RemoveBundle { ticket, name } => {
+                self.removal(ticket, &name, &mut actions);
+            }
             Event::Drain => self.drain(),
             Event::Tick => self.tick(&mut actions),
         }
+        self.follow_roster(&mut actions);
         self.dispatch_all(&mut actions);
         self.pump(&mut actions);
         self.wind_down(&mut actions);
         actions
-    }
-
-    /// A file is there and may still be written to.
-    fn present(&mut self, path: &Arc<Path>) {
-        let known = self.files.id(path).and_then(|id| self.files.get_mut(id));
-        if let Some(entry) = known {
-            entry.present = true;
-        }
-    }
-
-    /// Whether verdicts depend on a file that is not there for a verdict of its own.
-    pub fn is_only_a_dependency(&self, path: &Path) -> bool {
-        let entry = self.files.id(path).and_then(|id| self.files.get(id));
-        !entry.is_some_and(|it| it.present) && !self.files.dependents(path).is_empty()
-    }
-
-    /// A file is there and quiet: whose verdict depends on it?
-    fn touched(&mut self, path: &Arc<Path>, stamp: Stamp) {
-        for dependent in self.files.dependents(path) {
-            let differs = self
-                .files
-                .get(dependent)
-                .and_then(|entry| entry.judged.as_ref())
-                .is_none_or(|judged| {
-                    let input = judged.inputs.iter().find(|input| input.path == *path);
-                    judged.racy || input.and_then(|it| it.content).map(|it| it.0) != Some(stamp)
-                });
-            if differs {
-                self.doubt(dependent);
-            }
-        }
-    }
-
-    /// A file is there and quiet.
-    fn settled(&mut self, path: &Arc<Path>, stamp: Stamp) {
-        self.touched(path, stamp);
-        let Some(kind) = FileKind::of_path(path) else {
-            return;
-        };
-        let id = self
-            .files
-            .id(path)
-            .unwrap_or_else(|| self.files.insert(path, kind, stamp));
-        let Some(entry) = self.files.get_mut(id) else {
-            return;
-        };
-        let known = entry
-            .judged
-            .as_ref()
-            .and_then(|it| it.inputs.first().and_then(|root| root.content));
-        let racy = entry.judged.as_ref().is_some_and(|it| it.racy);
-        let same = entry.present
-            && entry.stamp == stamp
-            && !racy
-            && (known.map(|it| it.0) == Some(stamp) || !matches!(entry.stage(), Stage::Idle));
-        entry.present = true;
-        entry.stamp = stamp;
-        if !same {
-            self.changed(id);
-        }
-    }
-
-    /// Something that the verdict on a file depends on is not what it was. The file's own stamp
-    /// does not tell, so the verdict is marked: it stands only after everything was read again.
-    fn doubt(&mut self, id: FileId) {
-        if let Some(entry) = self.files.get_mut(id) {
-            entry.dirty = true;
-        }
-        self.changed(id);
-    }
-
-    /// The file, or something it depends on, is not what it was.
-    fn changed(&mut self, id: FileId) {
-        let Some(entry) = self.files.get_mut(id) else {
-            return;
-        };
-        if !entry.present {
-            return;
-        }
-        entry.not_before = Duration::ZERO;
-        match entry.stage() {
-            Stage::Active(_) => entry.dirty = true,
-            Stage::Idle | Stage::Waiting(..) => self.files.enqueue(id, Priority::Fresh, self.now),
-        }
-    }
-
-    fn vanished(&mut self, path: &Arc<Path>, actions: &mut Actions) {
-        for dependent in self.files.dependents(path) {
-            self.doubt(dependent);
-        }
-        if let Some(id) = self.files.id(path) {
-            self.vanished_file(id, actions);
-        }
-    }
-
-    /// A file has gone: its result is withdrawn once no job of it is left.
-    fn vanished_file(&mut self, id: FileId, actions: &mut Actions) {
-        let Some(entry) = self.files.get_mut(id) else {
-            return;
-        };
-        entry.present = false;
-        if let Stage::Active(job) = *entry.stage() {
-            // Nothing is stored for a file that is not there; a job at the writers' will notice.
-            if self
-                .jobs
-                .get(&job)
-                .is_some_and(|it| it.stage == jobs::JobStage::Checking)
-            {
-                self.end_job(job, actions);
-            }
-            return;
-        }
-        let path = entry.path.clone();
-        let reporters = self.void_reports(id);
-        self.files.remove(id);
-        actions.push(Action::Withdraw {
-            path: path.clone(),
-            reporters,
-        });
-        self.deliver_everything(actions);
-        self.answer_gone(&path, actions);
-    }
-
-    /// The first scan is complete: what the journal knew and the scan did not see has gone.
-    fn scanned(&mut self, actions: &mut Actions) {
-        self.scanned = true;
-        let gone: Vec<FileId> = self
-            .files
-            .iter()
-            .filter(|(_, entry)| !entry.present)
-            .map(|(id, _)| id)
-            .collect();
-        for id in gone {
-            self.vanished_file(id, actions);
-        }
     }
 
     fn garbage(&mut self, session: SessionId, what: &str, actions: &mut Actions) {
@@ -355,7 +236,9 @@ impl State {
     }
 
     fn gone(&mut self, session: SessionId, why: &str, actions: &mut Actions) {
-        self.retired.remove(&session);
+        if self.retired.remove(&session).is_some() {
+            self.retired_has_gone(session, actions);
+        }
         match self.sessions.get(&session).cloned() {
             Some((Role::Bundle, name)) => self.bundle_died(&name, why, actions),
             Some((Role::Reporter, name)) => self.reporter_died(&name, why, actions),
@@ -371,6 +254,7 @@ impl State {
     ) {
         if *message == qcbus_messages::FromPeer::Leaving {
             self.retired.remove(&session);
+            self.retired_has_gone(session, actions);
             actions.push(Action::Disconnect { session });
         }
     }
@@ -381,29 +265,16 @@ impl State {
         }
         self.config = digest;
         self.demand = demand;
+        self.begin_epoch();
         // What is being checked is checked under the old configuration: it starts anew.
-        let ids: Vec<JobId> = self
+        let under_way = self
             .jobs
             .iter()
-            .filter(|(_, job)| {
-                matches!(
-                    job.stage,
-                    jobs::JobStage::Checking | jobs::JobStage::Finished(_)
-                )
-            })
-            .map(|(id, _)| *id)
-            .collect();
+            .filter(|(_, job)| job.stage.is_before_storing());
+        let ids: Vec<JobId> = under_way.map(|(id, _)| *id).collect();
         for id in ids {
-            if let Some(entry) = self
-                .jobs
-                .get(&id)
-                .and_then(|job| self.files.get_mut(job.file))
-            {
-                entry.dirty = true;
-            }
-            self.end_job(id, actions);
+            self.begin_anew(id, actions);
         }
-        self.requeue_outdated();
     }
 
     /// Whether verdicts may be given: not before those who should take part have had their time.
@@ -414,27 +285,10 @@ impl State {
         if !self.judged_once {
             self.judged_once = self.now >= self.settings.collect && self.children_settled();
             if self.judged_once {
-                self.requeue_outdated();
+                self.reseat = true;
             }
         }
         self.judged_once
-    }
-
-    fn is_current(&self, id: FileId) -> bool {
-        let current = |entry: &files::FileEntry| {
-            entry
-                .judged
-                .as_ref()
-                .is_some_and(|judged| self.stands(entry.kind, judged))
-        };
-        // Without it, a bundle that is away would have its files judged over and over.
-        self.files.get(id).is_some_and(|entry| {
-            current(entry)
-                || entry
-                    .judged
-                    .as_ref()
-                    .is_some_and(|it| it.config == self.config)
-        })
     }
 
     fn tick(&mut self, actions: &mut Actions) {
@@ -443,84 +297,6 @@ impl State {
         self.watch_reporters(actions);
         self.fail_absent(actions);
         self.expire_waits(actions);
-    }
-
-    fn draining(&self) -> bool {
-        self.phase != Phase::Running
-    }
-
-    fn drain(&mut self) {
-        if self.phase == Phase::Running {
-            self.phase = Phase::Draining(self.now);
-        }
-    }
-
-    /// Moves the end on: jobs first, then reporters, then goodbye.
-    fn wind_down(&mut self, actions: &mut Actions) {
-        let quiet = self.jobs.is_empty() && self.all_delivered();
-        if self.settings.once
-            && self.scanned
-            && quiet
-            && self.files.is_quiet()
-            && !self.reporters_coming()
-        {
-            self.drain();
-        }
-        match self.phase {
-            Phase::Draining(since) => {
-                let overdue = self.now.saturating_sub(since) > self.settings.drain_limit;
-                if quiet || overdue {
-                    self.say_goodbye(actions);
-                }
-            }
-            Phase::Leaving(since) => {
-                let alone = self.sessions.values().all(|(_, name)| !self.is_ours(name));
-                if !alone && self.now.saturating_sub(since) > GOODBYE_LIMIT {
-                    self.kill_ours(actions);
-                }
-                if alone || self.now.saturating_sub(since) > GOODBYE_LIMIT {
-                    self.phase = Phase::Stopped;
-                    self.end_waits(actions);
-                    actions.push(Action::Stop);
-                }
-            }
-            Phase::Running | Phase::Stopped => {}
-        }
-    }
-
-    /// Whether a reporter that was to be started may still join.
-    fn reporters_coming(&self) -> bool {
-        self.children
-            .iter()
-            .any(|(name, child)| child.spec.role == Role::Reporter && self.child_is_coming(name))
-    }
-
-    fn say_goodbye(&mut self, actions: &mut Actions) {
-        self.phase = Phase::Leaving(self.now);
-        for (session, (_, name)) in &self.sessions {
-            if self.is_ours(name) {
-                actions.push(Action::Send {
-                    session: *session,
-                    message: ToPeer::Drain,
-                });
-            }
-        }
-    }
-
-    /// Kills what a broker started and what does not leave.
-    fn kill_ours(&self, actions: &mut Actions) {
-        for (role, name) in self.sessions.values() {
-            let process = match role {
-                Role::Bundle => self.bundles.get(name).map(|it| (it.launch, it.pid)),
-                Role::Reporter => self.reporter_named(name).map(|it| (it.launch, it.pid)),
-            };
-            if let Some((Some(launch), pid)) = process {
-                actions.push(Action::Kill {
-                    launch: Some(launch),
-                    pid,
-                });
-            }
-        }
     }
 
     /// Everything that the verdict on a file depends on, as it was read.
@@ -532,21 +308,13 @@ impl State {
             .unwrap_or_default()
     }
 
-    /// Whether a broker started this peer, this one or a former one.
-    fn is_ours(&self, name: &str) -> bool {
-        self.bundles.get(name).is_some_and(|it| it.launch.is_some())
-            || self
-                .reporter_named(name)
-                .is_some_and(|it| it.launch.is_some())
-    }
-
-    fn notice(&mut self, text: String, actions: &mut Actions) {
-        if self.notices.back() != Some(&text) {
+    fn notice(&mut self, notice: Notice, actions: &mut Actions) {
+        if self.notices.back() != Some(&notice) {
             if self.notices.len() >= NOTICES {
                 self.notices.pop_front();
             }
-            self.notices.push_back(text.clone());
-            actions.push(Action::Notice(text));
+            self.notices.push_back(notice.clone());
+            actions.push(Action::Notice(notice));
         }
     }
 }

@@ -1,40 +1,9 @@
 //! What a bundle said about a job, measured, cut to size and put in the form of a result.
 
 use qcbus_formats::xqar::{DomainInfo, InfoElement, Issue, Location, Locations, Status};
-use qcbus_messages::Catalogue;
-use sha2::{Digest as _, Sha256};
 
 use super::jobs::{Share, ShareState};
 use super::types::{BundleOutcome, CheckerOutcome};
-
-/// A number that changes when another set of bundles, versions or checkers would take part.
-pub(super) fn signature<'a>(
-    bundles: impl Iterator<Item = (&'a str, &'a str, Option<&'a Catalogue>)>,
-) -> u64 {
-    let mut hash = Sha256::new();
-    for (name, version, catalogue) in bundles {
-        let Some(catalogue) = catalogue else {
-            hash.update(format!("{name}\0absent\0"));
-            continue;
-        };
-        hash.update(format!("{name}\0{version}\0{}\0", catalogue.build_date));
-        for checker in &catalogue.checkers {
-            hash.update(format!(
-                "{}\0{:?}\0{}\0",
-                checker.id, checker.rule_uids, checker.default_on
-            ));
-            // Another default is another result.
-            for param in &checker.params {
-                hash.update(format!("{}={}\0", param.name, param.default));
-            }
-        }
-    }
-    let digest = hash.finalize();
-    digest
-        .iter()
-        .take(8)
-        .fold(0, |number, byte| (number << 8) | u64::from(*byte))
-}
 
 /// What one share says in the result.
 pub(super) fn outcome(name: &str, share: &Share) -> BundleOutcome {

@@ -5,10 +5,11 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use qcbus_messages::{FromPeer, Hello, JobId, PeerReport, Role};
+use qcbus_messages::{FromPeer, Hello, JobId, PeerReport, Role, ToPeer};
 
 use super::action::Action;
 use super::files::FileId;
+use super::notice::Notice;
 use super::types::{Delivery, Launch, SessionId};
 use super::{Actions, State};
 
@@ -41,6 +42,8 @@ pub(super) struct Reporter {
     pub void: BTreeSet<Arc<Path>>,
     /// Those of which it was told.
     pub voiding: BTreeSet<Arc<Path>>,
+    /// Older processes that finish what they have begun, and the files that it is about.
+    pub finishing: BTreeMap<SessionId, BTreeSet<FileId>>,
     pub heard: Duration,
     pub moved: Duration,
     pub done: u64,
@@ -57,7 +60,10 @@ impl Reporter {
     /// Takes the next file out of the queue. A file of which a result is under way waits for its
     /// turn: results are read back side by side, and the older one must not come last.
     fn next_in_queue(&mut self) -> Option<FileId> {
-        let under_way = |file: &FileId| self.active.values().any(|sent| sent.file == *file);
+        let under_way = |file: &FileId| {
+            self.active.values().any(|sent| sent.file == *file)
+                || self.finishing.values().any(|begun| begun.contains(file))
+        };
         let at = self.queue.iter().position(|file| !under_way(file))?;
         self.queue.remove(at)
     }
@@ -104,10 +110,8 @@ impl State {
         let Some(reporter) = self.reporters.get_mut(index as usize) else {
             return;
         };
-        if let Some(old) = reporter.session.replace(session) {
-            self.sessions.remove(&old);
-            actions.push(Action::Disconnect { session: old });
-        }
+        let old = reporter.session.replace(session);
+        let old = old.map(|old| (old, reporter.launch, reporter.pid));
         reporter.version.clone_from(&hello.version);
         reporter.incarnation = hello.incarnation;
         reporter.pid = hello.pid;
@@ -116,12 +120,49 @@ impl State {
         reporter.heard = now;
         reporter.moved = now;
         reporter.note.clear();
+        if let Some((old, launch, pid)) = old {
+            self.reporter_is_replaced(index, (old, launch, pid), hello.pid, actions);
+        }
         self.sessions
             .insert(session, (Role::Reporter, hello.name.clone()));
         actions.push(Action::Accept { session });
         self.drain_unwanted(&hello.name, launch, actions);
         self.queue_undelivered(index);
         self.deliver(index, actions);
+    }
+
+    /// A newer process of the same name takes over. The older one finishes what it has begun, and
+    /// until it has gone no newer result of those files is given out: it must not be overwritten.
+    fn reporter_is_replaced(
+        &mut self,
+        index: u32,
+        (old, launch, pid): (SessionId, Option<Launch>, u32),
+        newer: u32,
+        actions: &mut Actions,
+    ) {
+        self.sessions.remove(&old);
+        if pid == newer {
+            actions.push(Action::Disconnect { session: old });
+            return;
+        }
+        if let Some(reporter) = self.reporters.get_mut(index as usize) {
+            let begun = reporter.active.values().map(|sent| sent.file).collect();
+            reporter.finishing.insert(old, begun);
+        }
+        self.retire(old, launch, pid);
+        let message = ToPeer::Drain;
+        actions.push(Action::Send {
+            session: old,
+            message,
+        });
+    }
+
+    /// A process that was told to go has gone.
+    pub(super) fn retired_has_gone(&mut self, session: SessionId, actions: &mut Actions) {
+        let finished = |it: &mut Reporter| it.finishing.remove(&session).is_some();
+        if let Some(index) = self.reporters.iter_mut().position(finished) {
+            self.deliver(u32::try_from(index).unwrap_or(u32::MAX), actions);
+        }
     }
 
     /// Queues every result that this reporter has not acknowledged.
@@ -279,7 +320,10 @@ impl State {
                 if let Some(why) = failed {
                     reporter.failed += 1;
                     reporter.note.clone_from(&why);
-                    self.notice(format!("{name} could not report: {why}"), actions);
+                    self.notice(
+                        Notice::not_reported(name, format!("could not report: {why}")),
+                        actions,
+                    );
                 }
                 if let Some(entry) = self.files.get_mut(file) {
                     entry.delivered.retain(|(other, _)| *other != index);
@@ -302,7 +346,10 @@ impl State {
                 if let PeerReport::Failed(why) = report {
                     reporter.failed += 1;
                     reporter.note.clone_from(&why);
-                    self.notice(format!("{name} could not withdraw: {why}"), actions);
+                    self.notice(
+                        Notice::not_reported(name, format!("could not withdraw: {why}")),
+                        actions,
+                    );
                 }
                 if !again {
                     let reporter = name.to_owned();
@@ -338,12 +385,16 @@ impl State {
             && let Some(Sent { file, .. }) = reporter.active.remove(&job)
             && self.files.get(file).is_some_and(|it| it.present)
         {
-            self.notice(why, actions);
+            self.notice(Notice::NotDelivered(why), actions);
         }
         self.deliver(index, actions);
     }
 
     pub(super) fn reporter_died(&mut self, name: &str, why: &str, actions: &mut Actions) {
+        self.reporter_is_down(name, Notice::ended(name, why), actions);
+    }
+
+    fn reporter_is_down(&mut self, name: &str, notice: Notice, actions: &mut Actions) {
         let index = self.reporter_index(name);
         let Some(reporter) = self.reporters.get_mut(index as usize) else {
             return;
@@ -353,10 +404,11 @@ impl State {
             actions.push(Action::Disconnect { session });
         }
         let proved = reporter.done > 0;
-        reporter.note = why.to_owned();
+        let why = notice.why();
+        reporter.note.clone_from(&why);
         reporter.forget_session();
-        self.notice(format!("{name}: {why}"), actions);
-        self.child_down(name, proved, why, actions);
+        self.notice(notice, actions);
+        self.child_down(name, proved, &why, actions);
     }
 
     pub(super) fn watch_reporters(&mut self, actions: &mut Actions) {
@@ -377,7 +429,8 @@ impl State {
             if launch.is_some() {
                 actions.push(Action::Kill { launch, pid });
             }
-            self.reporter_died(&name, "it does not acknowledge results", actions);
+            let notice = Notice::killed(&name, "it does not acknowledge results");
+            self.reporter_is_down(&name, notice, actions);
         }
     }
 

@@ -6,11 +6,13 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use qcbus_messages::Verdict;
-use qcbus_messages::control::{FileCounts, PeerStatus, QueueStatus, Status};
+use qcbus_messages::control::{self, FileCounts, PeerStatus, QueueStatus, Status};
 
 use super::State;
 use super::bundles::Bundle;
 use super::children::ChildState;
+use super::files::{Priority, Stage};
+use super::notice::Notice;
 
 /// Verdicts of the last seconds.
 #[derive(Debug, Default)]
@@ -61,7 +63,8 @@ impl State {
             files: self.file_counts(),
             queue: self.queue_status(),
             peers: self.peer_status(),
-            notices: self.notices.iter().cloned().collect(),
+            epoch: self.epoch.0,
+            notices: self.notices.iter().map(told).collect(),
             ..Status::default()
         }
     }
@@ -75,8 +78,8 @@ impl State {
     }
 
     /// Keeps something for `status` that the state machine did not find out itself.
-    pub fn remark(&mut self, text: &str) {
-        self.notice(text.to_owned(), &mut Vec::new());
+    pub fn remark(&mut self, notice: Notice) {
+        self.notice(notice, &mut Vec::new());
     }
 
     fn file_counts(&self) -> FileCounts {
@@ -85,7 +88,7 @@ impl State {
             counts.total += 1;
             let idle = matches!(
                 entry.stage(),
-                super::Stage::Idle | super::Stage::Waiting(super::Priority::Background, _)
+                Stage::Idle | Stage::Waiting(Priority::Background, _)
             );
             let Some(judged) = entry.judged.as_ref().filter(|_| idle) else {
                 continue;
@@ -221,5 +224,13 @@ impl State {
             .get(name)
             .map_or(0, |child| child.restarts)
             .into()
+    }
+}
+
+fn told(notice: &Notice) -> control::Notice {
+    control::Notice {
+        kind: notice.kind().to_owned(),
+        about: notice.about().map(str::to_owned),
+        text: notice.to_string(),
     }
 }

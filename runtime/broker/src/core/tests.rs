@@ -18,6 +18,7 @@ use qcbus_messages::{
 use super::*;
 use crate::InForce;
 
+mod membership;
 mod parts;
 
 const CAPACITY: usize = 2;
@@ -37,6 +38,8 @@ struct World {
     peers: BTreeMap<SessionId, Bundle>,
     sessions: u64,
     judged: BTreeMap<u8, (Vec<Input>, Verdict)>,
+    /// The bundles whose judgement is in the verdict of each file, as stored.
+    judges: BTreeMap<u8, Vec<String>>,
     released: BTreeSet<JobId>,
     tickets: u64,
     waiting: BTreeMap<Ticket, u8>,
@@ -190,6 +193,7 @@ impl World {
             peers: BTreeMap::new(),
             sessions: 0,
             judged: BTreeMap::new(),
+            judges: BTreeMap::new(),
             released: BTreeSet::new(),
             tickets: 0,
             waiting: BTreeMap::new(),
@@ -306,6 +310,10 @@ impl World {
             unwatched: None,
             timeout: None,
         });
+    }
+
+    fn names_that_judged(&self, file: u8) -> Vec<&str> {
+        self.judges[&file].iter().map(String::as_str).collect()
     }
 
     fn input(&self, file: u8) -> Input {
@@ -449,6 +457,8 @@ impl World {
             StoreOutcome::Failed("full".to_owned())
         } else {
             self.stored.push(file);
+            let names = job.bundles.iter().map(|it| it.name.clone());
+            self.judges.insert(file, names.collect());
             let failed = job.bundles.iter().any(|bundle| bundle.failure.is_some());
             StoreOutcome::Stored(Box::new(Judged {
                 job: job.job,
@@ -460,7 +470,8 @@ impl World {
                 digest: prepared.root().unwrap().1,
                 basis: prepared.basis,
                 config: job.config,
-                bundles: job.signature,
+                jury: job.jury.clone(),
+                epoch: job.epoch,
                 inputs: prepared.inputs.clone(),
                 racy: false,
                 counts: [0; 3],

@@ -9,6 +9,8 @@ use qcbus_formats::xqar::{Issue, Metadata, Param, Status};
 use qcbus_messages::control::FileVerdict;
 use qcbus_messages::{Catalogue, Digest, Job, JobDocument, JobId, MissingDocument, Role, Verdict};
 
+use super::jury::{Epoch, Jury};
+
 /// A peer's session on the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SessionId(pub u64);
@@ -123,8 +125,10 @@ pub struct Judged {
     pub basis: Digest,
     /// Configuration it was given under.
     pub config: Digest,
-    /// Signature of the bundles that took part, see [`super::State::signature`].
-    pub bundles: u64,
+    /// Those who had to judge, and did.
+    pub jury: Arc<Jury>,
+    /// The epoch in which they were called.
+    pub epoch: Epoch,
     /// Everything it depends on.
     pub inputs: Vec<Input>,
     /// Whether the stamps in `inputs` are too young to be trusted alone.
@@ -195,8 +199,10 @@ pub struct FinishedJob {
     pub unreadable: Option<String>,
     /// By bundle.
     pub bundles: Vec<BundleOutcome>,
-    /// Signature of the bundles.
-    pub signature: u64,
+    /// Those who had to judge, and did.
+    pub jury: Arc<Jury>,
+    /// The epoch in which they were called: in a later one the job is not to be stored.
+    pub epoch: Epoch,
     /// Time since the job was taken from the queue.
     pub elapsed: Duration,
 }
@@ -208,6 +214,8 @@ pub enum StoreOutcome {
     Stored(Box<Judged>),
     /// The file has changed since it was read; nothing was written.
     Stale,
+    /// Others must judge it by now; nothing was written.
+    Outdated,
     /// It could not be written; worth another try.
     Failed(String),
 }
@@ -236,6 +244,26 @@ pub struct ChildSpec {
     pub command: Vec<String>,
     /// When to start it again.
     pub restart: Restart,
+}
+
+/// How a child process has ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ChildEnd {
+    /// There is no such program, or it cannot be run: for a person.
+    NotStarted(String),
+    /// With exit status 0.
+    Done(String),
+    /// With another status or by a signal.
+    Failed(String),
+}
+
+impl ChildEnd {
+    /// How, for a person.
+    pub fn how(&self) -> &str {
+        match self {
+            ChildEnd::NotStarted(how) | ChildEnd::Done(how) | ChildEnd::Failed(how) => how,
+        }
+    }
 }
 
 /// When a child is started again.

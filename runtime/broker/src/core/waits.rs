@@ -8,8 +8,8 @@ use qcbus_document::FileKind;
 use qcbus_messages::control::Response;
 
 use super::action::Action;
-use super::files::{FileId, Stage};
-use super::types::{Stamp, Ticket, file_verdict};
+use super::files::{FileEntry, FileId, Priority, Stage};
+use super::types::{Judged, Stamp, Ticket, file_verdict};
 use super::{Actions, State};
 
 /// One client.
@@ -42,7 +42,7 @@ impl State {
         if let Some(stamp) = stamp
             && FileKind::of_path(path).is_some()
         {
-            self.settled(path, stamp);
+            self.settled(path, stamp, actions);
         }
         let until = timeout.map(|timeout| self.now + timeout);
         self.waiters.push(Waiter {
@@ -52,6 +52,23 @@ impl State {
         });
         if let Some(id) = self.files.id(path) {
             self.settle_waits(id, actions);
+            if self.is_awaited(path) {
+                self.hurry(id);
+            }
+        }
+    }
+
+    /// Whether somebody waits for the verdict on this file.
+    pub(super) fn is_awaited(&self, path: &Path) -> bool {
+        self.waiters.iter().any(|it| *it.path == *path)
+    }
+
+    /// Somebody waits for a verdict that is not there: the file need not wait for its turn among
+    /// those that nobody asks for.
+    fn hurry(&mut self, id: FileId) {
+        let there = |it: &FileEntry| it.present && it.judged.is_some();
+        if self.files.get(id).is_some_and(there) {
+            self.files.enqueue(id, Priority::Fresh, self.now);
         }
     }
 
@@ -60,18 +77,32 @@ impl State {
         let Some(entry) = self.files.get(id) else {
             return;
         };
-        let background = matches!(
+        // One that waits in the background may have a verdict that stands nevertheless.
+        let settled = matches!(
             entry.stage(),
-            Stage::Waiting(super::Priority::Background, _)
+            Stage::Idle | Stage::Waiting(Priority::Background, _)
         );
-        let settled = *entry.stage() == Stage::Idle || background;
-        let Some(judged) = entry.judged.clone().filter(|_| settled && entry.present) else {
+        let stands = |judged: &Arc<Judged>| {
+            settled && entry.present && !entry.doubted && self.stands(entry.kind, judged)
+        };
+        let Some(judged) = entry.judged.clone().filter(stands) else {
             return;
         };
         let path = entry.path.clone();
         self.answer_all(&path, actions, |path| {
             Response::Verdict(file_verdict(path, &judged))
         });
+    }
+
+    /// A person wants a bundle off the roster.
+    pub(super) fn removal(&mut self, ticket: Ticket, name: &str, actions: &mut Actions) {
+        let response = match self.remove_bundle(name, actions) {
+            Ok(said) => Response::Reloaded {
+                changes: vec![said],
+            },
+            Err(reason) => Response::Failed { reason },
+        };
+        actions.push(Action::Answer { ticket, response });
     }
 
     pub(super) fn answer_gone(&mut self, path: &Path, actions: &mut Actions) {

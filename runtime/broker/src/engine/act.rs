@@ -6,7 +6,7 @@ use std::sync::Arc;
 use qcbus_messages::{JobId, ToPeer};
 
 use super::{Announcement, Broker, Ready, Told};
-use crate::core::{Action, Delivery, Event, SessionId};
+use crate::core::{Action, Delivery, Event, Notice, SessionId};
 use crate::journal::Entry;
 use crate::stages::reached;
 use crate::writers::Order;
@@ -103,6 +103,8 @@ impl Broker {
                     watcher.depend(files);
                 }
             }
+            Action::Enrol(member) => self.remember_at_once(Entry::Enrolled(member)),
+            Action::Strike { name } => self.remember_at_once(Entry::Struck { name }),
             // There is nothing to do before the gate holds claims.
             Action::Undepend { .. } | Action::CloseGate { .. } | Action::OpenGate { .. } => {}
             Action::Judged {
@@ -117,10 +119,22 @@ impl Broker {
                     fresh,
                 }));
             }
-            Action::Notice(text) => (self.tell)(Told::Notice(text)),
+            Action::Notice(notice) => (self.tell)(Told::Notice(notice)),
             Action::Stop => return false,
         }
         true
+    }
+
+    /// Who must judge is in the journal before anybody has judged. It happens seldom, so the loop
+    /// can wait for it; where the journal cannot be written now, a writer tries until it can.
+    fn remember_at_once(&mut self, entry: Entry) {
+        let entries = [entry];
+        if let Err(why) = self.store.record(&entries) {
+            self.say(Notice::Storing(why));
+            for entry in entries {
+                self.writers.order(Path::new(""), Order::Record(entry));
+            }
+        }
     }
 
     pub(super) fn accept(&mut self, session: SessionId) {

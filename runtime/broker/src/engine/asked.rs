@@ -11,7 +11,7 @@ use tokio::sync::oneshot;
 use super::Broker;
 use super::start::in_force;
 use crate::control::Asked;
-use crate::core::{Event, Stamp, Ticket};
+use crate::core::{Event, Notice, Stamp, Ticket};
 use crate::reload::{LoadError, differences};
 use crate::stamp::{stamp_of, stamp_through_links};
 
@@ -125,7 +125,7 @@ impl Broker {
             .cloned()
             .collect::<Vec<_>>()
         {
-            self.say(notice);
+            self.say(Notice::Loading(notice));
         }
         self.loaded = loaded;
         if in_force.digest != self.in_force.digest {
@@ -150,10 +150,12 @@ impl Broker {
         *fingerprint = now;
         match self.reload() {
             Ok(changes) if changes.is_empty() => {}
-            Ok(changes) => self.say(format!("reloaded: {}", changes.join("; "))),
-            Err(error) => self.say(format!(
+            Ok(changes) => {
+                self.say(Notice::Loading(format!("reloaded: {}", changes.join("; "))));
+            }
+            Err(error) => self.say(Notice::Loading(format!(
                 "not reloaded, what was in force stays in force: {error}"
-            )),
+            ))),
         }
     }
 

@@ -8,6 +8,7 @@ mod systemd;
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use qcbus_bus::{Host, HostEvent, PeerId, StartError as BusError};
@@ -16,7 +17,7 @@ use qcbus_messages::{JobId, ToPeer};
 use tokio::sync::{mpsc, oneshot};
 
 use crate::control::{Asked, ControlSocket};
-use crate::core::{Event, Judged, SessionId, State, Ticket};
+use crate::core::{Event, Judged, Notice, SessionId, State, Ticket};
 use crate::demand::InForce;
 use crate::intake::Intake;
 use crate::journal::JournalError;
@@ -76,7 +77,7 @@ pub enum Told {
     /// A verdict.
     Verdict(Announcement),
     /// Something for a person.
-    Notice(String),
+    Notice(Notice),
     /// The first look at everything is done.
     Scanned {
         /// The files known, in the order of their paths.
@@ -181,7 +182,7 @@ impl Broker {
         let children = self.loaded.children.clone();
         self.handle(Event::Children { specs: children });
         for notice in self.loaded.notices.clone() {
-            self.say(notice);
+            self.say(Notice::Loading(notice));
         }
         let mut tick = tokio::time::interval(TICK);
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
@@ -196,7 +197,7 @@ impl Broker {
                 Some(event) = self.inbox.events.recv() => self.own_event(event),
                 Some(seen) = self.inbox.seen.recv() => self.seen(seen),
                 Some(asked) = self.inbox.asked.recv() => self.asked(asked),
-                Some(notice) = self.inbox.notices.recv() => { self.say(notice); true }
+                Some(notice) = self.inbox.notices.recv() => { self.say(Notice::Storing(notice)); true }
                 Some(ready) = self.inbox.deliveries.recv() => self.delivery(ready),
                 Some(stop) = stops.recv() => match stop {
                     Stop::Drain => { self.notify_stopping(); self.handle(Event::Drain) }
@@ -254,6 +255,10 @@ impl Broker {
     /// Gives one event to the state machine and does what it wants. `false`: the end.
     fn handle(&mut self, event: Event) -> bool {
         let actions = self.state.handle(self.started.elapsed(), event);
+        // Before any of the actions: what is stored from now on is of this epoch.
+        self.store
+            .epoch
+            .store(self.state.epoch().0, Ordering::Release);
         actions
             .into_iter()
             .fold(true, |go_on, action| go_on & self.act(action))
@@ -319,14 +324,14 @@ impl Broker {
                 true
             }
             Seen::Notice(notice) => {
-                self.say(notice);
+                self.say(Notice::Watching(notice));
                 true
             }
         }
     }
 
-    fn say(&mut self, notice: String) {
-        self.state.remark(&notice);
+    fn say(&mut self, notice: Notice) {
+        self.state.remark(notice.clone());
         (self.tell)(Told::Notice(notice));
     }
 }

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex, RwLock};
 use std::time::Instant;
 
@@ -49,6 +50,7 @@ impl Broker {
         };
         let remembered = journal.remembered()?;
         let voids = journal.voids()?;
+        let members = journal.members()?;
         let in_force = Arc::new(in_force(&loaded)?);
         host.set_config(in_force.digest, &in_force.encoded);
         let state = State::new(options.settings.clone(), in_force.digest, in_force.demand());
@@ -93,6 +95,9 @@ impl Broker {
             control,
             options,
         };
+        for member in members {
+            broker.state.remember_member(member);
+        }
         for void in voids {
             broker.remember_void(&void.path, &void.reporter, void.xqar);
         }
@@ -200,6 +205,7 @@ fn store(options: &Options, journal: Journal) -> Store {
         journal: Mutex::new(journal),
         moving: RwLock::new(()),
         elsewhere: Mutex::default(),
+        epoch: AtomicU64::new(0),
     }
 }
 

@@ -304,9 +304,11 @@ impl Printer {
     fn told(&mut self, told: Told) {
         match told {
             Told::Notice(notice) => {
-                if self.notices.insert(notice.clone()) {
+                let text = notice.to_string();
+                if !self.notices.contains(&text) {
                     self.progress.clear();
-                    talk::say(&format!("note: {notice}"));
+                    talk::say(&format!("note: {text}"));
+                    self.notices.insert(text);
                 }
             }
             Told::Scanned { files } => {

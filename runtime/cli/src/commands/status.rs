@@ -77,7 +77,7 @@ pub fn render(status: &Status) -> String {
         line(&peer.role, peer_line(peer));
     }
     for notice in status.notices.iter().rev().take(5).rev() {
-        line("note", notice.clone());
+        line("note", notice.text.clone());
     }
     text
 }
@@ -124,7 +124,7 @@ fn span(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use qcbus_messages::control::{FileCounts, QueueStatus};
+    use qcbus_messages::control::{FileCounts, Notice, QueueStatus};
 
     #[test]
     fn a_busy_broker_as_a_person_sees_it() {
@@ -163,7 +163,12 @@ mod tests {
                 restarts: 1,
                 note: "slow: 16 jobs wait for it and for nobody else".into(),
             }],
-            notices: vec!["cannot write /farm/out/a.xqar: No space left on device".into()],
+            epoch: (3 << 32) + 2,
+            notices: vec![Notice {
+                kind: "not-written".into(),
+                about: None,
+                text: "cannot write /farm/out/a.xqar: No space left on device".into(),
+            }],
             ..Status::default()
         };
         insta::assert_snapshot!(render(&status));

@@ -1,0 +1,74 @@
+//! Bundles that must judge and are not there: how long they are waited for, and what their share of
+//! a job comes to.
+
+use std::collections::BTreeSet;
+
+use qcbus_messages::JobId;
+
+use super::jobs::ShareState;
+use super::jury::Origin;
+use super::{Actions, State};
+
+impl State {
+    /// Fails the shares of bundles that are not there and will not come in time.
+    pub(super) fn fail_absent(&mut self, actions: &mut Actions) {
+        let names: BTreeSet<String> = self
+            .jobs
+            .values()
+            .flat_map(|job| job.shares.iter())
+            .filter(|(_, share)| share.state == ShareState::Queued)
+            .map(|(name, _)| name.clone())
+            .collect();
+        for name in names {
+            if let Some(why) = self.hopeless(&name) {
+                self.fail_queued(&name, &why, actions);
+            }
+        }
+    }
+
+    /// Why there is no use in waiting for this bundle, if there is none.
+    pub(super) fn hopeless(&self, name: &str) -> Option<String> {
+        let Some(bundle) = self.bundles.get(name) else {
+            let text = format!("the configuration demands {name}, which has not joined");
+            return (!self.child_is_coming(name)).then_some(text);
+        };
+        let away = self.away_for(bundle)?;
+        let note = &bundle.note;
+        if let Some(why) = self.child_cannot_start(name) {
+            Some(format!("{name} cannot be started: {why}"))
+        } else if self.child_gave_up(name) {
+            Some(format!(
+                "{name} keeps failing and is not started for the time being: {note}"
+            ))
+        } else if away < self.settings.absence_limit {
+            None
+        } else if bundle.origin == Some(Origin::Joined) {
+            Some(format!(
+                "{name} is not there: {note}; if it need not judge any more: `qcbus bundle remove \
+                 {name}`"
+            ))
+        } else {
+            Some(format!("{name} is not there: {note}"))
+        }
+    }
+
+    fn fail_queued(&mut self, name: &str, why: &str, actions: &mut Actions) {
+        if let Some(bundle) = self.bundles.get_mut(name) {
+            bundle.queue.clear();
+            bundle.suspects.clear();
+        }
+        let ids: Vec<JobId> = self.jobs.keys().copied().collect();
+        for id in ids {
+            let share = self
+                .jobs
+                .get_mut(&id)
+                .and_then(|job| job.shares.get_mut(name))
+                .filter(|share| share.state == ShareState::Queued);
+            if let Some(share) = share {
+                share.state = ShareState::Failed(why.to_owned());
+                share.absent = true;
+                self.finish_if_over(id, actions);
+            }
+        }
+    }
+}

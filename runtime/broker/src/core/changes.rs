@@ -1,0 +1,166 @@
+//! What happens to files: they come, change and go, and so does what verdicts depend on.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use qcbus_document::FileKind;
+use qcbus_messages::Verdict;
+
+use super::action::Action;
+use super::files::{FileId, Priority, Stage};
+use super::types::{Judged, Stamp};
+use super::{Actions, State};
+
+impl State {
+    /// A file is there and may still be written to.
+    pub(super) fn present(&mut self, path: &Arc<Path>) {
+        let known = self.files.id(path).and_then(|id| self.files.get_mut(id));
+        if let Some(entry) = known {
+            entry.present = true;
+        }
+    }
+
+    /// Whether verdicts depend on a file that is not there for a verdict of its own.
+    pub fn is_only_a_dependency(&self, path: &Path) -> bool {
+        let entry = self.files.id(path).and_then(|id| self.files.get(id));
+        !entry.is_some_and(|it| it.present) && !self.files.dependents(path).is_empty()
+    }
+
+    /// A file is there and quiet: whose verdict depends on it?
+    pub(super) fn touched(&mut self, path: &Arc<Path>, stamp: Stamp, actions: &mut Actions) {
+        for dependent in self.files.dependents(path) {
+            let judged = self.files.get(dependent).and_then(|it| it.judged.clone());
+            let read = judged.as_ref().and_then(|judged| {
+                let input = judged.inputs.iter().find(|input| input.path == *path);
+                input.and_then(|it| it.content).map(|it| it.0)
+            });
+            if read != Some(stamp) {
+                self.doubt(dependent, actions);
+            } else if judged.is_some_and(|it| it.racy) {
+                self.look_again(dependent);
+            }
+        }
+    }
+
+    /// A file is there and quiet.
+    pub(super) fn settled(&mut self, path: &Arc<Path>, stamp: Stamp, actions: &mut Actions) {
+        self.touched(path, stamp, actions);
+        let Some(kind) = FileKind::of_path(path) else {
+            return;
+        };
+        let known = self.files.id(path);
+        let id = known.unwrap_or_else(|| self.files.insert(path, kind, stamp));
+        let Some(entry) = self.files.get_mut(id) else {
+            return;
+        };
+        let judged = entry.judged.as_ref();
+        let read = judged.and_then(|it| it.inputs.first()?.content);
+        let racy = judged.is_some_and(|it| it.racy);
+        let as_judged = read.map(|it| it.0) == Some(stamp);
+        let at_work = !matches!(entry.stage(), Stage::Idle);
+        let same = entry.present && entry.stamp == stamp && (as_judged || at_work);
+        entry.present = true;
+        entry.stamp = stamp;
+        if !as_judged {
+            self.shut(id, actions);
+        }
+        if !same || racy {
+            self.changed(id);
+        }
+    }
+
+    /// Something that the verdict on a file depends on is not what it was. The file's own stamp
+    /// does not tell, so the verdict is doubted: it stands only after everything was read again.
+    fn doubt(&mut self, id: FileId, actions: &mut Actions) {
+        self.shut(id, actions);
+        self.look_again(id);
+    }
+
+    /// Everything that a verdict depends on is to be read again, whatever the file's stamp says.
+    fn look_again(&mut self, id: FileId) {
+        if let Some(entry) = self.files.get_mut(id) {
+            entry.doubted = true;
+        }
+        self.changed(id);
+    }
+
+    /// What was accepted goes from behind the gate at once, before there is a new verdict.
+    fn shut(&mut self, id: FileId, actions: &mut Actions) {
+        let accepted = |judged: &Judged| judged.verdict == Verdict::Accepted;
+        if let Some(entry) = self.files.get_mut(id)
+            && entry.judged.as_deref().is_some_and(accepted)
+            && !std::mem::replace(&mut entry.shut, true)
+        {
+            let path = entry.path.clone();
+            actions.push(Action::CloseGate { path });
+        }
+    }
+
+    /// The file, or something it depends on, is not what it was.
+    fn changed(&mut self, id: FileId) {
+        let Some(entry) = self.files.get_mut(id) else {
+            return;
+        };
+        if !entry.present {
+            return;
+        }
+        entry.not_before = Duration::ZERO;
+        match entry.stage() {
+            Stage::Active(_) => entry.doubted = true,
+            Stage::Idle | Stage::Waiting(..) => self.files.enqueue(id, Priority::Fresh, self.now),
+        }
+    }
+
+    pub(super) fn vanished(&mut self, path: &Arc<Path>, actions: &mut Actions) {
+        for dependent in self.files.dependents(path) {
+            self.doubt(dependent, actions);
+        }
+        if let Some(id) = self.files.id(path) {
+            self.vanished_file(id, actions);
+        }
+    }
+
+    /// A file has gone: its result is withdrawn once no job of it is left.
+    pub(super) fn vanished_file(&mut self, id: FileId, actions: &mut Actions) {
+        let Some(entry) = self.files.get_mut(id) else {
+            return;
+        };
+        entry.present = false;
+        if let Stage::Active(job) = *entry.stage() {
+            // Nothing is stored for a file that is not there; a job at the writers' will notice.
+            if self
+                .jobs
+                .get(&job)
+                .is_some_and(|it| it.stage.is_before_storing())
+            {
+                self.end_job(job, actions);
+            }
+            return;
+        }
+        let path = entry.path.clone();
+        let reporters = self.void_reports(id);
+        self.files.remove(id);
+        self.forget_dependencies(actions);
+        actions.push(Action::Withdraw {
+            path: path.clone(),
+            reporters,
+        });
+        self.deliver_everything(actions);
+        self.answer_gone(&path, actions);
+    }
+
+    /// The first scan is complete: what the journal knew and the scan did not see has gone.
+    pub(super) fn scanned(&mut self, actions: &mut Actions) {
+        self.scanned = true;
+        let gone: Vec<FileId> = self
+            .files
+            .iter()
+            .filter(|(_, entry)| !entry.present)
+            .map(|(id, _)| id)
+            .collect();
+        for id in gone {
+            self.vanished_file(id, actions);
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! Checking: shares of jobs are given out to bundles, and come to their end.
+
+use qcbus_messages::{DocId, JobId, ToPeer};
+
+use super::action::Action;
+use super::jobs::{ActiveJob, JobStage, ShareState};
+use super::{Actions, State};
+
+impl State {
+    /// Calls the jury of a job that is read and gives it out.
+    pub(super) fn give_out(&mut self, id: JobId, actions: &mut Actions) {
+        if let Some(job) = self.jobs.get_mut(&id) {
+            job.stage = JobStage::Checking;
+            job.config = self.config;
+        }
+        self.reseat(id, actions);
+        self.fail_absent(actions);
+    }
+
+    /// Gives a bundle its next jobs: suspects one at a time and alone, others up to its capacity.
+    pub(super) fn dispatch(&mut self, name: &str, actions: &mut Actions) {
+        loop {
+            let findings = self.room_for_findings();
+            let Some(bundle) = self.bundles.get_mut(name) else {
+                return;
+            };
+            let (Some(session), true) = (bundle.session, bundle.ready && !bundle.leaving) else {
+                return;
+            };
+            let room = if bundle.suspects.is_empty() {
+                bundle.capacity
+            } else {
+                1
+            };
+            if bundle.active.len() >= room {
+                return;
+            }
+            let Some((id, suspect)) = bundle.next_job(findings) else {
+                return;
+            };
+            let fresh = bundle.fresh_process;
+            let Some(job) = self.jobs.get_mut(&id) else {
+                continue;
+            };
+            let Some(share) = job.shares.get_mut(name) else {
+                continue;
+            };
+            if share.state != ShareState::Queued {
+                continue;
+            }
+            let Some(prepared) = job.prepared.clone() else {
+                continue;
+            };
+            share.state = ShareState::Sent {
+                alone_and_fresh: suspect && fresh,
+            };
+            let message = super::types::job_message(id, self.config, job.kind, &prepared);
+            bundle.give(id, self.now);
+            actions.push(Action::Send {
+                session,
+                message: ToPeer::Job(message),
+            });
+        }
+    }
+
+    /// Gives every bundle that has room its next jobs: room also comes from jobs that are cancelled.
+    pub(super) fn dispatch_all(&mut self, actions: &mut Actions) {
+        let waiting = self
+            .bundles
+            .iter()
+            .filter(|(_, it)| it.ready && !(it.queue.is_empty() && it.suspects.is_empty()));
+        let names: Vec<String> = waiting.map(|(name, _)| name.clone()).collect();
+        for name in names {
+            self.dispatch(&name, actions);
+        }
+    }
+
+    /// A bundle lacks a document of a job that it has.
+    pub(super) fn need_document(&mut self, name: &str, doc: DocId, actions: &mut Actions) {
+        let Some(bundle) = self.bundles.get(name) else {
+            return;
+        };
+        let has = |id: &&JobId| {
+            let prepared = self.jobs.get(id).and_then(|job| job.prepared.as_ref());
+            prepared.is_some_and(|it| it.documents.iter().any(|document| document.doc == doc))
+        };
+        if let Some(job) = bundle.active.keys().find(has) {
+            actions.push(Action::PublishAgain { job: *job, doc });
+        }
+    }
+
+    /// A bundle is through with a job.
+    pub(super) fn job_done(
+        &mut self,
+        name: &str,
+        id: JobId,
+        micros: u64,
+        actions: &mut Actions,
+    ) -> bool {
+        let Some(share) = self
+            .jobs
+            .get_mut(&id)
+            .and_then(|job| job.shares.get_mut(name))
+        else {
+            return false;
+        };
+        if !matches!(share.state, ShareState::Sent { .. }) {
+            return false;
+        }
+        share.state = ShareState::Done;
+        share.micros = micros;
+        if let Some(bundle) = self.bundles.get_mut(name) {
+            bundle.take(id, self.now);
+        }
+        self.finish_if_over(id, actions);
+        self.dispatch(name, actions);
+        true
+    }
+
+    /// Takes one bundle's share of a job away.
+    pub(super) fn cancel_share(&mut self, id: JobId, name: &str, actions: &mut Actions) {
+        let job = self.jobs.get_mut(&id);
+        let Some(share) = job.and_then(|job| job.shares.remove(name)) else {
+            return;
+        };
+        if matches!(share.state, ShareState::Sent { .. }) {
+            self.call_back(id, name, actions);
+        }
+    }
+
+    pub(super) fn cancel_shares(&mut self, id: JobId, job: &ActiveJob, actions: &mut Actions) {
+        for (name, share) in &job.shares {
+            if matches!(share.state, ShareState::Sent { .. }) {
+                self.call_back(id, name, actions);
+            }
+        }
+    }
+
+    fn call_back(&mut self, id: JobId, name: &str, actions: &mut Actions) {
+        let Some(bundle) = self.bundles.get_mut(name) else {
+            return;
+        };
+        bundle.active.remove(&id);
+        if let Some(session) = bundle.session {
+            let message = ToPeer::Cancel { job: id };
+            actions.push(Action::Send { session, message });
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! How it ends: jobs first, then reporters, then goodbye.
+
+use std::time::Duration;
+
+use qcbus_messages::{Role, ToPeer};
+
+use super::action::Action;
+use super::{Actions, Phase, State};
+
+/// How long peers may take to leave at the end.
+const GOODBYE_LIMIT: Duration = Duration::from_secs(3);
+
+impl State {
+    pub(super) fn draining(&self) -> bool {
+        self.phase != Phase::Running
+    }
+
+    pub(super) fn drain(&mut self) {
+        if self.phase == Phase::Running {
+            self.phase = Phase::Draining(self.now);
+        }
+    }
+
+    /// Moves the end on: jobs first, then reporters, then goodbye.
+    pub(super) fn wind_down(&mut self, actions: &mut Actions) {
+        let quiet = self.jobs.is_empty() && self.all_delivered();
+        if self.settings.once
+            && self.scanned
+            && quiet
+            && self.files.is_quiet()
+            && !self.reporters_coming()
+        {
+            self.drain();
+        }
+        match self.phase {
+            Phase::Draining(since) => {
+                let overdue = self.now.saturating_sub(since) > self.settings.drain_limit;
+                if quiet || overdue {
+                    self.say_goodbye(actions);
+                }
+            }
+            Phase::Leaving(since) => {
+                let alone = self.sessions.values().all(|(_, name)| !self.is_ours(name));
+                if !alone && self.now.saturating_sub(since) > GOODBYE_LIMIT {
+                    self.kill_ours(actions);
+                }
+                if alone || self.now.saturating_sub(since) > GOODBYE_LIMIT {
+                    self.phase = Phase::Stopped;
+                    self.end_waits(actions);
+                    actions.push(Action::Stop);
+                }
+            }
+            Phase::Running | Phase::Stopped => {}
+        }
+    }
+
+    /// Whether a reporter that was to be started may still join.
+    fn reporters_coming(&self) -> bool {
+        self.children
+            .iter()
+            .any(|(name, child)| child.spec.role == Role::Reporter && self.child_is_coming(name))
+    }
+
+    fn say_goodbye(&mut self, actions: &mut Actions) {
+        self.phase = Phase::Leaving(self.now);
+        for (session, (_, name)) in &self.sessions {
+            if self.is_ours(name) {
+                actions.push(Action::Send {
+                    session: *session,
+                    message: ToPeer::Drain,
+                });
+            }
+        }
+    }
+
+    /// Kills what a broker started and what does not leave.
+    fn kill_ours(&self, actions: &mut Actions) {
+        for (role, name) in self.sessions.values() {
+            let process = match role {
+                Role::Bundle => self.bundles.get(name).map(|it| (it.launch, it.pid)),
+                Role::Reporter => self.reporter_named(name).map(|it| (it.launch, it.pid)),
+            };
+            if let Some((Some(launch), pid)) = process {
+                actions.push(Action::Kill {
+                    launch: Some(launch),
+                    pid,
+                });
+            }
+        }
+    }
+
+    /// Whether a broker started this peer, this one or a former one.
+    fn is_ours(&self, name: &str) -> bool {
+        self.bundles.get(name).is_some_and(|it| it.launch.is_some())
+            || self
+                .reporter_named(name)
+                .is_some_and(|it| it.launch.is_some())
+    }
+}

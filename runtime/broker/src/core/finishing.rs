@@ -1,0 +1,213 @@
+//! Finishing: from a job whose shares are all there to a stored result.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use qcbus_document::FileKind;
+use qcbus_formats::xqar::Status;
+use qcbus_messages::{JobId, Verdict};
+
+use super::action::Action;
+use super::files::{FileId, Priority, Stage};
+use super::jobs::{ActiveJob, JobStage, Share};
+use super::notice::Notice;
+use super::outcome::outcome;
+use super::types::{BundleOutcome, CheckerOutcome, FinishedJob, Judged, StoreOutcome};
+use super::{Actions, State};
+
+impl State {
+    /// When every share is there, the job is ready to be stored.
+    pub(super) fn finish_if_over(&mut self, id: JobId, actions: &mut Actions) {
+        let Some(job) = self.jobs.get_mut(&id) else {
+            return;
+        };
+        if job.stage == JobStage::Checking && job.shares.values().all(Share::is_over) {
+            job.stage = JobStage::Finished(Duration::ZERO);
+            self.store_finished(actions);
+        }
+    }
+
+    pub(super) fn store_finished(&mut self, actions: &mut Actions) {
+        let now = self.now;
+        let due = |job: &ActiveJob| matches!(job.stage, JobStage::Finished(at) if at <= now);
+        let ids: Vec<JobId> = self
+            .jobs
+            .iter()
+            .filter(|(_, job)| due(job))
+            .map(|(id, _)| *id)
+            .collect();
+        for id in ids {
+            if self.storing >= self.settings.max_storing {
+                return;
+            }
+            let finished = self.finished(id);
+            if let (Some(finished), Some(job)) = (finished, self.jobs.get_mut(&id)) {
+                job.stage = JobStage::Storing;
+                self.storing += 1;
+                actions.push(Action::Store(Box::new(finished)));
+            }
+        }
+    }
+
+    fn finished(&self, id: JobId) -> Option<FinishedJob> {
+        let job = self.jobs.get(&id)?;
+        Some(FinishedJob {
+            job: id,
+            path: job.path.clone(),
+            kind: job.kind,
+            config: job.config,
+            prepared: job.prepared.clone().filter(|_| job.unreadable.is_none()),
+            unreadable: job.unreadable.clone(),
+            bundles: job
+                .shares
+                .iter()
+                .map(|(name, share)| outcome(name, share))
+                .chain(self.inapplicable(job.kind))
+                .collect(),
+            jury: State::jury(&job.shares),
+            epoch: self.epoch,
+            elapsed: self.now.saturating_sub(job.since),
+        })
+    }
+
+    /// Configured bundles that do not take files of this kind: their checkers are listed as
+    /// skipped, so that nobody takes them for lost.
+    fn inapplicable(&self, kind: FileKind) -> Vec<BundleOutcome> {
+        let mut outcomes = Vec::new();
+        let named = self.demand.named();
+        for (name, bundle) in &self.bundles {
+            let Some(catalogue) = &bundle.catalogue else {
+                continue;
+            };
+            let wanted = named
+                .iter()
+                .any(|it| self.demand.means(it, name, &catalogue.alias));
+            if !wanted || catalogue.kinds.contains(&kind) {
+                continue;
+            }
+            let skipped = |checker| CheckerOutcome {
+                checker,
+                status: Status::Skipped,
+                reason: format!("{name} does not check .{} files", kind.as_str()),
+                params: Vec::new(),
+                issues: Vec::new(),
+                metadata: Vec::new(),
+            };
+            let checkers = self.demand.checkers(name, catalogue, kind);
+            outcomes.push(BundleOutcome {
+                name: name.clone(),
+                version: bundle.version.clone(),
+                catalogue: Some(catalogue.clone()),
+                failure: None,
+                checkers: checkers.into_iter().map(skipped).collect(),
+                micros: 0,
+            });
+        }
+        outcomes
+    }
+
+    /// Storing is over.
+    pub(super) fn stored(&mut self, id: JobId, outcome: StoreOutcome, actions: &mut Actions) {
+        let Some(job) = self.jobs.get_mut(&id) else {
+            return;
+        };
+        if job.stage != JobStage::Storing {
+            return;
+        }
+        self.storing -= 1;
+        let file = job.file;
+        match outcome {
+            StoreOutcome::Stored(judged) => {
+                self.is_judged(file, Arc::new(*judged), actions);
+                self.end_job(id, actions);
+            }
+            StoreOutcome::Stale => {
+                if let Some(entry) = self.files.get_mut(file) {
+                    entry.doubted = true;
+                }
+                self.end_job(id, actions);
+            }
+            StoreOutcome::Outdated if job.config == self.config => {
+                job.stage = JobStage::Checking;
+                self.reseat(id, actions);
+            }
+            // What was found counts for nothing under another configuration.
+            StoreOutcome::Outdated => self.begin_anew(id, actions),
+            StoreOutcome::Failed(why) => {
+                job.stage = JobStage::Finished(self.now + self.settings.retry_after);
+                self.notice(Notice::NotWritten(why), actions);
+                self.reseat(id, actions);
+            }
+        }
+    }
+
+    fn is_judged(&mut self, file: FileId, judged: Arc<Judged>, actions: &mut Actions) {
+        self.rate.note(self.now);
+        if let Some(entry) = self.files.get_mut(file) {
+            entry.judged = Some(judged.clone());
+            entry.shut = false;
+            let (path, fresh) = (entry.path.clone(), true);
+            let doubted = entry.doubted && judged.verdict == Verdict::Accepted;
+            let (gated, told) = (path.clone(), judged);
+            actions.push(Action::Judged {
+                path,
+                judged: told,
+                fresh,
+            });
+            if doubted {
+                // It changed while its acceptance was on its way.
+                entry.shut = true;
+                actions.push(Action::CloseGate { path: gated });
+            }
+        }
+        self.deliver_to_all(file, actions);
+    }
+
+    /// The job counts for nothing, and its file is read again.
+    pub(super) fn begin_anew(&mut self, id: JobId, actions: &mut Actions) {
+        let file = self.jobs.get(&id).map(|job| job.file);
+        if let Some(entry) = file.and_then(|file| self.files.get_mut(file)) {
+            entry.doubted = true;
+        }
+        self.end_job(id, actions);
+    }
+
+    /// The job is over, whatever came of it. The file waits again if it changed meanwhile, or if
+    /// others must judge it by now.
+    pub(super) fn end_job(&mut self, id: JobId, actions: &mut Actions) {
+        let Some(job) = self.jobs.remove(&id) else {
+            return;
+        };
+        match job.stage {
+            JobStage::Preparing | JobStage::Storing | JobStage::Finished(_) => {}
+            JobStage::Checking => self.cancel_shares(id, &job, actions),
+        }
+        actions.push(Action::Release { job: id });
+        self.files.set_stage(job.file, Stage::Idle);
+        let Some(entry) = self.files.get(job.file) else {
+            return;
+        };
+        let stands = |judged: &Arc<Judged>| self.stands(entry.kind, judged);
+        if !entry.present {
+            self.vanished_file(job.file, actions);
+        } else if entry.doubted || entry.judged.is_none() {
+            self.files.enqueue(job.file, Priority::Fresh, self.now);
+        } else if entry.judged.as_ref().is_some_and(stands) {
+            self.settle_waits(job.file, actions);
+        } else {
+            let priority = self.priority_of(&entry.path);
+            self.files.enqueue(job.file, priority, self.now);
+        }
+    }
+
+    /// How soon a file is judged again whose verdict does not stand any more: at once where
+    /// somebody waits for it.
+    pub(super) fn priority_of(&self, path: &Path) -> Priority {
+        if self.is_awaited(path) {
+            Priority::Fresh
+        } else {
+            Priority::Background
+        }
+    }
+}

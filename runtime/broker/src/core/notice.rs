@@ -1,0 +1,141 @@
+//! What a person should read: a closed list, so that `status`, JSON and tests need not read English.
+
+use std::fmt;
+
+/// Something that a person should read.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum Notice {
+    /// A process may not take part, and why.
+    TurnedAway(String),
+    /// A bundle or reporter has ended.
+    Ended {
+        /// Its name.
+        name: String,
+        /// How.
+        why: String,
+    },
+    /// The broker has ended the session of a bundle or reporter, and its process where it started it.
+    Killed {
+        /// Its name.
+        name: String,
+        /// What it did wrong.
+        why: String,
+    },
+    /// A child failed too often and is left alone for a while.
+    GaveUp {
+        /// Its name.
+        name: String,
+        /// How often, and how it failed.
+        why: String,
+    },
+    /// The newer process of a child does not join; the older goes on.
+    NotUpgraded {
+        /// Its name.
+        name: String,
+        /// Why.
+        why: String,
+    },
+    /// There is no room for a file's image.
+    NoRoom(String),
+    /// A result could not be written.
+    NotWritten(String),
+    /// A result could not be read back for a reporter.
+    NotDelivered(String),
+    /// A reporter could not do its work.
+    NotReported {
+        /// The reporter.
+        name: String,
+        /// Why.
+        why: String,
+    },
+    /// Of the directories that are watched.
+    Watching(String),
+    /// Of the configuration and the manifests.
+    Loading(String),
+    /// Of the journal and the results on the disk.
+    Storing(String),
+}
+
+impl Notice {
+    pub(super) fn ended(name: &str, why: &str) -> Notice {
+        let (name, why) = (name.to_owned(), why.to_owned());
+        Notice::Ended { name, why }
+    }
+
+    pub(super) fn killed(name: &str, why: &str) -> Notice {
+        let (name, why) = (name.to_owned(), why.to_owned());
+        Notice::Killed { name, why }
+    }
+
+    pub(super) fn not_reported(name: &str, why: String) -> Notice {
+        let name = name.to_owned();
+        Notice::NotReported { name, why }
+    }
+
+    /// A word for programs, which never changes.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Notice::TurnedAway(_) => "turned-away",
+            Notice::Ended { .. } => "ended",
+            Notice::Killed { .. } => "killed",
+            Notice::GaveUp { .. } => "gave-up",
+            Notice::NotUpgraded { .. } => "not-upgraded",
+            Notice::NoRoom(_) => "no-room",
+            Notice::NotWritten(_) => "not-written",
+            Notice::NotDelivered(_) => "not-delivered",
+            Notice::NotReported { .. } => "not-reported",
+            Notice::Watching(_) => "watching",
+            Notice::Loading(_) => "loading",
+            Notice::Storing(_) => "storing",
+        }
+    }
+
+    /// The bundle or reporter that it is about.
+    pub fn about(&self) -> Option<&str> {
+        match self {
+            Notice::Ended { name, .. }
+            | Notice::Killed { name, .. }
+            | Notice::GaveUp { name, .. }
+            | Notice::NotUpgraded { name, .. }
+            | Notice::NotReported { name, .. } => Some(name),
+            _ => None,
+        }
+    }
+
+    /// What it says, without whom it is about.
+    pub(super) fn why(&self) -> String {
+        match self {
+            Notice::Ended { why, .. }
+            | Notice::Killed { why, .. }
+            | Notice::GaveUp { why, .. }
+            | Notice::NotUpgraded { why, .. }
+            | Notice::NotReported { why, .. } => why.clone(),
+            other => other.to_string(),
+        }
+    }
+}
+
+impl fmt::Display for Notice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Notice::TurnedAway(reason) => write!(f, "turned away: {reason}"),
+            Notice::Ended { name, why } | Notice::Killed { name, why } => {
+                write!(f, "{name}: {why}")
+            }
+            Notice::GaveUp { name, why } => write!(f, "{name} {why}"),
+            Notice::NotUpgraded { name, why } => {
+                write!(
+                    f,
+                    "{name} is not upgraded, the process before goes on: {why}"
+                )
+            }
+            Notice::NotReported { name, why } => write!(f, "{name} {why}"),
+            Notice::NoRoom(text)
+            | Notice::NotWritten(text)
+            | Notice::NotDelivered(text)
+            | Notice::Watching(text)
+            | Notice::Loading(text)
+            | Notice::Storing(text) => f.write_str(text),
+        }
+    }
+}

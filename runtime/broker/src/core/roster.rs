@@ -1,0 +1,348 @@
+//! The roster: the bundles that must judge, whether they are there or not. It lasts over restarts,
+//! and every change of it begins a new epoch.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Duration;
+
+use qcbus_document::FileKind;
+use qcbus_messages::{JobId, Role};
+
+use super::action::Action;
+use super::bundles::Bundle;
+use super::files::Priority;
+use super::jobs::{JobStage, Share, ShareState};
+use super::jury::{Epoch, Juror, Jury, Mark, Member, Origin, Seat};
+use super::types::Judged;
+use super::{Actions, State};
+
+/// The seats by kind of file, made anew with every epoch.
+pub(super) type Seats = BTreeMap<FileKind, Arc<[Seat]>>;
+
+impl State {
+    /// The epoch of who must judge.
+    pub fn epoch(&self) -> Epoch {
+        self.epoch
+    }
+
+    /// Puts in what the journal knows of a bundle. Children that nobody wants any more are struck
+    /// when it is known which are wanted.
+    pub fn remember_member(&mut self, member: Member) {
+        let bundle = Bundle {
+            mark: member
+                .catalogue
+                .as_ref()
+                .map(|it| Mark::of(&member.version, it)),
+            version: member.version,
+            catalogue: member.catalogue,
+            origin: Some(member.origin),
+            away_since: Some(self.now),
+            note: "it has not joined since the broker was started".to_owned(),
+            ..Bundle::default()
+        };
+        self.bundles.insert(member.name, bundle);
+        self.begin_epoch();
+    }
+
+    /// Children that are bundles are on the roster as long as they are children, seen or not.
+    pub(super) fn enrol_children(&mut self, actions: &mut Actions) {
+        let wanted = |name: &String| {
+            let child = self.children.get(name);
+            child.is_some_and(|it| it.spec.role == Role::Bundle)
+        };
+        let struck: Vec<String> = self
+            .bundles
+            .iter()
+            .filter(|(name, it)| it.origin == Some(Origin::Supervised) && !wanted(name))
+            .filter(|(_, it)| it.session.is_none())
+            .map(|(name, _)| name.clone())
+            .collect();
+        for name in struck {
+            self.drop_bundle(&name, actions);
+        }
+        let children = self.children.iter();
+        let bundles = children.filter(|(_, child)| child.spec.role == Role::Bundle);
+        for (name, _) in bundles {
+            let bundle = self.bundles.entry(name.clone()).or_insert_with(|| Bundle {
+                away_since: Some(self.now.max(self.settings.collect)),
+                note: "it has never joined".to_owned(),
+                ..Bundle::default()
+            });
+            bundle.origin = Some(Origin::Supervised);
+        }
+        self.begin_epoch();
+    }
+
+    /// A bundle has said what it offers: from now on it must judge, until it leaves.
+    pub(super) fn enrol(&mut self, name: &str, actions: &mut Actions) {
+        let supervised = self.children.contains_key(name);
+        let Some(bundle) = self.bundles.get_mut(name) else {
+            return;
+        };
+        let Some(catalogue) = bundle.catalogue.clone() else {
+            return;
+        };
+        let origin = if supervised {
+            Origin::Supervised
+        } else {
+            Origin::Joined
+        };
+        let mark = Mark::of(&bundle.version, &catalogue);
+        let known = bundle.mark.replace(mark) == Some(mark) && bundle.origin == Some(origin);
+        if bundle.leaving {
+            return;
+        }
+        bundle.origin = Some(origin);
+        if !known {
+            let member = Member {
+                name: name.to_owned(),
+                version: bundle.version.clone(),
+                catalogue: Some(catalogue),
+                origin,
+            };
+            actions.push(Action::Enrol(member));
+            self.begin_epoch();
+        }
+        // Also when it has only come back: what was judged without it is not settled.
+        self.reseat = true;
+    }
+
+    /// Takes a bundle off the roster, if it is on it.
+    pub(super) fn strike(&mut self, name: &str, actions: &mut Actions) {
+        let Some(bundle) = self.bundles.remove(name) else {
+            return;
+        };
+        if bundle.origin.is_some() {
+            let name = name.to_owned();
+            actions.push(Action::Strike { name });
+            self.begin_epoch();
+        }
+    }
+
+    /// A person wants a bundle off the roster.
+    ///
+    /// # Errors
+    /// Why not, for that person.
+    pub(super) fn remove_bundle(
+        &mut self,
+        name: &str,
+        actions: &mut Actions,
+    ) -> Result<String, String> {
+        if self.children.contains_key(name) {
+            return Err(format!(
+                "{name} comes from a manifest or with qcbus; remove the manifest, or start qcbus \
+                 with --no-standard-bundles"
+            ));
+        }
+        let Some(bundle) = self.bundles.get(name) else {
+            return Err(format!(
+                "no bundle {name} is known here; see `qcbus bundle list`"
+            ));
+        };
+        if bundle.session.is_some() {
+            self.drain_peer(name, actions);
+            return Ok(format!("{name} was told to finish and go"));
+        }
+        self.drop_bundle(name, actions);
+        Ok(format!("{name} need not judge any more"))
+    }
+
+    /// Who must judge, or what is demanded of them, has changed.
+    pub(super) fn begin_epoch(&mut self) {
+        self.epoch = self.epoch.next();
+        let kinds = FileKind::ALL.into_iter();
+        self.seats = kinds
+            .map(|kind| (kind, self.seats_for(kind).into()))
+            .collect();
+        self.reseat = true;
+    }
+
+    /// The bundles that must judge files of a kind, each with its checkers, by name.
+    fn seats_for(&self, kind: FileKind) -> Vec<Seat> {
+        let mut seats: BTreeMap<String, Seat> = BTreeMap::new();
+        for (name, bundle) in &self.bundles {
+            if let Some(seat) = self.seat_of(name, bundle, kind) {
+                seats.insert(name.clone(), seat);
+            }
+        }
+        for name in self.absent_by_name() {
+            let seat = Seat {
+                name: name.clone(),
+                version: String::new(),
+                catalogue: None,
+                mark: None,
+                demanded: Vec::new(),
+            };
+            seats.entry(name).or_insert(seat);
+        }
+        seats.into_values().collect()
+    }
+
+    fn seat_of(&self, name: &str, bundle: &Bundle, kind: FileKind) -> Option<Seat> {
+        if bundle.leaving || bundle.origin.is_none() {
+            return None;
+        }
+        let alias = bundle.catalogue.as_ref().map_or("", |it| it.alias.as_str());
+        if !self.demand.wants_bundle(name, alias) {
+            return None;
+        }
+        let mut demanded = Vec::new();
+        if let Some(catalogue) = &bundle.catalogue {
+            demanded = self.demand.checkers(name, catalogue, kind);
+            if demanded.is_empty() || !catalogue.kinds.contains(&kind) {
+                return None;
+            }
+        }
+        Some(Seat {
+            name: name.to_owned(),
+            version: bundle.version.clone(),
+            catalogue: bundle.catalogue.clone(),
+            mark: bundle.mark,
+            demanded,
+        })
+    }
+
+    /// Bundles that the configuration names and nobody has seen.
+    fn absent_by_name(&self) -> Vec<String> {
+        let seen = |named: &String| {
+            self.bundles.iter().any(|(name, bundle)| {
+                let alias = bundle.catalogue.as_ref().map_or("", |it| it.alias.as_str());
+                bundle.catalogue.is_some() && self.demand.means(named, name, alias)
+            })
+        };
+        let named = self.demand.named().into_iter();
+        named.filter(|named| !seen(named)).collect()
+    }
+
+    pub(super) fn seats(&self, kind: FileKind) -> Arc<[Seat]> {
+        self.seats.get(&kind).cloned().unwrap_or_default()
+    }
+
+    /// Whether a verdict was given under the configuration in force by those who must judge.
+    pub(super) fn stands(&self, kind: FileKind, judged: &Judged) -> bool {
+        let seats = self.seats(kind);
+        let same = |(seat, juror): (&Seat, &Juror)| {
+            seat.name == juror.name && self.is_served_by(seat, juror.mark)
+        };
+        judged.config == self.config
+            && seats.len() == judged.jury.0.len()
+            && seats.iter().zip(&judged.jury.0).all(same)
+    }
+
+    /// Whether a seat has spoken its last word: as what it is now, or as one that is not there and
+    /// for which nobody waits.
+    fn is_served_by(&self, seat: &Seat, mark: Option<Mark>) -> bool {
+        match mark {
+            Some(mark) => seat.mark == Some(mark),
+            None => self.hopeless(&seat.name).is_some(),
+        }
+    }
+
+    /// Those who judged a job.
+    pub(super) fn jury(shares: &BTreeMap<String, Share>) -> Arc<Jury> {
+        let juror = |(name, share): (&String, &Share)| Juror {
+            name: name.clone(),
+            mark: share.mark.filter(|_| !share.absent),
+        };
+        Arc::new(Jury(shares.iter().map(juror).collect()))
+    }
+
+    /// Queues every file whose verdict was given under another configuration or by others.
+    pub(super) fn requeue_outdated(&mut self) {
+        if !self.may_judge() {
+            return;
+        }
+        let outdated = |judged: &Arc<Judged>, kind| !self.stands(kind, judged);
+        let files = self.files.iter();
+        let ids: Vec<(u32, Priority)> = files
+            .filter(|(_, it)| {
+                it.judged
+                    .as_ref()
+                    .is_some_and(|judged| outdated(judged, it.kind))
+            })
+            .map(|(id, it)| (id, self.priority_of(&it.path)))
+            .collect();
+        for (id, priority) in ids {
+            self.files.enqueue(id, priority, self.now);
+        }
+    }
+
+    /// After a change of the roster: jobs under way get the jury that is demanded now, and verdicts
+    /// of other juries are outdated.
+    pub(super) fn follow_roster(&mut self, actions: &mut Actions) {
+        if !std::mem::take(&mut self.reseat) {
+            return;
+        }
+        let under_way = self
+            .jobs
+            .iter()
+            .filter(|(_, job)| job.stage.is_before_storing());
+        let ids: Vec<JobId> = under_way.map(|(id, _)| *id).collect();
+        for id in ids {
+            self.reseat(id, actions);
+        }
+        self.requeue_outdated();
+        self.fail_absent(actions);
+    }
+
+    /// Gives a job the jury that is demanded now. What those have said who stay is kept.
+    pub(super) fn reseat(&mut self, id: JobId, actions: &mut Actions) {
+        let Some(job) = self.jobs.get(&id) else {
+            return;
+        };
+        let (seats, unreadable) = (self.seats(job.kind), job.unreadable.clone());
+        let gone: Vec<String> = job
+            .shares
+            .keys()
+            .filter(|name| seats.iter().all(|seat| seat.name != **name))
+            .cloned()
+            .collect();
+        let anew: Vec<&Seat> = seats
+            .iter()
+            .filter(|seat| {
+                let share = job.shares.get(&seat.name);
+                share.is_none_or(|share| self.must_judge_anew(seat, share))
+            })
+            .collect();
+        for name in gone.iter().chain(anew.iter().map(|seat| &seat.name)) {
+            self.cancel_share(id, name, actions);
+        }
+        let Some(job) = self.jobs.get_mut(&id) else {
+            return;
+        };
+        job.epoch = self.epoch;
+        for seat in &anew {
+            let share = Share::of(seat, unreadable.as_deref());
+            let queued = share.state == ShareState::Queued;
+            job.shares.insert(seat.name.clone(), share);
+            if let Some(bundle) = self.bundles.get_mut(&seat.name).filter(|_| queued) {
+                bundle.expect(id);
+            }
+        }
+        if job.shares.values().any(|share| !share.is_over()) {
+            job.stage = JobStage::Checking;
+        }
+        for seat in anew {
+            self.dispatch(&seat.name, actions);
+        }
+        self.finish_if_over(id, actions);
+    }
+
+    fn must_judge_anew(&self, seat: &Seat, share: &Share) -> bool {
+        match share.state {
+            // It is given out as what the bundle is by then.
+            ShareState::Queued => share.mark != seat.mark || share.demanded != seat.demanded,
+            ShareState::Sent { .. } => share.demanded != seat.demanded,
+            ShareState::Done | ShareState::Failed(_) => {
+                let mark = share.mark.filter(|_| !share.absent);
+                share.demanded != seat.demanded || !self.is_served_by(seat, mark)
+            }
+        }
+    }
+
+    /// How long nobody of this name has been there.
+    pub(super) fn away_for(&self, bundle: &Bundle) -> Option<Duration> {
+        let since = bundle.away_since.filter(|_| bundle.session.is_none())?;
+        Some(self.now.saturating_sub(since))
+    }
+}

@@ -1,0 +1,136 @@
+//! Who must judge: joins, leaves and upgrades while files are at work.
+
+use super::*;
+
+/// The session of a bundle that is there.
+fn session_of(world: &World, name: &str) -> SessionId {
+    let found = world.peers.iter().find(|(_, bundle)| bundle.name == name);
+    *found.unwrap().0
+}
+
+/// A file at the writers, checked by the first bundle alone.
+fn world_with_a_file_at_the_writers() -> World {
+    let mut world = World::new();
+    world.join("First");
+    world.write(1);
+    world.prepare(0, true);
+    world.answer(0);
+    assert_eq!(world.storing.len(), 1);
+    world
+}
+
+#[test]
+fn a_file_at_work_while_a_bundle_joins_gets_its_judgement_too() {
+    let mut world = World::new();
+    world.join("First");
+    world.write(1);
+    world.prepare(0, true);
+    world.join("Second");
+    world.settle();
+    assert_eq!(world.names_that_judged(1), ["First", "Second"]);
+}
+
+#[test]
+fn a_file_at_the_writers_while_a_bundle_joins_is_judged_again() {
+    let mut world = world_with_a_file_at_the_writers();
+    world.join("Second");
+    world.store(0, true);
+    world.settle();
+    assert_eq!(world.names_that_judged(1), ["First", "Second"]);
+}
+
+/// Six judged files, of which the first four are at work in vain, so that the others wait.
+fn world_that_is_busy() -> World {
+    let mut world = World::new();
+    world.join("First");
+    for file in 0..6 {
+        world.write(file);
+    }
+    while world.judged.len() < 6 {
+        world.prepare(0, true);
+        world.answer(0);
+        world.store(0, true);
+    }
+    world
+}
+
+#[test]
+fn who_waits_is_not_told_a_verdict_of_former_judges() {
+    let mut world = world_that_is_busy();
+    world.join("Second");
+    for file in 0..6 {
+        world.wait(file);
+    }
+    assert_eq!(world.waiting.len(), 6, "the second has not judged");
+    world.settle();
+    assert!(world.waiting.is_empty());
+}
+
+#[test]
+fn who_waits_after_a_reload_is_not_told_the_verdict_of_the_old_configuration() {
+    let mut world = world_that_is_busy();
+    world.step(&Step::Reconfigure(2));
+    for file in 0..6 {
+        world.wait(file);
+    }
+    assert_eq!(world.waiting.len(), 6, "some wait in the background");
+    world.settle();
+    assert!(world.waiting.is_empty());
+}
+
+#[test]
+fn late_words_on_many_cancelled_jobs_are_no_offence() {
+    let mut world = World::new();
+    world.join("First");
+    world.write(0);
+    world.write(4);
+    let session = session_of(&world, "First");
+    for round in 0..100_u8 {
+        world.prepare(0, true);
+        world.prepare(0, true);
+        let jobs: Vec<JobId> = world.peers[&session].jobs.iter().copied().collect();
+        assert_eq!(jobs.len(), 2);
+        // They are cancelled and given anew, and the bundle's words were under way.
+        world.step(&Step::Reconfigure(round % 2));
+        for job in jobs {
+            world.say(session, FromPeer::JobDone { job, micros: 1 });
+        }
+    }
+    assert!(world.peers.contains_key(&session), "it did nothing wrong");
+}
+
+#[test]
+fn words_on_jobs_that_were_never_given_are_offences() {
+    let mut world = World::new();
+    world.join("First");
+    let session = session_of(&world, "First");
+    for number in 0..100 {
+        let job = JobId((1 << 40) + number);
+        world.say(session, FromPeer::JobDone { job, micros: 1 });
+    }
+    assert!(!world.peers.contains_key(&session));
+}
+
+#[test]
+fn a_job_that_is_forgotten_while_others_are_finished_is_noticed() {
+    let mut world = World::new();
+    world.join("First");
+    let session = session_of(&world, "First");
+    world.write(0);
+    world.prepare(0, true);
+    let forgotten = *world.peers[&session].jobs.first().unwrap();
+    let mut passed = Duration::ZERO;
+    while world.peers.contains_key(&session) {
+        assert!(passed < Duration::from_secs(600), "nobody notices");
+        world.write(4);
+        world.prepare(0, true);
+        let others: Vec<JobId> = world.peers[&session].jobs.iter().copied().collect();
+        for job in others.into_iter().filter(|job| *job != forgotten) {
+            world.peers.get_mut(&session).unwrap().jobs.remove(&job);
+            world.say(session, FromPeer::JobDone { job, micros: 1 });
+        }
+        world.store(0, true);
+        world.pass(Duration::from_secs(5));
+        passed += Duration::from_secs(5);
+    }
+}
