@@ -51,7 +51,10 @@ fn stderr(output: &Output) -> String {
 fn notice(farm: &Farm, words: &str) -> String {
     let look = || {
         let notices = farm.status()?.notices;
-        notices.into_iter().find(|it| it.contains(words))
+        notices
+            .into_iter()
+            .map(|it| it.text)
+            .find(|it| it.contains(words))
     };
     let found = until_or("a notice", look, || format!("{words}\n{}", farm.log()));
     told(farm, &found)

@@ -5,13 +5,13 @@ use std::collections::BTreeSet;
 
 use qcbus_messages::JobId;
 
+use super::State;
 use super::jobs::ShareState;
 use super::jury::Origin;
-use super::{Actions, State};
 
 impl State {
     /// Fails the shares of bundles that are not there and will not come in time.
-    pub(super) fn fail_absent(&mut self, actions: &mut Actions) {
+    pub(super) fn fail_absent(&mut self) {
         let names: BTreeSet<String> = self
             .jobs
             .values()
@@ -21,7 +21,7 @@ impl State {
             .collect();
         for name in names {
             if let Some(why) = self.hopeless(&name) {
-                self.fail_queued(&name, &why, actions);
+                self.fail_queued(&name, &why);
             }
         }
     }
@@ -52,7 +52,7 @@ impl State {
         }
     }
 
-    fn fail_queued(&mut self, name: &str, why: &str, actions: &mut Actions) {
+    fn fail_queued(&mut self, name: &str, why: &str) {
         if let Some(bundle) = self.bundles.get_mut(name) {
             bundle.queue.clear();
             bundle.suspects.clear();
@@ -67,7 +67,7 @@ impl State {
             if let Some(share) = share {
                 share.state = ShareState::Failed(why.to_owned());
                 share.absent = true;
-                self.finish_if_over(id, actions);
+                self.finish_if_over(id);
             }
         }
     }

@@ -375,7 +375,7 @@ impl State {
         let nobody_misses_it = bundle.origin.is_none() || bundle.leaving;
         self.notice(notice, actions);
         self.take_back(name, true);
-        self.condemn(name, &why, actions);
+        self.condemn(name, &why);
         self.child_down(name, proved, &why, actions);
         if nobody_misses_it && !self.children.contains_key(name) {
             self.drop_bundle(name, actions);

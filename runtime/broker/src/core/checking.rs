@@ -14,7 +14,7 @@ impl State {
             job.config = self.config;
         }
         self.reseat(id, actions);
-        self.fail_absent(actions);
+        self.fail_absent();
     }
 
     /// Gives a bundle its next jobs: suspects one at a time and alone, others up to its capacity.
@@ -112,7 +112,7 @@ impl State {
         if let Some(bundle) = self.bundles.get_mut(name) {
             bundle.take(id, self.now);
         }
-        self.finish_if_over(id, actions);
+        self.finish_if_over(id);
         self.dispatch(name, actions);
         true
     }

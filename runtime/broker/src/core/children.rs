@@ -274,7 +274,7 @@ impl State {
             "failed {times} times within {seconds} s and is tried again in {seconds} s: {why}"
         );
         self.notice(Notice::GaveUp { name, why }, actions);
-        self.fail_absent(actions);
+        self.fail_absent();
     }
 
     /// A child process has ended or could not be started.
@@ -337,7 +337,7 @@ impl State {
             }
             self.child_down(name, false, end.how(), actions);
         }
-        self.fail_absent(actions);
+        self.fail_absent();
     }
 
     /// The newer process of a child has ended, or hangs, before it joined: it is tried again.
@@ -412,7 +412,7 @@ impl State {
             child.stuck = Some(why.to_owned());
         }
         self.child_down(name, false, why, actions);
-        self.fail_absent(actions);
+        self.fail_absent();
     }
 
     fn kill_overdue(&mut self, actions: &mut Actions) {

@@ -18,16 +18,16 @@ use super::{Actions, State};
 
 impl State {
     /// When every share is there, the job is ready to be stored.
-    pub(super) fn finish_if_over(&mut self, id: JobId, actions: &mut Actions) {
+    pub(super) fn finish_if_over(&mut self, id: JobId) {
         let Some(job) = self.jobs.get_mut(&id) else {
             return;
         };
         if job.stage == JobStage::Checking && job.shares.values().all(Share::is_over) {
             job.stage = JobStage::Finished(Duration::ZERO);
-            self.store_finished(actions);
         }
     }
 
+    /// Gives finished jobs to the writers, as far as there is room.
     pub(super) fn store_finished(&mut self, actions: &mut Actions) {
         let now = self.now;
         let due = |job: &ActiveJob| matches!(job.stage, JobStage::Finished(at) if at <= now);
@@ -66,7 +66,7 @@ impl State {
                 .chain(self.inapplicable(job.kind))
                 .collect(),
             jury: State::jury(&job.shares),
-            epoch: self.epoch,
+            epoch: job.epoch,
             elapsed: self.now.saturating_sub(job.since),
         })
     }

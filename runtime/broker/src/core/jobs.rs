@@ -128,7 +128,6 @@ impl State {
             };
             self.take(id, actions);
         }
-        self.store_finished(actions);
     }
 
     fn documents_active(&self) -> usize {

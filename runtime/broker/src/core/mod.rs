@@ -211,6 +211,7 @@ impl State {
         self.follow_roster(&mut actions);
         self.dispatch_all(&mut actions);
         self.pump(&mut actions);
+        self.store_finished(&mut actions);
         self.wind_down(&mut actions);
         actions
     }
@@ -295,7 +296,7 @@ impl State {
         self.watch_children(actions);
         self.watch_bundles(actions);
         self.watch_reporters(actions);
-        self.fail_absent(actions);
+        self.fail_absent();
         self.expire_waits(actions);
     }
 

@@ -282,7 +282,7 @@ impl State {
             self.reseat(id, actions);
         }
         self.requeue_outdated();
-        self.fail_absent(actions);
+        self.fail_absent();
     }
 
     /// Gives a job the jury that is demanded now. What those have said who stay is kept.
@@ -322,17 +322,15 @@ impl State {
         if job.shares.values().any(|share| !share.is_over()) {
             job.stage = JobStage::Checking;
         }
-        for seat in anew {
-            self.dispatch(&seat.name, actions);
-        }
-        self.finish_if_over(id, actions);
+        // Nothing is given out or stored before every job has followed.
+        self.finish_if_over(id);
     }
 
     fn must_judge_anew(&self, seat: &Seat, share: &Share) -> bool {
         match share.state {
-            // It is given out as what the bundle is by then.
-            ShareState::Queued => share.mark != seat.mark || share.demanded != seat.demanded,
-            ShareState::Sent { .. } => share.demanded != seat.demanded,
+            ShareState::Queued | ShareState::Sent { .. } => {
+                share.mark != seat.mark || share.demanded != seat.demanded
+            }
             ShareState::Done | ShareState::Failed(_) => {
                 let mark = share.mark.filter(|_| !share.absent);
                 share.demanded != seat.demanded || !self.is_served_by(seat, mark)

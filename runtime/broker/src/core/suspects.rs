@@ -1,8 +1,8 @@
 //! Suspects: after a death every job that the bundle had is tried alone. Only a pair of file and
 //! bundle that fails twice alone in a fresh process is given up.
 
+use super::State;
 use super::jobs::ShareState;
-use super::{Actions, State};
 
 /// Deaths of a bundle, alone with a file in a fresh process, until it is not tried again.
 const STRIKES: u8 = 2;
@@ -38,7 +38,7 @@ impl State {
     }
 
     /// Pairs of file and bundle that have had all their chances end here.
-    pub(super) fn condemn(&mut self, name: &str, why: &str, actions: &mut Actions) {
+    pub(super) fn condemn(&mut self, name: &str, why: &str) {
         let Some(bundle) = self.bundles.get_mut(name) else {
             return;
         };
@@ -58,7 +58,7 @@ impl State {
         }
         bundle.suspects.retain(|id| !over.contains(id));
         for id in over {
-            self.finish_if_over(id, actions);
+            self.finish_if_over(id);
         }
     }
 }

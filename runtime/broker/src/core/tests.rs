@@ -1,54 +1,20 @@
 //! The state machine against a world that it cannot foresee: files come, change and go, bundles
 //! answer, lie, hang and die in any order, and still every file that is there gets one verdict.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::path::Path;
-use std::sync::Arc;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use proptest::prelude::*;
-use qcbus_document::FileKind;
-use qcbus_formats::xqar::{Issue, Level, Status};
-use qcbus_messages::control::Response;
-use qcbus_messages::{
-    Catalogue, CheckerInfo, Digest, DocId, DocumentRole, FromPeer, Hello, JobDocument, JobId,
-    PROTOCOL_VERSION, Role, ToPeer, Verdict,
-};
+use qcbus_messages::{FromPeer, Hello, JobId, PROTOCOL_VERSION, Role, ToPeer, Verdict};
 
 use super::*;
 use crate::InForce;
 
+mod dependencies;
 mod membership;
-mod parts;
+mod world;
 
-const CAPACITY: usize = 2;
-
-/// A world around the state machine: it answers actions when it pleases.
-struct World {
-    state: State,
-    now: Duration,
-    /// What is there, each with the number of its stamp.
-    there: HashMap<Arc<Path>, u64>,
-    /// The bytes behind each stamp: a file that is touched has the same under a new one.
-    contents: HashMap<u64, u64>,
-    stamps: u64,
-    preparing: Vec<(JobId, u8)>,
-    storing: Vec<FinishedJob>,
-    stored: Vec<u8>,
-    peers: BTreeMap<SessionId, Bundle>,
-    sessions: u64,
-    judged: BTreeMap<u8, (Vec<Input>, Verdict)>,
-    /// The bundles whose judgement is in the verdict of each file, as stored.
-    judges: BTreeMap<u8, Vec<String>>,
-    released: BTreeSet<JobId>,
-    tickets: u64,
-    waiting: BTreeMap<Ticket, u8>,
-}
-
-struct Bundle {
-    name: &'static str,
-    jobs: BTreeSet<JobId>,
-}
+use world::*;
 
 #[derive(Debug, Clone)]
 enum Step {
@@ -66,6 +32,13 @@ enum Step {
     DiskFull(u8),
     Pass(u16),
     Reconfigure(u8),
+    Upgrade(bool),
+    Leave(u8),
+    Remove(u8),
+    Manifest(u8),
+    ChildJoins,
+    ChildEnds(u8),
+    Restart,
 }
 
 fn steps() -> impl Strategy<Value = Vec<Step>> {
@@ -84,407 +57,18 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
         1 => any::<u8>().prop_map(Step::DiskFull),
         2 => (0..3000_u16).prop_map(Step::Pass),
         1 => (0..3_u8).prop_map(Step::Reconfigure),
+        1 => any::<bool>().prop_map(Step::Upgrade),
+        1 => any::<u8>().prop_map(Step::Leave),
+        1 => (0..3_u8).prop_map(Step::Remove),
+        2 => (0..3_u8).prop_map(Step::Manifest),
+        2 => Just(Step::ChildJoins),
+        1 => (0..4_u8).prop_map(Step::ChildEnds),
+        1 => Just(Step::Restart),
     ];
     prop::collection::vec(step, 1..120)
 }
 
-/// The first six are checked, the others are only parts of them.
-fn path_of(file: u8) -> Arc<Path> {
-    let ending = if file < 6 { "xodr" } else { "part" };
-    Path::new(&format!("/farm/{file}.{ending}")).into()
-}
-
-/// What a verdict depends on besides the file: on another that has a verdict itself, on a part of
-/// its own, on a part that it shares, on all of these, or on nothing.
-fn dependencies_of(file: u8) -> &'static [u8] {
-    match file {
-        1 => &[0, 6],
-        2 => &[6],
-        3 => &[4],
-        5 => &[4, 6, 7],
-        _ => &[],
-    }
-}
-
-fn file_of(path: &Path) -> u8 {
-    path.file_stem()
-        .and_then(|it| it.to_str())
-        .and_then(|it| it.parse().ok())
-        .unwrap()
-}
-
-fn stamp(number: u64) -> Stamp {
-    Stamp {
-        size: number,
-        mtime_ns: i128::from(number),
-        ctime_ns: i128::from(number),
-        inode: 1,
-    }
-}
-
-fn digest(number: u64) -> Digest {
-    let mut digest = Digest::default();
-    digest.0[..8].copy_from_slice(&number.to_le_bytes());
-    digest
-}
-
-fn basis(inputs: &[Input]) -> Digest {
-    let mut basis = Digest::default();
-    for (at, input) in inputs.iter().enumerate() {
-        if let Some((_, digest)) = input.content {
-            basis.0[at * 8..][..8].copy_from_slice(&digest.0[..8]);
-        }
-    }
-    basis
-}
-
-fn catalogue(name: &str) -> Catalogue {
-    let checker = |id: String| CheckerInfo {
-        id,
-        description: String::new(),
-        rule_uids: Vec::new(),
-        kinds: vec![FileKind::Xodr],
-        default_on: true,
-        level: Level::Error,
-        params: Vec::new(),
-    };
-    Catalogue {
-        alias: name.to_lowercase(),
-        kinds: vec![FileKind::Xodr],
-        checkers: vec![
-            checker(format!("{name}.one")),
-            checker(format!("{name}.two")),
-        ],
-        ..Catalogue::default()
-    }
-}
-
-fn finding() -> Issue {
-    Issue {
-        id: 0,
-        description: "too much".to_owned(),
-        level: Level::Warning,
-        rule_uid: String::new(),
-        locations: Vec::new(),
-        domain_info: Vec::new(),
-    }
-}
-
 impl World {
-    fn new() -> World {
-        let in_force = InForce::new(None).unwrap();
-        let settings = Settings {
-            collect: Duration::ZERO,
-            max_active: 4,
-            max_preparing: 2,
-            max_storing: 2,
-            max_findings_bytes: 1000,
-            ..Settings::default()
-        };
-        let mut world = World {
-            state: State::new(settings, in_force.digest, in_force.demand()),
-            now: Duration::ZERO,
-            there: HashMap::new(),
-            contents: HashMap::new(),
-            stamps: 0,
-            preparing: Vec::new(),
-            storing: Vec::new(),
-            stored: Vec::new(),
-            peers: BTreeMap::new(),
-            sessions: 0,
-            judged: BTreeMap::new(),
-            judges: BTreeMap::new(),
-            released: BTreeSet::new(),
-            tickets: 0,
-            waiting: BTreeMap::new(),
-        };
-        world.event(Event::Scanned);
-        world
-    }
-
-    fn event(&mut self, event: Event) {
-        for action in self.state.handle(self.now, event) {
-            self.act(action);
-        }
-    }
-
-    fn act(&mut self, action: Action) {
-        match action {
-            Action::Prepare { job, path } => self.preparing.push((job, file_of(&path))),
-            Action::Release { job } => {
-                self.released.insert(job);
-            }
-            Action::Send {
-                session,
-                message: ToPeer::Job(job),
-            } => {
-                let bundle = self
-                    .peers
-                    .get_mut(&session)
-                    .expect("no job goes to a closed session");
-                assert!(
-                    bundle.jobs.insert(job.job),
-                    "a job is given out once per session"
-                );
-                assert!(bundle.jobs.len() <= CAPACITY, "the credit window is kept");
-            }
-            Action::Send {
-                session,
-                message: ToPeer::Cancel { job },
-            } => {
-                if let Some(bundle) = self.peers.get_mut(&session) {
-                    bundle.jobs.remove(&job);
-                }
-            }
-            Action::Disconnect { session } | Action::Refuse { session, .. } => {
-                self.peers.remove(&session);
-            }
-            Action::Store(job) => {
-                let names: BTreeSet<_> = job.bundles.iter().map(|it| it.name.clone()).collect();
-                assert_eq!(
-                    names.len(),
-                    job.bundles.len(),
-                    "no bundle is in a result twice"
-                );
-                for bundle in &job.bundles {
-                    assert_eq!(bundle.checkers.len(), 2, "every demanded checker is there");
-                }
-                self.storing.push(*job);
-            }
-            Action::Judged { path, judged, .. } => {
-                let verdict = (judged.inputs.clone(), judged.verdict);
-                self.judged.insert(file_of(&path), verdict);
-            }
-            Action::Answer { ticket, response } => {
-                let file = self.waiting.remove(&ticket).expect("one answer for each");
-                if matches!(response, Response::Verdict(_)) {
-                    let told = self.state.inputs_of(&path_of(file));
-                    assert_eq!(told, self.inputs(file), "the answer is true at that moment");
-                }
-            }
-            Action::Withdraw { path, .. } => {
-                self.judged.remove(&file_of(&path));
-            }
-            _ => {}
-        }
-    }
-
-    fn write(&mut self, file: u8) {
-        self.put(file, self.stamps + 1);
-    }
-
-    /// The same bytes under a new stamp.
-    fn touch(&mut self, file: u8) {
-        if let Some(number) = self.there.get(&path_of(file)) {
-            self.put(file, self.contents[number]);
-        }
-    }
-
-    fn put(&mut self, file: u8, content: u64) {
-        self.stamps += 1;
-        self.contents.insert(self.stamps, content);
-        self.there.insert(path_of(file), self.stamps);
-        let stamp = stamp(self.stamps);
-        self.event(Event::Settled {
-            path: path_of(file),
-            stamp,
-        });
-    }
-
-    fn delete(&mut self, file: u8) {
-        if self.there.remove(&path_of(file)).is_some() {
-            self.event(Event::Vanished {
-                path: path_of(file),
-            });
-        }
-    }
-
-    fn wait(&mut self, file: u8) {
-        self.tickets += 1;
-        self.waiting.insert(Ticket(self.tickets), file);
-        let path = path_of(file);
-        self.event(Event::Wait {
-            ticket: Ticket(self.tickets),
-            stamp: self.there.get(&path).map(|number| stamp(*number)),
-            path,
-            unwatched: None,
-            timeout: None,
-        });
-    }
-
-    fn names_that_judged(&self, file: u8) -> Vec<&str> {
-        self.judges[&file].iter().map(String::as_str).collect()
-    }
-
-    fn input(&self, file: u8) -> Input {
-        let path = path_of(file);
-        let number = self.there.get(&path);
-        Input {
-            content: number.map(|it| (stamp(*it), digest(self.contents[it]))),
-            path,
-        }
-    }
-
-    /// What reading a file now would give.
-    fn inputs(&self, file: u8) -> Vec<Input> {
-        let others = dependencies_of(file).iter();
-        let all = std::iter::once(&file).chain(others);
-        all.map(|it| self.input(*it)).collect()
-    }
-
-    fn join(&mut self, name: &'static str) {
-        if self.peers.values().any(|bundle| bundle.name == name) {
-            return;
-        }
-        self.sessions += 1;
-        let session = SessionId(self.sessions);
-        self.peers.insert(
-            session,
-            Bundle {
-                name,
-                jobs: BTreeSet::new(),
-            },
-        );
-        let hello = Hello {
-            protocol: PROTOCOL_VERSION,
-            role: Role::Bundle,
-            name: name.to_owned(),
-            version: "1".to_owned(),
-            incarnation: self.sessions,
-            pid: u32::try_from(self.sessions).unwrap() + 1000,
-            launch: None,
-            capacity: u16::try_from(CAPACITY).unwrap(),
-        };
-        self.event(Event::Hello { session, hello });
-        self.say(session, FromPeer::Catalogue(Box::new(catalogue(name))));
-    }
-
-    fn say(&mut self, session: SessionId, message: FromPeer) {
-        if self.peers.contains_key(&session) {
-            self.event(Event::Message { session, message });
-        }
-    }
-
-    fn nth_peer(&self, n: u8) -> Option<SessionId> {
-        let count = self.peers.len();
-        (count > 0).then(|| *self.peers.keys().nth(usize::from(n) % count).unwrap())
-    }
-
-    fn kill(&mut self, n: u8) {
-        if let Some(session) = self.nth_peer(n) {
-            self.peers.remove(&session);
-            self.event(Event::Gone { session });
-        }
-    }
-
-    fn answer(&mut self, n: u8) {
-        let Some(session) = self.nth_peer(n) else {
-            return;
-        };
-        let Some(job) = self
-            .peers
-            .get_mut(&session)
-            .and_then(|it| it.jobs.pop_first())
-        else {
-            return;
-        };
-        for checker in 0..2 {
-            // Some have much to say, so that the room for findings runs out now and then.
-            let issues = vec![finding(); usize::from(n % 3)];
-            self.say(
-                session,
-                FromPeer::Issues {
-                    job,
-                    checker,
-                    issues,
-                },
-            );
-            self.say(
-                session,
-                FromPeer::CheckerDone {
-                    job,
-                    checker,
-                    status: Status::Completed,
-                    reason: String::new(),
-                    params: Vec::new(),
-                    metadata: Vec::new(),
-                },
-            );
-        }
-        self.say(session, FromPeer::JobDone { job, micros: 1 });
-    }
-
-    fn prepare(&mut self, n: u8, room: bool) {
-        if self.preparing.is_empty() {
-            return;
-        }
-        let (job, file) = self.preparing.remove(usize::from(n) % self.preparing.len());
-        let inputs = self.inputs(file);
-        let result = match inputs[0].content {
-            None => Err(PrepareFailure::Vanished),
-            Some(_) if !room => Err(PrepareFailure::NoRoom("full".to_owned())),
-            Some((_, digest)) => {
-                let document = JobDocument {
-                    doc: DocId(job.0),
-                    role: DocumentRole::Root,
-                    path: String::new(),
-                    digest,
-                    referred_at: 0,
-                };
-                Ok(Box::new(PreparedJob {
-                    basis: basis(&inputs),
-                    inputs,
-                    racy: false,
-                    documents: vec![document],
-                    missing: Vec::new(),
-                    bytes: 1,
-                }))
-            }
-        };
-        self.event(Event::Prepared { job, result });
-    }
-
-    fn store(&mut self, n: u8, room: bool) {
-        if self.storing.is_empty() {
-            return;
-        }
-        let job = self.storing.remove(usize::from(n) % self.storing.len());
-        let file = file_of(&job.path);
-        let prepared = job.prepared.as_ref().unwrap();
-        let outcome = if prepared.inputs != self.inputs(file) {
-            StoreOutcome::Stale
-        } else if !room {
-            StoreOutcome::Failed("full".to_owned())
-        } else {
-            self.stored.push(file);
-            let names = job.bundles.iter().map(|it| it.name.clone());
-            self.judges.insert(file, names.collect());
-            let failed = job.bundles.iter().any(|bundle| bundle.failure.is_some());
-            StoreOutcome::Stored(Box::new(Judged {
-                job: job.job,
-                verdict: if failed {
-                    Verdict::Undetermined
-                } else {
-                    Verdict::Accepted
-                },
-                digest: prepared.root().unwrap().1,
-                basis: prepared.basis,
-                config: job.config,
-                jury: job.jury.clone(),
-                epoch: job.epoch,
-                inputs: prepared.inputs.clone(),
-                racy: false,
-                counts: [0; 3],
-                why: Vec::new(),
-                xqar: "/out".into(),
-            }))
-        };
-        self.event(Event::Stored {
-            job: job.job,
-            outcome,
-        });
-    }
-
     fn step(&mut self, step: &Step) {
         match *step {
             Step::Write(file) => self.write(file),
@@ -505,7 +89,23 @@ impl World {
             Step::Store(n) => self.store(n, true),
             Step::DiskFull(n) => self.store(n, false),
             Step::Pass(millis) => self.pass(Duration::from_millis(millis.into())),
+            Step::Upgrade(first) => {
+                let name = if first { "First" } else { "Second" };
+                *self.versions.entry(name).or_insert(1) += 1;
+            }
+            Step::Leave(n) => self.leave(n),
+            Step::Remove(n) => self.remove(["First", "Second", CHILD][usize::from(n)]),
+            // Absent, or one of two versions.
+            Step::Manifest(n) => self.manifest((n > 0).then_some(n)),
+            Step::ChildJoins => self.child_joins(),
+            Step::ChildEnds(n) => self.child_ends(match n {
+                0 => ChildEnd::NotStarted("no such program".to_owned()),
+                1 => ChildEnd::Done("it ended".to_owned()),
+                _ => ChildEnd::Failed("it crashed".to_owned()),
+            }),
+            Step::Restart => self.restart(),
             Step::Reconfigure(n) => {
+                self.reconfigured = n;
                 let in_force = InForce::new(None).unwrap();
                 let event = Event::Configured {
                     digest: digest(n.into()),
@@ -514,32 +114,6 @@ impl World {
                 self.event(event);
             }
         }
-    }
-
-    fn pass(&mut self, time: Duration) {
-        self.now += time;
-        self.event(Event::Tick);
-    }
-
-    /// Lets everything that is under way come to its end, with both bundles there.
-    fn settle(&mut self) {
-        for _ in 0..2000 {
-            self.join("First");
-            self.join("Second");
-            for n in 0..4 {
-                self.prepare(n, true);
-                self.answer(n);
-                self.store(n, true);
-            }
-            self.pass(Duration::from_millis(300));
-            if self.state.files.is_quiet() && self.state.jobs.is_empty() {
-                return;
-            }
-        }
-        panic!(
-            "the state machine does not come to rest: {:#?}",
-            self.state.jobs
-        );
     }
 }
 
@@ -562,6 +136,12 @@ proptest! {
         let judged: BTreeMap<u8, Vec<Input>> =
             world.judged.iter().map(|(file, (inputs, _))| (*file, inputs.clone())).collect();
         prop_assert_eq!(judged, present);
+        for file in world.judged.keys() {
+            let id = world.state.files.id(&path_of(*file)).unwrap();
+            let judged = world.state.files.get(id).unwrap().judged.clone().unwrap();
+            prop_assert_eq!(named(&judged.jury), world.expected_jury());
+            prop_assert_eq!(&world.journal[file], &*judged, "the journal knows the same");
+        }
         prop_assert!(!world.waiting.values().any(there), "{:?}", world.waiting);
         prop_assert_eq!(world.state.preparing, 0);
         prop_assert_eq!(world.state.storing, 0);
@@ -673,6 +253,7 @@ fn files_are_judged_again_without_a_bundle_that_has_left() {
         .iter()
         .find(|(_, bundle)| bundle.name == "Second");
     let session = *second.unwrap().0;
+    world.demanded.remove("Second");
     world.say(session, FromPeer::Leaving);
     for n in 0..4 {
         world.prepare(n, true);
@@ -689,9 +270,10 @@ fn world_with_an_unwanted_bundle() -> (World, SessionId) {
     let session = SessionId(77);
     world.peers.insert(
         session,
-        Bundle {
+        Process {
             name: "Left over",
             jobs: BTreeSet::new(),
+            drained: false,
         },
     );
     let hello = Hello {

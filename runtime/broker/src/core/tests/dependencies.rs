@@ -3,7 +3,7 @@
 use super::*;
 
 /// A file with all that it depends on, judged. `known` is a file whose verdict is looked at.
-fn world_with_parts(known: u8) -> World {
+fn world_with_dependencies(known: u8) -> World {
     let mut world = World::new();
     world.join("First");
     world.join("Second");
@@ -16,9 +16,9 @@ fn world_with_parts(known: u8) -> World {
 }
 
 #[test]
-fn a_changed_part_has_its_file_judged_again() {
+fn a_changed_dependency_has_its_file_judged_again() {
     for (file, part) in [(1, 0), (1, 6), (2, 6), (3, 4), (5, 7)] {
-        let mut world = world_with_parts(file);
+        let mut world = world_with_dependencies(file);
         // It changes, goes, stays away, comes back: each time there is a new verdict.
         let deeds: [fn(&mut World, u8); 3] = [World::write, World::delete, World::write];
         for deed in deeds {
@@ -40,7 +40,7 @@ fn a_changed_part_has_its_file_judged_again() {
 }
 
 #[test]
-fn a_part_that_is_looked_for_and_comes_later_has_its_file_judged_again() {
+fn a_dependency_that_is_looked_for_and_comes_later_has_its_file_judged_again() {
     let mut world = World::new();
     world.join("First");
     world.write(2);
@@ -52,9 +52,9 @@ fn a_part_that_is_looked_for_and_comes_later_has_its_file_judged_again() {
 }
 
 #[test]
-fn a_part_that_has_only_a_new_stamp_costs_no_new_verdict() {
+fn a_dependency_that_has_only_a_new_stamp_costs_no_new_verdict() {
     for touched in [5, 7, 4] {
-        let mut world = world_with_parts(5);
+        let mut world = world_with_dependencies(5);
         let before = world.stored.len();
         world.touch(touched);
         world.settle();
@@ -73,8 +73,8 @@ fn a_part_that_has_only_a_new_stamp_costs_no_new_verdict() {
 }
 
 #[test]
-fn a_part_that_changes_before_the_first_scan_sees_its_file_is_not_forgotten() {
-    let known = world_with_parts(2);
+fn a_dependency_that_changes_before_the_first_scan_sees_its_file_is_not_forgotten() {
+    let known = world_with_dependencies(2);
     let judged = known
         .state
         .files
