@@ -8,7 +8,7 @@ use qcbus_messages::{Catalogue, FromPeer, Hello, JobId, Role, ToPeer};
 
 use super::action::Action;
 use super::children::LEAVE_LIMIT;
-use super::jury::{Mark, Origin};
+use super::jury::{Mark, Member, Origin};
 use super::notice::Notice;
 use super::types::{Launch, SessionId};
 use super::{Actions, State};
@@ -77,6 +77,16 @@ enum Word {
 const LIES_FORGIVEN: u32 = 64;
 
 impl Bundle {
+    /// As the journal remembers it, once it is known what it checks.
+    pub fn as_member(&self, name: &str) -> Option<Member> {
+        Some(Member {
+            name: name.to_owned(),
+            version: self.version.clone(),
+            catalogue: Some(self.catalogue.clone()?),
+            origin: self.origin?,
+        })
+    }
+
     /// A job waits for this bundle.
     pub fn expect(&mut self, id: JobId) {
         self.queue.push_back(id);

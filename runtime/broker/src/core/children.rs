@@ -157,6 +157,11 @@ impl State {
         if let Some(bundle) = self.bundles.get_mut(name) {
             bundle.leaving = true;
             bundle.moved = now;
+            // From now on nobody misses it, also when the broker ends before it has left.
+            if bundle.origin.take().is_some() {
+                let name = name.to_owned();
+                actions.push(Action::Strike { name });
+            }
             match bundle.session {
                 Some(session) => actions.push(Action::Send {
                     session,

@@ -1,7 +1,7 @@
 //! The roster: the bundles that must judge, whether they are there or not. It lasts over restarts,
 //! and every change of it begins a new epoch.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -46,31 +46,50 @@ impl State {
 
     /// Children that are bundles are on the roster as long as they are children, seen or not.
     pub(super) fn enrol_children(&mut self, actions: &mut Actions) {
-        let wanted = |name: &String| {
-            let child = self.children.get(name);
-            child.is_some_and(|it| it.spec.role == Role::Bundle)
-        };
+        let children = self.children.iter();
+        let wanted: BTreeSet<String> = children
+            .filter(|(_, child)| child.spec.role == Role::Bundle)
+            .map(|(name, _)| name.clone())
+            .collect();
         let struck: Vec<String> = self
             .bundles
             .iter()
-            .filter(|(name, it)| it.origin == Some(Origin::Supervised) && !wanted(name))
+            .filter(|(name, it)| it.origin == Some(Origin::Supervised) && !wanted.contains(*name))
             .filter(|(_, it)| it.session.is_none())
             .map(|(name, _)| name.clone())
             .collect();
         for name in struck {
             self.drop_bundle(&name, actions);
         }
-        let children = self.children.iter();
-        let bundles = children.filter(|(_, child)| child.spec.role == Role::Bundle);
-        for (name, _) in bundles {
+        for name in wanted {
+            self.let_leave(&name);
             let bundle = self.bundles.entry(name.clone()).or_insert_with(|| Bundle {
                 away_since: Some(self.now.max(self.settings.collect)),
                 note: "it has never joined".to_owned(),
                 ..Bundle::default()
             });
-            bundle.origin = Some(Origin::Supervised);
+            if bundle.origin.replace(Origin::Supervised).is_none() {
+                actions.extend(bundle.as_member(&name).map(Action::Enrol));
+            }
         }
         self.begin_epoch();
+    }
+
+    /// A process that was told to go is replaced by the next one of its name, which is wanted again.
+    fn let_leave(&mut self, name: &str) {
+        let now = self.now;
+        let Some(bundle) = self.bundles.get_mut(name).filter(|it| it.leaving) else {
+            return;
+        };
+        bundle.leaving = false;
+        bundle.ready = false;
+        bundle.away_since = Some(now);
+        let (session, launch, pid) = (bundle.session.take(), bundle.launch, bundle.pid);
+        self.take_back(name, false);
+        if let Some(session) = session {
+            self.sessions.remove(&session);
+            self.retire(session, launch, pid);
+        }
     }
 
     /// A bundle has said what it offers: from now on it must judge, until it leaves.
@@ -79,7 +98,7 @@ impl State {
         let Some(bundle) = self.bundles.get_mut(name) else {
             return;
         };
-        let Some(catalogue) = bundle.catalogue.clone() else {
+        let Some(catalogue) = &bundle.catalogue else {
             return;
         };
         let origin = if supervised {
@@ -87,20 +106,14 @@ impl State {
         } else {
             Origin::Joined
         };
-        let mark = Mark::of(&bundle.version, &catalogue);
+        let mark = Mark::of(&bundle.version, catalogue);
         let known = bundle.mark.replace(mark) == Some(mark) && bundle.origin == Some(origin);
         if bundle.leaving {
             return;
         }
         bundle.origin = Some(origin);
         if !known {
-            let member = Member {
-                name: name.to_owned(),
-                version: bundle.version.clone(),
-                catalogue: Some(catalogue),
-                origin,
-            };
-            actions.push(Action::Enrol(member));
+            actions.extend(bundle.as_member(name).map(Action::Enrol));
             self.begin_epoch();
         }
         // Also when it has only come back: what was judged without it is not settled.

@@ -117,8 +117,14 @@ impl World {
     }
 }
 
+/// How many random worlds there are: more of them for a night, by `QCBUS_WORLDS`.
+fn worlds() -> u32 {
+    let wanted = std::env::var("QCBUS_WORLDS").ok();
+    wanted.and_then(|it| it.parse().ok()).unwrap_or(400)
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(400))]
+    #![proptest_config(ProptestConfig::with_cases(worlds()))]
 
     /// Whatever happens in whatever order: once the world calms down, every file that is there has
     /// a verdict on its present bytes and those of all that it depends on, none that has gone has

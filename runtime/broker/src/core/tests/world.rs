@@ -474,7 +474,11 @@ impl World {
     pub fn manifest(&mut self, version: Option<u8>) {
         if let Some(version) = version {
             self.versions.insert(CHILD, version);
-            self.demanded.entry(CHILD.to_owned()).or_insert(None);
+            // Its last process may not have left yet: what that one said counts.
+            let known = self.state.bundles.get(CHILD);
+            let known = known.filter(|it| it.catalogue.is_some());
+            let known = known.and_then(|it| it.version.parse().ok());
+            self.demanded.entry(CHILD.to_owned()).or_insert(known);
         } else {
             self.demanded.remove(CHILD);
         }
@@ -517,8 +521,11 @@ impl World {
         for member in self.members.values() {
             self.state.remember_member(member.clone());
         }
-        for (file, judged) in &self.journal {
-            self.state.remember(&path_of(*file), judged.clone(), &[]);
+        for (file, judged) in self.journal.clone() {
+            let mut judged = judged;
+            // As the engine does: what has changed while nobody watched is looked at again.
+            judged.racy |= judged.inputs[1..] != self.inputs(file)[1..];
+            self.state.remember(&path_of(file), judged, &[]);
         }
         let version = self.versions.get(CHILD).copied().filter(|_| self.manifest);
         let specs = version.map(child).into_iter().collect();
