@@ -4,7 +4,9 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use qcbus_messages::{Digest, FromPeer, Hello, JobId, PROTOCOL_VERSION, PeerReport, Role, Verdict};
+use qcbus_messages::{
+    Digest, FromPeer, Hello, JobId, PROTOCOL_VERSION, PeerReport, Role, ToPeer, Verdict,
+};
 
 use super::*;
 use crate::InForce;
@@ -54,16 +56,7 @@ impl Desk {
     fn join(&mut self) -> (SessionId, Vec<Action>) {
         self.sessions += 1;
         let session = SessionId(self.sessions);
-        let hello = Hello {
-            protocol: PROTOCOL_VERSION,
-            role: Role::Reporter,
-            name: TEXT.to_owned(),
-            version: "1".to_owned(),
-            incarnation: self.sessions,
-            pid: 100 + u32::try_from(self.sessions).unwrap(),
-            launch: None,
-            capacity: 4,
-        };
+        let hello = hello(self.sessions, None);
         (session, self.event(Event::Hello { session, hello }))
     }
 
@@ -74,6 +67,29 @@ impl Desk {
 
     fn say(&mut self, session: SessionId, message: FromPeer) -> Vec<Action> {
         self.event(Event::Message { session, message })
+    }
+}
+
+fn hello(number: u64, launch: Option<u64>) -> Hello {
+    Hello {
+        protocol: PROTOCOL_VERSION,
+        role: Role::Reporter,
+        name: TEXT.to_owned(),
+        version: "1".to_owned(),
+        incarnation: number,
+        pid: 100 + u32::try_from(number).unwrap(),
+        launch,
+        capacity: 4,
+    }
+}
+
+fn spec(version: u8) -> ChildSpec {
+    ChildSpec {
+        name: TEXT.to_owned(),
+        role: Role::Reporter,
+        version: Some(version.to_string()),
+        command: vec!["text".to_owned()],
+        restart: Restart::OnFailure,
     }
 }
 
@@ -143,14 +159,9 @@ fn a_result_under_way_is_not_sent_after_its_file_has_gone() {
 #[test]
 fn what_a_former_broker_sent_unheard_is_taken_back_too() {
     let mut desk = Desk::new(false);
-    let spec = ChildSpec {
-        name: TEXT.to_owned(),
-        role: Role::Reporter,
-        version: None,
-        command: vec!["text".to_owned()],
-        restart: Restart::OnFailure,
-    };
-    desk.event(Event::Children { specs: vec![spec] });
+    desk.event(Event::Children {
+        specs: vec![spec(1)],
+    });
     desk.vanish();
     let (_, actions) = desk.join();
     assert!(is_told(&actions), "{actions:?}");
@@ -191,4 +202,40 @@ fn a_newer_result_waits_until_the_one_before_it_has_arrived() {
     assert_eq!(sent(&desk.say(session, done(JobId(7)))), [JobId(8)]);
     assert_eq!(sent(&desk.say(session, done(JobId(8)))), []);
     assert!(desk.state.all_delivered());
+}
+
+#[test]
+fn a_reporter_that_is_upgraded_finishes_what_it_has_begun() {
+    let mut desk = Desk::new(false);
+    desk.event(Event::Children {
+        specs: vec![spec(1)],
+    });
+    let (old, _) = desk.join();
+    let specs = vec![spec(2)];
+    let actions = desk.event(Event::Children { specs });
+    let launch = actions.iter().find_map(|it| match it {
+        Action::Spawn { launch, .. } => Some(*launch),
+        _ => None,
+    });
+    desk.sessions += 1;
+    let hello = hello(desk.sessions, Some(launch.unwrap().0));
+    let new = SessionId(desk.sessions);
+    let actions = desk.event(Event::Hello {
+        session: new,
+        hello,
+    });
+    let drained = |it: &Action| matches!(it, Action::Send { session, message: ToPeer::Drain } if *session == old);
+    assert!(
+        actions.iter().any(drained),
+        "it is not cut off: {actions:?}"
+    );
+    let cut = |it: &Action| matches!(it, Action::Disconnect { session } if *session == old);
+    assert!(!actions.iter().any(cut), "{actions:?}");
+    let given = |it: &Action| matches!(it, Action::Deliver { session, .. } if *session == new);
+    assert!(
+        !actions.iter().any(given),
+        "the older may still write the same report"
+    );
+    let actions = desk.say(old, FromPeer::Leaving);
+    assert!(actions.iter().any(given), "{actions:?}");
 }

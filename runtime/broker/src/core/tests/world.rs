@@ -74,6 +74,7 @@ pub struct World {
     pub versions: BTreeMap<&'static str, u8>,
     /// Children that were started and have not joined.
     pub launched: Vec<(Launch, &'static str)>,
+    pub killed: Vec<Launch>,
     /// Whether the manifest of the child is there.
     pub manifest: bool,
     /// What the journal has been told.
@@ -194,6 +195,7 @@ impl World {
             demanded: BTreeMap::new(),
             versions: BTreeMap::new(),
             launched: Vec::new(),
+            killed: Vec::new(),
             manifest: false,
             members: BTreeMap::new(),
             journal: BTreeMap::new(),
@@ -253,6 +255,7 @@ impl World {
             }
             Action::Spawn { launch, .. } => self.launched.push((launch, CHILD)),
             Action::Kill { launch, .. } => {
+                self.killed.extend(launch);
                 self.launched.retain(|(it, _)| Some(*it) != launch);
             }
             Action::Enrol(member) => {

@@ -1,0 +1,138 @@
+//! Children: what becomes of files while a child cannot be started, and of upgrades that fail.
+
+use super::*;
+
+fn notices(world: &World) -> Vec<&'static str> {
+    world.state.notices.iter().map(Notice::kind).collect()
+}
+
+/// The child runs as version 1, and a manifest of version 2 has come.
+fn world_with_an_upgrade() -> World {
+    let mut world = World::new();
+    world.manifest(Some(1));
+    world.pass(Duration::ZERO);
+    world.child_joins();
+    world.write(0);
+    world.settle();
+    world.manifest(Some(2));
+    assert_eq!(world.launched.len(), 1, "the newer one is started");
+    world
+}
+
+fn child_version(world: &World) -> &str {
+    &world.state.bundles[CHILD].version
+}
+
+#[test]
+fn an_upgrade_takes_over_and_the_old_process_goes() {
+    let mut world = world_with_an_upgrade();
+    world.child_joins();
+    assert_eq!(child_version(&world), "2");
+    let old = world.peers.values().find(|it| it.drained);
+    assert_eq!(old.unwrap().name, CHILD);
+    world.settle();
+    assert!(world.peers.values().all(|it| !it.drained));
+}
+
+#[test]
+fn an_upgrade_that_dies_before_it_joins_is_said_and_tried_again() {
+    let mut world = world_with_an_upgrade();
+    world.child_ends(ChildEnd::Failed("it crashed".to_owned()));
+    assert!(notices(&world).contains(&"not-upgraded"));
+    assert_eq!(child_version(&world), "1", "the older goes on");
+    world.pass(Duration::from_secs(1));
+    assert_eq!(world.launched.len(), 1, "it is started again");
+    world.child_joins();
+    assert_eq!(child_version(&world), "2");
+}
+
+#[test]
+fn an_upgrade_that_hangs_is_killed_and_tried_again() {
+    let mut world = world_with_an_upgrade();
+    let (launch, _) = world.launched[0];
+    world.pass(Duration::from_secs(16));
+    assert!(world.killed.contains(&launch), "{:?}", world.killed);
+    assert!(notices(&world).contains(&"not-upgraded"));
+    world.pass(Duration::from_secs(60));
+    world.child_joins();
+    assert_eq!(child_version(&world), "2");
+}
+
+#[test]
+fn a_file_is_undetermined_at_once_when_a_child_cannot_be_started() {
+    let ends = [
+        (1, ChildEnd::NotStarted("no such program".to_owned())),
+        (1, ChildEnd::Done("it ended with exit code 0".to_owned())),
+        (3, ChildEnd::Failed("it ended with exit code 1".to_owned())),
+    ];
+    for (times, end) in ends {
+        let mut world = World::new();
+        world.join("First");
+        world.manifest(Some(1));
+        world.write(0);
+        world.prepare(0, true);
+        for _ in 0..times {
+            world.pass(Duration::from_millis(900));
+            world.child_ends(end.clone());
+        }
+        world.answer(0);
+        world.store(0, true);
+        let (_, verdict) = &world.judged[&0];
+        assert_eq!(*verdict, Verdict::Undetermined, "{end:?}");
+        assert!(world.now < world.state.settings.absence_limit);
+        // And nothing is done over and over while it stays away.
+        let stored = world.stored.len();
+        for _ in 0..10 {
+            world.pass(Duration::from_secs(1));
+            world.prepare(0, true);
+            world.answer(0);
+            world.store(0, true);
+        }
+        assert_eq!(world.stored.len(), stored, "{end:?}");
+    }
+}
+
+#[test]
+fn a_child_that_never_joins_is_waited_for_once() {
+    let mut world = World::new();
+    world.join("First");
+    world.manifest(Some(1));
+    world.write(0);
+    world.prepare(0, true);
+    world.answer(0);
+    world.store(0, true);
+    assert!(world.judged.is_empty(), "it may come yet");
+    world.pass(Duration::from_secs(16));
+    world.answer(0);
+    world.store(0, true);
+    assert_eq!(world.judged[&0].1, Verdict::Undetermined);
+    // When it comes at last, it judges.
+    world.pass(Duration::from_secs(60));
+    world.child_joins();
+    world.settle();
+    assert_eq!(world.judged[&0].1, Verdict::Accepted);
+}
+
+#[test]
+fn a_bundle_that_joined_by_hand_must_judge_after_a_restart() {
+    let mut world = World::new();
+    world.join("First");
+    world.join("Second");
+    world.restart();
+    world.join("First");
+    world.write(0);
+    world.prepare(0, true);
+    world.answer(0);
+    world.store(0, true);
+    assert!(world.judged.is_empty(), "the second is waited for");
+    world.pass(Duration::from_secs(25));
+    world.store(0, true);
+    assert_eq!(world.judged[&0].1, Verdict::Undetermined);
+    world.remove("Second");
+    for _ in 0..4 {
+        world.prepare(0, true);
+        world.answer(0);
+        world.store(0, true);
+    }
+    assert_eq!(world.judged[&0].1, Verdict::Accepted);
+}
