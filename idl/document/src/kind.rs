@@ -23,8 +23,9 @@ impl FileKind {
     /// The kind that a file's name promises (suffixes are compared without regard to case), or
     /// `None` when qcbus does not check such files.
     pub fn of_path(path: &Path) -> Option<FileKind> {
-        let name = path.file_name()?.to_str()?.to_ascii_lowercase();
-        let ends = |suffix: &str| name.len() > suffix.len() && name.ends_with(suffix);
+        // Only the end of a name counts; the rest of it need not be UTF-8.
+        let name = path.file_name()?.as_encoded_bytes().to_ascii_lowercase();
+        let ends = |suffix: &str| name.len() > suffix.len() && name.ends_with(suffix.as_bytes());
         if ends(".xodr") || ends(".xodrz") || ends(".xodr.gz") {
             Some(FileKind::Xodr)
         } else if ends(".xosc") {
@@ -60,5 +61,13 @@ mod tests {
         assert_eq!(of("b.mosc"), Some(FileKind::Mosc));
         assert_eq!(of("b.xml"), None);
         assert_eq!(of(".xodr"), None);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn the_rest_of_a_name_need_not_be_utf8() {
+        use std::os::unix::ffi::OsStrExt as _;
+        let name = std::ffi::OsStr::from_bytes(b"a/stra\xDFe.XODR");
+        assert_eq!(FileKind::of_path(Path::new(name)), Some(FileKind::Xodr));
     }
 }

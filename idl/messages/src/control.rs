@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::Verdict;
+use crate::{Verdict, path_text};
 
 /// A command's request.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -15,6 +15,7 @@ pub enum Request {
     /// Answer when the file's present bytes have a verdict.
     Wait {
         /// Absolute path of the file.
+        #[serde(with = "path_text::one")]
         file: PathBuf,
         /// Give up after this many milliseconds; never, when absent.
         timeout_ms: Option<u64>,
@@ -58,12 +59,14 @@ pub enum Response {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FileVerdict {
     /// Absolute path.
+    #[serde(with = "path_text::one")]
     pub file: PathBuf,
     /// The verdict.
     pub verdict: Verdict,
     /// SHA-256 of the bytes that it is about.
     pub digest: String,
-    /// Where the result lies.
+    /// Where the result lies; empty when there is none.
+    #[serde(with = "path_text::one")]
     pub xqar: PathBuf,
     /// Issues of level error.
     pub errors: u64,
@@ -89,10 +92,12 @@ pub struct Status {
     /// Seconds since the start.
     pub uptime_s: u64,
     /// Watched directories.
+    #[serde(with = "path_text::many")]
     pub watching: Vec<PathBuf>,
     /// `notify` or `poll`, and why when it is not what was asked for.
     pub watch_mode: String,
     /// Where results go.
+    #[serde(with = "path_text::one")]
     pub out: PathBuf,
     /// Digest of the configuration in force.
     pub config: String,
@@ -104,6 +109,9 @@ pub struct Status {
     pub peers: Vec<PeerStatus>,
     /// Counts up with every change of who must judge, or of what is demanded of them.
     pub epoch: u64,
+    /// What lies in the watched directories and cannot be looked at now; the first hundred.
+    #[serde(default)]
+    pub unseen: Vec<Unseen>,
     /// Things a person should look at, newest last.
     pub notices: Vec<Notice>,
 }
@@ -117,6 +125,28 @@ pub struct Notice {
     pub about: Option<String>,
     /// For a person.
     pub text: String,
+}
+
+/// Something in a watched or given directory that could not be looked at, so that nothing is known
+/// of what lies there.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Unseen {
+    /// Absolute path.
+    #[serde(with = "path_text::one")]
+    pub path: PathBuf,
+    /// Why, for a person.
+    pub why: String,
+}
+
+impl std::fmt::Display for Unseen {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "not looked at: {}: {}",
+            path_text::to_text(&self.path),
+            self.why
+        )
+    }
 }
 
 /// How many files are in which state.

@@ -9,6 +9,7 @@ pub mod codec;
 pub mod control;
 mod exit;
 pub mod ids;
+pub mod path_text;
 pub mod peer_to_broker;
 pub mod services;
 pub mod verdict;

@@ -1,0 +1,175 @@
+//! Paths as text. On disk a name is bytes; in messages, JSON and the journal it is text.
+//!
+//! A path that is UTF-8 is written as it is. Any other is written as `bytes:` and the path, in
+//! which every byte that is no UTF-8, and every `%`, stands as `%` and two hexadecimal digits. So
+//! two paths never share a text, and every text leads back to its path.
+
+use std::ffi::OsString;
+use std::os::unix::ffi::{OsStrExt, OsStringExt};
+use std::path::{Path, PathBuf};
+
+/// Begins the text of a path that cannot be written as it is.
+const ESCAPED: &str = "bytes:";
+
+/// The text of a path.
+pub fn to_text(path: &Path) -> String {
+    // A plain path that looks like an escaped one would be mistaken for it.
+    if let Some(plain) = path.to_str().filter(|text| !text.starts_with(ESCAPED)) {
+        return plain.to_owned();
+    }
+    let mut text = ESCAPED.to_owned();
+    for chunk in path.as_os_str().as_bytes().utf8_chunks() {
+        text.push_str(&chunk.valid().replace('%', "%25"));
+        for byte in chunk.invalid() {
+            text.push_str(&format!("%{byte:02X}"));
+        }
+    }
+    text
+}
+
+/// The path of a text. Text that nobody gets from [`to_text`] is taken as it is.
+pub fn from_text(text: &str) -> PathBuf {
+    let unescaped = text.strip_prefix(ESCAPED).and_then(unescape);
+    unescaped.map_or_else(
+        || PathBuf::from(text),
+        |bytes| PathBuf::from(OsString::from_vec(bytes)),
+    )
+}
+
+fn unescape(text: &str) -> Option<Vec<u8>> {
+    let mut bytes = Vec::with_capacity(text.len());
+    let mut rest = text.as_bytes();
+    while let Some((&byte, tail)) = rest.split_first() {
+        if byte != b'%' {
+            bytes.push(byte);
+            rest = tail;
+            continue;
+        }
+        let (digits, tail) = tail.split_at_checked(2)?;
+        let digits = std::str::from_utf8(digits).ok()?;
+        // `from_str_radix` would take a sign.
+        if !digits.bytes().all(|digit| digit.is_ascii_hexdigit()) {
+            return None;
+        }
+        bytes.push(u8::from_str_radix(digits, 16).ok()?);
+        rest = tail;
+    }
+    Some(bytes)
+}
+
+/// For `#[serde(with = "path_text::one")]`: a path as its text.
+pub mod one {
+    use std::path::{Path, PathBuf};
+
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    /// Writes the text of a path.
+    ///
+    /// # Errors
+    /// The serializer's.
+    pub fn serialize<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&super::to_text(path))
+    }
+
+    /// Reads a path from its text.
+    ///
+    /// # Errors
+    /// When there is no text.
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<PathBuf, D::Error> {
+        String::deserialize(deserializer).map(|text| super::from_text(&text))
+    }
+}
+
+/// For `#[serde(with = "path_text::many")]`: paths as their texts.
+pub mod many {
+    use std::path::PathBuf;
+
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    /// Writes the texts of paths.
+    ///
+    /// # Errors
+    /// The serializer's.
+    pub fn serialize<S: Serializer>(paths: &[PathBuf], serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(paths.iter().map(|path| super::to_text(path)))
+    }
+
+    /// Reads paths from their texts.
+    ///
+    /// # Errors
+    /// When there is no list of texts.
+    pub fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Vec<PathBuf>, D::Error> {
+        let texts = Vec::<String>::deserialize(deserializer)?;
+        Ok(texts.iter().map(|text| super::from_text(text)).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn path(bytes: &[u8]) -> PathBuf {
+        PathBuf::from(OsString::from_vec(bytes.to_vec()))
+    }
+
+    #[test]
+    fn utf8_is_written_as_it_is_and_the_rest_by_its_bytes() {
+        let cases: [(&[u8], &str); 6] = [
+            (b"/farm/a.xodr", "/farm/a.xodr"),
+            (
+                "/farm/straße 100%.xodr".as_bytes(),
+                "/farm/straße 100%.xodr",
+            ),
+            (b"/farm/stra\xDFe.xodr", "bytes:/farm/stra%DFe.xodr"),
+            (b"/farm/\xFF%DF.xodr", "bytes:/farm/%FF%25DF.xodr"),
+            (b"bytes:a", "bytes:bytes:a"),
+            (b"", ""),
+        ];
+        for (bytes, text) in cases {
+            assert_eq!(to_text(&path(bytes)), text);
+            assert_eq!(from_text(text), path(bytes));
+        }
+    }
+
+    #[test]
+    fn text_of_other_origin_is_a_path_too() {
+        for text in ["bytes:%", "bytes:%F", "bytes:%+1", "bytes:%ß", "%FF"] {
+            assert_eq!(from_text(text), PathBuf::from(text));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn every_path_comes_back_from_its_text(bytes in mostly_text()) {
+            prop_assert_eq!(from_text(&to_text(&path(&bytes))), path(&bytes));
+        }
+
+        #[test]
+        fn two_paths_never_share_a_text(one in mostly_text(), other in mostly_text()) {
+            let same = to_text(&path(&one)) == to_text(&path(&other));
+            prop_assert_eq!(same, path(&one).as_os_str() == path(&other).as_os_str());
+        }
+
+        #[test]
+        fn every_text_is_some_path(text in "(bytes:)?[%A-F0-9a-zß/]{0,12}") {
+            let path = from_text(&text);
+            prop_assert_eq!(from_text(&to_text(&path)), path);
+        }
+    }
+
+    /// Names in which escapes, their prefix and broken UTF-8 meet.
+    fn mostly_text() -> impl Strategy<Value = Vec<u8>> {
+        let part = prop_oneof![
+            Just(b"bytes:".to_vec()),
+            Just(b"%DF".to_vec()),
+            Just(b"%25".to_vec()),
+            Just("ß".as_bytes().to_vec()),
+            proptest::collection::vec(any::<u8>(), 1..4),
+        ];
+        proptest::collection::vec(part, 0..5).prop_map(|parts| parts.concat())
+    }
+}
