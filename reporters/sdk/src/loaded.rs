@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use qcbus_formats::xqar::{self, Level, Results, Status};
+use qcbus_messages::path_text::{from_text, to_text};
 use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
 
 /// Why an `.xqar` could not be read.
@@ -47,7 +48,7 @@ pub fn load(path: &Path) -> Result<ResultMessage, LoadError> {
         job: JobId(0),
         display_path: displayed(&input),
         input,
-        xqar: absolute.to_string_lossy().into_owned(),
+        xqar: to_text(&absolute),
         verdict: verdict_of(&results),
         digest: Digest::default(),
         config: Digest::default(),
@@ -84,22 +85,22 @@ fn input_of(results: &Results, xqar: &Path) -> String {
     let Some(named) = named else {
         return String::new();
     };
-    let here = std::path::absolute(named).unwrap_or_else(|_| PathBuf::from(named));
-    let beside = xqar.with_file_name(named);
+    let named = from_text(named);
+    let here = std::path::absolute(&named).unwrap_or_else(|_| named.clone());
+    let beside = xqar.with_file_name(&named);
     let path = if !here.exists() && beside.exists() {
         beside
     } else {
         here
     };
-    path.to_string_lossy().into_owned()
+    to_text(&path)
 }
 
 /// The path as a person in the current directory would write it.
 fn displayed(input: &str) -> String {
     let current = std::env::current_dir().unwrap_or_default();
-    let path = Path::new(input);
-    let short = path.strip_prefix(&current).unwrap_or(path);
-    short.to_string_lossy().into_owned()
+    let path = from_text(input);
+    to_text(path.strip_prefix(&current).unwrap_or(&path))
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use qcbus_formats::xqar::Param;
+use qcbus_messages::path_text::from_text;
 
 use crate::{ReportError, Subject};
 
@@ -43,11 +44,11 @@ impl Output {
         match self {
             Output::BesideResult => {
                 let stem = subject.xqar.strip_suffix(".xqar").unwrap_or(subject.xqar);
-                Some(PathBuf::from(format!("{stem}.{suffix}")))
+                Some(from_text(&format!("{stem}.{suffix}")))
             }
             Output::Directory(directory) => {
                 let path = format!("{}.{suffix}", subject.display_path);
-                Some(directory.join(inside(Path::new(&path))))
+                Some(directory.join(inside(&from_text(&path))))
             }
             Output::File(_) | Output::Stdout | Output::Stderr => None,
         }
@@ -153,6 +154,18 @@ mod tests {
             Output::File("all.txt".into())
         );
         assert_eq!(Output::of(&params("__stdout__")), Output::Stdout);
+    }
+
+    #[test]
+    fn names_that_are_no_utf8_have_a_report_each() {
+        use std::os::unix::ffi::OsStrExt as _;
+        let mut result = result(1, "bytes:maps/a%FE.xodr");
+        result.xqar = "bytes:/out/maps/a%FE.xodr.xqar".into();
+        let name = std::ffi::OsStr::from_bytes(b"maps/a\xFE.xodr.txt");
+        for (output, directory) in [(&params("r/")[..], "r"), (&[], "/out")] {
+            let own = Output::of(output).own_file(Subject::from(&result), "txt");
+            assert_eq!(own, Some(Path::new(directory).join(name)));
+        }
     }
 
     #[test]

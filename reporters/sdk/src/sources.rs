@@ -3,11 +3,11 @@
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::ops::Deref;
-use std::path::Path;
 use std::time::SystemTime;
 
 use qcbus_document::Document;
 use qcbus_ingest::Limits;
+use qcbus_messages::path_text::from_text;
 use qcbus_messages::{Digest, ResultMessage};
 
 /// Gives lines of files. A line that may not be the one that was checked is not given.
@@ -158,7 +158,7 @@ impl FileSources {
     }
 
     fn open(&self, path: &str) -> Option<ImageSources<Vec<u8>>> {
-        let file = Path::new(path);
+        let file = from_text(path);
         if !file.is_absolute() || !file.is_file() {
             return None;
         }
@@ -167,7 +167,7 @@ impl FileSources {
             return None;
         }
         let boundary = file.parent()?;
-        let prepared = qcbus_ingest::prepare(file, boundary, &Limits::default()).ok()?;
+        let prepared = qcbus_ingest::prepare(&file, boundary, &Limits::default()).ok()?;
         if known && Digest(prepared.digest()) != self.digest {
             return None;
         }
@@ -186,7 +186,7 @@ impl Sources for FileSources {
 }
 
 fn modified(path: &str) -> Option<SystemTime> {
-    std::fs::metadata(path).ok()?.modified().ok()
+    std::fs::metadata(from_text(path)).ok()?.modified().ok()
 }
 
 /// Where the lines of a file begin.

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use qcbus_formats::config::{Config, reporter_for};
 use qcbus_formats::xqar::{self, Checker, Param, Results};
 use qcbus_messages::codec::MAX_MESSAGE;
+use qcbus_messages::path_text::to_text;
 use qcbus_messages::{DocId, ResultMessage, Withdrawn};
 
 use crate::core::{Delivery, weight};
@@ -28,11 +29,11 @@ pub fn message(
     let fail = |error: &dyn std::fmt::Display| {
         format!(
             "cannot read {} back for {reporter}: {error}",
-            judged.xqar.display()
+            to_text(&judged.xqar)
         )
     };
     if !judged.is_written() {
-        let (path, why) = (delivery.path.display(), judged.why.join("; "));
+        let (path, why) = (to_text(&delivery.path), judged.why.join("; "));
         return Err(format!("{path} has no result for {reporter}: {why}"));
     }
     let bytes = std::fs::read(&judged.xqar).map_err(|error| fail(&error))?;
@@ -41,12 +42,9 @@ pub fn message(
     cut_to(&mut results, MOST_BYTES);
     Ok(ResultMessage {
         job: delivery.job,
-        input: delivery.path.to_string_lossy().into_owned(),
-        display_path: places
-            .display(&delivery.path)
-            .to_string_lossy()
-            .into_owned(),
-        xqar: judged.xqar.to_string_lossy().into_owned(),
+        input: to_text(&delivery.path),
+        display_path: to_text(&places.display(&delivery.path)),
+        xqar: to_text(&judged.xqar),
         verdict: judged.verdict,
         digest: judged.digest,
         config: judged.config,
@@ -70,9 +68,9 @@ pub fn withdrawn(
     let shown = shown.unwrap_or_else(|| places.display(path));
     let xqar = left.map_or_else(|| places.xqar(path), Path::to_path_buf);
     Withdrawn {
-        input: path.to_string_lossy().into_owned(),
-        display_path: shown.to_string_lossy().into_owned(),
-        xqar: xqar.to_string_lossy().into_owned(),
+        input: to_text(path),
+        display_path: to_text(&shown),
+        xqar: to_text(&xqar),
         params: params_of(reporter, config),
     }
 }

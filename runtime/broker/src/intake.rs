@@ -9,6 +9,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use qcbus_bus::{Documents, Held, Loan, LoanError};
 use qcbus_document::{Document, FileKind};
 use qcbus_ingest::{BuildError, IngestError, Limits, Prepared, Reference, Role};
+use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Digest, DocId, DocumentRole, JobDocument, JobId, MissingDocument};
 use sha2::{Digest as _, Sha256};
 
@@ -303,18 +304,18 @@ impl Intake {
                     // It is written to this very moment: it is read again shortly.
                     _ => PrepareFailure::NoRoom(format!(
                         "{} changes while it is read",
-                        path.display()
+                        to_text(path)
                     )),
                 }
             }
             Failure::Ingest(error) => unreadable(path, error.to_string()),
             Failure::Build(error) => unreadable(path, error),
             Failure::Loan(LoanError::TooLarge(_)) => {
-                unreadable(path, format!("{} is too large for the bus", path.display()))
+                unreadable(path, format!("{} is too large for the bus", to_text(path)))
             }
             Failure::Loan(LoanError::Busy) => PrepareFailure::Busy,
             Failure::Loan(error) => {
-                PrepareFailure::NoRoom(format!("cannot publish {}: {error}", path.display()))
+                PrepareFailure::NoRoom(format!("cannot publish {}: {error}", to_text(path)))
             }
         }
     }
@@ -367,7 +368,7 @@ impl Gathered {
         self.documents.push(JobDocument {
             doc: published.doc,
             role,
-            path: path.to_string_lossy().into_owned(),
+            path: to_text(path),
             digest: published.digest,
             referred_at,
         });
@@ -381,7 +382,7 @@ impl Gathered {
     fn has(&self, path: &Path) -> bool {
         self.documents
             .iter()
-            .any(|document| Path::new(&document.path) == path)
+            .any(|document| document.path == to_text(path))
     }
 
     /// Something that is there and could not be had: when it changes, the verdict is void.
@@ -428,7 +429,7 @@ impl Gathered {
         self.missing.push(MissingDocument {
             role,
             reference: reference.text.clone(),
-            path: path.to_string_lossy().into_owned(),
+            path: to_text(path),
             why,
             referred_at: reference.offset,
         });
@@ -513,11 +514,12 @@ fn is_unchanged(input: &Input) -> bool {
 
 fn unreadable(path: &Path, reason: String) -> PrepareFailure {
     match stamp_of(path) {
-        Ok(Some(stamp)) => PrepareFailure::Unreadable {
+        Ok(None) => PrepareFailure::Vanished,
+        // What cannot even be looked at may be there.
+        seen => PrepareFailure::Unreadable {
             reason,
-            stamp: Some(stamp),
+            stamp: seen.ok().flatten(),
         },
-        _ => PrepareFailure::Vanished,
     }
 }
 

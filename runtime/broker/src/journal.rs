@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
+use qcbus_messages::path_text::{from_text, to_text as text};
 use qcbus_messages::{Digest, JobId, Verdict};
 use rusqlite::{Connection, OpenFlags, OptionalExtension, Transaction, params};
 
@@ -263,7 +264,7 @@ impl Journal {
             if let Some(judged) = judged_of(row)? {
                 let delivered = delivered.remove(&path).unwrap_or_default();
                 all.push(Remembered {
-                    path: Path::new(&path).into(),
+                    path: from_text(&path).into(),
                     judged,
                     delivered,
                 });
@@ -285,9 +286,9 @@ impl Journal {
             let rows = query.query_map([], |row| {
                 let path: String = row.get(0)?;
                 Ok(Void {
-                    path: Path::new(&path).into(),
+                    path: from_text(&path).into(),
                     reporter: row.get(1)?,
-                    xqar: row.get::<_, Option<String>>(2)?.map(PathBuf::from),
+                    xqar: row.get::<_, Option<String>>(2)?.map(|it| from_text(&it)),
                 })
             })?;
             rows.collect()
@@ -335,7 +336,7 @@ impl Journal {
                 .optional()
         };
         let place = read().map_err(|source| classify(&self.path, source))?;
-        Ok(place.filter(|it| !it.is_empty()).map(PathBuf::from))
+        Ok(place.filter(|it| !it.is_empty()).map(|it| from_text(&it)))
     }
 
     /// Writes entries in one transaction: all of them or none.
@@ -619,7 +620,7 @@ fn inputs_from_text(text: &str) -> Option<Vec<Input>> {
             )),
         };
         Some(Input {
-            path: Path::new(&path).into(),
+            path: from_text(&path).into(),
             content,
         })
     };
@@ -669,13 +670,8 @@ fn judged_of(row: &rusqlite::Row<'_>) -> rusqlite::Result<Option<Judged>> {
             number(row.get(9)?),
         ],
         why: serde_json::from_str(&row.get::<_, String>(10)?).unwrap_or_default(),
-        xqar: PathBuf::from(row.get::<_, String>(11)?),
+        xqar: from_text(&row.get::<_, String>(11)?),
     }))
-}
-
-/// Paths that are no UTF-8 lose something here, which only costs a new check after a restart.
-fn text(path: &Path) -> String {
-    path.to_string_lossy().into_owned()
 }
 
 fn signed(number: u64) -> i64 {

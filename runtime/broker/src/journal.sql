@@ -1,4 +1,5 @@
 -- The journal of one qcbus state directory. Safe to read with `sqlite3` while the broker runs.
+-- A path that is no UTF-8 is written as `bytes:` and the path with its strange bytes as %XX.
 -- Digests are SHA-256 in hexadecimal, times are milliseconds since 1970 (UTC).
 
 -- One row per file with a verdict: what the broker remembers over a restart.

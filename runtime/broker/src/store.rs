@@ -10,6 +10,7 @@ use qcbus_document::Document;
 use qcbus_formats::config::Config;
 use qcbus_formats::pool::{self, NoPlaces, PoolInput, Pooled, Resolver, Scope};
 use qcbus_formats::xqar::{self, Dialect, Status};
+use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Digest, Verdict};
 
 use crate::core::{BundleOutcome, FinishedJob, Input, Judged, StoreOutcome};
@@ -114,7 +115,7 @@ impl Store {
         root: Option<&[u8]>,
     ) -> Pooled {
         let input = PoolInput {
-            input_file: &job.path.to_string_lossy(),
+            input_file: &to_text(&job.path),
             config,
             bundles,
             remarks: Vec::new(),
@@ -130,7 +131,7 @@ impl Store {
 
     fn write(&self, job: &FinishedJob, pooled: &Pooled, judged: &Judged) -> Result<(), Unwritten> {
         let fail = |path: &Path, error: &io::Error| Unwritten {
-            what: format!("cannot write {}: {error}", path.display()),
+            what: format!("cannot write {}: {error}", to_text(path)),
             further: "; it is tried again",
             for_good: is_for_good(error),
         };
@@ -241,7 +242,7 @@ impl Store {
     /// What a person should know; it is to be tried again.
     pub fn withdraw(&self, path: &Arc<Path>, reporters: &[String]) -> Result<(), Trouble> {
         let fail = |error: io::Error| Trouble {
-            what: format!("cannot withdraw the result of {}: {error}", path.display()),
+            what: format!("cannot withdraw the result of {}: {error}", to_text(path)),
             concerns_all: false,
         };
         let entry = Entry::Withdrawn {

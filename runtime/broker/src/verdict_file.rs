@@ -4,6 +4,7 @@
 use qcbus_formats::pool::{FailedChecker, Pooled};
 use qcbus_formats::xqar::Status;
 use qcbus_messages::Verdict;
+use qcbus_messages::path_text::to_text;
 use serde::Serialize;
 
 use crate::core::{BundleOutcome, FinishedJob, Input};
@@ -61,13 +62,13 @@ pub fn render(
         .map_or(&[], |prepared| &prepared.inputs);
     let sha256 = |input: &Input| input.digest().map(|digest| digest.to_string());
     let depends_on = inputs.iter().skip(1).map(|input| Dependency {
-        path: input.path.to_string_lossy().into_owned(),
+        path: to_text(&input.path),
         sha256: sha256(input),
     });
     let file = VerdictFile {
         format: 1,
         verdict,
-        input_file: job.path.to_string_lossy().into_owned(),
+        input_file: to_text(&job.path),
         sha256: inputs.first().and_then(sha256).unwrap_or_default(),
         depends_on: depends_on.collect(),
         configuration_sha256: job.config.to_string(),
@@ -88,7 +89,7 @@ pub fn render(
         filtered: pooled.removed.errors + pooled.removed.warnings + pooled.removed.information,
         skipped: skipped(&job.bundles),
         failed: pooled.failed.iter().map(failed).collect(),
-        result: xqar.to_string_lossy().into_owned(),
+        result: to_text(xqar),
     };
     let mut text = serde_json::to_vec_pretty(&file).unwrap_or_default();
     text.push(b'\n');

@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use qcbus_bus::Held;
 use qcbus_formats::config::Config;
+use qcbus_messages::path_text::to_text;
 use tokio::sync::mpsc::UnboundedSender;
 
 use crate::core::{Event, FinishedJob, StoreOutcome};
@@ -221,7 +222,7 @@ impl Writer {
             && !judged.is_written()
             && self.store.retries
         {
-            let (path, why) = (job.path.display(), judged.why.join("; "));
+            let (path, why) = (to_text(&job.path), judged.why.join("; "));
             let _ = self.notices.send(format!(
                 "{path} stays undetermined until it changes or qcbus is started anew: {why}"
             ));

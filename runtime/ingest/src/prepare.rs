@@ -1,6 +1,8 @@
 //! From a path to a [`Prepared`] document: reading, unpacking, decoding, following includes.
 
 use std::collections::HashMap;
+use std::ffi::OsStr;
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Component, Path, PathBuf};
 
 use qcbus_document::{FaultCode, FileKind};
@@ -39,23 +41,30 @@ pub fn prepare_bytes(path: &Path, bytes: Vec<u8>, limits: &Limits) -> Prepared {
 /// Parts `archive.mosc!member!member` into the file on disk and the members. A `!` that follows
 /// no archive is an ordinary character.
 pub(crate) fn split_members(path: &Path) -> (PathBuf, Vec<String>) {
-    let Some(text) = path.to_str() else {
+    // The file's name may be no UTF-8; its members have names in the archive, which is.
+    let bytes = path.as_os_str().as_bytes();
+    let file_of = |at: usize| Path::new(OsStr::from_bytes(&bytes[..at]));
+    let mut marks = (0..bytes.len()).filter(|&at| bytes[at] == b'!');
+    let archive = marks.find(|&at| ends_in_mosc(file_of(at)));
+    let Some((at, members)) =
+        archive.and_then(|at| Some((at, std::str::from_utf8(&bytes[at + 1..]).ok()?)))
+    else {
         return (path.to_path_buf(), Vec::new());
     };
-    let archive = text
-        .match_indices('!')
-        .find(|&(at, _)| ends_in_mosc(&text[..at]));
-    let Some((at, _)) = archive else {
-        return (path.to_path_buf(), Vec::new());
-    };
-    (
-        PathBuf::from(&text[..at]),
-        text[at + 1..].split('!').map(str::to_string).collect(),
-    )
+    let members = members.split('!').map(str::to_string).collect();
+    (file_of(at).to_path_buf(), members)
 }
 
-fn ends_in_mosc(text: &str) -> bool {
-    FileKind::of_path(Path::new(text)) == Some(FileKind::Mosc)
+fn ends_in_mosc(path: &Path) -> bool {
+    FileKind::of_path(path) == Some(FileKind::Mosc)
+}
+
+/// `archive.mosc!member`.
+fn member_of(archive: &Path, name: &str) -> PathBuf {
+    let mut path = archive.as_os_str().to_owned();
+    path.push("!");
+    path.push(name);
+    PathBuf::from(path)
 }
 
 fn assemble(
@@ -164,8 +173,8 @@ fn open_archive(path: &Path, packed: &[u8], members: &[String], limits: &Limits)
         _ => (MAIN_MEMBER, &[][..]),
     };
     let member = read_member(packed, name, limits);
-    let path = PathBuf::from(format!("{}!{name}", path.display()));
-    if ends_in_mosc(name) && member.present {
+    let path = member_of(path, name);
+    if ends_in_mosc(Path::new(name)) && member.present {
         let mut inner = open_archive(&path, &member.bytes, rest, limits);
         inner.findings.splice(0..0, member.findings);
         return inner;

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use qcbus_document::{BuildError, Capacities, FaultCode, ImageBuilder};
+use qcbus_messages::path_text::to_text;
 
 use crate::count;
 use crate::finding::Finding;
@@ -163,7 +164,7 @@ impl Prepared {
         let paths: usize = self
             .texts
             .iter()
-            .map(|text| text.path.as_os_str().len() * 3)
+            .map(|text| to_text(&text.path).len())
             .sum();
         Capacities {
             text: self.texts.iter().map(|text| text.text.len()).sum(),
@@ -255,10 +256,7 @@ impl Prepared {
     }
 
     fn paths(&self) -> Vec<String> {
-        self.texts
-            .iter()
-            .map(|text| text.path.to_string_lossy().into_owned())
-            .collect()
+        self.texts.iter().map(|text| to_text(&text.path)).collect()
     }
 
     fn input<'t>(&'t self, paths: &'t [String]) -> Input<'t> {

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use qcbus_document::{Document, Node};
+use qcbus_messages::path_text::from_text;
 
 use crate::prepare::{normal, split_members};
 
@@ -114,7 +115,7 @@ fn resolve(role: Role, node: Node<'_>, text: &str, parameters: &Parameters<'_>) 
         .and_then(|text| check(role, &text).map(|()| text));
     match outcome {
         Err(reason) => reference.unresolved = Some(reason),
-        Ok(path) => locate(&mut reference, Path::new(node.position().path), &path),
+        Ok(path) => locate(&mut reference, &from_text(node.position().path), &path),
     }
     reference
 }
@@ -213,10 +214,10 @@ fn places(role: Role, from: &Path, text: &str) -> Vec<PathBuf> {
     if let Some((_, around)) = members.split_last()
         && (role == Role::ScenarioReference || role == Role::ScenarioFile)
     {
-        let mut place = file.display().to_string();
+        let mut place = file.as_os_str().to_owned();
         for member in around.iter().map(String::as_str).chain([text]) {
-            place.push('!');
-            place.push_str(member);
+            place.push("!");
+            place.push(member);
         }
         places.push(PathBuf::from(place));
     }

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
+use qcbus_messages::path_text::from_text;
 use qcbus_messages::{FromPeer, Hello, JobId, PeerReport, Role, ToPeer};
 
 use super::action::Action;
@@ -338,7 +339,7 @@ impl State {
                 self.deliver(index, actions);
             }
             FromPeer::WithdrawalDone { input, report } => {
-                let Some(path) = reporter.voiding.take(Path::new(&input)) else {
+                let Some(path) = reporter.voiding.take(from_text(&input).as_path()) else {
                     return;
                 };
                 reporter.moved = now;

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use qcbus_document::FileKind;
 use qcbus_messages::control::Response;
+use qcbus_messages::path_text::to_text;
 
 use super::action::Action;
 use super::files::{FileEntry, FileId, Priority, Stage};
@@ -107,7 +108,7 @@ impl State {
 
     pub(super) fn answer_gone(&mut self, path: &Path, actions: &mut Actions) {
         self.answer_all(path, actions, |path| Response::Unwatched {
-            reason: format!("{} has been deleted", path.display()),
+            reason: format!("{} has been deleted", to_text(path)),
         });
     }
 
