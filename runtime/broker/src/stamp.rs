@@ -1,5 +1,6 @@
 //! What `stat` says of a file.
 
+use std::ffi::OsString;
 use std::fs::Metadata;
 use std::io;
 use std::os::unix::fs::MetadataExt;
@@ -11,16 +12,19 @@ use qcbus_ingest::{Content, Stat};
 
 use crate::core::Stamp;
 
-/// The stamp of a regular file that is no symbolic link; `None` for anything else.
+/// The stamp of a regular file, which may lie behind a symbolic link; `None` for anything else, a
+/// link that leads nowhere or back to itself for instance.
 ///
 /// # Errors
-/// Whatever `lstat` says, other than that there is no such file.
+/// Whatever `stat` says, other than that there is no such file: there may be one.
 pub fn stamp_of(path: &Path) -> io::Result<Option<Stamp>> {
-    match std::fs::symlink_metadata(path) {
+    match std::fs::metadata(path) {
         Ok(data) if data.is_file() => Ok(Some(from_metadata(&data))),
         Ok(_) => Ok(None),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(error) if error.raw_os_error() == Some(libc::ENOTDIR) => Ok(None),
+        // The path itself is that link, not a directory on the way to a file that may be there.
+        Err(error) if error.raw_os_error() == Some(libc::ELOOP) && path.is_symlink() => Ok(None),
         Err(error) => Err(error),
     }
 }
@@ -41,14 +45,16 @@ pub fn stamp_through_links(path: &Path) -> Option<Stamp> {
 
 fn listing(directory: &Path, inode: u64) -> Option<Stamp> {
     let entries = std::fs::read_dir(directory).ok()?;
-    let mut names: Vec<String> = entries
+    let mut names: Vec<OsString> = entries
         .flatten()
         .filter(|entry| FileKind::of_path(&entry.path()) == Some(FileKind::Xosc))
-        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .map(|entry| entry.file_name())
         .collect();
     names.sort();
     // FNV-1a, because equal names must give equal stamps in every process.
-    let bytes = names.iter().flat_map(|name| name.bytes().chain([0]));
+    let bytes = names
+        .iter()
+        .flat_map(|name| name.as_encoded_bytes().iter().copied().chain([0]));
     let hash = bytes.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
     });
@@ -86,18 +92,29 @@ fn from_stat(size: u64, stat: Stat) -> Stamp {
 /// A file that was changed this recently may change again without its stamp telling.
 const RACY: Duration = Duration::from_secs(2);
 
-/// Whether a file has changed so recently that its stamp proves nothing. Its time of change counts
-/// too: a copy may carry an old modification time.
+/// How far the clock of a file server may be ahead of ours.
+const AHEAD: Duration = Duration::from_secs(3600);
+
+/// Whether a file has changed so recently that its stamp proves nothing.
 pub fn is_racy(stamp: Stamp) -> bool {
-    age_of(stamp.mtime_ns.max(stamp.ctime_ns)) < nanoseconds(RACY)
+    is_younger(stamp, RACY)
 }
 
-/// Nanoseconds since then; negative for times to come.
-pub fn age_of(time_ns: i128) -> i128 {
-    let now = SystemTime::now()
-        .duration_since(UNIX_EPOCH)
-        .unwrap_or_default();
-    nanoseconds(now) - time_ns
+/// Whether a file was changed within that time. Both its times count: a copy may carry an old time
+/// of modification, and some file systems have no true time of change.
+///
+/// A time of modification that is still to come was set at will and says nothing. A time of change
+/// that is still to come is another machine's, whose clock is ahead, or ours was set back; beyond
+/// an hour it can only be the latter, and then another change would bear another time.
+pub fn is_younger(stamp: Stamp, limit: Duration) -> bool {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH);
+    was_younger(stamp, limit, nanoseconds(now.unwrap_or_default()))
+}
+
+fn was_younger(stamp: Stamp, limit: Duration, now_ns: i128) -> bool {
+    let limit = nanoseconds(limit);
+    let within = |time_ns, ahead: i128| (-ahead..limit).contains(&(now_ns - time_ns));
+    within(stamp.mtime_ns, limit) || within(stamp.ctime_ns, nanoseconds(AHEAD))
 }
 
 fn nanoseconds(time: Duration) -> i128 {
@@ -168,15 +185,50 @@ pub(crate) mod tests {
     fn a_young_file_is_racy_however_old_it_says_that_it_is() {
         let dir = tempfile::tempdir().unwrap();
         let stamp = put(&dir.path().join("a.xodr"), b"", UNIX_EPOCH - HOUR);
-        assert!(is_racy(Stamp {
-            ctime_ns: stamp.ctime_ns + nanoseconds(HOUR),
-            ..stamp
-        }));
-        assert!(!is_racy(Stamp {
-            ctime_ns: stamp.ctime_ns - nanoseconds(HOUR),
-            ..stamp
-        }));
+        let now = stamp.ctime_ns;
+        let second = nanoseconds(Duration::from_secs(1));
+        let racy = |stamp| was_younger(stamp, RACY, now);
+        let changed = |seconds: i128| {
+            let ctime_ns = now + seconds * second;
+            racy(Stamp { ctime_ns, ..stamp })
+        };
+        assert!(changed(0) && changed(-1));
+        assert!(!changed(-3));
+        assert!(changed(1800), "a clock that is ahead");
+        assert!(!changed(7200), "a clock that was set back");
         let listing = stamp_through_links(dir.path()).unwrap();
-        assert!(!is_racy(listing), "it has no time: {listing:?}");
+        assert!(!racy(listing), "it has no time: {listing:?}");
+    }
+
+    #[test]
+    fn a_time_of_modification_that_is_to_come_makes_no_file_young() {
+        let now = nanoseconds(HOUR);
+        let second = nanoseconds(Duration::from_secs(1));
+        let modified = |seconds: i128| {
+            let stamp = Stamp {
+                mtime_ns: now + seconds * second,
+                ctime_ns: 0,
+                ..Stamp::default()
+            };
+            was_younger(stamp, RACY, now)
+        };
+        assert!(modified(0) && modified(-1), "no true time of change");
+        assert!(!modified(-3));
+        assert!(!modified(10) && !modified(1 << 32), "set at will");
+    }
+
+    #[test]
+    fn behind_a_link_lies_the_file_or_none() {
+        use std::os::unix::fs::symlink;
+        let dir = tempfile::tempdir().unwrap();
+        let (file, link) = (dir.path().join("a.xodr"), dir.path().join("link.xodr"));
+        let stamp = put(&file, b"<OpenDRIVE/>", SystemTime::now() - HOUR);
+        symlink(&file, &link).unwrap();
+        assert_eq!(stamp_of(&link).unwrap(), Some(stamp));
+        std::fs::remove_file(&file).unwrap();
+        assert_eq!(stamp_of(&link).unwrap(), None);
+        symlink(&link, &file).unwrap();
+        assert_eq!(stamp_of(&link).unwrap(), None, "it leads back to itself");
+        assert!(stamp_of(&link.join("b.xodr")).is_err(), "who knows?");
     }
 }

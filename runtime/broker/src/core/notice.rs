@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use qcbus_messages::control::Unseen;
+
 /// Something that a person should read.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum Notice {
@@ -54,6 +56,8 @@ pub enum Notice {
     Loading(String),
     /// Of the journal and the results on the disk.
     Storing(String),
+    /// Something in the directories that are looked at cannot be looked at.
+    Unseen(Unseen),
 }
 
 impl Notice {
@@ -87,6 +91,7 @@ impl Notice {
             Notice::Watching(_) => "watching",
             Notice::Loading(_) => "loading",
             Notice::Storing(_) => "storing",
+            Notice::Unseen(_) => "unseen",
         }
     }
 
@@ -136,6 +141,7 @@ impl fmt::Display for Notice {
             | Notice::Watching(text)
             | Notice::Loading(text)
             | Notice::Storing(text) => f.write_str(text),
+            Notice::Unseen(unseen) => unseen.fmt(f),
         }
     }
 }

@@ -103,10 +103,15 @@ impl Broker {
                     watcher.depend(files);
                 }
             }
+            Action::Undepend { paths } => {
+                if let Some(watcher) = &self.watcher {
+                    watcher.undepend(paths);
+                }
+            }
             Action::Enrol(member) => self.remember_at_once(Entry::Enrolled(member)),
             Action::Strike { name } => self.remember_at_once(Entry::Struck { name }),
             // There is nothing to do before the gate holds claims.
-            Action::Undepend { .. } | Action::CloseGate { .. } | Action::OpenGate { .. } => {}
+            Action::CloseGate { .. } | Action::OpenGate { .. } => {}
             Action::Judged {
                 path,
                 judged,

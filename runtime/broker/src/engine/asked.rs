@@ -1,11 +1,13 @@
 //! What commands ask, and what a change of configuration or manifests sets off.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use qcbus_messages::control::{Request, Response, Status};
+use qcbus_messages::control::{Request, Response, Status, Unseen};
+use qcbus_messages::path_text::to_text;
 use tokio::sync::oneshot;
 
 use super::Broker;
@@ -14,6 +16,9 @@ use crate::control::Asked;
 use crate::core::{Event, Notice, Stamp, Ticket};
 use crate::reload::{LoadError, differences};
 use crate::stamp::{stamp_of, stamp_through_links};
+
+/// Most that is told of what could not be looked at.
+const UNSEEN_SHOWN: usize = 100;
 
 impl Broker {
     pub(super) fn asked(&mut self, asked: Asked) -> bool {
@@ -50,6 +55,7 @@ impl Broker {
         timeout_ms: Option<u64>,
         answer: oneshot::Sender<Response>,
     ) -> bool {
+        let file = &*self.as_watched(file);
         self.next_ticket += 1;
         let ticket = Ticket(self.next_ticket);
         self.tickets.insert(ticket, answer);
@@ -64,6 +70,16 @@ impl Broker {
             unwatched,
             timeout,
         })
+    }
+
+    /// A link from elsewhere to a watched file means that file.
+    fn as_watched<'f>(&self, file: &'f Path) -> Cow<'f, Path> {
+        if self.store.places.contains(file) {
+            return Cow::Borrowed(file);
+        }
+        let real = file.canonicalize().ok();
+        let watched = real.filter(|real| self.store.places.contains(real));
+        watched.map_or(Cow::Borrowed(file), Cow::Owned)
     }
 
     /// A client that asks must not be told what was true a moment ago: changes of dependencies
@@ -96,14 +112,12 @@ impl Broker {
     }
 
     pub(super) fn why_unwatched(&self, file: &Path, stamp: Option<Stamp>) -> Option<String> {
-        let shown = file.display();
+        let shown = to_text(file);
         if qcbus_document::FileKind::of_path(file).is_none() {
             Some(format!(
                 "{shown} is no file that qcbus checks (.xodr .xodrz .xodr.gz .xosc .mosc)"
             ))
-        } else if !self.options.roots.iter().any(|root| file.starts_with(root))
-            && !self.options.files.iter().any(|it| it == file)
-        {
+        } else if !self.store.places.contains(file) {
             Some(format!("{shown} lies outside the watched directories"))
         } else if stamp.is_some() && crate::watch::is_left_alone(&self.options.roots, file) {
             Some(format!("{shown} is ignored (by its name or a .qcignore)"))
@@ -168,7 +182,16 @@ impl Broker {
             watching: self.options.roots.clone(),
             watch_mode: self.watch_mode.clone(),
             out: self.options.out.clone(),
+            unseen: self.all_unseen(),
             ..self.state.status()
         }
+    }
+    fn all_unseen(&self) -> Vec<Unseen> {
+        let unseen = |(path, why): (&PathBuf, &String)| Unseen {
+            path: path.clone(),
+            why: why.clone(),
+        };
+        // Whoever asks wants to see where to look, and no answer of any length.
+        self.unseen.iter().take(UNSEEN_SHOWN).map(unseen).collect()
     }
 }

@@ -12,7 +12,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use qcbus_bus::{Host, HostEvent, PeerId, StartError as BusError};
-use qcbus_messages::control::Response;
+use qcbus_messages::control::{Response, Unseen};
 use qcbus_messages::{JobId, ToPeer};
 use tokio::sync::{mpsc, oneshot};
 
@@ -100,6 +100,8 @@ pub struct Broker {
     in_force: Arc<InForce>,
     watcher: Option<Watcher>,
     watch_mode: String,
+    /// What could not be looked at, and why.
+    unseen: BTreeMap<PathBuf, String>,
     sessions: Sessions,
     tickets: HashMap<Ticket, oneshot::Sender<Response>>,
     downs: Vec<oneshot::Sender<Response>>,
@@ -312,7 +314,16 @@ impl Broker {
                 let event = self.settled(path, stamp);
                 self.handle(event)
             }
+            Seen::Present(path) => self.handle(Event::Present { path }),
             Seen::Vanished(path) => self.handle(Event::Vanished { path }),
+            Seen::Unseen(unseen) => {
+                self.unseen(unseen);
+                true
+            }
+            Seen::SeenAgain(path) => {
+                self.unseen.remove(&path);
+                true
+            }
             Seen::Scanned => {
                 let files = self.state.present_files();
                 self.notify_ready(files.len());
@@ -328,6 +339,11 @@ impl Broker {
                 true
             }
         }
+    }
+
+    fn unseen(&mut self, unseen: Unseen) {
+        self.unseen.insert(unseen.path.clone(), unseen.why.clone());
+        self.say(Notice::Unseen(unseen));
     }
 
     fn say(&mut self, notice: Notice) {

@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, RwLock};
 use std::time::Instant;
 
 use qcbus_bus::Host;
+use qcbus_messages::control::Unseen;
 use tokio::sync::mpsc;
 
 use super::{Broker, Inbox, Sessions, StartError, Told};
@@ -84,6 +85,7 @@ impl Broker {
             in_force,
             watcher: None,
             watch_mode: "once".to_owned(),
+            unseen: BTreeMap::new(),
             sessions: Sessions::default(),
             tickets: HashMap::new(),
             downs: Vec::new(),
@@ -231,27 +233,25 @@ fn look_once(roots: &[PathBuf], files: &[PathBuf], seen: &mpsc::UnboundedSender<
     // The loop may have been told to quit meanwhile; then nobody listens.
     let tell = |what| drop(seen.send(what));
     for root in roots {
-        let found = scan_directory(root);
-        found
-            .failures
-            .into_iter()
-            .for_each(|failure| tell(Seen::Notice(failure)));
+        let found = scan_directory(root, roots);
+        for unseen in found.unseen {
+            tell(Seen::Unseen(unseen));
+        }
         for (path, stamp) in found.files {
             tell(Seen::Settled(path.into(), stamp));
         }
     }
     for file in files {
-        match stamp_of(file) {
-            Ok(Some(stamp)) => tell(Seen::Settled(file.as_path().into(), stamp)),
-            Ok(None) => tell(Seen::Notice(format!(
-                "{} is not there, or no regular file",
-                file.display()
-            ))),
-            Err(error) => tell(Seen::Notice(format!(
-                "cannot look at {}: {error}",
-                file.display()
-            ))),
-        }
+        let path = file.clone();
+        let why = match stamp_of(file) {
+            Ok(Some(stamp)) => {
+                tell(Seen::Settled(path.into(), stamp));
+                continue;
+            }
+            Ok(None) => "it is not there any more, or no regular file".to_owned(),
+            Err(error) => format!("cannot look at it: {error}"),
+        };
+        tell(Seen::Unseen(Unseen { path, why }));
     }
     tell(Seen::Scanned);
 }

@@ -5,15 +5,16 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use qcbus_broker::core::{Delivery, Judged, Settings};
+use qcbus_broker::core::{Delivery, Judged, Notice, Settings};
 use qcbus_broker::{Broker, Options, ResultPaths, Told};
 use qcbus_bus::{HostOptions, Instance};
 use qcbus_document::FileKind;
 use qcbus_formats::config::Config;
+use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Exit, Verdict};
 use qcbus_reporter_sdk::FileSources;
 
-use super::settings::{absolute, dialect, limits, memory_limit, program, settings};
+use super::settings::{absolute, dialect, limits, memory_limit, named, program, settings};
 use crate::args::{CheckArgs, Format};
 use crate::{standard, talk};
 
@@ -157,18 +158,22 @@ fn targets(
     let (mut roots, mut files) = (BTreeSet::new(), BTreeSet::new());
     for path in &paths {
         let real = std::fs::canonicalize(path)
-            .map_err(|error| usage(format!("cannot check {}: {error}", path.display())))?;
+            .map_err(|error| usage(format!("cannot check {}: {error}", to_text(path))))?;
+        // A link to a file is checked under its own name, as it is in a directory.
+        let file = named(path);
         if real.is_dir() {
             roots.insert(real);
         } else if !real.is_file() {
-            let shown = path.display();
+            let shown = to_text(path);
             return Err(usage(format!(
                 "cannot check {shown}: it is no regular file"
             )));
+        } else if FileKind::of_path(&file).is_some() {
+            files.insert(file);
         } else if FileKind::of_path(&real).is_some() {
             files.insert(real);
         } else {
-            let shown = path.display();
+            let shown = to_text(path);
             return Err(usage(format!(
                 "{shown} is no file that qcbus checks (.xodr .xodrz .xodr.gz .xosc .mosc)"
             )));
@@ -240,6 +245,7 @@ fn check(args: &CheckArgs, prepared: Prepared) -> Exit {
         judged: BTreeMap::new(),
         verdicts: Vec::new(),
         unwritten: 0,
+        unseen: 0,
         notices: BTreeSet::new(),
     };
     let directory = prepared.options.instance.dir().to_path_buf();
@@ -297,6 +303,8 @@ struct Printer {
     verdicts: Vec<Verdict>,
     /// Files whose result could not be written.
     unwritten: usize,
+    /// What could not be looked at: nobody knows what lies there.
+    unseen: usize,
     notices: BTreeSet<String>,
 }
 
@@ -304,6 +312,7 @@ impl Printer {
     fn told(&mut self, told: Told) {
         match told {
             Told::Notice(notice) => {
+                self.unseen += usize::from(matches!(notice, Notice::Unseen(_)));
                 let text = notice.to_string();
                 if !self.notices.contains(&text) {
                     self.progress.clear();
@@ -343,10 +352,10 @@ impl Printer {
         if !judged.is_written() {
             self.unwritten += 1;
             let why = judged.why.join("; ");
-            talk::fail(&format!("{} has no result: {why}", shown.display()));
+            talk::fail(&format!("{} has no result: {why}", to_text(&shown)));
         }
         if self.quiet && self.format == Format::Text {
-            talk::print(&format!("{}: {}\n", shown.display(), judged.verdict));
+            talk::print(&format!("{}: {}\n", to_text(&shown), judged.verdict));
             return;
         }
         let delivery = Delivery {
@@ -389,6 +398,10 @@ impl Printer {
         }
         let count = |verdict| self.verdicts.iter().filter(|it| **it == verdict).count();
         let total = self.verdicts.len();
+        if total == 0 && self.unseen > 0 {
+            talk::fail("nothing was checked: what there may be could not be looked at");
+            return Exit::Undetermined;
+        }
         if total == 0 {
             talk::fail(
                 "nothing to check: there is no .xodr, .xodrz, .xodr.gz, .xosc or .mosc file",
@@ -402,9 +415,13 @@ impl Printer {
             ));
         }
         let files = if total == 1 { "file" } else { "files" };
+        let unseen = match self.unseen {
+            0 => String::new(),
+            unseen => format!(", {unseen} not looked at"),
+        };
         if self.format == Format::Text && (total > 1 || self.quiet) {
             talk::say(&format!(
-                "{total} {files}: {} accepted, {} rejected, {} undetermined; results in {}",
+                "{total} {files}: {} accepted, {} rejected, {} undetermined{unseen}; results in {}",
                 count(Verdict::Accepted),
                 count(Verdict::Rejected),
                 count(Verdict::Undetermined),
@@ -414,7 +431,7 @@ impl Printer {
         let exit = Exit::of_verdicts(self.verdicts.iter().copied());
         if self.unwritten > 0 {
             Exit::Internal
-        } else if exit == Exit::Accepted && total < self.expected.len() {
+        } else if exit == Exit::Accepted && (total < self.expected.len() || self.unseen > 0) {
             Exit::Undetermined
         } else {
             exit

@@ -1,12 +1,11 @@
 //! Commands that ask a running broker: `down`, `wait`, `reload`.
 
-use std::path::{Path, PathBuf};
-
 use qcbus_broker::control::{AskError, ask_broker};
 use qcbus_messages::Exit;
 use qcbus_messages::control::{FileVerdict, Request, Response};
+use qcbus_messages::path_text::to_text;
 
-use super::settings::{absolute, instance};
+use super::settings::{instance, named};
 use crate::args::{InstanceArgs, WaitArgs};
 use crate::talk;
 
@@ -55,7 +54,7 @@ pub fn reload(args: &InstanceArgs) -> Exit {
 
 /// `qcbus wait`.
 pub fn wait(args: &WaitArgs) -> Exit {
-    let file = really(&args.file);
+    let file = named(&args.file);
     let timeout_ms = args
         .timeout
         .map(|it| u64::try_from(it.as_millis()).unwrap_or(u64::MAX));
@@ -69,7 +68,7 @@ pub fn wait(args: &WaitArgs) -> Exit {
             };
             talk::fail(&format!(
                 "no verdict on {} in time{why}",
-                args.file.display()
+                to_text(&args.file)
             ));
             Exit::Undetermined
         }
@@ -91,14 +90,14 @@ fn tell(args: &WaitArgs, verdict: &FileVerdict) -> Exit {
     } else if !args.quiet {
         talk::print(&format!(
             "{}: {} ({}, {}); {}\n",
-            args.file.display(),
+            to_text(&args.file),
             verdict.verdict,
             count(verdict.errors, "error"),
             count(verdict.warnings, "warning"),
             if verdict.xqar.as_os_str().is_empty() {
-                "no result".into()
+                "no result".to_owned()
             } else {
-                verdict.xqar.to_string_lossy()
+                to_text(&verdict.xqar)
             }
         ));
         for why in &verdict.why {
@@ -121,25 +120,5 @@ fn unexpected(response: &Response) -> Exit {
     match response {
         Response::Failed { .. } => Exit::Usage,
         _ => Exit::Internal,
-    }
-}
-
-/// The path as the broker knows it, without symbolic links, also of a file that is still to come.
-fn really(path: &Path) -> PathBuf {
-    let path = absolute(path);
-    let known = path.ancestors().find_map(|above| {
-        let real = std::fs::canonicalize(above).ok()?;
-        Some((above, real))
-    });
-    match known {
-        Some((above, mut real)) => {
-            real.extend(
-                path.strip_prefix(above)
-                    .unwrap_or(Path::new(""))
-                    .components(),
-            );
-            real
-        }
-        None => path,
     }
 }

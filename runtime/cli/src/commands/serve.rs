@@ -6,6 +6,7 @@ use qcbus_broker::journal::JournalError;
 use qcbus_broker::{Broker, Options, StartError, Told};
 use qcbus_bus::{HostOptions, StartError as BusError};
 use qcbus_messages::Exit;
+use qcbus_messages::path_text::to_text;
 
 use super::settings::{absolute, dialect, instance, limits, memory_limit, program, real, settings};
 use crate::args::{ReportArg, ServeArgs};
@@ -99,7 +100,7 @@ fn tell(told: Told) {
             errors = it.judged.counts[0],
             warnings = it.judged.counts[1],
             "{}",
-            it.path.display()
+            to_text(&it.path)
         ),
         Told::Verdict(_) => {}
         Told::Notice(notice) => tracing::warn!("{notice}"),

@@ -38,6 +38,16 @@ pub fn real(path: &Path) -> PathBuf {
     real
 }
 
+/// A file as a broker knows it, also one that is still to come: through links to directories, but
+/// under its own name where it is a link itself.
+pub fn named(file: &Path) -> PathBuf {
+    let file = absolute(file);
+    let (Some(above), Some(name)) = (file.parent(), file.file_name()) else {
+        return real(&file);
+    };
+    real(above).join(name)
+}
+
 /// The form of results.
 pub fn dialect(arg: DialectArg) -> Dialect {
     match arg {

@@ -76,7 +76,15 @@ pub fn render(status: &Status) -> String {
     for peer in &status.peers {
         line(&peer.role, peer_line(peer));
     }
-    for notice in status.notices.iter().rev().take(5).rev() {
+    for unseen in status.unseen.iter().take(5) {
+        line("note", unseen.to_string());
+    }
+    if let Some(more) = status.unseen.len().checked_sub(5).filter(|it| *it > 0) {
+        line("note", format!("and {more} more that cannot be looked at"));
+    }
+    // What is still unseen has been named, and the rest no longer is.
+    let notices = status.notices.iter().filter(|it| it.kind != "unseen");
+    for notice in notices.rev().take(5).collect::<Vec<_>>().into_iter().rev() {
         line("note", notice.text.clone());
     }
     text

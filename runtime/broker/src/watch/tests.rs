@@ -1,0 +1,188 @@
+//! The looker over real directories, without its thread: what happens, and what it tells.
+
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use super::ignore::IGNORE_FILE;
+use super::looker::Looker;
+use super::settle::QUIET;
+use super::{Seen, WatchOptions};
+use crate::stamp::stamp_of;
+
+/// A looker around one directory, and what it says.
+fn looker(root: &Path) -> (Looker, Receiver<Seen>) {
+    let (tell, told) = channel();
+    let options = WatchOptions {
+        roots: vec![root.to_path_buf()],
+        poll: None,
+        rescan: Duration::MAX,
+    };
+    let tell = Box::new(move |seen| tell.send(seen).unwrap());
+    (Looker::new(options, tell), told)
+}
+
+/// A directory without links in its path.
+fn farm() -> (tempfile::TempDir, PathBuf) {
+    let dir = tempfile::tempdir().unwrap();
+    let root = dir.path().canonicalize().unwrap();
+    (dir, root)
+}
+
+/// What was told, in words, with paths below `root`.
+fn words(root: &Path, told: &Receiver<Seen>) -> Vec<String> {
+    let name = |path: &Path| path.strip_prefix(root).unwrap().display().to_string();
+    let word = |seen| match seen {
+        Seen::Settled(path, _) => format!("settled {}", name(&path)),
+        Seen::Present(path) => format!("present {}", name(&path)),
+        Seen::Vanished(path) => format!("vanished {}", name(&path)),
+        Seen::Unseen(it) => format!("unseen {}", name(&it.path)),
+        Seen::SeenAgain(path) => format!("seen again {}", name(&path)),
+        other => format!("{other:?}"),
+    };
+    told.try_iter().map(word).collect()
+}
+
+/// What has been touched settles.
+fn settle(looker: &mut Looker) {
+    let later = Instant::now() + QUIET * 2;
+    let stamp = |path: &Path| stamp_of(path).ok().flatten();
+    for path in looker.settling.settled(later, stamp) {
+        looker.look(&path);
+    }
+}
+
+#[test]
+fn a_file_behind_a_link_is_seen_through_all_that_happens_to_it() {
+    let ((_dir, root), (_other, outside)) = (farm(), farm());
+    let (link, target) = (root.join("a.xodr"), outside.join("target"));
+    std::fs::write(&target, "one").unwrap();
+    symlink(&target, &link).unwrap();
+    let (mut looker, told) = looker(&root);
+    let then = |looker: &mut Looker| {
+        looker.look_behind_links();
+        settle(looker);
+        words(&root, &told)
+    };
+    looker.scan_all(true);
+    assert_eq!(then(&mut looker), ["present a.xodr", "settled a.xodr"]);
+    assert!(then(&mut looker).is_empty());
+
+    std::fs::write(&target, "other bytes").unwrap();
+    assert_eq!(then(&mut looker), ["settled a.xodr"], "rewritten");
+    std::fs::write(outside.join("new"), "replaced").unwrap();
+    std::fs::rename(outside.join("new"), &target).unwrap();
+    assert_eq!(then(&mut looker), ["settled a.xodr"], "replaced");
+    std::fs::write(outside.join("other"), "elsewhere").unwrap();
+    std::fs::remove_file(&link).unwrap();
+    symlink(outside.join("other"), &link).unwrap();
+    assert_eq!(then(&mut looker), ["settled a.xodr"], "pointed elsewhere");
+
+    std::fs::remove_file(outside.join("other")).unwrap();
+    let gone = ["unseen a.xodr", "vanished a.xodr"];
+    assert_eq!(then(&mut looker), gone, "dangling");
+    looker.scan_all(false);
+    assert!(then(&mut looker).is_empty(), "it has been said");
+    std::fs::write(outside.join("other"), "back").unwrap();
+    let back = ["seen again a.xodr", "settled a.xodr"];
+    assert_eq!(then(&mut looker), back, "back again");
+    std::fs::remove_file(&link).unwrap();
+    assert_eq!(then(&mut looker), ["vanished a.xodr"]);
+    assert!(then(&mut looker).is_empty());
+}
+
+#[test]
+fn what_cannot_be_looked_at_is_said_once_and_when_it_can_be() {
+    let ((_dir, root), (_other, outside)) = (farm(), farm());
+    symlink(&outside, root.join("maps")).unwrap();
+    symlink(root.join("loop"), root.join("loop")).unwrap();
+    symlink("nowhere", root.join("a.xodr")).unwrap();
+    // Nobody misses these.
+    symlink("nowhere", root.join("readme")).unwrap();
+    std::fs::create_dir(root.join("known")).unwrap();
+    symlink(root.join("known"), root.join("known_too")).unwrap();
+    symlink(&outside, root.join("ignored")).unwrap();
+    std::fs::write(root.join(IGNORE_FILE), "ignored/\n").unwrap();
+    let (mut looker, told) = looker(&root);
+    looker.scan_all(true);
+    let mut said = words(&root, &told);
+    said.sort();
+    assert_eq!(said, ["unseen a.xodr", "unseen loop", "unseen maps"]);
+    looker.scan_all(false);
+    assert!(words(&root, &told).is_empty());
+    std::fs::remove_file(root.join("maps")).unwrap();
+    looker.scan_all(false);
+    assert_eq!(words(&root, &told), ["seen again maps"]);
+}
+
+#[test]
+fn what_the_first_look_sees_is_there_before_it_has_settled() {
+    let (_dir, root) = farm();
+    std::fs::write(root.join("young.xodr"), "").unwrap();
+    let (mut looker, told) = looker(&root);
+    looker.scan_all(true);
+    assert_eq!(words(&root, &told), ["present young.xodr"]);
+    settle(&mut looker);
+    assert_eq!(words(&root, &told), ["settled young.xodr"]);
+    std::fs::write(root.join("new.xodr"), "").unwrap();
+    looker.scan_all(false);
+    assert!(words(&root, &told).is_empty());
+}
+
+#[test]
+fn a_directory_that_becomes_a_link_to_another_takes_its_files_with_it() {
+    let ((_dir, root), (_other, outside)) = (farm(), farm());
+    for directory in [&root, &outside] {
+        std::fs::create_dir(directory.join("maps")).unwrap();
+        std::fs::write(directory.join("maps/a.xodr"), "").unwrap();
+    }
+    let (mut looker, told) = looker(&root);
+    looker.look(&root.join("maps/a.xodr"));
+    assert_eq!(words(&root, &told), ["settled maps/a.xodr"]);
+    std::fs::remove_dir_all(root.join("maps")).unwrap();
+    symlink(outside.join("maps"), root.join("maps")).unwrap();
+    looker.scan_all(false);
+    let said = ["unseen maps", "vanished maps/a.xodr"];
+    assert_eq!(words(&root, &told), said);
+}
+
+fn vanished(told: &Receiver<Seen>) -> Vec<PathBuf> {
+    let path = |seen| match seen {
+        Seen::Vanished(path) => Some(path.to_path_buf()),
+        _ => None,
+    };
+    told.try_iter().filter_map(path).collect()
+}
+
+#[test]
+fn a_file_that_cannot_be_looked_at_has_not_gone() {
+    let dir = tempfile::tempdir().unwrap();
+    let (below, aside) = (dir.path().join("maps"), dir.path().join("aside.d"));
+    std::fs::create_dir(&below).unwrap();
+    std::fs::write(below.join("a.xodr"), "").unwrap();
+    let (mut looker, told) = looker(dir.path());
+    looker.look(&below.join("a.xodr"));
+    // Root may look into every directory, but through a link to itself nobody sees anything.
+    std::fs::rename(&below, &aside).unwrap();
+    symlink(&below, &below).unwrap();
+    looker.scan_all(false);
+    assert_eq!(vanished(&told), Vec::<PathBuf>::new());
+    std::fs::remove_file(&below).unwrap();
+    looker.scan_all(false);
+    assert_eq!(vanished(&told), [below.join("a.xodr")]);
+}
+
+#[test]
+fn looking_through_everything_reads_the_rules_afresh() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("a.xodr");
+    std::fs::write(&file, "").unwrap();
+    let (mut looker, told) = looker(dir.path());
+    looker.look(&file);
+    looker.scan_all(false);
+    assert_eq!(vanished(&told), Vec::<PathBuf>::new());
+    std::fs::write(dir.path().join(IGNORE_FILE), "*.xodr\n").unwrap();
+    looker.scan_all(false);
+    assert_eq!(vanished(&told), [file]);
+}
