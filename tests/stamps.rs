@@ -304,3 +304,79 @@ fn what_is_there_and_cannot_be_read_does_not_keep_a_file_from_its_verdict() {
     rests_on_becomes(&farm, "s.xosc", &map, Some(&bytes));
     farm.settle(3);
 }
+
+/// Where the result of a file lies, its copy behind the gate and its report: the very files.
+fn inodes(farm: &Farm, name: &str) -> [u64; 3] {
+    let files = [
+        farm.out().join(format!("{name}.xqar")),
+        gate(farm).join(name),
+        farm.out().join(format!("{name}.txt")),
+    ];
+    files.map(|file| std::fs::metadata(file).unwrap().ino())
+}
+
+#[test]
+fn a_file_of_tomorrow_keeps_its_verdict_over_a_restart() {
+    let mut farm = farm_with_gate();
+    farm.arguments.extend(["--report".into(), "text".into()]);
+    farm.write("tomorrow.xodr", &Content::Good(1).bytes());
+    set_modified(
+        &farm.root().join("tomorrow.xodr"),
+        SystemTime::now() + 24 * HOUR,
+    );
+    farm.write("now.xodr", &Content::Good(2).bytes());
+    let names = ["tomorrow.xodr", "now.xodr"];
+    let mut broker = farm.serve_ready();
+    farm.settle(2);
+    for name in names {
+        verdict_becomes(&farm, name, Verdict::Accepted);
+        let report = farm.out().join(format!("{name}.txt"));
+        until_so("there is a report", || report.exists());
+    }
+    let before = names.map(|name| inodes(&farm, name));
+    for restart in 0..3 {
+        farm.qcbus(&["down"]);
+        broker.wait();
+        // Written to in passing: its time of change is of this moment.
+        let rights = std::fs::Permissions::from_mode(0o640 + restart);
+        std::fs::set_permissions(farm.root().join("now.xodr"), rights).unwrap();
+        broker = farm.serve_ready();
+        farm.settle(2);
+        assert_eq!(names.map(|name| inodes(&farm, name)), before);
+        for name in names {
+            assert_eq!(farm.verdict(name).verdict, Verdict::Accepted);
+        }
+    }
+    farm.settle(2);
+    assert_eq!(names.map(|name| inodes(&farm, name)), before);
+    let once = verdicts_in_journal(&farm.journal());
+    assert_eq!(once.into_values().collect::<Vec<_>>(), [1, 1]);
+}
+
+/// How often a file was read, as the broker's log of stages tells.
+fn times_read(farm: &Farm, name: &str) -> usize {
+    let log = farm.log();
+    let read = log.lines().filter(|it| it.contains("stage=\"taken\""));
+    read.filter(|it| it.contains(name)).count()
+}
+
+#[test]
+fn a_file_of_tomorrow_comes_to_rest() {
+    let farm = farm_with_gate();
+    let path = farm.root().join("tomorrow.xodr");
+    farm.write("tomorrow.xodr", &Content::Good(1).bytes());
+    set_modified(&path, SystemTime::now() + 24 * HOUR);
+    let mut command = farm.serve_command();
+    command.env("QCBUS_LOG", "info,qcbus_broker::stages=debug");
+    let _broker = Broker::start(&mut command, &farm.log_path());
+    farm.settle(1);
+    rest(&farm);
+    // Read once more, because it was young when it was read first; and then never again.
+    farm.verdict("tomorrow.xodr");
+    let read = times_read(&farm, "tomorrow.xodr");
+    assert!(read > 0, "{}", tail(&farm.log()));
+    for _ in 0..3 {
+        assert_eq!(farm.verdict("tomorrow.xodr").verdict, Verdict::Accepted);
+    }
+    assert_eq!(times_read(&farm, "tomorrow.xodr"), read);
+}
