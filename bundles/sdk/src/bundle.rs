@@ -4,7 +4,7 @@ use std::any::TypeId;
 
 use qcbus_document::{Document, FileKind};
 use qcbus_formats::xqar::Level;
-use qcbus_messages::{Catalogue, CheckerInfo, ParamInfo};
+use qcbus_messages::{BUILD_DATE, Catalogue, CheckerInfo, ParamInfo};
 
 use crate::pages::{Page, Template};
 use crate::rule::Facts;
@@ -33,13 +33,6 @@ pub struct Bundle {
     /// What the short examples of the pages are put into.
     pub templates: &'static [Template],
 }
-
-/// Day of the build, `YYYY-MM-DD`: what `QCBUS_BUILD_DATE` was when it was compiled, else the day
-/// of the last release, so that results of two builds of one source do not differ.
-pub const BUILD_DATE: &str = match option_env!("QCBUS_BUILD_DATE") {
-    Some(date) => date,
-    None => "2026-11-21",
-};
 
 /// One checker as results list it. A rule with a separate backport makes two.
 #[derive(Clone)]

@@ -22,13 +22,14 @@ mod sink;
 mod subject;
 mod version;
 
-pub use bundle::{BACKPORT_SUFFIX, BUILD_DATE, Bundle, Checker};
+pub use bundle::{BACKPORT_SUFFIX, Bundle, Checker};
 pub use check::{Listener, Outcome, check};
 pub use load::{LoadError, Loaded};
 pub use param::{Default, MAX_ISSUES, Param, ParamError, Values};
 pub use place::Place;
 pub use plan::Plan;
 pub use qcbus_formats::xqar::{Issue, Level, Status};
+pub use qcbus_messages::BUILD_DATE;
 pub use resource::{Brought, Resource, ResourceError, ResourceFile, UserFiles};
 pub use rule::{AnyRule, Backport, Each, Facts, Model, Rule, Skip};
 pub use run::{Exit, Mode, Timings, examine, examine_timed, main, run};

@@ -14,6 +14,10 @@ pub mod peer_to_broker;
 pub mod services;
 pub mod verdict;
 
+/// Day of the build, `YYYY-MM-DD`: that of the commit, so that two builds of one source give the
+/// same results. See `build.rs`.
+pub const BUILD_DATE: &str = env!("QCBUS_BUILD_DATE");
+
 pub use broker_to_peer::{
     Job, JobDocument, MissingDocument, PeerReport, ResultMessage, ToPeer, Withdrawn,
 };
@@ -22,3 +26,32 @@ pub use exit::Exit;
 pub use ids::{Digest, DocId, DocumentRole, JobId, PROTOCOL_VERSION};
 pub use peer_to_broker::FromPeer;
 pub use verdict::Verdict;
+
+#[cfg(test)]
+#[expect(dead_code, reason = "the rest of it runs when this is built")]
+#[path = "../build.rs"]
+mod build;
+
+#[cfg(test)]
+mod tests {
+    use super::build::day_of;
+
+    #[test]
+    fn days_are_counted_as_the_calendar_does() {
+        let days = [
+            (0, "1970-01-01"),
+            (-1, "1969-12-31"),
+            (86_399, "1970-01-01"),
+            (951_782_400, "2000-02-29"),
+            (951_868_800, "2000-03-01"),
+            (1_709_164_800, "2024-02-29"),
+            (4_107_456_000, "2100-02-28"),
+            (4_107_542_400, "2100-03-01"),
+            (1_795_305_600, "2026-11-22"),
+        ];
+        for (seconds, day) in days {
+            assert_eq!(day_of(seconds), day);
+        }
+        assert_eq!(super::BUILD_DATE.len(), "1970-01-01".len());
+    }
+}

@@ -31,4 +31,3 @@ pub use demand::InForce;
 pub use engine::{Announcement, Broker, StartError, Stop, Told};
 pub use options::Options;
 pub use result_paths::ResultPaths;
-pub use store::BUILD_DATE;

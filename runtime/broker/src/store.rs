@@ -11,7 +11,7 @@ use qcbus_formats::config::Config;
 use qcbus_formats::pool::{self, NoPlaces, PoolInput, Pooled, Resolver, Scope};
 use qcbus_formats::xqar::{self, Dialect, Status};
 use qcbus_messages::path_text::to_text;
-use qcbus_messages::{Digest, Verdict};
+use qcbus_messages::{BUILD_DATE, Digest, Verdict};
 
 use crate::core::{BundleOutcome, FinishedJob, Input, Judged, StoreOutcome};
 use crate::disk::{is_for_good, remove, write_both, write_whole};
@@ -355,10 +355,6 @@ struct Unwritten {
     /// No waiting helps.
     for_good: bool,
 }
-
-/// The date of the commit or release that this was built from, fixed so that equal input gives
-/// equal bytes.
-pub const BUILD_DATE: &str = "2026-11-21";
 
 /// Whether everything that the verdict depends on is what it was when it was read. Stamps that
 /// moved although the bytes are the same (another link to the file, other rights) are taken over.
