@@ -136,6 +136,23 @@ fn a_verdict_on_what_lies_behind_a_link_outlives_the_broker() {
     becomes(&farm, &gate, "a.xodr", Some(Verdict::Rejected));
 }
 
+#[test]
+fn a_directory_keeps_its_name_however_many_links_lead_to_it() {
+    let (farm, gate, beside) = farm_with_gate();
+    std::fs::create_dir(farm.root().join("maps")).unwrap();
+    // Before the name of the directory, and after it.
+    for link in ["again", "once_more"] {
+        symlink("maps", farm.root().join(link)).unwrap();
+    }
+    let _broker = farm.serve_ready();
+    std::fs::write(beside.join("new"), Content::Good(1).bytes()).unwrap();
+    std::fs::rename(beside.join("new"), farm.root().join("maps/a.xodr")).unwrap();
+    becomes(&farm, &gate, "maps/a.xodr", Some(Verdict::Accepted));
+    assert!(farm.settle(1).unseen.is_empty());
+    let published: Vec<PathBuf> = files_below(&gate);
+    assert_eq!(published, [Path::new("maps/a.xodr")]);
+}
+
 /// A road whose plan view is included from `view.xml`, and what must be in there.
 fn road_in_two_parts() -> (String, String) {
     let whole = String::from_utf8(Content::Good(1).bytes()).unwrap();

@@ -12,7 +12,8 @@ pub enum Exit {
     Rejected = 1,
     /// Wrong usage or configuration, nothing to check, or a file that nobody watches.
     Usage = 2,
-    /// No file is rejected and at least one is undetermined, or the time is over.
+    /// No file is rejected and at least one is undetermined, something could not be looked at, or the
+    /// time is over.
     Undetermined = 3,
     /// No broker runs as the instance that was asked for.
     NoBroker = 4,

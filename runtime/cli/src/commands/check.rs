@@ -10,7 +10,7 @@ use qcbus_broker::{Broker, Options, ResultPaths, Told};
 use qcbus_bus::{HostOptions, Instance};
 use qcbus_document::FileKind;
 use qcbus_formats::config::Config;
-use qcbus_messages::path_text::to_text;
+use qcbus_messages::path_text::{from_text, to_text};
 use qcbus_messages::{Exit, Verdict};
 use qcbus_reporter_sdk::FileSources;
 
@@ -153,7 +153,7 @@ fn targets(
                 "the configuration names no InputFile; add one, or name a file after -c CONFIG",
             ));
         };
-        paths.push(input_path(Path::new(input), config_path));
+        paths.push(input_path(&from_text(input), config_path));
     }
     let (mut roots, mut files) = (BTreeSet::new(), BTreeSet::new());
     for path in &paths {

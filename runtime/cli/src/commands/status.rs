@@ -132,7 +132,7 @@ fn span(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use qcbus_messages::control::{FileCounts, Notice, QueueStatus};
+    use qcbus_messages::control::{FileCounts, Notice, QueueStatus, Unseen};
 
     #[test]
     fn a_busy_broker_as_a_person_sees_it() {
@@ -176,6 +176,10 @@ mod tests {
                 kind: "not-written".into(),
                 about: None,
                 text: "cannot write /farm/out/a.xqar: No space left on device".into(),
+            }],
+            unseen: vec![Unseen {
+                path: "/farm/in/closed".into(),
+                why: "cannot look into this directory: Permission denied".into(),
             }],
             ..Status::default()
         };
