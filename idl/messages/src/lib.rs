@@ -9,15 +9,14 @@ pub mod codec;
 pub mod control;
 mod exit;
 pub mod ids;
+pub mod missing;
 pub mod peer_to_broker;
 pub mod services;
-pub mod verdict;
 
-pub use broker_to_peer::{
-    Job, JobDocument, MissingDocument, PeerReport, ResultMessage, ToPeer, Withdrawn,
-};
+pub use broker_to_peer::{Job, JobDocument, PeerReport, ResultMessage, ToPeer, Withdrawn};
 pub use catalogue::{Catalogue, CheckerInfo, Hello, ParamInfo, Role};
 pub use exit::Exit;
 pub use ids::{Digest, DocId, DocumentRole, JobId, PROTOCOL_VERSION};
+pub use missing::{Absence, MissingDocument};
 pub use peer_to_broker::FromPeer;
-pub use verdict::Verdict;
+pub use qcbus_formats::Verdict;

@@ -2,7 +2,7 @@
 
 #![allow(dead_code, reason = "every test file uses a part of it")]
 
-use qcbus_formats::pool::{BundleOutcome, CheckerOutcome, PoolInput, Scope};
+use qcbus_formats::pool::{BundleOutcome, CheckerOutcome, Ending, PoolInput, Scope};
 use qcbus_formats::xqar::{
     Checker, CheckerBundle, DomainInfo, InfoElement, Issue, Level, Location, Locations, Metadata,
     Param, Results, Status,
@@ -44,7 +44,7 @@ pub fn checker(id: &str, issues: Vec<Issue>) -> CheckerOutcome {
         id: id.into(),
         description: format!("Looks at {id}."),
         rule_uids: vec![UID.into()],
-        status: Some(Status::Completed),
+        ending: Some(Ending::Completed),
         issues,
         ..CheckerOutcome::default()
     }
@@ -57,8 +57,8 @@ pub fn bundle(name: &str, alias: &str, checkers: Vec<CheckerOutcome>) -> BundleO
         version: "0.1.0".into(),
         build_date: "2025-01-31".into(),
         description: format!("The bundle {name}."),
-        params: Vec::new(),
         checkers,
+        ..BundleOutcome::default()
     }
 }
 
