@@ -131,6 +131,7 @@ fn place_at(
     });
     Locations {
         description: description.to_owned(),
+        elsewhere: None,
         places: std::iter::once(file).chain(xml).collect(),
     }
 }

@@ -198,13 +198,10 @@ fn as_text(path: &Path, pooled: &Pooled) -> String {
     let mut lines: Vec<(u64, u64, String)> = Vec::new();
     for issue in checkers(pooled).flat_map(|(_, checker)| &checker.issues) {
         let (row, column) = row_column(issue).unwrap_or((1, 1));
-        let elsewhere = issue
-            .domain_info
-            .iter()
-            .any(|info| info.name == qcbus_formats::location::NAME);
-        let place = issue.locations.first().filter(|_| elsewhere);
-        let place = place
-            .map(|place| format!(" ({})", place.description))
+        let first = issue.locations.first();
+        let place = first
+            .filter(|place| place.elsewhere.is_some())
+            .map(|place| format!(" ({})", place.written()))
             .unwrap_or_default();
         let level = level_name(issue.level);
         let text = format!(

@@ -35,6 +35,7 @@ pub fn xml_place(xpath: &str) -> Locations {
     }];
     Locations {
         description: "the road".into(),
+        elsewhere: None,
         places,
     }
 }
@@ -101,10 +102,12 @@ pub fn full() -> Results {
     rich.locations = vec![
         Locations {
             description: "road 5".into(),
+            elsewhere: None,
             places: vec![file, xml, inertial, road.clone()],
         },
         Locations {
             description: "its end".into(),
+            elsewhere: None,
             places: vec![road.clone(), road],
         },
     ];
@@ -126,6 +129,7 @@ pub fn full() -> Results {
     late.rule_uid = OTHER_UID.into();
     late.locations = vec![Locations {
         description: String::new(),
+        elsewhere: None,
         places: vec![
             Location::Time { time: 3.5 },
             Location::Message {

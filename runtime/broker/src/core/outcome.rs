@@ -152,8 +152,14 @@ pub(crate) fn weight(issue: &Issue) -> usize {
         Location::Xml { xpath } => 64 + xpath.len(),
         _ => 64,
     };
-    let places =
-        |it: &Locations| 64 + it.description.len() + it.places.iter().map(place).sum::<usize>();
+    let places = |it: &Locations| {
+        let elsewhere = it.elsewhere.as_ref();
+        let xpath = elsewhere
+            .and_then(|it| it.xpath.as_ref())
+            .map_or(0, String::len);
+        let elsewhere = elsewhere.map_or(0, |it| it.path.len()) + xpath;
+        64 + it.description.len() + elsewhere + it.places.iter().map(place).sum::<usize>()
+    };
     let infos = |it: &DomainInfo| it.name.len() + it.content.iter().map(info_weight).sum::<usize>();
     256 + issue.description.len()
         + issue.rule_uid.len()
@@ -182,6 +188,13 @@ pub(super) fn clip(issue: &mut Issue, max: usize) {
     for place in &mut issue.locations {
         clip_text(&mut place.description, max);
         place.places.truncate(16);
+        if let Some(elsewhere) = &mut place.elsewhere {
+            clip_text(&mut elsewhere.path, max);
+            elsewhere
+                .xpath
+                .iter_mut()
+                .for_each(|xpath| clip_text(xpath, max));
+        }
     }
 }
 
