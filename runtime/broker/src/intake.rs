@@ -87,7 +87,7 @@ impl Intake {
     pub fn prepare(&self, job: JobId, path: &Path) -> Result<Box<PreparedJob>, PrepareFailure> {
         let root = self
             .publish_fresh(path)
-            .map_err(|failure| self.explain(failure, path))?;
+            .map_err(|failure| explained(failure, path))?;
         let mut gathered = Gathered::new(path, &root);
         self.gather(&root.held, &mut gathered)?;
         let prepared = gathered.finish();
@@ -228,28 +228,26 @@ impl Intake {
         root.max_by_key(|root| root.as_os_str().len())
             .map_or_else(|| path.parent().unwrap_or(path), PathBuf::as_path)
     }
+}
 
-    fn explain(&self, failure: Failure, path: &Path) -> PrepareFailure {
-        match failure {
-            Failure::Ingest(IngestError::Missing { .. } | IngestError::Unsettled { .. }) => {
-                match stamp_of(path) {
-                    Ok(None) => PrepareFailure::Vanished,
-                    // It is written to this very moment: it is read again shortly.
-                    _ => PrepareFailure::NoRoom(format!(
-                        "{} changes while it is read",
-                        path.display()
-                    )),
-                }
+/// What the failure means for the root.
+fn explained(failure: Failure, path: &Path) -> PrepareFailure {
+    match failure {
+        Failure::Ingest(IngestError::Missing { .. } | IngestError::Unsettled { .. }) => {
+            match stamp_of(path) {
+                Ok(None) => PrepareFailure::Vanished,
+                // It is written to this very moment: it is read again shortly.
+                _ => PrepareFailure::NoRoom(format!("{} changes while it is read", path.display())),
             }
-            Failure::Ingest(error) => unreadable(path, error.to_string()),
-            Failure::Build(error) => unreadable(path, error),
-            Failure::Loan(LoanError::TooLarge(_)) => {
-                unreadable(path, format!("{} is too large for the bus", path.display()))
-            }
-            Failure::Loan(LoanError::Busy) => PrepareFailure::Busy,
-            Failure::Loan(error) => unpublished(path, &error),
-            Failure::Publish(error) => unpublished(path, &error),
         }
+        Failure::Ingest(error) => unreadable(path, error.to_string()),
+        Failure::Build(error) => unreadable(path, error),
+        Failure::Loan(LoanError::TooLarge(_)) => {
+            unreadable(path, format!("{} is too large for the bus", path.display()))
+        }
+        Failure::Loan(LoanError::Busy) => PrepareFailure::Busy,
+        Failure::Loan(error) => unpublished(path, &error),
+        Failure::Publish(error) => unpublished(path, &error),
     }
 }
 
@@ -274,18 +272,7 @@ impl Source for Links<'_> {
         let before = stamp_through_links(path);
         let absence = match self.intake.publish_shared(path) {
             Ok(published) => return Ok(Ok(published)),
-            Err(Failure::Loan(LoanError::TooLarge(_))) => Absence::TooLarge {
-                why: "it does not fit on the bus".to_owned(),
-            },
-            Err(Failure::Loan(LoanError::Busy)) => return Err(PrepareFailure::Busy),
-            Err(Failure::Loan(error)) => return Err(unpublished(path, &error)),
-            Err(Failure::Publish(error)) => return Err(unpublished(path, &error)),
-            // It is written to this very moment: the whole is read again shortly.
-            Err(Failure::Ingest(error @ IngestError::Unsettled { .. })) => {
-                return Err(PrepareFailure::NoRoom(error.to_string()));
-            }
-            Err(Failure::Ingest(error)) => error.to_absence(),
-            Err(Failure::Build(why)) => Absence::Unreadable { why },
+            Err(failure) => failure.of_linked(path)?,
         };
         if absence != Absence::NotThere {
             self.gathered.unread(path, before);
@@ -320,6 +307,27 @@ enum Failure {
     /// The image is there, and the bus did not take it.
     Publish(String),
     Loan(LoanError),
+}
+
+impl Failure {
+    /// What the failure means for a file that a root refers to: that it cannot be had, or that the
+    /// whole is to be tried again.
+    fn of_linked(self, path: &Path) -> Result<Absence, PrepareFailure> {
+        match self {
+            Failure::Loan(LoanError::TooLarge(_)) => Ok(Absence::TooLarge {
+                why: "it does not fit on the bus".to_owned(),
+            }),
+            Failure::Loan(LoanError::Busy) => Err(PrepareFailure::Busy),
+            Failure::Loan(error) => Err(unpublished(path, &error)),
+            Failure::Publish(error) => Err(unpublished(path, &error)),
+            // It is written to this very moment: the whole is read again shortly.
+            Failure::Ingest(error @ IngestError::Unsettled { .. }) => {
+                Err(PrepareFailure::NoRoom(error.to_string()))
+            }
+            Failure::Ingest(error) => Ok(error.to_absence()),
+            Failure::Build(why) => Ok(Absence::Unreadable { why }),
+        }
+    }
 }
 
 impl From<IngestError> for Failure {
@@ -491,4 +499,40 @@ fn unreadable(path: &Path, reason: String) -> PrepareFailure {
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_becomes_of_a_linked_file_never_makes_the_root_vanish() {
+        let path = Path::new("/farm/map.xodr");
+        let of = |failure: Failure| failure.of_linked(path);
+        let unsettled = IngestError::Unsettled {
+            path: path.to_owned(),
+            what: "was removed",
+        };
+        let again = of(unsettled.into());
+        assert!(matches!(again, Err(PrepareFailure::NoRoom(_))), "{again:?}");
+        let missing = IngestError::Missing {
+            path: path.to_owned(),
+        };
+        assert_eq!(of(missing.into()), Ok(Absence::NotThere));
+        let large = of(LoanError::TooLarge(1).into());
+        assert!(matches!(large, Ok(Absence::TooLarge { .. })), "{large:?}");
+    }
+
+    #[test]
+    fn what_the_bus_does_not_take_now_is_tried_again() {
+        let path = Path::new("/farm/map.xodr");
+        let refused = || Failure::Publish("no subscriber slot".to_owned());
+        let linked = refused().of_linked(path);
+        assert!(
+            matches!(linked, Err(PrepareFailure::NoRoom(_))),
+            "{linked:?}"
+        );
+        let root = explained(refused(), path);
+        assert!(matches!(root, PrepareFailure::NoRoom(_)), "{root:?}");
+    }
 }
