@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use qcbus_schema::{BroughtContent, BroughtFile, Checked, Options, Outcome, Override};
-use qcbus_sdk::{Brought, Model, Param, Resource, ResourceFile, Skip, Subject};
+use qcbus_schema::{BroughtContent, BroughtFile, Checked, Options, Outcome, Override, SkipReason};
+use qcbus_sdk::{Brought, Model, Param, Resource, ResourceFile, Subject, Unbuilt};
 
-/// Marks rules about the validated document; they are skipped when no schema applies.
+/// Marks rules about the validated document; they say nothing when no schema applies.
 #[derive(Debug)]
 pub struct Validated;
 
@@ -13,7 +13,7 @@ impl Model for Validated {
     type Of<'d> = Checked<'d>;
     type Part = ();
 
-    fn build<'d>(subject: &'d Subject<'d>) -> Result<Checked<'d>, Skip> {
+    fn build<'d>(subject: &'d Subject<'d>) -> Result<Checked<'d>, Unbuilt> {
         let brought = subject.brought::<Overrides>();
         let options = Options {
             overrides: brought.map(|it| it.0.clone()).unwrap_or_default(),
@@ -21,12 +21,23 @@ impl Model for Validated {
         };
         match qcbus_schema::check(&subject.root(), subject.kind(), &options) {
             Outcome::Checked(checked) => Ok(checked),
-            Outcome::Skipped(reason) => Err(Skip(reason.to_string())),
+            Outcome::Skipped(reason) => Err(unbuilt(&reason)),
         }
     }
 
     fn parts(_: &Checked<'_>) -> Vec<()> {
         vec![()]
+    }
+}
+
+/// Old versions have no schema, and the rule does not apply to them. A file that does not say its
+/// version or is not well-formed is broken: that other rules say so is no reason to accept it here.
+fn unbuilt(reason: &SkipReason) -> Unbuilt {
+    let text = reason.to_string();
+    match reason {
+        SkipReason::MajorZero(_) | SkipReason::NoSchema(_) => Unbuilt::NotApplicable(text),
+        SkipReason::NoVersion | SkipReason::IllFormed => Unbuilt::Broken(text),
+        SkipReason::Tables(_) => Unbuilt::Failed(text),
     }
 }
 

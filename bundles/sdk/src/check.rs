@@ -1,21 +1,21 @@
 //! Checks one subject: gates, preconditions, models, panics.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
-use qcbus_formats::xqar::{Issue, Level, Metadata, Param, Status};
+use qcbus_formats::pool::Ending;
+use qcbus_formats::xqar::{Issue, Level, Metadata, Param};
 
 use crate::plan::{Entry, Plan};
 use crate::rule::Built;
-use crate::{AnyRule, Backport, Checker, Sink, Skip, Subject, Values, Version};
+use crate::{AnyRule, Backport, Checker, Sink, Subject, Values, Version};
 
-/// How a checker ended.
+/// How a checker ended, and what is to be said besides its findings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// Completed, skipped or error.
-    pub status: Status,
-    /// Why it was skipped or failed; empty when it completed.
-    pub reason: String,
+    /// How it ended.
+    pub ending: Ending,
     /// The parameters that it used.
     pub params: Vec<Param>,
     /// Further facts.
@@ -36,7 +36,8 @@ pub trait Listener {
         let _ = checker;
     }
 
-    /// A demanded checker has ended with these findings.
+    /// A checker has ended with these findings: a demanded one, or one besides that kept a demanded
+    /// one from looking. The latter come last.
     fn ended(&mut self, checker: usize, issues: Vec<Issue>, outcome: Outcome);
 }
 
@@ -48,7 +49,8 @@ pub fn check(plan: &Plan, subject: &Subject<'_>, listener: &mut dyn Listener) ->
         plan,
         subject,
         listener,
-        endings: vec![None; plan.checkers.len()],
+        standings: vec![None; plan.checkers.len()],
+        aside: BTreeMap::new(),
         cancelled: false,
     };
     for group in &plan.groups {
@@ -59,6 +61,9 @@ pub fn check(plan: &Plan, subject: &Subject<'_>, listener: &mut dyn Listener) ->
             .collect();
         run.group(&members);
     }
+    if !run.cancelled {
+        run.tell_what_was_in_the_way();
+    }
     !run.cancelled
 }
 
@@ -66,19 +71,35 @@ struct Run<'r> {
     plan: &'r Plan,
     subject: &'r Subject<'r>,
     listener: &'r mut dyn Listener,
-    endings: Vec<Option<Ending>>,
+    standings: Vec<Option<Standing>>,
+    /// What undemanded checkers said, as far as they may be in the way of a demanded one.
+    aside: BTreeMap<usize, (Vec<Issue>, Outcome)>,
     cancelled: bool,
 }
 
 /// What matters of a checker to those that come after it.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Ending {
+enum Standing {
     /// Not yet at its end: it waits for its turn.
     Waits,
     Clean,
     FoundErrors,
-    Skipped,
+    NotApplicable,
+    Blocked,
     Failed,
+}
+
+impl Standing {
+    /// What it means for those that rest on the checker; `None`: nothing, they may look.
+    fn in_the_way(self) -> Option<&'static str> {
+        match self {
+            Standing::Clean => None,
+            Standing::FoundErrors => Some("found errors"),
+            Standing::NotApplicable | Standing::Blocked => Some("was skipped"),
+            Standing::Failed => Some("failed"),
+            Standing::Waits => Some("did not run before it"),
+        }
+    }
 }
 
 /// How a checker is let through: with a note when its rule is not normative for the version.
@@ -137,13 +158,11 @@ impl<'r> Run<'r> {
         });
         let outcome = match built {
             Ok(Ok(())) => return,
-            Ok(Err(Skip(reason))) => Outcome::without_run(Status::Skipped, reason),
-            Err(panic) => {
-                Outcome::without_run(Status::Error, format!("its model panicked: {panic}"))
-            }
+            Ok(Err(unbuilt)) => Outcome::without_run(unbuilt.into()),
+            Err(panic) => Outcome::failed(format!("its model panicked: {panic}")),
         };
         for index in open {
-            if self.endings[index].is_none() {
+            if self.standings[index].is_none() {
                 let outcome = self
                     .gate(index)
                     .map_or_else(|gated| gated, |_| outcome.clone());
@@ -164,8 +183,8 @@ impl<'r> Run<'r> {
         waiting.push(self.turn(first.0, first.1));
         for index in rest {
             let after = self.plan.entries[index].after.as_deref().unwrap_or(&[]);
-            let mut endings = after.iter().map(|before| self.endings[*before]);
-            if endings.any(|ending| ending == Some(Ending::Waits)) {
+            let mut standings = after.iter().map(|before| self.standings[*before]);
+            if standings.any(|standing| standing == Some(Standing::Waits)) {
                 self.take(&mut waiting, built);
                 waiting.clear();
             }
@@ -181,7 +200,7 @@ impl<'r> Run<'r> {
     }
 
     fn turn(&mut self, index: usize, pass: Pass<'r>) -> Turn<'r> {
-        self.endings[index] = Some(Ending::Waits);
+        self.standings[index] = Some(Standing::Waits);
         let checker = &self.plan.checkers[index];
         let Pass {
             values,
@@ -229,13 +248,14 @@ impl<'r> Run<'r> {
     fn close(&mut self, turn: &mut Turn<'r>) {
         // What was found before a panic is still true.
         let (issues, metadata) = turn.sink.finish();
-        let (status, reason) = match turn.failed.take() {
-            None => (Status::Completed, String::new()),
-            Some(panic) => (Status::Error, format!("the rule panicked: {panic}")),
+        let ending = match turn.failed.take() {
+            None => Ending::Completed,
+            Some(panic) => Ending::Failed {
+                reason: format!("the rule panicked: {panic}"),
+            },
         };
         let outcome = Outcome {
-            status,
-            reason,
+            ending,
             params: turn.values.listed(),
             metadata,
             took: turn.took,
@@ -245,22 +265,52 @@ impl<'r> Run<'r> {
 
     fn end(&mut self, index: usize, issues: Vec<Issue>, outcome: Outcome) {
         let found_errors = issues.iter().any(|issue| issue.level == Level::Error);
-        self.endings[index] = Some(match outcome.status {
-            Status::Completed if found_errors => Ending::FoundErrors,
-            Status::Completed => Ending::Clean,
-            Status::Skipped => Ending::Skipped,
-            Status::Error => Ending::Failed,
-        });
+        let standing = match outcome.ending {
+            Ending::Completed if found_errors => Standing::FoundErrors,
+            Ending::Completed => Standing::Clean,
+            Ending::NotApplicable { .. } => Standing::NotApplicable,
+            Ending::Blocked { .. } => Standing::Blocked,
+            Ending::Failed { .. } => Standing::Failed,
+        };
+        self.standings[index] = Some(standing);
         if self.plan.entries[index].demanded {
             self.listener.ended(index, issues, outcome);
+        } else if standing.in_the_way().is_some() {
+            self.aside.insert(index, (issues, outcome));
         }
+    }
+
+    /// The fault that was found is reported, whoever asked: what kept demanded checkers from
+    /// looking, directly or through others, says so in the order of the checkers.
+    fn tell_what_was_in_the_way(&mut self) {
+        let demanded = |index: &usize| self.plan.entries[*index].demanded;
+        let mut open: Vec<usize> = (0..self.standings.len()).filter(demanded).collect();
+        let mut told = BTreeSet::new();
+        while let Some(index) = open.pop() {
+            if self.standings[index] == Some(Standing::Blocked) {
+                let after = self.plan.entries[index].after.iter().flatten();
+                open.extend(after.filter(|before| self.is_stop(**before) && told.insert(**before)));
+            }
+        }
+        for index in told {
+            if let Some((issues, outcome)) = self.aside.remove(&index) {
+                self.listener.ended(index, issues, outcome);
+            }
+        }
+    }
+
+    /// Whether those that rest on the checker could not look because of it. That it does not apply
+    /// is no such reason.
+    fn is_stop(&self, index: usize) -> bool {
+        let standing = self.standings[index].unwrap_or(Standing::Waits);
+        standing.in_the_way().is_some() && standing != Standing::NotApplicable
     }
 
     /// Parameters, preconditions, version: in this order.
     fn gate(&self, index: usize) -> Result<Pass<'r>, Outcome> {
         let plan = self.plan;
         let (checker, entry) = (&plan.checkers[index], &plan.entries[index]);
-        let fails = |reason: &String| Outcome::without_run(Status::Error, reason.clone());
+        let fails = |reason: &String| Outcome::failed(reason.clone());
         let values = entry.values.as_ref().map_err(fails)?;
         let with_params = |mut outcome: Outcome| {
             outcome.params = values.listed();
@@ -274,26 +324,38 @@ impl<'r> Run<'r> {
         })
     }
 
+    /// Whether everything that the checker rests on has looked and found no error. What rests on a
+    /// checker that does not apply does not apply either; anything else is in its way.
     fn preconditions(&self, entry: &Entry) -> Result<(), Outcome> {
-        let fails = |reason: &String| Outcome::without_run(Status::Error, reason.clone());
-        for &index in entry.after.as_ref().map_err(fails)? {
-            let what = match self.endings[index] {
-                Some(Ending::Clean) => continue,
-                Some(Ending::FoundErrors) => "found errors",
-                Some(Ending::Skipped) => "was skipped",
-                Some(Ending::Failed) => "failed",
-                Some(Ending::Waits) | None => "did not run before it",
+        let fails = |reason: &String| Outcome::failed(reason.clone());
+        let after = entry.after.as_ref().map_err(fails)?;
+        let mut stopped: Option<String> = None;
+        let mut by = Vec::new();
+        for &index in after {
+            let standing = self.standings[index].unwrap_or(Standing::Waits);
+            let Some(what) = standing.in_the_way() else {
+                continue;
             };
-            let reason = format!("`{}` {what}", self.plan.checkers[index].id);
-            return Err(Outcome::without_run(Status::Skipped, reason));
+            let id = &self.plan.checkers[index].id;
+            stopped.get_or_insert_with(|| format!("`{id}` {what}"));
+            if self.is_stop(index) {
+                by.push(id.clone());
+            }
         }
-        Ok(())
+        let Some(reason) = stopped else {
+            return Ok(());
+        };
+        Err(Outcome::without_run(if by.is_empty() {
+            Ending::NotApplicable { reason }
+        } else {
+            Ending::Blocked { by, reason }
+        }))
     }
 
     /// Whether the checker applies to the document's version; with the note of a backport.
     fn version_gate(&self, checker: &Checker) -> Result<Option<String>, Outcome> {
-        let fails = |reason: &String| Outcome::without_run(Status::Error, reason.clone());
-        let skips = |reason: String| Outcome::without_run(Status::Skipped, reason);
+        let fails = |reason: &String| Outcome::failed(reason.clone());
+        let skips = |reason: String| Outcome::without_run(Ending::NotApplicable { reason });
         let range = checker.range.as_ref().map_err(fails)?;
         if range.is_everything() {
             return Ok(None);
@@ -302,7 +364,11 @@ impl<'r> Run<'r> {
         let Some(version) = self.subject.version() else {
             let reason =
                 format!("the rule applies to {standard} {range}; the file names no version");
-            return Err(skips(reason));
+            // Whether it applies cannot be known, because the document lacks what it must say.
+            return Err(Outcome::without_run(Ending::Blocked {
+                by: Vec::new(),
+                reason,
+            }));
         };
         let backported = range.is_before(version) && reaches_back(checker.facts.backport, version)?;
         let separate = matches!(checker.facts.backport, Backport::Separate { .. });
@@ -329,18 +395,20 @@ fn reaches_back(backport: Backport, version: Version) -> Result<bool, Outcome> {
         Backport::None => Ok(false),
         Backport::Lower { since: "" } | Backport::Separate { since: "" } => Ok(true),
         Backport::Lower { since } | Backport::Separate { since } => {
-            let wrong =
-                |error: crate::VersionError| Outcome::without_run(Status::Error, error.to_string());
+            let wrong = |error: crate::VersionError| Outcome::failed(error.to_string());
             Ok(since.parse::<Version>().map_err(wrong)? <= version)
         }
     }
 }
 
 impl Outcome {
-    fn without_run(status: Status, reason: String) -> Outcome {
+    fn failed(reason: String) -> Outcome {
+        Outcome::without_run(Ending::Failed { reason })
+    }
+
+    fn without_run(ending: Ending) -> Outcome {
         Outcome {
-            status,
-            reason,
+            ending,
             params: Vec::new(),
             metadata: Vec::new(),
             took: Duration::ZERO,

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use qcbus_document::Document;
 use qcbus_formats::pool::CheckerOutcome;
-use qcbus_formats::xqar::{Issue, Location, Status};
+use qcbus_formats::xqar::{Issue, Location};
 use serde_json::Value;
 
 use crate::run::examine;
@@ -181,11 +181,7 @@ fn counted(peer: &Value, ours: &CheckerOutcome) -> Option<String> {
 }
 
 fn status_of(ours: &CheckerOutcome) -> &'static str {
-    match ours.status {
-        Some(Status::Completed) => "completed",
-        Some(Status::Skipped) => "skipped",
-        _ => "error",
-    }
+    ours.status().as_str()
 }
 
 /// Fails the running test with every disagreement that is not declared and every declared deviation
@@ -269,7 +265,7 @@ impl Compared<'_> {
         if theirs != status {
             return Some(format!(
                 "recorded {theirs}, ours {status} ({})",
-                ours.reason
+                ours.reason()
             ));
         }
         let recorded = self.recorded_issues(&ours.id);

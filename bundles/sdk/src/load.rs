@@ -1,10 +1,12 @@
 //! From files to a subject, without a broker: for one-shot runs and for the examples of pages.
 
+use std::convert::Infallible;
 use std::path::{Path, PathBuf};
 
 use qcbus_document::{Document, FileKind, ImageError};
-use qcbus_ingest::{Limits, Prepared, Reference, Role};
-use qcbus_messages::{Digest, DocumentRole, MissingDocument};
+use qcbus_formats::pool::{BundleOutcome, Remark};
+use qcbus_ingest::{IngestError, Limits, Prepared, Source};
+use qcbus_messages::{Absence, Digest, DocumentRole, MissingDocument};
 
 use crate::subject::Linked;
 use crate::{Bundle, Subject};
@@ -88,6 +90,19 @@ impl Loaded {
         Ok(subject.with(linked, self.missing.clone()))
     }
 
+    /// What qcbus itself has to say about the file: references that lead nowhere, and what is wrong
+    /// with the file when no bundle says so.
+    ///
+    /// # Errors
+    /// [`LoadError::Image`].
+    pub fn remarks(&self, bundles: &[BundleOutcome]) -> Result<Vec<Remark>, LoadError> {
+        Ok(qcbus_ingest::remarks(
+            &Document::open(&self.root)?,
+            &self.missing,
+            bundles,
+        ))
+    }
+
     /// What the file's name promises.
     pub fn kind(&self) -> FileKind {
         self.kind
@@ -115,60 +130,51 @@ impl Loaded {
     }
 
     fn follow(&mut self, boundary: &Path) -> Result<(), LoadError> {
-        let references = qcbus_ingest::references(&Document::open(&self.root)?);
-        for reference in references {
-            self.load_reference(&reference, boundary);
-        }
+        let mut shelf = Shelf {
+            boundary,
+            linked: Vec::new(),
+        };
+        let root = Document::open(&self.root)?;
+        let Ok(missing) = qcbus_ingest::gather(&root, MAX_DOCUMENTS, &mut shelf);
+        self.missing = missing;
+        self.linked = shelf.linked;
         Ok(())
-    }
-
-    fn load_reference(&mut self, reference: &Reference, boundary: &Path) {
-        let Some(role) = role_of(reference.role) else {
-            return;
-        };
-        let missing = |path: &Path, why: String| MissingDocument {
-            role,
-            reference: reference.text.clone(),
-            path: path.display().to_string(),
-            why,
-            referred_at: reference.offset,
-        };
-        if let Some(why) = &reference.unresolved {
-            self.missing.push(missing(Path::new(""), why.clone()));
-        }
-        // Every file of a catalog directory is meant; else the first candidate that is there.
-        let all = reference.role == Role::CatalogDirectory;
-        let (mut failed, mut loaded) = (Vec::new(), false);
-        for path in &reference.candidates {
-            // Maps and catalogs may lie anywhere; what they include stays around them.
-            match prepare(path, path.parent().unwrap_or(boundary)) {
-                Ok(prepared) => {
-                    self.linked.push(LinkedImage {
-                        role,
-                        path: path.display().to_string(),
-                        referred_at: reference.offset,
-                        image: prepared.build(),
-                    });
-                    loaded = true;
-                }
-                Err(error) => failed.push(missing(path, error.to_string())),
-            }
-            if loaded && !all {
-                return;
-            }
-        }
-        let told = if all { failed.len() } else { 1 };
-        self.missing.extend(failed.into_iter().take(told));
     }
 }
 
-/// What a referenced file is to the job; schemas are never read.
-fn role_of(role: Role) -> Option<DocumentRole> {
-    match role {
-        Role::LogicFile => Some(DocumentRole::Map),
-        Role::CatalogDirectory => Some(DocumentRole::Catalog),
-        Role::ScenarioReference | Role::ScenarioFile => Some(DocumentRole::Scenario),
-        Role::Schema => None,
+/// Most documents that may belong to a file: their images lie in this process, not on the bus.
+const MAX_DOCUMENTS: usize = 2048;
+
+/// Fetches documents from disk into memory.
+struct Shelf<'b> {
+    boundary: &'b Path,
+    linked: Vec<LinkedImage>,
+}
+
+impl Source for Shelf<'_> {
+    type Document = Vec<u8>;
+    type Halt = Infallible;
+
+    fn fetch(&mut self, path: &Path) -> Result<Result<Vec<u8>, Absence>, Infallible> {
+        // Maps and catalogs may lie anywhere; what they include stays around them.
+        let boundary = path.parent().unwrap_or(self.boundary);
+        let prepared = qcbus_ingest::prepare(path, boundary, &Limits::default());
+        Ok(prepared
+            .map(|prepared| prepared.build())
+            .map_err(|error: IngestError| error.to_absence()))
+    }
+
+    fn image(document: &Vec<u8>) -> &[u8] {
+        document
+    }
+
+    fn keep(&mut self, path: &Path, role: DocumentRole, referred_at: u32, image: Vec<u8>) {
+        self.linked.push(LinkedImage {
+            role,
+            path: qcbus_messages::path_text::to_text(&path),
+            referred_at,
+            image,
+        });
     }
 }
 

@@ -1,7 +1,8 @@
 //! From an element, an attribute or an offset to the locations that a result file lists.
 
 use qcbus_document::{Attribute, Document, FaultCode, Node, Position};
-use qcbus_formats::xqar::{DomainInfo, InfoElement, Location, Locations};
+use qcbus_formats::location::OtherPlace;
+use qcbus_formats::xqar::{Location, Locations};
 
 use crate::Subject;
 
@@ -92,14 +93,12 @@ impl<'p> Place<'p> {
 /// A place with everything that a result says about it.
 pub(crate) struct Spot {
     pub locations: Locations,
-    /// Set when the place is not in the root file.
-    pub elsewhere: Option<DomainInfo>,
     /// Document order: the root's text first, then other documents in the order of references.
     pub order: (usize, u32),
 }
 
 /// Works out rows, columns and XPaths. A place in another file is shown at the element of the
-/// root file that leads there; where it really is, its description says.
+/// root file that leads there.
 pub(crate) fn locate(subject: &Subject<'_>, place: &Place<'_>, description: Option<&str>) -> Spot {
     let document = place.document();
     let position = document.position(place.offset());
@@ -111,9 +110,9 @@ pub(crate) fn locate(subject: &Subject<'_>, place: &Place<'_>, description: Opti
         return Spot {
             locations: Locations {
                 description,
+                elsewhere: None,
                 places,
             },
-            elsewhere: None,
             order,
         };
     }
@@ -123,7 +122,6 @@ pub(crate) fn locate(subject: &Subject<'_>, place: &Place<'_>, description: Opti
     let path = path
         .filter(|_| position.is_root_file)
         .unwrap_or(position.path);
-    let (row, column) = (position.row, position.column);
     let reference = match linked.and_then(|index| subject.linked().get(index)) {
         Some(linked) => reference_at(subject, linked.referred_at),
         None => including_element(place.node()).or(subject.root().root()),
@@ -134,10 +132,15 @@ pub(crate) fn locate(subject: &Subject<'_>, place: &Place<'_>, description: Opti
     };
     Spot {
         locations: Locations {
-            description: format!("{path}:{row}:{column}: {description}"),
+            description,
+            elsewhere: Some(OtherPlace {
+                path: path.to_owned(),
+                row: position.row.into(),
+                column: position.column.into(),
+                xpath: place.xpath(subject),
+            }),
             places,
         },
-        elsewhere: Some(location_info(path, &position, place.xpath(subject))),
         order,
     }
 }
@@ -186,22 +189,4 @@ fn including_element(node: Option<Node<'_>>) -> Option<Node<'_>> {
     node?
         .ancestors()
         .find(|ancestor| ancestor.position().is_root_file)
-}
-
-fn location_info(path: &str, position: &Position<'_>, xpath: Option<String>) -> DomainInfo {
-    let mut attributes = vec![
-        ("path".to_owned(), path.to_owned()),
-        ("row".to_owned(), position.row.to_string()),
-        ("column".to_owned(), position.column.to_string()),
-    ];
-    attributes.extend(xpath.map(|xpath| ("xpath".to_owned(), xpath)));
-    let element = InfoElement {
-        name: "Location".to_owned(),
-        attributes,
-        ..InfoElement::default()
-    };
-    DomainInfo {
-        name: "qcbus.location".to_owned(),
-        content: vec![element],
-    }
 }

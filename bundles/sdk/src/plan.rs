@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use qcbus_formats::pool::Asked;
+
 use crate::bundle::groups;
 use crate::resource::Resource;
 use crate::seen::Seen;
@@ -115,6 +117,14 @@ impl Plan {
         self.seen.iter().any(Seen::is_outdated)
     }
 
+    /// How many checkers are demanded, and of how many.
+    pub fn asked(&self) -> Asked {
+        Asked {
+            asked: self.entries.iter().filter(|entry| entry.demanded).count(),
+            offered: self.entries.len(),
+        }
+    }
+
     /// Whether the result of the checker with this index is asked for.
     pub fn is_demanded(&self, index: usize) -> bool {
         self.entries.get(index).is_some_and(|entry| entry.demanded)
@@ -149,7 +159,7 @@ fn preconditions(checkers: &[Checker], checker: &Checker) -> Result<Vec<usize>, 
     checker.facts.after.iter().map(index_of).collect()
 }
 
-/// What a demanded checker depends on runs too; its findings are not reported.
+/// What a demanded checker depends on runs too; its findings are reported when they are in the way.
 fn mark_preconditions(entries: &mut [Entry]) {
     let mut open: Vec<usize> = (0..entries.len()).filter(|&i| entries[i].runs).collect();
     while let Some(index) = open.pop() {

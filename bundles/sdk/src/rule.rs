@@ -3,6 +3,7 @@
 use std::any::{Any, TypeId};
 
 use qcbus_document::Document;
+use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::Level;
 
 use crate::{Param, Resource, Sink, Subject};
@@ -21,23 +22,43 @@ pub trait Model: 'static {
     /// Builds the model. It should be lazy: most documents need little of it.
     ///
     /// # Errors
-    /// [`Skip`] when rules about this model cannot say anything about the document.
-    fn build<'d>(subject: &'d Subject<'d>) -> Result<Self::Of<'d>, Skip>;
+    /// [`Unbuilt`] when rules about this model cannot say anything about the document.
+    fn build<'d>(subject: &'d Subject<'d>) -> Result<Self::Of<'d>, Unbuilt>;
 
     /// The parts of a model, in document order.
     fn parts(model: &Self::Of<'_>) -> Vec<Self::Part>;
 }
 
-/// Why checkers do not apply, as a sentence fragment: `the road network could not be loaded`.
+/// Why there is no model, each with a sentence fragment: `the road network could not be loaded`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Skip(pub String);
+pub enum Unbuilt {
+    /// Rules about it do not apply to such a document: that is an answer.
+    NotApplicable(String),
+    /// The document is broken: its rules owe an answer, and the file is not accepted.
+    Broken(String),
+    /// What the model is built with is of no use; the document may be all right.
+    Failed(String),
+}
+
+impl From<Unbuilt> for Ending {
+    fn from(unbuilt: Unbuilt) -> Ending {
+        match unbuilt {
+            Unbuilt::NotApplicable(reason) => Ending::NotApplicable { reason },
+            Unbuilt::Broken(reason) => Ending::Blocked {
+                by: Vec::new(),
+                reason,
+            },
+            Unbuilt::Failed(reason) => Ending::Failed { reason },
+        }
+    }
+}
 
 /// The document itself, for rules that need no more: `Rule<Document>`.
 impl Model for Document<'static> {
     type Of<'d> = Document<'d>;
     type Part = ();
 
-    fn build<'d>(subject: &'d Subject<'d>) -> Result<Document<'d>, Skip> {
+    fn build<'d>(subject: &'d Subject<'d>) -> Result<Document<'d>, Unbuilt> {
         Ok(subject.root())
     }
 
@@ -70,7 +91,8 @@ pub struct Rule<M: Model> {
     pub versions: &'static str,
     /// Whether older documents are looked at, too.
     pub backport: Backport,
-    /// Checkers that must have run without finding an error; else this one is skipped.
+    /// Checkers that must have run without finding an error; else this one cannot look, and the file is not
+    /// accepted.
     pub after: &'static [&'static str],
     /// Parameters that it reads.
     pub params: &'static [Param],
@@ -178,7 +200,7 @@ pub trait AnyRule: Sync {
         &self,
         subject: &'d Subject<'d>,
         hand: &mut dyn FnMut(&dyn Built<'d>),
-    ) -> Result<(), Skip>;
+    ) -> Result<(), Unbuilt>;
     /// The rule, to find out its type.
     #[doc(hidden)]
     fn as_any(&self) -> &dyn Any;
@@ -228,7 +250,7 @@ impl<M: Model> AnyRule for Rule<M> {
         &self,
         subject: &'d Subject<'d>,
         hand: &mut dyn FnMut(&dyn Built<'d>),
-    ) -> Result<(), Skip> {
+    ) -> Result<(), Unbuilt> {
         let whole = &M::build(subject)?;
         let parts = M::parts(whole);
         hand(&Divided::<M> { whole, parts });

@@ -161,7 +161,6 @@ impl<'d> Sink<'d> {
         let worst = suppressed.worst.min(suppressed.last);
         let mut rest = issue(text, worst, first(self.facts.uids));
         rest.locations.push(suppressed.first.locations);
-        rest.domain_info.extend(suppressed.first.elsewhere);
         issues.push(rest);
         let metadata = Metadata {
             key: "qcbus.not_listed".to_owned(),
@@ -200,7 +199,6 @@ impl<'d> Sink<'d> {
         let spot = locate(self.subject, place, None);
         let mut issue = issue(text, level, first(self.facts.uids));
         issue.locations.push(spot.locations);
-        issue.domain_info.extend(spot.elsewhere);
         (spot.order, issue)
     }
 }
@@ -218,16 +216,8 @@ pub struct Finding<'s, 'd> {
 impl Finding<'_, '_> {
     /// Describes the place itself, instead of "element `road`".
     pub fn here(self, description: &str) -> Self {
-        let elsewhere = !self.issue.domain_info.is_empty();
         if let Some(locations) = self.issue.locations.first_mut() {
-            let place = locations
-                .description
-                .rsplit_once(": ")
-                .filter(|_| elsewhere);
-            let prefix = place
-                .map(|(place, _)| format!("{place}: "))
-                .unwrap_or_default();
-            locations.description = format!("{prefix}{description}");
+            description.clone_into(&mut locations.description);
         }
         self
     }
@@ -239,7 +229,6 @@ impl Finding<'_, '_> {
         }
         let spot = locate(self.subject, &place.into(), Some(description.as_ref()));
         self.issue.locations.push(spot.locations);
-        self.issue.domain_info.extend(spot.elsewhere);
         self
     }
 

@@ -99,7 +99,7 @@ async fn talk(host: &mut Host) -> (usize, Status) {
                     assert_eq!(job, JOB);
                     issues += batch.len();
                 }
-                FromPeer::CheckerDone { status: ended, .. } => status = ended,
+                FromPeer::CheckerDone { ending, .. } => status = ending.status(),
                 FromPeer::JobDone { .. } => host.send(peer, &ToPeer::Drain),
                 FromPeer::Leaving => return (issues, status),
                 FromPeer::Heartbeat { .. }

@@ -11,11 +11,11 @@ mod common;
 use std::path::Path;
 
 use qcbus_document::Document;
-use qcbus_formats::pool::CheckerOutcome;
+use qcbus_formats::pool::{CheckerOutcome, Ending};
 use qcbus_formats::xqar::Status;
 use qcbus_sdk::{
-    AnyRule, Backport, Bundle, Checker, Level, Loaded, Model, Param, Plan, Rule, Sink, Skip,
-    Subject, examine, examine_timed,
+    AnyRule, Backport, Bundle, Checker, Level, Loaded, Model, Param, Plan, Rule, Sink, Subject,
+    Unbuilt, examine, examine_timed,
 };
 
 const LIMIT: Param = Param::number("limit", 0.0, "m", "a limit");
@@ -92,8 +92,10 @@ impl Model for Unavailable {
     type Of<'d> = ();
     type Part = ();
 
-    fn build<'d>(_: &'d Subject<'d>) -> Result<(), Skip> {
-        Err(Skip("there is nothing to look at".to_owned()))
+    fn build<'d>(_: &'d Subject<'d>) -> Result<(), Unbuilt> {
+        Err(Unbuilt::NotApplicable(
+            "there is nothing to look at".to_owned(),
+        ))
     }
 
     fn parts((): &()) -> Vec<()> {
@@ -141,14 +143,14 @@ fn of(id: &str) -> CheckerOutcome {
         |checker| checker.id == id,
         |_, name| (name == "limit").then(|| "2.5".to_owned()),
     );
-    assert_eq!(all.len(), 1, "only what is demanded is reported");
-    all.remove(0)
+    let at = all.iter().position(|outcome| outcome.id == id).unwrap();
+    all.remove(at)
 }
 
 #[test]
 fn findings_are_located_and_in_document_order() {
     let outcome = of("finds_errors");
-    assert_eq!(outcome.status, Some(Status::Completed));
+    assert_eq!(outcome.status(), Status::Completed);
     let places: Vec<_> = outcome
         .issues
         .iter()
@@ -180,11 +182,12 @@ fn timings_name_every_demanded_checker_and_sum_up() {
 #[test]
 fn a_panic_is_that_checkers_error_and_keeps_what_was_found() {
     let outcome = of("panics");
-    assert_eq!(
-        (outcome.status, outcome.issues.len()),
-        (Some(Status::Error), 2)
+    assert_eq!((outcome.status(), outcome.issues.len()), (Status::Error, 2));
+    assert!(
+        outcome.reason().contains("on purpose"),
+        "{}",
+        outcome.reason()
     );
-    assert!(outcome.reason.contains("on purpose"), "{}", outcome.reason);
     assert_eq!(
         checked(|_| true, |_, _| None).len(),
         RULES.len() + 1,
@@ -196,10 +199,10 @@ fn a_panic_is_that_checkers_error_and_keeps_what_was_found() {
 fn preconditions_hold_transitively_even_when_not_demanded() {
     let reasons = [of("after_errors"), of("after_skipped")].map(|outcome| {
         assert_eq!(
-            (outcome.status, outcome.issues.len()),
-            (Some(Status::Skipped), 0)
+            (outcome.status(), outcome.issues.len()),
+            (Status::Skipped, 0)
         );
-        outcome.reason
+        outcome.reason().to_owned()
     });
     assert_eq!(
         reasons,
@@ -210,7 +213,7 @@ fn preconditions_hold_transitively_even_when_not_demanded() {
 #[test]
 fn versions_gate_and_backports_lower() {
     assert_eq!(
-        of("newer").reason,
+        of("newer").reason(),
         "the rule applies to OpenDRIVE 1.8 and later; the file is 1.4"
     );
     let lowered = of("lowered");
@@ -221,11 +224,11 @@ fn versions_gate_and_backports_lower() {
             .contains("1.4 does not demand this"),
         "{lowered:?}"
     );
-    assert_eq!(of("separate").status, Some(Status::Skipped));
+    assert_eq!(of("separate").status(), Status::Skipped);
     let backport = of("separate_backport");
     assert_eq!(
-        (backport.status, backport.issues[0].level),
-        (Some(Status::Completed), Level::Warning)
+        (backport.status(), backport.issues[0].level),
+        (Status::Completed, Level::Warning)
     );
 }
 
@@ -233,23 +236,27 @@ fn versions_gate_and_backports_lower() {
 fn parameters_reach_the_rule_and_the_result() {
     let outcome = of("with_param");
     assert_eq!(
-        (outcome.status, outcome.params[0].value.as_str()),
-        (Some(Status::Completed), "2.5")
+        (outcome.status(), outcome.params[0].value.as_str()),
+        (Status::Completed, "2.5")
     );
     let wrong = checked(
         |checker| checker.id == "with_param",
         |_, _| Some("much".to_owned()),
     );
-    assert_eq!(wrong[0].status, Some(Status::Error));
-    assert!(wrong[0].reason.contains("`much`"), "{}", wrong[0].reason);
+    assert_eq!(wrong[0].status(), Status::Error);
+    assert!(
+        wrong[0].reason().contains("`much`"),
+        "{}",
+        wrong[0].reason()
+    );
 }
 
 #[test]
 fn a_model_that_cannot_be_built_skips_its_rules() {
     let outcome = of("on_no_model");
     assert_eq!(
-        (outcome.status, outcome.reason.as_str()),
-        (Some(Status::Skipped), "there is nothing to look at")
+        (outcome.status(), outcome.reason()),
+        (Status::Skipped, "there is nothing to look at")
     );
 }
 
@@ -285,4 +292,26 @@ fn rules_are_found_by_id_uid_and_their_ends() {
     assert_eq!(ids("separate_backport"), ["separate"]);
     assert_eq!(ids("errors"), ["finds_errors", "after_errors"]);
     assert!(ids("nothing").is_empty() && ids("").is_empty());
+}
+
+#[test]
+fn what_is_in_the_way_of_a_demanded_checker_is_told() {
+    let demanded = |id: &'static str| checked(move |checker| checker.id == id, |_, _| None);
+    let ids = |all: &[CheckerOutcome]| all.iter().map(|it| it.id.clone()).collect::<Vec<_>>();
+    let all = demanded("after_skipped");
+    assert_eq!(ids(&all), ["finds_errors", "after_errors", "after_skipped"]);
+    let by = |at: usize| match &all[at].ending {
+        Some(Ending::Blocked { by, .. }) => by.clone(),
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(
+        (by(1), by(2)),
+        (vec!["finds_errors".into()], vec!["after_errors".into()])
+    );
+    assert_eq!(all[0].issues.len(), 2, "the fault itself");
+    assert_eq!(
+        ids(&demanded("newer")),
+        ["newer"],
+        "that it does not apply is an answer"
+    );
 }

@@ -9,7 +9,7 @@ use std::path::Path;
 use qcbus_document::Node;
 use qcbus_formats::xqar::{Issue, Status};
 use qcbus_sdk::{
-    AnyRule, Bundle, Listener, Loaded, Model, Outcome, Plan, Rule, Sink, Skip, Subject, check,
+    AnyRule, Bundle, Listener, Loaded, Model, Outcome, Plan, Rule, Sink, Subject, Unbuilt, check,
 };
 
 /// The roads of a file, each of which is a part.
@@ -19,7 +19,7 @@ impl Model for Roads<'static> {
     type Of<'d> = Roads<'d>;
     type Part = usize;
 
-    fn build<'d>(subject: &'d Subject<'d>) -> Result<Roads<'d>, Skip> {
+    fn build<'d>(subject: &'d Subject<'d>) -> Result<Roads<'d>, Unbuilt> {
         Ok(Roads(subject.root().elements("road").collect()))
     }
 
@@ -141,8 +141,12 @@ fn rules_look_at_a_part_in_turn_and_then_at_the_whole() {
 fn who_panics_at_a_part_is_not_asked_again_and_keeps_what_was_found() {
     let (_, heard) = heard(None);
     let (_, issues, outcome) = &heard.ended[1];
-    assert_eq!(outcome.status, Status::Error);
-    assert!(outcome.reason.contains("on purpose"), "{}", outcome.reason);
+    assert_eq!(outcome.ending.status(), Status::Error);
+    assert!(
+        outcome.ending.reason().contains("on purpose"),
+        "{}",
+        outcome.ending.reason()
+    );
     assert_eq!(texts(issues), ["road 0", "road 1"]);
 }
 
@@ -153,9 +157,9 @@ fn preconditions_end_before_what_depends_on_them_begins() {
         let mut all = heard.ended.iter();
         all.find(|(checker, ..)| *checker == wanted).unwrap()
     };
-    assert_eq!(of(4).2.status, Status::Skipped);
-    assert_eq!(of(4).2.reason, "`finds` found errors");
-    assert_eq!(of(3).2.status, Status::Completed);
+    assert_eq!(of(4).2.ending.status(), Status::Skipped);
+    assert_eq!(of(4).2.ending.reason(), "`finds` found errors");
+    assert_eq!(of(3).2.ending.status(), Status::Completed);
     assert_eq!(of(3).1.len(), 3);
 }
 

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Model, Skip, Subject};
+use qcbus_sdk::{Model, Subject, Unbuilt};
 
 /// Some roads by their places, for [`RoadMap::part`].
 pub type Part = Range<usize>;
@@ -15,7 +15,7 @@ impl Model for Roads {
     type Of<'d> = RoadMap<'d>;
     type Part = Part;
 
-    fn build<'d>(subject: &'d Subject<'d>) -> Result<RoadMap<'d>, Skip> {
+    fn build<'d>(subject: &'d Subject<'d>) -> Result<RoadMap<'d>, Unbuilt> {
         Ok(RoadMap::new(subject.root()))
     }
 

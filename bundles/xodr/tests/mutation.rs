@@ -90,7 +90,7 @@ impl Listener for Heard<'_> {
     fn ended(&mut self, checker: usize, issues: Vec<Issue>, outcome: Outcome) {
         // A backport is the same rule on older files.
         let rule = name(self.plan.checkers()[checker].facts.id);
-        if outcome.status == Status::Completed {
+        if outcome.ending.status() == Status::Completed {
             self.verdict.completed.insert(rule);
         }
         if !issues.is_empty() {

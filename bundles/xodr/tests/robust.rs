@@ -24,8 +24,8 @@ struct Broken(Vec<(usize, String)>);
 
 impl Listener for Broken {
     fn ended(&mut self, checker: usize, _: Vec<qcbus_sdk::Issue>, outcome: Outcome) {
-        if outcome.status == qcbus_sdk::Status::Error {
-            self.0.push((checker, outcome.reason));
+        if outcome.ending.status() == qcbus_sdk::Status::Error {
+            self.0.push((checker, outcome.ending.reason().to_owned()));
         }
     }
 }

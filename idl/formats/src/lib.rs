@@ -9,9 +9,12 @@ pub mod distance;
 pub mod location;
 pub mod manifest;
 pub mod pool;
+pub mod verdict;
 pub mod xqar;
 
 mod xml;
+
+pub use verdict::Verdict;
 
 #[doc(hidden)]
 pub mod fuzzing;

@@ -1,16 +1,21 @@
 //! Places in other files than the checked one: an include, a catalog, a map, a library scenario.
 //!
-//! A result file speaks of one file only. So an issue about another one says the place at the
-//! start of its `Locations` description, `PATH:ROW:COLUMN: text`, and carries it in a
-//! `DomainSpecificInfo` named [`NAME`]; its `FileLocation` is the reference in the checked file.
+//! Everywhere in qcbus such a place is [`Locations::elsewhere`]. Only a result file, which speaks of one
+//! file, has no element for it: there an issue says the place at the start of its `Locations`
+//! description, `PATH:ROW:COLUMN: text`, and carries it in a `DomainSpecificInfo` named [`NAME`]; its
+//! `FileLocation` is the reference in the checked file. The reader turns both back.
 
-use crate::xqar::{DomainInfo, InfoElement, Issue};
+use std::borrow::Cow;
+
+use serde::{Deserialize, Serialize};
+
+use crate::xqar::{DomainInfo, InfoElement, Issue, Locations};
 
 /// Name of the `DomainSpecificInfo`.
 pub const NAME: &str = "qcbus.location";
 
 /// A place in another file.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct OtherPlace {
     /// Path of the file.
     pub path: String,
@@ -35,26 +40,17 @@ impl OtherPlace {
         }
     }
 
-    /// The place at the start of a `Locations` description, and the text behind it.
-    pub fn from_description(description: &str) -> Option<(OtherPlace, &str)> {
-        for (at, _) in description.match_indices(':') {
-            let (path, rest) = (&description[..at], &description[at + 1..]);
-            if let Some((row, column, text)) = numbers(rest).filter(|_| !path.is_empty()) {
-                return Some((
-                    OtherPlace {
-                        path: path.to_owned(),
-                        row,
-                        column,
-                        xpath: None,
-                    },
-                    text,
-                ));
-            }
+    /// The text behind this place at the start of a description; `None` when it is not there.
+    fn behind<'t>(&self, description: &'t str) -> Option<&'t str> {
+        let rest = description.strip_prefix(&self.describe(""))?;
+        if rest.is_empty() {
+            Some(rest)
+        } else {
+            rest.strip_prefix(": ")
         }
-        None
     }
 
-    /// The place for an issue's `domain_info`.
+    /// The place as a result file carries it.
     pub fn to_info(&self) -> DomainInfo {
         let mut attributes = vec![
             (String::from("path"), self.path.clone()),
@@ -77,26 +73,47 @@ impl OtherPlace {
         }
     }
 
-    /// The places that a `DomainSpecificInfo` holds; none when it is about something else.
-    pub fn from_info(info: &DomainInfo) -> Vec<OtherPlace> {
-        if info.name != NAME {
-            return Vec::new();
-        }
-        info.content
-            .iter()
-            .filter(|e| e.name == "Location")
-            .filter_map(from_element)
-            .collect()
+    /// The place that a `DomainSpecificInfo` holds, when it holds one and nothing else.
+    pub fn from_info(info: &DomainInfo) -> Option<OtherPlace> {
+        let place = from_element(info.content.first()?)?;
+        (place.to_info() == *info).then_some(place)
     }
+}
 
-    /// The places in other files that an issue carries, in order.
-    pub fn of_issue(issue: &Issue) -> Vec<OtherPlace> {
-        issue
-            .domain_info
-            .iter()
-            .flat_map(OtherPlace::from_info)
-            .collect()
+impl Locations {
+    /// The description as a result file has it: with the place when it is in another file.
+    pub fn written(&self) -> Cow<'_, str> {
+        match &self.elsewhere {
+            Some(place) => Cow::Owned(place.describe(&self.description)),
+            None => Cow::Borrowed(&self.description),
+        }
     }
+}
+
+impl Issue {
+    /// The facts as a result file has them: with the places in other files, which come first.
+    pub fn written_info(&self) -> impl Iterator<Item = Cow<'_, DomainInfo>> {
+        let places = self.locations.iter().filter_map(|it| it.elsewhere.as_ref());
+        let places = places.map(|place| Cow::Owned(place.to_info()));
+        places.chain(self.domain_info.iter().map(Cow::Borrowed))
+    }
+}
+
+/// Turns a fact of a result file back into a place; `false` when it is another fact, or about no
+/// place that is described.
+pub(crate) fn turn_back(info: &DomainInfo, locations: &mut [Locations]) -> bool {
+    let Some(place) = OtherPlace::from_info(info) else {
+        return false;
+    };
+    let here = locations.iter_mut().filter(|it| it.elsewhere.is_none());
+    for locations in here {
+        if let Some(text) = place.behind(&locations.description) {
+            locations.description = text.to_owned();
+            locations.elsewhere = Some(place);
+            return true;
+        }
+    }
+    false
 }
 
 fn from_element(element: &InfoElement) -> Option<OtherPlace> {
@@ -115,30 +132,6 @@ fn from_element(element: &InfoElement) -> Option<OtherPlace> {
     })
 }
 
-/// `ROW:COLUMN`, at the end or before `: ` and a text.
-fn numbers(text: &str) -> Option<(u64, u64, &str)> {
-    let (row, rest) = text.split_once(':')?;
-    let end = rest
-        .find(|c: char| !c.is_ascii_digit())
-        .unwrap_or(rest.len());
-    let behind = &rest[end..];
-    let text = if behind.is_empty() {
-        behind
-    } else {
-        behind.strip_prefix(": ")?
-    };
-    Some((whole(row)?, whole(&rest[..end])?, text))
-}
-
-/// Digits only: `parse` would also take a sign.
-fn whole(text: &str) -> Option<u64> {
-    if text.bytes().all(|byte| byte.is_ascii_digit()) {
-        text.parse().ok()
-    } else {
-        None
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -152,48 +145,50 @@ mod tests {
         }
     }
 
+    fn described(description: &str) -> Locations {
+        Locations {
+            description: description.to_owned(),
+            ..Locations::default()
+        }
+    }
+
     #[test]
-    fn a_description_reads_back() {
-        let description = place().describe("road 5: no lanes at 3:4");
-        assert_eq!(
-            description,
-            "/maps/C:odd/town 1.xodr:12:7: road 5: no lanes at 3:4"
-        );
-        let (read, text) = OtherPlace::from_description(&description).unwrap();
-        assert_eq!(
-            (read.row, read.column, text),
-            (12, 7, "road 5: no lanes at 3:4")
-        );
-        assert_eq!(read.path, place().path);
-        let bare = place().describe("");
-        assert_eq!(
-            OtherPlace::from_description(&bare).map(|(_, text)| text),
-            Some("")
-        );
+    fn what_is_written_is_turned_back() {
+        let told = Locations {
+            elsewhere: Some(place()),
+            ..described("road 5: no lanes at 3:4")
+        };
+        let written = "/maps/C:odd/town 1.xodr:12:7: road 5: no lanes at 3:4";
+        assert_eq!(told.written(), written);
+        let mut read = [described("here"), described(written)];
+        assert!(turn_back(&place().to_info(), &mut read));
+        assert_eq!(read, [described("here"), told]);
+        let mut bare = [described(&place().describe(""))];
+        assert!(turn_back(&place().to_info(), &mut bare));
+        assert_eq!(bare[0].description, "");
     }
 
     #[test]
     fn other_descriptions_are_no_places() {
+        let path = place().path;
         for text in [
             "",
             "the lane ends here",
-            "a:b:c",
-            ":1:2",
-            "x:1:2x",
-            "x:+1:2",
-            "ratio 1:2",
+            &format!("{path}:12:71: x"),
+            &format!("{path}:12:7x"),
         ] {
-            assert_eq!(OtherPlace::from_description(text), None, "{text}");
+            let mut read = [described(text)];
+            assert!(!turn_back(&place().to_info(), &mut read), "{text}");
         }
     }
 
     #[test]
     fn a_domain_specific_info_reads_back() {
-        assert_eq!(OtherPlace::from_info(&place().to_info()), [place()]);
+        assert_eq!(OtherPlace::from_info(&place().to_info()), Some(place()));
         let other = DomainInfo {
             name: String::from("else"),
             ..place().to_info()
         };
-        assert_eq!(OtherPlace::from_info(&other), []);
+        assert_eq!(OtherPlace::from_info(&other), None);
     }
 }

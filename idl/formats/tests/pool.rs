@@ -8,10 +8,11 @@
 mod common;
 
 use common::{UID, bundle, checker, input, issue, param, xml_place};
+use qcbus_formats::Verdict;
 use qcbus_formats::config::Config;
 use qcbus_formats::pool::{
-    BundleOutcome, Counts, NoPlaces, PoolInput, Pooled, Remark, Scope, XPathPlace, is_rule_uid,
-    pool,
+    Asked, BundleOutcome, Counts, Ending, NoPlaces, NotAsked, PoolInput, Pooled, Remark, Scope,
+    XPathPlace, is_rule_uid, pool,
 };
 use qcbus_formats::xqar::{Dialect, Issue, Level, Location, Results, Status, read, write};
 
@@ -98,7 +99,10 @@ fn without_a_configuration_everything_stays_as_given() {
             information: 1
         }
     );
-    assert_eq!((pooled.removed, pooled.failed), (Counts::default(), vec![]));
+    assert_eq!(
+        (pooled.removed, pooled.unfinished),
+        (Counts::default(), vec![])
+    );
 }
 
 #[test]
@@ -139,9 +143,8 @@ fn a_configuration_orders_filters_relevels_and_misses() {
         }
     );
     let failed: Vec<String> = pooled
-        .failed
-        .iter()
-        .map(|f| format!("{} {}: {}", f.bundle, f.checker, f.reason))
+        .open()
+        .map(|f| format!("{} {}: {}", f.bundle, f.checker, f.ending.reason()))
         .collect();
     insta::assert_snapshot!(failed.join("\n"));
     let params = &pooled.results.bundles[2].params;
@@ -197,16 +200,17 @@ fn a_bundle_by_itself_minds_its_own_business() {
     let pooled = pooled(alone);
     assert_eq!(pooled.results.bundles.len(), 1);
     assert_eq!(pooled.counts.total(), 3);
-    assert_eq!(pooled.failed, []);
+    assert_eq!(pooled.unfinished, []);
 }
 
 #[test]
 fn checkers_that_break_their_word_are_in_error() {
     let mut silent = checker("silent", vec![issue(Level::Warning, "kept")]);
-    silent.status = None;
-    silent.reason = "killed by signal 9".into();
+    silent.ending = None;
     let mut liar = checker("liar", vec![issue(Level::Warning, "kept as well")]);
-    liar.status = Some(Status::Skipped);
+    liar.ending = Some(Ending::NotApplicable {
+        reason: "OpenDRIVE 1.4".into(),
+    });
     let mut odd = checker("odd", vec![issue(Level::Error, "no rule")]);
     odd.issues[0].rule_uid = "my rule".into();
     odd.rule_uids.push("also wrong".into());
@@ -216,7 +220,7 @@ fn checkers_that_break_their_word_are_in_error() {
     bundles.push(bundle("b", "b", vec![]));
     let pooled = pooled(input(bundles));
     insta::assert_snapshot!(outline(&pooled.results));
-    assert_eq!(pooled.failed.len(), 2);
+    assert_eq!(pooled.open().count(), 2);
     assert_eq!(
         pooled.results.bundles[0].checkers[2].metadata[0].value,
         "also wrong"
@@ -231,7 +235,8 @@ fn remarks_are_never_filtered() {
     let remark = Remark {
         checker: "qcbus_limits".into(),
         description: "Texts keep within their limits.".into(),
-        issue: text,
+        issue: Some(text),
+        open: None,
     };
     let pooled = pooled(PoolInput {
         config: Some(&config),
@@ -302,4 +307,119 @@ fn the_same_input_gives_the_same_bytes() {
         write(&pooled(input).results, Dialect::Current)
     };
     assert_eq!(once(), once());
+}
+
+fn blocked(by: &[&str]) -> Option<Ending> {
+    Some(Ending::Blocked {
+        by: by.iter().map(|&id| id.into()).collect(),
+        reason: format!("`{}` found errors", by.join("`, `")),
+    })
+}
+
+const ONLY_LANES: &str = "<Config><CheckerBundle application='xodr'><Checker checkerId='lanes'/></CheckerBundle></Config>";
+
+/// `lanes` rests on `ids`, which rests on `xml`; `signs` is nobody's business.
+fn resting(xml: Vec<Issue>) -> Vec<BundleOutcome> {
+    let [mut lanes, mut ids] = ["lanes", "ids"].map(|id| checker(id, Vec::new()));
+    lanes.ending = blocked(&["ids"]);
+    ids.ending = blocked(&["xml"]);
+    let signs = checker("signs", vec![issue(Level::Error, "not asked")]);
+    vec![bundle(
+        "xodrBundle",
+        "xodr",
+        vec![checker("xml", xml), ids, lanes, signs],
+    )]
+}
+
+#[test]
+fn what_kept_a_demanded_checker_from_looking_is_told_whoever_demanded_it() {
+    let config = config(ONLY_LANES);
+    let input = PoolInput {
+        config: Some(&config),
+        ..input(resting(vec![issue(Level::Error, "not well-formed")]))
+    };
+    let pooled = pooled(input);
+    insta::assert_snapshot!(outline(&pooled.results));
+    assert_eq!(pooled.verdict(), Verdict::Rejected);
+    assert_eq!(pooled.removed.errors, 1, "what stands in nobody's way");
+}
+
+#[test]
+fn a_demanded_checker_that_could_not_look_is_no_acceptance() {
+    let config = config(ONLY_LANES);
+    let input = PoolInput {
+        config: Some(&config),
+        ..input(resting(Vec::new()))
+    };
+    let pooled = pooled(input);
+    assert_eq!(pooled.verdict(), Verdict::Undetermined);
+    let open: Vec<String> = pooled.open().map(ToString::to_string).collect();
+    assert_eq!(
+        open,
+        [
+            "xodrBundle / lanes: `ids` found errors",
+            "xodrBundle / ids: `xml` found errors"
+        ]
+    );
+    let text = write(&pooled.results, Dialect::Current);
+    let read = read(text.as_bytes()).unwrap();
+    assert_eq!(Verdict::of(&read), Verdict::Undetermined, "{text}");
+}
+
+#[test]
+fn what_a_remark_leaves_open_keeps_the_verdict() {
+    let remark = |open: &str| Remark {
+        checker: "qcbus_bundles".into(),
+        description: "Somebody checks the file.".into(),
+        issue: None,
+        open: Some(open.into()),
+    };
+    let pooled = pooled(PoolInput {
+        remarks: vec![remark("nobody came"), remark("nor went")],
+        ..input(Vec::new())
+    });
+    assert_eq!(pooled.verdict(), Verdict::Undetermined);
+    assert_eq!(
+        pooled.unfinished[0].ending.reason(),
+        "nobody came (and 1 more)"
+    );
+}
+
+#[test]
+fn how_little_was_asked_stands_in_the_result() {
+    let mut bundles = two_bundles();
+    bundles[0].asked = Some(Asked {
+        asked: 2,
+        offered: 252,
+    });
+    bundles[1].asked = Some(Asked {
+        asked: 1,
+        offered: 1,
+    });
+    let pooled = pooled(input(bundles));
+    let said: Vec<String> = NotAsked::of(&pooled.results)
+        .iter()
+        .map(ToString::to_string)
+        .collect();
+    assert_eq!(said, ["250 of the 252 checkers of xodrBundle"]);
+}
+
+#[test]
+fn a_bundle_that_was_never_seen_owes_every_answer() {
+    let never = || {
+        let mut bundle = bundle("mine", "", Vec::new());
+        bundle.absent = Some("mine cannot be started: no such file".into());
+        bundle
+    };
+    let free = pooled(input(vec![never()]));
+    assert_eq!(free.verdict(), Verdict::Undetermined);
+    let config = config(
+        "<Config><CheckerBundle application='mine'><Checker checkerId='a'/></CheckerBundle></Config>",
+    );
+    let configured = pooled(PoolInput {
+        config: Some(&config),
+        ..input(vec![never()])
+    });
+    let open: Vec<String> = configured.open().map(ToString::to_string).collect();
+    assert_eq!(open, ["mine / a: mine cannot be started: no such file"]);
 }

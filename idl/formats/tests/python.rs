@@ -90,7 +90,7 @@ fn results() -> Vec<Results> {
         qcbus_formats::xqar::Locations::default(),
     ];
     let mut silent = checker("c", vec![odd, issue(Level::Information, "removed")]);
-    silent.status = None;
+    silent.ending = None;
     let input = PoolInput {
         config: Some(&config),
         ..input(vec![bundle("b", "b", vec![silent])])

@@ -3,6 +3,7 @@
 use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
+use qcbus_formats::location::OtherPlace;
 use qcbus_formats::xqar::{
     Checker, CheckerBundle, Dialect, DomainInfo, InfoElement, Issue, Level, Location, Locations,
     Metadata, Param, Results, Status, read, write,
@@ -73,19 +74,37 @@ fn road() -> impl Strategy<Value = Location> {
     (text(), number(), number()).prop_map(|(road_id, s, t)| Location::Road { road_id, s, t })
 }
 
+fn elsewhere() -> impl Strategy<Value = OtherPlace> {
+    let path = "/[a-zA-Z0-9:. ]{0,12}";
+    (path, 1..1000_u64, 1..1000_u64, option::of("/[a-z]{1,5}")).prop_map(
+        |(path, row, column, xpath)| OtherPlace {
+            path,
+            row,
+            column,
+            xpath,
+        },
+    )
+}
+
 /// Places as this project writes them: road positions last, places of nothing else at the end.
 fn locations() -> impl Strategy<Value = Vec<Locations>> {
-    let mixed = (text(), vec(location(), 1..4), vec(road(), 0..3)).prop_map(
-        |(description, mut places, roads)| {
+    let mixed = (
+        text(),
+        option::of(elsewhere()),
+        vec(location(), 1..4),
+        vec(road(), 0..3),
+    )
+        .prop_map(|(description, elsewhere, mut places, roads)| {
             places.extend(roads);
             Locations {
                 description,
+                elsewhere,
                 places,
             }
-        },
-    );
+        });
     let roads = (text(), vec(road(), 1..3)).prop_map(|(description, places)| Locations {
         description,
+        elsewhere: None,
         places,
     });
     (vec(mixed, 0..3), vec(roads, 0..3)).prop_map(|(mut mixed, roads)| {
@@ -251,7 +270,7 @@ proptest! {
             description: texts[1].clone(),
             level: Level::Error,
             rule_uid: texts[2].clone(),
-            locations: vec![Locations { description: texts[3].clone(), places: Vec::new() }],
+            locations: vec![Locations { description: texts[3].clone(), ..Locations::default() }],
             domain_info: vec![info],
         };
         let checker = Checker { id: texts[3].clone(), issues: vec![issue], ..Checker::default() };

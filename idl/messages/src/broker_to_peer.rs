@@ -6,7 +6,7 @@ use qcbus_document::FileKind;
 use qcbus_formats::xqar::{Param, Results};
 use serde::{Deserialize, Serialize};
 
-use crate::{Digest, DocId, DocumentRole, JobId, Verdict};
+use crate::{Digest, DocId, DocumentRole, JobId, MissingDocument, Verdict};
 
 /// Broker → bundle or reporter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -65,21 +65,6 @@ pub struct JobDocument {
     /// Digest of the bytes on disk; for an image of several files, see the image's sources.
     pub digest: Digest,
     /// Byte offset of the referring element in the root's image; 0 for the root.
-    pub referred_at: u32,
-}
-
-/// A file that the root refers to and that could not be had.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct MissingDocument {
-    /// What it would have been.
-    pub role: DocumentRole,
-    /// The reference as written.
-    pub reference: String,
-    /// Where it was looked for.
-    pub path: String,
-    /// Why it could not be had, for a person.
-    pub why: String,
-    /// Byte offset of the referring element in the root's image.
     pub referred_at: u32,
 }
 

@@ -9,23 +9,22 @@ pub mod codec;
 pub mod control;
 mod exit;
 pub mod ids;
+pub mod missing;
 pub mod path_text;
 pub mod peer_to_broker;
 pub mod services;
-pub mod verdict;
 
 /// Day of the build, `YYYY-MM-DD`: that of the commit, so that two builds of one source give the
 /// same results. See `build.rs`.
 pub const BUILD_DATE: &str = env!("QCBUS_BUILD_DATE");
 
-pub use broker_to_peer::{
-    Job, JobDocument, MissingDocument, PeerReport, ResultMessage, ToPeer, Withdrawn,
-};
+pub use broker_to_peer::{Job, JobDocument, PeerReport, ResultMessage, ToPeer, Withdrawn};
 pub use catalogue::{Catalogue, CheckerInfo, Hello, ParamInfo, Role};
 pub use exit::Exit;
 pub use ids::{Digest, DocId, DocumentRole, JobId, PROTOCOL_VERSION};
+pub use missing::{Absence, MissingDocument};
 pub use peer_to_broker::FromPeer;
-pub use verdict::Verdict;
+pub use qcbus_formats::Verdict;
 
 #[cfg(test)]
 #[expect(dead_code, reason = "the rest of it runs when this is built")]

@@ -1,6 +1,7 @@
 //! What a bundle or reporter says to the broker.
 
-use qcbus_formats::xqar::{Issue, Metadata, Param, Status};
+use qcbus_formats::pool::Ending;
+use qcbus_formats::xqar::{Issue, Metadata, Param};
 use serde::{Deserialize, Serialize};
 
 use crate::{Catalogue, DocId, JobId, PeerReport};
@@ -24,16 +25,14 @@ pub enum FromPeer {
         /// The findings, ids still 0.
         issues: Vec<Issue>,
     },
-    /// One checker has ended.
+    /// One checker has ended: a demanded one, or one besides that kept it from looking.
     CheckerDone {
         /// The job.
         job: JobId,
         /// Index into the catalogue.
         checker: u32,
         /// How.
-        status: Status,
-        /// Why it was skipped or failed; empty when completed.
-        reason: String,
+        ending: Ending,
         /// The parameters that it used.
         params: Vec<Param>,
         /// Further facts.

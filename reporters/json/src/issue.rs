@@ -1,5 +1,7 @@
 //! One issue.
 
+use std::borrow::Cow;
+
 use qcbus_formats::xqar::{Issue, Location};
 use qcbus_reporter_sdk::{Place, places};
 use serde::Serialize;
@@ -32,7 +34,7 @@ struct LocationsJson<'r> {
 
 #[derive(Serialize)]
 struct Described<'r, T> {
-    description: &'r str,
+    description: Cow<'r, str>,
     #[serde(flatten)]
     location: T,
 }
@@ -119,7 +121,7 @@ pub(crate) fn issue<'r>(issue: &'r Issue, input: &str) -> IssueJson<'r> {
         description: &issue.description,
         rule_uid: &issue.rule_uid,
         locations: locations(issue),
-        domain_specific_info: issue.domain_info.iter().map(xml::text).collect(),
+        domain_specific_info: issue.written_info().map(|info| xml::text(&info)).collect(),
         places: places(issue)
             .into_iter()
             .map(|each| place(each, input))
@@ -131,14 +133,14 @@ fn locations(issue: &Issue) -> LocationsJson<'_> {
     let mut lists = LocationsJson::default();
     for group in &issue.locations {
         for location in &group.places {
-            lists.add(&group.description, location);
+            lists.add(group.written(), location);
         }
     }
     lists
 }
 
 impl<'r> LocationsJson<'r> {
-    fn add(&mut self, description: &'r str, location: &'r Location) {
+    fn add(&mut self, description: Cow<'r, str>, location: &'r Location) {
         match location {
             &Location::File {
                 row,

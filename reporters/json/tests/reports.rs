@@ -55,14 +55,16 @@ fn issue() -> Issue {
         locations: vec![
             Locations {
                 description: "the second one".into(),
+                elsewhere: None,
                 places: here,
             },
             Locations {
-                description: elsewhere.describe("the first one"),
+                description: "the first one".into(),
+                elsewhere: Some(elsewhere),
                 places: vec![reference],
             },
         ],
-        domain_info: vec![elsewhere.to_info()],
+        domain_info: Vec::new(),
     }
 }
 

@@ -22,7 +22,7 @@ mod sources;
 
 pub use clean::{one_line, printable};
 pub use daemon::{Identity, RunError, run};
-pub use loaded::{LoadError, load, verdict_of};
+pub use loaded::{LoadError, load};
 pub use once::{OnceError, OneShot, report_once};
 pub use outlet::{Outlet, Subject};
 pub use output::{Output, param, replace_file};

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use qcbus_formats::xqar::{self, Level, Results, Status};
+use qcbus_formats::xqar::{self, Results};
 use qcbus_messages::path_text::{from_text, to_text};
 use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
 
@@ -49,7 +49,7 @@ pub fn load(path: &Path) -> Result<ResultMessage, LoadError> {
         display_path: displayed(&input),
         input,
         xqar: to_text(&absolute),
-        verdict: verdict_of(&results),
+        verdict: Verdict::of(&results),
         digest: Digest::default(),
         config: Digest::default(),
         document: None,
@@ -57,21 +57,6 @@ pub fn load(path: &Path) -> Result<ResultMessage, LoadError> {
         rules: BTreeMap::new(),
         params: Vec::new(),
     })
-}
-
-/// The verdict that a pooled result stands for: rejected by an error, undetermined by a checker
-/// that should have run and did not. A checker without status, as other tools write it, is taken
-/// at its issues.
-pub fn verdict_of(results: &Results) -> Verdict {
-    let mut checkers = results.bundles.iter().flat_map(|bundle| &bundle.checkers);
-    let mut issues = checkers.clone().flat_map(|checker| &checker.issues);
-    if issues.any(|issue| issue.level == Level::Error) {
-        Verdict::Rejected
-    } else if checkers.any(|checker| checker.status == Some(Status::Error)) {
-        Verdict::Undetermined
-    } else {
-        Verdict::Accepted
-    }
 }
 
 /// The checked file: the first bundle's `InputFile` (or its older names). A relative one is meant
@@ -105,47 +90,7 @@ fn displayed(input: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use qcbus_formats::xqar::{Checker, CheckerBundle, Issue};
-
     use super::*;
-
-    fn results(status: Option<Status>, level: Option<Level>) -> Results {
-        let issue = |level| Issue {
-            id: 0,
-            description: String::new(),
-            level,
-            rule_uid: String::new(),
-            locations: Vec::new(),
-            domain_info: Vec::new(),
-        };
-        let checker = Checker {
-            status,
-            issues: level.map(issue).into_iter().collect(),
-            ..Checker::default()
-        };
-        let bundle = CheckerBundle {
-            checkers: vec![checker],
-            ..CheckerBundle::default()
-        };
-        Results {
-            version: "1.0.0".into(),
-            bundles: vec![bundle],
-        }
-    }
-
-    #[test]
-    fn the_verdict_follows_from_issues_and_statuses() {
-        let of = |status, level| verdict_of(&results(status, level));
-        assert_eq!(of(Some(Status::Completed), None), Verdict::Accepted);
-        assert_eq!(of(Some(Status::Skipped), None), Verdict::Accepted);
-        assert_eq!(of(None, None), Verdict::Accepted);
-        assert_eq!(of(Some(Status::Error), None), Verdict::Undetermined);
-        assert_eq!(of(None, Some(Level::Warning)), Verdict::Accepted);
-        assert_eq!(
-            of(Some(Status::Error), Some(Level::Error)),
-            Verdict::Rejected
-        );
-    }
 
     #[test]
     fn what_is_no_result_says_which_file_and_why() {

@@ -34,23 +34,15 @@ pub struct Place {
 
 /// The places of an issue in their order; the first is the main one.
 pub fn places(issue: &Issue) -> Vec<Place> {
-    let elsewhere = OtherPlace::of_issue(issue);
-    if let ([], [place]) = (issue.locations.as_slice(), elsewhere.as_slice()) {
-        return vec![moved(place, Place::default(), "")];
+    // Another tool may say the other file and nothing else.
+    if let ([], [info]) = (issue.locations.as_slice(), issue.domain_info.as_slice())
+        && let Some(place) = OtherPlace::from_info(info)
+    {
+        return vec![moved(&place, Place::default())];
     }
-    let place_of = |locations: &Locations| {
-        let gathered = gather(locations);
-        let Some((named, text)) = OtherPlace::from_description(&locations.description) else {
-            return gathered;
-        };
-        // Only what the issue also carries as a place is one; a text may look like it by chance.
-        let same = |other: &&OtherPlace| {
-            (&other.path, other.row, other.column) == (&named.path, named.row, named.column)
-        };
-        match elsewhere.iter().find(same) {
-            Some(other) => moved(other, gathered, text),
-            None => gathered,
-        }
+    let place_of = |locations: &Locations| match &locations.elsewhere {
+        Some(other) => moved(other, gather(locations)),
+        None => gather(locations),
     };
     issue.locations.iter().map(place_of).collect()
 }
@@ -105,12 +97,11 @@ fn gather_one(place: &mut Place, location: &Location) {
 }
 
 /// What was gathered is the reference in the checked file; the place itself is in the other file.
-fn moved(other: &OtherPlace, gathered: Place, description: &str) -> Place {
+fn moved(other: &OtherPlace, gathered: Place) -> Place {
     let referred_at = gathered
         .row
         .map(|row| (row, gathered.column.unwrap_or_default()));
     Place {
-        description: description.trim().to_owned(),
         referred_at,
         offset: None,
         path: Some(other.path.clone()),
@@ -146,6 +137,7 @@ mod tests {
     fn at(description: &str, row: u64, column: u64) -> Locations {
         Locations {
             description: description.into(),
+            elsewhere: None,
             places: vec![
                 Location::File {
                     row,
@@ -168,25 +160,17 @@ mod tests {
 
     #[test]
     fn a_place_in_another_file_keeps_where_it_is_referred_to() {
-        let found = places(&issue(
-            vec![at("here", 3, 4), at("/m/t.xodr:12:5: the road", 7, 9)],
-            vec![elsewhere("/m/t.xodr", 12, 5).to_info()],
-        ));
+        let other = Locations {
+            elsewhere: Some(elsewhere("/m/t.xodr", 12, 5)),
+            ..at("the road", 7, 9)
+        };
+        let found = places(&issue(vec![at("here", 3, 4), other], Vec::new()));
         assert_eq!(found[0].path, None);
         assert_eq!(found[1].path.as_deref(), Some("/m/t.xodr"));
         assert_eq!((found[1].row, found[1].column), (Some(12), Some(5)));
         assert_eq!(found[1].xpath.as_deref(), Some("/map/road[2]"));
         assert_eq!(found[1].referred_at, Some((7, 9)));
         assert_eq!(found[1].description, "the road");
-    }
-
-    #[test]
-    fn a_longer_number_is_another_place() {
-        let found = places(&issue(
-            vec![at("/m/t.xodr:12:51: x", 7, 9), at("y", 1, 1)],
-            vec![elsewhere("/m/t.xodr", 12, 5).to_info()],
-        ));
-        assert_eq!(found[0].path, None);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use qcbus_formats::pool::NotAsked;
 use qcbus_formats::xqar::{Level, Status};
 use qcbus_messages::{Digest, ResultMessage};
 use qcbus_reporter_sdk::{one_line, printable};
@@ -19,6 +20,11 @@ pub(crate) fn write(out: &mut String, result: &ResultMessage, paint: Paint, opti
     let _ = writeln!(out, "  checkers: {}", checkers(result));
     for group in groups(result) {
         group.write(out, options);
+    }
+    let not_asked = NotAsked::of(&result.results);
+    if !not_asked.is_empty() {
+        let not_asked: Vec<String> = not_asked.iter().map(ToString::to_string).collect();
+        let _ = writeln!(out, "  not asked: {}", printable(&not_asked.join(", ")));
     }
     if result.digest != Digest::default() {
         let _ = writeln!(out, "  sha256: {}", result.digest);

@@ -54,6 +54,7 @@ fn at(row: u64, column: u64, xpath: &str, description: &str) -> Locations {
     };
     Locations {
         description: description.into(),
+        elsewhere: None,
         places: vec![file, xml],
     }
 }
@@ -187,7 +188,7 @@ fn a_place_in_another_file_is_shown_there() {
             4,
             5,
             "/OpenSCENARIO/RoadNetwork/LogicFile",
-            "/farm/maps/harbour.xodr:4:2: the second one",
+            "the second one",
         )],
     );
     let place = OtherPlace {
@@ -196,7 +197,7 @@ fn a_place_in_another_file_is_shown_there() {
         column: 2,
         xpath: Some("/OpenDRIVE/road[2]".into()),
     };
-    found.domain_info.push(place.to_info());
+    found.locations[0].elsewhere = Some(place);
     let checkers = vec![checker("check_map", Status::Completed, "", vec![found])];
     insta::assert_snapshot!(text(&result("lane.xosc", Verdict::Rejected, checkers)));
 }

@@ -8,9 +8,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use qcbus_bus::{Documents, Held, Loan, LoanError};
 use qcbus_document::{Document, FileKind};
-use qcbus_ingest::{BuildError, IngestError, Limits, Prepared, Reference, Role};
+use qcbus_ingest::{BuildError, IngestError, Limits, Look, Prepared, Source};
 use qcbus_messages::path_text::to_text;
-use qcbus_messages::{Digest, DocId, DocumentRole, JobDocument, JobId, MissingDocument};
+use qcbus_messages::{Absence, Digest, DocId, DocumentRole, JobDocument, JobId, MissingDocument};
 use sha2::{Digest as _, Sha256};
 
 use crate::core::{Input, PrepareFailure, PreparedJob, Stamp};
@@ -88,9 +88,9 @@ impl Intake {
     pub fn prepare(&self, job: JobId, path: &Path) -> Result<Box<PreparedJob>, PrepareFailure> {
         let root = self
             .publish_fresh(path)
-            .map_err(|failure| self.explain(failure, path))?;
+            .map_err(|failure| explained(failure, path))?;
         let mut gathered = Gathered::new(path, &root);
-        self.gather(&root.held, path, &mut gathered)?;
+        self.gather(&root.held, &mut gathered)?;
         let prepared = gathered.finish();
         self.hold(job, gathered.held);
         Ok(Box::new(prepared))
@@ -143,83 +143,17 @@ impl Intake {
     }
 
     /// Follows the root's references.
-    fn gather(
-        &self,
-        root: &Held,
-        path: &Path,
-        gathered: &mut Gathered,
-    ) -> Result<(), PrepareFailure> {
+    fn gather(&self, root: &Held, gathered: &mut Gathered) -> Result<(), PrepareFailure> {
         let Ok(document) = Document::open(root) else {
             return Ok(());
         };
-        for reference in qcbus_ingest::references(&document) {
-            let Some(role) = role_of(reference.role) else {
-                continue;
-            };
-            if let Some(why) = &reference.unresolved {
-                gathered.miss(role, &reference, path, why.clone());
-            }
-            if let Some(directory) = &reference.directory {
-                gathered.listing(directory);
-            }
-            // The first of several candidates is meant, except that every file of a catalog
-            // directory is a catalog.
-            let every = reference.role == Role::CatalogDirectory;
-            let mut missing = None;
-            for candidate in &reference.candidates {
-                match self.candidate(role, &reference, candidate, gathered)? {
-                    None if every => {}
-                    None => {
-                        missing = None;
-                        break;
-                    }
-                    Some(why) if every => gathered.miss(role, &reference, candidate, why),
-                    Some(why) => {
-                        gathered.absent(candidate);
-                        missing = missing.or(Some((candidate, why)));
-                    }
-                }
-            }
-            if let Some((candidate, why)) = missing {
-                gathered.miss(role, &reference, candidate, why);
-            }
-        }
+        let mut links = Links {
+            intake: self,
+            gathered,
+        };
+        let missing = qcbus_ingest::gather(&document, self.max_documents, &mut links)?;
+        gathered.missing = missing;
         Ok(())
-    }
-
-    /// Adds one referenced file; `Some` says why it could not be had.
-    fn candidate(
-        &self,
-        role: DocumentRole,
-        reference: &Reference,
-        path: &Path,
-        gathered: &mut Gathered,
-    ) -> Result<Option<String>, PrepareFailure> {
-        if gathered.has(path) {
-            return Ok(None);
-        }
-        if gathered.documents.len() >= self.max_documents {
-            gathered.unread(path, stamp_through_links(path));
-            return Ok(Some(format!(
-                "more than {} documents belong to this file",
-                self.max_documents
-            )));
-        }
-        // Looked at before: when it changes while it is tried, this stamp fits no more.
-        let before = stamp_through_links(path);
-        match self.publish_shared(path) {
-            Ok(published) => {
-                gathered.push(path, role, reference.offset, &published);
-                Ok(None)
-            }
-            Err(Failure::Ingest(error)) => {
-                if !matches!(error, IngestError::Missing { .. }) {
-                    gathered.unread(path, before);
-                }
-                Ok(Some(error.to_string()))
-            }
-            Err(failure) => Err(self.explain(failure, path)),
-        }
     }
 
     /// A map or catalog: from the cache as long as nothing has changed.
@@ -258,7 +192,7 @@ impl Intake {
         let doc = DocId(self.next_doc.fetch_add(1, Ordering::Relaxed));
         let held = loan
             .publish(doc, used, digest, kind)
-            .map_err(|error| Failure::Build(error.to_string()))?;
+            .map_err(|error| Failure::Publish(error.to_string()))?;
         reached("published", path);
         let bytes = inputs
             .iter()
@@ -295,28 +229,74 @@ impl Intake {
         root.max_by_key(|root| root.as_os_str().len())
             .map_or_else(|| path.parent().unwrap_or(path), PathBuf::as_path)
     }
+}
 
-    fn explain(&self, failure: Failure, path: &Path) -> PrepareFailure {
-        match failure {
-            Failure::Ingest(IngestError::Missing { .. } | IngestError::Unsettled { .. }) => {
-                match stamp_of(path) {
-                    Ok(None) => PrepareFailure::Vanished,
-                    // It is written to this very moment: it is read again shortly.
-                    _ => PrepareFailure::NoRoom(format!(
-                        "{} changes while it is read",
-                        to_text(path)
-                    )),
-                }
+/// What the failure means for the root.
+fn explained(failure: Failure, path: &Path) -> PrepareFailure {
+    match failure {
+        Failure::Ingest(IngestError::Missing { .. } | IngestError::Unsettled { .. }) => {
+            match stamp_of(path) {
+                Ok(None) => PrepareFailure::Vanished,
+                // It is written to this very moment: it is read again shortly.
+                _ => PrepareFailure::NoRoom(format!("{} changes while it is read", to_text(path))),
             }
-            Failure::Ingest(error) => unreadable(path, error.to_string()),
-            Failure::Build(error) => unreadable(path, error),
-            Failure::Loan(LoanError::TooLarge(_)) => {
-                unreadable(path, format!("{} is too large for the bus", to_text(path)))
+        }
+        Failure::Ingest(error) => unreadable(path, error.to_string()),
+        Failure::Build(error) => unreadable(path, error),
+        Failure::Loan(LoanError::TooLarge(_)) => {
+            unreadable(path, format!("{} is too large for the bus", to_text(path)))
+        }
+        Failure::Loan(LoanError::Busy) => PrepareFailure::Busy,
+        Failure::Loan(error) => unpublished(path, &error),
+        Failure::Publish(error) => unpublished(path, &error),
+    }
+}
+
+/// The bus has no room, or could not take it: nothing that is the file's fault, or that stays.
+fn unpublished(path: &Path, error: &dyn std::fmt::Display) -> PrepareFailure {
+    PrepareFailure::NoRoom(format!("cannot publish {}: {error}", to_text(path)))
+}
+
+/// The documents that a root refers to, on their way to the bus. Whatever becomes of them, it is the
+/// root's verdict that is at stake: none of them can make the root vanish or unreadable.
+struct Links<'i> {
+    intake: &'i Intake,
+    gathered: &'i mut Gathered,
+}
+
+impl Source for Links<'_> {
+    type Document = Published;
+    type Halt = PrepareFailure;
+
+    fn fetch(&mut self, path: &Path) -> Result<Result<Published, Absence>, PrepareFailure> {
+        // Looked at before: when it changes while it is tried, this stamp fits no more.
+        let before = stamp_through_links(path);
+        let absence = match self.intake.publish_shared(path) {
+            Ok(published) => return Ok(Ok(published)),
+            Err(failure) => failure.of_linked(path)?,
+        };
+        if absence != Absence::NotThere {
+            self.gathered.unread(path, before);
+        }
+        Ok(Err(absence))
+    }
+
+    fn image(document: &Published) -> &[u8] {
+        &document.held
+    }
+
+    fn keep(&mut self, path: &Path, role: DocumentRole, referred_at: u32, document: Published) {
+        self.gathered.push(path, role, referred_at, &document);
+    }
+
+    fn looked(&mut self, look: Look<'_>) {
+        match look {
+            Look::NotHad(path) => self.gathered.absent(path),
+            Look::NotRead(path) => {
+                self.gathered.unread(path, stamp_through_links(path));
+                self.gathered.absent(path);
             }
-            Failure::Loan(LoanError::Busy) => PrepareFailure::Busy,
-            Failure::Loan(error) => {
-                PrepareFailure::NoRoom(format!("cannot publish {}: {error}", to_text(path)))
-            }
+            Look::Listed(directory) => self.gathered.listing(directory),
         }
     }
 }
@@ -325,7 +305,30 @@ impl Intake {
 enum Failure {
     Ingest(IngestError),
     Build(String),
+    /// The image is there, and the bus did not take it.
+    Publish(String),
     Loan(LoanError),
+}
+
+impl Failure {
+    /// What the failure means for a file that a root refers to: that it cannot be had, or that the
+    /// whole is to be tried again.
+    fn of_linked(self, path: &Path) -> Result<Absence, PrepareFailure> {
+        match self {
+            Failure::Loan(LoanError::TooLarge(_)) => Ok(Absence::TooLarge {
+                why: "it does not fit on the bus".to_owned(),
+            }),
+            Failure::Loan(LoanError::Busy) => Err(PrepareFailure::Busy),
+            Failure::Loan(error) => Err(unpublished(path, &error)),
+            Failure::Publish(error) => Err(unpublished(path, &error)),
+            // It is written to this very moment: the whole is read again shortly.
+            Failure::Ingest(error @ IngestError::Unsettled { .. }) => {
+                Err(PrepareFailure::NoRoom(error.to_string()))
+            }
+            Failure::Ingest(error) => Ok(error.to_absence()),
+            Failure::Build(why) => Ok(Absence::Unreadable { why }),
+        }
+    }
 }
 
 impl From<IngestError> for Failure {
@@ -379,12 +382,6 @@ impl Gathered {
         self.bytes += published.bytes;
     }
 
-    fn has(&self, path: &Path) -> bool {
-        self.documents
-            .iter()
-            .any(|document| document.path == to_text(path))
-    }
-
     /// Something that is there and could not be had: when it changes, the verdict is void.
     fn unread(&mut self, path: &Path, stamp: Option<Stamp>) {
         if let Some(stamp) = stamp {
@@ -424,17 +421,6 @@ impl Gathered {
         );
     }
 
-    fn miss(&mut self, role: DocumentRole, reference: &Reference, path: &Path, why: String) {
-        self.absent(path);
-        self.missing.push(MissingDocument {
-            role,
-            reference: reference.text.clone(),
-            path: to_text(path),
-            why,
-            referred_at: reference.offset,
-        });
-    }
-
     fn finish(&self) -> PreparedJob {
         let root = self.root.first().map(|input| input.path.clone());
         let others = self
@@ -452,16 +438,6 @@ impl Gathered {
             missing: self.missing.clone(),
             bytes: self.bytes,
         }
-    }
-}
-
-/// What a referenced file is to the job; `None` for what is only named, never read.
-fn role_of(role: Role) -> Option<DocumentRole> {
-    match role {
-        Role::LogicFile => Some(DocumentRole::Map),
-        Role::CatalogDirectory => Some(DocumentRole::Catalog),
-        Role::ScenarioReference | Role::ScenarioFile => Some(DocumentRole::Scenario),
-        Role::Schema => None,
     }
 }
 
@@ -525,4 +501,40 @@ fn unreadable(path: &Path, reason: String) -> PrepareFailure {
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_becomes_of_a_linked_file_never_makes_the_root_vanish() {
+        let path = Path::new("/farm/map.xodr");
+        let of = |failure: Failure| failure.of_linked(path);
+        let unsettled = IngestError::Unsettled {
+            path: path.to_owned(),
+            what: "was removed",
+        };
+        let again = of(unsettled.into());
+        assert!(matches!(again, Err(PrepareFailure::NoRoom(_))), "{again:?}");
+        let missing = IngestError::Missing {
+            path: path.to_owned(),
+        };
+        assert_eq!(of(missing.into()), Ok(Absence::NotThere));
+        let large = of(LoanError::TooLarge(1).into());
+        assert!(matches!(large, Ok(Absence::TooLarge { .. })), "{large:?}");
+    }
+
+    #[test]
+    fn what_the_bus_does_not_take_now_is_tried_again() {
+        let path = Path::new("/farm/map.xodr");
+        let refused = || Failure::Publish("no subscriber slot".to_owned());
+        let linked = refused().of_linked(path);
+        assert!(
+            matches!(linked, Err(PrepareFailure::NoRoom(_))),
+            "{linked:?}"
+        );
+        let root = explained(refused(), path);
+        assert!(matches!(root, PrepareFailure::NoRoom(_)), "{root:?}");
+    }
 }

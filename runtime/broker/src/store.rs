@@ -8,12 +8,14 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
 use qcbus_document::Document;
 use qcbus_formats::config::Config;
-use qcbus_formats::pool::{self, NoPlaces, PoolInput, Pooled, Resolver, Scope};
+use qcbus_formats::pool::{
+    self, BundleOutcome, Ending, NoPlaces, PoolInput, Pooled, Remark, Resolver, Scope, Unfinished,
+};
 use qcbus_formats::xqar::{self, Dialect, Status};
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::{BUILD_DATE, Digest, Verdict};
 
-use crate::core::{BundleOutcome, FinishedJob, Input, Judged, StoreOutcome};
+use crate::core::{FinishedJob, Input, Judged, ShareOutcome, StoreOutcome};
 use crate::disk::{is_for_good, remove, write_both, write_whole};
 use crate::journal::{Entry, History, Journal};
 use crate::result_paths::{ResultPaths, with_suffix};
@@ -57,18 +59,11 @@ impl Store {
         if !refresh(job) {
             return StoreOutcome::Stale;
         }
-        let outcomes: Vec<pool::BundleOutcome> =
-            job.bundles.iter_mut().filter_map(to_pool).collect();
-        let takes = |it: &BundleOutcome| {
-            it.catalogue
-                .as_ref()
-                .is_some_and(|it| it.kinds.contains(&job.kind))
-        };
-        let nothing_checked = !job.bundles.iter().any(takes);
+        let outcomes: Vec<BundleOutcome> = job.bundles.iter_mut().map(taken).collect();
         let pooled = self.pool(job, outcomes, config, root);
         reached("pooled", &job.path);
-        let verdict = verdict_of(&pooled, nothing_checked || job.unreadable.is_some());
-        let why = reasons(job, &pooled, nothing_checked);
+        let verdict = pooled.verdict();
+        let why = reasons(job, &pooled, verdict);
         let judged = judged(job, &pooled, verdict, why, self.places.xqar(&job.path));
         // At the last moment: from here on a verdict is on its way to where others see it.
         if self.epoch.load(Ordering::Acquire) != job.epoch.0 {
@@ -110,20 +105,25 @@ impl Store {
     fn pool(
         &self,
         job: &FinishedJob,
-        bundles: Vec<pool::BundleOutcome>,
+        bundles: Vec<BundleOutcome>,
         config: Option<&Config>,
         root: Option<&[u8]>,
     ) -> Pooled {
+        let document = root.and_then(|bytes| Document::open(bytes).ok());
+        let mut remarks: Vec<Remark> = unanswered(job).into_iter().collect();
+        if let (Some(document), Some(prepared)) = (&document, &job.prepared) {
+            remarks.extend(qcbus_ingest::remarks(document, &prepared.missing, &bundles));
+        }
         let input = PoolInput {
             input_file: &to_text(&job.path),
             config,
             bundles,
-            remarks: Vec::new(),
+            remarks,
             scope: Scope::Whole,
             version: env!("CARGO_PKG_VERSION"),
             build_date: BUILD_DATE,
         };
-        match root.and_then(|bytes| Document::open(bytes).ok()) {
+        match document {
             Some(document) => pool::pool(input, &mut InDocument { document }),
             None => pool::pool(input, &mut NoPlaces),
         }
@@ -397,37 +397,49 @@ fn digest_of(bytes: &[u8]) -> Digest {
     Digest(Sha256::digest(bytes).into())
 }
 
-fn verdict_of(pooled: &Pooled, incomplete: bool) -> Verdict {
-    if pooled.counts.errors > 0 {
-        Verdict::Rejected
-    } else if incomplete || !pooled.failed.is_empty() {
-        Verdict::Undetermined
+/// The remark that nobody could answer for the file: it cannot be read, or nobody checks its kind.
+fn unanswered(job: &FinishedJob) -> Option<Remark> {
+    let takes = |it: &ShareOutcome| {
+        let catalogue = it.catalogue.as_ref();
+        catalogue.is_some_and(|it| it.kinds.contains(&job.kind))
+    };
+    let (checker, description, open) = if let Some(why) = &job.unreadable {
+        (
+            "qcbus_file",
+            "The file is whole and can be read.",
+            why.clone(),
+        )
+    } else if job.bundles.iter().any(takes) {
+        return None;
     } else {
-        Verdict::Accepted
-    }
+        let kind = job.kind.as_str();
+        let why = format!("no bundle that is running checks .{kind} files");
+        ("qcbus_bundles", "A bundle checks files of this kind.", why)
+    };
+    Some(Remark {
+        checker: checker.to_owned(),
+        description: description.to_owned(),
+        issue: None,
+        open: Some(open),
+    })
 }
 
 /// Reasons shown to a person; more than these are counted.
 const REASONS: usize = 20;
 
-fn reasons(job: &FinishedJob, pooled: &Pooled, nothing_checked: bool) -> Vec<String> {
-    if let Some(why) = &job.unreadable {
-        return vec![why.clone()];
+/// What a person is told of a verdict: what keeps it open. Beside an error only what failed counts:
+/// that the error kept others from looking goes without saying.
+fn reasons(job: &FinishedJob, pooled: &Pooled, verdict: Verdict) -> Vec<String> {
+    if let Some(open) = unanswered(job).and_then(|remark| remark.open) {
+        return vec![open];
     }
-    if nothing_checked {
-        return vec![format!(
-            "no bundle that is running checks .{} files",
-            job.kind.as_str()
-        )];
-    }
-    let mut why: Vec<String> = pooled
-        .failed
-        .iter()
-        .take(REASONS)
-        .map(|it| format!("{} / {}: {}", it.bundle, it.checker, it.reason))
-        .collect();
-    if pooled.failed.len() > REASONS {
-        why.push(format!("and {} more", pooled.failed.len() - REASONS));
+    let told = |it: &&Unfinished| {
+        verdict != Verdict::Rejected || matches!(it.ending, Ending::Failed { .. })
+    };
+    let open: Vec<&Unfinished> = pooled.open().filter(told).collect();
+    let mut why: Vec<String> = open.iter().take(REASONS).map(ToString::to_string).collect();
+    if open.len() > REASONS {
+        why.push(format!("and {} more", open.len() - REASONS));
     }
     why
 }
@@ -461,42 +473,20 @@ fn judged(
     }
 }
 
-/// One bundle's outcome as pooling wants it. A bundle that was never seen has none: pooling itself
-/// lists what the configuration demands of it.
-/// Takes what was found: there can be megabytes of it.
-fn to_pool(bundle: &mut BundleOutcome) -> Option<pool::BundleOutcome> {
-    let catalogue = bundle.catalogue.as_ref()?;
-    let checkers = bundle.checkers.iter_mut().filter_map(|said| {
-        let offered = catalogue
-            .checkers
-            .get(usize::try_from(said.checker).ok()?)?;
-        Some(pool::CheckerOutcome {
-            id: offered.id.clone(),
-            description: offered.description.clone(),
-            rule_uids: offered.rule_uids.clone(),
-            status: Some(said.status),
-            reason: said.reason.clone(),
-            params: std::mem::take(&mut said.params),
-            issues: std::mem::take(&mut said.issues),
-            metadata: std::mem::take(&mut said.metadata),
-        })
-    });
-    Some(pool::BundleOutcome {
-        name: bundle.name.clone(),
-        alias: catalogue.alias.clone(),
-        version: bundle.version.clone(),
-        build_date: catalogue.build_date.clone(),
-        description: catalogue.description.clone(),
-        params: Vec::new(),
-        checkers: checkers.collect(),
-    })
+/// What a bundle said, taken out of the job: there can be megabytes of it.
+fn taken(share: &mut ShareOutcome) -> BundleOutcome {
+    let checkers = std::mem::take(&mut share.said.checkers);
+    BundleOutcome {
+        checkers,
+        ..share.said.clone()
+    }
 }
 
 fn history(job: &FinishedJob, pooled: &Pooled) -> History {
     let bundles = job.bundles.iter().map(|it| {
         (
-            it.name.clone(),
-            it.version.clone(),
+            it.said.name.clone(),
+            it.said.version.clone(),
             it.micros,
             it.failure.clone().unwrap_or_default(),
         )

@@ -1,13 +1,13 @@
 //! The verdict file `NAME.verdict.json` beside a result: everything that a farm needs to decide,
 //! without reading the result itself.
 
-use qcbus_formats::pool::{FailedChecker, Pooled};
-use qcbus_formats::xqar::Status;
+use qcbus_formats::pool::{NotAsked, OWN_BUNDLE, Pooled, Unfinished};
+use qcbus_formats::xqar::{CheckerBundle, Status};
 use qcbus_messages::Verdict;
 use qcbus_messages::path_text::to_text;
 use serde::Serialize;
 
-use crate::core::{BundleOutcome, FinishedJob, Input};
+use crate::core::{FinishedJob, Input};
 
 /// The content of a verdict file. Fields are only ever added.
 #[derive(Debug, Serialize)]
@@ -26,6 +26,10 @@ pub struct VerdictFile<'a> {
     filtered: u64,
     skipped: Vec<CheckerLine<'a>>,
     failed: Vec<CheckerLine<'a>>,
+    /// What keeps the verdict undetermined.
+    open: Vec<CheckerLine<'a>>,
+    /// Bundles of which a configuration left checkers out.
+    not_asked: Vec<NotAskedLine>,
     result: String,
 }
 
@@ -47,6 +51,13 @@ struct CheckerLine<'a> {
     bundle: &'a str,
     checker: &'a str,
     reason: &'a str,
+}
+
+#[derive(Debug, Serialize)]
+struct NotAskedLine {
+    bundle: String,
+    checkers: usize,
+    of: usize,
 }
 
 /// The text of a verdict file.
@@ -73,22 +84,20 @@ pub fn render(
         depends_on: depends_on.collect(),
         configuration_sha256: job.config.to_string(),
         qcbus_version: env!("CARGO_PKG_VERSION"),
-        bundles: job
-            .bundles
-            .iter()
-            .filter(|it| it.catalogue.is_some())
-            .map(|it| BundleLine {
-                name: &it.name,
-                version: &it.version,
-                checkers: it.checkers.len(),
-            })
-            .collect(),
+        bundles: bundles(pooled),
         errors: pooled.counts.errors,
         warnings: pooled.counts.warnings,
         information: pooled.counts.information,
         filtered: pooled.removed.errors + pooled.removed.warnings + pooled.removed.information,
-        skipped: skipped(&job.bundles),
-        failed: pooled.failed.iter().map(failed).collect(),
+        skipped: unfinished(pooled, |it| it.ending.status() == Status::Skipped),
+        failed: unfinished(pooled, |it| it.ending.status() == Status::Error),
+        open: unfinished(pooled, |it| {
+            verdict == Verdict::Undetermined && it.ending.is_open()
+        }),
+        not_asked: NotAsked::of(&pooled.results)
+            .into_iter()
+            .map(not_asked)
+            .collect(),
         result: to_text(xqar),
     };
     let mut text = serde_json::to_vec_pretty(&file).unwrap_or_default();
@@ -96,30 +105,38 @@ pub fn render(
     text
 }
 
-fn skipped(bundles: &[BundleOutcome]) -> Vec<CheckerLine<'_>> {
-    let mut lines = Vec::new();
-    for bundle in bundles {
-        let offered = bundle.catalogue.as_deref();
-        let skipped = bundle.checkers.iter();
-        for said in skipped.filter(|it| it.status == Status::Skipped) {
-            let index = usize::try_from(said.checker).unwrap_or(usize::MAX);
-            let Some(checker) = offered.and_then(|it| it.checkers.get(index)) else {
-                continue;
-            };
-            lines.push(CheckerLine {
-                bundle: &bundle.name,
-                checker: &checker.id,
-                reason: &said.reason,
-            });
-        }
-    }
-    lines
+/// The bundles that took part; not those that are only demanded.
+fn bundles(pooled: &Pooled) -> Vec<BundleLine<'_>> {
+    let bundles = pooled.results.bundles.iter();
+    let there = bundles.filter(|it| it.name != OWN_BUNDLE && !it.version.is_empty());
+    there.map(bundle_line).collect()
 }
 
-fn failed(it: &FailedChecker) -> CheckerLine<'_> {
+fn bundle_line(bundle: &CheckerBundle) -> BundleLine<'_> {
+    BundleLine {
+        name: &bundle.name,
+        version: &bundle.version,
+        checkers: bundle.checkers.len(),
+    }
+}
+
+fn unfinished(pooled: &Pooled, listed: impl Fn(&Unfinished) -> bool) -> Vec<CheckerLine<'_>> {
+    let listed = pooled.unfinished.iter().filter(|it| listed(it));
+    listed.map(checker_line).collect()
+}
+
+fn checker_line(it: &Unfinished) -> CheckerLine<'_> {
     CheckerLine {
         bundle: &it.bundle,
         checker: &it.checker,
-        reason: &it.reason,
+        reason: it.ending.reason(),
+    }
+}
+
+fn not_asked(it: NotAsked) -> NotAskedLine {
+    NotAskedLine {
+        bundle: it.bundle,
+        checkers: it.left_out,
+        of: it.offered,
     }
 }

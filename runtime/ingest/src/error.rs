@@ -2,7 +2,12 @@
 
 use std::path::PathBuf;
 
+use qcbus_messages::Absence;
+
 use crate::limits::Exceeded;
+
+/// What [`IngestError::NotAFile`] calls a directory.
+pub(crate) const DIRECTORY: &str = "a directory";
 
 /// Why no bytes could be had from a file. Anything wrong *inside* the bytes is a fault of the
 /// document instead.
@@ -49,6 +54,24 @@ pub enum IngestError {
 }
 
 impl IngestError {
+    /// What it means for a file that another one refers to.
+    pub fn to_absence(&self) -> Absence {
+        match self {
+            IngestError::Missing { .. } => Absence::NotThere,
+            IngestError::NotAFile { what, .. } if *what == DIRECTORY => Absence::Directory,
+            IngestError::NotAFile { .. } => Absence::NotAFile,
+            IngestError::Unreadable { source, .. } => Absence::Unreadable {
+                why: source.to_string(),
+            },
+            IngestError::TooLarge { exceeded, .. } => Absence::TooLarge {
+                why: exceeded.to_string(),
+            },
+            IngestError::Unsettled { what, .. } => Absence::Unreadable {
+                why: format!("it {what} while it was being read"),
+            },
+        }
+    }
+
     /// The file that the error is about.
     pub fn path(&self) -> &std::path::Path {
         match self {

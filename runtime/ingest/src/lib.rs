@@ -10,8 +10,10 @@ mod count;
 mod decode;
 mod error;
 mod finding;
+mod findings;
 #[doc(hidden)]
 pub mod fuzzing;
+mod gather;
 mod limits;
 mod prepare;
 mod prepared;
@@ -21,9 +23,11 @@ mod unpack;
 mod xml;
 
 pub use error::IngestError;
+pub use findings::{faults_of_root, missing_references, remarks};
+pub use gather::{Look, Source, gather};
 pub use limits::{Exceeded, Limits};
 pub use prepare::{prepare, prepare_bytes};
 pub use prepared::Prepared;
 pub use qcbus_document::BuildError;
 pub use read::{Content, FileStamp, Stat};
-pub use references::{Reference, Role, references};
+pub use references::{Reference, references};

@@ -180,7 +180,7 @@ fn read_once(
 fn regular(path: &Path, metadata: &Metadata) -> Result<(), IngestError> {
     let what = match metadata.file_type() {
         kind if kind.is_file() => return Ok(()),
-        kind if kind.is_dir() => "a directory",
+        kind if kind.is_dir() => crate::error::DIRECTORY,
         _ => "a device, pipe or socket",
     };
     Err(IngestError::NotAFile {

@@ -1,33 +1,24 @@
 //! What other files a scenario refers to: its map, its catalogs, the scenarios it is built from.
 
 use std::collections::HashMap;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use qcbus_document::{Document, Node};
 use qcbus_messages::path_text::from_text;
+use qcbus_messages::{Absence, DocumentRole};
 
 use crate::prepare::{normal, split_members};
-
-/// What a referenced file is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Role {
-    /// `RoadNetwork/LogicFile`: the OpenDRIVE map.
-    LogicFile,
-    /// `CatalogLocations/…/Directory`: a folder whose `.xosc` files are catalogs.
-    CatalogDirectory,
-    /// `ScenarioReference`: a scenario that a modular scenario is built from.
-    ScenarioReference,
-    /// `ParameterValueDistribution/ScenarioFile`: the scenario whose parameters are varied.
-    ScenarioFile,
-    /// `xsi:schemaLocation` and its sibling: named for information, never fetched.
-    Schema,
-}
 
 /// A reference from a document to another file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reference {
-    /// What the file is for.
-    pub role: Role,
+    /// What the file is for: `RoadNetwork/LogicFile` names the map, `CatalogLocations/…/Directory` a
+    /// folder whose `.xosc` files are catalogs, `ScenarioReference` and
+    /// `ParameterValueDistribution/ScenarioFile` scenarios.
+    pub role: DocumentRole,
+    /// Of a catalog directory: what kind of catalogs, such as `VehicleCatalog`.
+    pub catalogs: Option<String>,
     /// The reference as written.
     pub text: String,
     /// Offset of the referring element in the document's text.
@@ -37,8 +28,15 @@ pub struct Reference {
     pub candidates: Vec<PathBuf>,
     /// The catalog directory itself, for whoever watches it.
     pub directory: Option<PathBuf>,
-    /// Why there is no candidate.
-    pub unresolved: Option<String>,
+    /// Why there is no candidate, or not every one.
+    pub unresolved: Option<Absence>,
+}
+
+impl Reference {
+    /// Whether each of the candidates is meant, not the first that is there.
+    pub fn means_all(&self) -> bool {
+        self.role == DocumentRole::Catalog
+    }
 }
 
 /// Most files of one catalog directory that are taken for catalogs.
@@ -57,7 +55,7 @@ pub fn references(document: &Document<'_>) -> Vec<Reference> {
 }
 
 /// The referring elements with their references as written.
-fn targets<'d>(document: &Document<'d>) -> Vec<(Role, Node<'d>, &'d str)> {
+fn targets<'d>(document: &Document<'d>) -> Vec<(DocumentRole, Node<'d>, &'d str)> {
     let mut found = Vec::new();
     let mut gather = |role, element: &str, attribute: &str, parent: &dyn Fn(Node<'d>) -> bool| {
         for node in document
@@ -73,70 +71,70 @@ fn targets<'d>(document: &Document<'d>) -> Vec<(Role, Node<'d>, &'d str)> {
         node.parent()
             .is_some_and(|above| above.is("CatalogLocations"))
     };
-    gather(Role::LogicFile, "LogicFile", "filepath", &|parent| {
-        parent.is("RoadNetwork")
-    });
-    gather(Role::CatalogDirectory, "Directory", "path", &in_catalogs);
+    // Before OpenSCENARIO 1.0 it was `Logics`.
+    for element in ["LogicFile", "Logics"] {
+        gather(DocumentRole::Map, element, "filepath", &|parent| {
+            parent.is("RoadNetwork")
+        });
+    }
+    gather(DocumentRole::Catalog, "Directory", "path", &in_catalogs);
     gather(
-        Role::ScenarioReference,
+        DocumentRole::Scenario,
         "ScenarioReference",
         "scenarioFileName",
         &|_| true,
     );
-    gather(Role::ScenarioFile, "ScenarioFile", "filepath", &|parent| {
-        parent.is("ParameterValueDistribution")
-    });
-    if let Some(root) = document.root() {
-        for attribute in root.attributes() {
-            let local = attribute.name().rsplit(':').next().unwrap_or("");
-            if local == "noNamespaceSchemaLocation" || local == "schemaLocation" {
-                found.push((Role::Schema, root, attribute.value()));
-            }
-        }
-    }
+    gather(
+        DocumentRole::Scenario,
+        "ScenarioFile",
+        "filepath",
+        &|parent| parent.is("ParameterValueDistribution"),
+    );
     found
 }
 
-fn resolve(role: Role, node: Node<'_>, text: &str, parameters: &Parameters<'_>) -> Reference {
+fn resolve(
+    role: DocumentRole,
+    node: Node<'_>,
+    text: &str,
+    parameters: &Parameters<'_>,
+) -> Reference {
     let mut reference = Reference {
         role,
+        catalogs: (role == DocumentRole::Catalog)
+            .then(|| node.parent().map(|kind| kind.name().to_string()))
+            .flatten(),
         text: text.to_string(),
         offset: node.offset(),
         candidates: Vec::new(),
         directory: None,
         unresolved: None,
     };
-    if role == Role::Schema {
-        reference.unresolved = Some("schemas are never fetched; qcbus brings its own".to_string());
-        return reference;
-    }
     let outcome = parameters
         .fill(text)
         .and_then(|text| check(role, &text).map(|()| text));
     match outcome {
-        Err(reason) => reference.unresolved = Some(reason),
+        Err(why) => reference.unresolved = Some(why),
         Ok(path) => locate(&mut reference, &from_text(node.position().path), &path),
     }
     reference
 }
 
 /// Whether the text can name a file at all.
-fn check(role: Role, text: &str) -> Result<(), String> {
+fn check(role: DocumentRole, text: &str) -> Result<(), Absence> {
     let text = text.trim();
     if text.is_empty() {
-        return Err("the path is empty".to_string());
+        return Err(Absence::EmptyPath);
     }
     if text.contains("://") && !text.starts_with("file://") {
-        return Err("nothing is fetched from the network".to_string());
+        return Err(Absence::Remote);
     }
     let has_extension = Path::new(text.rsplit(['/', '\\']).next().unwrap_or(text))
         .extension()
         .is_some();
     let is_bare = !text.contains(['/', '\\']) && !has_extension;
-    if role == Role::LogicFile && is_bare {
-        return Err(format!(
-            "{text} is the name of a map that the simulator knows, not of a file"
-        ));
+    if role == DocumentRole::Map && is_bare {
+        return Err(Absence::SimulatorMap);
     }
     Ok(())
 }
@@ -150,23 +148,26 @@ fn locate(reference: &mut Reference, from: &Path, text: &str) {
             }
         }
     }
-    if reference.role != Role::CatalogDirectory {
+    if !reference.means_all() {
         reference.candidates = candidates;
         return;
     }
-    let listed = candidates
-        .iter()
-        .find_map(|folder| Some((folder, catalogs(folder)?)));
-    match listed {
-        Some((folder, catalogs)) => {
-            reference.directory = Some(folder.clone());
-            reference.candidates = catalogs;
-        }
-        None => {
-            reference.unresolved = Some("there is no such directory".to_string());
-            reference.directory = candidates.into_iter().next();
+    let mut why = Absence::NotThere;
+    for folder in &candidates {
+        match catalogs(folder) {
+            Ok((catalogs, left_out)) => {
+                reference.directory = Some(folder.clone());
+                reference.candidates = catalogs;
+                reference.unresolved = left_out;
+                return;
+            }
+            // Where one spelling is there and of no use, that is the one that is meant.
+            Err(found) if why == Absence::NotThere => why = found,
+            Err(_) => {}
         }
     }
+    reference.unresolved = Some(why);
+    reference.directory = candidates.into_iter().next();
 }
 
 /// As written first; then what the writer may have meant by `%20`, `file://` and backslashes.
@@ -207,12 +208,12 @@ fn percent_decoded(text: &str) -> String {
 
 /// Relative to the referring file. What a member of an archive refers to is looked for in the
 /// archive first, then beside it.
-fn places(role: Role, from: &Path, text: &str) -> Vec<PathBuf> {
+fn places(role: DocumentRole, from: &Path, text: &str) -> Vec<PathBuf> {
     let mut places = Vec::new();
     // A `!` that follows no archive is an ordinary character of a name.
     let (file, members) = split_members(from);
     if let Some((_, around)) = members.split_last()
-        && (role == Role::ScenarioReference || role == Role::ScenarioFile)
+        && role == DocumentRole::Scenario
     {
         let mut place = file.as_os_str().to_owned();
         for member in around.iter().map(String::as_str).chain([text]) {
@@ -227,24 +228,38 @@ fn places(role: Role, from: &Path, text: &str) -> Vec<PathBuf> {
     places
 }
 
-/// The `.xosc` files of a folder by name; `None` when it cannot be listed.
-fn catalogs(folder: &Path) -> Option<Vec<PathBuf>> {
+/// The `.xosc` files of a folder by name, and what is said of those that are too many.
+fn catalogs(folder: &Path) -> Result<(Vec<PathBuf>, Option<Absence>), Absence> {
     if folder.is_file() {
         // Some tools write the catalog's own path.
-        return Some(vec![folder.to_path_buf()]);
+        return Ok((vec![folder.to_path_buf()], None));
     }
-    let mut catalogs: Vec<PathBuf> = std::fs::read_dir(folder)
-        .ok()?
+    let entries = std::fs::read_dir(folder).map_err(|error| unlisted(folder, &error))?;
+    let mut catalogs: Vec<PathBuf> = entries
         .filter_map(|entry| Some(entry.ok()?.path()))
         .filter(|path| {
             path.extension()
                 .is_some_and(|ext| ext.eq_ignore_ascii_case("xosc"))
         })
-        .filter(|path| path.is_file())
+        .filter(|path| !path.is_dir())
         .collect();
     catalogs.sort();
+    let left_out = (catalogs.len() > MAX_CATALOGS).then_some(Absence::TooMany {
+        most: MAX_CATALOGS as u64,
+    });
     catalogs.truncate(MAX_CATALOGS);
-    Some(catalogs)
+    Ok((catalogs, left_out))
+}
+
+fn unlisted(folder: &Path, error: &io::Error) -> Absence {
+    match error.kind() {
+        io::ErrorKind::NotFound => Absence::NotThere,
+        io::ErrorKind::NotADirectory if folder.exists() => Absence::NotAFile,
+        io::ErrorKind::NotADirectory => Absence::NotThere,
+        _ => Absence::Unreadable {
+            why: error.to_string(),
+        },
+    }
 }
 
 /// Values of the scenario's own parameters, as far as they are plain.
@@ -272,24 +287,23 @@ impl<'d> Parameters<'d> {
     }
 
     /// Replaces every `$name` by its declared default.
-    fn fill(&self, text: &str) -> Result<String, String> {
+    fn fill(&self, text: &str) -> Result<String, Absence> {
         let mut filled = String::new();
         let mut rest = text;
         while let Some(at) = rest.find('$') {
             filled.push_str(&rest[..at]);
             let name = &rest[at + 1..];
             if name.starts_with('{') {
-                return Err(
-                    "the path is an expression, which is known only when it runs".to_string(),
-                );
+                return Err(Absence::Expression);
             }
             let len = name
                 .find(|c: char| !(c.is_alphanumeric() || c == '_'))
                 .unwrap_or(name.len());
             let (name, after) = name.split_at(len);
             let value = self.defaults.get(name).filter(|value| !value.contains('$'));
-            let value =
-                value.ok_or_else(|| format!("the parameter ${name} has no plain default"))?;
+            let value = value.ok_or_else(|| Absence::Parameter {
+                name: name.to_string(),
+            })?;
             filled.push_str(value);
             rest = after;
         }

@@ -7,7 +7,8 @@ use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 
 use qcbus_document::Document;
-use qcbus_ingest::{Limits, Reference, Role, prepare_bytes, references};
+use qcbus_ingest::{Limits, Reference, prepare_bytes, references};
+use qcbus_messages::{Absence, DocumentRole};
 
 fn of(path: &Path, text: &str) -> Vec<Reference> {
     let image = prepare_bytes(path, text.into(), &Limits::default()).build();
@@ -26,7 +27,7 @@ fn map(filepath: &str) -> Reference {
     assert!(text[reference.offset as usize..].starts_with("<LogicFile"));
     assert_eq!(
         (reference.role, &*reference.text),
-        (Role::LogicFile, filepath)
+        (DocumentRole::Map, filepath)
     );
     reference
 }
@@ -63,16 +64,19 @@ fn an_exclamation_mark_alone_makes_no_archive() {
 
 #[test]
 fn what_names_no_file_says_why() {
-    for (filepath, part) in [
-        ("Town05", "the name of a map that the simulator knows"),
-        ("", "the path is empty"),
-        ("http://x/a.xodr", "nothing is fetched"),
-        ("$unknown/a.xodr", "$unknown has no plain default"),
-        ("${1+2}.xodr", "is an expression"),
+    let unknown = Absence::Parameter {
+        name: "unknown".to_owned(),
+    };
+    for (filepath, why) in [
+        ("Town05", Absence::SimulatorMap),
+        ("", Absence::EmptyPath),
+        ("http://x/a.xodr", Absence::Remote),
+        ("$unknown/a.xodr", unknown),
+        ("${1+2}.xodr", Absence::Expression),
     ] {
         let reference = map(filepath);
         assert_eq!(reference.candidates, Vec::<PathBuf>::new());
-        assert!(reference.unresolved.unwrap().contains(part), "{filepath}");
+        assert_eq!(reference.unresolved, Some(why), "{filepath}");
     }
 }
 
@@ -89,16 +93,14 @@ fn catalog_directories_are_listed() {
                 </CatalogLocations></OpenSCENARIO>";
     let found = of(&dir.path().join("x.xosc"), text);
     assert_eq!(found.len(), 2);
-    assert_eq!(found[0].role, Role::CatalogDirectory);
+    assert_eq!(found[0].role, DocumentRole::Catalog);
+    assert_eq!(found[0].catalogs.as_deref(), Some("VehicleCatalog"));
     assert_eq!(
         found[0].candidates,
         [catalogs.join("a.xosc"), catalogs.join("b.xosc")]
     );
     assert_eq!(found[0].directory, Some(catalogs));
-    assert_eq!(
-        found[1].unresolved.as_deref(),
-        Some("there is no such directory")
-    );
+    assert_eq!(found[1].unresolved, Some(Absence::NotThere));
     assert_eq!(found[1].directory, Some(dir.path().join("nowhere")));
 }
 
@@ -109,14 +111,10 @@ fn other_roles() {
                 <ParameterValueDistribution><ScenarioFile filepath='../a.xosc'/>\
                 </ParameterValueDistribution></OpenSCENARIO>";
     let found = of(Path::new("/farm/d/x.xosc"), text);
+    assert_eq!(found.len(), 1, "schemas are never fetched");
     assert_eq!(
-        (found[0].role, found[0].candidates.len()),
-        (Role::Schema, 0)
-    );
-    assert!(found[0].unresolved.is_some());
-    assert_eq!(
-        (found[1].role, &found[1].candidates[0]),
-        (Role::ScenarioFile, &PathBuf::from("/farm/a.xosc"))
+        (found[0].role, &found[0].candidates[0]),
+        (DocumentRole::Scenario, &PathBuf::from("/farm/a.xosc"))
     );
 }
 
@@ -143,7 +141,7 @@ fn members_of_an_archive_come_before_what_lies_beside_it() {
     let found = references(&Document::open(&image).unwrap());
     assert_eq!(found[0].candidates, [PathBuf::from("/farm/m.xodr")]);
     let member = PathBuf::from("/farm/x.mosc!lib.xosc");
-    assert_eq!(found[1].role, Role::ScenarioReference);
+    assert_eq!(found[1].role, DocumentRole::Scenario);
     assert_eq!(
         found[1].candidates,
         [member.clone(), PathBuf::from("/farm/lib.xosc")]
@@ -153,4 +151,17 @@ fn members_of_an_archive_come_before_what_lies_beside_it() {
     let document = Document::open(&image).unwrap();
     assert!(document.root().unwrap().is("lib"));
     assert_eq!(document.path(), "/farm/x.mosc!lib.xosc");
+}
+
+#[test]
+fn catalogs_that_are_too_many_are_said() {
+    let dir = tempfile::tempdir().unwrap();
+    for number in 0..=1000 {
+        fs::write(dir.path().join(format!("{number}.xosc")), "").unwrap();
+    }
+    let text = "<OpenSCENARIO><CatalogLocations><VehicleCatalog><Directory path='.'/>\
+                </VehicleCatalog></CatalogLocations></OpenSCENARIO>";
+    let found = of(&dir.path().join("x.xosc"), text);
+    assert_eq!(found[0].candidates.len(), 1000);
+    assert_eq!(found[0].unresolved, Some(Absence::TooMany { most: 1000 }));
 }

@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 
 use qcbus_bus::{Instance, JoinError, Peer, PeerEvent, PeerOptions};
 use qcbus_document::FileKind;
-use qcbus_formats::xqar::{Level, Status};
+use qcbus_formats::pool::Ending;
+use qcbus_formats::xqar::Level;
 use qcbus_messages::{
     Catalogue, CheckerInfo, FromPeer, Hello, Job, JobId, PROTOCOL_VERSION, PeerReport, Role, ToPeer,
 };
@@ -92,8 +93,7 @@ pub fn checker_done(peer: &mut Peer, job: JobId, checker: u32) {
     peer.send(&FromPeer::CheckerDone {
         job,
         checker,
-        status: Status::Completed,
-        reason: String::new(),
+        ending: Ending::Completed,
         params: Vec::new(),
         metadata: Vec::new(),
     });

@@ -304,8 +304,8 @@ impl PageTest<'_> {
         let mine = |index: &usize| self.plan.checkers()[*index].facts.id == self.rule.facts().id;
         let (mut issues, mut ran, mut reasons) = (Vec::new(), false, Vec::new());
         for (_, found, outcome) in all.ended.into_iter().filter(|(index, ..)| mine(index)) {
-            ran |= outcome.status == Status::Completed;
-            reasons.push(outcome.reason);
+            ran |= outcome.ending.status() == Status::Completed;
+            reasons.push(outcome.ending.reason().to_owned());
             issues.extend(found);
         }
         self.judge(example, &issues, ran, &reasons)?;
@@ -387,11 +387,12 @@ impl Endings {
         let mut failed = self
             .ended
             .iter()
-            .filter(|(_, _, outcome)| outcome.status == Status::Error);
+            .filter(|(_, _, outcome)| outcome.ending.status() == Status::Error);
         failed.next().map_or(Ok(()), |(index, _, outcome)| {
             Err(format!(
                 "`{}` fails on it: {}",
-                checkers[*index].id, outcome.reason
+                checkers[*index].id,
+                outcome.ending.reason()
             ))
         })
     }

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use qcbus_formats::location::OtherPlace;
 use qcbus_formats::xqar::{Issue, Level, Location, Locations};
 
 use super::example::Staged;
@@ -28,23 +29,22 @@ pub(super) fn render(issues: &[Issue], uid: &str, staged: &Staged) -> String {
         }
         for locations in places {
             let (whereabouts, extras) = place(locations, staged);
-            let _ = writeln!(text, "  {whereabouts}: {}", locations.description);
+            let _ = writeln!(text, "  {whereabouts}: {}", locations.written());
             for extra in extras {
                 let _ = writeln!(text, "    {extra}");
             }
         }
-        for info in issue
-            .domain_info
+        let elsewhere = issue
+            .locations
             .iter()
-            .filter(|info| info.name == "qcbus.location")
+            .filter_map(|it| it.elsewhere.as_ref());
+        for OtherPlace {
+            row, column, xpath, ..
+        } in elsewhere
         {
-            for element in &info.content {
-                let attributes = element.attributes.iter().filter(|(name, _)| name != "path");
-                let words: Vec<_> = attributes
-                    .map(|(name, value)| format!("{name}={value}"))
-                    .collect();
-                let _ = writeln!(text, "  elsewhere: {}", words.join(" "));
-            }
+            let xpath = xpath.as_ref().map(|xpath| format!(" xpath={xpath}"));
+            let xpath = xpath.unwrap_or_default();
+            let _ = writeln!(text, "  elsewhere: row={row} column={column}{xpath}");
         }
     }
     staged.without_folder(&text)

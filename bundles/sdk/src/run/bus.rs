@@ -8,7 +8,8 @@ use std::time::Duration;
 
 use qcbus_bus::{Instance, JoinError, Peer, PeerEvent, PeerOptions};
 use qcbus_formats::config::Config;
-use qcbus_formats::xqar::{Issue, Status};
+use qcbus_formats::pool::Ending;
+use qcbus_formats::xqar::Issue;
 use qcbus_messages::{
     Digest, DocId, FromPeer, Hello, Job, JobId, PROTOCOL_VERSION, Role, ToPeer, codec,
 };
@@ -457,8 +458,7 @@ impl Daemon {
             });
         }
         let Outcome {
-            status,
-            reason,
+            ending,
             params,
             metadata,
             ..
@@ -466,8 +466,7 @@ impl Daemon {
         self.peer.send(&FromPeer::CheckerDone {
             job,
             checker,
-            status,
-            reason,
+            ending,
             params,
             metadata,
         });
@@ -483,8 +482,9 @@ impl Daemon {
             self.peer.send(&FromPeer::CheckerDone {
                 job,
                 checker,
-                status: Status::Error,
-                reason: reason.to_owned(),
+                ending: Ending::Failed {
+                    reason: reason.to_owned(),
+                },
                 params: Vec::new(),
                 metadata: Vec::new(),
             });

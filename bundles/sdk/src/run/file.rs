@@ -1,12 +1,14 @@
 //! One file, checked at once, without a broker.
 
+use std::collections::BTreeMap;
 use std::io::{self, Write as _};
 use std::path::Path;
 use std::time::Instant;
 
-use qcbus_formats::pool::{BundleOutcome, CheckerOutcome};
-use qcbus_formats::xqar::{Issue, Level, Location, Status};
-use qcbus_messages::Verdict;
+use qcbus_formats::pool::{
+    BundleOutcome, CheckerOutcome, Ending, NoPlaces, PoolInput, Pooled, Scope, pool,
+};
+use qcbus_formats::xqar::{Checker, CheckerBundle, Issue, Location};
 
 use super::{Exit, Timings};
 use crate::pages::level_name;
@@ -56,23 +58,61 @@ pub(super) fn run(
         ));
         return Exit::Usage;
     }
-    match examine_timed(&Plan::by_default(bundle).with_files(given), &loaded) {
-        Ok((outcome, took)) => {
-            if timings {
-                complain(&took.to_string());
-            }
-            let verdict = verdict(&outcome);
-            print(&match format {
-                Format::Text => as_text(path, &outcome),
-                Format::Json => as_json(path, &outcome, verdict),
-            });
-            verdict.into()
-        }
+    let plan = Plan::by_default(bundle).with_files(given);
+    let Judged {
+        pooled,
+        reasons,
+        took,
+    } = match judge(&plan, &loaded) {
+        Ok(judged) => judged,
         Err(error) => {
             complain(&format!("failed to {error}\n"));
-            Exit::Internal
+            return Exit::Internal;
         }
+    };
+    if timings {
+        complain(&took.to_string());
     }
+    print(&match format {
+        Format::Text => as_text(path, &pooled),
+        Format::Json => as_json(path, bundle, &pooled, &reasons),
+    });
+    pooled.verdict().into()
+}
+
+struct Judged {
+    pooled: Pooled,
+    /// Why checkers did not complete, by identifier.
+    reasons: BTreeMap<String, String>,
+    took: Timings,
+}
+
+/// Checks a file and pools what was found, as a broker does without a configuration.
+fn judge(plan: &Plan, loaded: &Loaded) -> Result<Judged, crate::LoadError> {
+    let (outcome, took) = examine_timed(plan, loaded)?;
+    let mut reasons: BTreeMap<String, String> = outcome
+        .checkers
+        .iter()
+        .map(|checker| (checker.id.clone(), checker.reason().to_owned()))
+        .collect();
+    let bundles = vec![outcome];
+    let input = PoolInput {
+        input_file: &loaded.path().display().to_string(),
+        config: None,
+        remarks: loaded.remarks(&bundles)?,
+        bundles,
+        scope: Scope::Alone,
+        version: plan.bundle().version,
+        build_date: BUILD_DATE,
+    };
+    let pooled = pool(input, &mut NoPlaces);
+    let own = pooled.unfinished.iter();
+    reasons.extend(own.map(|it| (it.checker.clone(), it.ending.reason().to_owned())));
+    Ok(Judged {
+        pooled,
+        reasons,
+        took,
+    })
 }
 
 /// Everything that the plan's demanded checkers find in a loaded file.
@@ -115,6 +155,8 @@ pub fn examine_timed(
             .into_iter()
             .map(|(_, checker)| checker)
             .collect(),
+        absent: None,
+        asked: Some(plan.asked()),
     };
     Ok((outcome, timings))
 }
@@ -143,8 +185,7 @@ impl Listener for Collected<'_> {
                     .iter()
                     .map(|&uid| uid.to_owned())
                     .collect(),
-                status: Some(outcome.status),
-                reason: outcome.reason,
+                ending: Some(outcome.ending),
                 params: outcome.params,
                 issues,
                 metadata: outcome.metadata,
@@ -153,33 +194,14 @@ impl Listener for Collected<'_> {
     }
 }
 
-/// Rejected on any error; else undetermined when a checker failed.
-fn verdict(outcome: &BundleOutcome) -> Verdict {
-    let mut issues = outcome.checkers.iter().flat_map(|checker| &checker.issues);
-    if issues.any(|issue| issue.level == Level::Error) {
-        Verdict::Rejected
-    } else if outcome
-        .checkers
-        .iter()
-        .any(|checker| checker.status == Some(Status::Error))
-    {
-        Verdict::Undetermined
-    } else {
-        Verdict::Accepted
-    }
-}
-
-fn as_text(path: &Path, outcome: &BundleOutcome) -> String {
+fn as_text(path: &Path, pooled: &Pooled) -> String {
     let mut lines: Vec<(u64, u64, String)> = Vec::new();
-    for issue in outcome.checkers.iter().flat_map(|checker| &checker.issues) {
+    for issue in checkers(pooled).flat_map(|(_, checker)| &checker.issues) {
         let (row, column) = row_column(issue).unwrap_or((1, 1));
-        let elsewhere = issue
-            .domain_info
-            .iter()
-            .any(|info| info.name == "qcbus.location");
-        let place = issue.locations.first().filter(|_| elsewhere);
-        let place = place
-            .map(|place| format!(" ({})", place.description))
+        let first = issue.locations.first();
+        let place = first
+            .filter(|place| place.elsewhere.is_some())
+            .map(|place| format!(" ({})", place.written()))
             .unwrap_or_default();
         let level = level_name(issue.level);
         let text = format!(
@@ -191,38 +213,49 @@ fn as_text(path: &Path, outcome: &BundleOutcome) -> String {
         lines.push((row, column, text));
     }
     lines.sort();
-    let failed = outcome
-        .checkers
-        .iter()
-        .filter(|checker| checker.status == Some(Status::Error));
-    let failed = failed.map(|c| format!("{}: {} failed: {}\n", path.display(), c.id, c.reason));
-    lines
-        .into_iter()
-        .map(|(_, _, line)| line)
-        .chain(failed)
-        .collect()
+    let open = pooled.open().map(|it| {
+        let what = match it.ending {
+            Ending::Failed { .. } => "failed",
+            _ => "could not look",
+        };
+        let (path, why) = (path.display(), it.ending.reason());
+        format!("{path}: {} {what}: {why}\n", it.checker)
+    });
+    let lines = lines.into_iter().map(|(_, _, line)| line);
+    lines.chain(open).collect()
 }
 
-fn as_json(path: &Path, outcome: &BundleOutcome, verdict: Verdict) -> String {
-    let checkers = outcome.checkers.iter().map(|checker| {
+fn as_json(
+    path: &Path,
+    bundle: &Bundle,
+    pooled: &Pooled,
+    reasons: &BTreeMap<String, String>,
+) -> String {
+    let checkers = checkers(pooled).map(|(of, checker)| {
         serde_json::json!({
             "id": checker.id,
+            "bundle": of.name,
             "status": checker.status,
-            "reason": checker.reason,
+            "reason": reasons.get(&checker.id).map_or("", String::as_str),
             "params": checker.params,
             "metadata": checker.metadata,
             "issues": checker.issues,
-            "rules": checker.rule_uids,
+            "rules": checker.addressed_rules,
         })
     });
     let whole = serde_json::json!({
         "file": path.display().to_string(),
-        "bundle": outcome.name,
-        "version": outcome.version,
-        "verdict": verdict.as_str(),
+        "bundle": bundle.name,
+        "version": bundle.version,
+        "verdict": pooled.verdict().as_str(),
         "checkers": checkers.collect::<Vec<_>>(),
     });
     format!("{whole:#}\n")
+}
+
+fn checkers(pooled: &Pooled) -> impl Iterator<Item = (&CheckerBundle, &Checker)> {
+    let bundles = pooled.results.bundles.iter();
+    bundles.flat_map(|bundle| bundle.checkers.iter().map(move |checker| (bundle, checker)))
 }
 
 fn row_column(issue: &Issue) -> Option<(u64, u64)> {

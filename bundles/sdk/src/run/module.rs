@@ -79,15 +79,20 @@ fn module(
     } else {
         Plan::new(bundle, |_| false, |_, _| None)
     };
-    let outcome = examine(&plan, &loaded)?;
+    let bundles = vec![examine(&plan, &loaded)?];
+    let remarks = if bundle.kinds.contains(&loaded.kind()) {
+        loaded.remarks(&bundles)?
+    } else {
+        Vec::new()
+    };
     let input = input.display().to_string();
     let mut nowhere = qcbus_formats::pool::NoPlaces;
     let pooled = pool(
         PoolInput {
             input_file: &input,
             config: Some(&config),
-            bundles: vec![outcome],
-            remarks: Vec::new(),
+            bundles,
+            remarks,
             scope: Scope::Alone,
             version: bundle.version,
             build_date: BUILD_DATE,

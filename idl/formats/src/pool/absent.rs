@@ -1,28 +1,25 @@
 //! What the configuration demands and nobody brought.
 
-use super::{BundleOutcome, CheckerOutcome};
+use super::{BundleOutcome, CheckerOutcome, Ending};
 use crate::config::{BundleConfig, published_name};
 use crate::distance::did_you_mean;
-use crate::xqar::Status;
 
 /// The checker that stands for a whole bundle when the configuration names none of its checkers.
 const WHOLE_BUNDLE: &str = "qcbus_bundle_is_there";
 
-/// The outcome of a bundle that is not there: each of its configured checkers is in error.
-pub(super) fn bundle(config: &BundleConfig) -> BundleOutcome {
+/// The outcome of a bundle that is not there: each of its configured checkers is in error. `why` is
+/// known when somebody waited for it.
+pub(super) fn bundle(config: &BundleConfig, why: Option<String>) -> BundleOutcome {
     let application = &config.application;
-    let reason = format!("no bundle `{application}` took part in this check");
-    let checkers = if config.checkers.is_empty() {
-        let mut checker = failed(WHOLE_BUNDLE, reason);
-        checker.description = String::from("The bundle that the configuration names takes part.");
-        vec![checker]
-    } else {
-        config
-            .checkers
-            .iter()
-            .map(|checker| failed(&checker.id, reason.clone()))
-            .collect()
-    };
+    let reason =
+        why.unwrap_or_else(|| format!("no bundle `{application}` took part in this check"));
+    let configured = config.checkers.iter();
+    let mut checkers: Vec<CheckerOutcome> = configured
+        .map(|checker| failed(&checker.id, reason.clone()))
+        .collect();
+    if checkers.is_empty() {
+        checkers.push(whole(reason));
+    }
     BundleOutcome {
         name: published_name(application)
             .unwrap_or(application)
@@ -30,6 +27,22 @@ pub(super) fn bundle(config: &BundleConfig) -> BundleOutcome {
         description: String::from("Configured, and not there."),
         checkers,
         ..BundleOutcome::default()
+    }
+}
+
+/// The outcome of a bundle that must take part without being configured, and is not there.
+pub(super) fn demanded(why: String) -> BundleOutcome {
+    BundleOutcome {
+        description: String::from("Demanded, and not there."),
+        checkers: vec![whole(why)],
+        ..BundleOutcome::default()
+    }
+}
+
+fn whole(reason: String) -> CheckerOutcome {
+    CheckerOutcome {
+        description: String::from("The bundle that must take part does."),
+        ..failed(WHOLE_BUNDLE, reason)
     }
 }
 
@@ -46,8 +59,7 @@ fn failed(id: &str, reason: String) -> CheckerOutcome {
     CheckerOutcome {
         id: id.to_owned(),
         description: String::from("Configured, and not there."),
-        status: Some(Status::Error),
-        reason,
+        ending: Some(Ending::Failed { reason }),
         ..CheckerOutcome::default()
     }
 }

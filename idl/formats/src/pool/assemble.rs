@@ -6,11 +6,11 @@ mod summary;
 use super::places::Completer;
 use super::remarks::{self, Removal, Why};
 use super::{
-    BundleOutcome, CheckerOutcome, Counts, FailedChecker, OWN_BUNDLE, PoolInput, Pooled, Remark,
-    Resolver, Scope, absent,
+    Asked, BundleOutcome, CheckerOutcome, Counts, Ending, OWN_BUNDLE, PoolInput, Pooled, Remark,
+    Resolver, Scope, Unfinished, absent, in_the_answer,
 };
 use crate::config::{BundleConfig, Config, INPUT_PARAMS, Selection, same_bundle};
-use crate::xqar::{Checker, CheckerBundle, FORMAT_VERSION, Level, Param, Status};
+use crate::xqar::{Checker, CheckerBundle, FORMAT_VERSION, Level, Param};
 
 pub(super) fn pool(input: PoolInput<'_>, resolver: &mut dyn Resolver) -> Pooled {
     let PoolInput {
@@ -99,7 +99,7 @@ fn in_order<'c>(
             }
         }
         if !found && scope == Scope::Whole {
-            let outcome = absent::bundle(bundle);
+            let outcome = absent::bundle(bundle, None);
             let name = outcome.name.clone();
             ordered.push((Entry::Configured(bundle), (outcome, name)));
         }
@@ -129,12 +129,18 @@ impl<'a> Pool<'a, '_> {
             Entry::Free => None,
             Entry::Configured(bundle) => Some(bundle),
         };
+        let outcome = match (outcome.absent.clone(), entry) {
+            (None, _) => outcome,
+            (why, Some(bundle)) => absent::bundle(bundle, why),
+            (Some(why), None) => absent::demanded(why),
+        };
         let BundleOutcome {
             version,
             build_date,
             description,
             params,
             checkers,
+            asked,
             ..
         } = outcome;
         let checkers = merged(checkers);
@@ -148,7 +154,7 @@ impl<'a> Pool<'a, '_> {
             .collect();
         self.pooled.results.bundles.push(CheckerBundle {
             summary: summary::of_bundle(&checkers),
-            params: self.params(entry, params),
+            params: self.params(entry, params, asked),
             name,
             version,
             build_date,
@@ -157,7 +163,8 @@ impl<'a> Pool<'a, '_> {
         });
     }
 
-    /// The checkers that the configuration names, in its order; the others' issues are removed.
+    /// The checkers that the configuration names, in its order, and after them those that kept one
+    /// of them from looking; the others' issues are removed.
     fn configured(
         &mut self,
         config: &BundleConfig,
@@ -165,15 +172,19 @@ impl<'a> Pool<'a, '_> {
         outcomes: Vec<CheckerOutcome>,
     ) -> Vec<CheckerOutcome> {
         let there: Vec<String> = outcomes.iter().map(|outcome| outcome.id.clone()).collect();
-        let wanted = |outcome: &CheckerOutcome| config.checker(&outcome.id).is_some();
-        let (mut wanted, others): (Vec<_>, Vec<_>) = outcomes.into_iter().partition(wanted);
+        let kept = in_the_answer(&outcomes, |id| config.checker(id).is_some());
+        let (mut wanted, mut others) = (Vec::new(), Vec::new());
+        for (outcome, kept) in outcomes.into_iter().zip(kept) {
+            if kept { &mut wanted } else { &mut others }.push(outcome);
+        }
         let mut ordered = Vec::with_capacity(config.checkers.len());
         for checker in &config.checkers {
             match wanted.iter().position(|outcome| outcome.id == checker.id) {
-                Some(at) => ordered.push(wanted.swap_remove(at)),
+                Some(at) => ordered.push(wanted.remove(at)),
                 None => ordered.push(absent::checker(&checker.id, name, &there)),
             }
         }
+        ordered.append(&mut wanted);
         self.remove_all(name, &others, Why::Checker);
         ordered
     }
@@ -209,7 +220,7 @@ impl<'a> Pool<'a, '_> {
         bundle: &str,
         mut outcome: CheckerOutcome,
     ) -> Checker {
-        checker::settle_status(&mut outcome);
+        let ending = checker::settle(&mut outcome);
         let configured = self
             .config
             .map(|config| config.effective_params(entry, &outcome.id, &[]))
@@ -222,18 +233,24 @@ impl<'a> Pool<'a, '_> {
         for issue in &mut outcome.issues {
             self.places.complete(issue);
         }
-        if outcome.status == Some(Status::Error) {
-            self.pooled.failed.push(FailedChecker {
+        if ending != Ending::Completed {
+            self.pooled.unfinished.push(Unfinished {
                 bundle: bundle.to_owned(),
                 checker: outcome.id.clone(),
-                reason: outcome.reason.clone(),
+                ending,
             });
         }
         checker::finish(outcome, configured, removed)
     }
 
-    /// `InputFile` first, then the configured parameters, then the bundle's own.
-    fn params(&self, entry: Option<&BundleConfig>, own: Vec<Param>) -> Vec<Param> {
+    /// `InputFile` first, then the configured parameters, then the bundle's own, then how little
+    /// was asked of it.
+    fn params(
+        &self,
+        entry: Option<&BundleConfig>,
+        own: Vec<Param>,
+        asked: Option<Asked>,
+    ) -> Vec<Param> {
         let mut params = vec![Param {
             name: INPUT_PARAMS[0].to_owned(),
             value: self.input_file.to_owned(),
@@ -245,7 +262,8 @@ impl<'a> Pool<'a, '_> {
         let own = own
             .into_iter()
             .filter(|param| !INPUT_PARAMS.contains(&param.name.as_str()));
-        for param in configured.into_iter().chain(own) {
+        let asked = asked.and_then(Asked::to_param);
+        for param in configured.into_iter().chain(own).chain(asked) {
             if !params.iter().any(|earlier| earlier.name == param.name) {
                 params.push(param);
             }

@@ -5,19 +5,28 @@
 //! what is missing is told, and the same input gives the same result, byte for byte.
 
 mod absent;
+mod asked;
 mod assemble;
+mod outcome;
 mod places;
 mod remarks;
 mod uid;
 
+use crate::Verdict;
 use crate::config::Config;
-use crate::xqar::{Issue, Metadata, Param, Results, Status};
+use crate::xqar::{Issue, Results};
 
+pub use asked::NotAsked;
+pub use outcome::{Asked, BundleOutcome, CheckerOutcome, Ending, in_the_answer};
 pub use places::{NoPlaces, Resolver, XPathPlace};
 pub use uid::is_rule_uid;
 
 /// The name of the bundle in which qcbus speaks for itself.
 pub const OWN_BUNDLE: &str = "qcbus";
+
+/// Key of the metadata of a checker that could not look, which ASAM's format calls `skipped` like
+/// one that does not apply.
+pub const BLOCKED: &str = "qcbus.blockedBy";
 
 /// What is to be pooled.
 #[derive(Debug)]
@@ -47,48 +56,7 @@ pub enum Scope {
     Alone,
 }
 
-/// What one bundle found.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct BundleOutcome {
-    /// Its name, such as `xodrBundle`.
-    pub name: String,
-    /// Its short name, such as `xodr`; a configuration may use it for the name.
-    pub alias: String,
-    /// Its version.
-    pub version: String,
-    /// Date of its build, `YYYY-MM-DD`.
-    pub build_date: String,
-    /// What it checks.
-    pub description: String,
-    /// Parameters of the bundle beyond the configured ones.
-    pub params: Vec<Param>,
-    /// Its checkers in the order of its catalogue: those that were demanded, and any others for
-    /// which it sent something.
-    pub checkers: Vec<CheckerOutcome>,
-}
-
-/// What one checker found.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct CheckerOutcome {
-    /// Its identifier.
-    pub id: String,
-    /// What it checks.
-    pub description: String,
-    /// The rules that it answers for.
-    pub rule_uids: Vec<String>,
-    /// How it ended; `None`: it never said, which becomes `error`.
-    pub status: Option<Status>,
-    /// Why it was skipped or failed; empty when completed.
-    pub reason: String,
-    /// The parameters that it used.
-    pub params: Vec<Param>,
-    /// Its findings, ids not yet given.
-    pub issues: Vec<Issue>,
-    /// Further facts.
-    pub metadata: Vec<Metadata>,
-}
-
-/// Something that qcbus says itself; becomes an issue of the bundle `qcbus`, never filtered.
+/// Something that qcbus says itself, in the bundle `qcbus`, never filtered.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Remark {
     /// The checker under which it is listed, such as `qcbus_limits`.
@@ -96,7 +64,9 @@ pub struct Remark {
     /// What that checker looks at, in a sentence.
     pub description: String,
     /// The issue: its `rule_uid` becomes an addressed rule of that checker.
-    pub issue: Issue,
+    pub issue: Option<Issue>,
+    /// Why nothing may be accepted as long as this is so.
+    pub open: Option<String>,
 }
 
 /// A pooled result and what a verdict needs to know about it.
@@ -108,8 +78,20 @@ pub struct Pooled {
     pub counts: Counts,
     /// The issues removed, by level as they would have been kept.
     pub removed: Counts,
-    /// The demanded checkers that ended with status error, in the order of the result.
-    pub failed: Vec<FailedChecker>,
+    /// The checkers that did not complete, in the order of the result.
+    pub unfinished: Vec<Unfinished>,
+}
+
+impl Pooled {
+    /// The verdict.
+    pub fn verdict(&self) -> Verdict {
+        Verdict::of(&self.results)
+    }
+
+    /// What keeps the file from being accepted though no error was found.
+    pub fn open(&self) -> impl Iterator<Item = &Unfinished> {
+        self.unfinished.iter().filter(|it| it.ending.is_open())
+    }
 }
 
 /// Numbers of issues.
@@ -123,15 +105,27 @@ pub struct Counts {
     pub information: u64,
 }
 
-/// A demanded checker that did not do its work.
+/// A checker that did not complete.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct FailedChecker {
+pub struct Unfinished {
     /// Name of its bundle.
     pub bundle: String,
     /// Its identifier.
     pub checker: String,
-    /// Why.
-    pub reason: String,
+    /// How it ended.
+    pub ending: Ending,
+}
+
+impl std::fmt::Display for Unfinished {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "{} / {}: {}",
+            self.bundle,
+            self.checker,
+            self.ending.reason()
+        )
+    }
 }
 
 /// Pools what bundles found into one result. Places are completed with `resolver`.

@@ -1,8 +1,8 @@
 //! What qcbus itself has to say: the bundle `qcbus`.
 
-use super::{CheckerOutcome, Counts, OWN_BUNDLE, Remark};
+use super::{CheckerOutcome, Counts, Ending, OWN_BUNDLE, Remark};
 use crate::config::{Config, Levels};
-use crate::xqar::{Issue, Level, Status};
+use crate::xqar::{Issue, Level};
 
 /// Rule: issues that the configuration does not want are removed, and that is said.
 pub(super) const FILTERED: &str = "qcbus.dev:qcbus:1.0.0:pooling.filtered";
@@ -56,7 +56,8 @@ impl Removal {
         Remark {
             checker: String::from("qcbus_filter"),
             description: String::from("Issues that the configuration removes are counted."),
-            issue: information(FILTERED, text),
+            issue: Some(information(FILTERED, text)),
+            open: None,
         }
     }
 }
@@ -74,7 +75,8 @@ pub(super) fn level_order(config: &Config) -> Option<Remark> {
     Some(Remark {
         checker: String::from("qcbus_config"),
         description: String::from("Older ways to write a configuration are understood and told."),
-        issue: information(LEVEL_ORDER, text),
+        issue: Some(information(LEVEL_ORDER, text)),
+        open: None,
     })
 }
 
@@ -91,28 +93,39 @@ fn information(rule: &str, description: String) -> Issue {
 
 /// Remarks as the checkers of the bundle `qcbus`, in the order in which they first speak.
 pub(super) fn to_checkers(remarks: Vec<Remark>) -> Vec<CheckerOutcome> {
-    let mut checkers: Vec<CheckerOutcome> = Vec::new();
-    for Remark {
-        checker: id,
-        description,
-        issue,
-    } in remarks
-    {
-        let at = checkers
-            .iter()
-            .position(|checker| checker.id == id)
-            .unwrap_or_else(|| {
-                checkers.push(CheckerOutcome {
-                    id,
-                    description,
-                    status: Some(Status::Completed),
-                    ..CheckerOutcome::default()
-                });
-                checkers.len() - 1
-            });
-        checkers[at].issues.push(issue);
+    let mut checkers: Vec<(CheckerOutcome, Vec<String>)> = Vec::new();
+    for remark in remarks {
+        let known = checkers.iter().position(|(it, _)| it.id == remark.checker);
+        let at = known.unwrap_or_else(|| {
+            let checker = CheckerOutcome {
+                id: remark.checker,
+                description: remark.description,
+                ..CheckerOutcome::default()
+            };
+            checkers.push((checker, Vec::new()));
+            checkers.len() - 1
+        });
+        checkers[at].0.issues.extend(remark.issue);
+        checkers[at].1.extend(remark.open);
     }
-    checkers
+    let ended = |(mut checker, open): (CheckerOutcome, Vec<String>)| {
+        checker.ending = Some(ending(open));
+        checker
+    };
+    checkers.into_iter().map(ended).collect()
+}
+
+/// How a checker of ours ended: what it leaves open is a failure, or nobody would see it in a result.
+fn ending(open: Vec<String>) -> Ending {
+    let more = open.len().saturating_sub(1);
+    let Some(first) = open.into_iter().next() else {
+        return Ending::Completed;
+    };
+    let reason = match more {
+        0 => first,
+        more => format!("{first} (and {more} more)"),
+    };
+    Ending::Failed { reason }
 }
 
 /// The name that a guest gets who calls itself like qcbus.

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::location::OtherPlace;
+
 /// How severe an issue is. The number is the one written to files; a smaller number is worse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -154,11 +156,14 @@ pub struct Issue {
     pub domain_info: Vec<DomainInfo>,
 }
 
-/// One place, described in one or several ways.
+/// One place, described in one or several ways. When it lies in another file, the ways lead to the
+/// reference in the checked file.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Locations {
     /// What is to be seen here.
     pub description: String,
+    /// Where it is, when it is in another file than the checked one.
+    pub elsewhere: Option<OtherPlace>,
     /// The ways to find it, in the order in which they are written.
     pub places: Vec<Location>,
 }

@@ -4,6 +4,7 @@ use super::{
     Checker, CheckerBundle, DomainInfo, InfoElement, Issue, Level, Location, Locations,
     MAX_INFO_DEPTH, Metadata, Param, Results, Status, numbers, road,
 };
+use crate::location::turn_back;
 use crate::pool::is_rule_uid;
 use crate::xml::{self, Document, Element, Node};
 
@@ -116,7 +117,8 @@ impl Reader<'_> {
         let mut domain_info = Vec::new();
         for child in named(element, "DomainSpecificInfo") {
             let info = self.domain_info(child)?;
-            if !road::from_info(&info, listed, &mut locations) {
+            if !turn_back(&info, &mut locations) && !road::from_info(&info, listed, &mut locations)
+            {
                 domain_info.push(info);
             }
         }
@@ -153,6 +155,7 @@ impl Reader<'_> {
         }
         Ok(Locations {
             description: text(element, "description"),
+            elsewhere: None,
             places,
         })
     }

@@ -40,7 +40,7 @@ pub(super) fn to_info(issue: &Issue) -> Option<DomainInfo> {
             if !apart {
                 attributes.push((String::from("locations"), written.to_string()));
             } else if first {
-                attributes.push((String::from("description"), place.description.clone()));
+                attributes.push((String::from("description"), place.written().into_owned()));
             }
             first = false;
             content.push(InfoElement {
@@ -77,6 +77,7 @@ pub(super) fn from_info(info: &DomainInfo, listed: usize, places: &mut Vec<Locat
             Target::NewPlace(description) => {
                 places.push(Locations {
                     description,
+                    elsewhere: None,
                     places: vec![road],
                 });
             }

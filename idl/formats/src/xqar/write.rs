@@ -179,12 +179,11 @@ impl Writer {
             self.locations(place);
         }
         if !old {
-            for info in issue
-                .domain_info
-                .iter()
-                .chain(road::to_info(issue).as_ref())
-            {
-                info::write(&mut self.out, info);
+            for info in issue.written_info() {
+                info::write(&mut self.out, &info);
+            }
+            if let Some(roads) = road::to_info(issue) {
+                info::write(&mut self.out, &roads);
             }
         }
         self.out.close("Issue");
@@ -192,7 +191,7 @@ impl Writer {
 
     fn locations(&mut self, place: &Locations) {
         self.out
-            .open("Locations", &[("description", &place.description)]);
+            .open("Locations", &[("description", &*place.written())]);
         let mut written = false;
         for location in &place.places {
             written |= self.location(location);

@@ -2,7 +2,7 @@
 
 #![allow(dead_code, reason = "every test file uses a part of it")]
 
-use qcbus_formats::pool::{BundleOutcome, CheckerOutcome, PoolInput, Scope};
+use qcbus_formats::pool::{BundleOutcome, CheckerOutcome, Ending, PoolInput, Scope};
 use qcbus_formats::xqar::{
     Checker, CheckerBundle, DomainInfo, InfoElement, Issue, Level, Location, Locations, Metadata,
     Param, Results, Status,
@@ -35,6 +35,7 @@ pub fn xml_place(xpath: &str) -> Locations {
     }];
     Locations {
         description: "the road".into(),
+        elsewhere: None,
         places,
     }
 }
@@ -44,7 +45,7 @@ pub fn checker(id: &str, issues: Vec<Issue>) -> CheckerOutcome {
         id: id.into(),
         description: format!("Looks at {id}."),
         rule_uids: vec![UID.into()],
-        status: Some(Status::Completed),
+        ending: Some(Ending::Completed),
         issues,
         ..CheckerOutcome::default()
     }
@@ -57,8 +58,8 @@ pub fn bundle(name: &str, alias: &str, checkers: Vec<CheckerOutcome>) -> BundleO
         version: "0.1.0".into(),
         build_date: "2025-01-31".into(),
         description: format!("The bundle {name}."),
-        params: Vec::new(),
         checkers,
+        ..BundleOutcome::default()
     }
 }
 
@@ -101,10 +102,12 @@ pub fn full() -> Results {
     rich.locations = vec![
         Locations {
             description: "road 5".into(),
+            elsewhere: None,
             places: vec![file, xml, inertial, road.clone()],
         },
         Locations {
             description: "its end".into(),
+            elsewhere: None,
             places: vec![road.clone(), road],
         },
     ];
@@ -126,6 +129,7 @@ pub fn full() -> Results {
     late.rule_uid = OTHER_UID.into();
     late.locations = vec![Locations {
         description: String::new(),
+        elsewhere: None,
         places: vec![
             Location::Time { time: 3.5 },
             Location::Message {

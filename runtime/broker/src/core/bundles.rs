@@ -275,11 +275,10 @@ impl State {
             FromPeer::CheckerDone {
                 job,
                 checker,
-                status,
-                reason,
+                ending,
                 params,
                 metadata,
-            } => self.checker_done(name, job, checker, status, reason, params, metadata),
+            } => self.checker_done(name, job, checker, ending, (params, metadata)),
             FromPeer::JobDone { job, micros } => self.job_done(name, job, micros, actions),
             FromPeer::Heartbeat { .. } => true,
             FromPeer::Leaving => {

@@ -5,15 +5,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use qcbus_document::FileKind;
-use qcbus_formats::xqar::Status;
 use qcbus_messages::{JobId, Verdict};
 
 use super::action::Action;
 use super::files::{FileId, Priority, Stage};
 use super::jobs::{ActiveJob, JobStage, Share};
 use super::notice::Notice;
-use super::outcome::outcome;
-use super::types::{BundleOutcome, CheckerOutcome, FinishedJob, Judged, StoreOutcome};
+use super::outcome::{not_applicable, outcome};
+use super::types::{FinishedJob, Judged, ShareOutcome, StoreOutcome};
 use super::{Actions, State};
 
 impl State {
@@ -73,7 +72,7 @@ impl State {
 
     /// Configured bundles that do not take files of this kind: their checkers are listed as
     /// skipped, so that nobody takes them for lost.
-    fn inapplicable(&self, kind: FileKind) -> Vec<BundleOutcome> {
+    fn inapplicable(&self, kind: FileKind) -> Vec<ShareOutcome> {
         let mut outcomes = Vec::new();
         let named = self.demand.named();
         for (name, bundle) in &self.bundles {
@@ -86,23 +85,9 @@ impl State {
             if !wanted || catalogue.kinds.contains(&kind) {
                 continue;
             }
-            let skipped = |checker| CheckerOutcome {
-                checker,
-                status: Status::Skipped,
-                reason: format!("{name} does not check .{} files", kind.as_str()),
-                params: Vec::new(),
-                issues: Vec::new(),
-                metadata: Vec::new(),
-            };
             let checkers = self.demand.checkers(name, catalogue, kind);
-            outcomes.push(BundleOutcome {
-                name: name.clone(),
-                version: bundle.version.clone(),
-                catalogue: Some(catalogue.clone()),
-                failure: None,
-                checkers: checkers.into_iter().map(skipped).collect(),
-                micros: 0,
-            });
+            let version = &bundle.version;
+            outcomes.push(not_applicable(name, version, catalogue, &checkers, kind));
         }
         outcomes
     }

@@ -1,45 +1,148 @@
 //! What a bundle said about a job, measured, cut to size and put in the form of a result.
 
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use qcbus_document::FileKind;
+use qcbus_formats::pool::{Asked, BundleOutcome, CheckerOutcome, Ending, in_the_answer};
 use qcbus_formats::xqar::{DomainInfo, InfoElement, Issue, Location, Locations, Status};
+use qcbus_messages::{Catalogue, CheckerInfo};
 
 use super::jobs::{Share, ShareState};
-use super::types::{BundleOutcome, CheckerOutcome};
+use super::staging::Staged;
+use super::types::ShareOutcome;
 
-/// What one share says in the result.
-pub(super) fn outcome(name: &str, share: &Share) -> BundleOutcome {
+/// What one share comes to: every demanded checker, and those besides that kept one from looking.
+pub(super) fn outcome(name: &str, share: &Share) -> ShareOutcome {
     let failure = match &share.state {
         ShareState::Failed(why) => Some(why.clone()),
         _ => None,
     };
-    let said = |checker: u32| share.staged.get(&checker).filter(|_| failure.is_none());
-    let checkers = share.demanded.iter().map(|checker| {
-        let staged = said(*checker);
-        let done = staged.and_then(|staged| staged.done.clone());
-        let withheld = staged.map_or(0, |staged| staged.withheld);
-        let kept = staged.map_or(0, |staged| staged.issues.len());
-        let (mut status, mut reason, params, metadata) = done.unwrap_or_else(|| {
-            let why = failure.clone().unwrap_or_else(|| {
-                "the bundle said that it was done without a word on this checker".to_owned()
-            });
-            (Status::Error, why, Vec::new(), Vec::new())
-        });
-        if withheld > 0 {
-            status = Status::Error;
-            reason = format!(
-                "more findings than one checker may report: {kept} are kept, {withheld} were cut off"
-            );
+    let nothing = BTreeMap::new();
+    let staged = match failure {
+        Some(_) => &nothing,
+        None => &share.staged,
+    };
+    let catalogue = share.catalogue.as_deref();
+    let demanded: BTreeSet<u32> = share.demanded.iter().copied().collect();
+    let told = staged.iter().filter(|(_, staged)| staged.done.is_some());
+    let all: BTreeSet<u32> = told
+        .map(|(checker, _)| *checker)
+        .chain(demanded.clone())
+        .collect();
+    let mut asked = BTreeSet::new();
+    let mut checkers = Vec::with_capacity(all.len());
+    for index in all {
+        let Some(offered) = offered(catalogue, index) else {
+            continue;
+        };
+        if demanded.contains(&index) {
+            asked.insert(offered.id.as_str());
         }
-        let issues = staged.map(|staged| staged.issues.clone()).unwrap_or_default();
-        let issues = if status == Status::Skipped { Vec::new() } else { issues };
-        CheckerOutcome { checker: *checker, status, reason, params, issues, metadata }
+        checkers.push(said(offered, staged.get(&index), failure.as_deref()));
+    }
+    let mut kept = in_the_answer(&checkers, |id| asked.contains(id)).into_iter();
+    checkers.retain(|_| kept.next().unwrap_or(true));
+    let mut said = bundle(name, &share.version, catalogue, demanded.len(), checkers);
+    if catalogue.is_none() {
+        let why = failure.clone();
+        said.absent = Some(why.unwrap_or_else(|| format!("{name} has never been seen")));
+    }
+    ShareOutcome {
+        said,
+        catalogue: share.catalogue.clone(),
+        failure,
+        micros: share.micros,
+    }
+}
+
+/// A bundle that does not take files of this kind: each demanded checker says that it does not apply.
+pub(super) fn not_applicable(
+    name: &str,
+    version: &str,
+    catalogue: &Arc<Catalogue>,
+    demanded: &[u32],
+    kind: FileKind,
+) -> ShareOutcome {
+    let offered = demanded
+        .iter()
+        .filter_map(|index| offered(Some(catalogue), *index));
+    let checkers = offered.map(|offered| CheckerOutcome {
+        ending: Some(Ending::NotApplicable {
+            reason: format!("{name} does not check .{} files", kind.as_str()),
+        }),
+        ..described(offered)
     });
+    let checkers = checkers.collect();
+    ShareOutcome {
+        said: bundle(name, version, Some(catalogue), demanded.len(), checkers),
+        catalogue: Some(catalogue.clone()),
+        failure: None,
+        micros: 0,
+    }
+}
+
+fn offered(catalogue: Option<&Catalogue>, index: u32) -> Option<&CheckerInfo> {
+    catalogue?.checkers.get(usize::try_from(index).ok()?)
+}
+
+fn described(offered: &CheckerInfo) -> CheckerOutcome {
+    CheckerOutcome {
+        id: offered.id.clone(),
+        description: offered.description.clone(),
+        rule_uids: offered.rule_uids.clone(),
+        ..CheckerOutcome::default()
+    }
+}
+
+fn bundle(
+    name: &str,
+    version: &str,
+    catalogue: Option<&Catalogue>,
+    asked: usize,
+    checkers: Vec<CheckerOutcome>,
+) -> BundleOutcome {
     BundleOutcome {
         name: name.to_owned(),
-        version: share.version.clone(),
-        catalogue: share.catalogue.clone(),
-        checkers: checkers.collect(),
-        micros: share.micros,
-        failure: failure.clone(),
+        alias: catalogue.map_or_else(String::new, |it| it.alias.clone()),
+        version: version.to_owned(),
+        build_date: catalogue.map_or_else(String::new, |it| it.build_date.clone()),
+        description: catalogue.map_or_else(String::new, |it| it.description.clone()),
+        params: Vec::new(),
+        checkers,
+        absent: None,
+        asked: catalogue.map(|it| Asked {
+            asked,
+            offered: it.checkers.len(),
+        }),
+    }
+}
+
+/// What one checker said, or why it said nothing.
+fn said(offered: &CheckerInfo, staged: Option<&Staged>, failure: Option<&str>) -> CheckerOutcome {
+    let done = staged.and_then(|staged| staged.done.clone());
+    let (mut ending, params, metadata) = done.unwrap_or_else(|| {
+        let silent = "the bundle said that it was done without a word on this checker";
+        let reason = failure.unwrap_or(silent).to_owned();
+        (Ending::Failed { reason }, Vec::new(), Vec::new())
+    });
+    let (kept, withheld) = staged.map_or((0, 0), |it| (it.issues.len(), it.withheld));
+    if withheld > 0 {
+        ending = Ending::Failed {
+            reason: format!(
+                "more findings than one checker may report: {kept} are kept, {withheld} were cut off"
+            ),
+        };
+    }
+    let issues = staged.map(|staged| staged.issues.clone());
+    CheckerOutcome {
+        issues: issues
+            .filter(|_| ending.status() != Status::Skipped)
+            .unwrap_or_default(),
+        ending: Some(ending),
+        params,
+        metadata,
+        ..described(offered)
     }
 }
 
@@ -49,8 +152,14 @@ pub(crate) fn weight(issue: &Issue) -> usize {
         Location::Xml { xpath } => 64 + xpath.len(),
         _ => 64,
     };
-    let places =
-        |it: &Locations| 64 + it.description.len() + it.places.iter().map(place).sum::<usize>();
+    let places = |it: &Locations| {
+        let elsewhere = it.elsewhere.as_ref();
+        let xpath = elsewhere
+            .and_then(|it| it.xpath.as_ref())
+            .map_or(0, String::len);
+        let elsewhere = elsewhere.map_or(0, |it| it.path.len()) + xpath;
+        64 + it.description.len() + elsewhere + it.places.iter().map(place).sum::<usize>()
+    };
     let infos = |it: &DomainInfo| it.name.len() + it.content.iter().map(info_weight).sum::<usize>();
     256 + issue.description.len()
         + issue.rule_uid.len()
@@ -79,6 +188,13 @@ pub(super) fn clip(issue: &mut Issue, max: usize) {
     for place in &mut issue.locations {
         clip_text(&mut place.description, max);
         place.places.truncate(16);
+        if let Some(elsewhere) = &mut place.elsewhere {
+            clip_text(&mut elsewhere.path, max);
+            elsewhere
+                .xpath
+                .iter_mut()
+                .for_each(|xpath| clip_text(xpath, max));
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! What bundles have said about jobs that are not stored yet, and how much of it there may be.
 
-use qcbus_formats::xqar::{Issue, Metadata, Param, Status};
+use qcbus_formats::pool::Ending;
+use qcbus_formats::xqar::{Issue, Metadata, Param};
 use qcbus_messages::JobId;
 
 use super::State;
@@ -8,12 +9,15 @@ use super::bundles::Bundle;
 use super::jobs::{JobStage, Share, ShareState};
 use super::outcome::{clip, clip_text, weight};
 
+/// More checkers need not be named as those in the way of one.
+const MOST_IN_THE_WAY: usize = 64;
+
 /// What one checker has said so far.
 #[derive(Debug, Default)]
 pub(super) struct Staged {
     pub issues: Vec<Issue>,
     pub withheld: u64,
-    pub done: Option<(Status, String, Vec<Param>, Vec<Metadata>)>,
+    pub done: Option<(Ending, Vec<Param>, Vec<Metadata>)>,
 }
 
 /// Which jobs there is room for among the findings that are kept.
@@ -73,24 +77,26 @@ impl State {
     }
 
     /// One checker has ended.
-    #[expect(clippy::too_many_arguments, reason = "the fields of one message")]
     pub(super) fn checker_done(
         &mut self,
         name: &str,
         id: JobId,
         checker: u32,
-        status: Status,
-        reason: String,
-        params: Vec<Param>,
-        metadata: Vec<Metadata>,
+        mut ending: Ending,
+        (params, metadata): (Vec<Param>, Vec<Metadata>),
     ) -> bool {
         let max_text = self.settings.max_text;
         let Some(share) = self.sent_share(name, id, checker) else {
             return false;
         };
-        let mut reason = reason;
-        clip_text(&mut reason, max_text);
-        share.staged.entry(checker).or_default().done = Some((status, reason, params, metadata));
+        if let Some(reason) = ending.reason_mut() {
+            clip_text(reason, max_text);
+        }
+        if let Ending::Blocked { by, .. } = &mut ending {
+            by.truncate(MOST_IN_THE_WAY);
+            by.iter_mut().for_each(|id| clip_text(id, max_text));
+        }
+        share.staged.entry(checker).or_default().done = Some((ending, params, metadata));
         true
     }
 

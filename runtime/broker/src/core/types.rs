@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use qcbus_document::FileKind;
-use qcbus_formats::xqar::{Issue, Metadata, Param, Status};
+use qcbus_formats::pool::BundleOutcome;
 use qcbus_messages::control::FileVerdict;
 use qcbus_messages::{Catalogue, Digest, Job, JobDocument, JobId, MissingDocument, Role, Verdict};
 
@@ -148,36 +148,15 @@ impl Judged {
     }
 }
 
-/// What one checker of one bundle said.
+/// What one bundle's share of a job came to.
 #[derive(Debug, Clone, PartialEq)]
-pub struct CheckerOutcome {
-    /// Index into the catalogue.
-    pub checker: u32,
-    /// How it ended.
-    pub status: Status,
-    /// Why, unless completed.
-    pub reason: String,
-    /// The parameters used.
-    pub params: Vec<Param>,
-    /// The findings.
-    pub issues: Vec<Issue>,
-    /// Further facts.
-    pub metadata: Vec<Metadata>,
-}
-
-/// What one bundle said about one file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BundleOutcome {
-    /// Name.
-    pub name: String,
-    /// Version.
-    pub version: String,
+pub struct ShareOutcome {
+    /// What it said, as it goes into the result.
+    pub said: BundleOutcome,
     /// What it offers; `None` for a bundle that was demanded and never seen.
     pub catalogue: Option<Arc<Catalogue>>,
     /// Why the whole bundle failed, if it did.
     pub failure: Option<String>,
-    /// Its checkers' outcomes, by index.
-    pub checkers: Vec<CheckerOutcome>,
     /// Time spent checking, in microseconds, as the bundle says.
     pub micros: u64,
 }
@@ -198,7 +177,7 @@ pub struct FinishedJob {
     /// Why it could not be read.
     pub unreadable: Option<String>,
     /// By bundle.
-    pub bundles: Vec<BundleOutcome>,
+    pub bundles: Vec<ShareOutcome>,
     /// Those who had to judge, and did.
     pub jury: Arc<Jury>,
     /// The epoch in which they were called: in a later one the job is not to be stored.

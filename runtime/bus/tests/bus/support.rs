@@ -5,8 +5,9 @@ use std::time::Duration;
 
 use qcbus_bus::{Host, HostEvent, HostOptions, Instance, Peer, PeerEvent, PeerId, PeerOptions};
 use qcbus_document::FileKind;
+use qcbus_formats::xqar::Level;
 use qcbus_messages::{
-    Digest, DocumentRole, FromPeer, Hello, Job, JobId, MissingDocument, Role, ToPeer,
+    Absence, Digest, DocumentRole, FromPeer, Hello, Job, JobId, MissingDocument, Role, ToPeer,
 };
 use tempfile::TempDir;
 
@@ -126,10 +127,11 @@ pub fn numbered(number: u64, len: usize) -> FromPeer {
     FromPeer::CheckerDone {
         job: JobId(number),
         checker: 0,
-        status: qcbus_formats::xqar::Status::Completed,
-        reason: char::from(b'a' + (number % 26) as u8)
-            .to_string()
-            .repeat(len),
+        ending: qcbus_formats::pool::Ending::Failed {
+            reason: char::from(b'a' + (number % 26) as u8)
+                .to_string()
+                .repeat(len),
+        },
         params: Vec::new(),
         metadata: Vec::new(),
     }
@@ -146,7 +148,8 @@ pub fn numbered_job(number: u64, len: usize) -> ToPeer {
             role: DocumentRole::Map,
             reference: "x".repeat(len),
             path: String::new(),
-            why: String::new(),
+            why: Absence::NotThere,
+            level: Level::Error,
             referred_at: 0,
         }],
     })

@@ -1,9 +1,9 @@
 //! What becomes of one checker.
 
-use super::super::{CheckerOutcome, Counts, is_rule_uid};
+use super::super::{BLOCKED, CheckerOutcome, Counts, Ending, is_rule_uid};
 use super::summary;
 use crate::config::Selected;
-use crate::xqar::{Checker, Issue, Metadata, Param, Status};
+use crate::xqar::{Checker, Issue, Metadata, Param};
 
 /// The rule of issues whose bundle named none that can be written.
 const UNNAMED: &str = "qcbus.dev:qcbus:1.0.0:pooling.rule_named";
@@ -11,20 +11,24 @@ const UNNAMED: &str = "qcbus.dev:qcbus:1.0.0:pooling.rule_named";
 /// Key of the metadata that keep a rule UID which no reader would accept.
 const UNREADABLE: &str = "qcbus.unreadableRuleUID";
 
-/// A checker that never said how it ended, or says what cannot be, is in error.
-pub(super) fn settle_status(outcome: &mut CheckerOutcome) {
-    let wrong = match outcome.status {
+/// How a checker ended. One that never said, or says what cannot be, has failed.
+pub(super) fn settle(outcome: &mut CheckerOutcome) -> Ending {
+    let wrong = match &outcome.ending {
         None => "the bundle never said how it ended",
-        Some(Status::Skipped) if !outcome.issues.is_empty() => {
+        Some(Ending::NotApplicable { .. } | Ending::Blocked { .. })
+            if !outcome.issues.is_empty() =>
+        {
             "the bundle said that it was skipped, and yet reported issues"
         }
-        Some(_) => return,
+        Some(ending) => return ending.clone(),
     };
-    outcome.status = Some(Status::Error);
-    outcome.reason = match outcome.reason.as_str() {
+    let reason = match outcome.reason() {
         "" => wrong.to_owned(),
         reason => format!("{wrong} ({reason})"),
     };
+    let ending = Ending::Failed { reason };
+    outcome.ending = Some(ending.clone());
+    ending
 }
 
 /// Gives issues their configured level and keeps those that are wanted; returns what was removed.
@@ -48,6 +52,10 @@ pub(super) fn finish(
     removed: Counts,
 ) -> Checker {
     let summary = summary::of_checker(&outcome, removed);
+    let status = Some(outcome.status());
+    outcome
+        .metadata
+        .extend(outcome.ending.as_ref().and_then(blocked));
     let addressed_rules = rules(&mut outcome);
     let mut params = outcome.params;
     for param in configured {
@@ -59,7 +67,7 @@ pub(super) fn finish(
         id: outcome.id,
         description: outcome.description,
         summary,
-        status: outcome.status,
+        status,
         params,
         issues: outcome.issues,
         addressed_rules,
@@ -92,6 +100,22 @@ fn rules(outcome: &mut CheckerOutcome) -> Vec<String> {
     rules
 }
 
+/// What tells a checker that could not look from one that does not apply.
+fn blocked(ending: &Ending) -> Option<Metadata> {
+    let Ending::Blocked { by, .. } = ending else {
+        return None;
+    };
+    let value = match by.as_slice() {
+        [] => String::from("the file"),
+        by => by.join(" "),
+    };
+    Some(Metadata {
+        key: BLOCKED.to_owned(),
+        value,
+        description: String::from("What kept the checker from looking: it owes an answer."),
+    })
+}
+
 fn unreadable(uid: String) -> Metadata {
     Metadata {
         key: UNREADABLE.to_owned(),
@@ -102,15 +126,15 @@ fn unreadable(uid: String) -> Metadata {
 
 /// Adds a second outcome of the same checker to the first.
 pub(super) fn merge(first: &mut CheckerOutcome, second: CheckerOutcome) {
-    let worst = |status: Option<Status>| match status {
-        Some(Status::Skipped) => 0,
-        Some(Status::Completed) => 1,
-        None => 2,
-        Some(Status::Error) => 3,
+    let worst = |ending: &Option<Ending>| match ending {
+        Some(Ending::NotApplicable { .. }) => 0,
+        Some(Ending::Completed) => 1,
+        Some(Ending::Blocked { .. }) => 2,
+        None => 3,
+        Some(Ending::Failed { .. }) => 4,
     };
-    if worst(second.status) > worst(first.status) {
-        first.status = second.status;
-        first.reason = second.reason;
+    if worst(&second.ending) > worst(&first.ending) {
+        first.ending = second.ending;
     }
     first.rule_uids.extend(second.rule_uids);
     first.issues.extend(second.issues);

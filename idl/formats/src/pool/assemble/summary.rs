@@ -21,14 +21,15 @@ pub(super) fn of_bundle(checkers: &[Checker]) -> String {
 
 /// `Skipped: the file is OpenDRIVE 1.4. 0 issues.`
 pub(super) fn of_checker(outcome: &CheckerOutcome, removed: Counts) -> String {
-    let word = match outcome.status {
-        Some(Status::Completed) => "Completed",
-        Some(Status::Skipped) => "Skipped",
-        Some(Status::Error) | None => "Error",
+    let status = outcome.status();
+    let word = match status {
+        Status::Completed => "Completed",
+        Status::Skipped => "Skipped",
+        Status::Error => "Error",
     };
-    let reason = outcome.reason.trim();
+    let reason = outcome.reason().trim();
     let head = match reason {
-        "" if outcome.status == Some(Status::Completed) => String::new(),
+        "" if status == Status::Completed => String::new(),
         "" => format!("{word}. "),
         reason if reason.ends_with(['.', '?', '!']) => format!("{word}: {reason} "),
         reason => format!("{word}: {reason}. "),

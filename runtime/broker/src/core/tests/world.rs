@@ -8,7 +8,8 @@ use std::time::Duration;
 use super::super::*;
 use crate::InForce;
 use qcbus_document::FileKind;
-use qcbus_formats::xqar::{Issue, Level, Status};
+use qcbus_formats::pool::Ending;
+use qcbus_formats::xqar::{Issue, Level};
 use qcbus_messages::control::Response;
 use qcbus_messages::{
     Catalogue, CheckerInfo, Digest, DocId, DocumentRole, FromPeer, Hello, JobDocument, JobId,
@@ -268,14 +269,19 @@ impl World {
                 self.journal.insert(file_of(&path), (*judged).clone());
             }
             Action::Store(job) => {
-                let names: BTreeSet<_> = job.bundles.iter().map(|it| it.name.clone()).collect();
+                let names: BTreeSet<_> =
+                    job.bundles.iter().map(|it| it.said.name.clone()).collect();
                 assert_eq!(
                     names.len(),
                     job.bundles.len(),
                     "no bundle is in a result twice"
                 );
                 for bundle in job.bundles.iter().filter(|it| it.catalogue.is_some()) {
-                    assert_eq!(bundle.checkers.len(), 2, "every demanded checker is there");
+                    assert_eq!(
+                        bundle.said.checkers.len(),
+                        2,
+                        "every demanded checker is there"
+                    );
                 }
                 self.storing.push(*job);
             }
@@ -572,8 +578,7 @@ impl World {
                 FromPeer::CheckerDone {
                     job,
                     checker,
-                    status: Status::Completed,
-                    reason: String::new(),
+                    ending: Ending::Completed,
                     params: Vec::new(),
                     metadata: Vec::new(),
                 },
@@ -627,7 +632,7 @@ impl World {
             StoreOutcome::Failed("full".to_owned())
         } else {
             self.stored.push(file);
-            let names = job.bundles.iter().map(|it| it.name.clone());
+            let names = job.bundles.iter().map(|it| it.said.name.clone());
             self.judges.insert(file, names.collect());
             let failed = job.bundles.iter().any(|bundle| bundle.failure.is_some());
             let judged = Judged {

@@ -1,0 +1,114 @@
+//! The verdict on a file, and the one rule by which a result gets it.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use crate::pool::BLOCKED;
+use crate::xqar::{Checker, Level, Results, Status};
+
+/// What a farm may do with a file. `Undetermined` is never `Accepted`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// Every demanded checker ran or did not apply, and none of the issues kept is an error.
+    Accepted,
+    /// At least one of the issues kept is an error.
+    Rejected,
+    /// A demanded checker crashed, hung, was absent or could not look, and no error was found.
+    Undetermined,
+}
+
+impl Verdict {
+    /// The verdict that a result stands for: rejected by an error; undetermined by a checker that
+    /// should have answered and did not; else accepted. A checker without status, as other tools
+    /// write it, is taken at its issues.
+    pub fn of(results: &Results) -> Verdict {
+        let mut checkers = results.bundles.iter().flat_map(|bundle| &bundle.checkers);
+        let mut issues = checkers.clone().flat_map(|checker| &checker.issues);
+        if issues.any(|issue| issue.level == Level::Error) {
+            Verdict::Rejected
+        } else if checkers.any(is_open) {
+            Verdict::Undetermined
+        } else {
+            Verdict::Accepted
+        }
+    }
+
+    /// The word written to reports and verdict files.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Verdict::Accepted => "accepted",
+            Verdict::Rejected => "rejected",
+            Verdict::Undetermined => "undetermined",
+        }
+    }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.as_str())
+    }
+}
+
+/// Whether a checker owes an answer. ASAM's format calls one that could not look `skipped`, like one
+/// that does not apply: what tells them apart is its metadata.
+fn is_open(checker: &Checker) -> bool {
+    checker.status == Some(Status::Error) || checker.metadata.iter().any(|fact| fact.key == BLOCKED)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::xqar::{CheckerBundle, Issue, Metadata};
+
+    use super::*;
+
+    fn results(status: Option<Status>, level: Option<Level>, blocked: bool) -> Results {
+        let issue = |level| Issue {
+            id: 0,
+            description: String::new(),
+            level,
+            rule_uid: String::new(),
+            locations: Vec::new(),
+            domain_info: Vec::new(),
+        };
+        let fact = Metadata {
+            key: BLOCKED.to_owned(),
+            ..Metadata::default()
+        };
+        let checker = Checker {
+            status,
+            issues: level.map(issue).into_iter().collect(),
+            metadata: blocked.then_some(fact).into_iter().collect(),
+            ..Checker::default()
+        };
+        let bundle = CheckerBundle {
+            checkers: vec![checker],
+            ..CheckerBundle::default()
+        };
+        Results {
+            version: "1.0.0".into(),
+            bundles: vec![bundle],
+        }
+    }
+
+    #[test]
+    fn the_verdict_follows_from_issues_and_statuses() {
+        let of = |status, level| Verdict::of(&results(status, level, false));
+        assert_eq!(of(Some(Status::Completed), None), Verdict::Accepted);
+        assert_eq!(of(Some(Status::Skipped), None), Verdict::Accepted);
+        assert_eq!(of(None, None), Verdict::Accepted);
+        assert_eq!(of(Some(Status::Error), None), Verdict::Undetermined);
+        assert_eq!(of(None, Some(Level::Warning)), Verdict::Accepted);
+        assert_eq!(
+            of(Some(Status::Error), Some(Level::Error)),
+            Verdict::Rejected
+        );
+    }
+
+    #[test]
+    fn a_checker_that_could_not_look_is_no_acceptance() {
+        let blocked = results(Some(Status::Skipped), None, true);
+        assert_eq!(Verdict::of(&blocked), Verdict::Undetermined);
+    }
+}

@@ -1,0 +1,160 @@
+//! What qcbus itself finds in a set of documents: faults and missing references, whoever demanded what.
+
+use qcbus_document::{Document, FaultCode, FaultGroup, Node};
+use qcbus_formats::pool::{BundleOutcome, Remark};
+use qcbus_formats::xqar::{Issue, Level, Location, Locations};
+use qcbus_messages::{Absence, DocumentRole, MissingDocument};
+
+/// Rule: what the file refers to is there and can be read.
+const REFERENCES: &str = "qcbus.dev:qcbus:1.0.0:file.references_resolved";
+/// Rule: the file is whole and well-formed.
+const WELL_FORMED: &str = "qcbus.dev:qcbus:1.0.0:file.well_formed";
+
+/// More of them are counted in one remark.
+const MOST: usize = 100;
+
+/// Everything that qcbus itself has to say about a document set. The faults of the root are said only
+/// when no bundle reports an error: theirs say the same and more.
+pub fn remarks(
+    root: &Document<'_>,
+    missing: &[MissingDocument],
+    bundles: &[BundleOutcome],
+) -> Vec<Remark> {
+    let mut checkers = bundles.iter().flat_map(|bundle| &bundle.checkers);
+    let is_error = |issue: &Issue| issue.level == Level::Error;
+    let mut remarks = if checkers.any(|checker| checker.issues.iter().any(is_error)) {
+        Vec::new()
+    } else {
+        faults_of_root(root)
+    };
+    remarks.extend(missing_references(root, missing));
+    remarks
+}
+
+/// What the root refers to and could not be had, each at its reference. What is not known to lead
+/// nowhere keeps the verdict open.
+pub fn missing_references(root: &Document<'_>, missing: &[MissingDocument]) -> Vec<Remark> {
+    let listed = missing.iter().take(MOST);
+    let mut remarks: Vec<Remark> = listed.map(|it| missing_reference(root, it)).collect();
+    if let Some(rest) = missing.get(MOST..).filter(|rest| !rest.is_empty()) {
+        let level = rest.iter().map(|it| it.level).min();
+        let text = format!("{} further references are not listed", rest.len());
+        let level = level.unwrap_or(Level::Warning);
+        remarks.push(reference_remark(text.clone(), text, level, Vec::new()));
+    }
+    remarks
+}
+
+fn missing_reference(root: &Document<'_>, missing: &MissingDocument) -> Remark {
+    let what = match missing.role {
+        DocumentRole::Map => "the map",
+        DocumentRole::Catalog => "the catalog location",
+        _ => "the scenario",
+    };
+    let MissingDocument {
+        reference,
+        path,
+        why,
+        ..
+    } = missing;
+    let looked = match path.as_str() {
+        "" => String::new(),
+        path if *why == Absence::NotThere && !reference.trim_start().starts_with('/') => {
+            format!(
+                "; it was looked for at {path}, because paths start at the directory of the file"
+            )
+        }
+        path => format!("; it was looked for at {path}"),
+    };
+    let text = format!("{what} `{reference}` {why}{looked}");
+    let open = format!("where {what} `{reference}` leads is not known");
+    let place = place_of(root, missing);
+    reference_remark(text, open, missing.level, vec![place])
+}
+
+fn reference_remark(text: String, open: String, level: Level, locations: Vec<Locations>) -> Remark {
+    Remark {
+        checker: String::from("qcbus_references"),
+        description: String::from("What the file refers to is there and can be read."),
+        open: (level == Level::Warning).then_some(open),
+        issue: Some(Issue {
+            id: 0,
+            description: text,
+            level,
+            rule_uid: REFERENCES.to_owned(),
+            locations,
+            domain_info: Vec::new(),
+        }),
+    }
+}
+
+/// The attribute that holds the reference, else the element.
+fn place_of(root: &Document<'_>, missing: &MissingDocument) -> Locations {
+    let mut nodes = root.root().into_iter().flat_map(|node| node.descendants());
+    let Some(node) = nodes.find(|node| node.offset() == missing.referred_at) else {
+        return place_at(root, missing.referred_at, None, "here");
+    };
+    let attribute = node
+        .attributes()
+        .find(|attribute| attribute.value() == missing.reference);
+    match attribute {
+        Some(attribute) => {
+            let name = attribute.name();
+            let label = format!("attribute `{name}` of element `{}`", node.name());
+            place_at(root, attribute.offset(), Some((node, name)), &label)
+        }
+        None => place_at(root, node.offset(), Some((node, "")), "the reference"),
+    }
+}
+
+fn place_at(
+    root: &Document<'_>,
+    offset: u32,
+    node: Option<(Node<'_>, &str)>,
+    description: &str,
+) -> Locations {
+    let position = root.position(offset);
+    // Results count bytes on disk; those of a transcoded file are others than the image's.
+    let transcoded = root
+        .faults()
+        .any(|fault| fault.code == FaultCode::EncodingTranscoded);
+    let file = Location::File {
+        row: position.row.into(),
+        column: position.column.into(),
+        offset: (!transcoded).then(|| position.offset.into()),
+    };
+    let xml = node.map(|(node, attribute)| Location::Xml {
+        xpath: match attribute {
+            "" => node.xpath(),
+            attribute => format!("{}/@{attribute}", node.xpath()),
+        },
+    });
+    Locations {
+        description: description.to_owned(),
+        elsewhere: None,
+        places: std::iter::once(file).chain(xml).collect(),
+    }
+}
+
+/// The faults of the root itself for which no bundle was asked: a file of which only a part is known
+/// is not accepted because of what was demanded. None when the file is whole.
+pub fn faults_of_root(root: &Document<'_>) -> Vec<Remark> {
+    let partial = root.faults().filter(|fault| fault.code.makes_partial());
+    let remark = |fault: qcbus_document::Fault<'_>| {
+        let limit = fault.code.group() == FaultGroup::Limit;
+        Remark {
+            checker: String::from("qcbus_file"),
+            description: String::from("The file is whole and can be read."),
+            open: limit.then(|| fault.text.to_owned()),
+            issue: Some(Issue {
+                id: 0,
+                description: fault.text.to_owned(),
+                level: Level::Error,
+                rule_uid: WELL_FORMED.to_owned(),
+                locations: vec![place_at(root, fault.offset, None, fault.code.as_str())],
+                domain_info: Vec::new(),
+            }),
+        }
+    };
+    partial.take(MOST).map(remark).collect()
+}

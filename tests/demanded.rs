@@ -1,0 +1,121 @@
+//! What a configuration demands: a demanded checker that could not look is no answer, and how little
+//! was asked is said.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::path::Path;
+
+use support::desk::{Desk, Said, sample_farm};
+
+fn check_with(desk: &Desk, bundle: &str, checkers: &[&str], file: &Path) -> Said {
+    let checkers: String = checkers
+        .iter()
+        .map(|id| format!("<Checker checkerId=\"{id}\"/>"))
+        .collect();
+    desk.write(
+        "config.xml",
+        format!(
+            "<Config><CheckerBundle application=\"{bundle}\">{checkers}</CheckerBundle></Config>"
+        ),
+    );
+    let file = file.to_string_lossy();
+    desk.qcbus(&["check", "-c", "config.xml", &file])
+}
+
+const IDS: &str = "check_asam_xodr_ids_id_unique_in_class";
+
+#[test]
+fn what_a_demanded_checker_rests_on_counts_whoever_demanded_it() {
+    let desk = Desk::new();
+    let broken = sample_farm().join("faulty/not_well_formed.xodr");
+    let said = check_with(&desk, "xodrBundle", &[IDS], &broken);
+    let whole = said.whole(&desk);
+    assert_eq!(said.code, Some(1), "{whole}");
+    assert!(said.stdout.contains("not_well_formed.xodr:40:5"), "{whole}");
+    let results = desk.result("Result.xqar");
+    let ids: Vec<&str> = results.bundles[0]
+        .checkers
+        .iter()
+        .map(|checker| checker.id.as_str())
+        .collect();
+    assert_eq!(ids.first(), Some(&IDS), "what is configured comes first");
+    assert!(
+        ids.contains(&"check_asam_xodr_xml_valid_xml_document"),
+        "{ids:?}"
+    );
+}
+
+#[test]
+fn a_module_tells_what_kept_a_demanded_checker_from_looking() {
+    let desk = Desk::new();
+    let broken = sample_farm().join("faulty/not_well_formed.xodr");
+    desk.write(
+        "config.xml",
+        format!(
+            "<Config><Param name=\"InputFile\" value=\"{}\"/><CheckerBundle \
+             application=\"xodrBundle\"><Checker checkerId=\"{IDS}\"/></CheckerBundle></Config>",
+            broken.display()
+        ),
+    );
+    let said = desk.qcbus(&["bundle", "run", "xodr", "-c", "config.xml"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    let results = desk.result("xodrBundle.xqar");
+    let found = results.bundles[0]
+        .checkers
+        .iter()
+        .find(|checker| checker.id == "check_asam_xodr_xml_valid_xml_document");
+    assert_eq!(found.map(|checker| checker.issues.len()), Some(1));
+}
+
+#[test]
+fn a_filter_on_what_a_checker_rests_on_makes_no_acceptance() {
+    let desk = Desk::new();
+    let broken = sample_farm().join("faulty/not_well_formed.xodr");
+    desk.write(
+        "config.xml",
+        format!(
+            "<Config><CheckerBundle application=\"xodrBundle\"><Checker checkerId=\"{IDS}\"/>\
+             <Checker checkerId=\"check_asam_xodr_xml_valid_xml_document\" maxLevel=\"3\" \
+             minLevel=\"3\"/></CheckerBundle></Config>"
+        ),
+    );
+    let said = desk.qcbus(&["check", "-c", "config.xml", &broken.to_string_lossy()]);
+    assert_eq!(said.code, Some(3), "{}", said.whole(&desk));
+}
+
+#[test]
+fn how_little_was_asked_is_said_in_one_line() {
+    let desk = Desk::new();
+    let good = sample_farm().join("maps/ring.xodr");
+    let said = check_with(&desk, "xodrBundle", &[IDS], &good);
+    let whole = said.whole(&desk);
+    assert_eq!(said.code, Some(0), "{whole}");
+    let line = said.stdout.lines().find(|line| line.contains("not asked"));
+    let line = line.unwrap_or_else(|| panic!("{whole}")).trim();
+    let words: Vec<&str> = line.split(' ').collect();
+    let [
+        "not",
+        "asked:",
+        out,
+        "of",
+        "the",
+        all,
+        "checkers",
+        "of",
+        "xodrBundle",
+    ] = words[..]
+    else {
+        panic!("{line}")
+    };
+    let (out, all): (usize, usize) = (out.parse().unwrap(), all.parse().unwrap());
+    assert!(out + 1 == all && all > 200, "{line}");
+
+    let plain = desk.qcbus(&["check", &good.to_string_lossy()]);
+    assert!(!plain.stdout.contains("not asked"), "{}", plain.stdout);
+}

@@ -1,0 +1,338 @@
+//! What a file refers to counts: a scenario whose map or catalog cannot be had is not accepted.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::fs::File;
+use std::os::unix::fs::{PermissionsExt, symlink};
+use std::process::Command;
+
+use qcbus_formats::xqar::{Location, Results};
+use support::desk::{Desk, sample_farm};
+
+const MAP: &str = "../maps/quay_straight.xodr";
+const CATALOGS: &str = "../catalogs";
+
+/// Where the reference to the map stands, and that to the catalogs: row and column.
+const AT_MAP: (u64, u64) = (11, 16);
+const AT_CATALOGS: (u64, u64) = (7, 18);
+
+/// A scenario, its verdict, and what is said of its reference.
+struct Case {
+    name: &'static str,
+    text: String,
+    verdict: &'static str,
+    said: Option<(&'static str, (u64, u64))>,
+}
+
+fn scenario() -> String {
+    std::fs::read_to_string(sample_farm().join("scenarios/van_follows.xosc")).unwrap()
+}
+
+/// The sample scenario with another path to its map.
+fn map(
+    name: &'static str,
+    path: &str,
+    verdict: &'static str,
+    said: impl Into<Option<&'static str>>,
+) -> Case {
+    Case {
+        name,
+        text: scenario().replace(MAP, path),
+        verdict,
+        said: said.into().map(|said| (said, AT_MAP)),
+    }
+}
+
+/// The sample scenario with another path to its catalogs.
+fn catalogs(name: &'static str, path: &str, verdict: &'static str, said: &'static str) -> Case {
+    Case {
+        name,
+        text: scenario().replace(CATALOGS, path),
+        verdict,
+        said: Some((said, AT_CATALOGS)),
+    }
+}
+
+/// A file that varies the parameters of another scenario.
+fn distribution(
+    name: &'static str,
+    path: &str,
+    verdict: &'static str,
+    said: impl Into<Option<&'static str>>,
+) -> Case {
+    let text = format!(
+        "<?xml version=\"1.0\"?>\n<OpenSCENARIO>\n<FileHeader revMajor=\"1\" revMinor=\"2\" \
+         date=\"2026-03-02T08:00:00\" description=\"d\" author=\"qcbus\"/>\n\
+         <ParameterValueDistribution>\n<ScenarioFile filepath=\"{path}\"/>\n<Deterministic/>\n\
+         </ParameterValueDistribution>\n</OpenSCENARIO>\n"
+    );
+    Case {
+        name,
+        text,
+        verdict,
+        said: said.into().map(|said| (said, (5, 15))),
+    }
+}
+
+const NOT_THERE: &str = "is not there";
+
+fn cases() -> Vec<Case> {
+    let unused =
+        "<RouteCatalog><Directory path=\"../routes\"/></RouteCatalog>\n  </CatalogLocations>";
+    vec![
+        map("whole", MAP, "accepted", None),
+        map(
+            "backslashes",
+            "..\\maps\\quay_straight.xodr",
+            "accepted",
+            None,
+        ),
+        map(
+            "simulators_own",
+            "Town05",
+            "accepted",
+            "a map that the simulator knows",
+        ),
+        map("missing", "../maps/gone.xodr", "rejected", NOT_THERE),
+        map(
+            "missing_spelt",
+            "..\\maps\\a%20b.xodr",
+            "rejected",
+            NOT_THERE,
+        ),
+        map(
+            "missing_absolute",
+            "/nowhere/gone.xodr",
+            "rejected",
+            NOT_THERE,
+        ),
+        map(
+            "missing_url_of_file",
+            "file:///nowhere/gone.xodr",
+            "rejected",
+            NOT_THERE,
+        ),
+        map(
+            "below_a_file",
+            "../maps/quay_straight.xodr/a.xodr",
+            "rejected",
+            NOT_THERE,
+        ),
+        map(
+            "dangling_link",
+            "../maps/dangling.xodr",
+            "rejected",
+            NOT_THERE,
+        ),
+        map("directory", "../maps", "rejected", "is a directory"),
+        map(
+            "broken",
+            "../maps/broken.xodr",
+            "rejected",
+            "broken.xodr:2:",
+        ),
+        map(
+            "lacks_include",
+            "../maps/lacks.xodr",
+            "rejected",
+            "lacks.xodr:2:",
+        ),
+        map(
+            "looping_link",
+            "../maps/loop.xodr",
+            "undetermined",
+            "cannot be read",
+        ),
+        map(
+            "pipe",
+            "../maps/pipe.xodr",
+            "undetermined",
+            "a device, pipe or socket",
+        ),
+        map(
+            "remote",
+            "https://maps.example/a.xodr",
+            "undetermined",
+            "nothing is fetched",
+        ),
+        map(
+            "too_large",
+            "../maps/large.xodr",
+            "undetermined",
+            "is too large",
+        ),
+        map(
+            "parameter",
+            "$road/a.xodr",
+            "undetermined",
+            "the parameter `$road`",
+        ),
+        map(
+            "expression",
+            "${1 + 2}.xodr",
+            "undetermined",
+            "is an expression",
+        ),
+        map("empty", "", "undetermined", "is an empty path"),
+        catalogs("no_catalogs", "../nowhere", "rejected", NOT_THERE),
+        catalogs(
+            "catalogs_file",
+            "../maps/notes.txt",
+            "undetermined",
+            "notes.txt:1:",
+        ),
+        catalogs("broken_catalog", "../half", "undetermined", "half.xosc:1:"),
+        catalogs(
+            "many_catalogs",
+            "../many",
+            "undetermined",
+            "more than 48 documents",
+        ),
+        Case {
+            name: "unused_catalogs",
+            text: scenario().replace("</CatalogLocations>", unused),
+            verdict: "undetermined",
+            said: Some((NOT_THERE, (9, 28))),
+        },
+        distribution("varied", "whole.xosc", "accepted", None),
+        distribution("varied_missing", "gone.xosc", "rejected", NOT_THERE),
+    ]
+}
+
+/// Everything that the cases refer to.
+fn desk() -> Desk {
+    let desk = Desk::new();
+    let farm = |name: &str| std::fs::read(sample_farm().join(name)).unwrap();
+    desk.write("maps/quay_straight.xodr", farm("maps/quay_straight.xodr"));
+    desk.write("catalogs/vehicles.xosc", farm("catalogs/vehicles.xosc"));
+    desk.write("half/half.xosc", "<OpenSCENARIO><Catalog");
+    desk.write("maps/notes.txt", "not a catalog");
+    desk.write("maps/broken.xodr", "<OpenDRIVE>\n<road></OpenDRIVE>");
+    desk.write(
+        "maps/lacks.xodr",
+        "<OpenDRIVE><header revMajor=\"1\" revMinor=\"7\"/>\n<include file=\"gone.xml\"/></OpenDRIVE>",
+    );
+    for number in 0..60 {
+        let name = format!("many/{number}.xosc");
+        desk.write(&name, farm("catalogs/vehicles.xosc"));
+    }
+    let at = |name: &str| desk.path().join("maps").join(name);
+    symlink("gone.xodr", at("dangling.xodr")).unwrap();
+    symlink("loop.xodr", at("loop.xodr")).unwrap();
+    let made = Command::new("mkfifo").arg(at("pipe.xodr")).status();
+    assert!(made.unwrap().success());
+    // Sparse: nothing of it is read.
+    let large = File::create(at("large.xodr")).unwrap();
+    large.set_len((1 << 30) + 1).unwrap();
+    desk
+}
+
+/// Descriptions of what qcbus itself says of references, with their places.
+fn remarks(results: &Results) -> Vec<(String, (u64, u64))> {
+    let own = results.bundles.iter().filter(|it| it.name == "qcbus");
+    let checkers = own.flat_map(|bundle| &bundle.checkers);
+    let of_references = checkers.filter(|checker| checker.id == "qcbus_references");
+    let issues = of_references.flat_map(|checker| &checker.issues);
+    let place = |places: &[Location]| match places.first() {
+        Some(Location::File { row, column, .. }) => (*row, *column),
+        other => panic!("{other:?}"),
+    };
+    issues
+        .map(|it| (it.description.clone(), place(&it.locations[0].places)))
+        .collect()
+}
+
+fn assert_said(case: &Case, results: &Results, whole: &str) {
+    let remarks = remarks(results);
+    let Some((said, at)) = case.said else {
+        assert!(remarks.is_empty(), "{}: {remarks:?}", case.name);
+        return;
+    };
+    let hit = remarks
+        .iter()
+        .any(|(text, place)| text.contains(said) && *place == at);
+    assert!(hit, "{}: {said} at {at:?}: {remarks:?}\n{whole}", case.name);
+}
+
+#[test]
+fn what_a_scenario_refers_to_counts() {
+    let desk = desk();
+    let cases = cases();
+    for case in &cases {
+        desk.write(&format!("scenarios/{}.xosc", case.name), &case.text);
+    }
+    let said = desk.qcbus(&["check", "scenarios", "--out", "out"]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    for case in &cases {
+        let name = format!("{}.xosc", case.name);
+        let line = format!("{}: {name}: ", case.verdict);
+        assert!(said.stdout.contains(&line), "{line}\n{}", said.whole(&desk));
+        let results = desk.result(&format!("out/{name}.xqar"));
+        assert_said(case, &results, &said.whole(&desk));
+    }
+}
+
+fn code_of(verdict: &str) -> Option<i32> {
+    Some(match verdict {
+        "accepted" => 0,
+        "rejected" => 1,
+        _ => 3,
+    })
+}
+
+#[test]
+fn a_bundle_without_a_broker_says_the_same() {
+    let desk = desk();
+    // A broker keeps few documents at a time on the bus; a bundle by itself has them in memory.
+    for case in cases().iter().filter(|case| case.name != "many_catalogs") {
+        let name = format!("scenarios/{}.xosc", case.name);
+        desk.write("scenarios/whole.xosc", scenario());
+        desk.write(&name, &case.text);
+        let said = desk.qcbus(&["bundle", "run", "xosc", &name]);
+        let whole = said.whole(&desk);
+        assert_eq!(said.code, code_of(case.verdict), "{}: {whole}", case.name);
+        let text = case.said.map_or("", |(text, _)| text);
+        assert!(said.stdout.contains(text), "{}: {whole}", case.name);
+    }
+}
+
+#[test]
+fn a_module_of_asams_framework_says_the_same() {
+    let desk = desk();
+    let input = desk.write(
+        "scenarios/missing.xosc",
+        scenario().replace(MAP, "gone.xodr"),
+    );
+    desk.write(
+        "config.xml",
+        format!(
+            "<Config><Param name=\"InputFile\" value=\"{}\"/>\
+             <CheckerBundle application=\"xoscBundle\"/></Config>",
+            input.display()
+        ),
+    );
+    let said = desk.qcbus(&["bundle", "run", "xosc", "-c", "config.xml"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    let remarks = remarks(&desk.result("xoscBundle.xqar"));
+    assert_eq!(remarks.len(), 1, "{remarks:?}");
+}
+
+#[test]
+fn a_map_that_may_not_be_read_is_no_acceptance() {
+    let desk = desk();
+    let locked = desk.path().join("maps/quay_straight.xodr");
+    std::fs::set_permissions(&locked, PermissionsExt::from_mode(0o000)).unwrap();
+    if File::open(&locked).is_ok() {
+        println!("skipped: this user may read everything");
+        return;
+    }
+    desk.write("scenarios/locked.xosc", scenario());
+    let said = desk.qcbus(&["check", "scenarios"]);
+    assert_eq!(said.code, Some(3), "{}", said.whole(&desk));
+}
