@@ -83,6 +83,7 @@ pub fn settings(args: &LimitArgs) -> Settings {
     let mut settings = Settings::default();
     settings.job_deadline = args.job_deadline.unwrap_or(settings.job_deadline);
     settings.silence_limit = args.silence_limit.unwrap_or(settings.silence_limit);
+    settings.absence_limit = args.absence_limit.unwrap_or(settings.absence_limit);
     settings.max_restarts = args.max_restarts.unwrap_or(settings.max_restarts);
     settings
 }
