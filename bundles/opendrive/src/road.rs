@@ -12,7 +12,7 @@ use crate::names::Names;
 use crate::plan_view::{END_TOLERANCE, PlanView};
 use crate::profile::Profile;
 use crate::section_ref::SectionRef;
-use crate::steps::Place;
+use crate::station::Station;
 use crate::surface::Frame;
 use crate::touching::TouchingLanes;
 use crate::value::{ContactPoint, LayerKind, known, number};
@@ -252,17 +252,17 @@ impl<'a> Road<'a> {
 
     /// The pose of the reference line at `s`; `None` outside of the road (more than 1 µm before
     /// the start, or beyond both `@length` and the last geometry's end).
-    pub fn pose(&self, s: impl Into<Place>) -> Option<Pose> {
-        let place = s.into();
+    pub fn pose(&self, s: impl Into<Station>) -> Option<Pose> {
+        let station = s.into();
         let end = match (self.length(), self.plan_view().end()) {
             (Some(length), Some(end)) => length.max(end),
             (one, other) => one.or(other)?,
         };
-        let on_road = place.x() >= -END_TOLERANCE && place.x() <= end + END_TOLERANCE;
+        let on_road = station.x() >= -END_TOLERANCE && station.x() <= end + END_TOLERANCE;
         if !on_road {
             return None;
         }
-        self.plan_view().pose(place)
+        self.plan_view().pose(station)
     }
 
     /// The pose of the reference line at one of its ends, in the direction of s: where the first

@@ -2,7 +2,7 @@ use std::cell::OnceCell;
 use std::collections::BTreeSet;
 
 use qcbus_opendrive::geometry::Point;
-use qcbus_opendrive::{Junction, Place, Road, RoadMap};
+use qcbus_opendrive::{Junction, Road, RoadMap, Station};
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
 use crate::families::junction_area::{boundary, ring};
@@ -180,8 +180,9 @@ fn parts<'m, 'a>(map: &'m RoadMap<'a>) -> Vec<Part<'m, 'a>> {
 /// A box that a road cannot leave: no point of it is farther from both ends together than its length.
 fn reach(road: &Road<'_>) -> Option<Extent> {
     let length = road.length().filter(|length| *length > 0.0)?;
-    let [start, end] = [road.pose(0.0)?, road.pose(Place::before(length))?];
-    let edges = [Place::at(0.0), Place::before(length)].map(|place| traffic_edges(road, place));
+    let [start, end] = [road.pose(0.0)?, road.pose(Station::before(length))?];
+    let edges =
+        [Station::at(0.0), Station::before(length)].map(|station| traffic_edges(road, station));
     let width = edges
         .into_iter()
         .flatten()
@@ -265,8 +266,8 @@ fn fine(ring: &[Point]) -> impl Iterator<Item = Point> {
 /// The pieces of a road.
 fn pieces(road: &Road<'_>) -> Vec<Patch> {
     let range = [0.0, road.length().unwrap_or(0.0)];
-    strip(road, range, STEP, SHRINK, |place| {
-        traffic_edges(road, place)
+    strip(road, range, STEP, SHRINK, |station| {
+        traffic_edges(road, station)
     })
 }
 
