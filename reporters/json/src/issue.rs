@@ -1,7 +1,7 @@
 //! One issue.
 
 use qcbus_formats::xqar::{Issue, Location};
-use qcbus_reporter_sdk::{Place, places};
+use qcbus_reporter_sdk::{IssueLocation, issue_locations};
 use serde::Serialize;
 
 use crate::xml;
@@ -120,7 +120,7 @@ pub(crate) fn issue<'r>(issue: &'r Issue, input: &str) -> IssueJson<'r> {
         rule_uid: &issue.rule_uid,
         locations: locations(issue),
         domain_specific_info: issue.domain_info.iter().map(xml::text).collect(),
-        places: places(issue)
+        places: issue_locations(issue)
             .into_iter()
             .map(|each| place(each, input))
             .collect(),
@@ -186,7 +186,7 @@ impl<'r> LocationsJson<'r> {
     }
 }
 
-fn place(place: Place, input: &str) -> PlaceJson {
+fn place(place: IssueLocation, input: &str) -> PlaceJson {
     let pair = |(row, column)| RowColumn { row, column };
     PlaceJson {
         path: place.path.unwrap_or_else(|| input.to_owned()),

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use qcbus_formats::xqar::{DomainInfo, InfoElement, Level};
 use qcbus_messages::ResultMessage;
-use qcbus_reporter_sdk::{Place, Sources, one_line, printable};
+use qcbus_reporter_sdk::{IssueLocation, Sources, one_line, printable};
 
 use crate::Finding;
 use crate::paint::Paint;
@@ -55,7 +55,14 @@ impl View<'_> {
         }
     }
 
-    fn place(&self, out: &mut String, place: &Place, level: Level, gutter: usize, main: bool) {
+    fn place(
+        &self,
+        out: &mut String,
+        place: &IssueLocation,
+        level: Level,
+        gutter: usize,
+        main: bool,
+    ) {
         let arrow = self.paint.frame(if main { "-->" } else { ":::" });
         let _ = writeln!(out, "{:gutter$}{arrow} {}", "", self.name(place));
         let shown = self.snippet(out, place, level, gutter);
@@ -77,7 +84,7 @@ impl View<'_> {
     }
 
     /// `PATH:ROW:COLUMN`, as far as known.
-    fn name(&self, place: &Place) -> String {
+    fn name(&self, place: &IssueLocation) -> String {
         let mut name = match &place.path {
             Some(path) => printable(&self.shortened(path)),
             None => printable(&self.result.display_path),
@@ -97,7 +104,13 @@ impl View<'_> {
     }
 
     /// The source line with marks; says whether there was one.
-    fn snippet(&self, out: &mut String, place: &Place, level: Level, gutter: usize) -> bool {
+    fn snippet(
+        &self,
+        out: &mut String,
+        place: &IssueLocation,
+        level: Level,
+        gutter: usize,
+    ) -> bool {
         let Some(row) = place.row else { return false };
         let path = place.path.as_deref().unwrap_or(&self.result.input);
         let near = place.column.unwrap_or(1);
@@ -140,7 +153,7 @@ impl View<'_> {
 
 /// Columns for the largest row number that may be shown. Larger rows than files have are other
 /// tools' nonsense.
-fn gutter(places: &[Place]) -> usize {
+fn gutter(places: &[IssueLocation]) -> usize {
     let rows = places.iter().filter_map(|place| place.row);
     rows.max().map_or(1, |row| row.to_string().len().min(8))
 }
@@ -155,7 +168,7 @@ fn rule_of(finding: &Finding<'_>) -> String {
     }
 }
 
-fn facts(place: &Place) -> String {
+fn facts(place: &IssueLocation) -> String {
     let mut facts = Vec::new();
     if let Some(xpath) = &place.xpath {
         facts.push(xpath.clone());

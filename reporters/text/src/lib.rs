@@ -20,7 +20,7 @@ use qcbus_formats::xqar::{Checker, CheckerBundle, Issue};
 use qcbus_messages::ResultMessage;
 #[cfg(doc)]
 use qcbus_reporter_sdk::Output;
-use qcbus_reporter_sdk::{Place, Sources, places};
+use qcbus_reporter_sdk::{IssueLocation, Sources, issue_locations};
 
 use paint::Paint;
 
@@ -53,7 +53,7 @@ pub(crate) struct Finding<'r> {
     pub(crate) bundle: &'r CheckerBundle,
     pub(crate) checker: &'r Checker,
     pub(crate) issue: &'r Issue,
-    pub(crate) places: Vec<Place>,
+    pub(crate) places: Vec<IssueLocation>,
 }
 
 /// The report of one result: its issues in the order of their places, then the verdict and the
@@ -89,7 +89,7 @@ fn findings(result: &ResultMessage) -> Vec<Finding<'_>> {
             bundle,
             checker,
             issue,
-            places: places(issue),
+            places: issue_locations(issue),
         };
         checker.issues.iter().map(finding)
     });

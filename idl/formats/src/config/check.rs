@@ -4,8 +4,8 @@ use std::collections::HashSet;
 
 use super::lookup::{canonical_bundle, reporter_names};
 use super::{
-    BundleConfig, CheckerConfig, Config, ConfigParam, INPUT_PARAMS, LEVEL_PARAM, Notice, Place,
-    ReportConfig, reporter_for, same_bundle,
+    BundleConfig, CheckerConfig, Config, ConfigParam, INPUT_PARAMS, LEVEL_PARAM, Notice,
+    ReportConfig, TextPosition, reporter_for, same_bundle,
 };
 use crate::distance::did_you_mean;
 
@@ -97,7 +97,7 @@ fn check_bundle(bundle: &BundleConfig, known: &Known, notices: &mut Vec<Notice>)
         .iter()
         .find(|b| same_bundle(application, &b.name, &b.alias));
     let Some(found) = found else {
-        notices.push(unknown_bundle(application, bundle.place, known));
+        notices.push(unknown_bundle(application, bundle.position, known));
         return;
     };
     let mut names: HashSet<&str> = FRAMEWORK_PARAMS.into_iter().chain(INPUT_PARAMS).collect();
@@ -122,12 +122,12 @@ fn named_before(bundle: &BundleConfig, before: &[BundleConfig], known: &Known) -
     let text = format!(
         "`{}` in row {} is the same bundle as `{}`; put everything into the first one, only that \
          counts",
-        first.application, first.place.row, bundle.application
+        first.application, first.position.row, bundle.application
     );
-    Some(Notice::warning(bundle.place, text))
+    Some(Notice::warning(bundle.position, text))
 }
 
-fn unknown_bundle(application: &str, place: Place, known: &Known) -> Notice {
+fn unknown_bundle(application: &str, position: TextPosition, known: &Known) -> Notice {
     let names = known
         .bundles
         .iter()
@@ -147,7 +147,7 @@ fn unknown_bundle(application: &str, place: Place, known: &Known) -> Notice {
         _ => String::new(),
     };
     Notice::warning(
-        place,
+        position,
         format!("no bundle is called `{application}`{meant}{there}"),
     )
 }
@@ -181,7 +181,7 @@ fn unknown_checker(checker: &CheckerConfig, bundle: &KnownBundle, known: &Known)
         "bundle `{}` has no checker `{}`{hint}",
         bundle.name, checker.id
     );
-    Notice::warning(checker.place, text)
+    Notice::warning(checker.position, text)
 }
 
 fn check_params(
@@ -199,7 +199,7 @@ fn check_params(
         near.sort_unstable();
         let hint = did_you_mean(&param.name, near);
         notices.push(Notice::warning(
-            param.place,
+            param.position,
             format!("{what} `{}`{hint}", param.name),
         ));
     }
@@ -221,7 +221,7 @@ fn check_report(report: &ReportConfig, known: &Known) -> Option<Notice> {
         hint => hint,
     };
     Some(Notice::warning(
-        report.place,
+        report.position,
         format!("no reporter is called `{name}`{hint}"),
     ))
 }

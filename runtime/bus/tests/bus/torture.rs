@@ -6,7 +6,7 @@
 use std::time::{Duration, Instant};
 
 use crate::helper::Helper;
-use crate::support::{Place, files_of, fresh_number, identity_of, run, shared_memory_named};
+use crate::support::{Site, files_of, fresh_number, identity_of, run, shared_memory_named};
 
 const BUNDLES: usize = 3;
 
@@ -33,12 +33,12 @@ fn random_kills_lose_nothing_and_leave_nothing() {
     let seconds = from_environment("QCBUS_TORTURE_SECONDS").unwrap_or(15);
     println!("QCBUS_TORTURE_SEED={seed}");
     let mut dice = Dice(seed);
-    let place = Place::new();
-    let start = |role| Helper::start(role, &place.instance);
+    let site = Site::new();
+    let start = |role| Helper::start(role, &site.instance);
     let mut broker = start("serves");
     let mut bundles: Vec<Helper> = (0..BUNDLES).map(|_| start("answers_jobs")).collect();
     assert!(broker.line().starts_with("serves"));
-    let identity = identity_of(&place.instance);
+    let identity = identity_of(&site.instance);
 
     let until = Instant::now() + Duration::from_secs(seconds);
     let (mut kills, mut jobs) = (0, 0);
@@ -68,8 +68,8 @@ fn random_kills_lose_nothing_and_leave_nothing() {
         bundle.kill();
     }
     run(async move {
-        drop(place.host());
-        assert_eq!(files_of(&place.instance), Vec::<String>::new());
+        drop(site.host());
+        assert_eq!(files_of(&site.instance), Vec::<String>::new());
         assert_eq!(shared_memory_named(&identity), Vec::<String>::new());
     });
 }

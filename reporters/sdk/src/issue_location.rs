@@ -3,9 +3,9 @@
 use qcbus_formats::location::OtherPlace;
 use qcbus_formats::xqar::{Issue, Location, Locations};
 
-/// One place of an issue, put together from the several ways in which a result says where.
+/// Where an issue shows, put together from the several ways in which a result says where.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Place {
+pub struct IssueLocation {
     /// The file; `None` is the checked file itself.
     pub path: Option<String>,
     /// Line, from 1. Other tools' 0 for "unknown" has become `None`.
@@ -33,10 +33,10 @@ pub struct Place {
 }
 
 /// The places of an issue in their order; the first is the main one.
-pub fn places(issue: &Issue) -> Vec<Place> {
+pub fn issue_locations(issue: &Issue) -> Vec<IssueLocation> {
     let elsewhere = OtherPlace::of_issue(issue);
     if let ([], [place]) = (issue.locations.as_slice(), elsewhere.as_slice()) {
-        return vec![moved(place, Place::default(), "")];
+        return vec![moved(place, IssueLocation::default(), "")];
     }
     let place_of = |locations: &Locations| {
         let gathered = gather(locations);
@@ -56,10 +56,10 @@ pub fn places(issue: &Issue) -> Vec<Place> {
 }
 
 /// Everything that one `Locations` says.
-fn gather(locations: &Locations) -> Place {
-    let mut place = Place {
+fn gather(locations: &Locations) -> IssueLocation {
+    let mut place = IssueLocation {
         description: locations.description.trim().to_owned(),
-        ..Place::default()
+        ..IssueLocation::default()
     };
     let mut seen_file = false;
     for location in &locations.places {
@@ -82,7 +82,7 @@ fn gather(locations: &Locations) -> Place {
     place
 }
 
-fn gather_one(place: &mut Place, location: &Location) {
+fn gather_one(place: &mut IssueLocation, location: &Location) {
     match location {
         Location::File { .. } => {}
         Location::Xml { xpath } => {
@@ -105,11 +105,11 @@ fn gather_one(place: &mut Place, location: &Location) {
 }
 
 /// What was gathered is the reference in the checked file; the place itself is in the other file.
-fn moved(other: &OtherPlace, gathered: Place, description: &str) -> Place {
+fn moved(other: &OtherPlace, gathered: IssueLocation, description: &str) -> IssueLocation {
     let referred_at = gathered
         .row
         .map(|row| (row, gathered.column.unwrap_or_default()));
-    Place {
+    IssueLocation {
         description: description.trim().to_owned(),
         referred_at,
         offset: None,
@@ -168,7 +168,7 @@ mod tests {
 
     #[test]
     fn a_place_in_another_file_keeps_where_it_is_referred_to() {
-        let found = places(&issue(
+        let found = issue_locations(&issue(
             vec![at("here", 3, 4), at("/m/t.xodr:12:5: the road", 7, 9)],
             vec![elsewhere("/m/t.xodr", 12, 5).to_info()],
         ));
@@ -182,7 +182,7 @@ mod tests {
 
     #[test]
     fn a_longer_number_is_another_place() {
-        let found = places(&issue(
+        let found = issue_locations(&issue(
             vec![at("/m/t.xodr:12:51: x", 7, 9), at("y", 1, 1)],
             vec![elsewhere("/m/t.xodr", 12, 5).to_info()],
         ));
@@ -199,14 +199,14 @@ mod tests {
                 offset: None,
             });
         }
-        let found = places(&issue(vec![locations], Vec::new()));
+        let found = issue_locations(&issue(vec![locations], Vec::new()));
         assert_eq!((found[0].row, found[0].column), (None, None));
         assert_eq!(found[0].also, [(8, 0)]);
     }
 
     #[test]
     fn without_locations_the_other_file_is_the_place() {
-        let found = places(&issue(
+        let found = issue_locations(&issue(
             Vec::new(),
             vec![elsewhere("/c.xosc", 0, 4).to_info()],
         ));
