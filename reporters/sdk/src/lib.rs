@@ -16,7 +16,7 @@ mod loaded;
 mod once;
 mod outlet;
 mod output;
-mod session;
+mod responder;
 mod shelf;
 mod sources;
 
@@ -27,7 +27,7 @@ pub use loaded::{LoadError, load, verdict_of};
 pub use once::{OnceError, OneShot, report_once};
 pub use outlet::{Outlet, Subject};
 pub use output::{Output, param, replace_file};
-pub use session::Session;
+pub use responder::Responder;
 pub use shelf::{Format, Shelf};
 pub use sources::{Answer, BothSources, FileSources, ImageSources, Line, NoSources, Sources};
 
