@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use qcbus_document::{Document, FileKind};
 
-use crate::finding::{Finding, Limits, Report, Rest};
 use crate::model::Schema;
 use crate::validate::Overlay;
 use crate::versions::{SkipReason, Version, select, version_of};
+use crate::violation::{Limits, Report, Rest, Violation};
 
 /// A schema brought by the user, used instead of the shipped one.
 #[derive(Clone, Debug)]
@@ -34,13 +34,13 @@ pub struct Source {
 /// How to check.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// How many findings are listed.
+    /// How many violations are listed.
     pub limits: Limits,
     /// The user's schemas; the first that fits is used.
     pub overrides: Vec<Override>,
 }
 
-/// How much a finding weighs.
+/// How much a violation weighs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Severity {
     /// The file breaks its schema.
@@ -76,9 +76,9 @@ pub struct Checked<'a> {
     /// The default namespace of the root, which was disregarded: the published schemas have none,
     /// or one that no file uses.
     pub namespace: Option<&'a str>,
-    /// The findings in order of discovery.
-    pub findings: Vec<Finding<'a>>,
-    /// Findings beyond the limits, counted by kind.
+    /// The violations in order of discovery.
+    pub violations: Vec<Violation<'a>>,
+    /// Violations beyond the limits, counted by kind.
     pub rest: Vec<Rest>,
 }
 
@@ -118,7 +118,7 @@ impl Checked<'_> {
             .collect()
     }
 
-    /// How much the findings of a kind weigh that are only counted.
+    /// How much the violations of a kind weigh that are only counted.
     pub fn severity_of_rest(&self, rest: &Rest) -> Severity {
         match rest.known_schema_defect {
             _ if self.newer => Severity::Information,
@@ -127,9 +127,9 @@ impl Checked<'_> {
         }
     }
 
-    /// How much a finding weighs.
-    pub fn severity(&self, finding: &Finding<'_>) -> Severity {
-        match finding.known_schema_defect {
+    /// How much a violation weighs.
+    pub fn severity(&self, violation: &Violation<'_>) -> Severity {
+        match violation.known_schema_defect {
             _ if self.newer => Severity::Information,
             Some(_) => Severity::Warning,
             None => Severity::Error,
@@ -189,7 +189,7 @@ fn checked<'a>(
     } else {
         Overlay::None
     };
-    let Report { findings, rest } = schema.validate_with(document, options.limits, overlay);
+    let Report { violations, rest } = schema.validate_with(document, options.limits, overlay);
     let namespace = document
         .root()
         .and_then(|root| root.attr("xmlns"))
@@ -201,7 +201,7 @@ fn checked<'a>(
         newer,
         modular,
         namespace,
-        findings,
+        violations,
         rest,
     }
 }

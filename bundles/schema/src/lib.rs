@@ -10,7 +10,6 @@ mod check;
 mod compile;
 mod constraint;
 mod defects;
-mod finding;
 #[doc(hidden)]
 pub mod generate;
 mod model;
@@ -22,6 +21,7 @@ mod similar;
 mod simple;
 mod validate;
 mod versions;
+mod violation;
 mod work;
 
 pub use assertion::XPathProblem;
@@ -30,10 +30,10 @@ pub use check::{Checked, Fact, Options, Outcome, Override, Severity, Source, che
 pub use compile::{CompileError, Problem, compile};
 #[doc(hidden)]
 pub use defects::known_conditions;
-pub use finding::{Code, Finding, Limits, Report, Rest};
 pub use model::{Edition, Schema};
 pub use notation::NotationError;
 pub use regex::{Pattern, PatternError};
 pub use simple::Expectation;
 pub use validate::Overlay;
 pub use versions::{SHIPPED, Shipped, SkipReason, Version, version_of};
+pub use violation::{Code, Limits, Report, Rest, Violation};

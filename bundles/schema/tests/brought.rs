@@ -144,7 +144,7 @@ fn the_schema_for_a_version_comes_before_the_one_for_all() {
         match check(&open(&image), FileKind::Xodr, &options) {
             Outcome::Checked(checked) => (
                 checked.provenance()[0].value.clone(),
-                checked.findings.len(),
+                checked.violations.len(),
             ),
             Outcome::Skipped(reason) => panic!("{reason}"),
         }

@@ -6,7 +6,7 @@ use qcbus_formats::xqar::{DomainInfo, InfoElement, Level};
 use qcbus_messages::ResultMessage;
 use qcbus_reporter_sdk::{IssueLocation, Sources, one_line, printable};
 
-use crate::Finding;
+use crate::Entry;
 use crate::paint::Paint;
 use crate::snippet::snippet;
 use crate::wrap::wrap;
@@ -21,20 +21,20 @@ pub(crate) struct View<'v> {
 
 impl View<'_> {
     /// Writes headline, places with source lines, rule and reason.
-    pub(crate) fn write(&self, out: &mut String, finding: &Finding<'_>, why: Option<&str>) {
-        let gutter = gutter(&finding.places);
-        self.headline(out, finding);
-        for (number, place) in finding.places.iter().enumerate() {
-            self.place(out, place, finding.issue.level, gutter, number == 0);
+    pub(crate) fn write(&self, out: &mut String, entry: &Entry<'_>, why: Option<&str>) {
+        let gutter = gutter(&entry.places);
+        self.headline(out, entry);
+        for (number, place) in entry.places.iter().enumerate() {
+            self.place(out, place, entry.issue.level, gutter, number == 0);
         }
-        if finding.places.is_empty() {
+        if entry.places.is_empty() {
             let path = printable(&self.result.display_path);
             let arrow = self.paint.frame("-->");
             let _ = writeln!(out, "{:gutter$}{arrow} {path}", "");
         }
         let mut note = |name: &str, text: &str| self.note(out, gutter, name, text);
-        note("rule", &rule_of(finding));
-        for info in &finding.issue.domain_info {
+        note("rule", &rule_of(entry));
+        for info in &entry.issue.domain_info {
             if info.name != qcbus_formats::location::NAME {
                 note(&one_line(&info.name), &flat(info));
             }
@@ -44,9 +44,9 @@ impl View<'_> {
         }
     }
 
-    fn headline(&self, out: &mut String, finding: &Finding<'_>) {
-        let level = finding.issue.level;
-        let text = printable(finding.issue.description.trim());
+    fn headline(&self, out: &mut String, entry: &Entry<'_>) {
+        let level = entry.issue.level;
+        let text = printable(entry.issue.description.trim());
         let mut lines = text.lines();
         let first = self.paint.bold(lines.next().unwrap_or("(no description)"));
         let _ = writeln!(out, "{}: {first}", self.paint.level(level, level.as_str()));
@@ -160,9 +160,9 @@ fn gutter(places: &[IssueLocation]) -> usize {
 
 /// The rule's UID and the checker; ASAM's checkers carry the rule's name, so both are needed to
 /// look either up.
-fn rule_of(finding: &Finding<'_>) -> String {
-    let checker = format!("{}/{}", finding.bundle.name, finding.checker.id);
-    match finding.issue.rule_uid.as_str() {
+fn rule_of(entry: &Entry<'_>) -> String {
+    let checker = format!("{}/{}", entry.bundle.name, entry.checker.id);
+    match entry.issue.rule_uid.as_str() {
         "" => checker,
         uid => format!("{uid} ({checker})"),
     }

@@ -9,7 +9,6 @@ mod archive;
 mod count;
 mod decode;
 mod error;
-mod finding;
 #[doc(hidden)]
 pub mod fuzzing;
 mod limits;
@@ -17,6 +16,7 @@ mod prepare;
 mod prepared;
 mod read;
 mod references;
+mod text_fault;
 mod unpack;
 mod xml;
 
