@@ -9,7 +9,7 @@ use crate::validate::Overlay;
 use crate::versions::{SkipReason, Version, select, version_of};
 use crate::violation::{Limits, Report, Rest, Violation};
 
-/// A schema brought by the user, used instead of the shipped one.
+/// A user schema: used instead of the shipped one.
 #[derive(Clone, Debug)]
 pub struct Override {
     /// The kind of file it is for.
@@ -65,7 +65,7 @@ pub enum Outcome<'a> {
 pub struct Checked<'a> {
     /// What the schema is called, e.g. `OpenDRIVE 1.7`.
     pub schema: String,
-    /// The files that the user brought it in; empty for a shipped one.
+    /// The files of a user schema; empty for a shipped one.
     pub sources: Arc<[Source]>,
     /// The version the header names.
     pub version: Option<Version>,
@@ -112,7 +112,7 @@ impl Checked<'_> {
             .map(|file| {
                 fact(
                     format!("{} sha256:{}", file.path, file.sha256),
-                    "a file of the schema that the file was compared with, brought by the user",
+                    "a file of the schema that the file was compared with, given by the user",
                 )
             })
             .collect()
@@ -143,16 +143,16 @@ pub fn check<'a>(document: &Document<'a>, kind: FileKind, options: &Options) -> 
         return Outcome::Skipped(SkipReason::IllFormed);
     }
     let version = version_of(document, kind);
-    let brought = options
+    let own = options
         .overrides
         .iter()
         .find(|one| same_kind(one.kind, kind) && (one.version.is_none() || one.version == version));
-    if let Some(brought) = brought {
+    if let Some(own) = own {
         return Outcome::Checked(checked(
             document,
             kind,
             options,
-            (&brought.schema, brought.sources.clone()),
+            (&own.schema, own.sources.clone()),
             (version, false),
         ));
     }
