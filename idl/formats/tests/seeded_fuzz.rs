@@ -49,7 +49,7 @@ const MARKUP: [&[u8]; 14] = [
 ];
 
 /// Bytes removed, doubled, replaced and inserted.
-fn bend(bytes: &mut Vec<u8>, random: &mut Random) {
+fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
     for _ in 0..=random.below(4) {
         let at = random.below(bytes.len());
         let end = (at + random.below(40)).min(bytes.len());
@@ -71,7 +71,7 @@ fn run(seeds: &[String], body: fn(&[u8]), rounds: u64) {
         body(seed.as_bytes());
         for round in 0..rounds {
             let mut bytes = seed.clone().into_bytes();
-            bend(&mut bytes, &mut Random(round));
+            damage(&mut bytes, &mut Random(round));
             body(&bytes);
         }
     }
