@@ -132,15 +132,9 @@ fn an_interrupt_is_a_good_bye_too() {
 fn bundle_add_and_remove_do_the_same_for_a_supervised_one() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
-    let (zoo, bundles_d) = (zoo(), farm.bundles_d());
+    let zoo = zoo();
     let edit = |arguments: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
-        command
-            .arg("bundle")
-            .args(&arguments[..1])
-            .arg("--bundles-d")
-            .arg(&bundles_d);
-        let said = command.args(&arguments[1..]).output().unwrap();
+        let said = farm.qcbus(&[&["bundle"], arguments].concat());
         assert!(
             said.status.success(),
             "{}",

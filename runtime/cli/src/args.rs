@@ -297,16 +297,30 @@ pub struct BusArgs {
 /// `qcbus bundle add`.
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "Example:\n  \
-qcbus bundle add mine /opt/mine/bundle --bundles-d DIR -- --its-own-flag")]
+qcbus bundle add mine /opt/mine/bundle -- --its-own-flag")]
 pub struct BundleAddArgs {
     /// The bundle's name, as it says it itself
     pub name: String,
     /// The program and its arguments; put `--` before arguments that begin with `-`
     #[arg(required = true)]
     pub command: Vec<String>,
-    /// Directory of bundle manifests of the broker (default: qcbus-out/.qcbus/bundles.d)
+    /// Which broker, and which directory.
+    #[command(flatten)]
+    pub manifests: ManifestArgs,
+}
+
+/// Where the manifest of a bundle lies.
+#[derive(Debug, ClapArgs)]
+pub struct ManifestArgs {
+    /// Which broker.
+    #[command(flatten)]
+    pub instance: InstanceArgs,
+    /// Directory of bundle manifests (default: the one that the broker watches)
     #[arg(long, value_name = "DIR")]
     pub bundles_d: Option<PathBuf>,
+    /// For a broker that does not run now (default directory: qcbus-out/.qcbus/bundles.d)
+    #[arg(long)]
+    pub offline: bool,
 }
 
 /// `qcbus bundle remove`.
@@ -314,9 +328,9 @@ pub struct BundleAddArgs {
 pub struct BundleRemoveArgs {
     /// The bundle's name
     pub name: String,
-    /// Directory of bundle manifests of the broker (default: qcbus-out/.qcbus/bundles.d)
-    #[arg(long, value_name = "DIR")]
-    pub bundles_d: Option<PathBuf>,
+    /// Which broker, and which directory.
+    #[command(flatten)]
+    pub manifests: ManifestArgs,
 }
 
 /// `qcbus reporter …`.

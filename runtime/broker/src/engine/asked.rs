@@ -46,7 +46,27 @@ impl Broker {
                 let _ = asked.answer.send(response);
                 true
             }
+            Request::RemoveBundle { name } => {
+                let response = match self.remove_bundle(&name) {
+                    Ok(what) => Response::Removed { what },
+                    Err(reason) => Response::Failed { reason },
+                };
+                let _ = asked.answer.send(response);
+                true
+            }
         }
+    }
+
+    /// Lets a bundle go that no manifest names; says what that means, or why it cannot be.
+    fn remove_bundle(&mut self, name: &str) -> Result<String, String> {
+        if self.loaded.children.iter().any(|child| child.name == name) {
+            return Err(format!(
+                "`{name}` comes with the broker or is named by another manifest; it stays"
+            ));
+        }
+        Err(format!(
+            "no bundle `{name}` is demanded that no manifest names"
+        ))
     }
 
     pub(super) fn wait(
@@ -183,6 +203,7 @@ impl Broker {
             watch_mode: self.watch_mode.clone(),
             out: self.options.out.clone(),
             unseen: self.all_unseen(),
+            bundles_d: self.options.bundles_d.clone(),
             ..self.state.status()
         }
     }

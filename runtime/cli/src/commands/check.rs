@@ -14,7 +14,9 @@ use qcbus_messages::path_text::{from_text, to_text};
 use qcbus_messages::{Exit, Verdict};
 use qcbus_reporter_sdk::FileSources;
 
-use super::settings::{absolute, dialect, limits, memory_limit, named, program, settings};
+use super::settings::{
+    absolute, dialect, limits, manifest_directory, memory_limit, named, program, settings,
+};
 use crate::args::{CheckArgs, Format};
 use crate::{standard, talk};
 
@@ -52,6 +54,8 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         ),
         None => None,
     };
+    let bundles_d = args.bundles_d.as_deref().map(manifest_directory);
+    let bundles_d = bundles_d.transpose().map_err(usage)?;
     let (roots, files) = targets(args, config.as_deref(), parsed.as_ref())?;
     let asam = config.is_some() && roots.is_empty() && files.len() == 1;
     let out = absolute(args.output.out.as_deref().unwrap_or(Path::new(if asam {
@@ -84,7 +88,7 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         verdict_files: false,
         gate: None,
         config,
-        bundles_d: args.bundles_d.as_deref().map(absolute),
+        bundles_d,
         standard: wanted_bundles(bundles.map_err(usage)?, parsed.as_ref()),
         reporters: standard::reporter_specs(&program),
         die_with_broker: true,

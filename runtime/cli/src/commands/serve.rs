@@ -8,7 +8,9 @@ use qcbus_bus::{HostOptions, StartError as BusError};
 use qcbus_messages::Exit;
 use qcbus_messages::path_text::to_text;
 
-use super::settings::{absolute, dialect, instance, limits, memory_limit, program, real, settings};
+use super::settings::{
+    absolute, dialect, instance, limits, manifest_directory, memory_limit, program, real, settings,
+};
 use crate::args::{ReportArg, ServeArgs};
 use crate::{standard, talk};
 
@@ -158,6 +160,10 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         .state
         .as_deref()
         .map_or_else(|| out.join(".qcbus"), absolute);
+    let bundles_d = match &args.bundles_d {
+        Some(named) => manifest_directory(named)?,
+        None => state.join("bundles.d"),
+    };
     let program = program()?;
     let every_kind = qcbus_document::FileKind::ALL.into_iter().collect();
     let mut children = if args.no_standard_bundles {
@@ -181,11 +187,7 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         poll: args.poll,
         rescan: args.rescan,
         single_result: None,
-        bundles_d: Some(
-            args.bundles_d
-                .as_deref()
-                .map_or_else(|| state.join("bundles.d"), absolute),
-        ),
+        bundles_d: Some(bundles_d),
         out,
         state: Some(state),
         retention: args.retention,
