@@ -158,3 +158,125 @@ fn a_running_broker_takes_a_bundle_or_nothing_is_added() {
     );
     assert!(!farm.bundles_d().join("mine.json").exists());
 }
+
+/// Everything that a configuration can name and nobody has.
+const ODD: &str = r#"<Config>
+<Param name="InputFile" value="a.xodr"/>
+<CheckerBundle application="xodr">
+  <Checker checkerId="check_asam_xodr_road_lane_level_true_one_side"/>
+  <Checker checkerId="check_asam_xodr_road_length_sum_geometrie"><Param name="x" value="1"/></Checker>
+  <Checker checkerId="check_asam_xodr_junctions_no_overlap"><Param name="dept" value="1"/></Checker>
+</CheckerBundle>
+<CheckerBundle application="xodrBundel"/>
+<ReportModule application="GithubReport"/>
+</Config>"#;
+
+/// Words of what is wrong with it, and the rows.
+const ODDITIES: [(&str, u32); 4] = [
+    (
+        "`check_asam_xodr_road_length_sum_geometrie`; did you mean",
+        5,
+    ),
+    ("no parameter `dept`; did you mean `depth`", 6),
+    ("no bundle is called `xodrBundel`; did you mean", 8),
+    ("no reporter is called `GithubReport`", 9),
+];
+
+fn says_it_all(text: &str) {
+    for (words, row) in ODDITIES {
+        let place = format!("config.xml:{row}:");
+        let said = text.lines().any(|line| {
+            line.contains(&place) && line.contains(": warning: ") && line.contains(words)
+        });
+        assert!(said, "{words}: {text}");
+    }
+}
+
+#[test]
+fn what_a_configuration_names_in_vain_is_said_wherever_it_is_used() {
+    let desk = Desk::new();
+    desk.write("a.xodr", Content::Good(1).bytes());
+    desk.write("config.xml", ODD);
+    let said = desk.qcbus(&["config", "check", "config.xml"]);
+    refused(&said, &desk, 2, "not in order, 4 warnings");
+    says_it_all(&said.stdout);
+
+    // The unknown checker and the unknown bundle are demanded, and nobody can run them.
+    let said = desk.qcbus(&["check", "-c", "config.xml", "--quiet"]);
+    assert_eq!(said.code, Some(3), "{}", said.whole(&desk));
+    says_it_all(&said.stderr);
+}
+
+#[test]
+fn a_misspelt_parameter_alone_is_said_and_judges_nothing() {
+    let desk = Desk::new();
+    desk.write("a.xodr", Content::Good(1).bytes());
+    let kept: Vec<&str> = ODD
+        .lines()
+        .filter(|line| !line.contains("geometrie\"") && !line.contains("Bundel"))
+        .filter(|line| !line.contains("Github"))
+        .collect();
+    desk.write("config.xml", kept.join("\n"));
+    let said = desk.qcbus(&["check", "-c", "config.xml"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    assert!(
+        said.stderr.contains("did you mean `depth`"),
+        "{}",
+        said.whole(&desk)
+    );
+    assert_eq!(desk.qcbus(&["config", "check", "config.xml"]).code, Some(2));
+
+    desk.write(
+        "config.xml",
+        kept.join("\n").replace("\"dept\"", "\"depth\""),
+    );
+    let said = desk.qcbus(&["config", "check", "config.xml"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    let said = desk.qcbus(&["check", "-c", "config.xml"]);
+    assert_eq!(
+        (said.code, said.stderr.contains("warning")),
+        (Some(0), false)
+    );
+}
+
+#[test]
+fn serve_and_reload_say_what_a_configuration_names_in_vain() {
+    let mut farm = Farm::new();
+    let config = farm.base().join("config.xml");
+    std::fs::write(&config, ODD).unwrap();
+    let config_named = config.to_string_lossy().into_owned();
+    farm.arguments.extend(["-c".to_owned(), config_named]);
+    let _broker = farm.serve_ready();
+    says_it_all(&farm.status().unwrap().notices.join("\n"));
+    std::fs::write(&config, ODD.replace("<Config>", "<Config><!-- new -->")).unwrap();
+    let (code, text) = told(&farm.qcbus(&["reload"]));
+    assert_eq!(code, Some(0), "{text}");
+    says_it_all(&text);
+}
+
+#[test]
+fn a_bundle_of_ones_own_is_known_by_its_manifest() {
+    let desk = Desk::new();
+    let program = idler(desk.path());
+    let add = [
+        "bundle",
+        "add",
+        "mine",
+        &program,
+        "--offline",
+        "--bundles-d",
+        "d",
+    ];
+    assert_eq!(desk.qcbus(&add).code, Some(0));
+    let text = r#"<Config><CheckerBundle application="mine"><Checker checkerId="c"/></CheckerBundle></Config>"#;
+    desk.write("config.xml", text);
+    let check = ["config", "check", "config.xml"];
+    refused(&desk.qcbus(&check), &desk, 2, "not in order, 1 warning:");
+    let said = desk.qcbus(&[&check[..], &["--bundles-d", "d"]].concat());
+    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    assert!(
+        said.stdout.contains("is known only when it has joined"),
+        "{}",
+        said.stdout
+    );
+}

@@ -45,10 +45,13 @@ pub fn closest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) ->
     best.map(|(_, candidate)| candidate)
 }
 
+/// How a hint of [`did_you_mean`] begins.
+pub const DID_YOU_MEAN: &str = "; did you mean ";
+
 /// ``; did you mean `x`?`` to be put behind a message, or nothing when no candidate is near.
 pub fn did_you_mean<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> String {
     match closest(word, candidates) {
-        Some(candidate) => format!("; did you mean `{candidate}`?"),
+        Some(candidate) => format!("{DID_YOU_MEAN}`{candidate}`?"),
         None => String::new(),
     }
 }

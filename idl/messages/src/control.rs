@@ -53,6 +53,9 @@ pub enum Response {
     Reloaded {
         /// For a person.
         changes: Vec<String>,
+        /// What is odd about the configuration and the manifests now in force, for a person.
+        #[serde(default)]
+        notices: Vec<String>,
     },
     /// Answer to `RemoveBundle`: it is not demanded any more.
     Removed {

@@ -364,6 +364,9 @@ pub enum ConfigCommand {
     Check {
         /// The configuration
         file: PathBuf,
+        /// Directory of manifests of further bundles and reporters that it may name
+        #[arg(long, value_name = "DIR")]
+        bundles_d: Option<PathBuf>,
     },
 }
 

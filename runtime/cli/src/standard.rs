@@ -5,8 +5,9 @@ use std::path::Path;
 
 use qcbus_broker::core::{ChildSpec, Restart};
 use qcbus_document::FileKind;
+use qcbus_formats::config::{Known, KnownBundle, KnownChecker};
 use qcbus_messages::Role;
-use qcbus_sdk::{Bundle, UserFiles};
+use qcbus_sdk::{Bundle, Checker, UserFiles};
 
 /// The standard bundles.
 pub static BUNDLES: [&Bundle; 2] = [&qcbus_xodr::BUNDLE, &qcbus_xosc::BUNDLE];
@@ -70,5 +71,30 @@ fn spec(program: &Path, command: &str, alias: &str, name: &str, role: Role) -> C
             alias.to_owned(),
         ],
         restart: Restart::Always,
+    }
+}
+
+/// What a configuration can name: the standard bundles with their checkers and parameters. (The
+/// standard reporters are known to the configuration itself.)
+pub fn known() -> Known {
+    let bundle = |bundle: &&Bundle| {
+        let checker = |checker: Checker| KnownChecker {
+            params: checker
+                .facts
+                .params
+                .iter()
+                .map(|param| param.name.to_owned())
+                .collect(),
+            id: checker.id,
+        };
+        KnownBundle {
+            name: bundle.name.to_owned(),
+            alias: bundle.alias.to_owned(),
+            checkers: Some(bundle.checkers().into_iter().map(checker).collect()),
+        }
+    };
+    Known {
+        bundles: BUNDLES.iter().map(bundle).collect(),
+        ..Known::default()
     }
 }

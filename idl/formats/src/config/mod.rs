@@ -155,6 +155,21 @@ impl ConfigParam {
 }
 
 impl Notice {
+    /// As a line: `FILE:ROW:COLUMN: LEVEL: TEXT`.
+    pub fn line(&self, file: &std::path::Path) -> String {
+        let Notice {
+            level,
+            row,
+            column,
+            text,
+        } = self;
+        format!(
+            "{}:{row}:{column}: {}: {text}",
+            file.display(),
+            level.as_str()
+        )
+    }
+
     pub(crate) fn warning(position: TextPosition, text: String) -> Notice {
         Notice {
             level: Level::Warning,

@@ -36,7 +36,10 @@ impl Broker {
             }
             Request::Reload => {
                 let response = match self.reload() {
-                    Ok(changes) => Response::Reloaded { changes },
+                    Ok(changes) => Response::Reloaded {
+                        changes,
+                        notices: self.loaded.notices.clone(),
+                    },
                     Err(error) => Response::Failed {
                         reason: format!(
                             "nothing was changed, what was in force stays in force: {error}"

@@ -50,7 +50,7 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         Some(path) => Some(
             qcbus_broker::reload::read_config(path)
                 .map_err(|error| usage(error.to_string()))?
-                .0,
+                .config,
         ),
         None => None,
     };
@@ -91,6 +91,7 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         bundles_d,
         standard: wanted_bundles(bundles.map_err(usage)?, parsed.as_ref()),
         reporters: standard::reporter_specs(&program),
+        known: standard::known(),
         die_with_broker: true,
         memory_limit: memory_limit(&args.limits),
         limits: limits(&args.limits),

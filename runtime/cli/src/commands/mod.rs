@@ -33,7 +33,9 @@ pub fn run(args: Args) -> Exit {
         Command::Bundle(BundleCommand::Remove(args)) => manifests::remove(&args),
         Command::Reporter(ReporterCommand::Run { name, bus }) => reporter::run(name, &bus),
         Command::Rule(args) => rule::run(&args),
-        Command::Config(ConfigCommand::Check { file }) => config::check(&file),
+        Command::Config(ConfigCommand::Check { file, bundles_d }) => {
+            config::check(&file, bundles_d.as_deref())
+        }
         Command::Schema(SchemaCommand::Compile { path, output }) => schema::compile(&path, &output),
         Command::Doctor(args) => doctor::run(&args),
     }

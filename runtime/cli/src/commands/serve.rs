@@ -198,6 +198,7 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         config: args.config.as_deref().map(absolute),
         standard: children,
         reporters,
+        known: standard::known(),
         die_with_broker: false,
         memory_limit: memory_limit(&args.limits),
         limits: limits(&args.limits),
