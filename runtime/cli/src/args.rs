@@ -3,7 +3,10 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
+
+use crate::standard::{REPORTERS, StandardReporter};
 
 /// A checker for OpenDRIVE roads and OpenSCENARIO scenarios that parses every file once and lets
 /// independent checker bundles read it in place.
@@ -187,8 +190,8 @@ pub struct ServeArgs {
     #[arg(long, value_name = "DIR")]
     pub gate: Option<PathBuf>,
     /// Run a reporter; may be given several times
-    #[arg(long, value_name = "NAME", value_enum)]
-    pub report: Vec<ReportArg>,
+    #[arg(long, value_name = "NAME", value_parser = reporter())]
+    pub report: Vec<&'static StandardReporter>,
     /// Look around at intervals instead of relying on file events (network file systems)
     #[arg(long, value_name = "TIME", num_args = 0..=1, default_missing_value = "2s", value_parser = duration)]
     pub poll: Option<Duration>,
@@ -207,15 +210,6 @@ pub struct ServeArgs {
     /// Caps.
     #[command(flatten)]
     pub limits: LimitArgs,
-}
-
-/// The standard reporters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ReportArg {
-    /// NAME.txt beside every result
-    Text,
-    /// NAME.json beside every result
-    Json,
 }
 
 /// `qcbus status`.
@@ -338,9 +332,9 @@ pub struct BundleRemoveArgs {
 pub enum ReporterCommand {
     /// Run a reporter on the bus
     Run {
-        /// text or json
-        #[arg(value_enum)]
-        name: ReportArg,
+        /// Which one
+        #[arg(value_parser = reporter())]
+        name: &'static StandardReporter,
         /// How to join the bus.
         #[command(flatten)]
         bus: BusArgs,
@@ -395,6 +389,14 @@ pub struct DoctorArgs {
     /// State directory to look into
     #[arg(long, value_name = "DIR", default_value = "qcbus-out/.qcbus")]
     pub state: PathBuf,
+}
+
+/// Takes a standard reporter by its short name.
+fn reporter() -> impl TypedValueParser<Value = &'static StandardReporter> {
+    let row = |it: &StandardReporter| PossibleValue::new(it.alias).help(it.about);
+    let find = |alias: String| REPORTERS.iter().find(|it| it.alias == alias);
+    PossibleValuesParser::new(REPORTERS.iter().map(row))
+        .try_map(move |alias| find(alias).ok_or("there is no such reporter"))
 }
 
 /// Reads `250ms`, `30s`, `5m`, `2h`, `90d`; a number alone is seconds.

@@ -11,7 +11,7 @@ use qcbus_messages::path_text::to_text;
 use super::settings::{
     absolute, dialect, instance, limits, manifest_directory, memory_limit, program, real, settings,
 };
-use crate::args::{ReportArg, ServeArgs};
+use crate::args::ServeArgs;
 use crate::{standard, talk};
 
 /// Runs the command.
@@ -172,13 +172,7 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         standard::bundle_specs(&program, &every_kind, args.schema_dir.as_deref())?
     };
     let reporters = standard::reporter_specs(&program);
-    for report in &args.report {
-        let name = match report {
-            ReportArg::Text => qcbus_report_text::NAME,
-            ReportArg::Json => qcbus_report_json::NAME,
-        };
-        children.extend(reporters.iter().filter(|spec| spec.name == name).cloned());
-    }
+    children.extend(args.report.iter().map(|report| report.spec(&program)));
     Ok(Options {
         instance: instance(&args.instance)?,
         roots,
