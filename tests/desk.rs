@@ -1,6 +1,12 @@
 //! What is typed at a desk must not succeed by doing nothing: bundles that cannot be added, removed
 //! or found, and configurations that ask for what is not there.
 
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
 mod support;
 
 use std::os::unix::fs::PermissionsExt;

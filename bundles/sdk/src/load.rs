@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use qcbus_document::{Document, FileKind, ImageError};
+use qcbus_document::{Document, FileKind, ImageError, Suffix};
 use qcbus_ingest::{Limits, Prepared, Reference, Role};
 use qcbus_messages::{Digest, DocumentRole, MissingDocument};
 
@@ -30,7 +30,7 @@ struct LinkedImage {
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// Its name promises nothing that can be checked.
-    #[error("check {}: its name ends in none of .xodr, .xodrz, .xodr.gz, .xosc and .mosc", .0.display())]
+    #[error("check {}: its name ends in none of {}", .0.display(), Suffix::list())]
     UnknownKind(PathBuf),
     /// No byte of it could be had.
     #[error("{error}")]

@@ -5,7 +5,7 @@ use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Component, Path, PathBuf};
 
-use qcbus_document::{FaultCode, FileKind};
+use qcbus_document::{FaultCode, FileKind, Suffix};
 
 use crate::archive::{MAIN_MEMBER, is_zip, read_member};
 use crate::decode::decode;
@@ -143,7 +143,7 @@ fn decoded(
 
 fn promises_gzip(path: &Path) -> bool {
     let name = path.to_string_lossy().to_ascii_lowercase();
-    name.ends_with(".gz") || name.ends_with(".xodrz")
+    name.ends_with(".gz") || Suffix::of_path(path).is_some_and(|suffix| suffix.packed)
 }
 
 fn inflate(path: &Path, packed: &[u8], limits: &Limits, faults: &mut Vec<TextFault>) -> Vec<u8> {

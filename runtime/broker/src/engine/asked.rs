@@ -138,7 +138,8 @@ impl Broker {
         let shown = to_text(file);
         if qcbus_document::FileKind::of_path(file).is_none() {
             Some(format!(
-                "{shown} is no file that qcbus checks (.xodr .xodrz .xodr.gz .xosc .mosc)"
+                "{shown} is no file that qcbus checks ({})",
+                qcbus_document::Suffix::list()
             ))
         } else if !self.store.places.contains(file) {
             Some(format!("{shown} lies outside the watched directories"))

@@ -8,7 +8,7 @@ use std::time::Duration;
 use qcbus_broker::core::{Delivery, Judged, Notice, Settings};
 use qcbus_broker::{Broker, Options, ResultPaths, Told};
 use qcbus_bus::{HostOptions, Instance};
-use qcbus_document::FileKind;
+use qcbus_document::{FileKind, Suffix};
 use qcbus_formats::config::Config;
 use qcbus_messages::path_text::{from_text, to_text};
 use qcbus_messages::{Exit, Verdict};
@@ -180,7 +180,8 @@ fn targets(
         } else {
             let shown = to_text(path);
             return Err(usage(format!(
-                "{shown} is no file that qcbus checks (.xodr .xodrz .xodr.gz .xosc .mosc)"
+                "{shown} is no file that qcbus checks ({})",
+                Suffix::list()
             )));
         }
     }
@@ -408,9 +409,10 @@ impl Printer {
             return Exit::Undetermined;
         }
         if total == 0 {
-            talk::fail(
-                "nothing to check: there is no .xodr, .xodrz, .xodr.gz, .xosc or .mosc file",
-            );
+            talk::fail(&format!(
+                "nothing to check: there is no file that qcbus checks ({})",
+                Suffix::list()
+            ));
             return Exit::Usage;
         }
         if total < self.expected.len() {
