@@ -253,7 +253,9 @@ fn serve_and_reload_say_what_a_configuration_names_in_vain() {
     let config_named = config.to_string_lossy().into_owned();
     farm.arguments.extend(["-c".to_owned(), config_named]);
     let _broker = farm.serve_ready();
-    says_it_all(&farm.status().unwrap().notices.join("\n"));
+    let notices = farm.status().unwrap().notices;
+    let texts: Vec<&str> = notices.iter().map(|it| it.text.as_str()).collect();
+    says_it_all(&texts.join("\n"));
     std::fs::write(&config, ODD.replace("<Config>", "<Config><!-- new -->")).unwrap();
     let (code, text) = told(&farm.qcbus(&["reload"]));
     assert_eq!(code, Some(0), "{text}");

@@ -161,6 +161,25 @@ fn bundle_add_and_remove_do_the_same_for_a_supervised_one() {
 }
 
 #[test]
+fn a_bundle_that_joined_by_hand_and_is_gone_for_good_is_removed_by_name() {
+    let farm = Farm::new();
+    let _broker = farm.serve_ready();
+    let bundle = ByHand::start(&farm, &["polite"]);
+    wait_for_state(&farm, "polite", true);
+    bundle.signal(Signal::KILL);
+    wait_for_state(&farm, "polite", false);
+    let remove = || farm.qcbus(&["bundle", "remove", "polite"]);
+    let said = remove();
+    let text = String::from_utf8_lossy(&said.stderr).into_owned();
+    assert_eq!(said.status.code(), Some(0), "{text}");
+    let status = farm.status().unwrap();
+    let left = status.peers.iter().any(|peer| peer.name == "polite");
+    assert!(!left, "{status:#?}");
+    assert_eq!(checkers_of(&farm, "polite", 1), [""; 0]);
+    assert_eq!(remove().status.code(), Some(2));
+}
+
+#[test]
 fn what_was_judged_before_a_bundle_came_is_judged_again_with_it() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();

@@ -50,26 +50,18 @@ impl Broker {
                 true
             }
             Request::RemoveBundle { name } => {
-                let response = match self.remove_bundle(&name) {
-                    Ok(what) => Response::Removed { what },
-                    Err(reason) => Response::Failed { reason },
-                };
-                let _ = asked.answer.send(response);
-                true
+                let ticket = self.ticket(asked.answer);
+                self.handle(Event::RemoveBundle { ticket, name })
             }
         }
     }
 
-    /// Lets a bundle go that no manifest names; says what that means, or why it cannot be.
-    fn remove_bundle(&mut self, name: &str) -> Result<String, String> {
-        if self.loaded.children.iter().any(|child| child.name == name) {
-            return Err(format!(
-                "`{name}` comes with the broker or is named by another manifest; it stays"
-            ));
-        }
-        Err(format!(
-            "no bundle `{name}` is demanded that no manifest names"
-        ))
+    /// Keeps what somebody waits for until the state machine answers.
+    fn ticket(&mut self, answer: oneshot::Sender<Response>) -> Ticket {
+        self.next_ticket += 1;
+        let ticket = Ticket(self.next_ticket);
+        self.tickets.insert(ticket, answer);
+        ticket
     }
 
     pub(super) fn wait(
@@ -79,9 +71,7 @@ impl Broker {
         answer: oneshot::Sender<Response>,
     ) -> bool {
         let file = &*self.as_watched(file);
-        self.next_ticket += 1;
-        let ticket = Ticket(self.next_ticket);
-        self.tickets.insert(ticket, answer);
+        let ticket = self.ticket(answer);
         self.look_at_inputs(file);
         let stamp: Option<Stamp> = stamp_of(file).ok().flatten();
         let unwatched = self.why_unwatched(file, stamp);
