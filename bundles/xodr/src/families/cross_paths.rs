@@ -87,13 +87,14 @@ impl Landing<'_, '_> {
     /// s and t of a point near the landing on the road that is met. The road is followed from
     /// `@s` to the foot of the perpendicular in a few steps.
     pub fn project(&self, point: Point) -> Option<(f64, f64)> {
+        let length = self.other.length().filter(|length| *length >= 0.0)?;
         let mut s = self.s;
         for _ in 0..8 {
             let (ahead, left) = seen_from(self.other.pose(s)?, point);
             if ahead.abs() < 1e-6 {
                 return Some((s, left));
             }
-            s = (s + ahead).clamp(0.0, self.other.length()?);
+            s = (s + ahead).clamp(0.0, length);
         }
         let (_, left) = seen_from(self.other.pose(s)?, point);
         Some((s, left))
