@@ -52,9 +52,7 @@ impl Suffix {
     pub fn of_path(path: &Path) -> Option<Suffix> {
         // Only the end of a name counts; the rest of it need not be UTF-8.
         let name = path.file_name()?.as_encoded_bytes().to_ascii_lowercase();
-        let ends = |it: &Suffix| {
-            name.len() > it.text.len() && name.ends_with(it.text.as_bytes())
-        };
+        let ends = |it: &Suffix| name.len() > it.text.len() && name.ends_with(it.text.as_bytes());
         SUFFIXES.into_iter().find(ends)
     }
 
