@@ -169,7 +169,7 @@ fn unknown_names_are_warned_about_with_their_place() {
         config(&header_faults(), ALL, more).replace(HEADER, "check_qcbus_xodr_header_atributes"),
     );
     let said = desk.qcbus(&["config", "check", "config.xml"]);
-    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
     for (name, row) in [
         ("check_qcbus_xodr_header_atributes", 6),
         ("xodrBundel", 8),

@@ -176,16 +176,16 @@ fn command_of(desk: &Desk, name: &str) -> String {
 fn a_bundle_is_added_where_the_options_say_and_gets_what_follows_two_dashes() {
     let desk = Desk::new();
     let add = |name: &str, further: &[&str]| {
-        let mut arguments = vec!["bundle", "add", name, "/opt/mine/bundle"];
+        let mut arguments = vec!["bundle", "add", name, "/bin/sh", "--offline"];
         arguments.extend(further);
         desk.qcbus(&arguments)
     };
     let said = add("mine", &["--bundles-d", "bundles"]);
     assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
-    assert_eq!(command_of(&desk, "mine"), "/opt/mine/bundle");
+    assert_eq!(command_of(&desk, "mine"), "/bin/sh");
     let own = ["a", "--bundles-d", "bundles", "--", "--bundles-d", "x"];
     assert_eq!(add("other", &own).code, Some(0));
-    let command = "/opt/mine/bundle a --bundles-d x";
+    let command = "/bin/sh a --bundles-d x";
     assert_eq!(command_of(&desk, "other"), command);
     let unclear = add("third", &["--bundles-d", "bundles", "--its-own-flag"]);
     assert_eq!(unclear.code, Some(2));

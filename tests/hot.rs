@@ -132,15 +132,9 @@ fn an_interrupt_is_a_good_bye_too() {
 fn bundle_add_and_remove_do_the_same_for_a_supervised_one() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
-    let (zoo, bundles_d) = (zoo(), farm.bundles_d());
+    let zoo = zoo();
     let edit = |arguments: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
-        command
-            .arg("bundle")
-            .args(&arguments[..1])
-            .arg("--bundles-d")
-            .arg(&bundles_d);
-        let said = command.args(&arguments[1..]).output().unwrap();
+        let said = farm.qcbus(&[&["bundle"], arguments].concat());
         assert!(
             said.status.success(),
             "{}",
@@ -164,6 +158,25 @@ fn bundle_add_and_remove_do_the_same_for_a_supervised_one() {
         let left = processes.iter().any(|it| it.words[0].ends_with("/zoo"));
         (!left).then_some(())
     });
+}
+
+#[test]
+fn a_bundle_that_joined_by_hand_and_is_gone_for_good_is_removed_by_name() {
+    let farm = Farm::new();
+    let _broker = farm.serve_ready();
+    let bundle = ByHand::start(&farm, &["polite"]);
+    wait_for_state(&farm, "polite", true);
+    bundle.signal(Signal::KILL);
+    wait_for_state(&farm, "polite", false);
+    let remove = || farm.qcbus(&["bundle", "remove", "polite"]);
+    let said = remove();
+    let text = String::from_utf8_lossy(&said.stderr).into_owned();
+    assert_eq!(said.status.code(), Some(0), "{text}");
+    let status = farm.status().unwrap();
+    let left = status.peers.iter().any(|peer| peer.name == "polite");
+    assert!(!left, "{status:#?}");
+    assert_eq!(checkers_of(&farm, "polite", 1), [""; 0]);
+    assert_eq!(remove().status.code(), Some(2));
 }
 
 #[test]

@@ -6,6 +6,9 @@
     reason = "a test that cannot go on should panic"
 )]
 
+#[path = "house/documents.rs"]
+mod documents;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -227,68 +230,9 @@ fn no_file_knows_the_machine_it_was_written_on() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-#[test]
-fn paths_named_in_documents_exist() {
-    let root = root();
-    let mut wrong = Vec::new();
-    for file in files(&root) {
-        let markdown = file.extension().is_some_and(|suffix| suffix == "md");
-        let inside_tests = file.starts_with(root.join("tests/farm"));
-        let map = file.starts_with(root.join("docs")) || file.parent() == Some(&root);
-        if !markdown || inside_tests || !map {
-            continue;
-        }
-        let text = std::fs::read_to_string(&file).unwrap();
-        for path in named_paths(&text, &root) {
-            if !root.join(&path).exists() {
-                wrong.push(format!("{} names {path}", file.display()));
-            }
-        }
-    }
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-}
-
-#[test]
-fn the_farm_and_its_table_agree() {
-    let farm = root().join("tests/farm");
-    let table = std::fs::read_to_string(farm.join("README.md")).unwrap();
-    let rows = table.lines().filter_map(|line| line.strip_prefix("| `"));
-    let named: BTreeSet<PathBuf> = rows
-        .filter_map(|row| Some(PathBuf::from(row.split_once('`')?.0)))
-        .collect();
-    let there: BTreeSet<PathBuf> = files(&farm)
-        .into_iter()
-        .map(|file| file.strip_prefix(&farm).unwrap().to_owned())
-        .filter(|file| file.extension().is_some_and(|suffix| suffix != "md"))
-        // Included by another file, no file to check.
-        .filter(|file| file.extension().is_some_and(|suffix| suffix != "xml"))
-        .collect();
-    assert_eq!(named, there);
-}
-
 /// Whether a path may begin after `before`: not in the middle of another one.
 fn starts_a_path(before: &str) -> bool {
     !before.ends_with(|c: char| c.is_alphanumeric() || matches!(c, '.' | '_' | '-' | '}'))
-}
-
-/// What is written in backticks and begins with a directory of ours.
-fn named_paths(text: &str, root: &Path) -> BTreeSet<String> {
-    let quoted = text.split('`').skip(1).step_by(2);
-    let plain = |word: &&str| {
-        word.contains('/')
-            && word
-                .chars()
-                .all(|c| c.is_ascii_alphanumeric() || matches!(c, '/' | '.' | '_' | '-'))
-    };
-    let ours = |word: &&str| {
-        let first = word.split('/').next().unwrap_or_default();
-        !first.is_empty() && first != ".." && first != "target" && root.join(first).is_dir()
-    };
-    quoted
-        .filter(plain)
-        .filter(ours)
-        .map(str::to_owned)
-        .collect()
 }
 
 /// Lines of code with their numbers: comments are free to name anything.
@@ -321,7 +265,7 @@ fn files(directory: &Path) -> Vec<PathBuf> {
             let built = name.starts_with("target") || name == "qcbus-out" || name == ".git";
             if kind.is_dir() && !built {
                 open.push(entry.path());
-            } else if kind.is_file() {
+            } else if kind.is_file() && name != ".git" {
                 found.push(entry.path());
             }
         }

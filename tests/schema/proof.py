@@ -2,7 +2,7 @@
 
 A proof needs more than our word: it takes what is to be shown from the document and the XSD, and it
 puts the one fault right and sees that then both validators find the document valid. What no proof
-fits stays unexplained. `docs/schema.md` has the rules of the standard behind each class.
+fits stays unexplained. `docs/evidence/schema.md` has the rules of the standard behind each class.
 """
 
 import re

@@ -415,11 +415,11 @@ fn other_layer<'m, 'a>(
     layer: LayerKind,
 ) -> Option<SectionRef<'m, 'a>> {
     let road = lane.at.road;
-    let place = match end {
-        ContactPoint::Start => crate::Place::before(lane.at.s()?),
-        ContactPoint::End => crate::Place::at(lane.at.end(side)?),
+    let station = match end {
+        ContactPoint::Start => crate::Station::before(lane.at.s()?),
+        ContactPoint::End => crate::Station::at(lane.at.end(side)?),
     };
-    road.layer(layer)?.section_at(road, side, place)
+    road.layer(layer)?.section_at(road, side, station)
 }
 
 /// The end of the incoming road that lies nearer to the contact point of the target road.

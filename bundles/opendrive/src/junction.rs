@@ -303,9 +303,9 @@ view! {
     }
 }
 
-/// A place on a road given as a number or as one of the road's ends.
+/// A station of a road given as a number or as one of the road's ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum SegmentPlace {
+pub enum SegmentStation {
     /// A number: s in metres.
     S(f64),
     /// An end of the road.
@@ -314,22 +314,22 @@ pub enum SegmentPlace {
 
 impl<'a> BoundarySegment<'a> {
     /// `@sStart` of a lane segment; `begin` is an old word for `start`.
-    pub fn s_start(&self) -> Option<SegmentPlace> {
-        segment_place(self.node.attr("sStart")?)
+    pub fn s_start(&self) -> Option<SegmentStation> {
+        segment_station(self.node.attr("sStart")?)
     }
 
     /// `@sEnd` of a lane segment.
-    pub fn s_end(&self) -> Option<SegmentPlace> {
-        segment_place(self.node.attr("sEnd")?)
+    pub fn s_end(&self) -> Option<SegmentStation> {
+        segment_station(self.node.attr("sEnd")?)
     }
 }
 
-fn segment_place(text: &str) -> Option<SegmentPlace> {
+fn segment_station(text: &str) -> Option<SegmentStation> {
     match text {
-        "begin" => Some(SegmentPlace::End(ContactPoint::Start)),
+        "begin" => Some(SegmentStation::End(ContactPoint::Start)),
         _ => match ContactPoint::parse(text) {
-            Some(end) => Some(SegmentPlace::End(end)),
-            None => parse_number(text).map(SegmentPlace::S),
+            Some(end) => Some(SegmentStation::End(end)),
+            None => parse_number(text).map(SegmentStation::S),
         },
     }
 }

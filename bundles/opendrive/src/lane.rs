@@ -6,7 +6,8 @@ use qcbus_document::Node;
 
 use crate::names::{Name, Names};
 use crate::profile::Profile;
-use crate::steps::{Place, Starts, Steps};
+use crate::station::Station;
+use crate::steps::{Starts, Steps};
 use crate::surface::BorderPoint;
 use crate::value::{ContactPoint, Side, flag, known, numbers, parse_flag, parse_integer};
 use crate::view::view;
@@ -274,7 +275,7 @@ impl<'a> Lane<'a> {
 
     /// How far the height record that is valid at `ds` lifts the lane's borders above the road
     /// surface, inner and outer, in metres: zero without a record.
-    pub fn lift(&self, ds: impl Into<Place>) -> Option<(f64, f64)> {
+    pub fn lift(&self, ds: impl Into<Station>) -> Option<(f64, f64)> {
         let (heights, ds) = (&self.records().heights, ds.into());
         if heights.silent_at(ds) {
             return Some((0.0, 0.0));

@@ -6,7 +6,7 @@ use crate::geometry::finite;
 use crate::lane::Lane;
 use crate::profile::Profile;
 use crate::section_ref::SectionRef;
-use crate::steps::Place;
+use crate::station::Station;
 use crate::value::{ContactPoint, Side};
 
 /// Where a lane stands in the map: road, layer, section and lane by their places in document
@@ -101,21 +101,21 @@ impl<'m, 'a> LaneRef<'m, 'a> {
         self.at.length(self.side().unwrap_or(Side::Right))
     }
 
-    /// The place at an end of the section: at its start, or just before its end.
+    /// The station at an end of the section: at its start, or just before its end.
     #[inline]
-    pub fn end_place(self, end: ContactPoint) -> Option<Place> {
+    pub fn end_station(self, end: ContactPoint) -> Option<Station> {
         match end {
-            ContactPoint::Start => Some(Place::at(0.0)),
+            ContactPoint::Start => Some(Station::at(0.0)),
             ContactPoint::End => self
                 .length()
                 .filter(|length| *length > 0.0)
-                .map(Place::before),
+                .map(Station::before),
         }
     }
 
     /// The width at `ds` metres from the section's start: from `<width>`, or between two
     /// `<border>`s where the side has no widths. Negative in faulty files; zero for the center.
-    pub fn width(self, ds: impl Into<Place>) -> Option<f64> {
+    pub fn width(self, ds: impl Into<Station>) -> Option<f64> {
         let ds = ds.into();
         let Some(side) = self.side() else {
             return Some(0.0);
@@ -128,12 +128,12 @@ impl<'m, 'a> LaneRef<'m, 'a> {
 
     /// The width at an end of the section.
     pub fn width_at(self, end: ContactPoint) -> Option<f64> {
-        self.width(self.end_place(end)?)
+        self.width(self.end_station(end)?)
     }
 
     /// t of the outer border at `ds`, given t of the inner one.
     #[inline]
-    pub(crate) fn outer_from(self, by_width: bool, inner: f64, ds: Place) -> Option<f64> {
+    pub(crate) fn outer_from(self, by_width: bool, inner: f64, ds: Station) -> Option<f64> {
         let side = self.side()?;
         if by_width {
             finite(inner + side.sign() * self.widths().at(ds)?)
@@ -146,8 +146,8 @@ impl<'m, 'a> LaneRef<'m, 'a> {
 
     /// t of a border at `ds` metres from the section's start; `None` when a width further in is
     /// not defined or the ids do not tell the order of the lanes.
-    pub fn t(self, edge: Edge, ds: impl Into<Place>) -> Option<f64> {
-        let center = |section: SectionRef<'m, 'a>, place| section.center_t(place).map(|t| [t]);
+    pub fn t(self, edge: Edge, ds: impl Into<Station>) -> Option<f64> {
+        let center = |section: SectionRef<'m, 'a>, station| section.center_t(station).map(|t| [t]);
         let [t] = self.sum(
             edge,
             ds.into(),
@@ -158,28 +158,28 @@ impl<'m, 'a> LaneRef<'m, 'a> {
     }
 
     /// t of the inner border.
-    pub fn inner_t(self, ds: impl Into<Place>) -> Option<f64> {
+    pub fn inner_t(self, ds: impl Into<Station>) -> Option<f64> {
         self.t(Edge::Inner, ds)
     }
 
     /// t of the outer border.
-    pub fn outer_t(self, ds: impl Into<Place>) -> Option<f64> {
+    pub fn outer_t(self, ds: impl Into<Station>) -> Option<f64> {
         self.t(Edge::Outer, ds)
     }
 
     /// The slope dt/ds of a border.
-    pub fn t_slope(self, edge: Edge, ds: impl Into<Place>) -> Option<f64> {
-        let part = |profile: &Profile<'a>, place| Some([profile.slope_at(place)?]);
-        let [slope] = self.sum(edge, ds.into(), part, |section, place| {
-            Some([section.center_slope(place)?])
+    pub fn t_slope(self, edge: Edge, ds: impl Into<Station>) -> Option<f64> {
+        let part = |profile: &Profile<'a>, station| Some([profile.slope_at(station)?]);
+        let [slope] = self.sum(edge, ds.into(), part, |section, station| {
+            Some([section.center_slope(station)?])
         })?;
         Some(slope)
     }
 
     /// t of a border and its slope dt/ds.
-    pub(crate) fn t_and_slope(self, edge: Edge, ds: Place) -> Option<[f64; 2]> {
-        self.sum(edge, ds, Profile::both_at, |section, place| {
-            Some([section.center_t(place)?, section.center_slope(place)?])
+    pub(crate) fn t_and_slope(self, edge: Edge, ds: Station) -> Option<[f64; 2]> {
+        self.sum(edge, ds, Profile::both_at, |section, station| {
+            Some([section.center_t(station)?, section.center_slope(station)?])
         })
     }
 
@@ -187,9 +187,9 @@ impl<'m, 'a> LaneRef<'m, 'a> {
     fn sum<const N: usize>(
         self,
         edge: Edge,
-        ds: Place,
-        part: impl Fn(&Profile<'a>, Place) -> Option<[f64; N]>,
-        center: impl Fn(SectionRef<'m, 'a>, Place) -> Option<[f64; N]>,
+        ds: Station,
+        part: impl Fn(&Profile<'a>, Station) -> Option<[f64; N]>,
+        center: impl Fn(SectionRef<'m, 'a>, Station) -> Option<[f64; N]>,
     ) -> Option<[f64; N]> {
         let Some(side) = self.side() else {
             return center(self.at, ds);

@@ -10,7 +10,8 @@ use crate::names::{Name, Names};
 use crate::profile::Profile;
 use crate::road::Road;
 use crate::section_ref::SectionRef;
-use crate::steps::{Place, Starts, Steps};
+use crate::station::Station;
+use crate::steps::{Starts, Steps};
 use crate::value::{ContactPoint, LayerKind, Side, flag, known, layer, number};
 
 /// One `<lanes>` element: until 1.8 a road has one, since 1.9 a temporary one may lie over it.
@@ -111,16 +112,16 @@ impl<'a> LaneLayer<'a> {
         &'m self,
         road: &'m Road<'a>,
         side: Side,
-        s: impl Into<Place>,
+        s: impl Into<Station>,
     ) -> Option<SectionRef<'m, 'a>> {
-        let place = s.into();
-        let last = self.steps.index(self.steps.rank_at(place)?)?;
+        let station = s.into();
+        let last = self.steps.index(self.steps.rank_at(station)?)?;
         let mut section = self.section(road, last)?;
         if !section.covers(side) {
             section = section.previous(side)?;
         }
-        let over = section.end(side).is_some_and(|end| place.is_after(end));
-        let at_very_end = section.next(side).is_none() && section.end(side) == Some(place.x());
+        let over = section.end(side).is_some_and(|end| station.is_after(end));
+        let at_very_end = section.next(side).is_none() && section.end(side) == Some(station.x());
         (!over || at_very_end).then_some(section)
     }
 

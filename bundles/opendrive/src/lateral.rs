@@ -5,7 +5,7 @@ use qcbus_document::Node;
 
 use crate::geometry::finite;
 use crate::profile::Profile;
-use crate::steps::Place;
+use crate::station::Station;
 use crate::strips::CrossSectionSurface;
 use crate::value::number;
 
@@ -36,7 +36,7 @@ impl<'a> LateralProfile<'a> {
 
     /// The height above the reference plane that shape or cross section surface give at (s, t),
     /// in metres; zero without either. Combining both is not allowed; then none can be evaluated.
-    pub fn height(&self, s: impl Into<Place>, t: f64) -> Option<f64> {
+    pub fn height(&self, s: impl Into<Station>, t: f64) -> Option<f64> {
         let s = s.into();
         match &self.cross_section_surface {
             None => self.shape.height(s.x(), t),

@@ -28,6 +28,7 @@ mod railroad;
 mod road;
 mod section_ref;
 mod signals;
+mod station;
 mod steps;
 mod strips;
 mod surface;
@@ -39,7 +40,7 @@ pub use joints::{LaneEnd, LaneJoint, RoadContact, RoadEnd};
 pub use junction::{
     Boundary, BoundarySegment, Connection, CrossPath, CrossPathLaneLink, ElevationGrid, GridRow,
     Junction, JunctionController, JunctionLaneLink, JunctionType, Priority, RoadSection,
-    SegmentPlace,
+    SegmentStation,
 };
 pub use lane::{Lane, LaneGroup, LaneHeight, LaneLink, LaneRecord};
 pub use lane_ref::{Edge, LaneKey, LaneRef};
@@ -55,7 +56,8 @@ pub use part::MapPart;
 pub use plan_view::{Geometry, Located, PlanView, ShapeKind};
 pub use profile::{Profile, Record, Stretch, Valid};
 pub use railroad::{
-    Crg, JunctionGroup, JunctionReference, Platform, PlatformSegment, Station, Switch, Track,
+    Crg, JunctionGroup, JunctionReference, Platform, PlatformSegment, RailroadStation, Switch,
+    Track,
 };
 pub use road::{Road, RoadLink, RoadType, TrafficRule};
 pub use section_ref::{LaneSpan, SectionRef};
@@ -63,7 +65,7 @@ pub use signals::{
     Control, Controller, DisplayArea, ElementReference, Signal, SignalBoard, SignalDependency,
     SignalReference, VmsBoardReference, VmsGroup,
 };
-pub use steps::Place;
+pub use station::Station;
 pub use strips::{CrossSectionSurface, Strip, StripMode};
 pub use surface::{BorderPoint, Frame};
 pub use touching::TouchingLanes;

@@ -9,7 +9,7 @@ use crate::junction::Junction;
 use crate::lane_ref::{LaneKey, LaneRef};
 use crate::names::Names;
 use crate::objects::{Object, listed};
-use crate::railroad::{JunctionGroup, Station};
+use crate::railroad::{JunctionGroup, RailroadStation};
 use crate::road::Road;
 use crate::section_ref::SectionRef;
 use crate::signals::{Controller, Signal, VmsGroup};
@@ -162,8 +162,8 @@ impl<'a> RoadMap<'a> {
     }
 
     /// The stations (15.4).
-    pub fn stations(&self) -> impl Iterator<Item = Station<'a>> + use<'a> {
-        listed(self.root, "station").map(Station::of)
+    pub fn stations(&self) -> impl Iterator<Item = RailroadStation<'a>> + use<'a> {
+        listed(self.root, "station").map(RailroadStation::of)
     }
 
     /// The groups of boards with variable messages (14.7), within a road's signals or a junction.

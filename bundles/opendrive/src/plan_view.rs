@@ -3,7 +3,8 @@
 use qcbus_document::Node;
 
 use crate::geometry::{Cubic, Curve, ParamPoly3, ParamRange, Placed, Point, Poly3, Pose, Spiral};
-use crate::steps::{Place, Starts, Steps};
+use crate::station::Station;
+use crate::steps::{Starts, Steps};
 use crate::value::{known, numbers};
 
 /// How far beyond the ends, in metres, a place still counts as on the road.
@@ -282,10 +283,10 @@ impl<'a> PlanView<'a> {
 
     /// The geometry on which `s` lies: the last that starts at or before it. `None` before the
     /// first one; beyond the last one's end that one goes on.
-    pub fn locate(&self, s: impl Into<Place>) -> Option<Located<'_, 'a>> {
-        let place = s.into();
-        let near_start = |first: &&Geometry<'a>| first.s - place.x() <= END_TOLERANCE;
-        let index = match self.steps.rank_at(place) {
+    pub fn locate(&self, s: impl Into<Station>) -> Option<Located<'_, 'a>> {
+        let station = s.into();
+        let near_start = |first: &&Geometry<'a>| first.s - station.x() <= END_TOLERANCE;
+        let index = match self.steps.rank_at(station) {
             Some(rank) => self.steps.index(rank)?,
             None => {
                 self.in_order().next().filter(near_start)?;
@@ -293,7 +294,7 @@ impl<'a> PlanView<'a> {
             }
         };
         let geometry = self.geometries().get(index)?;
-        let ds = (place.x() - geometry.s).max(0.0);
+        let ds = (station.x() - geometry.s).max(0.0);
         Some(Located {
             geometry,
             index,
@@ -302,7 +303,7 @@ impl<'a> PlanView<'a> {
     }
 
     /// The pose at `s`, on the geometry that [`locate`](PlanView::locate) finds.
-    pub fn pose(&self, s: impl Into<Place>) -> Option<Pose> {
+    pub fn pose(&self, s: impl Into<Station>) -> Option<Pose> {
         let located = self.locate(s)?;
         located.geometry.pose(located.ds)
     }

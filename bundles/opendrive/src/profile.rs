@@ -4,7 +4,8 @@
 use qcbus_document::Node;
 
 use crate::geometry::{Cubic, finite};
-use crate::steps::{Place, Starts, Steps};
+use crate::station::Station;
+use crate::steps::{Starts, Steps};
 use crate::value::{known, numbers};
 
 /// One record of a profile: `a + b·ds + c·ds² + d·ds³`, valid from its start to the next record.
@@ -76,7 +77,7 @@ pub struct Profile<'a> {
     steps: Steps<Record<'a>>,
 }
 
-/// The record that is valid at some place, and the way from its start.
+/// The record that is valid at some station, and the way from its start.
 #[derive(Debug, Clone, Copy)]
 pub struct Valid<'p, 'a> {
     /// The record.
@@ -121,63 +122,63 @@ impl<'a> Profile<'a> {
         self.steps.in_order()
     }
 
-    /// The first place where a value is defined.
+    /// The first station where a value is defined.
     pub fn begin(&self) -> Option<f64> {
         self.in_order().next()?.start()
     }
 
-    /// The record that is valid at a place: the last that starts at or before it. `None` before
+    /// The record that is valid at a station: the last that starts at or before it. `None` before
     /// the first record, when the valid record is incomplete, or when any start is unknown.
     #[inline]
-    pub fn valid_at(&self, place: impl Into<Place>) -> Option<Valid<'_, 'a>> {
-        let place = place.into();
-        let record = self.steps.ranked(self.steps.rank_at(place)?)?;
+    pub fn valid_at(&self, station: impl Into<Station>) -> Option<Valid<'_, 'a>> {
+        let station = station.into();
+        let record = self.steps.ranked(self.steps.rank_at(station)?)?;
         Some(Valid {
             record,
-            ds: (place.x() - record.start).max(0.0),
+            ds: (station.x() - record.start).max(0.0),
             cubic: record.cubic()?,
         })
     }
 
-    /// The value at a place; see [`Profile::valid_at`].
+    /// The value at a station; see [`Profile::valid_at`].
     #[inline]
-    pub fn at(&self, place: impl Into<Place>) -> Option<f64> {
-        let valid = self.valid_at(place)?;
+    pub fn at(&self, station: impl Into<Station>) -> Option<f64> {
+        let valid = self.valid_at(station)?;
         valid.cubic.eval(valid.ds)
     }
 
-    /// The slope at a place; see [`Profile::valid_at`].
-    pub fn slope_at(&self, place: impl Into<Place>) -> Option<f64> {
-        let valid = self.valid_at(place)?;
+    /// The slope at a station; see [`Profile::valid_at`].
+    pub fn slope_at(&self, station: impl Into<Station>) -> Option<f64> {
+        let valid = self.valid_at(station)?;
         finite(valid.cubic.slope(valid.ds))
     }
 
-    /// The value and the slope at a place; see [`Profile::valid_at`].
-    pub(crate) fn both_at(&self, place: Place) -> Option<[f64; 2]> {
-        let valid = self.valid_at(place)?;
+    /// The value and the slope at a station; see [`Profile::valid_at`].
+    pub(crate) fn both_at(&self, station: Station) -> Option<[f64; 2]> {
+        let valid = self.valid_at(station)?;
         let (ds, cubic) = (valid.ds, valid.cubic);
         Some([cubic.eval(ds)?, finite(cubic.slope(ds))?])
     }
 
-    /// The value at a place, and zero where the profile does not say anything: without records
+    /// The value at a station, and zero where the profile does not say anything: without records
     /// and before the first one, as for elevation, superelevation and lane offset.
     #[inline]
-    pub fn at_or_zero(&self, place: impl Into<Place>) -> Option<f64> {
-        let place = place.into();
-        if self.steps.silent_at(place) {
+    pub fn at_or_zero(&self, station: impl Into<Station>) -> Option<f64> {
+        let station = station.into();
+        if self.steps.silent_at(station) {
             Some(0.0)
         } else {
-            self.at(place)
+            self.at(station)
         }
     }
 
-    /// The slope at a place, and zero where the profile does not say anything.
-    pub fn slope_or_zero(&self, place: impl Into<Place>) -> Option<f64> {
-        let place = place.into();
-        if self.steps.silent_at(place) {
+    /// The slope at a station, and zero where the profile does not say anything.
+    pub fn slope_or_zero(&self, station: impl Into<Station>) -> Option<f64> {
+        let station = station.into();
+        if self.steps.silent_at(station) {
             Some(0.0)
         } else {
-            self.slope_at(place)
+            self.slope_at(station)
         }
     }
 

@@ -58,8 +58,8 @@ view! {
 }
 
 view! {
-    /// A `<station>` (15.4).
-    Station {
+    /// A `<station>` (15.4), where trains stop.
+    RailroadStation {
         /// `@id`.
         id: text "id",
         /// `@name`.
@@ -69,7 +69,7 @@ view! {
     }
 }
 
-impl<'a> Station<'a> {
+impl<'a> RailroadStation<'a> {
     children! {
         /// The platforms.
         platforms: Platform "platform",

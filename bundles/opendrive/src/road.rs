@@ -12,7 +12,7 @@ use crate::names::Names;
 use crate::plan_view::{END_TOLERANCE, PlanView};
 use crate::profile::Profile;
 use crate::section_ref::SectionRef;
-use crate::steps::Place;
+use crate::station::Station;
 use crate::surface::Frame;
 use crate::touching::TouchingLanes;
 use crate::value::{ContactPoint, LayerKind, known, number};
@@ -36,7 +36,7 @@ pub struct Road<'a> {
     length: f64,
     junction: Option<&'a str>,
     rule: Option<TrafficRule>,
-    parts: Parts<'a>,
+    children: RoadChildren<'a>,
     plan_view: OnceLock<PlanView<'a>>,
     elevation: OnceLock<Profile<'a>>,
     lateral: OnceLock<LateralProfile<'a>>,
@@ -51,7 +51,7 @@ pub struct Road<'a> {
 
 /// The elements directly within a road, found in one pass; of several equals the first.
 #[derive(Debug, Clone, Copy, Default)]
-struct Parts<'a> {
+struct RoadChildren<'a> {
     link: Option<Node<'a>>,
     plan_view: Option<Node<'a>>,
     elevation: Option<Node<'a>>,
@@ -62,24 +62,24 @@ struct Parts<'a> {
     railroad: Option<Node<'a>>,
 }
 
-impl<'a> Parts<'a> {
-    fn of(road: Node<'a>) -> Parts<'a> {
-        let mut parts = Parts::default();
+impl<'a> RoadChildren<'a> {
+    fn of(road: Node<'a>) -> RoadChildren<'a> {
+        let mut children = RoadChildren::default();
         for child in road.children() {
             let slot = match child.name() {
-                "link" => &mut parts.link,
-                "planView" => &mut parts.plan_view,
-                "elevationProfile" => &mut parts.elevation,
-                "lateralProfile" => &mut parts.lateral,
-                "objects" => &mut parts.objects,
-                "signals" => &mut parts.signals,
-                "surface" => &mut parts.surface,
-                "railroad" => &mut parts.railroad,
+                "link" => &mut children.link,
+                "planView" => &mut children.plan_view,
+                "elevationProfile" => &mut children.elevation,
+                "lateralProfile" => &mut children.lateral,
+                "objects" => &mut children.objects,
+                "signals" => &mut children.signals,
+                "surface" => &mut children.surface,
+                "railroad" => &mut children.railroad,
                 _ => continue,
             };
             slot.get_or_insert(child);
         }
-        parts
+        children
     }
 }
 
@@ -96,7 +96,7 @@ impl<'a> Road<'a> {
                 Some("LHT") => Some(TrafficRule::LeftHand),
                 Some(_) => None,
             },
-            parts: Parts::of(node),
+            children: RoadChildren::of(node),
             plan_view: OnceLock::new(),
             elevation: OnceLock::new(),
             lateral: OnceLock::new(),
@@ -147,49 +147,49 @@ impl<'a> Road<'a> {
 
     /// The `<link>` element.
     pub fn link_node(&self) -> Option<Node<'a>> {
-        self.parts.link
+        self.children.link
     }
 
     /// The link at an end: `<predecessor>` at the start, `<successor>` at the end.
     #[inline]
     pub fn link(&self, end: ContactPoint) -> Option<RoadLink<'a>> {
-        let node = self.parts.link?.child(end.link_name())?;
+        let node = self.children.link?.child(end.link_name())?;
         Some(RoadLink::of(node))
     }
 
     /// The `<planView>` element.
     pub fn plan_view_node(&self) -> Option<Node<'a>> {
-        self.parts.plan_view
+        self.children.plan_view
     }
 
     /// The `<elevationProfile>` element.
     pub fn elevation_node(&self) -> Option<Node<'a>> {
-        self.parts.elevation
+        self.children.elevation
     }
 
     /// The `<lateralProfile>` element.
     pub fn lateral_node(&self) -> Option<Node<'a>> {
-        self.parts.lateral
+        self.children.lateral
     }
 
     /// The `<objects>` element.
     pub fn objects_node(&self) -> Option<Node<'a>> {
-        self.parts.objects
+        self.children.objects
     }
 
     /// The `<signals>` element.
     pub fn signals_node(&self) -> Option<Node<'a>> {
-        self.parts.signals
+        self.children.signals
     }
 
     /// The `<surface>` element.
     pub fn surface_node(&self) -> Option<Node<'a>> {
-        self.parts.surface
+        self.children.surface
     }
 
     /// The `<railroad>` element.
     pub fn railroad_node(&self) -> Option<Node<'a>> {
-        self.parts.railroad
+        self.children.railroad
     }
 
     /// The `<type>` records.
@@ -201,14 +201,14 @@ impl<'a> Road<'a> {
     #[inline]
     pub fn plan_view(&self) -> &PlanView<'a> {
         self.plan_view
-            .get_or_init(|| PlanView::read(self.parts.plan_view))
+            .get_or_init(|| PlanView::read(self.children.plan_view))
     }
 
     /// The elevation profile (10.5.1): z over s.
     #[inline]
     pub fn elevation(&self) -> &Profile<'a> {
         self.elevation.get_or_init(|| {
-            let node = self.parts.elevation.into_iter();
+            let node = self.children.elevation.into_iter();
             let records = node.flat_map(|node| node.children_named("elevation"));
             Profile::read(records, "s")
         })
@@ -218,7 +218,7 @@ impl<'a> Road<'a> {
     #[inline]
     pub fn lateral(&self) -> &LateralProfile<'a> {
         self.lateral
-            .get_or_init(|| LateralProfile::read(self.parts.lateral))
+            .get_or_init(|| LateralProfile::read(self.children.lateral))
     }
 
     /// The lane layers, one per `<lanes>` element.
@@ -252,17 +252,17 @@ impl<'a> Road<'a> {
 
     /// The pose of the reference line at `s`; `None` outside of the road (more than 1 µm before
     /// the start, or beyond both `@length` and the last geometry's end).
-    pub fn pose(&self, s: impl Into<Place>) -> Option<Pose> {
-        let place = s.into();
+    pub fn pose(&self, s: impl Into<Station>) -> Option<Pose> {
+        let station = s.into();
         let end = match (self.length(), self.plan_view().end()) {
             (Some(length), Some(end)) => length.max(end),
             (one, other) => one.or(other)?,
         };
-        let on_road = place.x() >= -END_TOLERANCE && place.x() <= end + END_TOLERANCE;
+        let on_road = station.x() >= -END_TOLERANCE && station.x() <= end + END_TOLERANCE;
         if !on_road {
             return None;
         }
-        self.plan_view().pose(place)
+        self.plan_view().pose(station)
     }
 
     /// The pose of the reference line at one of its ends, in the direction of s: where the first

@@ -6,7 +6,7 @@ use crate::lane::LaneGroup;
 use crate::lane_ref::LaneRef;
 use crate::lanes::{LaneLayer, LaneSection};
 use crate::road::Road;
-use crate::steps::Place;
+use crate::station::Station;
 use crate::value::{ContactPoint, Side};
 
 /// A lane section together with the road and the layer that it belongs to.
@@ -117,18 +117,18 @@ impl<'m, 'a> SectionRef<'m, 'a> {
 
     /// t of the center lane at `ds` metres from the section's start: the lane offset (11.5).
     #[inline]
-    pub fn center_t(self, ds: impl Into<Place>) -> Option<f64> {
+    pub fn center_t(self, ds: impl Into<Station>) -> Option<f64> {
         self.layer.offset().at_or_zero(ds.into().shifted(self.s()?))
     }
 
     /// The slope dt/ds of the center lane at `ds`.
-    pub(crate) fn center_slope(self, ds: Place) -> Option<f64> {
+    pub(crate) fn center_slope(self, ds: Station) -> Option<f64> {
         self.layer.offset().slope_or_zero(ds.shifted(self.s()?))
     }
 
     /// The cross section of a side at `ds` metres from the section's start: each lane with t of
     /// its inner and its outer border, from the center outward, as far as they are defined.
-    pub fn spans(self, side: Side, ds: impl Into<Place>) -> Vec<LaneSpan<'m, 'a>> {
+    pub fn spans(self, side: Side, ds: impl Into<Station>) -> Vec<LaneSpan<'m, 'a>> {
         self.each_span(side, ds).collect()
     }
 
@@ -137,7 +137,7 @@ impl<'m, 'a> SectionRef<'m, 'a> {
     pub fn each_span(
         self,
         side: Side,
-        ds: impl Into<Place>,
+        ds: impl Into<Station>,
     ) -> impl Iterator<Item = LaneSpan<'m, 'a>> {
         let ds = ds.into();
         let mut border = self.center_t(ds).filter(|_| self.is_numbered(side));
@@ -151,7 +151,7 @@ impl<'m, 'a> SectionRef<'m, 'a> {
     }
 
     /// t of the outermost border of a side at `ds`, the center's where a side has no lanes.
-    pub fn edge_t(self, side: Side, ds: impl Into<Place>) -> Option<f64> {
+    pub fn edge_t(self, side: Side, ds: impl Into<Station>) -> Option<f64> {
         let ds = ds.into();
         match self.side(side).next_back() {
             Some(lane) => lane.outer_t(ds),

@@ -1,69 +1,6 @@
 //! Things that are valid from a start up to the next one's start.
 
-/// Places that differ by less than this, in metres, are the same place: exporters write `1e-12`
-/// for the start and `24.999999999999996` for 25.
-const SAME_PLACE: f64 = 1e-9;
-
-/// A place along s or t, approached from above (what starts there is already valid) or from
-/// below (what starts there is not valid yet).
-///
-/// A plain number is the usual case: `profile.at(12.5)`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
-    x: f64,
-    below: bool,
-}
-
-impl Place {
-    /// At `x`: what starts at `x` is valid.
-    #[inline]
-    pub fn at(x: f64) -> Place {
-        Place { x, below: false }
-    }
-
-    /// Just before `x`: what ends at `x` is still valid.
-    #[inline]
-    pub fn before(x: f64) -> Place {
-        Place { x, below: true }
-    }
-
-    /// The coordinate.
-    #[inline]
-    pub fn x(self) -> f64 {
-        self.x
-    }
-
-    /// The same place seen from an origin that lies `by` further back.
-    #[inline]
-    pub fn shifted(self, by: f64) -> Place {
-        Place {
-            x: self.x + by,
-            ..self
-        }
-    }
-
-    /// Whether something that starts at `start` is valid here.
-    #[inline]
-    pub fn is_after(self, start: f64) -> bool {
-        start <= self.horizon()
-    }
-
-    /// Up to which start something is valid here.
-    #[inline]
-    fn horizon(self) -> f64 {
-        if self.below {
-            self.x - SAME_PLACE
-        } else {
-            self.x + SAME_PLACE
-        }
-    }
-}
-
-impl From<f64> for Place {
-    fn from(x: f64) -> Place {
-        Place::at(x)
-    }
-}
+use crate::station::Station;
 
 /// Something with a start; NaN when that is missing.
 pub(crate) trait Starts {
@@ -151,23 +88,23 @@ impl<T: Starts> Steps<T> {
     /// The rank of the last item that has started; `None` before the first one, and when a start
     /// is missing.
     #[inline]
-    pub(crate) fn rank_at(&self, place: Place) -> Option<usize> {
-        if self.unplaced || !place.x.is_finite() {
+    pub(crate) fn rank_at(&self, station: Station) -> Option<usize> {
+        if self.unplaced || !station.x().is_finite() {
             return None;
         }
         let started = if self.order.is_empty() {
             self.items
-                .partition_point(|item| place.is_after(item.start()))
+                .partition_point(|item| station.is_after(item.start()))
         } else {
             let start = |at: &u32| self.items[*at as usize].start();
-            self.order.partition_point(|at| place.is_after(start(at)))
+            self.order.partition_point(|at| station.is_after(start(at)))
         };
         started.checked_sub(1)
     }
 
-    /// Whether nothing is said about the place: there are no items, or the first starts later.
+    /// Whether nothing is said about the station: there are no items, or the first starts later.
     #[inline]
-    pub(crate) fn silent_at(&self, place: Place) -> bool {
-        !self.unplaced && place.x.is_finite() && self.rank_at(place).is_none()
+    pub(crate) fn silent_at(&self, station: Station) -> bool {
+        !self.unplaced && station.x().is_finite() && self.rank_at(station).is_none()
     }
 }

@@ -5,7 +5,7 @@ use qcbus_document::Node;
 
 use crate::geometry::finite;
 use crate::profile::Profile;
-use crate::steps::Place;
+use crate::station::Station;
 use crate::value::integer;
 
 /// A `<crossSectionSurface>`.
@@ -69,7 +69,7 @@ impl<'a> CrossSectionSurface<'a> {
     /// an inner strip without width reaches to the edge of the road; an outer strip counts dt
     /// from the inner strip's edge, and its height from there too when its mode is relative.
     /// `None` when a strip's mode is missing or unknown, or a width is negative.
-    pub fn height(&self, s: impl Into<Place>, t: f64) -> Option<f64> {
+    pub fn height(&self, s: impl Into<Station>, t: f64) -> Option<f64> {
         let s = s.into();
         let t = finite(t - self.t_offset.at_or_zero(s)?)?;
         // 10.5.4 counts t = 0 to the right side.
@@ -125,7 +125,7 @@ impl<'a> Strip<'a> {
 
     /// The polynomial's value at `dt` metres from the strip's inner edge (negative to the
     /// right); components that are not given are zero.
-    pub fn height(&self, s: impl Into<Place>, dt: f64) -> Option<f64> {
+    pub fn height(&self, s: impl Into<Station>, dt: f64) -> Option<f64> {
         let s = s.into();
         let mut height = 0.0;
         for component in self.coefficients.iter().rev() {

@@ -6,7 +6,7 @@ use crate::lane::Borders;
 use crate::lane_ref::{Edge, LaneRef};
 use crate::plan_view::END_TOLERANCE;
 use crate::road::Road;
-use crate::steps::Place;
+use crate::station::Station;
 use crate::value::ContactPoint;
 
 /// The cross section of a road at some s: where it lies and how it is tilted.
@@ -51,7 +51,7 @@ impl Frame {
 
 impl<'a> Road<'a> {
     /// The cross section at `s`.
-    pub fn frame(&self, s: impl Into<Place>) -> Option<Frame> {
+    pub fn frame(&self, s: impl Into<Station>) -> Option<Frame> {
         let s = s.into();
         self.frame_on(self.pose(s)?, s)
     }
@@ -60,15 +60,15 @@ impl<'a> Road<'a> {
     /// ends.
     pub fn end_frame(&self, end: ContactPoint) -> Option<Frame> {
         self.end_frame_or(end, || {
-            let place = match end {
-                ContactPoint::Start => Place::at(0.0),
-                ContactPoint::End => Place::before(self.length()?),
+            let station = match end {
+                ContactPoint::Start => Station::at(0.0),
+                ContactPoint::End => Station::before(self.length()?),
             };
-            self.frame_on(self.end_pose(end)?, place)
+            self.frame_on(self.end_pose(end)?, station)
         })
     }
 
-    fn frame_on(&self, pose: Pose, s: Place) -> Option<Frame> {
+    fn frame_on(&self, pose: Pose, s: Station) -> Option<Frame> {
         let superelevation = &self.lateral().superelevation;
         Some(Frame {
             pose,
@@ -81,7 +81,7 @@ impl<'a> Road<'a> {
 
     /// The point with the road coordinates (s, t, h): h is measured from the plane that
     /// superelevation tilts, perpendicular to it. There is no pitch (8.3).
-    pub fn point(&self, s: impl Into<Place>, t: f64, h: f64) -> Option<Point3> {
+    pub fn point(&self, s: impl Into<Station>, t: f64, h: f64) -> Option<Point3> {
         let frame = self.frame(s)?;
         let (lateral, up) = frame.tilted(t, h);
         frame.place(lateral, up)
@@ -89,7 +89,7 @@ impl<'a> Road<'a> {
 
     /// The point of the road's surface at (s, t): as [`point`](Road::point), on the height that
     /// shape or cross section surface give. Lane height and `@level` are left aside.
-    pub fn surface_point(&self, s: impl Into<Place>, t: f64) -> Option<Point3> {
+    pub fn surface_point(&self, s: impl Into<Station>, t: f64) -> Option<Point3> {
         let s = s.into();
         self.point(s, t, self.lateral().height(s, t)?)
     }
@@ -126,7 +126,7 @@ struct Lay {
 
 impl<'m, 'a> LaneRef<'m, 'a> {
     /// A border at `ds` metres from the section's start.
-    pub fn border(self, edge: Edge, ds: impl Into<Place>) -> Option<BorderPoint> {
+    pub fn border(self, edge: Edge, ds: impl Into<Station>) -> Option<BorderPoint> {
         let ds = ds.into();
         let frame = self.at.road.frame(ds.shifted(self.at.s()?))?;
         self.border_in(frame, edge, ds)
@@ -150,10 +150,10 @@ impl<'m, 'a> LaneRef<'m, 'a> {
 
     fn end_borders(self, end: ContactPoint) -> &'m Borders {
         let find = || {
-            let Some((frame, place)) = self.frame_at(end).zip(self.end_place(end)) else {
+            let Some((frame, station)) = self.frame_at(end).zip(self.end_station(end)) else {
                 return [None; 2];
             };
-            Edge::BOTH.map(|edge| self.border_in(frame, edge, place))
+            Edge::BOTH.map(|edge| self.border_in(frame, edge, station))
         };
         self.lane().borders_or(end, find)
     }
@@ -163,7 +163,7 @@ impl<'m, 'a> LaneRef<'m, 'a> {
         if self.is_at_road_end(end) {
             return self.at.road.end_frame(end);
         }
-        let ds = self.end_place(end)?;
+        let ds = self.end_station(end)?;
         self.at.road.frame(ds.shifted(self.at.s()?))
     }
 
@@ -184,7 +184,7 @@ impl<'m, 'a> LaneRef<'m, 'a> {
 
     /// The place of the lane's surface at a share of its width, 0 at the inner and 1 at the
     /// outer border.
-    pub fn surface_point(self, ds: impl Into<Place>, share: f64) -> Option<Point3> {
+    pub fn surface_point(self, ds: impl Into<Station>, share: f64) -> Option<Point3> {
         let ds = ds.into();
         let frame = self.at.road.frame(ds.shifted(self.at.s()?))?;
         let (inner, outer) = (self.inner_t(ds)?, self.outer_t(ds)?);
@@ -194,7 +194,7 @@ impl<'m, 'a> LaneRef<'m, 'a> {
         frame.place(lay.lateral, lay.up + low + share * (high - low))
     }
 
-    fn border_in(self, frame: Frame, edge: Edge, ds: Place) -> Option<BorderPoint> {
+    fn border_in(self, frame: Frame, edge: Edge, ds: Station) -> Option<BorderPoint> {
         let [t, t_slope] = self.t_and_slope(edge, ds)?;
         let lay = self.lay(frame, t, t_slope, ds)?;
         let (inner, outer) = self.lift(ds)?;
@@ -218,7 +218,7 @@ impl<'m, 'a> LaneRef<'m, 'a> {
 
     /// Where t lies in the cross section. On a lane with `@level` the surface goes on
     /// horizontally from the outer border of the last lane without it (11.7.4).
-    fn lay(self, frame: Frame, t: f64, t_slope: f64, ds: Place) -> Option<Lay> {
+    fn lay(self, frame: Frame, t: f64, t_slope: f64, ds: Station) -> Option<Lay> {
         if !self.level()? {
             return self.tilted_lay(frame, t, t_slope, ds);
         }
@@ -238,7 +238,7 @@ impl<'m, 'a> LaneRef<'m, 'a> {
         })
     }
 
-    fn tilted_lay(self, frame: Frame, t: f64, t_slope: f64, ds: Place) -> Option<Lay> {
+    fn tilted_lay(self, frame: Frame, t: f64, t_slope: f64, ds: Station) -> Option<Lay> {
         let height = self.at.road.lateral().height(ds.shifted(self.at.s()?), t)?;
         let (lateral, up) = frame.tilted(t, height);
         let (sin, cos) = frame.tilt();

@@ -5,7 +5,7 @@ mod common;
 
 use common::with_map;
 use proptest::prelude::*;
-use qcbus_opendrive::{ContactPoint, Edge, Place, RoadMap, Side};
+use qcbus_opendrive::{ContactPoint, Edge, RoadMap, Side, Station};
 
 const TEMPLATE: &str = r##"
 <road id="1" length="#" junction="-1"><link>
@@ -85,9 +85,9 @@ fn ask_everything(map: &RoadMap<'_>) -> usize {
         map.lane_joints().count() + map.touching_lanes().count() + map.road_contacts().len();
     for road in map.roads() {
         for s in [0.0, 0.5, 1.0, 50.0, 1e308, f64::NAN, f64::INFINITY, -1.0] {
-            for place in [Place::at(s), Place::before(s)] {
-                let frame = road.frame(place);
-                let point = road.surface_point(place, 1.0);
+            for station in [Station::at(s), Station::before(s)] {
+                let frame = road.frame(station);
+                let point = road.surface_point(station, 1.0);
                 assert!(point.is_none_or(|point| (point.x + point.y + point.z).is_finite()));
                 answers += usize::from(frame.is_some()) + usize::from(point.is_some());
             }

@@ -5,7 +5,7 @@
 mod common;
 
 use common::with_map;
-use qcbus_opendrive::{ContactPoint, Edge, LayerKind, Place, RoadMap, Side};
+use qcbus_opendrive::{ContactPoint, Edge, LayerKind, RoadMap, Side, Station};
 
 const ROAD: &str = r#"
 <road id="a-1" length="100" junction="-1">
@@ -44,7 +44,7 @@ fn lane_t(
     section: usize,
     id: i64,
     edge: Edge,
-    ds: impl Into<Place>,
+    ds: impl Into<Station>,
 ) -> Option<f64> {
     map.sections().nth(section)?.lane(id)?.t(edge, ds)
 }
@@ -72,7 +72,7 @@ fn borders_add_up_from_the_lane_offset() {
 #[test]
 fn a_step_is_seen_from_either_side() {
     with_map(ROAD, |map| {
-        near(lane_t(map, 0, 1, Edge::Inner, Place::before(50.0)), 0.5);
+        near(lane_t(map, 0, 1, Edge::Inner, Station::before(50.0)), 0.5);
         near(lane_t(map, 0, 1, Edge::Inner, 50.0), 1.0);
         near(lane_t(map, 0, 1, Edge::Inner, 49.999_999_999_9), 1.0);
     });
@@ -116,16 +116,16 @@ fn sections_know_their_ends() {
             .map(|section| section.length(Side::Left))
             .collect();
         assert_eq!(lengths, [Some(60.0), Some(40.0)]);
-        let at = |s: Place| {
+        let at = |s: Station| {
             layer
                 .section_at(road, Side::Right, s)
                 .map(|section| section.index())
         };
-        assert_eq!(at(Place::at(60.0)), Some(1));
-        assert_eq!(at(Place::before(60.0)), Some(0));
-        assert_eq!(at(Place::at(100.0)), Some(1));
-        assert_eq!(at(Place::at(100.1)), None);
-        assert_eq!(at(Place::at(-0.1)), None);
+        assert_eq!(at(Station::at(60.0)), Some(1));
+        assert_eq!(at(Station::before(60.0)), Some(0));
+        assert_eq!(at(Station::at(100.0)), Some(1));
+        assert_eq!(at(Station::at(100.1)), None);
+        assert_eq!(at(Station::at(-0.1)), None);
     });
 }
 

@@ -31,14 +31,14 @@ fn run(checked: &Checked<'_>, found: &mut Sink<'_>) {
     for fact in checked.provenance() {
         found.fact(fact.key, fact.value, fact.description);
     }
-    for finding in &checked.findings {
-        let place = match finding.attribute {
+    for violation in &checked.violations {
+        let place = match violation.attribute {
             Some(attribute) => Place::from(attribute),
-            None => Place::from(finding.node),
+            None => Place::from(violation.node),
         };
         found
-            .issue(place, finding.text.as_str())
-            .level(level(checked.severity(finding)));
+            .issue(place, violation.text.as_str())
+            .level(level(checked.severity(violation)));
     }
     for rest in &checked.rest {
         let Some(root) = found.subject().root().root() else {

@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 
-use qcbus_schema::{BroughtContent, BroughtFile, Checked, Options, Outcome, Override, SkipReason};
-use qcbus_sdk::{Brought, Model, Param, Resource, ResourceFile, Subject, Unbuilt};
+use qcbus_schema::{
+    Checked, Options, Outcome, Override, SkipReason, UserSchemaContent, UserSchemaFile,
+};
+use qcbus_sdk::{Model, Param, Resource, ResourceFile, ResourceValue, Subject, Unbuilt};
 
 /// Marks rules about the validated document; they say nothing when no schema applies.
 #[derive(Debug)]
@@ -14,9 +16,9 @@ impl Model for Validated {
     type Part = ();
 
     fn build<'d>(subject: &'d Subject<'d>) -> Result<Checked<'d>, Unbuilt> {
-        let brought = subject.brought::<Overrides>();
+        let own = subject.resource::<Overrides>();
         let options = Options {
-            overrides: brought.map(|it| it.0.clone()).unwrap_or_default(),
+            overrides: own.map(|it| it.0.clone()).unwrap_or_default(),
             ..Options::default()
         };
         match qcbus_schema::check(&subject.root(), subject.kind(), &options) {
@@ -58,26 +60,26 @@ pub(crate) static SCHEMAS: Resource = Resource {
 /// The schemas of the user, those for one version first.
 struct Overrides(Vec<Override>);
 
-fn compiled(files: &[ResourceFile]) -> Result<Brought, String> {
+fn compiled(files: &[ResourceFile]) -> Result<ResourceValue, String> {
     let read = |file: &ResourceFile| {
         let image = (!file.ends_in("tbl")).then(|| file.image());
         let path = file.path().display().to_string();
         (path, file.below(), file.digest().to_string(), image)
     };
     let read: Vec<_> = files.iter().map(read).collect();
-    let brought: Vec<BroughtFile<'_>> = read
+    let own: Vec<UserSchemaFile<'_>> = read
         .iter()
         .zip(files)
-        .map(|((path, below, sha256, image), file)| BroughtFile {
+        .map(|((path, below, sha256, image), file)| UserSchemaFile {
             path,
             below,
             sha256,
             content: match image {
-                Some(image) => BroughtContent::Xsd(image),
-                None => BroughtContent::Tables(file.bytes()),
+                Some(image) => UserSchemaContent::Xsd(image),
+                None => UserSchemaContent::Tables(file.bytes()),
             },
         })
         .collect();
-    let overrides = qcbus_schema::brought(&brought).map_err(|error| error.to_string())?;
+    let overrides = qcbus_schema::user_schemas(&own).map_err(|error| error.to_string())?;
     Ok(Arc::new(Overrides(overrides)))
 }

@@ -87,7 +87,7 @@ fn verdict(schema: &Schema, file: &str) -> Result<String, String> {
         return Ok("ill-formed\t0\t0\t0\t\t".to_owned());
     }
     let report = schema.validate(&document, Limits::default());
-    let Some(first) = report.findings.first() else {
+    let Some(first) = report.violations.first() else {
         return Ok("valid\t0\t0\t0\t\t".to_owned());
     };
     let row = document.position(first.node.offset()).row;
@@ -133,7 +133,7 @@ fn time(path: &str, file: &str) -> Result<(), String> {
         best = best.min((on_cpu() - started) / f64::from(turns));
     }
     println!(
-        "{megabytes:.1} MB, {total} findings, {:.1} ms on the CPU, {:.0} MB/s",
+        "{megabytes:.1} MB, {total} violations, {:.1} ms on the CPU, {:.0} MB/s",
         best * 1e3,
         megabytes / best
     );

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use qcbus_document::{Document, FileKind};
 
-use crate::finding::{Finding, Limits, Report, Rest};
 use crate::model::Schema;
 use crate::validate::Overlay;
 use crate::versions::{SkipReason, Version, select, version_of};
+use crate::violation::{Limits, Report, Rest, Violation};
 
-/// A schema brought by the user, used instead of the shipped one.
+/// A user schema: used instead of the shipped one.
 #[derive(Clone, Debug)]
 pub struct Override {
     /// The kind of file it is for.
@@ -34,13 +34,13 @@ pub struct Source {
 /// How to check.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// How many findings are listed.
+    /// How many violations are listed.
     pub limits: Limits,
     /// The user's schemas; the first that fits is used.
     pub overrides: Vec<Override>,
 }
 
-/// How much a finding weighs.
+/// How much a violation weighs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Severity {
     /// The file breaks its schema.
@@ -65,7 +65,7 @@ pub enum Outcome<'a> {
 pub struct Checked<'a> {
     /// What the schema is called, e.g. `OpenDRIVE 1.7`.
     pub schema: String,
-    /// The files that the user brought it in; empty for a shipped one.
+    /// The files of a user schema; empty for a shipped one.
     pub sources: Arc<[Source]>,
     /// The version the header names.
     pub version: Option<Version>,
@@ -76,9 +76,9 @@ pub struct Checked<'a> {
     /// The default namespace of the root, which was disregarded: the published schemas have none,
     /// or one that no file uses.
     pub namespace: Option<&'a str>,
-    /// The findings in order of discovery.
-    pub findings: Vec<Finding<'a>>,
-    /// Findings beyond the limits, counted by kind.
+    /// The violations in order of discovery.
+    pub violations: Vec<Violation<'a>>,
+    /// Violations beyond the limits, counted by kind.
     pub rest: Vec<Rest>,
 }
 
@@ -112,13 +112,13 @@ impl Checked<'_> {
             .map(|file| {
                 fact(
                     format!("{} sha256:{}", file.path, file.sha256),
-                    "a file of the schema that the file was compared with, brought by the user",
+                    "a file of the schema that the file was compared with, given by the user",
                 )
             })
             .collect()
     }
 
-    /// How much the findings of a kind weigh that are only counted.
+    /// How much the violations of a kind weigh that are only counted.
     pub fn severity_of_rest(&self, rest: &Rest) -> Severity {
         match rest.known_schema_defect {
             _ if self.newer => Severity::Information,
@@ -127,9 +127,9 @@ impl Checked<'_> {
         }
     }
 
-    /// How much a finding weighs.
-    pub fn severity(&self, finding: &Finding<'_>) -> Severity {
-        match finding.known_schema_defect {
+    /// How much a violation weighs.
+    pub fn severity(&self, violation: &Violation<'_>) -> Severity {
+        match violation.known_schema_defect {
             _ if self.newer => Severity::Information,
             Some(_) => Severity::Warning,
             None => Severity::Error,
@@ -143,16 +143,16 @@ pub fn check<'a>(document: &Document<'a>, kind: FileKind, options: &Options) -> 
         return Outcome::Skipped(SkipReason::IllFormed);
     }
     let version = version_of(document, kind);
-    let brought = options
+    let own = options
         .overrides
         .iter()
         .find(|one| same_kind(one.kind, kind) && (one.version.is_none() || one.version == version));
-    if let Some(brought) = brought {
+    if let Some(own) = own {
         return Outcome::Checked(checked(
             document,
             kind,
             options,
-            (&brought.schema, brought.sources.clone()),
+            (&own.schema, own.sources.clone()),
             (version, false),
         ));
     }
@@ -189,7 +189,7 @@ fn checked<'a>(
     } else {
         Overlay::None
     };
-    let Report { findings, rest } = schema.validate_with(document, options.limits, overlay);
+    let Report { violations, rest } = schema.validate_with(document, options.limits, overlay);
     let namespace = document
         .root()
         .and_then(|root| root.attr("xmlns"))
@@ -201,7 +201,7 @@ fn checked<'a>(
         newer,
         modular,
         namespace,
-        findings,
+        violations,
         rest,
     }
 }

@@ -5,12 +5,10 @@
 //! shipped in a notation of their own, which the compiler writes (`qcbus schema compile`).
 
 mod assertion;
-mod brought;
 mod check;
 mod compile;
 mod constraint;
 mod defects;
-mod finding;
 #[doc(hidden)]
 pub mod generate;
 mod model;
@@ -20,20 +18,22 @@ mod recursion;
 mod regex;
 mod similar;
 mod simple;
+mod user_schemas;
 mod validate;
 mod versions;
+mod violation;
 mod work;
 
 pub use assertion::XPathProblem;
-pub use brought::{BroughtContent, BroughtError, BroughtFile, brought};
 pub use check::{Checked, Fact, Options, Outcome, Override, Severity, Source, check};
 pub use compile::{CompileError, Problem, compile};
 #[doc(hidden)]
 pub use defects::known_conditions;
-pub use finding::{Code, Finding, Limits, Report, Rest};
 pub use model::{Edition, Schema};
 pub use notation::NotationError;
 pub use regex::{Pattern, PatternError};
 pub use simple::Expectation;
+pub use user_schemas::{UserSchemaContent, UserSchemaError, UserSchemaFile, user_schemas};
 pub use validate::Overlay;
 pub use versions::{SHIPPED, Shipped, SkipReason, Version, version_of};
+pub use violation::{Code, Limits, Report, Rest, Violation};

@@ -20,37 +20,13 @@ pub(crate) fn closest<'c>(
         {
             continue;
         }
-        let distance = distance(name.as_bytes(), candidate.as_bytes());
+        let distance = strsim::osa_distance(name, candidate);
         if distance <= allowed && best.is_none_or(|(least, _)| distance < least) {
             best = Some((distance, candidate));
         }
     }
     best.filter(|(distance, candidate)| *distance < candidate.len())
         .map(|(_, candidate)| candidate)
-}
-
-/// Damerau's distance (optimal string alignment) over bytes of texts up to `LONGEST` long.
-fn distance(left: &[u8], right: &[u8]) -> usize {
-    let mut before = [0usize; LONGEST + 1];
-    let mut above = [0usize; LONGEST + 1];
-    let mut row = [0usize; LONGEST + 1];
-    for (index, cell) in above.iter_mut().enumerate() {
-        *cell = index;
-    }
-    for (i, &a) in left.iter().enumerate() {
-        row[0] = i + 1;
-        for (j, &b) in right.iter().enumerate() {
-            let replaced = above[j] + usize::from(a != b);
-            let mut least = replaced.min(above[j + 1] + 1).min(row[j] + 1);
-            if i > 0 && j > 0 && a == right[j - 1] && left[i - 1] == b {
-                least = least.min(before[j - 1] + 1);
-            }
-            row[j + 1] = least;
-        }
-        before = above;
-        above = row;
-    }
-    above[right.len()]
 }
 
 #[cfg(test)]

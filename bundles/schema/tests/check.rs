@@ -30,7 +30,7 @@ fn said(
         Outcome::Checked(checked) => Ok((
             checked.schema.clone(),
             checked.newer,
-            checked.findings.len(),
+            checked.violations.len(),
         )),
     }
 }
@@ -52,9 +52,9 @@ fn the_header_chooses_the_schema() {
         ("7", "OpenDRIVE 1.7"),
         ("8", "OpenDRIVE 1.8.1"),
     ] {
-        let (schema, newer, findings) =
+        let (schema, newer, violations) =
             said_of_map(&format!("revMajor=\"1\" revMinor=\"{minor}\"")).expect("checked");
-        assert_eq!((schema.as_str(), newer, findings), (title, false, 0));
+        assert_eq!((schema.as_str(), newer, violations), (title, false, 0));
     }
     assert_eq!(
         said_of_map("revMajor=\"1\" revMinor=\" 07 \"")
@@ -108,9 +108,9 @@ fn a_version_newer_than_all_schemas_gets_information_only() {
         (checked.schema.as_str(), checked.newer),
         ("OpenDRIVE 1.8.1", true)
     );
-    assert_eq!(checked.findings.len(), 1, "{:?}", checked.findings);
+    assert_eq!(checked.violations.len(), 1, "{:?}", checked.violations);
     assert_eq!(
-        checked.severity(&checked.findings[0]),
+        checked.severity(&checked.violations[0]),
         Severity::Information
     );
 }
@@ -126,7 +126,7 @@ fn a_default_namespace_disturbs_nothing_and_is_told() {
     let Outcome::Checked(checked) = check(&document, FileKind::Xodr, &Options::default()) else {
         panic!("skipped")
     };
-    assert!(checked.findings.is_empty(), "{:?}", checked.findings);
+    assert!(checked.violations.is_empty(), "{:?}", checked.violations);
     assert_eq!(checked.namespace, Some("http://www.opendrive.org"));
 }
 
@@ -212,9 +212,9 @@ fn many_findings_of_one_kind_are_counted() {
         panic!("skipped")
     };
     assert_eq!(
-        checked.findings.len(),
+        checked.violations.len(),
         5 * 20,
-        "five attributes, twenty findings each"
+        "five attributes, twenty violations each"
     );
     let counted: u64 = checked.rest.iter().map(|rest| rest.count).sum();
     assert_eq!(counted, 5 * 4_980);
@@ -231,7 +231,7 @@ fn messages_say_where_a_late_child_belongs_and_what_a_short_attribute_meant() {
     )
     .expect("a sound schema");
     let found = |text: &str| -> Vec<String> {
-        let all = support::findings(&schema, "a.xodr", text);
+        let all = support::violations(&schema, "a.xodr", text);
         all.into_iter().map(|(_, text)| text).collect()
     };
     assert_eq!(

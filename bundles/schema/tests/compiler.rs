@@ -2,7 +2,7 @@
 
 mod support;
 
-use support::{compiled, findings};
+use support::{compiled, violations};
 
 fn schema(body: &str) -> String {
     format!("<xs:schema xmlns:xs=\"http://www.w3.org/2001/XMLSchema\">\n{body}\n</xs:schema>")
@@ -96,7 +96,7 @@ fn content_models_count_and_order() {
     ))
     .expect("a schema");
     let codes = |text: &str| {
-        findings(&schema, "t.xml", text)
+        violations(&schema, "t.xml", text)
             .into_iter()
             .map(|one| one.0)
             .collect::<Vec<_>>()
@@ -158,12 +158,12 @@ fn children_that_do_not_fit_are_told_apart() {
             Some("<g> occurs 3 times in <f>, but may occur at most once"),
         ),
     ] {
-        let found = findings(&schema, "t.xml", &format!("<a>{children}</a>"));
+        let found = violations(&schema, "t.xml", &format!("<a>{children}</a>"));
         let texts: Vec<&str> = found.iter().map(|one| one.1.as_str()).collect();
         assert_eq!(texts, said.into_iter().collect::<Vec<_>>(), "{children}");
     }
     // What was expected before a sibling counts as if it had been there.
-    let found = findings(&schema, "t.xml", "<a><d/><b/></a>");
+    let found = violations(&schema, "t.xml", "<a><d/><b/></a>");
     assert_eq!(
         found[1].1,
         "<b> in <a> comes too late: it must come before <d>"
@@ -171,12 +171,12 @@ fn children_that_do_not_fit_are_told_apart() {
 }
 
 #[test]
-fn findings_teach() {
+fn violations_teach() {
     let table = support::table("xodr-1.7");
     let road = |inner: &str| {
         format!("<OpenDRIVE><header revMajor=\"1\" revMinor=\"7\"/>{inner}</OpenDRIVE>")
     };
-    let found = findings(
+    let found = violations(
         table,
         "t.xodr",
         &road("<road id=\"1\" junction=\"-1\" length=\"abc\"><planVeiw/></road>"),
@@ -213,7 +213,7 @@ fn findings_teach() {
         ),
     ] {
         let text = road("").replacen("<OpenDRIVE", &format!("<OpenDRIVE {attributes}"), 1);
-        let found = findings(table, "t.xodr", &text);
+        let found = violations(table, "t.xodr", &text);
         let first = found.iter().map(|one| one.1.as_str()).next();
         assert_eq!(
             first.filter(|text| *text != "<OpenDRIVE> lacks <road>"),
@@ -221,7 +221,7 @@ fn findings_teach() {
             "{attributes}"
         );
     }
-    let found = findings(table, "t.xodr", &road("<raod/>"));
+    let found = violations(table, "t.xodr", &road("<raod/>"));
     assert!(
         found
             .iter()
@@ -231,7 +231,7 @@ fn findings_teach() {
 }
 
 #[test]
-fn one_cause_gives_one_finding() {
+fn one_cause_gives_one_violation() {
     let table = support::table("xosc-1.3");
     let scenario = |bounds: &str| {
         format!(
@@ -243,12 +243,12 @@ fn one_cause_gives_one_finding() {
     };
     let good =
         "<Center x=\"0\" y=\"0\" z=\"0\"/><Dimensions width=\"1\" length=\"1\" height=\"1\"/>";
-    assert_eq!(findings(table, "t.xosc", &scenario(good)), []);
+    assert_eq!(violations(table, "t.xosc", &scenario(good)), []);
     let renamed = good.replace("Center", "Position");
-    let found = findings(table, "t.xosc", &scenario(&renamed));
+    let found = violations(table, "t.xosc", &scenario(&renamed));
     assert_eq!(found.len(), 1, "{found:?}");
     let lower = good.replace("Center", "center");
-    let found = findings(table, "t.xosc", &scenario(&lower));
+    let found = violations(table, "t.xosc", &scenario(&lower));
     assert_eq!(found.len(), 1, "{found:?}");
     assert!(found[0].1.contains("did you mean \"Center\"?"), "{found:?}");
 }
@@ -269,8 +269,8 @@ fn keys_and_references() {
             road(second)
         )
     };
-    assert_eq!(findings(table, "t.xodr", &text("2")), []);
-    let found = findings(table, "t.xodr", &text("1"));
+    assert_eq!(violations(table, "t.xodr", &text("2")), []);
+    let found = violations(table, "t.xodr", &text("1"));
     assert_eq!(
         found.iter().map(|one| one.0).collect::<Vec<_>>(),
         ["duplicate-key"],
@@ -292,14 +292,14 @@ fn known_defects_of_published_schemas_say_so() {
     let image = support::image("t.xodr", text);
     let report = table.validate(&support::open(&image), qcbus_schema::Limits::default());
     let defect = report
-        .findings
+        .violations
         .iter()
         .filter_map(|one| one.known_schema_defect)
         .next();
     assert!(
         defect.is_some_and(|words| words.contains("_OpenDriveElement")),
         "{:?}",
-        report.findings
+        report.violations
     );
 }
 
@@ -338,7 +338,7 @@ fn arbitrary_schemas_are_judged() {
         match compiled(&text) {
             Ok(schema) => {
                 good += 1;
-                findings(&schema, "t.xml", "<a x='1'><a/><b>1</b></a>");
+                violations(&schema, "t.xml", "<a x='1'><a/><b>1</b></a>");
                 let again = qcbus_schema::Schema::from_notation(&schema.to_notation())
                     .expect("its own notation");
                 assert_eq!(again.to_notation(), schema.to_notation());

@@ -20,7 +20,7 @@ proptest! {
         let bytes = image(&name, &text);
         let sound = open(&bytes);
         let report = schema.validate(&sound, Limits::default());
-        prop_assert!(report.is_valid(), "{:?}\n{text}", report.findings.first().map(|one| &one.text));
+        prop_assert!(report.is_valid(), "{:?}\n{text}", report.violations.first().map(|one| &one.text));
 
         let (broken, what) = violate(&sound, &text, &mut Dice::new(seed));
         let bytes = image(&name, &broken);
@@ -113,7 +113,7 @@ fn arbitrary_documents_are_judged() {
                 total: 10,
             },
         );
-        assert!(report.findings.len() <= 10);
+        assert!(report.violations.len() <= 10);
     }
 }
 

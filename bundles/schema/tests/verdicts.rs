@@ -39,7 +39,7 @@ fn recorded_verdicts_are_ours_too() {
             report.is_valid(),
             expected,
             "{line}: {:?}",
-            report.findings.first().map(|one| &one.text)
+            report.violations.first().map(|one| &one.text)
         );
         if expected { valid += 1 } else { invalid += 1 }
     }
@@ -79,7 +79,7 @@ fn documents_of_ours_are_valid() {
         assert!(
             report.is_valid(),
             "{name}: {:?}",
-            report.findings.first().map(|one| &one.text)
+            report.violations.first().map(|one| &one.text)
         );
         count += 1;
     }

@@ -44,7 +44,7 @@ pub trait Listener {
 /// Runs the plan's checkers on a subject. Returns whether it came to its end, that is, was not
 /// cancelled. A panic in a rule or a model is that checker's error and nobody else's.
 pub fn check(plan: &Plan, subject: &Subject<'_>, listener: &mut dyn Listener) -> bool {
-    let subject = &subject.clone().bringing(plan.brought.clone());
+    let subject = &subject.clone().with_resources(plan.resources.clone());
     let mut run = Run {
         plan,
         subject,

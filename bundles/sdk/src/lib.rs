@@ -30,7 +30,7 @@ pub use place::Place;
 pub use plan::Plan;
 pub use qcbus_formats::xqar::{Issue, Level, Status};
 pub use qcbus_messages::BUILD_DATE;
-pub use resource::{Brought, Resource, ResourceError, ResourceFile, UserFiles};
+pub use resource::{Resource, ResourceError, ResourceFile, ResourceValue, UserFiles};
 pub use rule::{AnyRule, Backport, Each, Facts, Model, Rule, Unbuilt};
 pub use run::{Exit, Mode, Timings, examine, examine_timed, main, run};
 pub use sink::{Finding, Sink};

@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
 
-use qcbus_document::{Document, FileKind, ImageError};
+use qcbus_document::{Document, FileKind, ImageError, Suffix};
 use qcbus_formats::pool::{BundleOutcome, Remark};
 use qcbus_ingest::{IngestError, Limits, Prepared, Source};
 use qcbus_messages::{Absence, Digest, DocumentRole, MissingDocument};
@@ -32,7 +32,7 @@ struct LinkedImage {
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// Its name promises nothing that can be checked.
-    #[error("check {}: its name ends in none of .xodr, .xodrz, .xodr.gz, .xosc and .mosc", .0.display())]
+    #[error("check {}: its name ends in none of {}", .0.display(), Suffix::list())]
     UnknownKind(PathBuf),
     /// No byte of it could be had.
     #[error("{error}")]

@@ -7,7 +7,7 @@ use qcbus_formats::pool::Asked;
 use crate::bundle::groups;
 use crate::resource::Resource;
 use crate::seen::Seen;
-use crate::{Brought, Bundle, Checker, UserFiles, Values};
+use crate::{Bundle, Checker, ResourceValue, UserFiles, Values};
 
 /// A bundle's checkers, prepared for checking: which are demanded, and with which values.
 pub struct Plan {
@@ -18,7 +18,7 @@ pub struct Plan {
     /// In the order of `checkers`.
     pub(crate) entries: Vec<Entry>,
     /// What was made of the user's files.
-    pub(crate) brought: Vec<Brought>,
+    pub(crate) resources: Vec<ResourceValue>,
     /// What the files looked like that parameters name.
     seen: Vec<Seen>,
 }
@@ -58,7 +58,7 @@ impl Plan {
             groups: groups(&checkers),
             checkers,
             entries,
-            brought: Vec::new(),
+            resources: Vec::new(),
             seen: Vec::new(),
         }
     }
@@ -90,8 +90,8 @@ impl Plan {
                 Some((_, outcome)) => outcome.clone(),
                 None => {
                     let directory = values.text(&resource.param);
-                    let brought = bring(resource, given, directory.trim(), &mut self.seen);
-                    brought.map(|brought| self.brought.extend(brought))
+                    let value = value_of(resource, given, directory.trim(), &mut self.seen);
+                    value.map(|value| self.resources.extend(value))
                 }
             };
             read.push((resource, outcome.clone()));
@@ -132,14 +132,14 @@ impl Plan {
 }
 
 /// What a checker gets: from the command line, else from where its parameter says.
-fn bring(
+fn value_of(
     resource: &'static Resource,
     given: Option<&UserFiles>,
     directory: &str,
     seen: &mut Vec<Seen>,
-) -> Result<Option<Brought>, String> {
-    if let Some(brought) = given.and_then(|given| given.of(resource)) {
-        return Ok(Some(brought));
+) -> Result<Option<ResourceValue>, String> {
+    if let Some(value) = given.and_then(|given| given.of(resource)) {
+        return Ok(Some(value));
     }
     if directory.is_empty() {
         return Ok(None);

@@ -18,13 +18,13 @@ pub struct Resource {
     pub param: Param,
     /// The endings of the files that are read, in lower case.
     pub endings: &'static [&'static str],
-    /// Makes of the files what rules get by [`crate::Subject::brought`]. Does no I/O; an error
+    /// Makes of the files what rules get by [`crate::Subject::resource`]. Does no I/O; an error
     /// reads well after "failed to ".
-    pub make: fn(&[ResourceFile]) -> Result<Brought, String>,
+    pub make: fn(&[ResourceFile]) -> Result<ResourceValue, String>,
 }
 
 /// What was made of a user's files.
-pub type Brought = Arc<dyn Any + Send + Sync>;
+pub type ResourceValue = Arc<dyn Any + Send + Sync>;
 
 /// One file that was read.
 pub struct ResourceFile {
@@ -114,7 +114,7 @@ impl Resource {
     ///
     /// # Errors
     /// [`ResourceError`] when a file cannot be read or used: nothing is passed over in silence.
-    pub fn read(&self, path: &Path) -> Result<Brought, ResourceError> {
+    pub fn read(&self, path: &Path) -> Result<ResourceValue, ResourceError> {
         let files = self.files(path)?;
         (self.make)(&files).map_err(ResourceError::Unusable)
     }
@@ -160,7 +160,7 @@ impl Resource {
 pub struct UserFiles {
     directory: PathBuf,
     fingerprint: String,
-    brought: Vec<(&'static Resource, Brought)>,
+    values: Vec<(&'static Resource, ResourceValue)>,
 }
 
 impl UserFiles {
@@ -172,27 +172,27 @@ impl UserFiles {
         let directory = std::path::absolute(directory).unwrap_or_else(|_| directory.to_owned());
         let mut read = UserFiles {
             fingerprint: String::new(),
-            brought: Vec::new(),
+            values: Vec::new(),
             directory,
         };
         for resource in resources(bundle) {
             let files = resource.files(&read.directory)?;
             read.fingerprint = fingerprint(&files);
-            let brought = (resource.make)(&files).map_err(ResourceError::Unusable)?;
-            read.brought.push((resource, brought));
+            let value = (resource.make)(&files).map_err(ResourceError::Unusable)?;
+            read.values.push((resource, value));
         }
-        if read.brought.is_empty() {
+        if read.values.is_empty() {
             return Err(ResourceError::NotTaken(bundle.name));
         }
         Ok(read)
     }
 
-    pub(crate) fn of(&self, resource: &Resource) -> Option<Brought> {
+    pub(crate) fn of(&self, resource: &Resource) -> Option<ResourceValue> {
         let found = self
-            .brought
+            .values
             .iter()
             .find(|(known, _)| std::ptr::eq(*known, resource));
-        found.map(|(_, brought)| brought.clone())
+        found.map(|(_, value)| value.clone())
     }
 
     /// The directory as results and plans name it.
@@ -204,7 +204,7 @@ impl UserFiles {
     /// was judged with other files.
     pub(crate) fn tell(&self, catalogue: &mut Catalogue) {
         let names: Vec<&str> = self
-            .brought
+            .values
             .iter()
             .map(|(known, _)| known.param.name)
             .collect();

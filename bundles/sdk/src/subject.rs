@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use qcbus_document::{Document, FileKind, Node, XPaths};
 use qcbus_messages::{DocumentRole, MissingDocument};
 
-use crate::{Brought, Version};
+use crate::{ResourceValue, Version};
 
 /// The documents of one check.
 #[derive(Debug, Clone)]
@@ -15,7 +15,7 @@ pub struct Subject<'d> {
     version: Option<Version>,
     linked: Vec<Linked<'d>>,
     missing: Vec<MissingDocument>,
-    brought: Vec<Brought>,
+    resources: Vec<ResourceValue>,
     paths: RefCell<XPaths>,
 }
 
@@ -41,7 +41,7 @@ impl<'d> Subject<'d> {
             version,
             linked: Vec::new(),
             missing: Vec::new(),
-            brought: Vec::new(),
+            resources: Vec::new(),
             paths: RefCell::new(XPaths::new(root)),
         }
     }
@@ -56,14 +56,14 @@ impl<'d> Subject<'d> {
 
     /// The same subject with what was made of the user's files; see [`crate::Resource`].
     #[must_use]
-    pub fn bringing(mut self, brought: Vec<Brought>) -> Subject<'d> {
-        self.brought = brought;
+    pub fn with_resources(mut self, resources: Vec<ResourceValue>) -> Subject<'d> {
+        self.resources = resources;
         self
     }
 
-    /// What was made of the user's files, if the user brought any for this bundle.
-    pub fn brought<T: 'static>(&self) -> Option<&T> {
-        self.brought.iter().find_map(|one| one.downcast_ref())
+    /// What was made of the user's files, if the user gave any to this bundle.
+    pub fn resource<T: 'static>(&self) -> Option<&T> {
+        self.resources.iter().find_map(|one| one.downcast_ref())
     }
 
     /// The document that is checked.

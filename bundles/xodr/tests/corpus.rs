@@ -18,7 +18,7 @@ use qcbus_sdk::corpus::{self, Comparison, compare_asam_cases, compare_real_files
 /// The page that shows where we agree and where we do not.
 const PARITY: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
-    "/../../docs/parity-opendrive.md"
+    "/../../docs/evidence/parity-opendrive.md"
 );
 
 const CONTACT: &str = "check_asam_xodr_road_geometry_contact_point";

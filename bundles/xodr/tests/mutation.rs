@@ -1,7 +1,7 @@
 //! Proof by mutation: in maps with which nothing is wrong, one violating edit at a time makes the rule
 //! that it violates fire, and no other but those that the table of edits allows.
 //!
-//! The maps and the table lie in `tests/mutation/`. `QCBUS_BLESS=1` writes `docs/mutation-opendrive.md`;
+//! The maps and the table lie in `tests/mutation/`. `QCBUS_BLESS=1` writes `docs/evidence/mutation-opendrive.md`;
 //! `QCBUS_MUTATE=NAME` tries the edits of the rules whose name contains it, and says what each leads to.
 
 #![expect(
@@ -28,7 +28,7 @@ use tree::Tree;
 const EDITS: &str = include_str!("mutation/edits.txt");
 const PAGE: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
-    "/../../docs/mutation-opendrive.md"
+    "/../../docs/evidence/mutation-opendrive.md"
 );
 /// The schemas that are published reject some of what the standard prints; the rule says so and
 /// does not call it an error.

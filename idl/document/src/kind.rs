@@ -16,6 +16,52 @@ pub enum FileKind {
     Mosc,
 }
 
+/// A suffix of file names and what it promises.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Suffix {
+    /// With its dot, in lower case.
+    pub text: &'static str,
+    /// The kind of file.
+    pub kind: FileKind,
+    /// Whether the file is packed by gzip.
+    pub packed: bool,
+}
+
+const fn plain(text: &'static str, kind: FileKind) -> Suffix {
+    let packed = false;
+    Suffix { text, kind, packed }
+}
+
+const fn packed(text: &'static str, kind: FileKind) -> Suffix {
+    let packed = true;
+    Suffix { text, kind, packed }
+}
+
+/// The suffixes of all files that qcbus checks, the one table of them.
+pub const SUFFIXES: [Suffix; 5] = [
+    plain(".xodr", FileKind::Xodr),
+    packed(".xodrz", FileKind::Xodr),
+    packed(".xodr.gz", FileKind::Xodr),
+    plain(".xosc", FileKind::Xosc),
+    plain(".mosc", FileKind::Mosc),
+];
+
+impl Suffix {
+    /// The suffix of a file's name, compared without regard to case; `None` when it is none of
+    /// [`SUFFIXES`] or the whole name.
+    pub fn of_path(path: &Path) -> Option<Suffix> {
+        // Only the end of a name counts; the rest of it need not be UTF-8.
+        let name = path.file_name()?.as_encoded_bytes().to_ascii_lowercase();
+        let ends = |it: &Suffix| name.len() > it.text.len() && name.ends_with(it.text.as_bytes());
+        SUFFIXES.into_iter().find(ends)
+    }
+
+    /// All of them, for a message: `.xodr .xodrz ...`.
+    pub fn list() -> String {
+        SUFFIXES.map(|it| it.text).join(" ")
+    }
+}
+
 impl FileKind {
     /// Every kind, in a fixed order.
     pub const ALL: [FileKind; 3] = [FileKind::Xodr, FileKind::Xosc, FileKind::Mosc];
@@ -23,18 +69,7 @@ impl FileKind {
     /// The kind that a file's name promises (suffixes are compared without regard to case), or
     /// `None` when qcbus does not check such files.
     pub fn of_path(path: &Path) -> Option<FileKind> {
-        // Only the end of a name counts; the rest of it need not be UTF-8.
-        let name = path.file_name()?.as_encoded_bytes().to_ascii_lowercase();
-        let ends = |suffix: &str| name.len() > suffix.len() && name.ends_with(suffix.as_bytes());
-        if ends(".xodr") || ends(".xodrz") || ends(".xodr.gz") {
-            Some(FileKind::Xodr)
-        } else if ends(".xosc") {
-            Some(FileKind::Xosc)
-        } else if ends(".mosc") {
-            Some(FileKind::Mosc)
-        } else {
-            None
-        }
+        Suffix::of_path(path).map(|suffix| suffix.kind)
     }
 
     /// The kind's short name, `xodr`, `xosc` or `mosc`.
@@ -61,6 +96,12 @@ mod tests {
         assert_eq!(of("b.mosc"), Some(FileKind::Mosc));
         assert_eq!(of("b.xml"), None);
         assert_eq!(of(".xodr"), None);
+        let packed = |name: &str| Suffix::of_path(Path::new(name)).map(|it| it.packed);
+        assert_eq!(
+            (packed("b.XODRZ"), packed("b.xodr")),
+            (Some(true), Some(false))
+        );
+        assert_eq!(Suffix::list(), ".xodr .xodrz .xodr.gz .xosc .mosc");
     }
 
     #[cfg(unix)]

@@ -29,7 +29,7 @@ pub use attribute::{Attribute, Attributes};
 pub use builder::{BuildError, Capacities, ImageBuilder};
 pub use document::{Document, Elements, ImageError};
 pub use fault::{Fault, FaultCode, FaultGroup};
-pub use kind::FileKind;
+pub use kind::{FileKind, SUFFIXES, Suffix};
 pub use node::{Ancestors, Children, ChildrenNamed, Descendants, DescendantsNamed, Node};
 pub use source::{Position, Source};
 pub use value::{NumberKind, ValueError};

@@ -261,15 +261,15 @@ fn what_nobody_knows_is_told() {
             KnownBundle {
                 name: "xodrBundle".into(),
                 alias: "xodr".into(),
-                checkers: vec![
+                checkers: Some(vec![
                     checker("check_lanes", &["tolerance"]),
                     checker("check_ids", &[]),
-                ],
+                ]),
             },
             KnownBundle {
                 name: "xoscBundle".into(),
                 alias: "xosc".into(),
-                checkers: vec![checker("check_actors", &[])],
+                checkers: Some(vec![checker("check_actors", &[])]),
             },
         ],
         reporters: vec!["mail".into()],
@@ -322,7 +322,7 @@ fn two_names_of_one_bundle_are_told() {
         bundles: vec![KnownBundle {
             name: "mineBundle".into(),
             alias: "mine".into(),
-            checkers: vec![],
+            checkers: Some(vec![]),
         }],
         reporters: vec![],
     };
@@ -332,5 +332,35 @@ fn two_names_of_one_bundle_are_told() {
     assert!(
         notices[0].row == 2 && notices[0].text.contains("the same bundle"),
         "{notices:?}"
+    );
+}
+
+#[test]
+fn what_only_a_bundle_can_tell_is_said_to_be_unknown() {
+    let checker = KnownChecker {
+        id: "check_lanes".into(),
+        params: vec!["tolerance".into()],
+    };
+    let bundle = |name: &str, checkers| KnownBundle {
+        name: name.into(),
+        alias: String::new(),
+        checkers,
+    };
+    let known = Known {
+        bundles: vec![bundle("ours", Some(vec![checker])), bundle("mine", None)],
+        reporters: vec![],
+    };
+    let text = r#"<Config>
+  <Param name="of_mine" value="1"/><Param name="tolerence" value="1"/>
+  <CheckerBundle application="mine"><Checker checkerId="any"/></CheckerBundle>
+</Config>"#;
+    let remarks = parse(text).remarks(&known);
+    let found: Vec<_> = remarks.iter().map(|it| (it.row, it.level)).collect();
+    assert_eq!(found, [(2, Level::Warning), (3, Level::Information)]);
+    assert!(remarks[0].text.contains("tolerence"), "{remarks:?}");
+    let line = remarks[1].line(std::path::Path::new("c.xml"));
+    assert!(
+        line.starts_with("c.xml:3:3: information: what `mine` offers"),
+        "{line}"
     );
 }

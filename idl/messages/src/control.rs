@@ -24,6 +24,12 @@ pub enum Request {
     Down,
     /// Read the configuration and the bundle manifests again.
     Reload,
+    /// Demand a bundle no longer that no manifest names: one that joined by hand and is gone for
+    /// good.
+    RemoveBundle {
+        /// Its name.
+        name: String,
+    },
 }
 
 /// The broker's answer.
@@ -47,6 +53,14 @@ pub enum Response {
     Reloaded {
         /// For a person.
         changes: Vec<String>,
+        /// What is odd about the configuration and the manifests now in force, for a person.
+        #[serde(default)]
+        notices: Vec<String>,
+    },
+    /// Answer to `RemoveBundle`: it is not demanded any more.
+    Removed {
+        /// What that means, for a person.
+        what: String,
     },
     /// The request could not be carried out, and what stays in force.
     Failed {
@@ -99,6 +113,9 @@ pub struct Status {
     /// Where results go.
     #[serde(with = "path_text::one")]
     pub out: PathBuf,
+    /// The directory of bundle manifests that it watches.
+    #[serde(default)]
+    pub bundles_d: Option<PathBuf>,
     /// Digest of the configuration in force.
     pub config: String,
     /// Files by state.

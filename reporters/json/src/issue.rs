@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use qcbus_formats::xqar::{Issue, Location};
-use qcbus_reporter_sdk::{Place, places};
+use qcbus_reporter_sdk::{IssueLocation, issue_locations};
 use serde::Serialize;
 
 use crate::xml;
@@ -122,7 +122,7 @@ pub(crate) fn issue<'r>(issue: &'r Issue, input: &str) -> IssueJson<'r> {
         rule_uid: &issue.rule_uid,
         locations: locations(issue),
         domain_specific_info: issue.written_info().map(|info| xml::text(&info)).collect(),
-        places: places(issue)
+        places: issue_locations(issue)
             .into_iter()
             .map(|each| place(each, input))
             .collect(),
@@ -188,7 +188,7 @@ impl<'r> LocationsJson<'r> {
     }
 }
 
-fn place(place: Place, input: &str) -> PlaceJson {
+fn place(place: IssueLocation, input: &str) -> PlaceJson {
     let pair = |(row, column)| RowColumn { row, column };
     PlaceJson {
         path: place.path.unwrap_or_else(|| input.to_owned()),

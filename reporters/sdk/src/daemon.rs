@@ -5,7 +5,7 @@ use std::time::Duration;
 use qcbus_bus::{Instance, JoinError, Peer, PeerEvent, PeerOptions};
 use qcbus_messages::{FromPeer, Hello, PROTOCOL_VERSION, ResultMessage, Role, ToPeer};
 
-use crate::{BothSources, FileSources, ImageSources, Reporter, Session, Sources};
+use crate::{BothSources, FileSources, ImageSources, Reporter, Responder, Sources};
 
 /// How often a reporter says that it lives.
 const HEARTBEAT: Duration = Duration::from_secs(1);
@@ -48,9 +48,9 @@ pub async fn run(
     reporter: &mut dyn Reporter,
 ) -> Result<(), RunError> {
     let mut peer = Peer::join(instance, hello(identity), PeerOptions::default()).await?;
-    let mut session = Session::new(reporter);
+    let mut responder = Responder::new(reporter);
     let mut beat = tokio::time::interval(HEARTBEAT);
-    while !session.has_left() {
+    while !responder.has_left() {
         let event = tokio::select! {
             event = peer.next() => event,
             _ = beat.tick() => {
@@ -59,10 +59,10 @@ pub async fn run(
             }
         };
         match event {
-            PeerEvent::Message(message) => answer(&mut peer, &mut session, message),
-            PeerEvent::Rejoined => session.rejoined(),
+            PeerEvent::Message(message) => answer(&mut peer, &mut responder, message),
+            PeerEvent::Rejoined => responder.rejoined(),
             PeerEvent::Closed { reason } => {
-                session.finish();
+                responder.finish();
                 return Err(RunError::Closed(reason));
             }
             // Documents are looked up when a result needs one; reporters read no configuration.
@@ -73,12 +73,12 @@ pub async fn run(
     Ok(())
 }
 
-fn answer(peer: &mut Peer, session: &mut Session<'_>, message: ToPeer) {
+fn answer(peer: &mut Peer, responder: &mut Responder<'_>, message: ToPeer) {
     let document = match &message {
         ToPeer::Result(result) => result.document,
         _ => None,
     };
-    let answers = session.handle(message, |result| sources_of(peer, result));
+    let answers = responder.handle(message, |result| sources_of(peer, result));
     if let Some(document) = document {
         peer.forget(document);
     }

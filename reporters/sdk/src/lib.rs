@@ -6,28 +6,28 @@
 //! reporter on an `.xqar` that exists already, as ASAM's report modules do.
 //!
 //! What reporters have in common lies here too: the lines of the checked files ([`Sources`]), the
-//! places of an issue with those in other files ([`places`]), and where reports go ([`Outlet`],
+//! places of an issue with those in other files ([`issue_locations`]), and where reports go ([`Outlet`],
 //! [`Output`], [`Shelf`]).
 
 mod clean;
 mod daemon;
+mod issue_location;
 mod loaded;
 mod once;
 mod outlet;
 mod output;
-mod place;
-mod session;
+mod responder;
 mod shelf;
 mod sources;
 
 pub use clean::{one_line, printable};
 pub use daemon::{Identity, RunError, run};
+pub use issue_location::{IssueLocation, issue_locations};
 pub use loaded::{LoadError, load};
 pub use once::{OnceError, OneShot, report_once};
 pub use outlet::{Outlet, Subject};
 pub use output::{Output, param, replace_file};
-pub use place::{Place, places};
-pub use session::Session;
+pub use responder::Responder;
 pub use shelf::{Format, Shelf};
 pub use sources::{Answer, BothSources, FileSources, ImageSources, Line, NoSources, Sources};
 

@@ -113,7 +113,7 @@ fn inside(path: &Path) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::session::samples::result;
+    use crate::responder::samples::result;
 
     fn params(value: &str) -> Vec<Param> {
         vec![Param {

@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 
 use qcbus_formats::xqar::{DomainInfo, InfoElement, Level};
 use qcbus_messages::ResultMessage;
-use qcbus_reporter_sdk::{Place, Sources, one_line, printable};
+use qcbus_reporter_sdk::{IssueLocation, Sources, one_line, printable};
 
-use crate::Finding;
+use crate::Entry;
 use crate::paint::Paint;
 use crate::snippet::snippet;
 use crate::wrap::wrap;
@@ -21,20 +21,20 @@ pub(crate) struct View<'v> {
 
 impl View<'_> {
     /// Writes headline, places with source lines, rule and reason.
-    pub(crate) fn write(&self, out: &mut String, finding: &Finding<'_>, why: Option<&str>) {
-        let gutter = gutter(&finding.places);
-        self.headline(out, finding);
-        for (number, place) in finding.places.iter().enumerate() {
-            self.place(out, place, finding.issue.level, gutter, number == 0);
+    pub(crate) fn write(&self, out: &mut String, entry: &Entry<'_>, why: Option<&str>) {
+        let gutter = gutter(&entry.places);
+        self.headline(out, entry);
+        for (number, place) in entry.places.iter().enumerate() {
+            self.place(out, place, entry.issue.level, gutter, number == 0);
         }
-        if finding.places.is_empty() {
+        if entry.places.is_empty() {
             let path = printable(&self.result.display_path);
             let arrow = self.paint.frame("-->");
             let _ = writeln!(out, "{:gutter$}{arrow} {path}", "");
         }
         let mut note = |name: &str, text: &str| self.note(out, gutter, name, text);
-        note("rule", &rule_of(finding));
-        for info in &finding.issue.domain_info {
+        note("rule", &rule_of(entry));
+        for info in &entry.issue.domain_info {
             if info.name != qcbus_formats::location::NAME {
                 note(&one_line(&info.name), &flat(info));
             }
@@ -44,9 +44,9 @@ impl View<'_> {
         }
     }
 
-    fn headline(&self, out: &mut String, finding: &Finding<'_>) {
-        let level = finding.issue.level;
-        let text = printable(finding.issue.description.trim());
+    fn headline(&self, out: &mut String, entry: &Entry<'_>) {
+        let level = entry.issue.level;
+        let text = printable(entry.issue.description.trim());
         let mut lines = text.lines();
         let first = self.paint.bold(lines.next().unwrap_or("(no description)"));
         let _ = writeln!(out, "{}: {first}", self.paint.level(level, level.as_str()));
@@ -55,7 +55,14 @@ impl View<'_> {
         }
     }
 
-    fn place(&self, out: &mut String, place: &Place, level: Level, gutter: usize, main: bool) {
+    fn place(
+        &self,
+        out: &mut String,
+        place: &IssueLocation,
+        level: Level,
+        gutter: usize,
+        main: bool,
+    ) {
         let arrow = self.paint.frame(if main { "-->" } else { ":::" });
         let _ = writeln!(out, "{:gutter$}{arrow} {}", "", self.name(place));
         let shown = self.snippet(out, place, level, gutter);
@@ -77,7 +84,7 @@ impl View<'_> {
     }
 
     /// `PATH:ROW:COLUMN`, as far as known.
-    fn name(&self, place: &Place) -> String {
+    fn name(&self, place: &IssueLocation) -> String {
         let mut name = match &place.path {
             Some(path) => printable(&self.shortened(path)),
             None => printable(&self.result.display_path),
@@ -97,7 +104,13 @@ impl View<'_> {
     }
 
     /// The source line with marks; says whether there was one.
-    fn snippet(&self, out: &mut String, place: &Place, level: Level, gutter: usize) -> bool {
+    fn snippet(
+        &self,
+        out: &mut String,
+        place: &IssueLocation,
+        level: Level,
+        gutter: usize,
+    ) -> bool {
         let Some(row) = place.row else { return false };
         let path = place.path.as_deref().unwrap_or(&self.result.input);
         let near = place.column.unwrap_or(1);
@@ -140,22 +153,22 @@ impl View<'_> {
 
 /// Columns for the largest row number that may be shown. Larger rows than files have are other
 /// tools' nonsense.
-fn gutter(places: &[Place]) -> usize {
+fn gutter(places: &[IssueLocation]) -> usize {
     let rows = places.iter().filter_map(|place| place.row);
     rows.max().map_or(1, |row| row.to_string().len().min(8))
 }
 
 /// The rule's UID and the checker; ASAM's checkers carry the rule's name, so both are needed to
 /// look either up.
-fn rule_of(finding: &Finding<'_>) -> String {
-    let checker = format!("{}/{}", finding.bundle.name, finding.checker.id);
-    match finding.issue.rule_uid.as_str() {
+fn rule_of(entry: &Entry<'_>) -> String {
+    let checker = format!("{}/{}", entry.bundle.name, entry.checker.id);
+    match entry.issue.rule_uid.as_str() {
         "" => checker,
         uid => format!("{uid} ({checker})"),
     }
 }
 
-fn facts(place: &Place) -> String {
+fn facts(place: &IssueLocation) -> String {
     let mut facts = Vec::new();
     if let Some(xpath) = &place.xpath {
         facts.push(xpath.clone());

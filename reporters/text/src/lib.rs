@@ -20,7 +20,7 @@ use qcbus_formats::xqar::{Checker, CheckerBundle, Issue};
 use qcbus_messages::ResultMessage;
 #[cfg(doc)]
 use qcbus_reporter_sdk::Output;
-use qcbus_reporter_sdk::{Place, Sources, places};
+use qcbus_reporter_sdk::{IssueLocation, Sources, issue_locations};
 
 use paint::Paint;
 
@@ -48,59 +48,59 @@ impl Default for Options {
     }
 }
 
-/// One finding with what is around it.
-pub(crate) struct Finding<'r> {
+/// An issue with what is around it: one entry of a report.
+pub(crate) struct Entry<'r> {
     pub(crate) bundle: &'r CheckerBundle,
     pub(crate) checker: &'r Checker,
     pub(crate) issue: &'r Issue,
-    pub(crate) places: Vec<Place>,
+    pub(crate) places: Vec<IssueLocation>,
 }
 
 /// The report of one result: its issues in the order of their places, then the verdict and the
 /// summary. Ends with a line feed; equal input gives equal text.
 pub fn render(result: &ResultMessage, options: &Options, sources: &dyn Sources) -> String {
     let paint = Paint::new(options.color);
-    let mut findings = findings(result);
-    findings.sort_by_key(order);
+    let mut entries = entries(result);
+    entries.sort_by_key(order);
     let mut explained = std::collections::BTreeSet::new();
     let mut out = String::new();
-    for finding in &findings {
+    for entry in &entries {
         // Why a rule exists is said once per report, not under each of a hundred issues.
-        let why = result.rules.get(&finding.issue.rule_uid);
-        let why = why.filter(|_| explained.insert(finding.issue.rule_uid.as_str()));
+        let why = result.rules.get(&entry.issue.rule_uid);
+        let why = why.filter(|_| explained.insert(entry.issue.rule_uid.as_str()));
         let view = issue::View {
             result,
             sources,
             paint,
             width: options.width,
         };
-        view.write(&mut out, finding, why.map(String::as_str));
+        view.write(&mut out, entry, why.map(String::as_str));
         out.push('\n');
     }
     summary::write(&mut out, result, paint, options);
     out
 }
 
-fn findings(result: &ResultMessage) -> Vec<Finding<'_>> {
+fn entries(result: &ResultMessage) -> Vec<Entry<'_>> {
     let bundles = result.results.bundles.iter();
     let checkers = bundles.flat_map(|bundle| bundle.checkers.iter().map(move |c| (bundle, c)));
     let issues = checkers.flat_map(|(bundle, checker)| {
-        let finding = move |issue| Finding {
+        let entry = move |issue| Entry {
             bundle,
             checker,
             issue,
-            places: places(issue),
+            places: issue_locations(issue),
         };
-        checker.issues.iter().map(finding)
+        checker.issues.iter().map(entry)
     });
     issues.collect()
 }
 
 /// Issues are read along the file; what is in other files goes by where it is referred to, what
 /// qcbus says about the check itself comes last. The sort is stable: ties stay in result order.
-fn order(finding: &Finding<'_>) -> (bool, u64, u64) {
-    let own = finding.bundle.name == qcbus_formats::pool::OWN_BUNDLE;
-    let place = finding.places.first();
+fn order(entry: &Entry<'_>) -> (bool, u64, u64) {
+    let own = entry.bundle.name == qcbus_formats::pool::OWN_BUNDLE;
+    let place = entry.places.first();
     let at = place.map_or((0, 0), |place| {
         let here = (place.row.unwrap_or(0), place.column.unwrap_or(0));
         match place.path {

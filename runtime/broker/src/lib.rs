@@ -28,6 +28,7 @@ pub mod watch;
 mod writers;
 
 pub use demand::InForce;
+pub use disk::write_whole;
 pub use engine::{Announcement, Broker, StartError, Stop, Told};
 pub use options::Options;
 pub use result_paths::ResultPaths;

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use qcbus_bus::{HostOptions, Instance};
+use qcbus_formats::config::Known;
 use qcbus_formats::xqar::Dialect;
 use qcbus_ingest::Limits;
 
@@ -48,6 +49,9 @@ pub struct Options {
     pub standard: Vec<ChildSpec>,
     /// How to start a reporter that the configuration names, by our name for it.
     pub reporters: Vec<ChildSpec>,
+    /// What can be said beforehand of the bundles that come with the program, for looking at the
+    /// configuration.
+    pub known: Known,
     /// Whether children die with the broker at once.
     pub die_with_broker: bool,
     /// Most private memory of a child, in bytes.

@@ -4,7 +4,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use qcbus_formats::config::{BundleConfig, Config, reporter_for};
+use qcbus_formats::config::{
+    BundleConfig, Config, Known, KnownBundle, Notice, Parsed, reporter_for,
+};
 use qcbus_formats::manifest::{self, Mode, Module, ModuleType};
 use qcbus_messages::Role;
 
@@ -22,6 +24,8 @@ pub struct Sources {
     pub standard: Vec<ChildSpec>,
     /// Reporters that run when the configuration names them.
     pub reporters: Vec<ChildSpec>,
+    /// What can be said beforehand of the bundles that come with the program.
+    pub known: Known,
 }
 
 /// What was read, valid as a whole.
@@ -31,7 +35,9 @@ pub struct Loaded {
     pub config: Option<Config>,
     /// Everything that is to run.
     pub children: Vec<ChildSpec>,
-    /// What is odd, for a person.
+    /// What is odd about the configuration.
+    pub remarks: Vec<Notice>,
+    /// What is odd about anything, that included, for a person.
     pub notices: Vec<String>,
 }
 
@@ -56,18 +62,42 @@ impl Sources {
             children: self.standard.clone(),
             ..Loaded::default()
         };
-        if let Some(path) = &self.config {
-            let (config, notices) = read_config(path)?;
-            self.add_reporters(&config, &mut loaded);
-            loaded.config = Some(config);
-            loaded.notices = notices;
+        let parsed = match &self.config {
+            Some(path) => Some((path, read_config(path)?)),
+            None => None,
+        };
+        if let Some((_, parsed)) = &parsed {
+            self.add_reporters(&parsed.config, &mut loaded);
         }
         for path in self.manifests()? {
             for module in read_manifest(&path)? {
                 add_module(module, &mut loaded);
             }
         }
+        if let Some((path, parsed)) = parsed {
+            loaded.remarks = parsed.remarks(&self.known_with(&loaded.children));
+            let lines = loaded.remarks.iter().map(|remark| remark.line(path));
+            loaded.notices.splice(0..0, lines);
+            loaded.config = Some(parsed.config);
+        }
         Ok(loaded)
+    }
+
+    /// What there is to be named: what comes with the program, and what manifests bring.
+    fn known_with(&self, children: &[ChildSpec]) -> Known {
+        let mut known = self.known.clone();
+        for child in children {
+            let name = &child.name;
+            if child.role == Role::Reporter {
+                known.reporters.push(name.clone());
+            } else if known.bundles.iter().all(|bundle| bundle.name != *name) {
+                known.bundles.push(KnownBundle {
+                    name: name.clone(),
+                    ..KnownBundle::default()
+                });
+            }
+        }
+        known
     }
 
     fn add_reporters(&self, config: &Config, loaded: &mut Loaded) {
@@ -124,22 +154,10 @@ impl Sources {
 ///
 /// # Errors
 /// [`LoadError::Config`] with path, row and column.
-pub fn read_config(path: &Path) -> Result<(Config, Vec<String>), LoadError> {
+pub fn read_config(path: &Path) -> Result<Parsed, LoadError> {
     let bytes = std::fs::read(path)
         .map_err(|error| LoadError::Config(format!("cannot read {}: {error}", path.display())))?;
-    let parsed = Config::parse(&bytes)
-        .map_err(|error| LoadError::Config(format!("{}:{error}", path.display())))?;
-    let notices = parsed.notices.iter().map(|notice| {
-        let level = format!("{:?}", notice.level).to_lowercase();
-        format!(
-            "{}:{}:{}: {level}: {}",
-            path.display(),
-            notice.row,
-            notice.column,
-            notice.text
-        )
-    });
-    Ok((parsed.config, notices.collect()))
+    Config::parse(&bytes).map_err(|error| LoadError::Config(format!("{}:{error}", path.display())))
 }
 
 fn read_manifest(path: &Path) -> Result<Vec<Module>, LoadError> {

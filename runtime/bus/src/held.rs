@@ -78,7 +78,8 @@ impl Drop for Ticket {
     }
 }
 
-struct Hold {
+/// A mapping of shared memory with what it shows.
+struct Mapped {
     start: *const u8,
     len: usize,
     doc: DocId,
@@ -96,15 +97,15 @@ struct Hold {
 // SAFETY: `start` points into the mapping that `_sample` keeps; the memory is mapped read-only in
 // this process and no slot is written again before every hold of it has been dropped. The sample
 // itself is Send, and is only touched when it is dropped.
-unsafe impl Send for Hold {}
+unsafe impl Send for Mapped {}
 #[expect(unsafe_code, reason = "see above")]
 // SAFETY: as above; shared access only reads immutable memory.
-unsafe impl Sync for Hold {}
+unsafe impl Sync for Mapped {}
 
 /// A published image, read in place. It stays readable as long as any clone lives, even when the
 /// broker has gone.
 #[derive(Clone)]
-pub struct Held(Arc<Hold>);
+pub struct Held(Arc<Mapped>);
 
 impl Held {
     /// `None` when the header claims what cannot be.
@@ -115,7 +116,7 @@ impl Held {
         if len > bytes.len() || header.generation != generation {
             return None;
         }
-        Some(Held(Arc::new(Hold {
+        Some(Held(Arc::new(Mapped {
             start: bytes.as_ptr(),
             len,
             doc: DocId(header.doc),
@@ -156,7 +157,7 @@ impl Deref for Held {
     )]
     fn deref(&self) -> &[u8] {
         // SAFETY: `start` and `len` were taken from the sample's payload, within its bounds; the
-        // mapping lives as long as `self.0`, and nobody writes to it (see `Hold`).
+        // mapping lives as long as `self.0`, and nobody writes to it (see `Mapped`).
         unsafe { std::slice::from_raw_parts(self.0.start, self.0.len) }
     }
 }

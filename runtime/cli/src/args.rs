@@ -3,7 +3,10 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
+
+use crate::standard::{REPORTERS, StandardReporter};
 
 /// A checker for OpenDRIVE roads and OpenSCENARIO scenarios that parses every file once and lets
 /// independent checker bundles read it in place.
@@ -190,8 +193,8 @@ pub struct ServeArgs {
     #[arg(long, value_name = "DIR")]
     pub gate: Option<PathBuf>,
     /// Run a reporter; may be given several times
-    #[arg(long, value_name = "NAME", value_enum)]
-    pub report: Vec<ReportArg>,
+    #[arg(long, value_name = "NAME", value_parser = reporter())]
+    pub report: Vec<&'static StandardReporter>,
     /// Look around at intervals instead of relying on file events (network file systems)
     #[arg(long, value_name = "TIME", num_args = 0..=1, default_missing_value = "2s", value_parser = duration)]
     pub poll: Option<Duration>,
@@ -210,15 +213,6 @@ pub struct ServeArgs {
     /// Caps.
     #[command(flatten)]
     pub limits: LimitArgs,
-}
-
-/// The standard reporters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ReportArg {
-    /// NAME.txt beside every result
-    Text,
-    /// NAME.json beside every result
-    Json,
 }
 
 /// `qcbus status`.
@@ -300,16 +294,30 @@ pub struct BusArgs {
 /// `qcbus bundle add`.
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "Example:\n  \
-qcbus bundle add mine /opt/mine/bundle --bundles-d DIR -- --its-own-flag")]
+qcbus bundle add mine /opt/mine/bundle -- --its-own-flag")]
 pub struct BundleAddArgs {
     /// The bundle's name, as it says it itself
     pub name: String,
     /// The program and its arguments; put `--` before arguments that begin with `-`
     #[arg(required = true)]
     pub command: Vec<String>,
-    /// Directory of bundle manifests of the broker (default: qcbus-out/.qcbus/bundles.d)
+    /// Which broker, and which directory.
+    #[command(flatten)]
+    pub manifests: ManifestArgs,
+}
+
+/// Where the manifest of a bundle lies.
+#[derive(Debug, ClapArgs)]
+pub struct ManifestArgs {
+    /// Which broker.
+    #[command(flatten)]
+    pub instance: InstanceArgs,
+    /// Directory of bundle manifests (default: the one that the broker watches)
     #[arg(long, value_name = "DIR")]
     pub bundles_d: Option<PathBuf>,
+    /// For a broker that does not run now (default directory: qcbus-out/.qcbus/bundles.d)
+    #[arg(long)]
+    pub offline: bool,
 }
 
 /// `qcbus bundle remove`.
@@ -317,9 +325,9 @@ pub struct BundleAddArgs {
 pub struct BundleRemoveArgs {
     /// The bundle's name
     pub name: String,
-    /// Directory of bundle manifests of the broker (default: qcbus-out/.qcbus/bundles.d)
-    #[arg(long, value_name = "DIR")]
-    pub bundles_d: Option<PathBuf>,
+    /// Which broker, and which directory.
+    #[command(flatten)]
+    pub manifests: ManifestArgs,
 }
 
 /// `qcbus reporter …`.
@@ -327,9 +335,9 @@ pub struct BundleRemoveArgs {
 pub enum ReporterCommand {
     /// Run a reporter on the bus
     Run {
-        /// text or json
-        #[arg(value_enum)]
-        name: ReportArg,
+        /// Which one
+        #[arg(value_parser = reporter())]
+        name: &'static StandardReporter,
         /// How to join the bus.
         #[command(flatten)]
         bus: BusArgs,
@@ -353,6 +361,9 @@ pub enum ConfigCommand {
     Check {
         /// The configuration
         file: PathBuf,
+        /// Directory of manifests of further bundles and reporters that it may name
+        #[arg(long, value_name = "DIR")]
+        bundles_d: Option<PathBuf>,
     },
 }
 
@@ -381,6 +392,14 @@ pub struct DoctorArgs {
     /// State directory to look into
     #[arg(long, value_name = "DIR", default_value = "qcbus-out/.qcbus")]
     pub state: PathBuf,
+}
+
+/// Takes a standard reporter by its short name.
+fn reporter() -> impl TypedValueParser<Value = &'static StandardReporter> {
+    let row = |it: &StandardReporter| PossibleValue::new(it.alias).help(it.about);
+    let find = |alias: String| REPORTERS.iter().find(|it| it.alias == alias);
+    PossibleValuesParser::new(REPORTERS.iter().map(row))
+        .try_map(move |alias| find(alias).ok_or("there is no such reporter"))
 }
 
 /// Reads `250ms`, `30s`, `5m`, `2h`, `90d`; a number alone is seconds.

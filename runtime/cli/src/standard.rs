@@ -1,12 +1,14 @@
-//! The bundles and reporters that come with the program.
+//! The bundles and reporters that come with the program: a table of each.
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
 use qcbus_broker::core::{ChildSpec, Restart};
 use qcbus_document::FileKind;
+use qcbus_formats::config::{Known, KnownBundle, KnownChecker};
 use qcbus_messages::Role;
-use qcbus_sdk::{Bundle, UserFiles};
+use qcbus_reporter_sdk::Reporter;
+use qcbus_sdk::{Bundle, Checker, UserFiles};
 
 /// The standard bundles.
 pub static BUNDLES: [&Bundle; 2] = [&qcbus_xodr::BUNDLE, &qcbus_xosc::BUNDLE];
@@ -46,15 +48,46 @@ pub fn bundle_specs(
     specs.collect()
 }
 
+/// A reporter that comes with the program.
+#[derive(Debug)]
+pub struct StandardReporter {
+    /// What it is called on the command line.
+    pub alias: &'static str,
+    /// What it is called on the bus and in configurations.
+    pub name: &'static str,
+    /// What it writes, for the help.
+    pub about: &'static str,
+    /// Makes one that has written nothing yet, for the bus and for one result alike: whether to
+    /// colour what goes to a terminal, and whether earlier reports stay in a file for all.
+    pub make: fn(color: bool, keep: bool) -> Box<dyn Reporter>,
+}
+
+/// The standard reporters: one more is one more row.
+pub static REPORTERS: [StandardReporter; 2] = [
+    StandardReporter {
+        alias: "text",
+        name: qcbus_report_text::NAME,
+        about: "NAME.txt beside every result",
+        make: |color, keep| Box::new(qcbus_report_text::TextReporter::new(color, keep)),
+    },
+    StandardReporter {
+        alias: "json",
+        name: qcbus_report_json::NAME,
+        about: "NAME.json beside every result",
+        make: |_, keep| Box::new(qcbus_report_json::JsonReporter::new(keep)),
+    },
+];
+
+impl StandardReporter {
+    /// How to start it.
+    pub fn spec(&self, program: &Path) -> ChildSpec {
+        spec(program, "reporter", self.alias, self.name, Role::Reporter)
+    }
+}
+
 /// How to start the standard reporters.
 pub fn reporter_specs(program: &Path) -> Vec<ChildSpec> {
-    [
-        ("text", qcbus_report_text::NAME),
-        ("json", qcbus_report_json::NAME),
-    ]
-    .into_iter()
-    .map(|(alias, name)| spec(program, "reporter", alias, name, Role::Reporter))
-    .collect()
+    REPORTERS.iter().map(|it| it.spec(program)).collect()
 }
 
 fn spec(program: &Path, command: &str, alias: &str, name: &str, role: Role) -> ChildSpec {
@@ -70,5 +103,30 @@ fn spec(program: &Path, command: &str, alias: &str, name: &str, role: Role) -> C
             alias.to_owned(),
         ],
         restart: Restart::Always,
+    }
+}
+
+/// What a configuration can name: the standard bundles with their checkers and parameters. (The
+/// standard reporters are known to the configuration itself.)
+pub fn known() -> Known {
+    let bundle = |bundle: &&Bundle| {
+        let checker = |checker: Checker| KnownChecker {
+            params: checker
+                .facts
+                .params
+                .iter()
+                .map(|param| param.name.to_owned())
+                .collect(),
+            id: checker.id,
+        };
+        KnownBundle {
+            name: bundle.name.to_owned(),
+            alias: bundle.alias.to_owned(),
+            checkers: Some(bundle.checkers().into_iter().map(checker).collect()),
+        }
+    };
+    Known {
+        bundles: BUNDLES.iter().map(bundle).collect(),
+        ..Known::default()
     }
 }

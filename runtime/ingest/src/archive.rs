@@ -5,8 +5,8 @@ use std::io::{Cursor, Read};
 use zip::ZipArchive;
 use zip::result::ZipError;
 
-use crate::finding::{Code, Finding};
 use crate::limits::{Exceeded, Limits};
+use crate::text_fault::{Code, TextFault};
 use crate::unpack::inflated_cap;
 
 /// The member that a modular scenario starts from.
@@ -18,7 +18,7 @@ pub(crate) struct Member {
     pub bytes: Vec<u8>,
     /// Whether the archive has the member at all.
     pub present: bool,
-    pub findings: Vec<Finding>,
+    pub faults: Vec<TextFault>,
 }
 
 /// Whether the bytes begin as a zip archive does (a member, or an archive without members).
@@ -32,22 +32,22 @@ pub(crate) fn read_member(packed: &[u8], name: &str, limits: &Limits) -> Member 
     let mut member = Member {
         bytes: Vec::new(),
         present: false,
-        findings: Vec::new(),
+        faults: Vec::new(),
     };
     let mut archive = match ZipArchive::new(Cursor::new(packed)) {
         Ok(archive) => archive,
         Err(error) => {
-            member.findings.push(damaged(packed, &error));
+            member.faults.push(damaged(packed, &error));
             return member;
         }
     };
-    if let Err(finding) = check_directory(&mut archive, limits, &mut member.findings) {
-        member.findings.push(finding);
+    if let Err(fault) = check_directory(&mut archive, limits, &mut member.faults) {
+        member.faults.push(fault);
         return member;
     }
     match read_checked(&mut archive, name, limits) {
         Ok(Some(bytes)) => (member.bytes, member.present) = (bytes, true),
-        Ok(None) => member.findings.push(Finding::new(
+        Ok(None) => member.faults.push(TextFault::new(
             Code::ArchiveMemberMissing,
             0,
             format!(
@@ -55,9 +55,9 @@ pub(crate) fn read_member(packed: &[u8], name: &str, limits: &Limits) -> Member 
                 similar(&archive, name)
             ),
         )),
-        Err(finding) => {
+        Err(fault) => {
             member.present = true;
-            member.findings.push(finding);
+            member.faults.push(fault);
         }
     }
     member
@@ -70,8 +70,8 @@ type Archive<'b> = ZipArchive<Cursor<&'b [u8]>>;
 fn check_directory(
     archive: &mut Archive<'_>,
     limits: &Limits,
-    findings: &mut Vec<Finding>,
-) -> Result<(), Finding> {
+    faults: &mut Vec<TextFault>,
+) -> Result<(), TextFault> {
     let count = archive.len() as u64;
     Exceeded::check(
         "max_members",
@@ -80,13 +80,13 @@ fn check_directory(
         u64::from(limits.max_members),
     )
     .map_err(|exceeded| {
-        Finding::new(Code::ArchiveLimit, 0, format!("the archive has {exceeded}"))
+        TextFault::new(Code::ArchiveLimit, 0, format!("the archive has {exceeded}"))
     })?;
     if let Some(total) = archive.decompressed_size() {
         let total = u64::try_from(total).unwrap_or(u64::MAX);
         Exceeded::check("max_archive", "unpacked bytes", total, limits.max_archive).map_err(
             |exceeded| {
-                Finding::new(
+                TextFault::new(
                     Code::UnpackedLimit,
                     0,
                     format!("the archive has {exceeded}"),
@@ -96,7 +96,7 @@ fn check_directory(
     }
     if archive.has_duplicate_names() {
         let text = "the archive has several members of one name; the last one is read";
-        findings.push(Finding::new(Code::ArchiveDuplicate, 0, text));
+        faults.push(TextFault::new(Code::ArchiveDuplicate, 0, text));
     }
     let escaping: Vec<String> = (0..archive.len())
         .filter_map(|index| {
@@ -108,7 +108,7 @@ fn check_directory(
         .collect();
     for name in escaping {
         let text = format!("the member {name:?} leads out of the archive; it is never read");
-        findings.push(Finding::new(Code::ArchiveEscapes, 0, text));
+        faults.push(TextFault::new(Code::ArchiveEscapes, 0, text));
     }
     Ok(())
 }
@@ -125,7 +125,7 @@ fn read_checked(
     archive: &mut Archive<'_>,
     name: &str,
     limits: &Limits,
-) -> Result<Option<Vec<u8>>, Finding> {
+) -> Result<Option<Vec<u8>>, TextFault> {
     if !stays_inside(name) {
         return Ok(None);
     }
@@ -162,7 +162,7 @@ fn read_checked(
             found: cap.allowed + 1,
             ..cap
         };
-        return Err(Finding::new(
+        return Err(TextFault::new(
             code,
             0,
             format!("the member {name} has {exceeded}"),
@@ -172,22 +172,22 @@ fn read_checked(
     Ok(Some(bytes))
 }
 
-fn malformed(name: &str, reason: &str) -> Finding {
-    Finding::new(
+fn malformed(name: &str, reason: &str) -> TextFault {
+    TextFault::new(
         Code::ArchiveMalformed,
         0,
         format!("the member {name} cannot be read: {reason}"),
     )
 }
 
-fn damaged(packed: &[u8], error: &ZipError) -> Finding {
+fn damaged(packed: &[u8], error: &ZipError) -> TextFault {
     // A local header without the directory at the end: the archive began well and was cut.
     let code = if is_zip(packed) {
         Code::ArchiveTruncated
     } else {
         Code::ArchiveMalformed
     };
-    Finding::new(code, 0, format!("the archive cannot be read: {error}"))
+    TextFault::new(code, 0, format!("the archive cannot be read: {error}"))
 }
 
 /// A hint for the commonest mistake: the folder was packed instead of its content.
@@ -228,12 +228,8 @@ mod tests {
 
     fn read(packed: &[u8], limits: Limits) -> (Vec<u8>, Vec<Code>, String) {
         let member = read_member(packed, MAIN_MEMBER, &limits);
-        let texts: Vec<&str> = member
-            .findings
-            .iter()
-            .map(|finding| &*finding.text)
-            .collect();
-        let codes = member.findings.iter().map(|finding| finding.code).collect();
+        let texts: Vec<&str> = member.faults.iter().map(|fault| &*fault.text).collect();
+        let codes = member.faults.iter().map(|fault| fault.code).collect();
         (member.bytes, codes, texts.join("; "))
     }
 
@@ -307,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_is_a_finding() {
+    fn damage_is_a_fault() {
         let packed = zip(&[("main.xosc", b"<a/>")]);
         let (_, codes, _) = read(&packed[..packed.len() - 10], Limits::default());
         assert_eq!(codes, [Code::ArchiveTruncated]);

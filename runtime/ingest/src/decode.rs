@@ -4,14 +4,14 @@ use std::borrow::Cow;
 
 use encoding_rs::{Encoding, UTF_16BE, UTF_16LE};
 
-use crate::finding::{Code, Finding};
 use crate::limits::{Exceeded, Limits};
+use crate::text_fault::{Code, TextFault};
 
 /// A file's text in UTF-8, and what was wrong with its bytes. A UTF-8 byte-order mark stays, so
 /// that offsets are those of the file on disk.
 pub(crate) struct Decoded {
     pub text: String,
-    pub findings: Vec<Finding>,
+    pub faults: Vec<TextFault>,
 }
 
 /// How the bytes are to be read.
@@ -29,30 +29,30 @@ struct Opening {
     charset: Charset,
     /// Length of the byte-order mark.
     mark: usize,
-    finding: Option<Finding>,
+    fault: Option<TextFault>,
 }
 
-/// Decodes a whole file. Bytes that cannot be read become U+FFFD and a finding each (the first few),
+/// Decodes a whole file. Bytes that cannot be read become U+FFFD and a fault each (the first few),
 /// so that the rest stays readable.
 pub(crate) fn decode(bytes: Vec<u8>, limits: &Limits) -> Decoded {
     let opening = open(&bytes);
-    let mut findings: Vec<Finding> = opening.finding.into_iter().collect();
+    let mut faults: Vec<TextFault> = opening.fault.into_iter().collect();
     let text = match opening.charset {
-        Charset::Utf8 => utf8(bytes, &mut findings),
-        Charset::Ascii => ascii(bytes, &mut findings),
+        Charset::Utf8 => utf8(bytes, &mut faults),
+        Charset::Ascii => ascii(bytes, &mut faults),
         Charset::Latin1 => {
-            findings.push(transcoded("ISO-8859-1"));
+            faults.push(transcoded("ISO-8859-1"));
             bytes.iter().map(|&byte| char::from(byte)).collect()
         }
         Charset::Table(encoding) => {
-            findings.push(transcoded(encoding.name()));
+            faults.push(transcoded(encoding.name()));
             let text = table(
                 encoding,
                 bytes.get(opening.mark..).unwrap_or(&[]),
-                &mut findings,
+                &mut faults,
             );
             if is_utf16(encoding) {
-                check_utf16_declaration(&text, &mut findings);
+                check_utf16_declaration(&text, &mut faults);
             }
             text
         }
@@ -64,12 +64,12 @@ pub(crate) fn decode(bytes: Vec<u8>, limits: &Limits) -> Decoded {
         size,
         limits.max_unpacked,
     ) {
-        Ok(()) => Decoded { text, findings },
+        Ok(()) => Decoded { text, faults },
         Err(exceeded) => {
-            let finding = Finding::new(Code::UnpackedLimit, 0, format!("the text has {exceeded}"));
+            let fault = TextFault::new(Code::UnpackedLimit, 0, format!("the text has {exceeded}"));
             Decoded {
                 text: String::new(),
-                findings: vec![finding],
+                faults: vec![fault],
             }
         }
     }
@@ -77,10 +77,10 @@ pub(crate) fn decode(bytes: Vec<u8>, limits: &Limits) -> Decoded {
 
 /// Byte-order mark first, then the pattern of `<?` in 16 bits, then the declaration.
 fn open(bytes: &[u8]) -> Opening {
-    let found = |charset, mark, finding| Opening {
+    let found = |charset, mark, fault| Opening {
         charset,
         mark,
-        finding,
+        fault,
     };
     if let Some(text) = bytes.strip_prefix(b"\xEF\xBB\xBF") {
         return found(Charset::Utf8, 3, contradiction(text));
@@ -94,7 +94,7 @@ fn open(bytes: &[u8]) -> Opening {
             found(
                 Charset::Utf8,
                 0,
-                Some(Finding::new(Code::EncodingUnknown, 0, text)),
+                Some(TextFault::new(Code::EncodingUnknown, 0, text)),
             )
         }
         [0xFF, 0xFE, ..] => found(Charset::Table(UTF_16LE), 2, None),
@@ -109,9 +109,9 @@ fn is_utf16(encoding: &'static Encoding) -> bool {
     encoding == UTF_16LE || encoding == UTF_16BE
 }
 
-fn transcoded(name: &str) -> Finding {
+fn transcoded(name: &str) -> TextFault {
     let text = format!("the file is in {name}, not in UTF-8; places count its characters as UTF-8");
-    Finding::new(Code::EncodingTranscoded, 0, text)
+    TextFault::new(Code::EncodingTranscoded, 0, text)
 }
 
 fn by_declaration(bytes: &[u8]) -> Opening {
@@ -119,7 +119,7 @@ fn by_declaration(bytes: &[u8]) -> Opening {
         return Opening {
             charset: Charset::Utf8,
             mark: 0,
-            finding: None,
+            fault: None,
         };
     };
     let (charset, trouble) = match charset_of(&label) {
@@ -138,16 +138,16 @@ fn by_declaration(bytes: &[u8]) -> Opening {
             (Charset::Utf8, Some((Code::EncodingUnknown, text)))
         }
     };
-    let finding = trouble.map(|(code, text)| Finding::new(code, offset, text));
+    let fault = trouble.map(|(code, text)| TextFault::new(code, offset, text));
     Opening {
         charset,
         mark: 0,
-        finding,
+        fault,
     }
 }
 
 /// A declaration that names something else than the UTF-8 byte-order mark before it.
-fn contradiction(text: &[u8]) -> Option<Finding> {
+fn contradiction(text: &[u8]) -> Option<TextFault> {
     let (label, offset) = declared(text)?;
     if charset_of(&label) == Some(Charset::Utf8) {
         return None;
@@ -156,10 +156,10 @@ fn contradiction(text: &[u8]) -> Option<Finding> {
         "the file declares encoding \"{label}\" but begins with a UTF-8 byte-order mark; the mark \
          is believed"
     );
-    Some(Finding::new(Code::EncodingMismatch, offset + 3, text))
+    Some(TextFault::new(Code::EncodingMismatch, offset + 3, text))
 }
 
-fn check_utf16_declaration(text: &str, findings: &mut Vec<Finding>) {
+fn check_utf16_declaration(text: &str, faults: &mut Vec<TextFault>) {
     let Some((label, offset)) = declared(text.as_bytes()) else {
         return;
     };
@@ -167,7 +167,7 @@ fn check_utf16_declaration(text: &str, findings: &mut Vec<Finding>) {
         .is_some_and(|charset| matches!(charset, Charset::Table(encoding) if is_utf16(encoding)));
     if !is_utf16_label {
         let text = format!("the file declares encoding \"{label}\" but its bytes are UTF-16");
-        findings.push(Finding::new(Code::EncodingMismatch, offset, text));
+        faults.push(TextFault::new(Code::EncodingMismatch, offset, text));
     }
 }
 
@@ -224,7 +224,7 @@ fn declared(bytes: &[u8]) -> Option<(String, usize)> {
 /// Most places of unreadable bytes that are named one by one.
 const NAMED_PLACES: usize = 8;
 
-fn utf8(bytes: Vec<u8>, findings: &mut Vec<Finding>) -> String {
+fn utf8(bytes: Vec<u8>, faults: &mut Vec<TextFault>) -> String {
     let bytes = match String::from_utf8(bytes) {
         Ok(text) => return text,
         Err(error) => error.into_bytes(),
@@ -238,7 +238,7 @@ fn utf8(bytes: Vec<u8>, findings: &mut Vec<Finding>) -> String {
         }
         if named < NAMED_PLACES {
             named += 1;
-            findings.push(Finding::new(
+            faults.push(TextFault::new(
                 Code::EncodingMalformed,
                 text.len(),
                 format!(
@@ -261,30 +261,30 @@ fn hex(bytes: &[u8]) -> String {
     }
 }
 
-fn ascii(bytes: Vec<u8>, findings: &mut Vec<Finding>) -> String {
-    let before = findings.len();
+fn ascii(bytes: Vec<u8>, faults: &mut Vec<TextFault>) -> String {
+    let before = faults.len();
     if let Some(offset) = bytes.iter().position(|byte| !byte.is_ascii()) {
         let text = format!(
             "the file declares US-ASCII but contains the byte 0x{:02X}; it is read as UTF-8",
             bytes[offset]
         );
-        findings.push(Finding::new(Code::EncodingMismatch, offset, text));
+        faults.push(TextFault::new(Code::EncodingMismatch, offset, text));
     }
-    let text = utf8(bytes, findings);
-    findings.truncate(before + 1);
+    let text = utf8(bytes, faults);
+    faults.truncate(before + 1);
     text
 }
 
 /// Decodes by one of the web's tables; unmappable bytes are found again as U+FFFD in the result.
-fn table(encoding: &'static Encoding, bytes: &[u8], findings: &mut Vec<Finding>) -> String {
+fn table(encoding: &'static Encoding, bytes: &[u8], faults: &mut Vec<TextFault>) -> String {
     let (text, malformed) = encoding.decode_without_bom_handling(bytes);
     if malformed {
         let places = text
             .match_indices(char::REPLACEMENT_CHARACTER)
             .take(NAMED_PLACES);
-        findings.extend(places.map(|(offset, _)| {
+        faults.extend(places.map(|(offset, _)| {
             let text = format!("the bytes here are not valid {}", encoding.name());
-            Finding::new(Code::EncodingMalformed, offset, text)
+            TextFault::new(Code::EncodingMalformed, offset, text)
         }));
     }
     Cow::into_owned(text)
@@ -294,13 +294,13 @@ fn table(encoding: &'static Encoding, bytes: &[u8], findings: &mut Vec<Finding>)
 mod tests {
     use super::*;
 
-    fn read(bytes: &[u8]) -> (String, Vec<Finding>) {
+    fn read(bytes: &[u8]) -> (String, Vec<TextFault>) {
         let decoded = decode(bytes.to_vec(), &Limits::default());
-        (decoded.text, decoded.findings)
+        (decoded.text, decoded.faults)
     }
 
-    fn codes(findings: &[Finding]) -> Vec<Code> {
-        findings.iter().map(|finding| finding.code).collect()
+    fn codes(faults: &[TextFault]) -> Vec<Code> {
+        faults.iter().map(|fault| fault.code).collect()
     }
 
     fn with_declaration(label: &str, value: &[u8]) -> Vec<u8> {
@@ -321,19 +321,19 @@ mod tests {
             ("US-ASCII", b"plain", "plain"),
         ];
         for (label, bytes, expected) in table {
-            let (text, findings) = read(&with_declaration(label, bytes));
+            let (text, faults) = read(&with_declaration(label, bytes));
             assert!(
                 text.ends_with(&format!("<a name=\"{expected}\"/>")),
                 "{label}: {text}"
             );
             assert!(
-                codes(&findings)
+                codes(&faults)
                     .iter()
                     .all(|&code| code == Code::EncodingTranscoded),
                 "{label}"
             );
             assert_eq!(
-                findings.is_empty(),
+                faults.is_empty(),
                 matches!(*label, "UTF-8" | "US-ASCII"),
                 "{label}"
             );
@@ -347,14 +347,14 @@ mod tests {
         let big: Vec<u8> = text.encode_utf16().flat_map(u16::to_be_bytes).collect();
         for (mark, bytes) in [(&b"\xFF\xFE"[..], &little), (b"\xFE\xFF", &big)] {
             for bytes in [[mark, bytes].concat(), bytes.clone()] {
-                let (read, findings) = read(&bytes);
+                let (read, faults) = read(&bytes);
                 assert_eq!(read, text);
-                assert_eq!(codes(&findings), [Code::EncodingTranscoded]);
+                assert_eq!(codes(&faults), [Code::EncodingTranscoded]);
             }
         }
-        let (_, findings) = read(&[&b"\xFF\xFE"[..], &little, b"\x00\xD8"].concat());
+        let (_, faults) = read(&[&b"\xFF\xFE"[..], &little, b"\x00\xD8"].concat());
         assert_eq!(
-            codes(&findings),
+            codes(&faults),
             [Code::EncodingTranscoded, Code::EncodingMalformed]
         );
     }
@@ -405,35 +405,32 @@ mod tests {
             ),
         ];
         for (bytes, code, part, offset) in cases {
-            let (_, findings) = read(bytes);
-            assert_eq!(codes(&findings), [*code], "{part}: {findings:?}");
-            assert!(findings[0].text.contains(part), "{}", findings[0].text);
-            assert_eq!(findings[0].offset, *offset, "{part}");
+            let (_, faults) = read(bytes);
+            assert_eq!(codes(&faults), [*code], "{part}: {faults:?}");
+            assert!(faults[0].text.contains(part), "{}", faults[0].text);
+            assert_eq!(faults[0].offset, *offset, "{part}");
         }
         let marked: Vec<u8> = "\u{FEFF}<?xml version='1.0' encoding='UTF-8'?><a/>"
             .encode_utf16()
             .flat_map(u16::to_le_bytes)
             .collect();
-        let (text, findings) = read(&marked);
+        let (text, faults) = read(&marked);
         assert!(text.ends_with("<a/>"));
         assert_eq!(
-            codes(&findings),
+            codes(&faults),
             [Code::EncodingTranscoded, Code::EncodingMismatch]
         );
     }
 
     #[test]
     fn unreadable_bytes_keep_the_rest_readable() {
-        let (text, findings) = read(b"<a n='\xFF'><b m='\xFF'/></a>");
+        let (text, faults) = read(b"<a n='\xFF'><b m='\xFF'/></a>");
         assert_eq!(text, "<a n='\u{FFFD}'><b m='\u{FFFD}'/></a>");
         assert_eq!(
-            findings
-                .iter()
-                .map(|finding| finding.offset)
-                .collect::<Vec<_>>(),
+            faults.iter().map(|fault| fault.offset).collect::<Vec<_>>(),
             [6, 17]
         );
-        let (_, findings) = read(&[b"<a>", &[0xFF; 100][..]].concat());
-        assert_eq!(findings.len(), NAMED_PLACES);
+        let (_, faults) = read(&[b"<a>", &[0xFF; 100][..]].concat());
+        assert_eq!(faults.len(), NAMED_PLACES);
     }
 }

@@ -9,7 +9,6 @@ mod archive;
 mod count;
 mod decode;
 mod error;
-mod finding;
 mod findings;
 #[doc(hidden)]
 pub mod fuzzing;
@@ -19,6 +18,7 @@ mod prepare;
 mod prepared;
 mod read;
 mod references;
+mod text_fault;
 mod unpack;
 mod xml;
 

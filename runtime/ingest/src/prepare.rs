@@ -5,15 +5,15 @@ use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Component, Path, PathBuf};
 
-use qcbus_document::{FaultCode, FileKind};
+use qcbus_document::{FaultCode, FileKind, Suffix};
 
 use crate::archive::{MAIN_MEMBER, is_zip, read_member};
 use crate::decode::decode;
 use crate::error::IngestError;
-use crate::finding::Finding;
 use crate::limits::Limits;
 use crate::prepared::{NamedText, Prepared};
 use crate::read::{FileStamp, RawFile, read_file, stamp_of_bytes};
+use crate::text_fault::TextFault;
 use crate::unpack::{InflateError, gunzip, is_gzip};
 use crate::xml::{Include, Splice, SpliceKey, first_element, includes_of};
 
@@ -96,57 +96,57 @@ fn open(path: &Path, bytes: Vec<u8>, members: &[String], limits: &Limits) -> Nam
     if kind == Some(FileKind::Mosc) {
         return open_archive(path, &bytes, members, limits);
     }
-    let mut findings = Vec::new();
+    let mut faults = Vec::new();
     let packed = is_gzip(&bytes);
     let bytes = if packed {
-        inflate(path, &bytes, limits, &mut findings)
+        inflate(path, &bytes, limits, &mut faults)
     } else {
         bytes
     };
     if is_zip(&bytes) {
         let text = "the file is a zip archive although its name promises XML; modular scenarios end in .mosc";
-        findings.push(Finding::new(FaultCode::ArchiveMalformed, 0, text));
+        faults.push(TextFault::new(FaultCode::ArchiveMalformed, 0, text));
         return NamedText {
             path: path.to_path_buf(),
             text: String::new(),
-            findings,
+            faults,
         };
     }
     if promises_gzip(path) && !packed && !bytes.is_empty() {
         let text = "the name promises a gzip file, but the bytes are none";
-        findings.push(Finding::new(FaultCode::GzipMalformed, 0, text));
+        faults.push(TextFault::new(FaultCode::GzipMalformed, 0, text));
     }
-    decoded(path.to_path_buf(), bytes, findings, limits)
+    decoded(path.to_path_buf(), bytes, faults, limits)
 }
 
 fn decoded(
     path: PathBuf,
     bytes: Vec<u8>,
-    mut findings: Vec<Finding>,
+    mut faults: Vec<TextFault>,
     limits: &Limits,
 ) -> NamedText {
     let decoded = decode(bytes, limits);
-    findings.extend(decoded.findings);
+    faults.extend(decoded.faults);
     let named = crate::xml::chars::forbidden(&decoded.text)
         .take(8)
         .map(|(at, c)| {
             let text = format!("the character U+{:04X} is not allowed in XML", u32::from(c));
-            Finding::new(FaultCode::BadCharacter, at, text)
+            TextFault::new(FaultCode::BadCharacter, at, text)
         });
-    findings.extend(named);
+    faults.extend(named);
     NamedText {
         path,
         text: decoded.text,
-        findings,
+        faults,
     }
 }
 
 fn promises_gzip(path: &Path) -> bool {
     let name = path.to_string_lossy().to_ascii_lowercase();
-    name.ends_with(".gz") || name.ends_with(".xodrz")
+    name.ends_with(".gz") || Suffix::of_path(path).is_some_and(|suffix| suffix.packed)
 }
 
-fn inflate(path: &Path, packed: &[u8], limits: &Limits, findings: &mut Vec<Finding>) -> Vec<u8> {
+fn inflate(path: &Path, packed: &[u8], limits: &Limits, faults: &mut Vec<TextFault>) -> Vec<u8> {
     let inflated = gunzip(packed, limits);
     if let Some(trouble) = inflated.trouble {
         let code = match &trouble {
@@ -157,10 +157,10 @@ fn inflate(path: &Path, packed: &[u8], limits: &Limits, findings: &mut Vec<Findi
             }
             InflateError::Exceeded(_) => FaultCode::UnpackedLimit,
         };
-        findings.push(Finding::new(code, 0, trouble.to_string()));
+        faults.push(TextFault::new(code, 0, trouble.to_string()));
     } else if !promises_gzip(path) {
         let text = "the file is packed by gzip although its name promises plain XML";
-        findings.push(Finding::new(FaultCode::EncodingTranscoded, 0, text));
+        faults.push(TextFault::new(FaultCode::EncodingTranscoded, 0, text));
     }
     inflated.bytes
 }
@@ -176,17 +176,17 @@ fn open_archive(path: &Path, packed: &[u8], members: &[String], limits: &Limits)
     let path = member_of(path, name);
     if ends_in_mosc(Path::new(name)) && member.present {
         let mut inner = open_archive(&path, &member.bytes, rest, limits);
-        inner.findings.splice(0..0, member.findings);
+        inner.faults.splice(0..0, member.faults);
         return inner;
     }
     if !member.present {
         return NamedText {
             path,
             text: String::new(),
-            findings: member.findings,
+            faults: member.faults,
         };
     }
-    decoded(path, member.bytes, member.findings, limits)
+    decoded(path, member.bytes, member.faults, limits)
 }
 
 /// Reads the files that `<include>` elements name, each of them once.

@@ -7,9 +7,9 @@ use qcbus_document::{BuildError, Capacities, FaultCode, ImageBuilder};
 use qcbus_messages::path_text::to_text;
 
 use crate::count;
-use crate::finding::Finding;
 use crate::limits::{Exceeded, Limits};
 use crate::read::FileStamp;
+use crate::text_fault::TextFault;
 use crate::xml::{Counter, Halt, Input, SourceText, Splice, SpliceKey, parse};
 
 /// Heap set aside for the text of each fault; longer texts are cut.
@@ -25,7 +25,7 @@ pub struct Prepared {
     texts: Vec<NamedText>,
     splices: HashMap<SpliceKey, Splice>,
     /// In the image's offsets.
-    findings: Vec<Finding>,
+    faults: Vec<TextFault>,
     capacities: Capacities,
     /// The image would be too large: it holds the fault alone.
     refused: bool,
@@ -36,7 +36,7 @@ pub struct Prepared {
 pub(crate) struct NamedText {
     pub path: PathBuf,
     pub text: String,
-    pub findings: Vec<Finding>,
+    pub faults: Vec<TextFault>,
 }
 
 impl Prepared {
@@ -48,13 +48,13 @@ impl Prepared {
         mut texts: Vec<NamedText>,
         splices: HashMap<SpliceKey, Splice>,
     ) -> Prepared {
-        let mut findings = Vec::new();
+        let mut faults = Vec::new();
         let mut start = 0;
         for text in &mut texts {
-            for finding in text.findings.drain(..) {
-                findings.push(Finding {
-                    offset: start + finding.offset,
-                    ..finding
+            for fault in text.faults.drain(..) {
+                faults.push(TextFault {
+                    offset: start + fault.offset,
+                    ..fault
                 });
             }
             start += text.text.len() + 1;
@@ -66,7 +66,7 @@ impl Prepared {
             files,
             texts,
             splices,
-            findings,
+            faults,
             capacities,
             refused: false,
         };
@@ -160,7 +160,7 @@ impl Prepared {
     /// What is known without a look at the texts.
     fn known(&self) -> Capacities {
         // The parser's faults, those of its caps, and those of the bytes.
-        let faults = self.limits.max_faults as usize + 2 + self.findings.len();
+        let faults = self.limits.max_faults as usize + 2 + self.faults.len();
         let paths: usize = self
             .texts
             .iter()
@@ -198,7 +198,7 @@ impl Prepared {
             allowed: self.max_image() as u64,
         };
         let text = format!("the document image would have {exceeded}");
-        self.findings = vec![Finding::new(FaultCode::ImageLimit, 0, text)];
+        self.faults = vec![TextFault::new(FaultCode::ImageLimit, 0, text)];
         self.texts.truncate(1);
         self.texts
             .iter_mut()
@@ -215,7 +215,7 @@ impl Prepared {
         for source in &input.texts {
             builder.source(source.path, source.text)?;
         }
-        let mut faults = self.findings.clone();
+        let mut faults = self.faults.clone();
         if !self.refused {
             match parse(&input, &mut builder) {
                 Ok(found) => faults.extend(found),
@@ -244,10 +244,10 @@ impl Prepared {
             texts: vec![NamedText {
                 path: self.path().to_path_buf(),
                 text: String::new(),
-                findings: Vec::new(),
+                faults: Vec::new(),
             }],
             splices: HashMap::new(),
-            findings: Vec::new(),
+            faults: Vec::new(),
             capacities: Capacities::default(),
             refused: true,
         };

@@ -138,7 +138,7 @@ fn validate(schema: &Schema, document: &Document<'_>) -> Result<f64> {
     let start = on_cpu()?;
     let report = schema.validate(document, Limits::default());
     let took = on_cpu()? - start;
-    match report.findings.first() {
+    match report.violations.first() {
         Some(first) => Err(format!("the document is not valid: {}", first.text).into()),
         None => Ok(took),
     }

@@ -51,7 +51,7 @@ impl Cubic {
     }
 
     /// The second derivative at `x`.
-    pub fn bend(&self, x: f64) -> f64 {
+    pub fn second_derivative(&self, x: f64) -> f64 {
         2.0 * self.c + 6.0 * self.d * x
     }
 
@@ -60,7 +60,7 @@ impl Cubic {
         Cubic {
             a: self.value(offset),
             b: self.slope(offset),
-            c: self.bend(offset) / 2.0,
+            c: self.second_derivative(offset) / 2.0,
             d: self.d,
         }
     }

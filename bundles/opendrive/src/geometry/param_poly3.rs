@@ -56,12 +56,13 @@ impl ParamPoly3 {
         if speed.is_nan() || speed <= 0.0 {
             return None;
         }
-        let bend = (du / speed) * self.v.bend(p) - (dv / speed) * self.u.bend(p);
+        let across =
+            (du / speed) * self.v.second_derivative(p) - (dv / speed) * self.u.second_derivative(p);
         Pose {
             x: point.x,
             y: point.y,
             hdg: dv.atan2(du),
-            curvature: bend / speed / speed,
+            curvature: across / speed / speed,
         }
         .finite()
     }

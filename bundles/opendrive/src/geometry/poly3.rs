@@ -56,7 +56,7 @@ impl Poly3 {
             x: point.x,
             y: point.y,
             hdg: slope.atan(),
-            curvature: self.v.bend(u) / speed / speed / speed,
+            curvature: self.v.second_derivative(u) / speed / speed / speed,
         }
         .finite()
     }

@@ -16,6 +16,6 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     if let (Ok(document), Ok(schema)) = (Document::open(&image), shipped.schema()) {
         let limits = Limits::default();
         let report = schema.validate(&document, limits);
-        assert!(report.findings.len() <= limits.total as usize);
+        assert!(report.violations.len() <= limits.total as usize);
     }
 });

@@ -7,17 +7,17 @@ use crate::regex::PatternError;
 
 /// Why a schema could not be compiled, and where.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("compile {place}: {problem}")]
+#[error("compile {position}: {problem}")]
 pub struct CompileError {
-    /// The place.
-    pub place: Place,
+    /// Where.
+    pub position: SourcePosition,
     /// The problem.
     pub problem: Problem,
 }
 
-/// A place in an XSD file.
+/// A row and column of an XSD file, and what stands there.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct SourcePosition {
     /// The file; empty if the problem concerns the schema as a whole.
     pub path: String,
     /// Row from 1.
@@ -28,7 +28,7 @@ pub struct Place {
     pub construct: String,
 }
 
-impl std::fmt::Display for Place {
+impl std::fmt::Display for SourcePosition {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         if self.path.is_empty() {
             return f.write_str("the schema");
@@ -110,7 +110,7 @@ pub enum Problem {
 
 impl CompileError {
     pub(crate) fn at(node: Node<'_>, problem: impl Into<Problem>) -> Self {
-        let position = node.position();
+        let at = node.position();
         let label = [
             "name",
             "ref",
@@ -128,39 +128,39 @@ impl CompileError {
             Some((name, value)) => format!("{prefix}{colon}{} {name}=\"{value}\"", node.name()),
             None => format!("{prefix}{colon}{}", node.name()),
         };
-        let place = Place {
-            path: position.path.to_owned(),
-            row: position.row,
-            column: position.column,
+        let position = SourcePosition {
+            path: at.path.to_owned(),
+            row: at.row,
+            column: at.column,
             construct,
         };
         Self {
-            place,
+            position,
             problem: problem.into(),
         }
     }
 
     /// A problem of a file that is not even XML.
-    pub(crate) fn ill_formed(position: Position<'_>, fault: &str) -> Self {
-        let place = Place {
-            path: position.path.to_owned(),
-            row: position.row,
-            column: position.column,
+    pub(crate) fn ill_formed(at: Position<'_>, fault: &str) -> Self {
+        let position = SourcePosition {
+            path: at.path.to_owned(),
+            row: at.row,
+            column: at.column,
             construct: String::new(),
         };
         let problem = Problem::NotWellFormed(fault.to_owned());
-        Self { place, problem }
+        Self { position, problem }
     }
 
     /// A problem of a file as a whole.
     pub(crate) fn somewhere_in(path: &str, problem: Problem) -> Self {
-        let place = Place {
+        let position = SourcePosition {
             path: path.to_owned(),
             row: 0,
             column: 0,
             construct: String::new(),
         };
-        Self { place, problem }
+        Self { position, problem }
     }
 }
 

@@ -5,11 +5,11 @@ use qcbus_document::{Attribute, Node};
 use super::names::AttributeName;
 use super::types::Kind;
 use super::{Walk, wording};
-use crate::finding::Code;
 use crate::model::{AttributeUse, ComplexType};
 use crate::names::NameId;
 use crate::similar::closest;
 use crate::simple::{Order, Variety, XML_SPACE, same_value};
+use crate::violation::Code;
 use crate::work::steps;
 
 /// Which attributes of a type were seen; types have at most 512.

@@ -3,7 +3,7 @@
 //! A wrong child is one of these: a child that the model knows but expects only after others (those
 //! are missing), one that it knows but no longer expects (repeated or misplaced), or one that it
 //! does not know (perhaps a slip of the pen). In each case the automaton is brought into the state
-//! from which the rest of the children makes most sense, so that one cause gives one finding.
+//! from which the rest of the children makes most sense, so that one cause gives one violation.
 
 use std::collections::{HashMap, HashSet, VecDeque};
 
@@ -12,9 +12,9 @@ use qcbus_document::Node;
 use super::frame::{Body, Frame, Number};
 use super::memo::{Meant, Memo};
 use super::{Walk, wording};
-use crate::finding::Code;
 use crate::model::{AllModel, ElementDecl, Model};
 use crate::names::NameId;
+use crate::violation::Code;
 use crate::work::steps;
 
 /// States looked at when searching the way to an expected child.

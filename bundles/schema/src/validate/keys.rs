@@ -12,10 +12,10 @@ use super::reporter::Reporter;
 use super::types::Kind;
 use super::wording;
 use crate::constraint::{ConstraintKind, Constraints};
-use crate::finding::Code;
 use crate::model::Schema;
 use crate::names::NameId;
 use crate::simple::{Digits, Order, Variety, XML_SPACE, float_value, is_decimal};
+use crate::violation::Code;
 use crate::work::steps;
 
 /// Sets of keys up to this capacity are used again.

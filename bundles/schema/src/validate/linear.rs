@@ -12,7 +12,7 @@ use crate::{Limits, SHIPPED, Schema, compile};
 /// Steps per element and attribute: a few for a sound one, and for a wrong one the width of the
 /// widest type and about thirty siblings.
 const PER_PART: u64 = 200;
-/// Findings listed, and steps for wording them all.
+/// Violations listed, and steps for wording them all.
 const LISTED: Limits = Limits {
     per_kind: 5,
     total: 50,

@@ -13,13 +13,13 @@ use crate::work::steps;
 /// Answers kept; a schema and a document together seldom have more than a few dozen.
 const MOST: usize = 65_536;
 
-/// A place (model and state) and a name.
-type Place = (usize, u16, u16);
+/// A model, a state of it, and the name that is read there.
+type Transition = (usize, u16, u16);
 
 #[derive(Debug, Default)]
 pub(super) struct Memo<'s> {
-    ways: HashMap<Place, Option<Rc<Way>>>,
-    meant: HashMap<Place, Meant<'s>>,
+    ways: HashMap<Transition, Option<Rc<Way>>>,
+    meant: HashMap<Transition, Meant<'s>>,
     /// How often a model allows a name.
     most: HashMap<(usize, u16), Option<u32>>,
 }
@@ -103,7 +103,7 @@ impl<'s> Memo<'s> {
         meant.here
     }
 
-    fn known(&mut self, key: Place, search: impl FnOnce() -> Meant<'s>) -> Meant<'s> {
+    fn known(&mut self, key: Transition, search: impl FnOnce() -> Meant<'s>) -> Meant<'s> {
         if self.meant.len() >= MOST {
             return self.meant.get(&key).copied().unwrap_or_default();
         }

@@ -2,7 +2,7 @@
 //!
 //! Every element is met once: its declaration follows from one lookup in its parent's automaton,
 //! its attributes from its type's table. Names are compared as numbers, which are looked up once
-//! per distinct name of the document. Memory grows with depth, keys and findings, not with size.
+//! per distinct name of the document. Memory grows with depth, keys and violations, not with size.
 
 mod attributes;
 mod children;
@@ -23,8 +23,8 @@ use qcbus_document::{Document, Node};
 
 pub use overlay::Overlay;
 
-use crate::finding::{Code, Limits, Report};
 use crate::model::{ElementDecl, Schema};
+use crate::violation::{Code, Limits, Report};
 use crate::work::steps;
 use frame::{Body, Frame};
 use keys::{Keys, Opening};

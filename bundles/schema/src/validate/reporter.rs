@@ -1,13 +1,13 @@
-//! Collects findings, so many per kind and in all; counts the rest.
+//! Collects violations, so many per kind and in all; counts the rest.
 
 use std::collections::HashMap;
 
 use qcbus_document::{Attribute, Node};
 
 use super::wording::Wording;
-use crate::finding::{Code, Finding, Limits, Report, Rest};
+use crate::violation::{Code, Limits, Report, Rest, Violation};
 
-/// What makes two findings the same kind, beside their code: the type or model they are about and
+/// What makes two violations the same kind, beside their code: the type or model they are about and
 /// a name within it.
 pub(super) type KindKey = (usize, u32);
 
@@ -27,7 +27,7 @@ struct Tally {
 #[derive(Debug)]
 pub(super) struct Reporter<'a> {
     limits: Limits,
-    findings: Vec<Finding<'a>>,
+    violations: Vec<Violation<'a>>,
     kinds: HashMap<(Code, KindKey), Tally>,
 }
 
@@ -35,17 +35,17 @@ impl<'a> Reporter<'a> {
     pub(super) fn new(limits: Limits) -> Self {
         Self {
             limits,
-            findings: Vec::new(),
+            violations: Vec::new(),
             kinds: HashMap::new(),
         }
     }
 
     /// Whether nothing more will be listed.
     pub(super) fn is_full(&self) -> bool {
-        self.findings.len() >= self.limits.total as usize
+        self.violations.len() >= self.limits.total as usize
     }
 
-    /// Lists the finding, worded by `word`, or counts it.
+    /// Lists the violation, worded by `word`, or counts it.
     pub(super) fn add(
         &mut self,
         code: Code,
@@ -56,7 +56,7 @@ impl<'a> Reporter<'a> {
         self.add_at(code, kind, node, None, word);
     }
 
-    /// The same for a finding about an attribute.
+    /// The same for a violation about an attribute.
     pub(super) fn add_at(
         &mut self,
         code: Code,
@@ -81,7 +81,7 @@ impl<'a> Reporter<'a> {
             },
             listed: 0,
             unlisted: 0,
-            // No other findings are ever the schema's fault, so they need not be worded to know.
+            // No other violations are ever the schema's fault, so they need not be worded to know.
             defect: matches!(code, Code::ConditionFailed | Code::MissingElement),
             order,
         });
@@ -99,7 +99,7 @@ impl<'a> Reporter<'a> {
             text,
         } = word();
         tally.defect &= defect.is_some();
-        let finding = Finding {
+        let violation = Violation {
             code,
             node,
             attribute,
@@ -109,7 +109,7 @@ impl<'a> Reporter<'a> {
             known_schema_defect: defect,
             text,
         };
-        self.findings.push(finding);
+        self.violations.push(violation);
     }
 
     pub(super) fn finish(self) -> Report<'a> {
@@ -131,7 +131,7 @@ impl<'a> Reporter<'a> {
             .collect();
         rest.sort_by_key(|(order, _)| *order);
         Report {
-            findings: self.findings,
+            violations: self.violations,
             rest: rest.into_iter().map(|(_, rest)| rest).collect(),
         }
     }

@@ -4,8 +4,8 @@ use qcbus_document::Node;
 
 use super::frame::Body;
 use super::{Walk, wording};
-use crate::finding::Code;
 use crate::simple::{Builtin, Variety, XML_SPACE};
+use crate::violation::Code;
 use crate::work::steps;
 
 /// End tags longer than this are not looked into.

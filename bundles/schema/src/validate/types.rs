@@ -7,8 +7,8 @@ use qcbus_document::Node;
 use super::names::AttributeName;
 use super::{Walk, wording};
 use crate::assertion::Scope;
-use crate::finding::Code;
 use crate::model::{ComplexType, ElementDecl, TypeRef};
+use crate::violation::Code;
 use crate::work::steps;
 
 pub(super) const XSI: &str = "http://www.w3.org/2001/XMLSchema-instance";

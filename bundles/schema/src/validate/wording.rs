@@ -1,4 +1,4 @@
-//! Findings in words: what was found, what was expected, what was probably meant.
+//! Violations in words: what was found, what was expected, what was probably meant.
 
 use qcbus_document::{Attribute, Node};
 
@@ -12,7 +12,7 @@ use crate::similar::closest;
 use crate::simple::SimpleType;
 use crate::work::steps;
 
-/// A finding without its place.
+/// A violation without its place.
 #[derive(Debug, Default)]
 pub(super) struct Wording {
     pub(super) found: String,

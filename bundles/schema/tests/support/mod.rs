@@ -54,13 +54,13 @@ pub fn compiled(text: &str) -> Result<Schema, String> {
     qcbus_schema::compile("Test", &[open(&image)]).map_err(|error| error.to_string())
 }
 
-/// The codes and texts of all findings for a document.
+/// The codes and texts of all violations for a document.
 #[allow(dead_code, reason = "not every test asks for texts")]
-pub fn findings(schema: &Schema, name: &str, text: &str) -> Vec<(&'static str, String)> {
+pub fn violations(schema: &Schema, name: &str, text: &str) -> Vec<(&'static str, String)> {
     let image = image(name, text);
     let report = schema.validate(&open(&image), qcbus_schema::Limits::default());
     report
-        .findings
+        .violations
         .iter()
         .map(|one| (one.code.as_str(), one.text.clone()))
         .collect()

@@ -1,7 +1,9 @@
-//! The arguments of a bundle, few enough to be read by hand.
+//! The arguments of a bundle.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
+
+use lexopt::ValueExt as _;
 
 use super::{BusOptions, Format, Mode};
 
@@ -21,20 +23,9 @@ exit codes: 0 accepted, 1 rejected, 2 usage, 3 undetermined, 4 no broker, 5 inte
 /// Why arguments cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum UsageError {
-    /// Nothing of that name.
-    #[error("there is no option `{0}`")]
-    Unknown(String),
-    /// An option without its value.
-    #[error("`{0}` needs a value")]
-    NeedsValue(String),
-    /// A value that does not fit.
-    #[error("`{value}` is no value of `{option}`")]
-    BadValue {
-        /// The option.
-        option: String,
-        /// What it was given.
-        value: String,
-    },
+    /// An option that there is not, one without its value, or a value that does not fit.
+    #[error("{0}")]
+    Argument(String),
     /// Something that is of no use without something else.
     #[error("`{0}` needs {1}")]
     Lacks(&'static str, &'static str),
@@ -43,47 +34,39 @@ pub enum UsageError {
     Conflict(&'static str, &'static str),
 }
 
-pub(super) fn parse(mut arguments: impl Iterator<Item = OsString>) -> Result<Mode, UsageError> {
+impl From<lexopt::Error> for UsageError {
+    fn from(error: lexopt::Error) -> UsageError {
+        UsageError::Argument(error.to_string())
+    }
+}
+
+pub(super) fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Mode, UsageError> {
+    use lexopt::Arg::{Long, Short, Value};
+    let mut parser = lexopt::Parser::from_args(arguments);
     let mut bus = BusOptions::default();
     let (mut on_bus, mut config, mut file, mut format) = (false, None, None, None);
     let (mut schema_dir, mut timings) = (None, false);
-    while let Some(argument) = arguments.next() {
-        let option = argument.to_string_lossy().into_owned();
-        let mut value = || {
-            arguments
-                .next()
-                .ok_or_else(|| UsageError::NeedsValue(option.clone()))
-        };
-        let bad = |value: String| UsageError::BadValue {
-            option: option.clone(),
-            value,
-        };
-        match option.as_str() {
-            "-h" | "--help" => return Ok(Mode::Help),
-            "-c" | "--config" => config = Some(PathBuf::from(value()?)),
-            "--format" => {
-                let text = value()?.to_string_lossy().into_owned();
-                format = Some(Format::of(&text).ok_or_else(|| bad(text))?);
+    while let Some(argument) = parser.next()? {
+        on_bus |= matches!(argument, Long("instance" | "instance-dir" | "launch"));
+        match argument {
+            Short('h') | Long("help") => return Ok(Mode::Help),
+            Short('c') | Long("config") => config = Some(PathBuf::from(parser.value()?)),
+            Long("format") => {
+                let known = |text: &str| Format::of(text).ok_or("it is neither text nor json");
+                format = Some(parser.value()?.parse_with(known)?);
             }
-            "--timings" => timings = true,
-            "--instance" => bus.instance = value()?.to_string_lossy().into_owned(),
-            "--instance-dir" => bus.instance_dir = Some(PathBuf::from(value()?)),
-            "--launch" => {
-                let text = value()?.to_string_lossy().into_owned();
-                bus.launch = Some(text.parse().map_err(|_| bad(text))?);
+            Long("timings") => timings = true,
+            Long("instance") => bus.instance = parser.value()?.string()?,
+            Long("instance-dir") => bus.instance_dir = Some(PathBuf::from(parser.value()?)),
+            Long("launch") => bus.launch = Some(parser.value()?.parse()?),
+            Long("schema-dir") => schema_dir = Some(PathBuf::from(parser.value()?)),
+            Long("die-with-parent") => bus.die_with_parent = true,
+            Value(_) if file.is_some() => {
+                return Err(UsageError::Conflict("FILE", "a second FILE"));
             }
-            "--schema-dir" => schema_dir = Some(PathBuf::from(value()?)),
-            "--die-with-parent" => bus.die_with_parent = true,
-            _ if option.len() > 1 && option.starts_with('-') => {
-                return Err(UsageError::Unknown(option));
-            }
-            _ if file.is_some() => return Err(UsageError::Conflict("FILE", "a second FILE")),
-            _ => file = Some(PathBuf::from(&argument)),
+            Value(path) => file = Some(PathBuf::from(path)),
+            Short(_) | Long(_) => return Err(argument.unexpected().into()),
         }
-        on_bus |= matches!(
-            option.as_str(),
-            "--instance" | "--instance-dir" | "--launch"
-        );
     }
     if timings && file.is_none() {
         return Err(UsageError::Lacks("--timings", "FILE"));

@@ -2,7 +2,7 @@
 
 use qcbus_opendrive::geometry::Point;
 use qcbus_opendrive::{
-    ContactPoint, CrossPath, CrossPathLaneLink, Junction, Place, Road, RoadMap, Side,
+    ContactPoint, CrossPath, CrossPathLaneLink, Junction, Road, RoadMap, Side, Station,
 };
 
 use super::virtual_junctions::seen_from;
@@ -71,10 +71,10 @@ impl<'m, 'a> Crossing<'m, 'a> {
             let section = self.road.permanent()?.end_section(self.road, side, end)?;
             let lane = section.side(side).next_back();
             let t = match lane {
-                Some(lane) => lane.t(qcbus_opendrive::Edge::Outer, lane.end_place(end)?)?,
+                Some(lane) => lane.t(qcbus_opendrive::Edge::Outer, lane.end_station(end)?)?,
                 None => section.center_t(match end {
-                    ContactPoint::Start => Place::at(0.0),
-                    ContactPoint::End => Place::before(section.length(side)?),
+                    ContactPoint::Start => Station::at(0.0),
+                    ContactPoint::End => Station::before(section.length(side)?),
                 })?,
             };
             pose.beside(t)
@@ -87,13 +87,14 @@ impl Landing<'_, '_> {
     /// s and t of a point near the landing on the road that is met. The road is followed from
     /// `@s` to the foot of the perpendicular in a few steps.
     pub fn project(&self, point: Point) -> Option<(f64, f64)> {
+        let length = self.other.length().filter(|length| *length >= 0.0)?;
         let mut s = self.s;
         for _ in 0..8 {
             let (ahead, left) = seen_from(self.other.pose(s)?, point);
             if ahead.abs() < 1e-6 {
                 return Some((s, left));
             }
-            s = (s + ahead).clamp(0.0, self.other.length()?);
+            s = (s + ahead).clamp(0.0, length);
         }
         let (_, left) = seen_from(self.other.pose(s)?, point);
         Some((s, left))
@@ -103,17 +104,17 @@ impl Landing<'_, '_> {
     pub fn span(&self, s: f64) -> Option<[f64; 2]> {
         let side = Side::of_lane_id(self.lane)?;
         let end = self.other.length()?;
-        let place = if s >= end {
-            Place::before(end)
+        let station = if s >= end {
+            Station::before(end)
         } else {
-            Place::at(s)
+            Station::at(s)
         };
         let section = self
             .other
             .permanent()?
-            .section_at(self.other, side, place)?;
+            .section_at(self.other, side, station)?;
         let lane = section.lane(self.lane)?;
-        let ds = place.shifted(-section.s()?);
+        let ds = station.shifted(-section.s()?);
         let (inner, outer) = (lane.inner_t(ds)?, lane.outer_t(ds)?);
         Some([inner.min(outer), inner.max(outer)])
     }

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use qcbus_document::Node;
 use qcbus_opendrive::geometry::Point;
 use qcbus_opendrive::{
-    ContactPoint, Edge, JunctionType, LaneEnd, LaneJoint, LaneRef, Place, Road, RoadMap, Side,
+    ContactPoint, Edge, JunctionType, LaneEnd, LaneJoint, LaneRef, Road, RoadMap, Side, Station,
 };
 
 use super::strips::{Patch, area, common, strip};
@@ -113,8 +113,8 @@ fn course<'m, 'a>(lane: LaneRef<'m, 'a>, end: ContactPoint, reach: f64) -> Vec<C
             ContactPoint::Start => [start, start + here],
             ContactPoint::End => [start + length, start + length - here],
         };
-        let patches = strip(lane.at.road, range, STEP, SHRINK, |place| {
-            let ds = place.shifted(-start);
+        let patches = strip(lane.at.road, range, STEP, SHRINK, |station| {
+            let ds = station.shifted(-start);
             let (one, other) = (lane.t(Edge::Inner, ds)?, lane.t(Edge::Outer, ds)?);
             Some((one.min(other), one.max(other)))
         });
@@ -196,7 +196,7 @@ impl<'m, 'a> Arm<'m, 'a> {
             range.is_some_and(|(start, length)| s >= start && s <= start + length)
         };
         let lane = self.course.iter().find(holds)?.lane;
-        let ds = Place::at(s - lane.at.s()?);
+        let ds = Station::at(s - lane.at.s()?);
         let (inner, outer) = (lane.inner_t(ds)?, lane.outer_t(ds)?);
         let share = if outer == inner {
             0.0

@@ -2,7 +2,9 @@
 //! 12.11).
 
 use qcbus_opendrive::geometry::{Placed, Point};
-use qcbus_opendrive::{BoundarySegment, Edge, Junction, Place, Road, RoadMap, SegmentPlace, Side};
+use qcbus_opendrive::{
+    BoundarySegment, Edge, Junction, Road, RoadMap, SegmentStation, Side, Station,
+};
 
 /// Distance between samples along a border, in metres.
 const SPACING: f64 = 1.0;
@@ -66,11 +68,11 @@ fn points(map: &RoadMap<'_>, segment: BoundarySegment<'_>) -> Option<Vec<Point>>
 }
 
 fn along_lane(road: &Road<'_>, segment: BoundarySegment<'_>) -> Option<Vec<Point>> {
-    let place = |place: SegmentPlace| match place {
-        SegmentPlace::S(s) => Some(s),
-        SegmentPlace::End(end) => road.end_s(end),
+    let station = |station: SegmentStation| match station {
+        SegmentStation::S(s) => Some(s),
+        SegmentStation::End(end) => road.end_s(end),
     };
-    let (from, to) = (place(segment.s_start()?)?, place(segment.s_end()?)?);
+    let (from, to) = (station(segment.s_start()?)?, station(segment.s_end()?)?);
     let id = segment.boundary_lane()?;
     let length = to - from;
     let count = (length.abs() / SPACING).ceil().clamp(1.0, MOST_SAMPLES) as usize;
@@ -84,18 +86,20 @@ fn along_lane(road: &Road<'_>, segment: BoundarySegment<'_>) -> Option<Vec<Point
 fn outer_border(road: &Road<'_>, id: i64, s: f64) -> Option<Point> {
     let side = Side::of_lane_id(id).unwrap_or(Side::Right);
     let end = road.length()?;
-    let place = if s >= end {
-        Place::before(end)
+    let station = if s >= end {
+        Station::before(end)
     } else {
-        Place::at(s)
+        Station::at(s)
     };
     let layer = road.permanent()?;
     if id == 0 {
-        return road.pose(place)?.beside(layer.offset().at_or_zero(place)?);
+        return road
+            .pose(station)?
+            .beside(layer.offset().at_or_zero(station)?);
     }
-    let section = layer.section_at(road, side, place)?;
+    let section = layer.section_at(road, side, station)?;
     let lane = section.lane(id)?;
-    let ds = place.shifted(-section.s()?);
+    let ds = station.shifted(-section.s()?);
     Some(lane.border(Edge::Outer, ds)?.point.plan())
 }
 

@@ -3,7 +3,7 @@
 use qcbus_document::Node;
 use qcbus_opendrive::{
     Connection, ContactPoint, Junction, JunctionLaneLink, JunctionType, LaneJoint, LaneLink,
-    LaneRef, LayerKind, MapPart, Place, Road, RoadMap, SectionRef, Side,
+    LaneRef, LayerKind, MapPart, Road, RoadMap, SectionRef, Side, Station,
 };
 use qcbus_sdk::Sink;
 
@@ -132,7 +132,7 @@ fn sections_between<'m, 'a>(
         return Vec::new();
     };
     let side = side.unwrap_or(Side::Right);
-    let first = layer.section_at(road, side, Place::before(from.max(0.0)));
+    let first = layer.section_at(road, side, Station::before(from.max(0.0)));
     let first = first.or_else(|| layer.section_at(road, side, from));
     let begin = first.and_then(|section| section.s()).unwrap_or(from);
     let meets = |section: &SectionRef<'_, '_>| {

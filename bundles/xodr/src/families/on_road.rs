@@ -1,6 +1,6 @@
 //! Where a finding lies on its road, and how texts name roads and lanes.
 
-use qcbus_opendrive::{ContactPoint, LaneRef, Place, Road};
+use qcbus_opendrive::{ContactPoint, LaneRef, Road, Station};
 use qcbus_sdk::Finding;
 
 /// How many further places of one kind a finding names at most; more help nobody, and a hostile file
@@ -14,7 +14,7 @@ pub(crate) trait OnRoad {
     /// At an end of a road's reference line.
     fn at_end(self, road: &Road<'_>, end: ContactPoint) -> Self;
     /// In the middle of a lane, `ds` metres from the start of its section.
-    fn in_lane(self, lane: LaneRef<'_, '_>, ds: impl Into<Place>) -> Self;
+    fn in_lane(self, lane: LaneRef<'_, '_>, ds: impl Into<Station>) -> Self;
     /// In the middle of a lane, at an end of its section.
     fn at_lane_end(self, lane: LaneRef<'_, '_>, end: ContactPoint) -> Self;
 }
@@ -39,7 +39,7 @@ impl OnRoad for Finding<'_, '_> {
         }
     }
 
-    fn in_lane(self, lane: LaneRef<'_, '_>, ds: impl Into<Place>) -> Self {
+    fn in_lane(self, lane: LaneRef<'_, '_>, ds: impl Into<Station>) -> Self {
         let ds = ds.into();
         let Some(s) = lane.at.s().map(|start| start + ds.x()) else {
             return self;
@@ -57,8 +57,8 @@ impl OnRoad for Finding<'_, '_> {
     }
 
     fn at_lane_end(self, lane: LaneRef<'_, '_>, end: ContactPoint) -> Self {
-        match lane.end_place(end) {
-            Some(place) => self.in_lane(lane, place),
+        match lane.end_station(end) {
+            Some(station) => self.in_lane(lane, station),
             None => self,
         }
     }

@@ -7,7 +7,7 @@ use std::collections::hash_map::Entry;
 
 use foldhash::{HashMap, HashSet};
 use qcbus_opendrive::geometry::Point;
-use qcbus_opendrive::{LaneLayer, LaneRef, Place, Road, RoadMap, SectionRef, Side};
+use qcbus_opendrive::{LaneLayer, LaneRef, Road, RoadMap, SectionRef, Side, Station};
 
 use super::driving::is_drivable;
 
@@ -88,10 +88,10 @@ pub(crate) fn slices(map: &RoadMap<'_>, limits: &Limits) -> Vec<Slice> {
             continue;
         };
         let lanes: Vec<[Vec<bool>; 2]> = layer.sections(road).map(travelled).collect();
-        let edge = |place| edge(road, layer, &lanes, place, limits);
-        let mut before = edge(Place::at(0.0));
+        let edge = |station| edge(road, layer, &lanes, station, limits);
+        let mut before = edge(Station::at(0.0));
         for index in 0..count {
-            let after = edge(Place::before(at(index + 1)));
+            let after = edge(Station::before(at(index + 1)));
             if let (Some(start), Some(end)) = (before, after) {
                 slices.extend(slice(road, [at(index), at(index + 1)], start, end));
             }
@@ -128,7 +128,7 @@ fn edge<'a>(
     road: &Road<'a>,
     layer: &LaneLayer<'a>,
     lanes: &[[Vec<bool>; 2]],
-    s: Place,
+    s: Station,
     limits: &Limits,
 ) -> Option<(Point, Point, f64)> {
     let mut extent: Option<(f64, f64)> = None;

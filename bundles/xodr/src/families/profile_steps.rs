@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use qcbus_document::Node;
-use qcbus_opendrive::{Place, Profile, Road, Side};
+use qcbus_opendrive::{Profile, Road, Side, Station};
 use qcbus_sdk::Sink;
 
 use super::on_road::OnRoad;
@@ -20,7 +20,7 @@ pub(crate) fn elevation(road: &Road<'_>, found: &mut Sink<'_>) {
     let limit = found.number(&STEP);
     let profile = road.elevation();
     for (s, node) in breaks(profile) {
-        let (Some(before), Some(after)) = (profile.at(Place::before(s)), profile.at(s)) else {
+        let (Some(before), Some(after)) = (profile.at(Station::before(s)), profile.at(s)) else {
             continue;
         };
         let step = (after - before).abs();
@@ -40,7 +40,7 @@ pub(crate) fn lateral(road: &Road<'_>, found: &mut Sink<'_>) {
     let lateral = road.lateral();
     let roll = &lateral.superelevation;
     for (s, node) in breaks(roll) {
-        let (Some(before), Some(after)) = (roll.at(Place::before(s)), roll.at(s)) else {
+        let (Some(before), Some(after)) = (roll.at(Station::before(s)), roll.at(s)) else {
             continue;
         };
         let step = move |t: f64| Some(t * (after.sin() - before.sin()));
@@ -57,7 +57,8 @@ pub(crate) fn lateral(road: &Road<'_>, found: &mut Sink<'_>) {
     for (s, node) in of_strips.chain([&surface.t_offset]).flat_map(breaks) {
         // Several components may have a record at the same place; one of them stands for all.
         if seen.insert(s.to_bits()) {
-            let step = |t: f64| Some(surface.height(s, t)? - surface.height(Place::before(s), t)?);
+            let step =
+                |t: f64| Some(surface.height(s, t)? - surface.height(Station::before(s), t)?);
             report(road, "cross section surface", s, node, step, found);
         }
     }

@@ -68,11 +68,11 @@ pub(crate) fn in_lines<'p, 'a>(
     let one_line = |one: &Geometry<'_>, next: &Geometry<'_>| {
         let both = one.kind() == Some(ShapeKind::Line) && next.kind() == Some(ShapeKind::Line);
         let distance = one.end_point().zip(next.start_point());
-        let bend = one.hdg().zip(next.hdg());
+        let headings = one.hdg().zip(next.hdg());
         both && distance.is_some_and(|(end, start)| end.distance(start) <= gap)
-            && bend
+            && headings
                 .and_then(|(one, next)| heading_difference(one, next))
-                .is_some_and(|bend| bend <= turn)
+                .is_some_and(|between| between <= turn)
     };
     let pairs = lines.windows(2).filter(|pair| one_line(pair[0], pair[1]));
     pairs.map(|pair| [pair[0], pair[1]]).collect()

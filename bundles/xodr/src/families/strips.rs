@@ -1,7 +1,7 @@
 //! Strips of ground along roads, cut into quadrangles, and what two of them have in common.
 
 use qcbus_opendrive::geometry::Point;
-use qcbus_opendrive::{Place, Road, Side};
+use qcbus_opendrive::{Road, Side, Station};
 
 use super::driving::is_drivable;
 use super::overlap::{cut, turn};
@@ -31,7 +31,7 @@ pub(crate) fn strip(
     range: [f64; 2],
     step: f64,
     shrink: f64,
-    edges: impl Fn(Place) -> Option<Edges>,
+    edges: impl Fn(Station) -> Option<Edges>,
 ) -> Vec<Patch> {
     let [from, to] = range;
     let count = ((to - from).abs() / step).ceil().clamp(1.0, MOST);
@@ -39,14 +39,14 @@ pub(crate) fn strip(
         return Vec::new();
     }
     let at = |index: f64| from + (to - from) * index / count;
-    let cross = |place: Place| {
-        let (right, left) = edges(place)?;
+    let cross = |station: Station| {
+        let (right, left) = edges(station)?;
         let (right, left) = (right + shrink, left - shrink);
-        let pose = road.pose(place)?;
+        let pose = road.pose(station)?;
         (left - right > 0.05).then_some(((right, left), pose.beside(right)?, pose.beside(left)?))
     };
-    // Where s descends, what ends at a place comes first.
-    let sides = |s: f64| [Place::at(s), Place::before(s)];
+    // Where s descends, what ends at a station comes first.
+    let sides = |s: f64| [Station::at(s), Station::before(s)];
     let (first, last) = if from < to { (0, 1) } else { (1, 0) };
     let patches = (0..count as usize).filter_map(|index| {
         let (begin, end) = (at(index as f64), at(index as f64 + 1.0));
@@ -152,15 +152,15 @@ const ON_FOOT: [&str; 3] = ["walking", "sidewalk", "curb"];
 /// Drivable, but nobody travels there.
 const ASIDE: [&str; 3] = ["border", "stop", "restricted"];
 
-/// t of the right and the left end of a road's lanes with traffic at a place. Footways count where there is
+/// t of the right and the left end of a road's lanes with traffic at a station. Footways count where there is
 /// no other traffic.
-pub(crate) fn traffic_edges(road: &Road<'_>, place: Place) -> Option<Edges> {
+pub(crate) fn traffic_edges(road: &Road<'_>, station: Station) -> Option<Edges> {
     let mut extents: [Option<Edges>; 2] = [None; 2];
     for side in Side::BOTH {
-        let Some(section) = road.permanent()?.section_at(road, side, place) else {
+        let Some(section) = road.permanent()?.section_at(road, side, station) else {
             continue;
         };
-        for span in section.spans(side, place.shifted(-section.s()?)) {
+        for span in section.spans(side, station.shifted(-section.s()?)) {
             let kind = span.lane.kind().unwrap_or_default();
             let vehicles = is_drivable(span.lane) && !ASIDE.contains(&kind);
             if vehicles || TRAFFIC.contains(&kind) {

@@ -191,7 +191,7 @@ impl Pair<'_, '_> {
             lane_name(self.from),
             lane_name(self.to)
         );
-        let end = self.from.end_place(joint.from.end);
+        let end = self.from.end_station(joint.from.end);
         let s = self.from.at.s().zip(end).map_or(0.0, |(s, ds)| s + ds.x());
         found
             .issue(joint.node, text)

@@ -1,7 +1,7 @@
 use std::collections::BTreeSet;
 
 use qcbus_document::Node;
-use qcbus_opendrive::{JunctionType, Place, Road, RoadMap, RoadSection};
+use qcbus_opendrive::{JunctionType, Road, RoadMap, RoadSection, Station};
 use qcbus_sdk::{Param, Rule, Sink};
 
 use crate::families::on_road::OnRoad;
@@ -148,8 +148,8 @@ fn pieces(crossed: &Crossed<'_, '_>) -> Vec<Patch> {
         (from.min(to) - AROUND).clamp(0.0, length.max(0.0)),
         (from.max(to) + AROUND).clamp(0.0, length.max(0.0)),
     ];
-    strip(crossed.road, range, STEP, SHRINK, |place: Place| {
-        traffic_edges(crossed.road, place)
+    strip(crossed.road, range, STEP, SHRINK, |station: Station| {
+        traffic_edges(crossed.road, station)
     })
 }
 

@@ -2,7 +2,7 @@ use std::cell::OnceCell;
 use std::collections::BTreeSet;
 
 use qcbus_opendrive::geometry::Point;
-use qcbus_opendrive::{Junction, Place, Road, RoadMap};
+use qcbus_opendrive::{Junction, Road, RoadMap, Station};
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
 use crate::families::junction_area::{boundary, ring};
@@ -48,8 +48,8 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// A part of a junction: its boundary, or a road that belongs to it.
-struct Part<'m, 'a> {
+/// Ground that a junction covers: its boundary, or a road that belongs to it.
+struct Footprint<'m, 'a> {
     junction: &'m Junction<'a>,
     shape: Shape<'m, 'a>,
     extent: Extent,
@@ -71,20 +71,20 @@ enum Shape<'m, 'a> {
 type Extent = [f64; 4];
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    let mut parts = parts(map);
-    // Along the longer side of the map fewer parts lie beside each other.
-    let whole = parts
+    let mut footprints = footprints(map);
+    // Along the longer side of the map fewer footprints lie beside each other.
+    let whole = footprints
         .iter()
-        .fold(NOWHERE, |all, part| joined(all, part.extent));
+        .fold(NOWHERE, |all, one| joined(all, one.extent));
     let axis = if whole[1] - whole[0] >= whole[3] - whole[2] {
         0
     } else {
         2
     };
-    parts.sort_by(|one, other| one.extent[axis].total_cmp(&other.extent[axis]));
+    footprints.sort_by(|one, other| one.extent[axis].total_cmp(&other.extent[axis]));
     let (mut budget, mut told) = (BUDGET, BTreeSet::new());
-    for (at, one) in parts.iter().enumerate() {
-        let beside = parts[at + 1..].iter();
+    for (at, one) in footprints.iter().enumerate() {
+        let beside = footprints[at + 1..].iter();
         for other in beside.take_while(|other| other.extent[axis] <= one.extent[axis + 1]) {
             budget = budget.saturating_sub(1);
             if budget == 0 {
@@ -127,8 +127,8 @@ fn meet(one: Extent, other: Extent) -> bool {
     one[0] <= other[1] && other[0] <= one[1] && one[2] <= other[3] && other[2] <= one[3]
 }
 
-fn parts<'m, 'a>(map: &'m RoadMap<'a>) -> Vec<Part<'m, 'a>> {
-    let mut parts = Vec::new();
+fn footprints<'m, 'a>(map: &'m RoadMap<'a>) -> Vec<Footprint<'m, 'a>> {
+    let mut footprints = Vec::new();
     let mut bounded: Vec<Option<[f64; 2]>> = vec![None; map.junctions().len()];
     let rings: Vec<_> = map
         .junctions()
@@ -149,7 +149,7 @@ fn parts<'m, 'a>(map: &'m RoadMap<'a>) -> Vec<Part<'m, 'a>> {
         }
         if let Some(extent) = reach(road) {
             let height = height.unwrap_or(0.0);
-            parts.push(Part {
+            footprints.push(Footprint {
                 junction,
                 shape: Shape::Road {
                     road,
@@ -166,7 +166,7 @@ fn parts<'m, 'a>(map: &'m RoadMap<'a>) -> Vec<Part<'m, 'a>> {
         let points = ring
             .iter()
             .map(|point| [point.x, point.x, point.y, point.y]);
-        parts.push(Part {
+        footprints.push(Footprint {
             junction,
             extent: points.fold(NOWHERE, joined),
             shape: Shape::Ring(ring),
@@ -174,14 +174,15 @@ fn parts<'m, 'a>(map: &'m RoadMap<'a>) -> Vec<Part<'m, 'a>> {
             pieces: OnceCell::new(),
         });
     }
-    parts
+    footprints
 }
 
 /// A box that a road cannot leave: no point of it is farther from both ends together than its length.
 fn reach(road: &Road<'_>) -> Option<Extent> {
     let length = road.length().filter(|length| *length > 0.0)?;
-    let [start, end] = [road.pose(0.0)?, road.pose(Place::before(length))?];
-    let edges = [Place::at(0.0), Place::before(length)].map(|place| traffic_edges(road, place));
+    let [start, end] = [road.pose(0.0)?, road.pose(Station::before(length))?];
+    let edges =
+        [Station::at(0.0), Station::before(length)].map(|station| traffic_edges(road, station));
     let width = edges
         .into_iter()
         .flatten()
@@ -193,10 +194,10 @@ fn reach(road: &Road<'_>) -> Option<Extent> {
     Some([x - around, x + around, y - around, y + around])
 }
 
-/// Whether two parts overlap; then they are reported.
+/// Whether two footprints overlap; then they are reported.
 fn check(
-    one: &Part<'_, '_>,
-    other: &Part<'_, '_>,
+    one: &Footprint<'_, '_>,
+    other: &Footprint<'_, '_>,
     budget: &mut usize,
     found: &mut Sink<'_>,
 ) -> bool {
@@ -265,14 +266,14 @@ fn fine(ring: &[Point]) -> impl Iterator<Item = Point> {
 /// The pieces of a road.
 fn pieces(road: &Road<'_>) -> Vec<Patch> {
     let range = [0.0, road.length().unwrap_or(0.0)];
-    strip(road, range, STEP, SHRINK, |place| {
-        traffic_edges(road, place)
+    strip(road, range, STEP, SHRINK, |station| {
+        traffic_edges(road, station)
     })
 }
 
 fn roads_overlap(
-    (one, a): (&Part<'_, '_>, &Road<'_>),
-    (other, b): (&Part<'_, '_>, &Road<'_>),
+    (one, a): (&Footprint<'_, '_>, &Road<'_>),
+    (other, b): (&Footprint<'_, '_>, &Road<'_>),
     budget: &mut usize,
     found: &mut Sink<'_>,
 ) -> bool {

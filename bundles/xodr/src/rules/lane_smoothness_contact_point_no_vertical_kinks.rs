@@ -1,4 +1,4 @@
-use qcbus_opendrive::{Place, Road, RoadMap};
+use qcbus_opendrive::{Road, RoadMap, Station};
 use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
 
 use crate::families::on_road::OnRoad;
@@ -63,7 +63,7 @@ fn within(road: &Road<'_>, found: &mut Sink<'_>) {
             continue;
         };
         last = Some(s);
-        let before = Place::before(s);
+        let before = Station::before(s);
         let slopes = profile.slope_at(before).zip(profile.slope_at(s));
         let heights = profile.at(before).zip(profile.at(s));
         let (Some((before, after)), Some((low, high))) = (slopes, heights) else {

@@ -1,4 +1,4 @@
-use qcbus_opendrive::{Edge, LaneRef, Place, RoadMap, SectionRef, Side};
+use qcbus_opendrive::{Edge, LaneRef, RoadMap, SectionRef, Side, Station};
 use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
 
 use crate::families::driving::is_drivable;
@@ -59,7 +59,7 @@ fn check<'m, 'a>(one: LaneRef<'m, 'a>, edge: Edge, other: LaneRef<'m, 'a>, found
         (wide(one) && wide(other)).then_some((step, ds, there))
     });
     // The first of the greatest ones.
-    let worst = steps.fold(None, |worst: Option<(f64, Place, _)>, next| match worst {
+    let worst = steps.fold(None, |worst: Option<(f64, Station, _)>, next| match worst {
         Some(worst) if worst.0.abs() + 1e-9 >= next.0.abs() => Some(worst),
         _ => Some(next),
     });
@@ -86,7 +86,7 @@ fn check<'m, 'a>(one: LaneRef<'m, 'a>, edge: Edge, other: LaneRef<'m, 'a>, found
 fn places<'m, 'a>(
     section: SectionRef<'m, 'a>,
     lanes: [LaneRef<'m, 'a>; 2],
-) -> impl Iterator<Item = Place> {
+) -> impl Iterator<Item = Station> {
     let length = lanes[0].length().unwrap_or(0.0);
     let mut starts: Vec<f64> = lanes
         .iter()
@@ -100,15 +100,15 @@ fn places<'m, 'a>(
         .windows(2)
         .map(|pair| 0.5 * (pair[0] + pair[1]))
         .collect();
-    let mut all: Vec<Place> = Vec::with_capacity(3 * starts.len());
+    let mut all: Vec<Station> = Vec::with_capacity(3 * starts.len());
     for (at, start) in starts.iter().enumerate() {
         if at > 0 {
-            all.push(Place::before(*start));
+            all.push(Station::before(*start));
         }
         if at + 1 < starts.len() {
-            all.push(Place::at(*start));
+            all.push(Station::at(*start));
         }
-        all.extend(halves.get(at).map(|half| Place::at(*half)));
+        all.extend(halves.get(at).map(|half| Station::at(*half)));
     }
     all.into_iter()
 }

@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use qcbus_document::Node;
-use qcbus_opendrive::{LaneRef, LaneSpan, Place, Profile, RoadMap, SectionRef, Side};
+use qcbus_opendrive::{LaneRef, LaneSpan, Profile, RoadMap, SectionRef, Side, Station};
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
 use crate::families::driving::is_drivable;
@@ -53,7 +53,8 @@ fn check(section: SectionRef<'_, '_>, side: Side, found: &mut Sink<'_>) {
         }
     }
     for (ds, node) in steps.into_values() {
-        let [before, after] = [Place::before(ds), Place::at(ds)].map(|at| section.spans(side, at));
+        let [before, after] =
+            [Station::before(ds), Station::at(ds)].map(|at| section.spans(side, at));
         if let Some((lane, gap)) = jump(&before, &after, limit) {
             report(lane, ds, gap, node, found);
         }
@@ -67,7 +68,7 @@ fn stepping<'p, 'a>(
 ) -> impl Iterator<Item = (f64, Node<'a>)> + use<'p, 'a> {
     profile.in_order().skip(1).filter_map(move |record| {
         let start = record.start()?;
-        let step = profile.at(start)? - profile.at(Place::before(start))?;
+        let step = profile.at(start)? - profile.at(Station::before(start))?;
         (step.abs() > limit).then_some((start, record.node()))
     })
 }

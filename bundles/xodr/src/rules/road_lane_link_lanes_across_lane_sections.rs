@@ -1,5 +1,5 @@
 use qcbus_opendrive::{
-    ContactPoint, LaneJoint, LaneRef, LaneSpan, MapPart, Place, RoadMap, SectionRef, Side,
+    ContactPoint, LaneJoint, LaneRef, LaneSpan, MapPart, RoadMap, SectionRef, Side, Station,
 };
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
@@ -52,7 +52,7 @@ fn not_linked_at_all(section: SectionRef<'_, '_>, side: Side, found: &mut Sink<'
     };
     let (end, start) = (ContactPoint::End, ContactPoint::Start);
     let open = |lane: LaneRef<'_, '_>, end| is_drivable(lane) && lane.links(end).next().is_none();
-    let mut ends = section.spans(side, Place::before(length));
+    let mut ends = section.spans(side, Station::before(length));
     let mut starts = next.spans(side, 0.0);
     ends.retain(|span| open(span.lane, end));
     starts.retain(|span| open(span.lane, start));

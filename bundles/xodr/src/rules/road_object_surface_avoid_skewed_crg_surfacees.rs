@@ -51,7 +51,8 @@ fn sharpest(road: &Road<'_>, from: f64, to: f64) -> f64 {
         for s in [low, high].into_iter().filter(|_| low <= high) {
             let ds = s - stretch.from;
             let slope = stretch.cubic.slope(ds);
-            let curvature = stretch.cubic.bend(ds).abs() / (1.0 + slope * slope).powf(1.5);
+            let curvature =
+                stretch.cubic.second_derivative(ds).abs() / (1.0 + slope * slope).powf(1.5);
             sharpest = sharpest.max(curvature);
         }
     }

@@ -1,7 +1,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use qcbus_document::Node;
-use qcbus_opendrive::{Object, Place, Road, RoadMap};
+use qcbus_opendrive::{Object, Road, RoadMap, Station};
 use qcbus_sdk::{Param, Rule, Sink};
 
 use crate::families::on_road::{MAX_PLACES, OnRoad};
@@ -85,8 +85,8 @@ fn pieces<'m, 'a>(map: &'m RoadMap<'a>) -> Pieces<'m, 'a> {
     let (mut sorted, mut longest) = (Vec::new(), 0.0_f64);
     for road in map.roads() {
         let length = road.length().unwrap_or(0.0);
-        for piece in strip(road, [0.0, length], STEP, SHRINK, |place: Place| {
-            traffic_edges(road, place)
+        for piece in strip(road, [0.0, length], STEP, SHRINK, |station: Station| {
+            traffic_edges(road, station)
         }) {
             let values = piece.corners.iter().map(|corner| corner.x);
             let low = values.clone().fold(f64::INFINITY, f64::min);

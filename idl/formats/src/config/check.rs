@@ -4,10 +4,10 @@ use std::collections::HashSet;
 
 use super::lookup::{canonical_bundle, reporter_names};
 use super::{
-    BundleConfig, CheckerConfig, Config, ConfigParam, INPUT_PARAMS, LEVEL_PARAM, Notice, Place,
-    ReportConfig, reporter_for, same_bundle,
+    BundleConfig, CheckerConfig, Config, ConfigParam, INPUT_PARAMS, LEVEL_PARAM, Notice, Parsed,
+    ReportConfig, TextPosition, reporter_for, same_bundle,
 };
-use crate::distance::did_you_mean;
+use crate::distance::{DID_YOU_MEAN, did_you_mean};
 
 /// What is there: the catalogues of the bundles and the names of the reporters.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -25,8 +25,8 @@ pub struct KnownBundle {
     pub name: String,
     /// Its short name, such as `xodr`.
     pub alias: String,
-    /// Its checkers.
-    pub checkers: Vec<KnownChecker>,
+    /// Its checkers; `None` when only the bundle itself can tell, once it has joined.
+    pub checkers: Option<Vec<KnownChecker>>,
 }
 
 /// What is known about a checker.
@@ -50,6 +50,19 @@ const REPORT_PARAMS: [&str; 8] = [
     "strResultFile",
     "resultFile",
 ];
+
+impl Parsed {
+    /// All that is to be said of a configuration before it is used: what is odd about the file,
+    /// and what it names that nobody knows; in the order of the file. A warning stands for
+    /// something that is not done as the file says.
+    pub fn remarks(&self, known: &Known) -> Vec<Notice> {
+        let mut notices = self.notices.clone();
+        notices.extend(self.config.check(known));
+        notices.sort_by_key(|notice| (notice.row, notice.column));
+        notices.dedup();
+        notices
+    }
+}
 
 impl Config {
     /// What the configuration names and nobody knows: bundles, checkers, parameters, reports;
@@ -78,15 +91,20 @@ impl Config {
         names.extend(known.bundles.iter().flat_map(KnownBundle::param_names));
         names.remove(LEVEL_PARAM);
         let what = "no bundle or report reads a global parameter";
-        check_params(&self.params, &names, what, notices);
+        // A bundle whose parameters are not known may read any, but hardly one that is so near to
+        // another's.
+        let all_known = known.bundles.iter().all(|it| it.checkers.is_some());
+        let mut found = Vec::new();
+        check_params(&self.params, &names, what, &mut found);
+        found.retain(|notice| all_known || notice.text.contains(DID_YOU_MEAN));
+        notices.append(&mut found);
     }
 }
 
 impl KnownBundle {
     fn param_names(&self) -> impl Iterator<Item = &str> {
-        self.checkers
-            .iter()
-            .flat_map(|checker| checker.params.iter().map(String::as_str))
+        let checkers = self.checkers.iter().flatten();
+        checkers.flat_map(|checker| checker.params.iter().map(String::as_str))
     }
 }
 
@@ -97,7 +115,11 @@ fn check_bundle(bundle: &BundleConfig, known: &Known, notices: &mut Vec<Notice>)
         .iter()
         .find(|b| same_bundle(application, &b.name, &b.alias));
     let Some(found) = found else {
-        notices.push(unknown_bundle(application, bundle.place, known));
+        notices.push(unknown_bundle(application, bundle.position, known));
+        return;
+    };
+    let Some(checkers) = &found.checkers else {
+        notices.push(unknown_catalogue(bundle));
         return;
     };
     let mut names: HashSet<&str> = FRAMEWORK_PARAMS.into_iter().chain(INPUT_PARAMS).collect();
@@ -106,8 +128,17 @@ fn check_bundle(bundle: &BundleConfig, known: &Known, notices: &mut Vec<Notice>)
     let what = format!("no checker of bundle `{}` reads a parameter", found.name);
     check_params(&bundle.params, &names, &what, notices);
     for checker in &bundle.checkers {
-        check_checker(checker, found, known, notices);
+        check_checker(checker, (found, checkers), known, notices);
     }
+}
+
+fn unknown_catalogue(bundle: &BundleConfig) -> Notice {
+    let text = format!(
+        "what `{}` offers is known only when it has joined: its checkers and parameters were not \
+         looked at",
+        bundle.application
+    );
+    Notice::information(bundle.position, text)
 }
 
 /// Two names of one bundle that only its catalogue tells to be the same.
@@ -122,12 +153,12 @@ fn named_before(bundle: &BundleConfig, before: &[BundleConfig], known: &Known) -
     let text = format!(
         "`{}` in row {} is the same bundle as `{}`; put everything into the first one, only that \
          counts",
-        first.application, first.place.row, bundle.application
+        first.application, first.position.row, bundle.application
     );
-    Some(Notice::warning(bundle.place, text))
+    Some(Notice::warning(bundle.position, text))
 }
 
-fn unknown_bundle(application: &str, place: Place, known: &Known) -> Notice {
+fn unknown_bundle(application: &str, position: TextPosition, known: &Known) -> Notice {
     let names = known
         .bundles
         .iter()
@@ -147,19 +178,19 @@ fn unknown_bundle(application: &str, place: Place, known: &Known) -> Notice {
         _ => String::new(),
     };
     Notice::warning(
-        place,
+        position,
         format!("no bundle is called `{application}`{meant}{there}"),
     )
 }
 
 fn check_checker(
     checker: &CheckerConfig,
-    bundle: &KnownBundle,
+    (bundle, checkers): (&KnownBundle, &[KnownChecker]),
     known: &Known,
     notices: &mut Vec<Notice>,
 ) {
-    let Some(found) = bundle.checkers.iter().find(|c| c.id == checker.id) else {
-        notices.push(unknown_checker(checker, bundle, known));
+    let Some(found) = checkers.iter().find(|c| c.id == checker.id) else {
+        notices.push(unknown_checker(checker, (bundle, checkers), known));
         return;
     };
     let mut names: HashSet<&str> = found.params.iter().map(String::as_str).collect();
@@ -168,20 +199,24 @@ fn check_checker(
     check_params(&checker.params, &names, &what, notices);
 }
 
-fn unknown_checker(checker: &CheckerConfig, bundle: &KnownBundle, known: &Known) -> Notice {
+fn unknown_checker(
+    checker: &CheckerConfig,
+    (bundle, checkers): (&KnownBundle, &[KnownChecker]),
+    known: &Known,
+) -> Notice {
     let elsewhere = known
         .bundles
         .iter()
-        .find(|b| b.checkers.iter().any(|c| c.id == checker.id));
+        .find(|b| b.checkers.iter().flatten().any(|c| c.id == checker.id));
     let hint = match elsewhere {
         Some(other) => format!("; bundle `{}` has it", other.name),
-        None => did_you_mean(&checker.id, bundle.checkers.iter().map(|c| c.id.as_str())),
+        None => did_you_mean(&checker.id, checkers.iter().map(|c| c.id.as_str())),
     };
     let text = format!(
         "bundle `{}` has no checker `{}`{hint}",
         bundle.name, checker.id
     );
-    Notice::warning(checker.place, text)
+    Notice::warning(checker.position, text)
 }
 
 fn check_params(
@@ -199,7 +234,7 @@ fn check_params(
         near.sort_unstable();
         let hint = did_you_mean(&param.name, near);
         notices.push(Notice::warning(
-            param.place,
+            param.position,
             format!("{what} `{}`{hint}", param.name),
         ));
     }
@@ -221,7 +256,7 @@ fn check_report(report: &ReportConfig, known: &Known) -> Option<Notice> {
         hint => hint,
     };
     Some(Notice::warning(
-        report.place,
+        report.position,
         format!("no reporter is called `{name}`{hint}"),
     ))
 }

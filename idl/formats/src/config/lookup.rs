@@ -215,7 +215,7 @@ impl CheckerConfig {
     pub(super) fn old_order_notice(&self) -> Notice {
         let (worst, mildest) = (self.levels.worst() as u8, self.levels.mildest() as u8);
         Notice::information(
-            self.place,
+            self.position,
             format!(
                 "checker `{}`: minLevel=\"{worst}\" maxLevel=\"{mildest}\" is the order of 2023; \
                  read as the levels {worst} to {mildest} (today: minLevel=\"{mildest}\" \

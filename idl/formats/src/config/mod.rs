@@ -45,7 +45,7 @@ pub struct BundleConfig {
     /// Its checkers, in order, each id once; empty means: whatever the bundle runs by default.
     pub checkers: Vec<CheckerConfig>,
     /// Where it stands in the file.
-    pub place: Place,
+    pub position: TextPosition,
 }
 
 /// A configured checker.
@@ -62,7 +62,7 @@ pub struct CheckerConfig {
     /// Its parameters.
     pub params: Vec<ConfigParam>,
     /// Where it stands in the file.
-    pub place: Place,
+    pub position: TextPosition,
 }
 
 /// A configured report.
@@ -75,7 +75,7 @@ pub struct ReportConfig {
     /// Its parameters.
     pub params: Vec<ConfigParam>,
     /// Where it stands in the file.
-    pub place: Place,
+    pub position: TextPosition,
 }
 
 /// A parameter and where it stands.
@@ -86,14 +86,14 @@ pub struct ConfigParam {
     /// Value; empty when the file gives none.
     pub value: String,
     /// Where it stands in the file.
-    pub place: Place,
+    pub position: TextPosition,
 }
 
-/// A place in a configuration file, both from 1; columns in characters.
+/// A row and column of a configuration file, both from 1; columns in characters.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize,
 )]
-pub struct Place {
+pub struct TextPosition {
     /// Line.
     pub row: u64,
     /// Column.
@@ -145,7 +145,7 @@ fn hint_line(hint: &str) -> String {
 }
 
 impl ConfigParam {
-    /// The parameter without its place.
+    /// The parameter without its position.
     pub fn to_param(&self) -> Param {
         Param {
             name: self.name.clone(),
@@ -155,20 +155,35 @@ impl ConfigParam {
 }
 
 impl Notice {
-    pub(crate) fn warning(place: Place, text: String) -> Notice {
+    /// As a line: `FILE:ROW:COLUMN: LEVEL: TEXT`.
+    pub fn line(&self, file: &std::path::Path) -> String {
+        let Notice {
+            level,
+            row,
+            column,
+            text,
+        } = self;
+        format!(
+            "{}:{row}:{column}: {}: {text}",
+            file.display(),
+            level.as_str()
+        )
+    }
+
+    pub(crate) fn warning(position: TextPosition, text: String) -> Notice {
         Notice {
             level: Level::Warning,
-            row: place.row,
-            column: place.column,
+            row: position.row,
+            column: position.column,
             text,
         }
     }
 
-    pub(crate) fn information(place: Place, text: String) -> Notice {
+    pub(crate) fn information(position: TextPosition, text: String) -> Notice {
         Notice {
             level: Level::Information,
-            row: place.row,
-            column: place.column,
+            row: position.row,
+            column: position.column,
             text,
         }
     }

@@ -3,7 +3,7 @@
 use super::lookup::canonical_bundle;
 use super::{
     BundleConfig, CheckerConfig, Config, ConfigError, ConfigParam, LEVEL_PARAM, Levels, Notice,
-    Parsed, Place, ReportConfig, reporter_for,
+    Parsed, ReportConfig, TextPosition, reporter_for,
 };
 use crate::distance::did_you_mean;
 use crate::xml::{self, Document, Element, Node};
@@ -68,10 +68,10 @@ impl Parser<'_> {
         self.attributes(element, &["application"]);
         self.stray_text(element);
         let application = self.required(element, "application")?;
-        let place = self.place(element.offset);
+        let position = self.position(element.offset);
         let mut bundle = BundleConfig {
             application,
-            place,
+            position,
             ..BundleConfig::default()
         };
         for child in element.children() {
@@ -109,7 +109,7 @@ impl Parser<'_> {
             old_order: mildest < worst,
             relevel: self.relevel(&params),
             params,
-            place: self.place(element.offset),
+            position: self.position(element.offset),
         };
         if checker.old_order {
             self.notices.push(checker.old_order_notice());
@@ -132,12 +132,12 @@ impl Parser<'_> {
         let reporter = reporter_for(&application)
             .unwrap_or(&application)
             .to_owned();
-        let place = self.place(element.offset);
+        let position = self.position(element.offset);
         Ok(ReportConfig {
             application,
             reporter,
             params,
-            place,
+            position,
         })
     }
 
@@ -161,7 +161,7 @@ impl Parser<'_> {
         params.push(ConfigParam {
             name,
             value,
-            place: self.place(element.offset),
+            position: self.position(element.offset),
         });
         Ok(())
     }
@@ -192,7 +192,7 @@ impl Parser<'_> {
                 "`{LEVEL_PARAM}` is `{value}`, which is no level (error, warning, information) \
                  and has no effect{hint}"
             );
-            self.notices.push(Notice::warning(param.place, text));
+            self.notices.push(Notice::warning(param.position, text));
         }
         level
     }
@@ -202,7 +202,7 @@ impl Parser<'_> {
         for param in params.iter().filter(|param| param.name == LEVEL_PARAM) {
             let text =
                 format!("`{LEVEL_PARAM}` has no effect on a {what}: it belongs to a checker");
-            self.notices.push(Notice::warning(param.place, text));
+            self.notices.push(Notice::warning(param.position, text));
         }
     }
 
@@ -210,9 +210,9 @@ impl Parser<'_> {
         if let Some(first) = bundle.checker(&checker.id) {
             let text = format!(
                 "checker `{}` is configured twice in this bundle; the first one, in row {}, counts",
-                checker.id, first.place.row
+                checker.id, first.position.row
             );
-            self.notices.push(Notice::warning(checker.place, text));
+            self.notices.push(Notice::warning(checker.position, text));
             return;
         }
         bundle.checkers.push(checker);
@@ -232,9 +232,9 @@ impl Parser<'_> {
         };
         let text = format!(
             "bundle `{}` is configured twice; what is new here is added to the first one, in row {}",
-            bundle.application, first.place.row
+            bundle.application, first.position.row
         );
-        self.notices.push(Notice::warning(bundle.place, text));
+        self.notices.push(Notice::warning(bundle.position, text));
         merge(first, bundle, self);
     }
 
@@ -290,17 +290,18 @@ impl Parser<'_> {
         }
     }
 
-    fn place(&self, offset: usize) -> Place {
+    fn position(&self, offset: usize) -> TextPosition {
         let (row, column) = self.document.place(offset);
-        Place { row, column }
+        TextPosition { row, column }
     }
 
     fn warn(&mut self, offset: usize, text: String) {
-        self.notices.push(Notice::warning(self.place(offset), text));
+        self.notices
+            .push(Notice::warning(self.position(offset), text));
     }
 
     fn error(&self, offset: usize, text: String, hint: &str) -> ConfigError {
-        let Place { row, column } = self.place(offset);
+        let TextPosition { row, column } = self.position(offset);
         ConfigError {
             row,
             column,

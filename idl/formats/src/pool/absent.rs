@@ -1,4 +1,4 @@
-//! What the configuration demands and nobody brought.
+//! What the configuration demands and nobody offers.
 
 use super::{BundleOutcome, CheckerOutcome, Ending};
 use crate::config::{BundleConfig, published_name};

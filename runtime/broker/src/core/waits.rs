@@ -98,9 +98,7 @@ impl State {
     /// A person wants a bundle off the roster.
     pub(super) fn removal(&mut self, ticket: Ticket, name: &str, actions: &mut Actions) {
         let response = match self.remove_bundle(name, actions) {
-            Ok(said) => Response::Reloaded {
-                changes: vec![said],
-            },
+            Ok(what) => Response::Removed { what },
             Err(reason) => Response::Failed { reason },
         };
         actions.push(Action::Answer { ticket, response });

@@ -36,7 +36,10 @@ impl Broker {
             }
             Request::Reload => {
                 let response = match self.reload() {
-                    Ok(changes) => Response::Reloaded { changes },
+                    Ok(changes) => Response::Reloaded {
+                        changes,
+                        notices: self.loaded.notices.clone(),
+                    },
                     Err(error) => Response::Failed {
                         reason: format!(
                             "nothing was changed, what was in force stays in force: {error}"
@@ -46,7 +49,19 @@ impl Broker {
                 let _ = asked.answer.send(response);
                 true
             }
+            Request::RemoveBundle { name } => {
+                let ticket = self.ticket(asked.answer);
+                self.handle(Event::RemoveBundle { ticket, name })
+            }
         }
+    }
+
+    /// Keeps what somebody waits for until the state machine answers.
+    fn ticket(&mut self, answer: oneshot::Sender<Response>) -> Ticket {
+        self.next_ticket += 1;
+        let ticket = Ticket(self.next_ticket);
+        self.tickets.insert(ticket, answer);
+        ticket
     }
 
     pub(super) fn wait(
@@ -56,9 +71,7 @@ impl Broker {
         answer: oneshot::Sender<Response>,
     ) -> bool {
         let file = &*self.as_watched(file);
-        self.next_ticket += 1;
-        let ticket = Ticket(self.next_ticket);
-        self.tickets.insert(ticket, answer);
+        let ticket = self.ticket(answer);
         self.look_at_inputs(file);
         let stamp: Option<Stamp> = stamp_of(file).ok().flatten();
         let unwatched = self.why_unwatched(file, stamp);
@@ -115,7 +128,8 @@ impl Broker {
         let shown = to_text(file);
         if qcbus_document::FileKind::of_path(file).is_none() {
             Some(format!(
-                "{shown} is no file that qcbus checks (.xodr .xodrz .xodr.gz .xosc .mosc)"
+                "{shown} is no file that qcbus checks ({})",
+                qcbus_document::Suffix::list()
             ))
         } else if !self.store.places.contains(file) {
             Some(format!("{shown} lies outside the watched directories"))
@@ -183,6 +197,7 @@ impl Broker {
             watch_mode: self.watch_mode.clone(),
             out: self.options.out.clone(),
             unseen: self.all_unseen(),
+            bundles_d: self.options.bundles_d.clone(),
             ..self.state.status()
         }
     }

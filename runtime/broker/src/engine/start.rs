@@ -41,6 +41,7 @@ impl Broker {
             bundles_d: options.bundles_d.clone(),
             standard: options.standard.clone(),
             reporters: options.reporters.clone(),
+            known: options.known.clone(),
         };
         let loaded = sources.load()?;
         let mut host = Host::start(&options.instance, options.host)?;

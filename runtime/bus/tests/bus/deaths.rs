@@ -7,24 +7,24 @@ use qcbus_messages::{FromPeer, ToPeer};
 
 use crate::helper::{Helper, job_with};
 use crate::support::{
-    Place, files_of, identity_of, join, join_with, numbered_job, run, shared_memory_named,
+    Site, files_of, identity_of, join, join_with, numbered_job, run, shared_memory_named,
     shared_memory_of, watched, welcome,
 };
 
 #[test]
 fn a_clean_stop_leaves_nothing() {
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
-        let identity = identity_of(&place.instance);
-        let (_, peer) = join(&mut host, &place, "there").await;
-        assert!(!shared_memory_of(&place.instance).is_empty());
+        let site = Site::new();
+        let mut host = site.host();
+        let identity = identity_of(&site.instance);
+        let (_, peer) = join(&mut host, &site, "there").await;
+        assert!(!shared_memory_of(&site.instance).is_empty());
         assert_eq!(host.generation(), 1);
         drop(host);
-        assert_eq!(files_of(&place.instance), Vec::<String>::new());
+        assert_eq!(files_of(&site.instance), Vec::<String>::new());
         assert_eq!(shared_memory_named(&identity), Vec::<String>::new());
         drop(peer);
-        assert_eq!(files_of(&place.instance), Vec::<String>::new());
+        assert_eq!(files_of(&site.instance), Vec::<String>::new());
         assert_eq!(shared_memory_named(&identity), Vec::<String>::new());
     });
 }
@@ -32,10 +32,10 @@ fn a_clean_stop_leaves_nothing() {
 #[test]
 fn a_killed_peer_is_gone_and_leaves_nothing() {
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
-        let identity = identity_of(&place.instance);
-        let helper = Helper::start("answers_jobs", &place.instance);
+        let site = Site::new();
+        let mut host = site.host();
+        let identity = identity_of(&site.instance);
+        let helper = Helper::start("answers_jobs", &site.instance);
         let id = loop {
             if let HostEvent::Hello { peer, hello } = host.next().await {
                 assert_eq!(hello.pid, helper.pid());
@@ -60,7 +60,7 @@ fn a_killed_peer_is_gone_and_leaves_nothing() {
         let event = host.next().await;
         assert!(matches!(event, HostEvent::Gone { peer } if peer == id));
         drop(host);
-        assert_eq!(files_of(&place.instance), Vec::<String>::new());
+        assert_eq!(files_of(&site.instance), Vec::<String>::new());
         assert_eq!(shared_memory_named(&identity), Vec::<String>::new());
     });
 }
@@ -68,12 +68,12 @@ fn a_killed_peer_is_gone_and_leaves_nothing() {
 #[test]
 fn peers_survive_a_killed_broker_and_join_the_next() {
     run(async {
-        let place = Place::new();
-        let mut broker = Helper::start("serves", &place.instance);
+        let site = Site::new();
+        let mut broker = Helper::start("serves", &site.instance);
         assert_eq!(broker.line(), "serves 1");
-        let identity = identity_of(&place.instance);
+        let identity = identity_of(&site.instance);
         let mut bundles: Vec<Helper> = (0..3)
-            .map(|_| Helper::start("answers_jobs", &place.instance))
+            .map(|_| Helper::start("answers_jobs", &site.instance))
             .collect();
         for bundle in &mut bundles {
             assert_eq!(bundle.line(), "joined");
@@ -81,7 +81,7 @@ fn peers_survive_a_killed_broker_and_join_the_next() {
         for generation in 2..6 {
             while !broker.line().starts_with("done") {}
             broker.kill();
-            broker = Helper::start("serves", &place.instance);
+            broker = Helper::start("serves", &site.instance);
             assert_eq!(broker.line(), format!("serves {generation}"));
             for bundle in &mut bundles {
                 assert_eq!(bundle.line(), "rejoined");
@@ -90,7 +90,7 @@ fn peers_survive_a_killed_broker_and_join_the_next() {
         while !broker.line().starts_with("done") {}
         broker.kill();
         // The last one, in this process, cleans up after all.
-        let mut host = place.host();
+        let mut host = site.host();
         assert_eq!(host.generation(), 6);
         let mut there = 0;
         let mut gone = 0;
@@ -111,7 +111,7 @@ fn peers_survive_a_killed_broker_and_join_the_next() {
             assert!(bundle.end().success());
         }
         drop(host);
-        assert_eq!(files_of(&place.instance), Vec::<String>::new());
+        assert_eq!(files_of(&site.instance), Vec::<String>::new());
         assert_eq!(shared_memory_named(&identity), Vec::<String>::new());
     });
 }
@@ -119,12 +119,12 @@ fn peers_survive_a_killed_broker_and_join_the_next() {
 #[test]
 fn a_new_session_voids_the_old_one() {
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
-        let (id, mut peer) = join(&mut host, &place, "survivor").await;
+        let site = Site::new();
+        let mut host = site.host();
+        let (id, mut peer) = join(&mut host, &site, "survivor").await;
         host.send(id, &numbered_job(1, 10));
         drop(host);
-        let mut host = Host::start(&place.instance, HostOptions::default()).unwrap();
+        let mut host = Host::start(&site.instance, HostOptions::default()).unwrap();
         let event = watched(async {
             loop {
                 tokio::select! {
@@ -146,13 +146,13 @@ fn a_new_session_voids_the_old_one() {
 #[test]
 fn without_a_new_broker_a_peer_gives_up() {
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
+        let site = Site::new();
+        let mut host = site.host();
         let options = PeerOptions {
             grace: Duration::from_millis(100),
             ..PeerOptions::default()
         };
-        let (_, mut peer) = join_with(&mut host, &place, "orphan", options).await;
+        let (_, mut peer) = join_with(&mut host, &site, "orphan", options).await;
         drop(host);
         let event = peer.next().await;
         let PeerEvent::Closed { reason } = event else {
@@ -167,18 +167,18 @@ fn without_a_new_broker_a_peer_gives_up() {
 #[test]
 fn what_a_killed_broker_left_is_swept_but_other_instances_are_not() {
     run(async {
-        let (place, neighbour) = (Place::new(), Place::new());
+        let (site, neighbour) = (Site::new(), Site::new());
         let mut other = neighbour.host();
         let (other_id, mut other_peer) = join(&mut other, &neighbour, "neighbour").await;
-        let mut broker = Helper::start("serves", &place.instance);
+        let mut broker = Helper::start("serves", &site.instance);
         assert_eq!(broker.line(), "serves 1");
         broker.kill();
-        assert!(!shared_memory_of(&place.instance).is_empty());
-        let identity = identity_of(&place.instance);
-        let host = place.host();
+        assert!(!shared_memory_of(&site.instance).is_empty());
+        let identity = identity_of(&site.instance);
+        let host = site.host();
         assert_eq!(host.generation(), 2);
         drop(host);
-        assert_eq!(files_of(&place.instance), Vec::<String>::new());
+        assert_eq!(files_of(&site.instance), Vec::<String>::new());
         assert_eq!(shared_memory_named(&identity), Vec::<String>::new());
         other.send(other_id, &job_with(1, qcbus_messages::DocId(1)));
         tokio::select! {

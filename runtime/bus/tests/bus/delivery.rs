@@ -8,9 +8,7 @@ use qcbus_bus::{
 use qcbus_messages::{Digest, FromPeer, JobId, PROTOCOL_VERSION, ToPeer};
 
 use crate::helper::Helper;
-use crate::support::{
-    Place, hello, join, join_with, numbered, numbered_job, run, watched, welcome,
-};
+use crate::support::{Site, hello, join, join_with, numbered, numbered_job, run, watched, welcome};
 
 /// Sizes around everything that matters: nothing, a frame's end, many frames.
 const SIZES: [usize; 10] = [
@@ -20,9 +18,9 @@ const SIZES: [usize; 10] = [
 #[test]
 fn messages_arrive_in_order_both_ways() {
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
-        let (id, mut peer) = join(&mut host, &place, "polite").await;
+        let site = Site::new();
+        let mut host = site.host();
+        let (id, mut peer) = join(&mut host, &site, "polite").await;
         let count = 40;
         for number in 0..count {
             let len = SIZES[number as usize % SIZES.len()];
@@ -63,9 +61,9 @@ fn messages_arrive_in_order_both_ways() {
 #[test]
 fn what_was_sent_before_leaving_arrives() {
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
-        let (id, mut peer) = join(&mut host, &place, "leaver").await;
+        let site = Site::new();
+        let mut host = site.host();
+        let (id, mut peer) = join(&mut host, &site, "leaver").await;
         let count = 200;
         for number in 0..count {
             peer.send(&numbered(number, 20_000));
@@ -93,9 +91,9 @@ fn what_was_sent_before_leaving_arrives() {
 #[test]
 fn a_stopped_reader_costs_nobody_else() {
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
-        let mut deaf = Helper::start("answers_jobs", &place.instance);
+        let site = Site::new();
+        let mut host = site.host();
+        let mut deaf = Helper::start("answers_jobs", &site.instance);
         let deaf_id = loop {
             if let HostEvent::Hello { peer, .. } = host.next().await {
                 let welcome = welcome(&host);
@@ -111,7 +109,7 @@ fn a_stopped_reader_costs_nobody_else() {
         }
         assert_eq!(deaf.line(), "joined");
         deaf.signal(rustix::process::Signal::STOP);
-        let (id, mut peer) = join(&mut host, &place, "polite").await;
+        let (id, mut peer) = join(&mut host, &site, "polite").await;
         // Far more than a window, which stays with us.
         let flood = 3_000;
         for number in 0..flood {
@@ -147,10 +145,10 @@ fn a_stopped_reader_costs_nobody_else() {
 #[test]
 fn a_flooder_does_not_starve_a_polite_peer() {
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
-        let (flooder_id, mut flooder) = join(&mut host, &place, "flooder").await;
-        let (polite_id, mut polite) = join(&mut host, &place, "polite").await;
+        let site = Site::new();
+        let mut host = site.host();
+        let (flooder_id, mut flooder) = join(&mut host, &site, "flooder").await;
+        let (polite_id, mut polite) = join(&mut host, &site, "polite").await;
         for number in 0..200_000 {
             flooder.send(&numbered(number, 100));
         }
@@ -177,9 +175,9 @@ fn a_flooder_does_not_starve_a_polite_peer() {
 #[test]
 fn disconnecting_a_silent_peer_gives_its_window_back() {
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
-        let (id, mut peer) = join(&mut host, &place, "silent").await;
+        let site = Site::new();
+        let mut host = site.host();
+        let (id, mut peer) = join(&mut host, &site, "silent").await;
         for number in 0..1_000 {
             host.send(id, &numbered_job(number, 10_000));
         }
@@ -206,12 +204,12 @@ fn disconnecting_a_silent_peer_gives_its_window_back() {
 #[test]
 fn a_process_has_one_session_at_a_time() {
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
-        let (id, mut peer) = join(&mut host, &place, "returner").await;
+        let site = Site::new();
+        let mut host = site.host();
+        let (id, mut peer) = join(&mut host, &site, "returner").await;
         // The peer loses its session without a word, while the broker still has it: the file
         // that names the generation is away for as long as the peer takes to notice.
-        let current = place.instance.dir().join("current");
+        let current = site.instance.dir().join("current");
         let text = std::fs::read(&current).unwrap();
         std::fs::remove_file(&current).unwrap();
         let mut gone = false;
@@ -248,10 +246,10 @@ fn a_process_has_one_session_at_a_time() {
 #[test]
 fn garbage_is_reported_and_harms_nobody() {
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
-        let (id, mut peer) = join(&mut host, &place, "garbler").await;
-        let (polite_id, mut polite) = join(&mut host, &place, "polite").await;
+        let site = Site::new();
+        let mut host = site.host();
+        let (id, mut peer) = join(&mut host, &site, "garbler").await;
+        let (polite_id, mut polite) = join(&mut host, &site, "polite").await;
         peer.send_garbage(&[0xff; 100]);
         peer.send_garbage(&[]);
         peer.send(&numbered(1, 10));
@@ -282,9 +280,9 @@ fn garbage_is_reported_and_harms_nobody() {
 #[test]
 fn a_refused_peer_reads_why() {
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
-        let joining = Peer::join(&place.instance, hello("twin"), PeerOptions::default());
+        let site = Site::new();
+        let mut host = site.host();
+        let joining = Peer::join(&site.instance, hello("twin"), PeerOptions::default());
         tokio::pin!(joining);
         let error = loop {
             tokio::select! {
@@ -301,14 +299,14 @@ fn a_refused_peer_reads_why() {
 #[test]
 fn one_peer_too_many_is_told_so() {
     run(async {
-        let place = Place::new();
+        let site = Site::new();
         let options = HostOptions {
             max_peers: 1,
             ..HostOptions::default()
         };
-        let mut host = Host::start(&place.instance, options).unwrap();
-        let _first = join(&mut host, &place, "first").await;
-        let joining = Peer::join(&place.instance, hello("second"), PeerOptions::default());
+        let mut host = Host::start(&site.instance, options).unwrap();
+        let _first = join(&mut host, &site, "first").await;
+        let joining = Peer::join(&site.instance, hello("second"), PeerOptions::default());
         tokio::pin!(joining);
         let error = tokio::select! {
             joined = &mut joining => joined.err().unwrap(),
@@ -324,12 +322,12 @@ fn one_peer_too_many_is_told_so() {
 #[test]
 fn without_a_broker_there_is_a_clear_error() {
     run(async {
-        let place = Place::new();
+        let site = Site::new();
         let options = PeerOptions {
             patience: Duration::ZERO,
             ..PeerOptions::default()
         };
-        let error = Peer::join(&place.instance, hello("early"), options)
+        let error = Peer::join(&site.instance, hello("early"), options)
             .await
             .err()
             .unwrap();
@@ -345,9 +343,9 @@ fn without_a_broker_there_is_a_clear_error() {
 #[test]
 fn another_version_is_refused_by_name() {
     run(async {
-        let place = Place::new();
-        let _host = place.host();
-        let current = place.instance.dir().join("current");
+        let site = Site::new();
+        let _host = site.host();
+        let current = site.instance.dir().join("current");
         let text = std::fs::read_to_string(&current).unwrap();
         let (ours, theirs) = (PROTOCOL_VERSION, PROTOCOL_VERSION + 1);
         let newer = text.replace(
@@ -356,7 +354,7 @@ fn another_version_is_refused_by_name() {
         );
         assert_ne!(newer, text);
         std::fs::write(&current, newer).unwrap();
-        let joined = Peer::join(&place.instance, hello("old"), PeerOptions::default()).await;
+        let joined = Peer::join(&site.instance, hello("old"), PeerOptions::default()).await;
         assert_eq!(
             joined.err(),
             Some(JoinError::ProtocolMismatch { ours, theirs })
@@ -364,7 +362,7 @@ fn another_version_is_refused_by_name() {
         let other = text.replace("\"0.10.0\"", "\"0.11.0\"");
         assert_ne!(other, text);
         std::fs::write(&current, other).unwrap();
-        let joined = Peer::join(&place.instance, hello("old"), PeerOptions::default()).await;
+        let joined = Peer::join(&site.instance, hello("old"), PeerOptions::default()).await;
         assert!(matches!(
             joined.err(),
             Some(JoinError::IceoryxMismatch { .. })
@@ -375,14 +373,14 @@ fn another_version_is_refused_by_name() {
 #[test]
 fn a_second_broker_is_refused_and_names_the_first() {
     run(async {
-        let place = Place::new();
-        let _host = place.host();
-        let second = Host::start(&place.instance, HostOptions::default());
+        let site = Site::new();
+        let _host = site.host();
+        let second = Host::start(&site.instance, HostOptions::default());
         let Err(StartError::AlreadyRunning { pid, .. }) = second else {
             panic!("two brokers on one instance");
         };
         assert_eq!(pid, Some(std::process::id()));
-        assert_eq!(place.instance.broker_pid(), Some(std::process::id()));
+        assert_eq!(site.instance.broker_pid(), Some(std::process::id()));
     });
 }
 
@@ -391,9 +389,9 @@ fn long_paths_are_no_obstacle() {
     run(async {
         let dir = tempfile::TempDir::new().unwrap();
         let long = dir.path().join("a".repeat(100)).join("b".repeat(80));
-        let place = Instance::at(long);
-        let mut host = Host::start(&place, HostOptions::default()).unwrap();
-        let joining = Peer::join(&place, hello("far"), PeerOptions::default());
+        let site = Instance::at(long);
+        let mut host = Host::start(&site, HostOptions::default()).unwrap();
+        let joining = Peer::join(&site, hello("far"), PeerOptions::default());
         tokio::pin!(joining);
         loop {
             tokio::select! {
@@ -410,13 +408,13 @@ fn long_paths_are_no_obstacle() {
 #[test]
 fn the_configuration_reaches_everyone_and_the_latest_wins() {
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
-        let (_, mut early) = join(&mut host, &place, "early").await;
+        let site = Site::new();
+        let mut host = site.host();
+        let (_, mut early) = join(&mut host, &site, "early").await;
         for number in 0..10_u8 {
             host.set_config(Digest([number; 32]), &vec![number; 100_000]);
         }
-        let (_, mut late) = join_with(&mut host, &place, "late", PeerOptions::default()).await;
+        let (_, mut late) = join_with(&mut host, &site, "late", PeerOptions::default()).await;
         for peer in [&mut early, &mut late] {
             loop {
                 tokio::select! {

@@ -1,4 +1,4 @@
-//! Documents are published once and read in place.
+//! Documents are published once and read in site.
 
 use std::collections::BTreeMap;
 use std::os::unix::process::ExitStatusExt;
@@ -8,7 +8,7 @@ use qcbus_document::FileKind;
 use qcbus_messages::{Digest, DocId, FromPeer};
 
 use crate::helper::Helper;
-use crate::support::{Place, has_room, is_uniform, join, run, welcome};
+use crate::support::{Site, has_room, is_uniform, join, run, welcome};
 
 fn publish(documents: &Documents, doc: u64, len: usize) -> Held {
     let mut loan = documents.loan(len + 10).unwrap();
@@ -55,9 +55,9 @@ async fn arrival(host: &mut Host, peer: &mut Peer, doc: u64) -> Held {
 #[test]
 fn every_size_arrives_and_is_aligned() {
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
-        let (_, mut peer) = join(&mut host, &place, "reader").await;
+        let site = Site::new();
+        let mut host = site.host();
+        let (_, mut peer) = join(&mut host, &site, "reader").await;
         let documents = host.documents();
         let sizes = [0, 1, 63, 64, 65, 500_000, 524_288, 600_000, 9_000_000];
         for (doc, len) in (1..).zip(sizes) {
@@ -74,11 +74,11 @@ fn a_hundred_megabytes_reach_four_readers_in_place() {
         return;
     }
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
+        let site = Site::new();
+        let mut host = site.host();
         let mut readers = Vec::new();
         for name in ["a", "b", "c", "d"] {
-            readers.push(join(&mut host, &place, name).await.1);
+            readers.push(join(&mut host, &site, name).await.1);
         }
         let documents = host.documents();
         let len = 100_000_000;
@@ -104,10 +104,10 @@ fn readers_have_no_copy() {
         return;
     }
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
+        let site = Site::new();
+        let mut host = site.host();
         let _readers: Vec<Helper> = (0..4)
-            .map(|_| Helper::start("reads_and_weighs_itself", &place.instance))
+            .map(|_| Helper::start("reads_and_weighs_itself", &site.instance))
             .collect();
         let len = 100_000_000;
         let held = publish(&host.documents(), 1, len);
@@ -138,9 +138,9 @@ fn slots_are_recycled() {
         return;
     }
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
-        let (_, mut peer) = join(&mut host, &place, "reader").await;
+        let site = Site::new();
+        let mut host = site.host();
+        let (_, mut peer) = join(&mut host, &site, "reader").await;
         let documents = host.documents();
         let before = free_shared_memory();
         let len = 20_000_000;
@@ -163,14 +163,14 @@ fn free_shared_memory() -> u64 {
 #[test]
 fn who_comes_late_gets_what_is_there() {
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
+        let site = Site::new();
+        let mut host = site.host();
         let documents = host.documents();
         let held: Vec<Held> = (1..=20)
             .map(|doc| publish(&documents, doc, 10_000 * doc as usize))
             .collect();
         let large = publish(&documents, 21, 3_000_000);
-        let (_, mut peer) = join(&mut host, &place, "late").await;
+        let (_, mut peer) = join(&mut host, &site, "late").await;
         for ours in held.iter().chain([&large]) {
             let doc = ours.doc().0;
             check(&arrival(&mut host, &mut peer, doc).await, doc, ours.len());
@@ -181,9 +181,9 @@ fn who_comes_late_gets_what_is_there() {
 #[test]
 fn what_was_lost_is_published_again() {
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
-        let (_, mut peer) = join(&mut host, &place, "slow").await;
+        let site = Site::new();
+        let mut host = site.host();
+        let (_, mut peer) = join(&mut host, &site, "slow").await;
         let documents = host.documents();
         let first = publish(&documents, 1, 1_000);
         // More than the slow reader's buffer takes while it does not read.
@@ -200,9 +200,9 @@ fn what_was_lost_is_published_again() {
 #[test]
 fn a_reader_never_runs_out_of_hands() {
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
-        let (_, mut peer) = join(&mut host, &place, "hoarder").await;
+        let site = Site::new();
+        let mut host = site.host();
+        let (_, mut peer) = join(&mut host, &site, "hoarder").await;
         let documents = host.documents();
         // Reads everything, forgets nothing, holds on to a few: the newest is always there.
         let mut kept = BTreeMap::new();
@@ -222,8 +222,8 @@ fn a_reader_never_runs_out_of_hands() {
 #[test]
 fn no_more_is_lent_than_there_is() {
     run(async {
-        let place = Place::new();
-        let host = place.host();
+        let site = Site::new();
+        let host = site.host();
         let documents = host.documents();
         assert_eq!(
             documents.loan(usize::MAX).err(),
@@ -234,13 +234,13 @@ fn no_more_is_lent_than_there_is() {
         drop(some);
         assert!(documents.loan(100).is_ok());
 
-        let place = Place::new();
+        let site = Site::new();
         let stat = rustix::fs::statvfs("/dev/shm").unwrap();
         let options = HostOptions {
             shm_reserve_bytes: u64::MAX,
             ..HostOptions::default()
         };
-        let host = Host::start(&place.instance, options).unwrap();
+        let host = Host::start(&site.instance, options).unwrap();
         // The reserve is capped at a quarter, so what would leave less is refused.
         let most = stat.f_bavail * stat.f_frsize - stat.f_blocks * stat.f_frsize / 4;
         let refused = host.documents().loan(most as usize + (64 << 20));
@@ -253,9 +253,9 @@ fn no_more_is_lent_than_there_is() {
 #[test]
 fn documents_outlive_the_broker_in_the_hands_of_a_reader() {
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
-        let (_, mut peer) = join(&mut host, &place, "reader").await;
+        let site = Site::new();
+        let mut host = site.host();
+        let (_, mut peer) = join(&mut host, &site, "reader").await;
         let documents = host.documents();
         drop(publish(&documents, 1, 2_000_000));
         let held = arrival(&mut host, &mut peer, 1).await;
@@ -271,16 +271,16 @@ fn documents_outlive_the_broker_in_the_hands_of_a_reader() {
 #[test]
 fn a_killed_holder_gives_everything_back() {
     run(async {
-        let place = Place::new();
+        let site = Site::new();
         let options = HostOptions {
             active_documents: 2,
             max_peers: 1,
             ..HostOptions::default()
         };
-        let mut host = Host::start(&place.instance, options).unwrap();
+        let mut host = Host::start(&site.instance, options).unwrap();
         let documents = host.documents();
         for doc in 1..=30 {
-            let holder = Helper::start("holds_documents", &place.instance);
+            let holder = Helper::start("holds_documents", &site.instance);
             drop(publish(&documents, doc, 1_000));
             let id = loop {
                 if let HostEvent::Hello { peer, .. } = host.next().await {
@@ -314,11 +314,11 @@ fn a_killed_holder_gives_everything_back() {
 #[test]
 fn writing_into_a_document_kills_the_writer_alone() {
     run(async {
-        let place = Place::new();
-        let mut host = place.host();
-        let (_, mut peer) = join(&mut host, &place, "bystander").await;
+        let site = Site::new();
+        let mut host = site.host();
+        let (_, mut peer) = join(&mut host, &site, "bystander").await;
         let ours = publish(&host.documents(), 1, 1_000);
-        let mut writer = Helper::start("writes_into_a_document", &place.instance);
+        let mut writer = Helper::start("writes_into_a_document", &site.instance);
         let id = loop {
             if let HostEvent::Hello { peer, .. } = host.next().await {
                 let welcome = welcome(&host);
@@ -341,9 +341,9 @@ fn writing_into_a_document_kills_the_writer_alone() {
 
 #[test]
 fn a_small_shared_memory_is_given_back_and_used_again() {
-    let place = Place::new();
+    let site = Site::new();
     let role = "lives_in_a_small_memory";
-    let Some(mut helper) = Helper::start_in_small_memory(role, &place.instance) else {
+    let Some(mut helper) = Helper::start_in_small_memory(role, &site.instance) else {
         println!("skipped: mounting a small /dev/shm is not allowed here");
         return;
     };

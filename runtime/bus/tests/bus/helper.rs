@@ -175,9 +175,9 @@ async fn reads_and_weighs_itself(instance: &Instance) {
 
 /// Broker and reader in one, in a /dev/shm that has no room for the history of large documents.
 async fn lives_in_a_small_memory(instance: &Instance) {
-    let place = crate::support::Place::at(instance);
-    let mut host = place.host();
-    let (_, mut peer) = crate::support::join(&mut host, &place, "reader").await;
+    let site = crate::support::Site::at(instance);
+    let mut host = site.host();
+    let (_, mut peer) = crate::support::join(&mut host, &site, "reader").await;
     let documents = host.documents();
     let mut refused = 0;
     for doc in 1..=40 {

@@ -14,25 +14,25 @@ use tempfile::TempDir;
 /// Longer than anything takes on the slowest machine; only a hang gets here.
 pub const WATCHDOG: Duration = Duration::from_secs(60);
 
-/// A directory for one instance.
-pub struct Place {
+/// Where one instance lives: a directory of its own.
+pub struct Site {
     _dir: Option<TempDir>,
     pub instance: Instance,
 }
 
-impl Place {
-    pub fn new() -> Place {
+impl Site {
+    pub fn new() -> Site {
         let dir = TempDir::new().unwrap();
         let instance = Instance::at(dir.path().join("i"));
-        Place {
+        Site {
             _dir: Some(dir),
             instance,
         }
     }
 
     /// In a directory that somebody else has made.
-    pub fn at(instance: &Instance) -> Place {
-        Place {
+    pub fn at(instance: &Instance) -> Site {
+        Site {
             _dir: None,
             instance: instance.clone(),
         }
@@ -89,17 +89,17 @@ pub fn welcome(host: &Host) -> ToPeer {
 }
 
 /// Joins a peer of this process while the host is served.
-pub async fn join(host: &mut Host, place: &Place, name: &str) -> (PeerId, Peer) {
-    join_with(host, place, name, PeerOptions::default()).await
+pub async fn join(host: &mut Host, site: &Site, name: &str) -> (PeerId, Peer) {
+    join_with(host, site, name, PeerOptions::default()).await
 }
 
 pub async fn join_with(
     host: &mut Host,
-    place: &Place,
+    site: &Site,
     name: &str,
     options: PeerOptions,
 ) -> (PeerId, Peer) {
-    let joining = Peer::join(&place.instance, hello(name), options);
+    let joining = Peer::join(&site.instance, hello(name), options);
     tokio::pin!(joining);
     let mut id = None;
     let mut peer = loop {

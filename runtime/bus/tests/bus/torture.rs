@@ -6,22 +6,9 @@
 use std::time::{Duration, Instant};
 
 use crate::helper::Helper;
-use crate::support::{Place, files_of, fresh_number, identity_of, run, shared_memory_named};
+use crate::support::{Site, files_of, fresh_number, identity_of, run, shared_memory_named};
 
 const BUNDLES: usize = 3;
-
-/// Steele and Vigna's splitmix64: enough for choosing whom to kill.
-struct Dice(u64);
-
-impl Dice {
-    fn roll(&mut self, sides: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ (z >> 31)) % sides
-    }
-}
 
 fn from_environment(name: &str) -> Option<u64> {
     std::env::var(name).ok()?.parse().ok()
@@ -32,23 +19,23 @@ fn random_kills_lose_nothing_and_leave_nothing() {
     let seed = from_environment("QCBUS_TORTURE_SEED").unwrap_or_else(fresh_number);
     let seconds = from_environment("QCBUS_TORTURE_SECONDS").unwrap_or(15);
     println!("QCBUS_TORTURE_SEED={seed}");
-    let mut dice = Dice(seed);
-    let place = Place::new();
-    let start = |role| Helper::start(role, &place.instance);
+    let mut dice = fastrand::Rng::with_seed(seed);
+    let site = Site::new();
+    let start = |role| Helper::start(role, &site.instance);
     let mut broker = start("serves");
     let mut bundles: Vec<Helper> = (0..BUNDLES).map(|_| start("answers_jobs")).collect();
     assert!(broker.line().starts_with("serves"));
-    let identity = identity_of(&place.instance);
+    let identity = identity_of(&site.instance);
 
     let until = Instant::now() + Duration::from_secs(seconds);
     let (mut kills, mut jobs) = (0, 0);
     while Instant::now() < until {
         jobs += judge(&mut broker);
         // Most kills come in bursts, within the first milliseconds of a process.
-        let calm = if dice.roll(3) == 0 { 600 } else { 30 };
-        pause(Duration::from_millis(dice.roll(calm)));
+        let calm = if dice.u64(..3) == 0 { 600 } else { 30 };
+        pause(Duration::from_millis(dice.u64(..calm)));
         kills += 1;
-        let whom = dice.roll(BUNDLES as u64 + 2) as usize;
+        let whom = dice.u64(..BUNDLES as u64 + 2) as usize;
         if whom < BUNDLES {
             std::mem::replace(&mut bundles[whom], start("answers_jobs")).kill();
         } else {
@@ -68,8 +55,8 @@ fn random_kills_lose_nothing_and_leave_nothing() {
         bundle.kill();
     }
     run(async move {
-        drop(place.host());
-        assert_eq!(files_of(&place.instance), Vec::<String>::new());
+        drop(site.host());
+        assert_eq!(files_of(&site.instance), Vec::<String>::new());
         assert_eq!(shared_memory_named(&identity), Vec::<String>::new());
     });
 }

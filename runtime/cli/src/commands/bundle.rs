@@ -1,14 +1,12 @@
-//! `qcbus bundle …`.
+//! `qcbus bundle list` and `qcbus bundle run`.
 
 use std::os::unix::process::CommandExt;
-use std::path::{Path, PathBuf};
 
 use qcbus_messages::Exit;
 use qcbus_messages::control::{Request, Response};
 use qcbus_sdk::run::Mode;
 
-use super::settings::absolute;
-use crate::args::{BundleAddArgs, BundleRemoveArgs, BundleRunArgs, StatusArgs};
+use crate::args::{BundleRunArgs, StatusArgs};
 use crate::{standard, talk};
 
 /// `qcbus bundle list`.
@@ -98,86 +96,4 @@ fn run_program(args: &BundleRunArgs) -> Exit {
     };
     talk::fail(&format!("cannot run `{}`: {error}{hint}", args.name));
     Exit::Usage
-}
-
-fn manifests(given: Option<&Path>) -> PathBuf {
-    absolute(given.unwrap_or(Path::new("qcbus-out/.qcbus/bundles.d")))
-}
-
-/// `qcbus bundle add`: writes the manifest that the broker watches for.
-pub fn add(args: &BundleAddArgs) -> Exit {
-    let directory = manifests(args.bundles_d.as_deref());
-    let good = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
-    if args.name.is_empty() || !args.name.chars().all(good) {
-        talk::fail(&format!(
-            "`{}` is no name for a bundle: use A-Z a-z 0-9 . _ -",
-            args.name
-        ));
-        return Exit::Usage;
-    }
-    let quoted: Vec<String> = args.command.iter().map(|word| quote(word)).collect();
-    let manifest = serde_json::json!({"module": [{
-        "name": args.name,
-        "exec_type": "executable",
-        "module_type": "checker_bundle",
-        "exec_command": quoted.join(" "),
-        "mode": "bus",
-    }]});
-    let path = directory.join(format!("{}.json", args.name));
-    match write_manifest(&directory, &path, &format!("{manifest:#}\n")) {
-        Ok(()) => {
-            talk::say(&format!(
-                "{} written; the broker that watches it starts the bundle",
-                path.display()
-            ));
-            Exit::Accepted
-        }
-        Err(error) => {
-            talk::fail(&format!("cannot write {}: {error}", path.display()));
-            Exit::Internal
-        }
-    }
-}
-
-fn write_manifest(directory: &Path, path: &Path, text: &str) -> std::io::Result<()> {
-    std::fs::create_dir_all(directory)?;
-    // The broker must never read half a manifest: temporary names end in .tmp and are passed over.
-    let temporary = path.with_extension("json.tmp");
-    std::fs::write(&temporary, text)?;
-    std::fs::rename(temporary, path)
-}
-
-fn quote(word: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-=:,@%+".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', "'\\''"))
-    }
-}
-
-/// `qcbus bundle remove`.
-pub fn remove(args: &BundleRemoveArgs) -> Exit {
-    let path = manifests(args.bundles_d.as_deref()).join(format!("{}.json", args.name));
-    match std::fs::remove_file(&path) {
-        Ok(()) => {
-            talk::say(&format!(
-                "{} removed; the broker that watches it drains the bundle",
-                path.display()
-            ));
-            Exit::Accepted
-        }
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            talk::fail(&format!(
-                "no bundle `{}` was added: there is no {}",
-                args.name,
-                path.display()
-            ));
-            Exit::Usage
-        }
-        Err(error) => {
-            talk::fail(&format!("cannot remove {}: {error}", path.display()));
-            Exit::Usage
-        }
-    }
 }

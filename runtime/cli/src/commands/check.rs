@@ -8,13 +8,15 @@ use std::time::Duration;
 use qcbus_broker::core::{Delivery, Judged, Notice, Settings};
 use qcbus_broker::{Broker, Options, ResultPaths, Told};
 use qcbus_bus::{HostOptions, Instance};
-use qcbus_document::FileKind;
+use qcbus_document::{FileKind, Suffix};
 use qcbus_formats::config::Config;
 use qcbus_messages::path_text::{from_text, to_text};
 use qcbus_messages::{Exit, Verdict};
 use qcbus_reporter_sdk::FileSources;
 
-use super::settings::{absolute, dialect, limits, memory_limit, named, program, settings};
+use super::settings::{
+    absolute, dialect, limits, manifest_directory, memory_limit, named, program, settings,
+};
 use crate::args::{CheckArgs, Format};
 use crate::{standard, talk};
 
@@ -48,10 +50,12 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         Some(path) => Some(
             qcbus_broker::reload::read_config(path)
                 .map_err(|error| usage(error.to_string()))?
-                .0,
+                .config,
         ),
         None => None,
     };
+    let bundles_d = args.bundles_d.as_deref().map(manifest_directory);
+    let bundles_d = bundles_d.transpose().map_err(usage)?;
     let (roots, files) = targets(args, config.as_deref(), parsed.as_ref())?;
     let asam = config.is_some() && roots.is_empty() && files.len() == 1;
     let out = absolute(args.output.out.as_deref().unwrap_or(Path::new(if asam {
@@ -84,9 +88,10 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         verdict_files: false,
         gate: None,
         config,
-        bundles_d: args.bundles_d.as_deref().map(absolute),
+        bundles_d,
         standard: wanted_bundles(bundles.map_err(usage)?, parsed.as_ref()),
         reporters: standard::reporter_specs(&program),
+        known: standard::known(),
         die_with_broker: true,
         memory_limit: memory_limit(&args.limits),
         limits: limits(&args.limits),
@@ -175,7 +180,8 @@ fn targets(
         } else {
             let shown = to_text(path);
             return Err(usage(format!(
-                "{shown} is no file that qcbus checks (.xodr .xodrz .xodr.gz .xosc .mosc)"
+                "{shown} is no file that qcbus checks ({})",
+                Suffix::list()
             )));
         }
     }
@@ -403,9 +409,10 @@ impl Printer {
             return Exit::Undetermined;
         }
         if total == 0 {
-            talk::fail(
-                "nothing to check: there is no .xodr, .xodrz, .xodr.gz, .xosc or .mosc file",
-            );
+            talk::fail(&format!(
+                "nothing to check: there is no file that qcbus checks ({})",
+                Suffix::list()
+            ));
             return Exit::Usage;
         }
         if total < self.expected.len() {

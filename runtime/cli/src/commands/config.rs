@@ -2,68 +2,56 @@
 
 use std::path::Path;
 
-use qcbus_formats::config::{Config, Known, KnownBundle, KnownChecker};
+use qcbus_broker::reload::{Loaded, Sources};
+use qcbus_formats::config::Notice;
 use qcbus_formats::xqar::Level;
 use qcbus_messages::Exit;
 
+use super::settings::manifest_directory;
 use crate::{standard, talk};
 
 /// Runs the command.
-pub fn check(file: &Path) -> Exit {
-    let shown = file.display();
-    let bytes = match std::fs::read(file) {
-        Ok(bytes) => bytes,
-        Err(error) => {
-            talk::fail(&format!("cannot read {shown}: {error}"));
-            return Exit::Usage;
+pub fn check(file: &Path, bundles_d: Option<&Path>) -> Exit {
+    match load(file, bundles_d) {
+        Ok(loaded) => tell(file, &loaded),
+        Err(why) => {
+            talk::fail(&why);
+            Exit::Usage
         }
-    };
-    let parsed = match Config::parse(&bytes) {
-        Ok(parsed) => parsed,
-        Err(error) => {
-            talk::fail(&format!("{shown}:{error}"));
-            return Exit::Usage;
-        }
-    };
-    let mut notices = parsed.notices.clone();
-    notices.extend(parsed.config.check(&known()));
-    notices.sort_by_key(|notice| (notice.row, notice.column));
-    notices.dedup();
-    for notice in &notices {
-        let level = format!("{:?}", notice.level).to_lowercase();
-        talk::print(&format!(
-            "{shown}:{}:{}: {level}: {}\n",
-            notice.row, notice.column, notice.text
-        ));
     }
-    let warnings = notices
-        .iter()
-        .filter(|notice| notice.level <= Level::Warning)
-        .count();
-    talk::say(&format!("{shown}: usable, {warnings} warnings"));
-    Exit::Accepted
 }
 
-/// What this program brings along.
-fn known() -> Known {
-    let bundle = |bundle: &&qcbus_sdk::Bundle| {
-        let checker = |checker: qcbus_sdk::Checker| KnownChecker {
-            params: checker
-                .facts
-                .params
-                .iter()
-                .map(|param| param.name.to_owned())
-                .collect(),
-            id: checker.id,
-        };
-        KnownBundle {
-            name: bundle.name.to_owned(),
-            alias: bundle.alias.to_owned(),
-            checkers: bundle.checkers().into_iter().map(checker).collect(),
-        }
+/// As a broker loads it that is started with this configuration.
+fn load(file: &Path, bundles_d: Option<&Path>) -> Result<Loaded, String> {
+    let sources = Sources {
+        config: Some(file.to_path_buf()),
+        bundles_d: bundles_d.map(manifest_directory).transpose()?,
+        standard: Vec::new(),
+        reporters: Vec::new(),
+        known: standard::known(),
     };
-    Known {
-        bundles: standard::BUNDLES.iter().map(bundle).collect(),
-        ..Known::default()
+    sources.load().map_err(|error| error.to_string())
+}
+
+/// A configuration with warnings is not in order: what they are about is not done as it says, so
+/// whoever looks at it beforehand, perhaps a script, must hear of it.
+fn tell(file: &Path, loaded: &Loaded) -> Exit {
+    for line in &loaded.notices {
+        talk::print(&format!("{line}\n"));
     }
+    let shown = file.display();
+    let is_warning = |notice: &&Notice| notice.level <= Level::Warning;
+    let warnings = loaded.remarks.iter().filter(is_warning).count();
+    if warnings == 0 {
+        talk::say(&format!("{shown}: in order"));
+        return Exit::Accepted;
+    }
+    let warnings = match warnings {
+        1 => "1 warning".to_owned(),
+        several => format!("{several} warnings"),
+    };
+    talk::fail(&format!(
+        "{shown}: not in order, {warnings}: what they name is not done as the file says"
+    ));
+    Exit::Usage
 }

@@ -11,8 +11,8 @@ use super::settings::{absolute, instance};
 use crate::args::DoctorArgs;
 use crate::talk;
 
-/// One thing looked at.
-struct Finding {
+/// What is said of one thing that was looked at.
+struct Remark {
     ok: bool,
     what: &'static str,
     text: String,
@@ -21,8 +21,8 @@ struct Finding {
 
 /// Runs the command.
 pub fn run(args: &DoctorArgs) -> Exit {
-    let mut findings = vec![shared_memory(), watches(), open_files(), versions()];
-    findings.push(match instance(&args.instance) {
+    let mut remarks = vec![shared_memory(), watches(), open_files(), versions()];
+    remarks.push(match instance(&args.instance) {
         Ok(instance) => runtime_directory(instance.dir()),
         Err(why) => bad(
             "runtime directory",
@@ -31,26 +31,26 @@ pub fn run(args: &DoctorArgs) -> Exit {
         ),
     });
     if let Ok(instance) = instance(&args.instance) {
-        findings.push(broker(instance.dir()));
+        remarks.push(broker(instance.dir()));
     }
-    findings.push(stale_instances());
-    findings.push(journal(&absolute(&args.state)));
-    for finding in &findings {
-        let mark = if finding.ok { "ok  " } else { "FIX " };
-        talk::print(&format!("{mark} {:<18} {}\n", finding.what, finding.text));
-        if !finding.ok {
-            talk::print(&format!("     {:<18} {}\n", "", finding.advice));
+    remarks.push(stale_instances());
+    remarks.push(journal(&absolute(&args.state)));
+    for remark in &remarks {
+        let mark = if remark.ok { "ok  " } else { "FIX " };
+        talk::print(&format!("{mark} {:<18} {}\n", remark.what, remark.text));
+        if !remark.ok {
+            talk::print(&format!("     {:<18} {}\n", "", remark.advice));
         }
     }
-    if findings.iter().all(|finding| finding.ok) {
+    if remarks.iter().all(|remark| remark.ok) {
         Exit::Accepted
     } else {
         Exit::Rejected
     }
 }
 
-fn good(what: &'static str, text: String) -> Finding {
-    Finding {
+fn good(what: &'static str, text: String) -> Remark {
+    Remark {
         ok: true,
         what,
         text,
@@ -58,8 +58,8 @@ fn good(what: &'static str, text: String) -> Finding {
     }
 }
 
-fn bad(what: &'static str, text: String, advice: &'static str) -> Finding {
-    Finding {
+fn bad(what: &'static str, text: String, advice: &'static str) -> Remark {
+    Remark {
         ok: false,
         what,
         text,
@@ -70,7 +70,7 @@ fn bad(what: &'static str, text: String, advice: &'static str) -> Finding {
 /// Room that a broker with some large maps in flight wants.
 const SHM_WANTED: u64 = 512 << 20;
 
-fn shared_memory() -> Finding {
+fn shared_memory() -> Remark {
     let what = "shared memory";
     let advice = "mount /dev/shm larger (`mount -o remount,size=2G /dev/shm`; containers: --shm-size=2g), or remove what others left there";
     match rustix::fs::statvfs("/dev/shm") {
@@ -87,7 +87,7 @@ fn shared_memory() -> Finding {
     }
 }
 
-fn watches() -> Finding {
+fn watches() -> Remark {
     let what = "file watches";
     let path = "/proc/sys/fs/inotify/max_user_watches";
     match std::fs::read_to_string(path)
@@ -110,7 +110,7 @@ fn watches() -> Finding {
     }
 }
 
-fn open_files() -> Finding {
+fn open_files() -> Remark {
     let what = "open files";
     let limit = rustix::process::getrlimit(rustix::process::Resource::Nofile).current;
     match limit {
@@ -124,7 +124,7 @@ fn open_files() -> Finding {
     }
 }
 
-fn versions() -> Finding {
+fn versions() -> Remark {
     let text = format!(
         "qcbus {}, bus protocol {PROTOCOL_VERSION}, iceoryx2 {}",
         env!("CARGO_PKG_VERSION"),
@@ -133,7 +133,7 @@ fn versions() -> Finding {
     good("versions", text)
 }
 
-fn runtime_directory(directory: &Path) -> Finding {
+fn runtime_directory(directory: &Path) -> Remark {
     let what = "runtime directory";
     let probe = directory.join(".doctor");
     let text = directory.display().to_string();
@@ -151,7 +151,7 @@ fn runtime_directory(directory: &Path) -> Finding {
     }
 }
 
-fn broker(directory: &Path) -> Finding {
+fn broker(directory: &Path) -> Remark {
     let what = "broker";
     match ask_broker(directory, &Request::Status) {
         Ok(Response::Status(status)) => {
@@ -179,7 +179,7 @@ fn broker(directory: &Path) -> Finding {
     }
 }
 
-fn stale_instances() -> Finding {
+fn stale_instances() -> Remark {
     let swept = qcbus_bus::sweep_private_instances();
     let text = if swept == 0 {
         "none".to_owned()
@@ -189,7 +189,7 @@ fn stale_instances() -> Finding {
     good("stale instances", text)
 }
 
-fn journal(state: &Path) -> Finding {
+fn journal(state: &Path) -> Remark {
     let what = "journal";
     match Journal::examine(state) {
         None => good(

@@ -4,6 +4,7 @@ mod bundle;
 mod check;
 mod config;
 mod doctor;
+mod manifests;
 mod remote;
 mod reporter;
 mod rule;
@@ -28,11 +29,13 @@ pub fn run(args: Args) -> Exit {
         Command::Reload(args) => remote::reload(&args),
         Command::Bundle(BundleCommand::List(args)) => bundle::list(&args),
         Command::Bundle(BundleCommand::Run(args)) => bundle::run(args),
-        Command::Bundle(BundleCommand::Add(args)) => bundle::add(&args),
-        Command::Bundle(BundleCommand::Remove(args)) => bundle::remove(&args),
+        Command::Bundle(BundleCommand::Add(args)) => manifests::add(&args),
+        Command::Bundle(BundleCommand::Remove(args)) => manifests::remove(&args),
         Command::Reporter(ReporterCommand::Run { name, bus }) => reporter::run(name, &bus),
         Command::Rule(args) => rule::run(&args),
-        Command::Config(ConfigCommand::Check { file }) => config::check(&file),
+        Command::Config(ConfigCommand::Check { file, bundles_d }) => {
+            config::check(&file, bundles_d.as_deref())
+        }
         Command::Schema(SchemaCommand::Compile { path, output }) => schema::compile(&path, &output),
         Command::Doctor(args) => doctor::run(&args),
     }

@@ -39,12 +39,15 @@ pub fn down(args: &InstanceArgs) -> Exit {
 /// `qcbus reload`.
 pub fn reload(args: &InstanceArgs) -> Exit {
     match ask(args, &Request::Reload) {
-        Ok(Response::Reloaded { changes }) if changes.is_empty() => {
-            talk::print("nothing changed\n");
-            Exit::Accepted
-        }
-        Ok(Response::Reloaded { changes }) => {
-            talk::print(&format!("{}\n", changes.join("\n")));
+        Ok(Response::Reloaded { changes, notices }) => {
+            for notice in notices {
+                talk::say(&format!("note: {notice}"));
+            }
+            if changes.is_empty() {
+                talk::print("nothing changed\n");
+            } else {
+                talk::print(&format!("{}\n", changes.join("\n")));
+            }
             Exit::Accepted
         }
         Ok(other) => unexpected(&other),

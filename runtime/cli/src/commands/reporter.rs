@@ -1,14 +1,15 @@
 //! `qcbus reporter run`: a reporter daemon.
 
 use qcbus_messages::Exit;
-use qcbus_reporter_sdk::{Identity, Reporter, RunError};
+use qcbus_reporter_sdk::{Identity, RunError};
 
 use super::settings::instance;
-use crate::args::{BusArgs, ReportArg};
+use crate::args::BusArgs;
+use crate::standard::StandardReporter;
 use crate::talk;
 
 /// Runs the command.
-pub fn run(name: ReportArg, bus: &BusArgs) -> Exit {
+pub fn run(which: &StandardReporter, bus: &BusArgs) -> Exit {
     talk::log("warn");
     let instance = match instance(&bus.instance) {
         Ok(instance) => instance,
@@ -19,18 +20,9 @@ pub fn run(name: ReportArg, bus: &BusArgs) -> Exit {
     };
     // A private run reports its own files and nothing of earlier ones.
     let keep = !bus.die_with_parent;
-    let (own_name, mut reporter): (&str, Box<dyn Reporter>) = match name {
-        ReportArg::Text => (
-            qcbus_report_text::NAME,
-            Box::new(qcbus_report_text::TextReporter::new(talk::color(), keep)),
-        ),
-        ReportArg::Json => (
-            qcbus_report_json::NAME,
-            Box::new(qcbus_report_json::JsonReporter::new(keep)),
-        ),
-    };
+    let mut reporter = (which.make)(talk::color(), keep);
     let identity = Identity {
-        name: own_name.to_owned(),
+        name: which.name.to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         launch: bus.launch,
     };

@@ -8,8 +8,10 @@ use qcbus_bus::{HostOptions, StartError as BusError};
 use qcbus_messages::Exit;
 use qcbus_messages::path_text::to_text;
 
-use super::settings::{absolute, dialect, instance, limits, memory_limit, program, real, settings};
-use crate::args::{ReportArg, ServeArgs};
+use super::settings::{
+    absolute, dialect, instance, limits, manifest_directory, memory_limit, program, real, settings,
+};
+use crate::args::ServeArgs;
 use crate::{standard, talk};
 
 /// Runs the command.
@@ -158,6 +160,10 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         .state
         .as_deref()
         .map_or_else(|| out.join(".qcbus"), absolute);
+    let bundles_d = match &args.bundles_d {
+        Some(named) => manifest_directory(named)?,
+        None => state.join("bundles.d"),
+    };
     let program = program()?;
     let every_kind = qcbus_document::FileKind::ALL.into_iter().collect();
     let mut children = if args.no_standard_bundles {
@@ -166,13 +172,7 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         standard::bundle_specs(&program, &every_kind, args.schema_dir.as_deref())?
     };
     let reporters = standard::reporter_specs(&program);
-    for report in &args.report {
-        let name = match report {
-            ReportArg::Text => qcbus_report_text::NAME,
-            ReportArg::Json => qcbus_report_json::NAME,
-        };
-        children.extend(reporters.iter().filter(|spec| spec.name == name).cloned());
-    }
+    children.extend(args.report.iter().map(|report| report.spec(&program)));
     Ok(Options {
         instance: instance(&args.instance)?,
         roots,
@@ -181,11 +181,7 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         poll: args.poll,
         rescan: args.rescan,
         single_result: None,
-        bundles_d: Some(
-            args.bundles_d
-                .as_deref()
-                .map_or_else(|| state.join("bundles.d"), absolute),
-        ),
+        bundles_d: Some(bundles_d),
         out,
         state: Some(state),
         retention: args.retention,
@@ -196,6 +192,7 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         config: args.config.as_deref().map(absolute),
         standard: children,
         reporters,
+        known: standard::known(),
         die_with_broker: false,
         memory_limit: memory_limit(&args.limits),
         limits: limits(&args.limits),

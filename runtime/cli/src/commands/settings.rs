@@ -48,6 +48,19 @@ pub fn named(file: &Path) -> PathBuf {
     real(above).join(name)
 }
 
+/// A directory of manifests that somebody names must be there: a misspelt one has no bundles, and
+/// what they would have found is missed without a word.
+pub fn manifest_directory(named: &Path) -> Result<PathBuf, String> {
+    let path = absolute(named);
+    match std::fs::read_dir(&path) {
+        Ok(_) => Ok(path),
+        Err(error) => Err(format!(
+            "cannot take bundles from --bundles-d {}: {error}",
+            path.display()
+        )),
+    }
+}
+
 /// The form of results.
 pub fn dialect(arg: DialectArg) -> Dialect {
     match arg {

@@ -15,8 +15,8 @@ use super::namespaces::Prefixes;
 use super::sink::{Halt, Sink};
 use super::tag::{AttributeScanner, RawAttribute};
 use super::value::{BadReference, attribute_value};
-use crate::finding::Finding;
 use crate::limits::Limits;
+use crate::text_fault::TextFault;
 
 /// The texts of a document, the root file first, and what its includes lead to.
 pub(crate) struct Input<'t> {
@@ -47,7 +47,7 @@ pub(crate) enum Splice {
 
 /// Parses a whole document into `sink`; gives the faults in the order of their discovery, with
 /// offsets of the image's text. However faulty the text is, what could be read reaches the sink.
-pub(crate) fn parse<S: Sink>(input: &Input<'_>, sink: &mut S) -> Result<Vec<Finding>, Halt> {
+pub(crate) fn parse<S: Sink>(input: &Input<'_>, sink: &mut S) -> Result<Vec<TextFault>, Halt> {
     let mut parser = Parser::new(input, sink);
     match parser.file(0, None) {
         Ok(()) | Err(Stop::File | Stop::All) => Ok(parser.faults),
@@ -58,7 +58,7 @@ pub(crate) fn parse<S: Sink>(input: &Input<'_>, sink: &mut S) -> Result<Vec<Find
             );
             parser
                 .faults
-                .push(Finding::new(FaultCode::NameLimit, 0, text));
+                .push(TextFault::new(FaultCode::NameLimit, 0, text));
             Ok(parser.faults)
         }
         Err(Stop::Sink(halt)) => Err(halt),
@@ -120,7 +120,7 @@ struct File<'t> {
 struct Parser<'p, 't, S> {
     input: &'p Input<'t>,
     sink: &'p mut S,
-    faults: Vec<Finding>,
+    faults: Vec<TextFault>,
     stack: Vec<Open<'t>>,
     /// Files being read, outermost first.
     chain: Vec<usize>,
@@ -629,12 +629,12 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
         let at = file.start as usize + at;
         let limit = self.input.limits.max_faults as usize;
         if self.faults.len() < limit {
-            self.faults.push(Finding::new(code, at, text));
+            self.faults.push(TextFault::new(code, at, text));
             return Ok(());
         }
         let text = format!("more than {limit} faults, the rest of the file is not read");
         self.faults
-            .push(Finding::new(FaultCode::FaultLimit, at, text));
+            .push(TextFault::new(FaultCode::FaultLimit, at, text));
         Err(Stop::All)
     }
 }

@@ -1,4 +1,4 @@
-//! Schemas that a user brings: which files make one schema, and which files it is for.
+//! User schemas: which files make one schema, and which files it is for.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use crate::versions::Version;
 
 /// A file of the user, read by whoever may read files.
 #[derive(Clone, Copy, Debug)]
-pub struct BroughtFile<'f> {
+pub struct UserSchemaFile<'f> {
     /// Its path, as messages name it.
     pub path: &'f str,
     /// Its path below the directory that the user named.
@@ -21,12 +21,12 @@ pub struct BroughtFile<'f> {
     /// SHA-256 of its bytes, in hexadecimal.
     pub sha256: &'f str,
     /// What it is.
-    pub content: BroughtContent<'f>,
+    pub content: UserSchemaContent<'f>,
 }
 
 /// An XSD or compiled tables.
 #[derive(Clone, Copy, Debug)]
-pub enum BroughtContent<'f> {
+pub enum UserSchemaContent<'f> {
     /// The image of an `.xsd` file.
     Xsd(&'f [u8]),
     /// The bytes of a `.tbl` file.
@@ -35,7 +35,7 @@ pub enum BroughtContent<'f> {
 
 /// Why a user's schemas cannot be used; reads well after "failed to ".
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum BroughtError {
+pub enum UserSchemaError {
     /// An XSD that the compiler does not take.
     #[error(transparent)]
     Compile(#[from] CompileError),
@@ -85,11 +85,11 @@ pub enum BroughtError {
 /// that the user named, innermost first; without one it is for all versions.
 ///
 /// # Errors
-/// [`BroughtError`] for the first file that is of no use: nothing is passed over in silence.
-pub fn brought(files: &[BroughtFile<'_>]) -> Result<Vec<Override>, BroughtError> {
+/// [`UserSchemaError`] for the first file that is of no use: nothing is passed over in silence.
+pub fn user_schemas(files: &[UserSchemaFile<'_>]) -> Result<Vec<Override>, UserSchemaError> {
     let mut all: Vec<(String, Override)> = Vec::new();
     for file in files {
-        if let BroughtContent::Tables(bytes) = file.content {
+        if let UserSchemaContent::Tables(bytes) = file.content {
             let schema = tables(file, bytes)?;
             let version = version_in(&schema.title).or_else(|| version_of_path(file.below));
             add(&mut all, schema, &[file], version)?;
@@ -97,7 +97,7 @@ pub fn brought(files: &[BroughtFile<'_>]) -> Result<Vec<Override>, BroughtError>
     }
     for group in groups(files)? {
         let documents: Vec<Document<'_>> = group.iter().map(|(_, document)| *document).collect();
-        let members: Vec<&BroughtFile<'_>> = group.iter().map(|(file, _)| *file).collect();
+        let members: Vec<&UserSchemaFile<'_>> = group.iter().map(|(file, _)| *file).collect();
         let main = group
             .iter()
             .find(|(_, document)| declares_root(document))
@@ -119,9 +119,9 @@ const ROOTS: [(&str, FileKind); 2] = [
 fn add(
     all: &mut Vec<(String, Override)>,
     schema: Schema,
-    files: &[&BroughtFile<'_>],
+    files: &[&UserSchemaFile<'_>],
     version: Option<Version>,
-) -> Result<(), BroughtError> {
+) -> Result<(), UserSchemaError> {
     let path = files.first().map_or("", |file| file.path).to_owned();
     let sources: Arc<[Source]> = files
         .iter()
@@ -141,7 +141,7 @@ fn add(
             .iter()
             .find(|(_, one)| one.kind == kind && one.version == version);
         if let Some((first, _)) = taken {
-            return Err(BroughtError::Ambiguous {
+            return Err(UserSchemaError::Ambiguous {
                 first: first.clone(),
                 second: path,
                 what: version.map_or_else(
@@ -163,12 +163,12 @@ fn add(
     if known {
         Ok(())
     } else {
-        Err(BroughtError::NoKnownRoot(path))
+        Err(UserSchemaError::NoKnownRoot(path))
     }
 }
 
-fn tables(file: &BroughtFile<'_>, bytes: &[u8]) -> Result<Schema, BroughtError> {
-    let broken = |error| BroughtError::Tables {
+fn tables(file: &UserSchemaFile<'_>, bytes: &[u8]) -> Result<Schema, UserSchemaError> {
+    let broken = |error| UserSchemaError::Tables {
         path: file.path.to_owned(),
         error,
     };
@@ -182,16 +182,16 @@ fn tables(file: &BroughtFile<'_>, bytes: &[u8]) -> Result<Schema, BroughtError> 
     Schema::from_notation(text).map_err(broken)
 }
 
-type Member<'f> = (&'f BroughtFile<'f>, Document<'f>);
+type Member<'f> = (&'f UserSchemaFile<'f>, Document<'f>);
 
 /// XSDs by directory, those that include each other together, in the order of their paths.
-fn groups<'f>(files: &'f [BroughtFile<'f>]) -> Result<Vec<Vec<Member<'f>>>, BroughtError> {
+fn groups<'f>(files: &'f [UserSchemaFile<'f>]) -> Result<Vec<Vec<Member<'f>>>, UserSchemaError> {
     let mut groups: Vec<Vec<Member<'f>>> = Vec::new();
     for file in files {
-        let BroughtContent::Xsd(image) = file.content else {
+        let UserSchemaContent::Xsd(image) = file.content else {
             continue;
         };
-        let document = Document::open(image).map_err(|error| BroughtError::Image {
+        let document = Document::open(image).map_err(|error| UserSchemaError::Image {
             path: file.path.to_owned(),
             error,
         })?;

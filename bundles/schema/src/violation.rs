@@ -62,14 +62,14 @@ impl Code {
 
 /// One violation of a schema.
 #[derive(Clone, Debug)]
-pub struct Finding<'a> {
+pub struct Violation<'a> {
     /// What is wrong.
     pub code: Code,
     /// The element it is about.
     pub node: Node<'a>,
     /// The attribute it is about.
     pub attribute: Option<Attribute<'a>>,
-    /// What was found: a name or a value; empty if the finding is that something is missing.
+    /// What was found: a name or a value; empty if the violation is that something is missing.
     pub found: String,
     /// What would have been right: names or values.
     pub expected: Vec<String>,
@@ -81,7 +81,7 @@ pub struct Finding<'a> {
     pub text: String,
 }
 
-impl<'a> Finding<'a> {
+impl<'a> Violation<'a> {
     /// Offset, in the image's text, of the attribute or element it is about.
     pub fn offset(&self) -> u32 {
         self.attribute
@@ -90,7 +90,7 @@ impl<'a> Finding<'a> {
     }
 }
 
-/// Findings of one kind that were counted but not listed.
+/// Violations of one kind that were counted but not listed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rest {
     /// Their code.
@@ -106,9 +106,9 @@ pub struct Rest {
 /// The result of validating one document.
 #[derive(Clone, Debug, Default)]
 pub struct Report<'a> {
-    /// The findings in the order of their discovery: an element's own first, then those of its
+    /// The violations in the order of their discovery: an element's own first, then those of its
     /// children, what it lacks and which references dangle when it ends.
-    pub findings: Vec<Finding<'a>>,
+    pub violations: Vec<Violation<'a>>,
     /// How many more there were, by kind.
     pub rest: Vec<Rest>,
 }
@@ -116,21 +116,21 @@ pub struct Report<'a> {
 impl Report<'_> {
     /// Whether the document is valid.
     pub fn is_valid(&self) -> bool {
-        self.findings.is_empty() && self.rest.is_empty()
+        self.violations.is_empty() && self.rest.is_empty()
     }
 
     /// How many violations there are, listed or not.
     pub fn total(&self) -> u64 {
-        self.findings.len() as u64 + self.rest.iter().map(|rest| rest.count).sum::<u64>()
+        self.violations.len() as u64 + self.rest.iter().map(|rest| rest.count).sum::<u64>()
     }
 }
 
 /// How much is listed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Findings listed per kind (code, element and attribute or child).
+    /// Violations listed per kind (code, element and attribute or child).
     pub per_kind: u32,
-    /// Findings listed in all.
+    /// Violations listed in all.
     pub total: u32,
 }
 

@@ -7,7 +7,8 @@ use std::path::Path;
 
 use qcbus_document::FileKind;
 use qcbus_schema::{
-    BroughtContent, BroughtFile, Options, Outcome, Override, SHIPPED, Version, brought, check,
+    Options, Outcome, Override, SHIPPED, UserSchemaContent, UserSchemaFile, Version, check,
+    user_schemas,
 };
 use support::{image, open};
 
@@ -21,21 +22,21 @@ fn made(files: &[(&str, &str)]) -> Result<Vec<Override>, String> {
         .iter()
         .map(|(path, _)| format!("dir/{path}"))
         .collect();
-    let files: Vec<BroughtFile<'_>> = files
+    let files: Vec<UserSchemaFile<'_>> = files
         .iter()
         .zip(images.iter().zip(&paths))
-        .map(|((below, text), (image, path))| BroughtFile {
+        .map(|((below, text), (image, path))| UserSchemaFile {
             path,
             below: Path::new(below),
             sha256: "5ca1ab1e",
             content: if below.ends_with(".tbl") {
-                BroughtContent::Tables(text.as_bytes())
+                UserSchemaContent::Tables(text.as_bytes())
             } else {
-                BroughtContent::Xsd(image)
+                UserSchemaContent::Xsd(image)
             },
         })
         .collect();
-    brought(&files).map_err(|error| error.to_string())
+    user_schemas(&files).map_err(|error| error.to_string())
 }
 
 fn xsd(body: &str) -> String {
@@ -144,7 +145,7 @@ fn the_schema_for_a_version_comes_before_the_one_for_all() {
         match check(&open(&image), FileKind::Xodr, &options) {
             Outcome::Checked(checked) => (
                 checked.provenance()[0].value.clone(),
-                checked.findings.len(),
+                checked.violations.len(),
             ),
             Outcome::Skipped(reason) => panic!("{reason}"),
         }

@@ -3,9 +3,9 @@
 use qcbus_formats::location::OtherPlace;
 use qcbus_formats::xqar::{Issue, Location, Locations};
 
-/// One place of an issue, put together from the several ways in which a result says where.
+/// Where an issue shows, put together from the several ways in which a result says where.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Place {
+pub struct IssueLocation {
     /// The file; `None` is the checked file itself.
     pub path: Option<String>,
     /// Line, from 1. Other tools' 0 for "unknown" has become `None`.
@@ -33,12 +33,12 @@ pub struct Place {
 }
 
 /// The places of an issue in their order; the first is the main one.
-pub fn places(issue: &Issue) -> Vec<Place> {
+pub fn issue_locations(issue: &Issue) -> Vec<IssueLocation> {
     // Another tool may say the other file and nothing else.
     if let ([], [info]) = (issue.locations.as_slice(), issue.domain_info.as_slice())
         && let Some(place) = OtherPlace::from_info(info)
     {
-        return vec![moved(&place, Place::default())];
+        return vec![moved(&place, IssueLocation::default())];
     }
     let place_of = |locations: &Locations| match &locations.elsewhere {
         Some(other) => moved(other, gather(locations)),
@@ -48,10 +48,10 @@ pub fn places(issue: &Issue) -> Vec<Place> {
 }
 
 /// Everything that one `Locations` says.
-fn gather(locations: &Locations) -> Place {
-    let mut place = Place {
+fn gather(locations: &Locations) -> IssueLocation {
+    let mut place = IssueLocation {
         description: locations.description.trim().to_owned(),
-        ..Place::default()
+        ..IssueLocation::default()
     };
     let mut seen_file = false;
     for location in &locations.places {
@@ -74,7 +74,7 @@ fn gather(locations: &Locations) -> Place {
     place
 }
 
-fn gather_one(place: &mut Place, location: &Location) {
+fn gather_one(place: &mut IssueLocation, location: &Location) {
     match location {
         Location::File { .. } => {}
         Location::Xml { xpath } => {
@@ -97,11 +97,11 @@ fn gather_one(place: &mut Place, location: &Location) {
 }
 
 /// What was gathered is the reference in the checked file; the place itself is in the other file.
-fn moved(other: &OtherPlace, gathered: Place) -> Place {
+fn moved(other: &OtherPlace, gathered: IssueLocation) -> IssueLocation {
     let referred_at = gathered
         .row
         .map(|row| (row, gathered.column.unwrap_or_default()));
-    Place {
+    IssueLocation {
         referred_at,
         offset: None,
         path: Some(other.path.clone()),
@@ -164,7 +164,7 @@ mod tests {
             elsewhere: Some(elsewhere("/m/t.xodr", 12, 5)),
             ..at("the road", 7, 9)
         };
-        let found = places(&issue(vec![at("here", 3, 4), other], Vec::new()));
+        let found = issue_locations(&issue(vec![at("here", 3, 4), other], Vec::new()));
         assert_eq!(found[0].path, None);
         assert_eq!(found[1].path.as_deref(), Some("/m/t.xodr"));
         assert_eq!((found[1].row, found[1].column), (Some(12), Some(5)));
@@ -183,14 +183,14 @@ mod tests {
                 offset: None,
             });
         }
-        let found = places(&issue(vec![locations], Vec::new()));
+        let found = issue_locations(&issue(vec![locations], Vec::new()));
         assert_eq!((found[0].row, found[0].column), (None, None));
         assert_eq!(found[0].also, [(8, 0)]);
     }
 
     #[test]
     fn without_locations_the_other_file_is_the_place() {
-        let found = places(&issue(
+        let found = issue_locations(&issue(
             Vec::new(),
             vec![elsewhere("/c.xosc", 0, 4).to_info()],
         ));

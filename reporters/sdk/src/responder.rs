@@ -11,16 +11,16 @@ use crate::{Reporter, Sources};
 const REMEMBERED: usize = 4096;
 
 /// One reporter's side of the conversation with a broker: messages in, answers out.
-pub struct Session<'r> {
+pub struct Responder<'r> {
     reporter: &'r mut dyn Reporter,
     written: VecDeque<(JobId, String)>,
     left: bool,
 }
 
-impl<'r> Session<'r> {
+impl<'r> Responder<'r> {
     /// A conversation that has not begun.
-    pub fn new(reporter: &'r mut dyn Reporter) -> Session<'r> {
-        Session {
+    pub fn new(reporter: &'r mut dyn Reporter) -> Responder<'r> {
+        Responder {
             reporter,
             written: VecDeque::new(),
             left: false,
@@ -176,9 +176,12 @@ mod tests {
         }
     }
 
-    fn tell(session: &mut Session<'_>, job: u64, path: &str) -> PeerReport {
+    fn tell(responder: &mut Responder<'_>, job: u64, path: &str) -> PeerReport {
         let message = ToPeer::Result(Box::new(result(job, path)));
-        match session.handle(message, |_| Box::new(NoSources)).as_slice() {
+        match responder
+            .handle(message, |_| Box::new(NoSources))
+            .as_slice()
+        {
             [FromPeer::ResultDone { job: done, report }] if *done == JobId(job) => report.clone(),
             other => panic!("unexpected answer {other:?}"),
         }
@@ -187,20 +190,20 @@ mod tests {
     #[test]
     fn a_result_that_comes_again_is_acknowledged_and_not_written_again() {
         let mut notebook = Notebook::default();
-        let mut session = Session::new(&mut notebook);
-        assert_eq!(tell(&mut session, 1, "a.xodr"), PeerReport::Written);
-        assert_eq!(tell(&mut session, 1, "a.xodr"), PeerReport::Written);
-        assert_eq!(tell(&mut session, 2, "a.xodr"), PeerReport::Written);
-        session.rejoined();
-        assert_eq!(tell(&mut session, 1, "a.xodr"), PeerReport::Written);
+        let mut responder = Responder::new(&mut notebook);
+        assert_eq!(tell(&mut responder, 1, "a.xodr"), PeerReport::Written);
+        assert_eq!(tell(&mut responder, 1, "a.xodr"), PeerReport::Written);
+        assert_eq!(tell(&mut responder, 2, "a.xodr"), PeerReport::Written);
+        responder.rejoined();
+        assert_eq!(tell(&mut responder, 1, "a.xodr"), PeerReport::Written);
         assert_eq!(notebook.written, ["a.xodr", "a.xodr", "a.xodr"]);
     }
 
     #[test]
     fn what_cannot_be_written_is_said_with_the_reason() {
         let mut notebook = Notebook::default();
-        let mut session = Session::new(&mut notebook);
-        let PeerReport::Failed(why) = tell(&mut session, 1, "fails.xodr") else {
+        let mut responder = Responder::new(&mut notebook);
+        let PeerReport::Failed(why) = tell(&mut responder, 1, "fails.xodr") else {
             panic!("it was not written");
         };
         assert_eq!(why, "failed to put the result in its form: it is full");
@@ -209,43 +212,43 @@ mod tests {
     #[test]
     fn a_panic_costs_one_result() {
         let mut notebook = Notebook::default();
-        let mut session = Session::new(&mut notebook);
-        let report = tell(&mut session, 1, "panics.xodr");
+        let mut responder = Responder::new(&mut notebook);
+        let report = tell(&mut responder, 1, "panics.xodr");
         assert!(matches!(report, PeerReport::Failed(_)), "{report:?}");
-        assert_eq!(tell(&mut session, 2, "b.xodr"), PeerReport::Written);
+        assert_eq!(tell(&mut responder, 2, "b.xodr"), PeerReport::Written);
     }
 
     #[test]
     fn a_file_that_has_gone_takes_its_report_with_it() {
         let mut notebook = Notebook::default();
-        let mut session = Session::new(&mut notebook);
-        tell(&mut session, 1, "a.xodr");
-        tell(&mut session, 2, "b.xodr");
+        let mut responder = Responder::new(&mut notebook);
+        tell(&mut responder, 1, "a.xodr");
+        tell(&mut responder, 2, "b.xodr");
         let gone = Withdrawn {
             input: "/in/a.xodr".into(),
             display_path: "a.xodr".into(),
             xqar: "/out/a.xodr.xqar".into(),
             params: Vec::new(),
         };
-        let answer = session.handle(ToPeer::Withdrawn(gone), |_| Box::new(NoSources));
+        let answer = responder.handle(ToPeer::Withdrawn(gone), |_| Box::new(NoSources));
         let done = FromPeer::WithdrawalDone {
             input: "/in/a.xodr".into(),
             report: PeerReport::Written,
         };
         assert_eq!(answer, [done]);
         // It is there again, unchanged: the same job counts anew.
-        tell(&mut session, 1, "a.xodr");
+        tell(&mut responder, 1, "a.xodr");
         assert_eq!(notebook.written, ["b.xodr", "a.xodr"]);
     }
 
     #[test]
     fn drain_finishes_once_and_leaves() {
         let mut notebook = Notebook::default();
-        let mut session = Session::new(&mut notebook);
-        let answer = session.handle(ToPeer::Drain, |_| Box::new(NoSources));
+        let mut responder = Responder::new(&mut notebook);
+        let answer = responder.handle(ToPeer::Drain, |_| Box::new(NoSources));
         assert_eq!(answer, [FromPeer::Leaving]);
-        assert!(session.has_left());
-        session.finish();
+        assert!(responder.has_left());
+        responder.finish();
         assert_eq!(notebook.finished, 1);
     }
 }
