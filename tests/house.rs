@@ -309,7 +309,8 @@ fn sources(directory: &Path) -> Vec<(PathBuf, String)> {
     .collect()
 }
 
-/// All files below, in order, without what is built and what git keeps.
+/// All files below, in order, without what is built and what git keeps: a directory, or a file in a
+/// further work tree.
 fn files(directory: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut open = vec![directory.to_owned()];
@@ -321,7 +322,7 @@ fn files(directory: &Path) -> Vec<PathBuf> {
             let built = name.starts_with("target") || name == "qcbus-out" || name == ".git";
             if kind.is_dir() && !built {
                 open.push(entry.path());
-            } else if kind.is_file() {
+            } else if kind.is_file() && name != ".git" {
                 found.push(entry.path());
             }
         }

@@ -59,6 +59,11 @@ impl Farm {
         self.dir.path().join("out")
     }
 
+    /// Where accepted files are published, if the broker is told so.
+    pub fn gate(&self) -> PathBuf {
+        self.dir.path().join("gate")
+    }
+
     /// The instance's runtime directory.
     pub fn instance(&self) -> PathBuf {
         self.dir.path().join("instance")
