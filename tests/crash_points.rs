@@ -35,6 +35,7 @@ const BYSTANDER: &str = "bystander.xodr";
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Meanwhile {
     Nothing,
+    Deleted,
     Rewritten,
 }
 
@@ -224,6 +225,7 @@ impl Victim {
     fn meanwhile(&mut self, meanwhile: Meanwhile) {
         match meanwhile {
             Meanwhile::Nothing => {}
+            Meanwhile::Deleted => self.delete(),
             Meanwhile::Rewritten => {
                 let content = Content::NoVersion(self.fresh());
                 self.put(NAME, content);
@@ -300,6 +302,11 @@ fn a_broker_killed_anywhere_in_a_job_is_made_good_by_the_next() {
 #[test]
 fn a_broker_killed_anywhere_in_its_start_is_made_good_by_the_next() {
     killed_anywhere(Work::Start, Meanwhile::Nothing);
+}
+
+#[test]
+fn a_file_deleted_after_a_crash_leaves_nothing_behind() {
+    killed_anywhere(Work::Job, Meanwhile::Deleted);
 }
 
 #[test]
