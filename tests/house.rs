@@ -253,7 +253,8 @@ fn sources(directory: &Path) -> Vec<(PathBuf, String)> {
     .collect()
 }
 
-/// All files below, in order, without what is built and what git keeps.
+/// All files below, in order, without what is built and what git keeps: a directory, or a file in a
+/// further work tree.
 fn files(directory: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut open = vec![directory.to_owned()];

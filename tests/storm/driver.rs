@@ -13,7 +13,7 @@ use crate::support::dice::Dice;
 use crate::support::farm::Farm;
 use crate::support::inside::is_inside;
 use crate::support::judge::Files;
-use crate::support::processes::{Part, Process, signal_pid};
+use crate::support::processes::{Process, ProcessKind, signal_pid};
 use crate::support::watchdog::{pause, until_or};
 
 /// Files that there are about.
@@ -87,9 +87,9 @@ impl Driver {
         self.mend();
         match trouble::any(&mut self.dice) {
             Trouble::KillBroker => self.kill_broker(),
-            Trouble::KillBundle => self.kill(Part::Bundle, "kill bundle"),
-            Trouble::KillReporter => self.kill(Part::Reporter, "kill reporter"),
-            Trouble::KillAnimal => self.kill(Part::Animal, "kill animal"),
+            Trouble::KillBundle => self.kill(ProcessKind::Bundle, "kill bundle"),
+            Trouble::KillReporter => self.kill(ProcessKind::Reporter, "kill reporter"),
+            Trouble::KillAnimal => self.kill(ProcessKind::Animal, "kill animal"),
             Trouble::Stop => self.stop(),
             Trouble::Animal => self.animal(),
             Trouble::Configure => self.configure(),
@@ -218,8 +218,8 @@ impl Driver {
         self.start_at = Some(Instant::now() + self.dice.millis(late));
     }
 
-    fn kill(&mut self, part: Part, kind: &'static str) {
-        let Some(process) = self.any_process(|it| it.part() == part) else {
+    fn kill(&mut self, part: ProcessKind, kind: &'static str) {
+        let Some(process) = self.any_process(|it| it.kind() == part) else {
             return;
         };
         process.signal(Signal::KILL);
@@ -235,7 +235,7 @@ impl Driver {
     }
 
     fn stop(&mut self) {
-        let Some(process) = self.any_process(|it| it.part() != Part::Other) else {
+        let Some(process) = self.any_process(|it| it.kind() != ProcessKind::Other) else {
             return;
         };
         process.signal(Signal::STOP);
@@ -243,7 +243,7 @@ impl Driver {
         let until = Instant::now() + self.dice.millis(long);
         self.stopped.push((process.pid, until));
         self.tally
-            .note("stop", &format!("{} {:?}", process.pid, process.part()));
+            .note("stop", &format!("{} {:?}", process.pid, process.kind()));
     }
 
     fn animal(&mut self) {

@@ -19,7 +19,7 @@ use crate::{end, report};
 
 /// Length of the storm.
 pub fn seconds() -> u64 {
-    crate::number_from("QCBUS_CHAOS_SECONDS", 60)
+    crate::number_from("QCBUS_CHAOS_SECONDS", 20)
 }
 
 /// More private memory than this, at its peak, and the broker's memory is not bounded.

@@ -109,6 +109,31 @@ impl Judgement {
         (complete, foreign)
     }
 
+    /// Behind the gate lies what was accepted, byte for byte, and nothing else.
+    pub fn gate(&mut self, farm: &Farm, files: &Files, gate: &Path) {
+        for (name, content) in files {
+            let published = std::fs::read(gate.join(name)).ok();
+            let accepted = farm.out().join(format!("{name}.verdict.json")).exists()
+                && farm.verdict_file(name)["verdict"] == Verdict::Accepted.as_str();
+            match published {
+                Some(bytes) if !accepted => {
+                    let what = format!("{} bytes behind the gate, and not accepted", bytes.len());
+                    self.complain(name, what);
+                }
+                Some(bytes) if bytes != content.bytes() => {
+                    self.complain(name, "other bytes behind the gate");
+                }
+                None if accepted => self.complain(name, "accepted, and not behind the gate"),
+                _ => {}
+            }
+        }
+        for name in files_in(gate) {
+            if !files.contains_key(&name) {
+                self.complain(&name, "lies behind the gate, and no file is there for it");
+            }
+        }
+    }
+
     /// No result without a file, nothing half-written.
     fn nothing_else(&mut self, farm: &Farm, files: &Files) {
         for entry in std::fs::read_dir(farm.out()).unwrap().flatten() {
@@ -125,6 +150,12 @@ impl Judgement {
             }
         }
     }
+}
+
+fn files_in(directory: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    names.collect()
 }
 
 /// Whether the rule that the oracle expects has an issue.

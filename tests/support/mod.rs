@@ -12,4 +12,5 @@ pub mod farm;
 pub mod inside;
 pub mod judge;
 pub mod processes;
+pub mod tracer;
 pub mod watchdog;

@@ -13,7 +13,7 @@ pub struct Process {
 
 /// What a process is to the instance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Part {
+pub enum ProcessKind {
     /// `qcbus serve`.
     Broker,
     /// A standard bundle.
@@ -28,19 +28,19 @@ pub enum Part {
 
 impl Process {
     /// What it is.
-    pub fn part(&self) -> Part {
+    pub fn kind(&self) -> ProcessKind {
         let said = |word: &str| self.words.iter().skip(1).any(|it| it == word);
         let program = self.words.first().map_or("", String::as_str);
         if program.ends_with("/zoo") {
-            Part::Animal
+            ProcessKind::Animal
         } else if said("serve") {
-            Part::Broker
+            ProcessKind::Broker
         } else if said("bundle") && said("run") {
-            Part::Bundle
+            ProcessKind::Bundle
         } else if said("reporter") && said("run") {
-            Part::Reporter
+            ProcessKind::Reporter
         } else {
-            Part::Other
+            ProcessKind::Other
         }
     }
 

@@ -19,6 +19,8 @@ mod tree;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::Path;
+use std::sync::LazyLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use edit::{Edit, Entry};
 use qcbus_sdk::{Issue, Level, Listener, Loaded, Outcome, Plan, Status, check};
@@ -41,6 +43,9 @@ const MAPS: [(&str, &str); 4] = [
     ("1.9", include_str!("mutation/all-1.9.xodr")),
 ];
 
+/// Everything that is on by default: read from the rules' pages once, not for every map.
+static PLAN: LazyLock<Plan> = LazyLock::new(|| Plan::by_default(&BUNDLE));
+
 /// What the rules say of a map, by their names.
 #[derive(Default)]
 struct Verdict {
@@ -51,15 +56,11 @@ struct Verdict {
 
 impl Verdict {
     fn of(map: &str) -> Verdict {
-        let plan = Plan::by_default(&BUNDLE);
         let loaded = Loaded::from_bytes(Path::new("map.xodr"), map.as_bytes().to_vec()).unwrap();
         let subject = loaded.subject(&BUNDLE).unwrap();
-        let mut heard = Heard {
-            plan: &plan,
-            verdict: Verdict::default(),
-        };
-        check(&plan, &subject, &mut heard);
-        heard.verdict
+        let mut heard = Heard(Verdict::default());
+        check(&PLAN, &subject, &mut heard);
+        heard.0
     }
 
     /// Rules with a finding at error level.
@@ -81,24 +82,17 @@ impl Verdict {
     }
 }
 
-struct Heard<'p> {
-    plan: &'p Plan,
-    verdict: Verdict,
-}
+struct Heard(Verdict);
 
-impl Listener for Heard<'_> {
+impl Listener for Heard {
     fn ended(&mut self, checker: usize, issues: Vec<Issue>, outcome: Outcome) {
         // A backport is the same rule on older files.
-        let rule = name(self.plan.checkers()[checker].facts.id);
+        let rule = name(PLAN.checkers()[checker].facts.id);
         if outcome.ending.status() == Status::Completed {
-            self.verdict.completed.insert(rule);
+            self.0.completed.insert(rule);
         }
         if !issues.is_empty() {
-            self.verdict
-                .findings
-                .entry(rule)
-                .or_default()
-                .extend(issues);
+            self.0.findings.entry(rule).or_default().extend(issues);
         }
     }
 }
@@ -166,6 +160,36 @@ fn row(entry: &Entry, maps: &[Map], faults: &mut Vec<String>) -> Row {
         row.companions.extend(seen);
     }
     row
+}
+
+/// The rows of all rules whose name contains `wanted`, in order, and what is wrong. Rules do not know
+/// of each other, so every processor takes the next.
+fn rows(entries: &[Entry], maps: &[Map], wanted: &str) -> (Vec<Row>, Vec<String>) {
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut done = BTreeMap::new();
+        loop {
+            let at = next.fetch_add(1, Ordering::Relaxed);
+            let Some(entry) = entries.get(at) else {
+                return done;
+            };
+            let mut faults = Vec::new();
+            if entry.rule.contains(wanted) {
+                let row = row(entry, maps, &mut faults);
+                done.insert(at, (row, faults));
+            } else {
+                done.insert(at, (Row::default(), faults));
+            }
+        }
+    };
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let done: BTreeMap<usize, (Row, Vec<String>)> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+        let all = workers.into_iter().flat_map(|it| it.join().unwrap());
+        all.collect()
+    });
+    let (rows, faults): (Vec<Row>, Vec<Vec<String>>) = done.into_values().unzip();
+    (rows, faults.concat())
 }
 
 /// Whether the edited map makes the rule fire.
@@ -273,15 +297,7 @@ fn every_rule_has_edits_or_a_reason() {
 fn every_edit_is_found_and_by_its_rule_only() {
     let (entries, maps) = (edit::table(EDITS), maps());
     let wanted = std::env::var("QCBUS_MUTATE").unwrap_or_default();
-    let (mut rows, mut faults) = (Vec::new(), Vec::new());
-    for entry in &entries {
-        let run = entry.rule.contains(&wanted);
-        rows.push(if run {
-            row(entry, &maps, &mut faults)
-        } else {
-            Row::default()
-        });
-    }
+    let (rows, faults) = rows(&entries, &maps, &wanted);
     assert!(
         faults.is_empty(),
         "{} faults:\n{}",

@@ -1,6 +1,6 @@
 //! No file, however broken, makes a rule panic: truncations and seeded random mutations of every
 //! example of the pages, and of real maps where they are at hand. `QCBUS_FUZZ_ROUNDS` sets the
-//! number of mutations of examples (10,000), `QCBUS_FUZZ_MAPS` that of real maps (200),
+//! number of mutations of examples (3,000), `QCBUS_FUZZ_MAPS` that of real maps (200),
 //! `QCBUS_FUZZ_PLACES` at how many places those are cut (2), `QCBUS_FUZZ_SEED` another beginning.
 //!
 //! A file that is cut is no XML any more, and few rules look at it. So each is cut a second time, and
@@ -208,7 +208,7 @@ fn lengths_that_cannot_be_break_no_rule() {
 fn mutated_examples_break_no_rule() {
     let plan = Plan::by_default(&BUNDLE);
     let documents = evidence::documents(&BUNDLE);
-    let rounds = setting("QCBUS_FUZZ_ROUNDS", 10_000);
+    let rounds = setting("QCBUS_FUZZ_ROUNDS", 3_000);
     let mut dice = Rng::with_seed(setting("QCBUS_FUZZ_SEED", 0x9E37_79B9) as u64);
     for round in 0..rounds {
         let shown = &documents[round % documents.len()];

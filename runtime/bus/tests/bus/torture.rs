@@ -17,7 +17,7 @@ fn from_environment(name: &str) -> Option<u64> {
 #[test]
 fn random_kills_lose_nothing_and_leave_nothing() {
     let seed = from_environment("QCBUS_TORTURE_SEED").unwrap_or_else(fresh_number);
-    let seconds = from_environment("QCBUS_TORTURE_SECONDS").unwrap_or(15);
+    let seconds = from_environment("QCBUS_TORTURE_SECONDS").unwrap_or(5);
     println!("QCBUS_TORTURE_SEED={seed}");
     let mut dice = fastrand::Rng::with_seed(seed);
     let site = Site::new();

@@ -1,0 +1,320 @@
+//! Crash points: the broker is killed before and after every single thing that it does to the disk
+//! in a small job. Whatever lies there then, the next broker makes it right.
+//!
+//! The job: a file is written and accepted, written again and rejected, and deleted; then the broker
+//! is asked to end. `QCBUS_CRASH_POINTS` says at how many points, or `all` (a sample by default);
+//! `QCBUS_CHAOS_SEED` brings a sample back.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::process::ExitStatus;
+use std::time::Instant;
+
+use qcbus_messages::control::{Request, Response};
+use support::content::Content;
+use support::dice::{Dice, seed};
+use support::farm::{Farm, tail};
+use support::inside::skip;
+use support::judge::{Files, judge, verdicts_in_journal};
+use support::tracer::{Aim, Side, Traced, refused};
+use support::watchdog::until_or;
+
+/// Points of a sample.
+const SAMPLE: usize = 10;
+/// The file of the small job, and one that nothing happens to.
+const NAME: &str = "job.xodr";
+const BYSTANDER: &str = "bystander.xodr";
+
+/// What happens to the file between the crash and the next broker.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Meanwhile {
+    Nothing,
+    Deleted,
+    Rewritten,
+}
+
+/// A farm with a gate whose brokers are traced.
+struct Victim {
+    farm: Farm,
+    broker: Option<Traced>,
+    files: Files,
+    /// Makes the bytes of every round differ from all others.
+    number: u64,
+}
+
+impl Victim {
+    fn new() -> Victim {
+        let mut farm = Farm::new();
+        let gate = farm.gate().to_string_lossy().into_owned();
+        farm.arguments = vec!["--gate".to_owned(), gate];
+        let mut victim = Victim {
+            farm,
+            broker: None,
+            files: Files::new(),
+            number: 0,
+        };
+        victim.put(BYSTANDER, Content::Good(u64::MAX));
+        victim
+    }
+
+    fn put(&mut self, name: &str, content: Content) {
+        self.farm.write(name, &content.bytes());
+        self.files.insert(name.to_owned(), content);
+    }
+
+    fn delete(&mut self) {
+        let _ = std::fs::remove_file(self.farm.root().join(NAME));
+        self.files.remove(NAME);
+    }
+
+    fn fresh(&mut self) -> u64 {
+        self.number += 1;
+        self.number
+    }
+
+    /// A broker, killed at this point if it gets there.
+    fn start(&mut self, aim: Option<Aim>) -> &Traced {
+        let below = [self.farm.out(), self.farm.gate(), self.farm.instance()];
+        let (command, log) = (self.farm.serve_command(), self.farm.log_path());
+        self.broker
+            .insert(Traced::start(command, &log, &below, aim))
+    }
+
+    fn broker(&self) -> &Traced {
+        self.broker.as_ref().unwrap()
+    }
+
+    /// Waits until something is so, or the broker has ended.
+    fn until(&self, what: &str, is_so: impl Fn() -> bool) -> Option<ExitStatus> {
+        until_or(
+            what,
+            || match self.broker().ended() {
+                Some(ended) => Some(Some(ended)),
+                None => is_so().then_some(None),
+            },
+            || self.explain(),
+        )
+    }
+
+    fn explain(&self) -> String {
+        let (status, log) = (self.farm.status(), self.farm.log());
+        let deeds = self.broker().deeds();
+        format!("{deeds:#?}\n{status:#?}\n{}", tail(&log))
+    }
+
+    /// The small job, until it is over or the broker is.
+    fn job(&mut self) -> ExitStatus {
+        let steps = [Victim::accept, Victim::reject, Victim::remove];
+        let ended = steps.iter().find_map(|step| step(self));
+        ended.unwrap_or_else(|| self.down())
+    }
+
+    fn accept(&mut self) -> Option<ExitStatus> {
+        let content = Content::Good(self.fresh());
+        self.judged(content)
+    }
+
+    fn reject(&mut self) -> Option<ExitStatus> {
+        let content = Content::NoHeader(self.fresh());
+        self.judged(content)
+    }
+
+    fn judged(&mut self, content: Content) -> Option<ExitStatus> {
+        let expected = content.verdict();
+        self.put(NAME, content);
+        let file = self.farm.root().join(NAME);
+        let ask = Request::Wait {
+            file,
+            timeout_ms: Some(60_000),
+        };
+        self.until("a verdict", || match self.farm.ask(&ask) {
+            Some(Response::Verdict(told)) => {
+                assert_eq!(told.verdict, expected, "{told:?}\n{}", self.explain());
+                true
+            }
+            _ => false,
+        })
+    }
+
+    fn remove(&mut self) -> Option<ExitStatus> {
+        self.delete();
+        let forgotten = || {
+            let status = self.farm.status();
+            status.is_some_and(|it| it.files.total == 1 && it.queue.active == 0)
+        };
+        self.until("the file is forgotten", || {
+            forgotten() && !self.farm.out().join(format!("{NAME}.xqar")).exists()
+        })
+    }
+
+    /// Asks it to end.
+    fn down(&self) -> ExitStatus {
+        let _ = self.farm.ask(&Request::Down);
+        let ended = self.until("the broker ends", || false);
+        ended.unwrap()
+    }
+
+    /// A broker that nobody kills puts everything right.
+    fn recover(&mut self, what: &str) {
+        self.start(None);
+        let total = u64::try_from(self.files.len()).unwrap();
+        let ended = self.until(what, || {
+            self.farm.status().is_some_and(|status| {
+                let queue = status.queue;
+                let quiet = queue.waiting + queue.background + queue.active == 0;
+                quiet && status.files.total == total && status.files.judged == total
+            })
+        });
+        assert_eq!(ended, None, "{what}: the next broker does not stay");
+        self.demand(what);
+    }
+
+    fn demand(&self, what: &str) {
+        // What is withdrawn late is withdrawn: only what stays is a complaint.
+        let complaints = || {
+            let mut judgement = judge(&self.farm, &self.files, &[]);
+            judgement.gate(&self.farm, &self.files, &self.farm.gate());
+            assert_eq!(judgement.condemned, 0);
+            judgement.complaints
+        };
+        until_or(
+            what,
+            || complaints().is_empty().then_some(()),
+            || format!("{:#?}\n{}", complaints(), self.explain()),
+        );
+        let counts = verdicts_in_journal(&self.farm.journal());
+        let doubled: Vec<_> = counts.iter().filter(|(_, count)| **count != 1).collect();
+        assert!(doubled.is_empty(), "{what}: judged twice: {doubled:#?}");
+    }
+}
+
+/// What is interrupted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Work {
+    /// The small job, with a broker that is ready for it.
+    Job,
+    /// The start of a broker that finds a file rewritten.
+    Start,
+}
+
+impl Victim {
+    /// Does the work, killed at this point if it gets there.
+    fn work(&mut self, work: Work, aim: Option<Aim>) -> ExitStatus {
+        match work {
+            Work::Job => {
+                self.broker().aim(aim);
+                self.job()
+            }
+            Work::Start => {
+                self.down();
+                let content = Content::Good(self.fresh());
+                self.put(NAME, content.clone());
+                self.start(aim);
+                let ended = self.judged(content);
+                ended.unwrap_or_else(|| self.down())
+            }
+        }
+    }
+
+    fn meanwhile(&mut self, meanwhile: Meanwhile) {
+        match meanwhile {
+            Meanwhile::Nothing => {}
+            Meanwhile::Deleted => self.delete(),
+            Meanwhile::Rewritten => {
+                let content = Content::NoVersion(self.fresh());
+                self.put(NAME, content);
+            }
+        }
+    }
+}
+
+/// The points of a work with so many deeds that are tried.
+fn points(deeds: usize) -> Vec<Aim> {
+    let sides = [Side::Before, Side::After];
+    let of = |deed| sides.map(|side| Aim { deed, side });
+    let all: Vec<Aim> = (1..=deeds).flat_map(of).collect();
+    let wanted = std::env::var("QCBUS_CRASH_POINTS").unwrap_or_default();
+    if wanted == "all" {
+        return all;
+    }
+    let wanted = wanted.parse().unwrap_or(SAMPLE).clamp(1, all.len());
+    let seed = seed();
+    report(&format!("crash points: QCBUS_CHAOS_SEED={seed}"));
+    let mut dice = Dice::new(seed);
+    // One of each stretch of the work, so that every stage of it is among them.
+    let stretch = |at: usize| &all[at * all.len() / wanted..(at + 1) * all.len() / wanted];
+    let chosen = (0..wanted).filter_map(|at| dice.pick(stretch(at)));
+    chosen.copied().collect()
+}
+
+fn killed_anywhere(work: Work, meanwhile: Meanwhile) {
+    if let Some(why) = refused() {
+        return skip(&format!("crash points, {work:?}, {meanwhile:?}"), &why);
+    }
+    let mut victim = Victim::new();
+    victim.recover("nothing has happened yet");
+    let ended = victim.work(work, None);
+    assert!(ended.success(), "{ended}\n{}", victim.explain());
+    let deeds = victim.broker().deeds().len();
+    victim.recover("nothing has happened yet");
+    let points = points(deeds);
+    let (mut hits, start) = (0, Instant::now());
+    for point in &points {
+        let ended = victim.work(work, Some(*point));
+        let hit = victim.broker().hit();
+        assert_eq!(
+            ended.success(),
+            hit.is_none(),
+            "{ended}\n{}",
+            victim.explain()
+        );
+        hits += usize::from(hit.is_some());
+        victim.meanwhile(meanwhile);
+        let hit = hit.unwrap_or_else(|| "at no time".to_owned());
+        victim.recover(&format!(
+            "{work:?}, {meanwhile:?}, killed at {point:?}, {hit}"
+        ));
+    }
+    // Threads take turns, so that the last points of one run may not be there in another.
+    assert!(
+        hits * 2 > points.len(),
+        "{hits} of {} points were hit",
+        points.len()
+    );
+    report(&format!(
+        "crash points: {work:?}, {meanwhile:?}: killed at {hits} points of {deeds} deeds in {:.0} s",
+        start.elapsed().as_secs_f64()
+    ));
+    victim.down();
+}
+
+#[test]
+fn a_broker_killed_anywhere_in_a_job_is_made_good_by_the_next() {
+    killed_anywhere(Work::Job, Meanwhile::Nothing);
+}
+
+#[test]
+fn a_broker_killed_anywhere_in_its_start_is_made_good_by_the_next() {
+    killed_anywhere(Work::Start, Meanwhile::Nothing);
+}
+
+#[test]
+fn a_file_deleted_after_a_crash_leaves_nothing_behind() {
+    killed_anywhere(Work::Job, Meanwhile::Deleted);
+}
+
+#[test]
+fn a_file_rewritten_after_a_crash_has_a_verdict_for_what_it_is() {
+    killed_anywhere(Work::Job, Meanwhile::Rewritten);
+}
+
+#[expect(clippy::print_stderr, reason = "figures are for whoever runs the test")]
+fn report(text: &str) {
+    eprintln!("{text}");
+}
