@@ -9,7 +9,8 @@ use qcbus_document::FileKind;
 use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::Level;
 use qcbus_messages::{
-    Catalogue, CheckerInfo, FromPeer, Hello, Job, JobId, PROTOCOL_VERSION, PeerReport, Role, ToPeer,
+    Catalogue, CheckerInfo, FromPeer, Hello, Job, JobDocument, JobId, PROTOCOL_VERSION, PeerReport,
+    Role, ToPeer,
 };
 
 use crate::{Args, complain};
@@ -32,7 +33,7 @@ pub struct Animal {
 pub struct Manners {
     /// After the welcome.
     pub welcomed: fn(&mut Peer) -> Mood,
-    /// A job is to be checked; its root document is at hand.
+    /// A job is to be checked; its documents are at hand.
     pub job: fn(&mut Peer, &Job) -> Mood,
     /// A result is to be reported.
     pub result: fn(&mut Peer, JobId) -> Mood,
@@ -268,8 +269,11 @@ impl Cage {
 
     /// How long until the job at hand is done; `None`: there is nothing to do.
     fn pause(&mut self) -> Option<Duration> {
-        let root = self.jobs.front()?.documents.first()?.doc;
-        self.peer.document(root)?;
+        let documents = &self.jobs.front()?.documents;
+        let there = |document: &JobDocument| self.peer.document(document.doc).is_some();
+        if !documents.iter().all(there) {
+            return None;
+        }
         let begun = *self.begun.get_or_insert_with(Instant::now);
         Some(self.takes.saturating_sub(begun.elapsed()))
     }

@@ -6,6 +6,7 @@ mod dies_on_some_files;
 mod floods_issues;
 mod hangs_after_hello;
 mod hangs_in_a_job;
+mod judges_strictly;
 mod lies_about_job_id;
 mod never_acknowledges;
 mod reporter_never_acknowledges;
@@ -16,6 +17,7 @@ mod stops_reading;
 mod writes_to_the_image;
 
 pub use dies_on_some_files::POISON;
+pub use judges_strictly::MARK;
 pub use speaks_another_protocol::PROTOCOL as ANOTHER_PROTOCOL;
 
 use crate::keeper::Animal;
@@ -28,6 +30,7 @@ pub static ANIMALS: &[Animal] = &[
     floods_issues::ANIMAL,
     hangs_after_hello::ANIMAL,
     hangs_in_a_job::ANIMAL,
+    judges_strictly::ANIMAL,
     lies_about_job_id::ANIMAL,
     never_acknowledges::ANIMAL,
     reporter_never_acknowledges::ANIMAL,
