@@ -7,7 +7,7 @@ use qcbus_messages::Verdict;
 use qcbus_messages::path_text::to_text;
 use serde::Serialize;
 
-use crate::core::{FinishedJob, Input};
+use crate::core::{FinishedJob, Input, Juror, Jury};
 
 /// The content of a verdict file. Fields are only ever added.
 #[derive(Debug, Serialize)]
@@ -19,6 +19,12 @@ pub struct VerdictFile<'a> {
     depends_on: Vec<Dependency>,
     configuration_sha256: String,
     qcbus_version: &'a str,
+    /// Of who must judge: counts up with every change of that.
+    epoch: u64,
+    /// The bundles that had to judge in this epoch.
+    demanded: Vec<&'a str>,
+    /// Those of them that were not there.
+    absent: Vec<&'a str>,
     bundles: Vec<BundleLine<'a>>,
     errors: u64,
     warnings: u64,
@@ -84,6 +90,9 @@ pub fn render(
         depends_on: depends_on.collect(),
         configuration_sha256: job.config.to_string(),
         qcbus_version: env!("CARGO_PKG_VERSION"),
+        epoch: job.epoch.0,
+        demanded: names(&job.jury, |_| true),
+        absent: names(&job.jury, |juror| juror.mark.is_none()),
         bundles: bundles(pooled),
         errors: pooled.counts.errors,
         warnings: pooled.counts.warnings,
@@ -103,6 +112,11 @@ pub fn render(
     let mut text = serde_json::to_vec_pretty(&file).unwrap_or_default();
     text.push(b'\n');
     text
+}
+
+fn names(jury: &Jury, wanted: impl Fn(&Juror) -> bool) -> Vec<&str> {
+    let jurors = jury.0.iter().filter(|juror| wanted(juror));
+    jurors.map(|juror| juror.name.as_str()).collect()
 }
 
 /// The bundles that took part; not those that are only demanded.
