@@ -171,7 +171,7 @@ impl Source for Shelf<'_> {
     fn keep(&mut self, path: &Path, role: DocumentRole, referred_at: u32, image: Vec<u8>) {
         self.linked.push(LinkedImage {
             role,
-            path: qcbus_messages::path_text::to_text(&path),
+            path: qcbus_messages::path_text::to_text(path),
             referred_at,
             image,
         });
