@@ -9,7 +9,6 @@ mod archive;
 mod count;
 mod decode;
 mod error;
-mod findings;
 #[doc(hidden)]
 pub mod fuzzing;
 mod gather;
@@ -18,12 +17,12 @@ mod prepare;
 mod prepared;
 mod read;
 mod references;
+mod remarks;
 mod text_fault;
 mod unpack;
 mod xml;
 
 pub use error::IngestError;
-pub use findings::{faults_of_root, missing_references, remarks};
 pub use gather::{Look, Source, gather};
 pub use limits::{Exceeded, Limits};
 pub use prepare::{prepare, prepare_bytes};
@@ -31,3 +30,4 @@ pub use prepared::Prepared;
 pub use qcbus_document::BuildError;
 pub use read::{Content, FileStamp, Stat};
 pub use references::{Reference, references};
+pub use remarks::{faults_of_root, missing_references, remarks};
