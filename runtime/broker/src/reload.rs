@@ -323,3 +323,102 @@ fn bundle_differences(old: &BundleConfig, new: &BundleConfig, lines: &mut Vec<St
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sources(directory: &Path) -> Sources {
+        Sources {
+            config: Some(directory.join("config.xml")),
+            bundles_d: Some(directory.join("bundles.d")),
+            standard: vec![child("xodrBundle")],
+            reporters: vec![child("qc-report-text")],
+            known: Known::default(),
+        }
+    }
+
+    fn child(name: &str) -> ChildSpec {
+        ChildSpec {
+            name: name.to_owned(),
+            role: Role::Bundle,
+            version: None,
+            command: vec!["program".to_owned()],
+            restart: Restart::Always,
+        }
+    }
+
+    fn put(directory: &Path, config: &str, manifests: &[(&str, &str)]) {
+        let bundles_d = directory.join("bundles.d");
+        let _ = std::fs::remove_dir_all(&bundles_d);
+        std::fs::create_dir(&bundles_d).unwrap();
+        std::fs::write(directory.join("config.xml"), config).unwrap();
+        for (name, text) in manifests {
+            std::fs::write(bundles_d.join(name), text).unwrap();
+        }
+    }
+
+    fn manifest(name: &str, mode: &str) -> String {
+        format!(
+            r#"{{"module": [{{"name": "{name}", "exec_type": "executable", "mode": "{mode}",
+            "module_type": "checker_bundle", "exec_command": "/opt/{name}"}}]}}"#
+        )
+    }
+
+    const CONFIG: &str = "<Config>\n  <CheckerBundle application=\"xodrBundle\"/>\n</Config>\n";
+
+    #[test]
+    fn a_start_reads_the_configuration_and_every_manifest() {
+        let dir = tempfile::tempdir().unwrap();
+        let mine = manifest("mine", "bus");
+        let theirs = manifest("theirs", "once");
+        let hidden = (".hidden.json", "no manifest at all");
+        put(
+            dir.path(),
+            CONFIG,
+            &[("a.json", &mine), ("b.json", &theirs), hidden],
+        );
+        let loaded = sources(dir.path()).load().unwrap();
+        let names: Vec<&str> = loaded.children.iter().map(|it| it.name.as_str()).collect();
+        assert_eq!(names, ["xodrBundle", "mine"], "{:?}", loaded.notices);
+        assert!(loaded.notices.iter().any(|it| it.contains("theirs")));
+        assert_eq!(loaded.config.unwrap().bundles.len(), 1);
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_refused_as_a_whole() {
+        let dir = tempfile::tempdir().unwrap();
+        put(dir.path(), "<Config>", &[]);
+        assert!(matches!(
+            sources(dir.path()).load(),
+            Err(LoadError::Config(_))
+        ));
+        put(dir.path(), CONFIG, &[("a.json", "{")]);
+        assert!(matches!(
+            sources(dir.path()).load(),
+            Err(LoadError::Manifest(_))
+        ));
+    }
+
+    #[test]
+    fn what_has_changed_is_told_line_by_line() {
+        let dir = tempfile::tempdir().unwrap();
+        let sources = sources(dir.path());
+        let (mine, yours) = (manifest("mine", "bus"), manifest("yours", "bus"));
+        put(dir.path(), CONFIG, &[("a.json", &mine)]);
+        let (old, looks) = (sources.load().unwrap(), sources.fingerprint());
+        assert_eq!(differences(&old, &old), Vec::<String>::new());
+        let config = CONFIG.replace("xodrBundle", "xoscBundle");
+        put(dir.path(), &config, &[("b.json", &yours)]);
+        assert_ne!(sources.fingerprint(), looks);
+        let mut lines = differences(&old, &sources.load().unwrap());
+        lines.sort();
+        let expected = [
+            "added yours",
+            "removed mine",
+            "xodrBundle is no longer demanded",
+            "xoscBundle is demanded",
+        ];
+        assert_eq!(lines, expected);
+    }
+}

@@ -184,3 +184,122 @@ fn restrict(command: &mut Command, surroundings: &Surroundings) {
         });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
+
+    use super::*;
+    use crate::core::Restart;
+    use qcbus_messages::Role;
+
+    fn children() -> (Children, UnboundedReceiver<Event>) {
+        let (events, inbox) = unbounded_channel();
+        let surroundings = Surroundings {
+            instance_dir: "/nowhere".into(),
+            die_with_broker: true,
+            memory_limit: None,
+        };
+        (Children::new(surroundings, events), inbox)
+    }
+
+    fn spec(command: &[&str]) -> ChildSpec {
+        ChildSpec {
+            name: "child".to_owned(),
+            role: Role::Bundle,
+            version: None,
+            command: command.iter().map(|it| (*it).to_owned()).collect(),
+            restart: Restart::Never,
+        }
+    }
+
+    async fn end(inbox: &mut UnboundedReceiver<Event>) -> (Launch, ChildEnd) {
+        let watchdog = Duration::from_secs(60);
+        let event = tokio::time::timeout(watchdog, inbox.recv()).await;
+        match event.expect("the watchdog: no child has ended") {
+            Some(Event::Exited { launch, end }) => (launch, end),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[tokio::test]
+    async fn how_a_child_ends_is_told() {
+        let (mut children, mut inbox) = children();
+        type Told = fn(&ChildEnd) -> bool;
+        let not_started: Told = |it| matches!(it, ChildEnd::NotStarted(_));
+        let failed: Told = |it| matches!(it, ChildEnd::Failed(_));
+        let done: Told = |it| matches!(it, ChildEnd::Done(_));
+        let ends = [
+            (spec(&["/nowhere/at/all"]), not_started),
+            (spec(&[]), not_started),
+            (
+                spec(&["sh", "-c", "exec /nowhere/at/all", "sh"]),
+                not_started,
+            ),
+            (spec(&["sh", "-c", "exec /", "sh"]), not_started),
+            (spec(&["sh", "-c", "exit 0", "sh"]), done),
+            (spec(&["sh", "-c", "exit 3", "sh"]), failed),
+            (spec(&["sh", "-c", "kill -9 $$", "sh"]), failed),
+        ];
+        for (number, (spec, is_told)) in (1..).zip(ends) {
+            children.spawn(Launch(number), &spec);
+            let (launch, end) = end(&mut inbox).await;
+            assert_eq!(launch, Launch(number));
+            assert!(is_told(&end), "{spec:?}: {end:?}");
+            assert!(!end.how().is_empty());
+        }
+    }
+
+    #[tokio::test]
+    async fn a_child_is_killed_with_what_it_has_started() {
+        let (mut children, mut inbox) = children();
+        let dir = tempfile::tempdir().unwrap();
+        let pid = dir.path().join("pid");
+        let script = format!(
+            "sleep 1000 & echo $! > {0}.x; mv {0}.x {0}; wait",
+            pid.display()
+        );
+        children.spawn(Launch(1), &spec(&["sh", "-c", &script, "sh"]));
+        let started = async {
+            while !pid.exists() {
+                tokio::task::yield_now().await;
+            }
+        };
+        tokio::time::timeout(Duration::from_secs(60), started)
+            .await
+            .unwrap();
+        children.kill(Some(Launch(1)), 0);
+        let (_, end) = end(&mut inbox).await;
+        assert!(matches!(end, ChildEnd::Failed(how) if how.contains("signal 9")));
+        let grandchild = std::fs::read_to_string(&pid).unwrap();
+        let stat = Path::new("/proc").join(grandchild.trim()).join("stat");
+        let gone = async {
+            // A zombie that nobody has buried yet is as good as gone.
+            let runs = || std::fs::read_to_string(&stat).is_ok_and(|it| !it.contains(") Z "));
+            while runs() {
+                tokio::task::yield_now().await;
+            }
+        };
+        tokio::time::timeout(Duration::from_secs(60), gone)
+            .await
+            .unwrap();
+    }
+
+    #[tokio::test]
+    async fn a_process_of_somebody_else_is_let_alone() {
+        let (children, _inbox) = children();
+        let mut stranger = std::process::Command::new("sleep")
+            .arg("1000")
+            .spawn()
+            .unwrap();
+        children.kill(Some(Launch(7)), stranger.id());
+        assert!(
+            stranger.try_wait().unwrap().is_none(),
+            "it was started without --launch"
+        );
+        stranger.kill().unwrap();
+        stranger.wait().unwrap();
+    }
+}
