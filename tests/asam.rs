@@ -250,7 +250,7 @@ fn asams_own_library_reads_every_result() {
         Err(why) => return skip("asams_own_library_reads_every_result", &why),
     };
     let desk = Desk::new();
-    desk.qcbus(&["check", &sample_farm().to_string_lossy(), "--out", "out"]);
+    desk.check_in(&sample_farm(), &["."], "out");
     desk.write("config.xml", config(&header_faults(), ALL, ""));
     desk.qcbus(&["check", "-c", "config.xml"]);
     let files = files_below(&desk.path().join("out"));

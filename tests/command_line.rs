@@ -148,7 +148,7 @@ fn quiet_and_json_say_no_more_than_asked() {
     desk.write("in/a.xodr", Content::Good(1).bytes());
     desk.write("in/b.xodr", Content::NoHeader(1).bytes());
     let quiet = desk.qcbus(&["check", "in", "--quiet"]);
-    assert_eq!(quiet.stdout, "a.xodr: accepted\nb.xodr: rejected\n");
+    assert_eq!(quiet.stdout, "in/a.xodr: accepted\nin/b.xodr: rejected\n");
     let json = desk.qcbus(&["check", "in", "--format", "json"]);
     assert_eq!(
         (json.code, json.stdout.lines().count()),

@@ -78,7 +78,7 @@ fn checkable() -> Vec<PathBuf> {
 #[test]
 fn every_promised_issue_is_found_at_its_place() {
     let desk = Desk::new();
-    let said = desk.qcbus(&["check", &sample_farm().to_string_lossy(), "--out", "out"]);
+    let said = desk.check_in(&sample_farm(), &["."], "out");
     assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
     let promises = promises();
     assert_eq!(promises.len(), 10, "the table is read");
@@ -116,7 +116,7 @@ fn every_promised_issue_is_found_at_its_place() {
 #[test]
 fn good_files_are_accepted_without_a_word_of_blame() {
     let desk = Desk::new();
-    let said = desk.qcbus(&["check", &sample_farm().to_string_lossy(), "--out", "out"]);
+    let said = desk.check_in(&sample_farm(), &["."], "out");
     let good = table("Accepted");
     assert_eq!(
         good.len() + promises().len(),
@@ -141,7 +141,7 @@ fn good_files_are_accepted_without_a_word_of_blame() {
 #[test]
 fn every_issue_is_printed_with_row_and_column() {
     let desk = Desk::new();
-    let said = desk.qcbus(&["check", &sample_farm().to_string_lossy(), "--out", "out"]);
+    let said = desk.check_in(&sample_farm(), &["."], "out");
     let mut count = 0;
     for file in checkable() {
         let file = file.to_string_lossy();
@@ -164,10 +164,9 @@ fn every_issue_is_printed_with_row_and_column() {
 #[test]
 fn only_valid_xml_is_judged_on_its_meaning() {
     let desk = Desk::new();
-    let file = sample_farm().join("faulty/not_well_formed.xodr");
-    let said = desk.qcbus(&["check", &file.to_string_lossy()]);
+    let said = desk.check_in(&sample_farm(), &["faulty/not_well_formed.xodr"], "out");
     assert_eq!(said.code, Some(1));
-    let results = desk.result("qcbus-out/not_well_formed.xodr.xqar");
+    let results = desk.result("out/faulty/not_well_formed.xodr.xqar");
     for checker in support::desk::checkers(&results) {
         let expected = match checker.id.as_str() {
             "check_asam_xodr_xml_valid_xml_document" => Status::Completed,
@@ -187,7 +186,7 @@ fn only_valid_xml_is_judged_on_its_meaning() {
 fn results_lie_where_they_are_looked_for() {
     let desk = Desk::new();
     let farm = sample_farm();
-    desk.qcbus(&["check", &farm.to_string_lossy(), "--out", "tree"]);
+    desk.check_in(&farm, &["."], "tree");
     let expected: Vec<PathBuf> = checkable()
         .iter()
         .map(|file| format!("{}.xqar", file.display()).into())
@@ -198,45 +197,36 @@ fn results_lie_where_they_are_looked_for() {
         "one each, and nothing else"
     );
 
+    // A file that lies elsewhere has its place by its path from the root.
     let ring = farm.join("maps/ring.xodr");
     desk.qcbus(&["check", &ring.to_string_lossy()]);
-    assert!(
-        desk.path().join("qcbus-out/ring.xodr.xqar").exists(),
-        "a file's base name"
-    );
+    let from_root = ring.strip_prefix("/").unwrap().to_string_lossy();
+    let result = format!("qcbus-out/{from_root}.xqar");
+    assert!(desk.path().join(&result).exists(), "{result}");
 
-    let (one, two) = (
-        desk.write("a/x/m.xodr", "<OpenDRIVE/>"),
-        desk.write("a/y/m.xodr", "<OpenDRIVE/>"),
-    );
-    desk.qcbus(&[
-        "check",
-        &one.to_string_lossy(),
-        &two.to_string_lossy(),
-        "--out",
-        "pair",
-    ]);
-    let expected = ["x/m.xodr.xqar", "y/m.xodr.xqar"].map(PathBuf::from);
-    assert_eq!(
-        files_below(&desk.path().join("pair")),
-        expected,
-        "names that collide"
-    );
-
-    desk.qcbus(&["check", "a/x", "a/y", "--out", "two"]);
-    assert_eq!(
-        files_below(&desk.path().join("two")).len(),
-        2,
-        "two directories, none overwritten"
-    );
+    // Whatever else is given, here or in another run.
+    for file in ["a/x/m.xodr", "a/y/m.xodr", "b/m.xodr"] {
+        desk.write(file, "<OpenDRIVE/>");
+    }
+    for paths in [
+        &["a/x/m.xodr", "a/y/m.xodr"][..],
+        &["b/m.xodr"],
+        &["a/x"],
+        &["a"],
+        &["b"],
+    ] {
+        desk.qcbus(&[&["check", "--out", "all"], paths].concat());
+    }
+    let expected = ["a/x/m.xodr.xqar", "a/y/m.xodr.xqar", "b/m.xodr.xqar"].map(PathBuf::from);
+    assert_eq!(files_below(&desk.path().join("all")), expected);
 }
 
 #[test]
 fn two_runs_write_the_same_bytes() {
     let desk = Desk::new();
     let farm = sample_farm();
-    let one = desk.qcbus(&["check", &farm.to_string_lossy(), "--out", "one"]);
-    let two = desk.qcbus(&["check", &farm.to_string_lossy(), "--out", "two"]);
+    let one = desk.check_in(&farm, &["."], "one");
+    let two = desk.check_in(&farm, &["."], "two");
     assert_eq!(one.stdout, two.stdout);
     for file in files_below(&desk.path().join("one")) {
         let read = |run: &str| std::fs::read_to_string(desk.path().join(run).join(&file)).unwrap();
@@ -252,7 +242,7 @@ fn two_runs_write_the_same_bytes() {
 #[test]
 fn every_result_is_as_asam_describes_it() {
     let desk = Desk::new();
-    desk.qcbus(&["check", &sample_farm().to_string_lossy(), "--out", "out"]);
+    desk.check_in(&sample_farm(), &["."], "out");
     let files = files_below(&desk.path().join("out"));
     assert_eq!(files.len(), checkable().len());
     for file in files {

@@ -30,18 +30,18 @@ fn is_rejected(desk: &Desk, name: &str, text: &str, place: (u64, u64)) {
     let said = desk.qcbus(&["check", "in", "--out", "out"]);
     assert_eq!(said.code, Some(1), "{}", said.whole(desk));
     assert!(
-        said.stdout.contains("accepted: good.xodr: "),
+        said.stdout.contains("accepted: in/good.xodr: "),
         "{}",
         said.whole(desk)
     );
     assert!(
-        said.stdout.contains(&format!("rejected: {name}: ")),
+        said.stdout.contains(&format!("rejected: in/{name}: ")),
         "{}",
         said.whole(desk)
     );
     let told: Vec<&str> = said.stderr.lines().collect();
     assert_eq!(told.len(), 1, "nothing but the count is said: {told:?}");
-    let results = desk.result(&format!("out/{name}.xqar"));
+    let results = desk.result(&format!("out/in/{name}.xqar"));
     let found: Vec<_> = issues(&results)
         .map(|(_, issue)| (issue.description.as_str(), places(issue)))
         .collect();
@@ -50,7 +50,7 @@ fn is_rejected(desk: &Desk, name: &str, text: &str, place: (u64, u64)) {
         .any(|(said, at)| said.contains(text) && at.contains(&place));
     assert!(hit, "no issue says `{text}` at {place:?}: {found:#?}");
     assert!(checkers(&results).all(|it| it.status != Some(Status::Error)));
-    let written = std::fs::read_to_string(desk.path().join(format!("out/{name}.xqar"))).unwrap();
+    let written = std::fs::read_to_string(desk.path().join(format!("out/in/{name}.xqar"))).unwrap();
     assert_eq!(asam::complaints(&written), [""; 0]);
 }
 
@@ -81,7 +81,8 @@ fn a_directory_named_like_a_file() {
     let said = desk.qcbus(&["check", "in", "--out", "out"]);
     assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
     assert!(
-        said.stdout.contains("rejected: x.xodr/inner.xodr: 1 error"),
+        said.stdout
+            .contains("rejected: in/x.xodr/inner.xodr: 1 error"),
         "{}",
         said.whole(&desk)
     );
@@ -123,7 +124,7 @@ fn external_entity() {
     let desk = Desk::new();
     desk.write("in/x.xodr", text);
     is_rejected(&desk, "x.xodr", "DOCTYPE", (2, 1));
-    let written = std::fs::read_to_string(desk.path().join("out/x.xodr.xqar")).unwrap();
+    let written = std::fs::read_to_string(desk.path().join("out/in/x.xodr.xqar")).unwrap();
     assert!(!written.contains("root:"), "what it points to is not read");
 }
 
@@ -253,7 +254,7 @@ fn unreadable_file() {
     let said = desk.qcbus(&["check", "in", "--out", "out"]);
     assert!(said.code.is_some_and(|it| it != 0), "{}", said.whole(&desk));
     assert!(
-        said.stdout.contains("accepted: good.xodr: "),
+        said.stdout.contains("accepted: in/good.xodr: "),
         "{}",
         said.whole(&desk)
     );
@@ -448,8 +449,8 @@ fn a_check_ends_when_its_result_cannot_be_written() {
         "{}",
         said.whole(&desk)
     );
-    assert!(said.stdout.contains("rejected: a.xodr: "));
-    assert!(desk.path().join("out/a.xodr.xqar").exists());
+    assert!(said.stdout.contains("rejected: in/a.xodr: "));
+    assert!(desk.path().join("out/in/a.xodr.xqar").exists());
 }
 
 #[test]

@@ -149,7 +149,8 @@ fn a_directory_keeps_its_name_however_many_links_lead_to_it() {
     std::fs::rename(beside.join("new"), farm.root().join("maps/a.xodr")).unwrap();
     becomes(&farm, &gate, "maps/a.xodr", Some(Verdict::Accepted));
     assert!(farm.settle(1).unseen.is_empty());
-    let published: Vec<PathBuf> = files_below(&gate);
+    let mut published: Vec<PathBuf> = files_below(&gate);
+    published.retain(|it| it != Path::new(".qcbus-gate"));
     assert_eq!(published, [Path::new("maps/a.xodr")]);
 }
 
@@ -182,7 +183,7 @@ fn what_a_linked_file_includes_lies_beside_the_link() {
     for named in ["maps", "maps/a.xodr"] {
         let said = check(&desk, &[named]);
         assert_eq!(said.code, Some(0), "{named}: {}", said.whole(&desk));
-        assert!(desk.path().join("out/a.xodr.xqar").exists());
+        assert!(desk.path().join("out/maps/a.xodr.xqar").exists());
         std::fs::remove_dir_all(desk.path().join("out")).unwrap();
     }
     std::fs::remove_file(desk.path().join("maps/view.xml")).unwrap();
@@ -320,17 +321,17 @@ fn names_that_are_no_text_have_a_result_each() {
     assert!(said.stderr.contains("2 files: 1 accepted, 1 rejected"));
     // The place of the error, with its line.
     assert!(
-        said.stdout.contains("bytes:stra%FEe.xodr:"),
+        said.stdout.contains("bytes:maps/stra%FEe.xodr:"),
         "{}",
         said.stdout
     );
     assert!(said.stdout.contains("<OpenDRIVE"), "{}", said.stdout);
-    let written = files_below(&desk.path().join("out"));
+    let written = files_below(&desk.path().join("out/maps"));
     assert_eq!(written, NAMES.map(|it| with_suffix(name(it), ".xqar")));
     for file in NAMES {
         let result = std::fs::read(
             desk.path()
-                .join("out")
+                .join("out/maps")
                 .join(with_suffix(name(file), ".xqar")),
         );
         let result = String::from_utf8(result.unwrap()).unwrap();

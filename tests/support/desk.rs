@@ -53,11 +53,23 @@ impl Desk {
         self.run(Command::new(env!("CARGO_BIN_EXE_qcbus")).args(arguments))
     }
 
+    /// Types `qcbus check …` in another directory; results go into a directory of the desk.
+    pub fn check_in(&self, directory: &Path, paths: &[&str], out: &str) -> Said {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+        command.arg("check").args(paths);
+        command.arg("--out").arg(self.path().join(out));
+        self.run_in(directory, &mut command)
+    }
+
     /// Runs any program here and waits for its end.
     pub fn run(&self, command: &mut Command) -> Said {
+        self.run_in(self.path(), command)
+    }
+
+    fn run_in(&self, directory: &Path, command: &mut Command) -> Said {
         let (mut out, mut err) = (tempfile::tempfile().unwrap(), tempfile::tempfile().unwrap());
         command
-            .current_dir(self.path())
+            .current_dir(directory)
             .env("XDG_RUNTIME_DIR", self.path().join(".run"))
             .env("NO_COLOR", "1")
             .env_remove("COLUMNS")

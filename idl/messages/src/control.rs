@@ -116,6 +116,9 @@ pub struct Status {
     /// The directory of bundle manifests that it watches.
     #[serde(default)]
     pub bundles_d: Option<PathBuf>,
+    /// Where accepted files are published, if anywhere.
+    #[serde(default)]
+    pub gate: Option<GateStatus>,
     /// Digest of the configuration in force.
     pub config: String,
     /// Files by state.
@@ -164,6 +167,28 @@ impl std::fmt::Display for Unseen {
             self.why
         )
     }
+}
+
+/// What lies behind the gate, and what does not.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct GateStatus {
+    /// The directory.
+    pub directory: PathBuf,
+    /// Accepted files that are published.
+    pub published: u64,
+    /// Accepted files that are not, because of something that they depend on.
+    pub held_back: u64,
+    /// The first of them.
+    pub examples: Vec<HeldBack>,
+}
+
+/// A file that is accepted and not published.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct HeldBack {
+    /// Absolute path.
+    pub file: PathBuf,
+    /// Why: for a person.
+    pub why: String,
 }
 
 /// How many files are in which state.

@@ -1,10 +1,11 @@
 //! Writing files so that nobody ever sees half of one.
 
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io::{self, Write};
+use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, TempPath};
 
 /// Temporary names begin with this and the id of the process that writes.
 const PREFIX: &str = ".qcbus-";
@@ -25,11 +26,43 @@ pub fn write_whole(path: &Path, content: &[u8], durable: bool) -> io::Result<()>
     Ok(())
 }
 
+/// Writes `content` under a temporary name in the directory of `path`, to be renamed there later.
+/// With `durable`, the content is on the disk already.
+///
+/// # Errors
+/// As [`write_whole`].
+pub fn write_ahead(path: &Path, content: &[u8], durable: bool) -> io::Result<TempPath> {
+    let file = write_aside(path, content)?;
+    if durable {
+        file.as_file().sync_data()?;
+    }
+    Ok(file.into_temp_path())
+}
+
+/// What tells a file that was written from any other that comes to lie in its place: size, time of
+/// modification in nanoseconds, inode. A rename changes none of them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FileMark(pub String);
+
+impl FileMark {
+    fn of(data: &Metadata) -> FileMark {
+        let nanoseconds = i128::from(data.mtime()) * 1_000_000_000 + i128::from(data.mtime_nsec());
+        FileMark(format!("{} {nanoseconds} {}", data.len(), data.ino()))
+    }
+
+    /// That of the regular file which lies there, if one does.
+    pub fn at(path: &Path) -> Option<FileMark> {
+        let data = std::fs::symlink_metadata(path).ok()?;
+        data.is_file().then(|| FileMark::of(&data))
+    }
+}
+
 /// A file to be written: its path and its content.
 pub type Content<'a> = (&'a Path, &'a [u8]);
 
 /// Writes two files as [`write_whole`] does; `first` gets its name before `second` does. Both are
-/// synced at the same time, because then the file system's journal is written once for both.
+/// synced at the same time, because then the file system's journal is written once for both. Gives
+/// the mark of `first`.
 ///
 /// # Errors
 /// As [`write_whole`], with the path that could not be written.
@@ -37,7 +70,7 @@ pub fn write_both<'a>(
     first: Content<'a>,
     second: Content<'a>,
     durable: bool,
-) -> Result<(), (&'a Path, io::Error)> {
+) -> Result<FileMark, (&'a Path, io::Error)> {
     let of = |path| move |error| (path, error);
     let files = (
         write_aside(first.0, first.1).map_err(of(first.0))?,
@@ -46,11 +79,13 @@ pub fn write_both<'a>(
     if durable {
         sync_both(files.0.as_file(), files.1.as_file()).map_err(of(second.0))?;
     }
+    let mark = files.0.as_file().metadata().map(|data| FileMark::of(&data));
+    let mark = mark.map_err(of(first.0))?;
     let named = files.0.persist(first.0);
     named.map_err(|error| (first.0, error.error))?;
     let named = files.1.persist(second.0);
     named.map_err(|error| (second.0, error.error))?;
-    Ok(())
+    Ok(mark)
 }
 
 fn sync_both(first: &File, second: &File) -> io::Result<()> {
@@ -200,7 +235,9 @@ mod tests {
         let dir = tempfile::TempDir::new().unwrap();
         let path = |name: &str| dir.path().join(name);
         let (first, second) = (path("a.verdict.json"), path("deep/a.xqar"));
-        write_both((&first, b"verdict"), (&second, b"result"), true).unwrap();
+        let mark = write_both((&first, b"verdict"), (&second, b"result"), true).unwrap();
+        assert_eq!(FileMark::at(&first), Some(mark.clone()));
+        assert_ne!(FileMark::at(&second), Some(mark));
         assert_eq!(std::fs::read(&first).unwrap(), b"verdict");
         assert_eq!(std::fs::read(&second).unwrap(), b"result");
 

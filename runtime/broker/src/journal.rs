@@ -7,10 +7,11 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use qcbus_messages::path_text::{from_text, to_text as text};
 use qcbus_messages::{Digest, JobId, Verdict};
-use rusqlite::{Connection, OpenFlags, OptionalExtension, Transaction, params};
+use rusqlite::{Connection, OpenFlags, Transaction, params};
 
 use crate::core::{Epoch, Input, Judged, Juror, Jury, Mark, Member, Origin, Stamp};
-use crate::state_lock::StateLock;
+use crate::directory_lock::{DirectoryLock, LockError, Purpose};
+use crate::disk::FileMark;
 
 /// Version of the schema, kept in SQLite's `user_version`.
 pub const SCHEMA_VERSION: i64 = 3;
@@ -30,25 +31,9 @@ pub enum JournalError {
         /// What SQLite says.
         source: rusqlite::Error,
     },
-    /// Another broker works with this state directory.
-    #[error(
-        "{} is the state of another broker that runs ({holder}); stop that one with `qcbus down`, or give this one another directory with --out or --state",
-        state.display()
-    )]
-    Held {
-        /// The state directory.
-        state: PathBuf,
-        /// Who.
-        holder: String,
-    },
-    /// The state directory cannot be taken.
-    #[error("cannot write {path}: {source}; choose another state directory with --state")]
-    Lock {
-        /// The file to be locked.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
+    /// Another broker works with this state directory, or it cannot be taken.
+    #[error("{0}")]
+    State(#[from] LockError),
     /// Its disk is full.
     #[error(
         "the journal {path} cannot be written: its disk is full; make room, it is tried again until there is some"
@@ -94,6 +79,8 @@ pub struct Remembered {
     pub path: Arc<Path>,
     /// The verdict and what it depends on.
     pub judged: Judged,
+    /// The mark of the verdict file as it was written, where that was remembered.
+    pub written: Option<FileMark>,
     /// The reporters that have it, each with the job whose result it has.
     pub delivered: Vec<(String, JobId)>,
 }
@@ -133,11 +120,22 @@ pub enum Entry {
         judged: Arc<Judged>,
         /// How it came about; absent when the verdict only got fresh stamps.
         history: Option<Box<History>>,
+        /// The mark of the verdict file; absent when none was written now.
+        written: Option<FileMark>,
     },
     /// A file has gone.
     Withdrawn {
         /// The file.
         path: Arc<Path>,
+        /// Who is to take back a report about it.
+        reporters: Vec<String>,
+    },
+    /// A result was withdrawn that nothing was remembered of.
+    Left {
+        /// The file.
+        path: Arc<Path>,
+        /// Where the result lay.
+        xqar: PathBuf,
         /// Who is to take back a report about it.
         reporters: Vec<String>,
     },
@@ -172,7 +170,7 @@ pub struct Journal {
     connection: Connection,
     path: PathBuf,
     /// Kept as long as the journal is.
-    _lock: Option<StateLock>,
+    _lock: Option<DirectoryLock>,
 }
 
 impl Journal {
@@ -186,7 +184,7 @@ impl Journal {
             path: state.to_path_buf(),
             source,
         })?;
-        let lock = StateLock::take(state, instance)?;
+        let lock = DirectoryLock::take(state, Purpose::State, instance)?;
         let path = state.join("journal.sqlite");
         let fail = |source| classify(&path, source);
         let connection = Connection::open(&path).map_err(fail)?;
@@ -255,7 +253,7 @@ impl Journal {
         }
         let mut query = self.connection.prepare(
             "SELECT path, job, verdict, digest, basis, config, jury, errors, warnings, \
-             information, why, xqar, inputs, racy, epoch FROM files ORDER BY path",
+             information, why, xqar, inputs, racy, epoch, written FROM files ORDER BY path",
         )?;
         let mut rows = query.query([])?;
         let mut all = Vec::new();
@@ -266,6 +264,9 @@ impl Journal {
                 all.push(Remembered {
                     path: from_text(&path).into(),
                     judged,
+                    written: Some(row.get(15)?)
+                        .filter(|it: &String| !it.is_empty())
+                        .map(FileMark),
                     delivered,
                 });
             }
@@ -280,8 +281,9 @@ impl Journal {
     pub fn voids(&self) -> Result<Vec<Void>, JournalError> {
         let read = || -> rusqlite::Result<Vec<Void>> {
             let mut query = self.connection.prepare(
-                "SELECT path, reporter, xqar FROM deliveries LEFT JOIN gone USING (path) \
-                 WHERE job = 0 AND path NOT IN (SELECT path FROM files)",
+                "SELECT path, reporter, gone.xqar FROM deliveries LEFT JOIN gone USING (path) \
+                 LEFT JOIN files USING (path) \
+                 WHERE deliveries.job = 0 AND (files.path IS NULL OR files.xqar <> gone.xqar)",
             )?;
             let rows = query.query_map([], |row| {
                 let path: String = row.get(0)?;
@@ -320,23 +322,6 @@ impl Journal {
             rows.collect()
         };
         read().map_err(|source| classify(&self.path, source))
-    }
-
-    /// Where the result of a file was written.
-    ///
-    /// # Errors
-    /// When the journal cannot be read.
-    pub fn place(&self, path: &Path) -> Result<Option<PathBuf>, JournalError> {
-        let read = || -> rusqlite::Result<Option<String>> {
-            let mut query = self
-                .connection
-                .prepare_cached("SELECT xqar FROM files WHERE path = ?1")?;
-            query
-                .query_row(params![text(path)], |row| row.get(0))
-                .optional()
-        };
-        let place = read().map_err(|source| classify(&self.path, source))?;
-        Ok(place.filter(|it| !it.is_empty()).map(|it| from_text(&it)))
     }
 
     /// Writes entries in one transaction: all of them or none.
@@ -382,6 +367,7 @@ fn prepare(connection: &Connection, path: &Path) -> Result<(), JournalError> {
         // What is in the old column is no jury, so that every verdict is looked at again.
         let newer = "BEGIN; ALTER TABLE files RENAME COLUMN bundles TO jury; \
                      ALTER TABLE files ADD COLUMN epoch INTEGER NOT NULL DEFAULT 0; \
+                     ALTER TABLE files ADD COLUMN written TEXT NOT NULL DEFAULT ''; \
                      PRAGMA user_version = 3; COMMIT;";
         connection.execute_batch(newer).map_err(fail)?;
     }
@@ -411,8 +397,9 @@ fn put(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> {
             path,
             judged,
             history,
+            written,
         } => {
-            put_file(transaction, path, judged)?;
+            put_file(transaction, path, judged, written.as_ref())?;
             if let Some(history) = history {
                 put_history(transaction, path, judged, history)?;
             }
@@ -429,6 +416,20 @@ fn put(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> {
             transaction.execute("DELETE FROM files WHERE path = ?1", params![path])?;
             transaction.execute("DELETE FROM deliveries WHERE path = ?1", params![path])?;
             for reporter in reporters {
+                deliver(transaction, &path, reporter, JobId(0))?;
+            }
+        }
+        Entry::Left {
+            path,
+            xqar,
+            reporters,
+        } => {
+            let path = text(path);
+            for reporter in reporters {
+                transaction.execute(
+                    "INSERT OR REPLACE INTO gone (path, xqar) VALUES (?1, ?2)",
+                    params![path, text(xqar)],
+                )?;
                 deliver(transaction, &path, reporter, JobId(0))?;
             }
         }
@@ -472,11 +473,18 @@ fn deliver(
         .map(|_| ())
 }
 
-fn put_file(transaction: &Transaction<'_>, path: &Path, judged: &Judged) -> rusqlite::Result<()> {
+fn put_file(
+    transaction: &Transaction<'_>,
+    path: &Path,
+    judged: &Judged,
+    written: Option<&FileMark>,
+) -> rusqlite::Result<()> {
+    // Whoever writes no verdict file leaves the mark of the one that is there.
     let mut statement = transaction.prepare_cached(
         "INSERT OR REPLACE INTO files (path, job, verdict, digest, basis, config, jury, errors, \
-         warnings, information, why, xqar, inputs, racy, at, epoch) \
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16)",
+         warnings, information, why, xqar, inputs, racy, at, epoch, written) \
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, \
+         coalesce(?17, (SELECT written FROM files WHERE path = ?1), ''))",
     )?;
     statement.execute(params![
         text(path),
@@ -495,6 +503,7 @@ fn put_file(transaction: &Transaction<'_>, path: &Path, judged: &Judged) -> rusq
         judged.racy,
         millis(),
         signed(judged.epoch.0),
+        written.map(|it| &it.0),
     ])?;
     Ok(())
 }
@@ -754,6 +763,14 @@ mod tests {
                         path: path.clone(),
                         judged: expected.clone(),
                         history,
+                        written: Some(FileMark("7 8 9".to_owned())),
+                    },
+                    // Only fresh stamps.
+                    Entry::Judged {
+                        path: path.clone(),
+                        judged: expected.clone(),
+                        history: None,
+                        written: None,
                     },
                     Entry::Delivered {
                         path: path.clone(),
@@ -764,13 +781,10 @@ mod tests {
                 .unwrap();
         }
         let mut journal = Journal::open(dir.path(), "test").unwrap();
-        assert_eq!(
-            journal.place(&path).unwrap(),
-            Some("/out/a.xosc.xqar".into())
-        );
         let all = journal.remembered().unwrap();
         assert_eq!(all.len(), 1);
         assert_eq!(all[0].judged, *expected);
+        assert_eq!(all[0].written, Some(FileMark("7 8 9".to_owned())));
         assert_eq!(all[0].delivered, [("json".to_owned(), JobId(5))]);
         let reporters = vec!["json".to_owned(), "text".to_owned()];
         let gone = path.clone();
@@ -787,7 +801,6 @@ mod tests {
             xqar: Some("/out/a.xosc.xqar".into()),
         };
         let (json, text) = (void("json"), void("text"));
-        assert_eq!(journal.place(&path).unwrap(), None);
         assert_eq!(journal.voids().unwrap(), [json, text.clone()]);
         let reporter = "json".to_owned();
         let path = path.clone();
@@ -807,6 +820,7 @@ mod tests {
                 path,
                 judged: Arc::new(written.clone()),
                 history: None,
+                written: None,
             }])
             .unwrap();
         let digest = Digest([1; 32]);
@@ -819,7 +833,7 @@ mod tests {
             .connection
             .execute_batch(
                 "ALTER TABLE files RENAME COLUMN jury TO bundles; \
-                 ALTER TABLE files DROP COLUMN epoch; \
+                 ALTER TABLE files DROP COLUMN epoch; ALTER TABLE files DROP COLUMN written; \
                  UPDATE files SET bundles = 'ffffffffffffffff'; PRAGMA user_version = 1",
             )
             .unwrap();
@@ -836,6 +850,7 @@ mod tests {
         assert_eq!(all[0].judged.inputs[1], written.inputs[1]);
         assert_eq!(all[0].judged.basis, written.basis);
         assert_eq!(*all[0].judged.jury, Jury::unknown());
+        assert_eq!(all[0].written, None);
     }
 
     #[test]

@@ -19,7 +19,8 @@ CREATE TABLE IF NOT EXISTS files (
     inputs   TEXT NOT NULL,         -- JSON list of [path, [size, mtime_ns, inode, digest, ctime_ns]]; null: absent
     racy     INTEGER NOT NULL,      -- 1: read so soon after a write that the stamps prove nothing
     at       INTEGER NOT NULL,
-    epoch    INTEGER NOT NULL DEFAULT 0 -- of who had to judge
+    epoch    INTEGER NOT NULL DEFAULT 0, -- of who had to judge
+    written  TEXT NOT NULL DEFAULT ''    -- size, mtime_ns, inode of the verdict file as it was written
 ) WITHOUT ROWID;
 
 -- The roster: the bundles that must judge until somebody removes them, whether they are there or not.

@@ -2,7 +2,7 @@
 //!
 //! `core` decides and does nothing; `engine` does and decides nothing. Everything else is a pair
 //! of hands: `watch` sees files, `intake` reads and publishes them, `store` and `writers` put
-//! results on the disk, `journal` remembers and `hold` keeps others from it, `supervise` starts
+//! results on the disk, `journal` remembers, `directory_lock` keeps others out, `supervise` starts
 //! and kills, `control` answers commands, `reload` reads configuration and manifests, `memory`
 //! gives back what was taken.
 
@@ -10,8 +10,10 @@ pub mod control;
 pub mod core;
 pub mod deliveries;
 mod demand;
+mod directory_lock;
 mod disk;
 mod engine;
+mod gate;
 mod intake;
 pub mod journal;
 pub mod memory;
@@ -20,7 +22,6 @@ pub mod reload;
 mod result_paths;
 mod stages;
 mod stamp;
-mod state_lock;
 mod store;
 mod supervise;
 mod verdict_file;
@@ -28,7 +29,9 @@ pub mod watch;
 mod writers;
 
 pub use demand::InForce;
+pub use directory_lock::LockError;
 pub use disk::write_whole;
 pub use engine::{Announcement, Broker, StartError, Stop, Told};
+pub use gate::{GateError, Outside};
 pub use options::Options;
 pub use result_paths::ResultPaths;

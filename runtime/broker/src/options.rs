@@ -9,6 +9,7 @@ use qcbus_formats::xqar::Dialect;
 use qcbus_ingest::Limits;
 
 use crate::core::{ChildSpec, Settings};
+use crate::gate::Outside;
 
 /// Everything that a broker is told at its start.
 #[derive(Debug, Clone)]
@@ -27,6 +28,8 @@ pub struct Options {
     pub rescan: Duration,
     /// Directory of the results.
     pub out: PathBuf,
+    /// The directory of a single run, see [`crate::ResultPaths`].
+    pub here: Option<PathBuf>,
     /// One file for the one result, instead of a directory of results.
     pub single_result: Option<PathBuf>,
     /// Directory of the journal; none: it is forgotten at the end.
@@ -41,6 +44,8 @@ pub struct Options {
     pub verdict_files: bool,
     /// Directory in which accepted files are published.
     pub gate: Option<PathBuf>,
+    /// What becomes there of files that depend on others outside of the watched directories.
+    pub gate_outside: Outside,
     /// The configuration file.
     pub config: Option<PathBuf>,
     /// Directory of manifests of further bundles and reporters.

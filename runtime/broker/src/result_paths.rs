@@ -1,6 +1,6 @@
 //! Where the result of a file goes.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashSet;
 use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Component, Path, PathBuf};
@@ -12,45 +12,54 @@ pub struct ResultPaths {
     pub out: PathBuf,
     /// Watched or given directories, absolute.
     pub roots: Vec<PathBuf>,
-    /// Files given by name, each with the path of its result below `out`, without suffix.
-    pub files: HashMap<PathBuf, PathBuf>,
+    /// Files given by name, absolute.
+    pub files: HashSet<PathBuf>,
+    /// In a single run, the directory that it is run in: files have there the places that their
+    /// paths from here say, whatever else is given. A broker has none.
+    pub here: Option<PathBuf>,
     /// All results go into one file of this name instead (`check -c`).
     pub single: Option<PathBuf>,
 }
 
 impl ResultPaths {
-    /// ResultPaths for directories and single files. Files with equal names get their path below the
-    /// common ancestor, so that no result hides another.
-    pub fn new(out: PathBuf, roots: Vec<PathBuf>, files: &[PathBuf]) -> ResultPaths {
-        let mut by_name: BTreeMap<PathBuf, Vec<&PathBuf>> = BTreeMap::new();
-        for file in files {
-            let name = file.file_name().map(PathBuf::from).unwrap_or_default();
-            by_name.entry(name).or_default().push(file);
-        }
-        let mut names = HashMap::new();
-        for (name, same) in by_name {
-            let ancestor = common_ancestor(&same);
-            for file in &same {
-                let below = if same.len() == 1 {
-                    name.clone()
-                } else {
-                    below(file, &ancestor)
-                };
-                names.insert((*file).clone(), below);
-            }
-        }
+    /// For a broker: results mirror the watched directories.
+    pub fn of_watched(out: PathBuf, roots: Vec<PathBuf>) -> ResultPaths {
         ResultPaths {
             out,
             roots,
-            files: names,
+            files: HashSet::new(),
+            here: None,
             single: None,
         }
     }
 
-    /// The path for people: relative to the directory given or watched, or a given file's name.
+    /// For a single run in the directory `here`: results mirror the paths from there, and those of
+    /// files elsewhere their paths from the root, so that equal names never share a result.
+    pub fn of_run(
+        out: PathBuf,
+        here: PathBuf,
+        roots: Vec<PathBuf>,
+        files: &[PathBuf],
+    ) -> ResultPaths {
+        ResultPaths {
+            files: files.iter().cloned().collect(),
+            here: Some(here),
+            ..ResultPaths::of_watched(out, roots)
+        }
+    }
+
+    /// The path for people: relative to the directory that is watched or in which they are.
     pub fn display(&self, path: &Path) -> PathBuf {
-        if let Some(name) = self.files.get(path) {
-            return name.clone();
+        match &self.here {
+            Some(here) => path.strip_prefix(here).unwrap_or(path).to_path_buf(),
+            None => self.relative(path),
+        }
+    }
+
+    /// Where a file lies among its like: below the results, or behind the gate.
+    pub fn relative(&self, path: &Path) -> PathBuf {
+        if let Some(here) = &self.here {
+            return below(path, here);
         }
         match self.roots.as_slice() {
             [root] if path.starts_with(root) => below(path, root),
@@ -65,7 +74,7 @@ impl ResultPaths {
 
     /// Whether the file is among those given or watched.
     pub fn contains(&self, path: &Path) -> bool {
-        self.files.contains_key(path) || self.roots.iter().any(|root| path.starts_with(root))
+        self.files.contains(path) || self.roots.iter().any(|root| path.starts_with(root))
     }
 
     /// The path for people of the file whose result lies there; `None` when it lies elsewhere.
@@ -79,13 +88,20 @@ impl ResultPaths {
     pub fn xqar(&self, path: &Path) -> PathBuf {
         self.single
             .clone()
-            .unwrap_or_else(|| with_suffix(&self.out.join(self.display(path)), ".xqar"))
+            .unwrap_or_else(|| with_suffix(&self.out.join(self.relative(path)), ".xqar"))
     }
 
     /// Where the verdict file of this file goes.
     pub fn verdict(&self, path: &Path) -> PathBuf {
-        with_suffix(&self.out.join(self.display(path)), ".verdict.json")
+        with_suffix(&self.out.join(self.relative(path)), ".verdict.json")
     }
+}
+
+/// Where the verdict file lies that belongs to a result.
+pub fn verdict_beside(xqar: &Path) -> Option<PathBuf> {
+    let stem = xqar.as_os_str().as_bytes().strip_suffix(b".xqar")?;
+    let stem = Path::new(OsStr::from_bytes(stem));
+    Some(with_suffix(stem, ".verdict.json"))
 }
 
 /// `path` with something put behind its name.
@@ -128,7 +144,7 @@ mod tests {
 
     #[test]
     fn results_mirror_the_watched_directory() {
-        let places = ResultPaths::new("/out".into(), paths(&["/farm"]), &[]);
+        let places = ResultPaths::of_watched("/out".into(), paths(&["/farm"]));
         assert_eq!(
             places.xqar(Path::new("/farm/maps/a.xodr")),
             Path::new("/out/maps/a.xodr.xqar")
@@ -139,7 +155,7 @@ mod tests {
 
     #[test]
     fn what_is_not_watched_has_nobodys_place() {
-        let places = ResultPaths::new("/out".into(), paths(&["/farm"]), &[]);
+        let places = ResultPaths::of_watched("/out".into(), paths(&["/farm"]));
         let (inside, outside) = (Path::new("/farm/a.xodr"), Path::new("/old/a.xodr"));
         assert!(places.contains(inside) && !places.contains(outside));
         assert_ne!(places.xqar(inside), places.xqar(outside));
@@ -149,17 +165,37 @@ mod tests {
     }
 
     #[test]
-    fn equal_names_do_not_collide() {
-        let files = paths(&["/x/a/m.xodr", "/x/b/m.xodr", "/x/b/n.xodr"]);
-        let places = ResultPaths::new("/out".into(), vec![], &files);
-        assert_eq!(places.xqar(&files[0]), Path::new("/out/a/m.xodr.xqar"));
-        assert_eq!(places.xqar(&files[1]), Path::new("/out/b/m.xodr.xqar"));
-        assert_eq!(places.xqar(&files[2]), Path::new("/out/n.xodr.xqar"));
+    fn results_of_a_run_mirror_the_paths_from_where_it_is_run() {
+        let files = paths(&["/x/a/m.xodr", "/x/b/m.xodr", "/y/m.xodr"]);
+        let run = |here: &str, files: &[PathBuf]| {
+            ResultPaths::of_run("/out".into(), here.into(), paths(&["/x/c"]), files)
+        };
+        for given in [&files[..], &files[1..2], &[]] {
+            let places = run("/x", given);
+            let xqar = |file: &Path| places.xqar(file);
+            assert_eq!(xqar(&files[0]), Path::new("/out/a/m.xodr.xqar"));
+            assert_eq!(xqar(&files[1]), Path::new("/out/b/m.xodr.xqar"));
+            assert_eq!(xqar(&files[2]), Path::new("/out/y/m.xodr.xqar"));
+            assert_eq!(
+                xqar(Path::new("/x/c/m.xodr")),
+                Path::new("/out/c/m.xodr.xqar")
+            );
+            assert_eq!(places.display(&files[1]), Path::new("b/m.xodr"));
+            assert_eq!(places.display(&files[2]), files[2]);
+        }
+    }
+
+    #[test]
+    fn the_verdict_file_lies_beside() {
+        let beside = |xqar| verdict_beside(Path::new(xqar));
+        let expected = Some(PathBuf::from("/out/a.xodr.verdict.json"));
+        assert_eq!(beside("/out/a.xodr.xqar"), expected);
+        assert_eq!(beside("/out/a.xodr"), None);
     }
 
     #[test]
     fn two_directories_keep_their_files_apart() {
-        let places = ResultPaths::new("/out".into(), paths(&["/x/a", "/x/b"]), &[]);
+        let places = ResultPaths::of_watched("/out".into(), paths(&["/x/a", "/x/b"]));
         assert_eq!(
             places.xqar(Path::new("/x/a/m.xodr")),
             Path::new("/out/a/m.xodr.xqar")
@@ -172,7 +208,7 @@ mod tests {
 
     #[test]
     fn a_directory_inside_another_does_not_move_results() {
-        let places = ResultPaths::new("/out".into(), paths(&["/x", "/x/b"]), &[]);
+        let places = ResultPaths::of_watched("/out".into(), paths(&["/x", "/x/b"]));
         assert_eq!(
             places.xqar(Path::new("/x/b/m.xodr")),
             Path::new("/out/x/b/m.xodr.xqar")

@@ -67,6 +67,11 @@ fn listing(directory: &Path, inode: u64) -> Option<Stamp> {
     })
 }
 
+/// Whether this is the stamp of a directory, as [`stamp_through_links`] gives it.
+pub fn is_listing(stamp: &Stamp) -> bool {
+    stamp.ctime_ns == 0 && stamp.mtime_ns <= 0
+}
+
 /// The stamp in what `stat` returned.
 pub fn from_metadata(data: &Metadata) -> Stamp {
     from_stat(data.len(), Stat::of(data))
@@ -198,6 +203,7 @@ pub(crate) mod tests {
         assert!(!changed(7200), "a clock that was set back");
         let listing = stamp_through_links(dir.path()).unwrap();
         assert!(!racy(listing), "it has no time: {listing:?}");
+        assert!(is_listing(&listing) && !is_listing(&stamp));
     }
 
     #[test]

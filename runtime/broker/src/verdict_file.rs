@@ -1,13 +1,18 @@
 //! The verdict file `NAME.verdict.json` beside a result: everything that a farm needs to decide,
 //! without reading the result itself.
 
+use std::path::Path;
+
 use qcbus_formats::pool::{NotAsked, OWN_BUNDLE, Pooled, Unfinished};
 use qcbus_formats::xqar::{CheckerBundle, Status};
 use qcbus_messages::Verdict;
 use qcbus_messages::path_text::to_text;
 use serde::Serialize;
 
-use crate::core::{FinishedJob, Input, Juror, Jury};
+use crate::core::{FinishedJob, Input, Judged, Juror, Jury};
+
+/// Version of the form.
+pub const FORMAT: u32 = 1;
 
 /// The content of a verdict file. Fields are only ever added.
 #[derive(Debug, Serialize)]
@@ -37,6 +42,10 @@ pub struct VerdictFile<'a> {
     /// Bundles of which a configuration left checkers out.
     not_asked: Vec<NotAskedLine>,
     result: String,
+    /// Files that the verdict depends on and that do not lie behind the gate with it, because they
+    /// lie outside of the watched directories; absent when there is no gate.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    outside_gate: Option<Vec<String>>,
 }
 
 #[derive(Debug, Serialize)]
@@ -70,8 +79,8 @@ struct NotAskedLine {
 pub fn render(
     job: &FinishedJob,
     pooled: &Pooled,
-    verdict: Verdict,
-    xqar: &std::path::Path,
+    judged: &Judged,
+    outside_gate: Option<Vec<&Path>>,
 ) -> Vec<u8> {
     let inputs: &[Input] = job
         .prepared
@@ -83,8 +92,8 @@ pub fn render(
         sha256: sha256(input),
     });
     let file = VerdictFile {
-        format: 1,
-        verdict,
+        format: FORMAT,
+        verdict: judged.verdict,
         input_file: to_text(&job.path),
         sha256: inputs.first().and_then(sha256).unwrap_or_default(),
         depends_on: depends_on.collect(),
@@ -101,13 +110,14 @@ pub fn render(
         skipped: unfinished(pooled, |it| it.ending.status() == Status::Skipped),
         failed: unfinished(pooled, |it| it.ending.status() == Status::Error),
         open: unfinished(pooled, |it| {
-            verdict == Verdict::Undetermined && it.ending.is_open()
+            judged.verdict == Verdict::Undetermined && it.ending.is_open()
         }),
         not_asked: NotAsked::of(&pooled.results)
             .into_iter()
             .map(not_asked)
             .collect(),
-        result: to_text(xqar),
+        result: to_text(&judged.xqar),
+        outside_gate: outside_gate.map(|paths| paths.into_iter().map(to_text).collect()),
     };
     let mut text = serde_json::to_vec_pretty(&file).unwrap_or_default();
     text.push(b'\n');

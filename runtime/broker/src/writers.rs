@@ -13,7 +13,7 @@ use qcbus_formats::config::Config;
 use qcbus_messages::path_text::to_text;
 use tokio::sync::mpsc::UnboundedSender;
 
-use crate::core::{Event, FinishedJob, StoreOutcome};
+use crate::core::{Event, FinishedJob, Judged, Notice, StoreOutcome};
 use crate::journal::Entry;
 use crate::store::{Store, Trouble};
 
@@ -36,6 +36,30 @@ pub enum Order {
         /// Who is to take back a report about it.
         reporters: Vec<String>,
     },
+    /// Remember a verdict with fresh stamps.
+    Restamp {
+        /// The file.
+        path: Arc<Path>,
+        /// Its verdict.
+        judged: Arc<Judged>,
+    },
+    /// Take a file from behind the gate, with everything that rests on it.
+    CloseGate {
+        /// The file.
+        path: Arc<Path>,
+    },
+    /// Publish a file whose acceptance stands.
+    OpenGate {
+        /// The file.
+        path: Arc<Path>,
+        /// Its verdict.
+        judged: Arc<Judged>,
+    },
+    /// Publish an accepted file, if that has not been done, and what waited for it.
+    Follow {
+        /// The file.
+        path: Arc<Path>,
+    },
     /// Remember something.
     Record(Entry),
 }
@@ -57,7 +81,7 @@ impl Writers {
         count: usize,
         store: &Arc<Store>,
         events: &UnboundedSender<Event>,
-        notices: &UnboundedSender<String>,
+        notices: &UnboundedSender<Notice>,
     ) -> std::io::Result<Writers> {
         let mut writers = Writers {
             writers: Vec::new(),
@@ -107,10 +131,15 @@ impl Order {
     fn path(&self) -> Option<&Arc<Path>> {
         match self {
             Order::Store { job, .. } => Some(&job.path),
-            Order::Withdraw { path, .. } => Some(path),
+            Order::Withdraw { path, .. }
+            | Order::Restamp { path, .. }
+            | Order::CloseGate { path }
+            | Order::OpenGate { path, .. }
+            | Order::Follow { path } => Some(path),
             Order::Record(
                 Entry::Judged { path, .. }
                 | Entry::Withdrawn { path, .. }
+                | Entry::Left { path, .. }
                 | Entry::Voided { path, .. }
                 | Entry::Delivered { path, .. },
             ) => Some(path),
@@ -122,7 +151,7 @@ impl Order {
 struct Writer {
     store: Arc<Store>,
     events: UnboundedSender<Event>,
-    notices: UnboundedSender<String>,
+    notices: UnboundedSender<Notice>,
     /// Orders that failed and are tried again, with everything that came after them for the same
     /// files, in order.
     waiting: VecDeque<Order>,
@@ -174,7 +203,8 @@ impl Writer {
         let held_up = order.path().is_some_and(|path| self.held_up.contains(path));
         if !self.stopped && !held_up {
             match self.carry_out(&mut order) {
-                Ok(()) => return,
+                Ok(None) => return,
+                Ok(Some(next)) => return self.take(next),
                 Err(trouble) => self.hold_up(&trouble),
             }
         }
@@ -186,9 +216,10 @@ impl Writer {
         self.stopped |= trouble.concerns_all;
         if !self.told {
             self.told = true;
-            let _ = self
-                .notices
-                .send(format!("{}; it is tried again", trouble.what));
+            let _ = self.notices.send(Notice::Storing(format!(
+                "{}; it is tried again",
+                trouble.what
+            )));
         }
     }
 
@@ -201,20 +232,43 @@ impl Writer {
         }
     }
 
-    fn carry_out(&self, order: &mut Order) -> Result<(), Trouble> {
+    /// Does an order, and says what is to be done next.
+    fn carry_out(&self, order: &mut Order) -> Result<Option<Order>, Trouble> {
         match order {
             Order::Store { job, config, root } => {
                 let root = root.as_deref();
                 let outcome = self.store.store(job, config.as_deref(), root);
+                let published = matches!(&outcome, StoreOutcome::Stored(it) if it.is_accepted());
+                let path = job.path.clone();
                 self.tell(job, outcome);
-                Ok(())
+                return Ok(published.then_some(Order::Follow { path }));
             }
-            Order::Withdraw { path, reporters } => self.store.withdraw(path, reporters),
+            Order::Withdraw { path, reporters } => self.store.withdraw(path, reporters)?,
+            Order::Restamp { path, judged } => {
+                let entry = Entry::Judged {
+                    path: path.clone(),
+                    judged: judged.clone(),
+                    history: None,
+                    written: None,
+                };
+                self.store.record(&[entry]).map_err(Trouble::of_all)?;
+                return self.open_gate(path, judged);
+            }
+            Order::CloseGate { path } => self.store.close_gate(path)?,
+            Order::OpenGate { path, judged } => return self.open_gate(path, judged),
+            Order::Follow { path } => self.store.follow(path)?,
             Order::Record(entry) => {
                 let recorded = self.store.record(std::slice::from_ref(entry));
-                recorded.map_err(Trouble::of_all)
+                recorded.map_err(Trouble::of_all)?;
             }
         }
+        Ok(None)
+    }
+
+    fn open_gate(&self, path: &Arc<Path>, judged: &Judged) -> Result<Option<Order>, Trouble> {
+        self.store.open_gate(path, judged)?;
+        let path = path.clone();
+        Ok(judged.is_accepted().then_some(Order::Follow { path }))
     }
 
     fn tell(&self, job: &FinishedJob, outcome: StoreOutcome) {
@@ -223,9 +277,9 @@ impl Writer {
             && self.store.retries
         {
             let (path, why) = (to_text(&job.path), judged.why.join("; "));
-            let _ = self.notices.send(format!(
+            let _ = self.notices.send(Notice::Storing(format!(
                 "{path} stays undetermined until it changes or qcbus is started anew: {why}"
-            ));
+            )));
         }
         // After the end of the loop nobody waits for this.
         let _ = self.events.send(Event::Stored {

@@ -192,6 +192,9 @@ pub struct ServeArgs {
     /// Publish accepted files here, and only those
     #[arg(long, value_name = "DIR")]
     pub gate: Option<PathBuf>,
+    /// What becomes behind the gate of a file that depends on others outside of DIR
+    #[arg(long, value_name = "WHAT", value_enum, default_value_t = OutsideArg::Name, hide_short_help = true)]
+    pub gate_outside: OutsideArg,
     /// Run a reporter; may be given several times
     #[arg(long, value_name = "NAME", value_parser = reporter())]
     pub report: Vec<&'static StandardReporter>,
@@ -213,6 +216,15 @@ pub struct ServeArgs {
     /// Caps.
     #[command(flatten)]
     pub limits: LimitArgs,
+}
+
+/// What becomes behind the gate of a file that depends on others outside of what is watched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum OutsideArg {
+    /// It is published, and its verdict file names them
+    Name,
+    /// It is not published
+    Refuse,
 }
 
 /// `qcbus status`.

@@ -54,6 +54,8 @@ pub enum Notice {
     Watching(String),
     /// Of the configuration and the manifests.
     Loading(String),
+    /// An accepted file is not published, because of something that it depends on.
+    HeldBack(String),
     /// Of the journal and the results on the disk.
     Storing(String),
     /// Something in the directories that are looked at cannot be looked at.
@@ -90,6 +92,7 @@ impl Notice {
             Notice::NotReported { .. } => "not-reported",
             Notice::Watching(_) => "watching",
             Notice::Loading(_) => "loading",
+            Notice::HeldBack(_) => "held-back",
             Notice::Storing(_) => "storing",
             Notice::Unseen(_) => "unseen",
         }
@@ -140,6 +143,7 @@ impl fmt::Display for Notice {
             | Notice::NotDelivered(text)
             | Notice::Watching(text)
             | Notice::Loading(text)
+            | Notice::HeldBack(text)
             | Notice::Storing(text) => f.write_str(text),
             Notice::Unseen(unseen) => unseen.fmt(f),
         }

@@ -142,6 +142,11 @@ pub struct Judged {
 }
 
 impl Judged {
+    /// Whether the verdict is an acceptance.
+    pub fn is_accepted(&self) -> bool {
+        self.verdict == Verdict::Accepted
+    }
+
     /// Whether there is a result.
     pub fn is_written(&self) -> bool {
         !self.xqar.as_os_str().is_empty()

@@ -65,12 +65,16 @@ impl Broker {
                     .order(&at, Order::Record(Entry::Voided { path, reporter }));
             }
             Action::Restamp { path, judged } => {
-                let entry = Entry::Judged {
-                    path: path.clone(),
-                    judged,
-                    history: None,
-                };
-                self.writers.order(&path, Order::Record(entry));
+                let at = path.clone();
+                self.writers.order(&at, Order::Restamp { path, judged });
+            }
+            Action::CloseGate { path } => {
+                let at = path.clone();
+                self.writers.order(&at, Order::CloseGate { path });
+            }
+            Action::OpenGate { path, judged } => {
+                let at = path.clone();
+                self.writers.order(&at, Order::OpenGate { path, judged });
             }
             Action::Deliver {
                 session,
@@ -110,8 +114,6 @@ impl Broker {
             }
             Action::Enrol(member) => self.remember_at_once(Entry::Enrolled(member)),
             Action::Strike { name } => self.remember_at_once(Entry::Struck { name }),
-            // There is nothing to do before the gate holds claims.
-            Action::CloseGate { .. } | Action::OpenGate { .. } => {}
             Action::Judged {
                 path,
                 judged,

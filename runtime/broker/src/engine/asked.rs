@@ -14,6 +14,7 @@ use super::Broker;
 use super::start::in_force;
 use crate::control::Asked;
 use crate::core::{Event, Notice, Stamp, Ticket};
+use crate::gate::Gate;
 use crate::reload::{LoadError, differences};
 use crate::stamp::{stamp_of, stamp_through_links};
 
@@ -198,6 +199,7 @@ impl Broker {
             out: self.options.out.clone(),
             unseen: self.all_unseen(),
             bundles_d: self.options.bundles_d.clone(),
+            gate: self.store.gate.as_ref().map(Gate::status),
             ..self.state.status()
         }
     }

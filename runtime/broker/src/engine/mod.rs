@@ -19,6 +19,8 @@ use tokio::sync::{mpsc, oneshot};
 use crate::control::{Asked, ControlSocket};
 use crate::core::{Event, Judged, Notice, SessionId, State, Ticket};
 use crate::demand::InForce;
+use crate::directory_lock::{DirectoryLock, LockError};
+use crate::gate::GateError;
 use crate::intake::Intake;
 use crate::journal::JournalError;
 use crate::options::Options;
@@ -41,6 +43,12 @@ pub enum StartError {
     /// The configuration or a manifest.
     #[error("{0}")]
     Load(#[from] LoadError),
+    /// The directory of results is somebody else's.
+    #[error("{0}")]
+    Results(#[from] LockError),
+    /// The gate cannot be had.
+    #[error("{0}")]
+    Gate(#[from] GateError),
     /// Anything that the system refuses.
     #[error("{what}: {source}")]
     System {
@@ -106,7 +114,7 @@ pub struct Broker {
     tickets: HashMap<Ticket, oneshot::Sender<Response>>,
     downs: Vec<oneshot::Sender<Response>>,
     next_ticket: u64,
-    /// Where results lay when other directories were watched, by reporter and file, until the
+    /// Where the results of files lay that have been withdrawn, by reporter and file, until the
     /// reporter has taken back its report.
     left: HashMap<(String, Arc<Path>), PathBuf>,
     /// Results were stored or delivered since free memory was last given back.
@@ -114,6 +122,8 @@ pub struct Broker {
     inbox: Inbox,
     tell: Box<dyn FnMut(Told) + Send>,
     control: ControlSocket,
+    /// Nobody else writes results there.
+    _results: DirectoryLock,
 }
 
 impl std::fmt::Debug for Broker {
@@ -129,8 +139,8 @@ struct Inbox {
     events_in: mpsc::UnboundedSender<Event>,
     seen: mpsc::UnboundedReceiver<Seen>,
     asked: mpsc::UnboundedReceiver<Asked>,
-    notices: mpsc::UnboundedReceiver<String>,
-    notices_in: mpsc::UnboundedSender<String>,
+    notices: mpsc::UnboundedReceiver<Notice>,
+    notices_in: mpsc::UnboundedSender<Notice>,
     deliveries: mpsc::UnboundedReceiver<Ready>,
     deliveries_in: mpsc::UnboundedSender<Ready>,
 }
@@ -199,7 +209,7 @@ impl Broker {
                 Some(event) = self.inbox.events.recv() => self.own_event(event),
                 Some(seen) = self.inbox.seen.recv() => self.seen(seen),
                 Some(asked) = self.inbox.asked.recv() => self.asked(asked),
-                Some(notice) = self.inbox.notices.recv() => { self.say(Notice::Storing(notice)); true }
+                Some(notice) = self.inbox.notices.recv() => { self.say(notice); true }
                 Some(ready) = self.inbox.deliveries.recv() => self.delivery(ready),
                 Some(stop) = stops.recv() => match stop {
                     Stop::Drain => { self.notify_stopping(); self.handle(Event::Drain) }
@@ -249,7 +259,7 @@ impl Broker {
         tokio::task::spawn_blocking(move || {
             if let Err(why) = store.prune(keep) {
                 // After the end of the loop nobody listens.
-                let _ = notices.send(why);
+                let _ = notices.send(Notice::Storing(why));
             }
         });
     }
@@ -355,7 +365,7 @@ impl Broker {
 struct Senders {
     seen: mpsc::UnboundedSender<Seen>,
     asked: mpsc::UnboundedSender<Asked>,
-    notices: mpsc::UnboundedSender<String>,
+    notices: mpsc::UnboundedSender<Notice>,
 }
 
 impl Inbox {

@@ -3,27 +3,30 @@
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicU64;
-use std::sync::{Arc, Mutex, RwLock};
+use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use qcbus_bus::Host;
+use qcbus_messages::Role;
 use qcbus_messages::control::Unseen;
 use tokio::sync::mpsc;
 
 use super::{Broker, Inbox, Sessions, StartError, Told};
 use crate::control::ControlSocket;
-use crate::core::{Stamp, State};
+use crate::core::{Notice, Stamp, State};
 use crate::demand::InForce;
+use crate::directory_lock::{DirectoryLock, LockError, Purpose};
 use crate::disk::sweep;
+use crate::gate::{Gate, GateError, GateOptions};
 use crate::intake::Intake;
-use crate::journal::{Journal, Remembered};
+use crate::journal::Journal;
 use crate::options::Options;
 use crate::reload::{LoadError, Loaded, Sources};
 use crate::result_paths::ResultPaths;
-use crate::stamp::{stamp_of, stamp_through_links};
-use crate::store::Store;
+use crate::stamp::stamp_of;
+use crate::store::{Reconciled, Store, remove_earlier_results};
 use crate::supervise::{Children, Surroundings};
-use crate::watch::{Seen, WatchOptions, Watcher, scan_directory};
+use crate::watch::{Seen, WatchOptions, Watcher, is_looked_at, scan_directory};
 use crate::writers::{Order, Writers};
 
 impl Broker {
@@ -50,8 +53,7 @@ impl Broker {
             Some(state) => Journal::open(state, options.instance.name())?,
             None => Journal::in_memory()?,
         };
-        let remembered = journal.remembered()?;
-        let voids = journal.voids()?;
+        let results = results_of(&options)?;
         let members = journal.members()?;
         let in_force = Arc::new(in_force(&loaded)?);
         host.set_config(in_force.digest, &in_force.encoded);
@@ -59,11 +61,9 @@ impl Broker {
         let (inbox, senders) = Inbox::new();
         let control = ControlSocket::listen(options.instance.dir(), senders.asked)
             .map_err(|source| system("listen for commands", source))?;
-        if options.watch {
-            sweep(&options.out);
-            options.gate.iter().for_each(|gate| sweep(gate));
-        }
-        let store = Arc::new(store(&options, journal));
+        let store = Arc::new(store(&options, journal, &senders.notices)?);
+        let reconciled = reconcile(&options, &loaded, &store)?;
+        let voids = store.voids()?;
         let writers = Writers::start(
             options.settings.max_storing,
             &store,
@@ -96,6 +96,7 @@ impl Broker {
             inbox,
             tell: Box::new(tell),
             control,
+            _results: results,
             options,
         };
         for member in members {
@@ -104,7 +105,10 @@ impl Broker {
         for void in voids {
             broker.remember_void(&void.path, &void.reporter, void.xqar);
         }
-        let dependencies = broker.remember(remembered);
+        for said in &reconciled.said {
+            let _ = senders.notices.send(Notice::Storing(said.clone()));
+        }
+        let dependencies = broker.remember(reconciled);
         broker.look(senders.seen)?;
         if let Some(watcher) = &broker.watcher {
             watcher.depend(dependencies);
@@ -112,54 +116,22 @@ impl Broker {
         Ok(broker)
     }
 
-    /// Takes over what the journal knows, as far as it is still true: the result must be where it
-    /// belongs, and what has changed while nobody watched is looked at again. Returns what the
-    /// verdicts depend on.
-    fn remember(&mut self, files: Vec<Remembered>) -> Vec<(Arc<Path>, Option<Stamp>)> {
-        let mut stamps: BTreeMap<Arc<Path>, Option<Stamp>> = BTreeMap::new();
-        for mut file in files {
-            if self.store.has_moved(&file.path, &file.judged) {
-                self.store.lies_elsewhere(&file.path, &file.judged);
-            }
-            if stamp_of(&file.path).is_err() {
-                // It cannot be looked at now, which says nothing about it: its result is kept.
-                continue;
-            }
-            if !self.store.is_complete(&file.path, &file.judged) {
-                self.forget_incomplete(file);
-                continue;
-            }
+    /// Takes over what stands; what has changed while nobody watched is looked at again. Returns
+    /// what the verdicts depend on.
+    fn remember(&mut self, found: Reconciled) -> Vec<(Arc<Path>, Option<Stamp>)> {
+        for mut file in found.standing {
             for input in file.judged.inputs.iter().skip(1) {
-                let path = &input.path;
-                let now = *stamps
-                    .entry(path.clone())
-                    .or_insert_with(|| stamp_through_links(path));
+                let now = found.stamps.get(&input.path).copied().flatten();
                 file.judged.racy |= now != input.content.map(|content| content.0);
             }
             self.state
                 .remember(&file.path, file.judged, &file.delivered);
         }
-        stamps.into_iter().collect()
-    }
-
-    /// A result that is not all there counts for nothing, nor does what was reported of it; one
-    /// that lies where it would not be written today is withdrawn from there. What lies outside the
-    /// directories that are watched today is left alone until its file has gone.
-    fn forget_incomplete(&mut self, file: Remembered) {
-        let gone = !file.path.exists();
-        if !self.store.places.contains(&file.path) && !gone {
-            return;
+        for path in found.unpublished {
+            let at = path.clone();
+            self.writers.order(&at, Order::Follow { path });
         }
-        let moved = self.store.has_moved(&file.path, &file.judged);
-        let reporters: Vec<String> = file.delivered.into_iter().map(|(name, _)| name).collect();
-        for reporter in &reporters {
-            let left = moved.then(|| file.judged.xqar.clone());
-            self.remember_void(&file.path, reporter, left);
-        }
-        if gone || moved {
-            let (at, path) = (file.path.clone(), file.path);
-            self.writers.order(&at, Order::Withdraw { path, reporters });
-        }
+        found.stamps.into_iter().collect()
     }
 
     /// A reporter is to take back its report; `left` says where the result lay.
@@ -195,21 +167,76 @@ pub(super) fn in_force(loaded: &Loaded) -> Result<InForce, LoadError> {
     InForce::new(loaded.config.clone()).map_err(|error| LoadError::Config(error.to_string()))
 }
 
-fn store(options: &Options, journal: Journal) -> Store {
-    let mut places = ResultPaths::new(options.out.clone(), options.roots.clone(), &options.files);
+/// Nobody else may write results there meanwhile, but for other runs of `check`.
+fn results_of(options: &Options) -> Result<DirectoryLock, LockError> {
+    if options.watch {
+        DirectoryLock::take(&options.out, Purpose::Results, options.instance.name())
+    } else {
+        DirectoryLock::share(&options.out)
+    }
+}
+
+fn store(
+    options: &Options,
+    journal: Journal,
+    notices: &mpsc::UnboundedSender<Notice>,
+) -> Result<Store, GateError> {
+    let (out, roots) = (options.out.clone(), options.roots.clone());
+    let mut places = match &options.here {
+        Some(here) => ResultPaths::of_run(out, here.clone(), roots, &options.files),
+        None => ResultPaths::of_watched(out, roots),
+    };
     places.single.clone_from(&options.single_result);
-    Store {
+    let gate = options.gate.as_ref();
+    let gate = gate.map(|directory| gate_of(options, directory, &places, notices.clone()));
+    Ok(Store {
         places,
         dialect: options.dialect,
         durable: options.durable,
         verdict_files: options.verdict_files,
         retries: options.watch,
-        gate: options.gate.clone(),
+        gate: gate.transpose()?,
         journal: Mutex::new(journal),
-        moving: RwLock::new(()),
-        elsewhere: Mutex::default(),
         epoch: AtomicU64::new(0),
+    })
+}
+
+fn gate_of(
+    options: &Options,
+    directory: &Path,
+    paths: &ResultPaths,
+    notices: mpsc::UnboundedSender<Notice>,
+) -> Result<Gate, GateError> {
+    let roots = options.roots.clone();
+    let gate = GateOptions {
+        directory: directory.to_path_buf(),
+        paths: paths.clone(),
+        durable: options.durable,
+        outside: options.gate_outside,
+        is_judged: Box::new(move |path| is_looked_at(&roots, path)),
+        say: Box::new(move |text| {
+            // After the end of the loop nobody listens.
+            let _ = notices.send(Notice::HeldBack(text));
+        }),
+    };
+    Gate::open(gate, options.instance.name())
+}
+
+/// Sweeps and brings in agreement what is on the disk and what is remembered, before anything is
+/// judged.
+fn reconcile(options: &Options, loaded: &Loaded, store: &Store) -> Result<Reconciled, StartError> {
+    if !options.watch {
+        return Ok(Reconciled::nothing(remove_earlier_results(&store.places)));
     }
+    sweep(&options.out);
+    options.gate.iter().for_each(|gate| sweep(gate));
+    let reporters = loaded
+        .children
+        .iter()
+        .filter(|it| it.role == Role::Reporter);
+    let reporters: Vec<String> = reporters.map(|it| it.name.clone()).collect();
+    let remembered = store.remembered()?;
+    Ok(store.reconcile(remembered, &reporters)?)
 }
 
 fn intake(options: &Options, host: &Host) -> Arc<Intake> {

@@ -19,6 +19,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Sender, channel};
 use std::time::Duration;
 
+use qcbus_document::FileKind;
 use qcbus_messages::control::Unseen;
 
 use self::ignore::IgnoreRules;
@@ -41,6 +42,20 @@ pub fn is_left_alone(roots: &[PathBuf], file: &Path) -> bool {
         .map(|root| IgnoreRules::new(root).ignores(file, false))
         .peekable();
     ignored.peek().is_some() && ignored.all(|it| it)
+}
+
+/// Whether a file is one that a look through the roots finds: of a kind that is checked, not
+/// ignored, and not behind a link to a directory.
+pub fn is_looked_at(roots: &[PathBuf], file: &Path) -> bool {
+    let reached = |root: &PathBuf| {
+        let directories = file
+            .ancestors()
+            .skip(1)
+            .take_while(|it| it.starts_with(root));
+        let mut below = directories.filter(|it| it != root);
+        file.starts_with(root) && !below.any(Path::is_symlink)
+    };
+    FileKind::of_path(file).is_some() && roots.iter().any(reached) && !is_left_alone(roots, file)
 }
 
 /// What the watcher has to say.

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use qcbus_broker::core::{Delivery, Judged, Notice, Settings};
-use qcbus_broker::{Broker, Options, ResultPaths, Told};
+use qcbus_broker::{Broker, Options, Outside, ResultPaths, StartError, Told};
 use qcbus_bus::{HostOptions, Instance};
 use qcbus_document::{FileKind, Suffix};
 use qcbus_formats::config::Config;
@@ -79,6 +79,7 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         watch: false,
         poll: None,
         rescan: Duration::MAX,
+        here: Some(here()?),
         single_result: asam.then(|| out.join("Result.xqar")),
         out,
         state: None,
@@ -87,6 +88,7 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         durable: false,
         verdict_files: false,
         gate: None,
+        gate_outside: Outside::default(),
         config,
         bundles_d,
         standard: wanted_bundles(bundles.map_err(usage)?, parsed.as_ref()),
@@ -106,6 +108,11 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         options,
         config: parsed.map(Arc::new),
     })
+}
+
+/// The directory in which the command was typed.
+fn here() -> Result<PathBuf, Refusal> {
+    std::env::current_dir().map_err(|error| usage(format!("cannot see where this is: {error}")))
 }
 
 /// Refuses a place for results where nothing can be written, before anything is checked for it.
@@ -233,13 +240,11 @@ fn random_bytes() -> Result<[u8; 8], String> {
 }
 
 fn check(args: &CheckArgs, prepared: Prepared) -> Exit {
-    let places = {
-        let options = &prepared.options;
-        let mut places =
-            ResultPaths::new(options.out.clone(), options.roots.clone(), &options.files);
-        places.single.clone_from(&options.single_result);
-        places
-    };
+    let options = &prepared.options;
+    let here = options.here.clone().unwrap_or_default();
+    let (out, roots) = (options.out.clone(), options.roots.clone());
+    let mut places = ResultPaths::of_run(out, here, roots, &options.files);
+    places.single.clone_from(&options.single_result);
     let printer = Printer {
         places,
         config: prepared.config,
@@ -284,7 +289,7 @@ fn drive(options: Options, printer: &Arc<Mutex<Printer>>) -> Result<(), Refusal>
                 .told(told);
         };
         let broker = Broker::start(options, tell).map_err(|error| match error {
-            qcbus_broker::StartError::Load(_) => usage(error.to_string()),
+            StartError::Load(_) | StartError::Results(_) => usage(error.to_string()),
             _ => internal(error.to_string()),
         })?;
         let stops = super::stops::listen().map_err(|error| internal(error.to_string()))?;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use qcbus_broker::journal::JournalError;
-use qcbus_broker::{Broker, Options, StartError, Told};
+use qcbus_broker::{Broker, GateError, LockError, Options, Outside, StartError, Told};
 use qcbus_bus::{HostOptions, StartError as BusError};
 use qcbus_messages::Exit;
 use qcbus_messages::path_text::to_text;
@@ -11,7 +11,7 @@ use qcbus_messages::path_text::to_text;
 use super::settings::{
     absolute, dialect, instance, limits, manifest_directory, memory_limit, program, real, settings,
 };
-use crate::args::ServeArgs;
+use crate::args::{OutsideArg, ServeArgs};
 use crate::{standard, talk};
 
 /// Runs the command.
@@ -49,7 +49,9 @@ async fn serve(options: Options) -> Exit {
             return match error {
                 StartError::Load(_)
                 | StartError::Bus(BusError::AlreadyRunning { .. })
-                | StartError::Journal(JournalError::Held { .. }) => Exit::Usage,
+                | StartError::Journal(JournalError::State(LockError::Held { .. }))
+                | StartError::Results(LockError::Held { .. } | LockError::Shared { .. })
+                | StartError::Gate(GateError::Lock(_) | GateError::Foreign { .. }) => Exit::Usage,
                 _ => Exit::Internal,
             };
         }
@@ -130,6 +132,20 @@ fn keep_apart(gate: &Path, roots: &[PathBuf]) -> Result<(), String> {
     Ok(())
 }
 
+/// Refuses a gate that shares its directory with something else of the broker: whatever lies there
+/// and was not published is removed.
+fn of_its_own(gate: &Path, other: &Path, what: &str) -> Result<(), String> {
+    if !gate.starts_with(other) && !other.starts_with(gate) {
+        return Ok(());
+    }
+    Err(format!(
+        "the gate {} and the {what} {} lie in each other: whatever was not published is removed \
+         from a gate; choose a directory of its own for it",
+        gate.display(),
+        other.display()
+    ))
+}
+
 fn options(args: &ServeArgs) -> Result<Options, String> {
     let mut roots = Vec::new();
     for directory in &args.directories {
@@ -164,6 +180,10 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         Some(named) => manifest_directory(named)?,
         None => state.join("bundles.d"),
     };
+    if let Some(gate) = &gate {
+        of_its_own(gate, &real(&out), "directory of results")?;
+        of_its_own(gate, &real(&state), "state directory")?;
+    }
     let program = program()?;
     let every_kind = qcbus_document::FileKind::ALL.into_iter().collect();
     let mut children = if args.no_standard_bundles {
@@ -180,6 +200,7 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         watch: true,
         poll: args.poll,
         rescan: args.rescan,
+        here: None,
         single_result: None,
         bundles_d: Some(bundles_d),
         out,
@@ -189,6 +210,10 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         durable: true,
         verdict_files: true,
         gate,
+        gate_outside: match args.gate_outside {
+            OutsideArg::Name => Outside::Name,
+            OutsideArg::Refuse => Outside::Refuse,
+        },
         config: args.config.as_deref().map(absolute),
         standard: children,
         reporters,

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use qcbus_messages::Exit;
-use qcbus_messages::control::{PeerStatus, Request, Response, Status};
+use qcbus_messages::control::{GateStatus, PeerStatus, Request, Response, Status};
 
 use super::remote::ask;
 use crate::args::StatusArgs;
@@ -61,6 +61,15 @@ pub fn render(status: &Status) -> String {
         line("watching", format!("{}{mode}", directory.display()));
     }
     line("results", status.out.display().to_string());
+    if let Some(gate) = &status.gate {
+        line("gate", gate_line(gate));
+        for held in &gate.examples {
+            line(
+                "held back",
+                format!("{}: {}", held.file.display(), held.why),
+            );
+        }
+    }
     line(
         "files",
         format!(
@@ -88,6 +97,14 @@ pub fn render(status: &Status) -> String {
         line("note", notice.text.clone());
     }
     text
+}
+
+fn gate_line(gate: &GateStatus) -> String {
+    let mut line = format!("{}: {} published", gate.directory.display(), gate.published);
+    if gate.held_back > 0 {
+        let _ = write!(line, ", {} accepted and held back", gate.held_back);
+    }
+    line
 }
 
 fn queue_line(queue: &qcbus_messages::control::QueueStatus) -> String {

@@ -1,0 +1,69 @@
+//! What a result is about, without reading all of it.
+
+use quick_xml::events::{BytesStart, Event};
+use quick_xml::{Reader, XmlVersion};
+
+use crate::config::INPUT_PARAMS;
+
+/// The checked file that a result names first: the parameter `InputFile` of a bundle. `head` is the
+/// beginning of a result; `None` when it is none, or the parameter does not come in it.
+pub fn input_file(head: &[u8]) -> Option<String> {
+    let mut reader = Reader::from_reader(head);
+    let mut in_results = false;
+    loop {
+        let element = match reader.read_event().ok()? {
+            Event::Start(element) | Event::Empty(element) => element,
+            Event::Eof => return None,
+            _ => continue,
+        };
+        let name = element.local_name();
+        if !in_results && name.as_ref() != "CheckerResults" {
+            return None;
+        }
+        in_results = true;
+        let is_input = |it: &String| it == INPUT_PARAMS[0];
+        if name.as_ref() == "Param" && attribute(&element, "name").as_ref().is_some_and(is_input) {
+            return attribute(&element, "value").filter(|it| !it.is_empty());
+        }
+    }
+}
+
+fn attribute(element: &BytesStart<'_>, name: &str) -> Option<String> {
+    let attribute = element.try_get_attribute(name).ok()??;
+    attribute
+        .normalized_value(XmlVersion::Implicit1_0)
+        .ok()
+        .map(|it| it.into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::xqar::{CheckerBundle, Dialect, Param, Results, write};
+
+    #[test]
+    fn the_checked_file_is_found_in_the_beginning() {
+        let value = "/a <b> & \"c\".xodr".to_owned();
+        let results = Results {
+            version: "1.0.0".into(),
+            bundles: vec![CheckerBundle {
+                params: vec![Param {
+                    name: "InputFile".into(),
+                    value: value.clone(),
+                }],
+                ..CheckerBundle::default()
+            }],
+        };
+        for dialect in [Dialect::Current, Dialect::Qc4Openx] {
+            let text = write(&results, dialect);
+            assert_eq!(input_file(text.as_bytes()), Some(value.clone()));
+            let end = text.find("CheckerBundle").unwrap();
+            assert_eq!(input_file(&text.as_bytes()[..end]), None);
+        }
+        assert_eq!(
+            input_file(b"<Config><Param name=\"InputFile\" value=\"a\"/></Config>"),
+            None
+        );
+        assert_eq!(input_file(b"no result"), None);
+    }
+}

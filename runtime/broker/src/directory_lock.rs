@@ -1,0 +1,253 @@
+//! Who has a directory: the state, the results and the gate of a broker are each nobody else's
+//! while it runs.
+
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+
+use qcbus_messages::path_text::to_text;
+
+/// What a directory is to the one who has it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Purpose {
+    /// A broker's journal lies there.
+    State,
+    /// Results are written there.
+    Results,
+    /// Accepted files are published there.
+    Gate,
+}
+
+impl Purpose {
+    fn as_str(self) -> &'static str {
+        match self {
+            Purpose::State => "the state",
+            Purpose::Results => "the directory of results",
+            Purpose::Gate => "the gate",
+        }
+    }
+
+    fn way_out(self) -> &'static str {
+        match self {
+            Purpose::State => "another directory with --out or --state",
+            Purpose::Results => "another directory with --out",
+            Purpose::Gate => "another directory with --gate",
+        }
+    }
+
+    /// Name of the file in which the holder says who it is. It stays when nobody holds anything.
+    fn file(self) -> &'static str {
+        match self {
+            Purpose::State => "lock",
+            Purpose::Results => ".qcbus/results",
+            Purpose::Gate => GATE_FILE,
+        }
+    }
+}
+
+/// Name of the file that tells a gate from any other directory.
+pub const GATE_FILE: &str = ".qcbus-gate";
+
+/// Why a directory cannot be had, with the way out.
+#[derive(Debug, thiserror::Error)]
+pub enum LockError {
+    /// A broker has it.
+    #[error(
+        "{} is {} of another broker that runs ({holder}); stop that one with `qcbus down`, or give this one {}",
+        to_text(directory), purpose.as_str(), purpose.way_out()
+    )]
+    Held {
+        /// The directory.
+        directory: PathBuf,
+        /// What it is to that broker.
+        purpose: Purpose,
+        /// Who.
+        holder: String,
+    },
+    /// Runs of `qcbus check` write into it.
+    #[error(
+        "`qcbus check` is writing results into {}; wait for its end, or choose another directory with --out",
+        to_text(directory)
+    )]
+    Shared {
+        /// The directory.
+        directory: PathBuf,
+    },
+    /// It cannot be taken.
+    #[error("cannot write {}: {source}; choose {}", to_text(path), purpose.way_out())]
+    Unusable {
+        /// The directory, or the file in it.
+        path: PathBuf,
+        /// What it was to be.
+        purpose: Purpose,
+        /// What the system says.
+        source: io::Error,
+    },
+}
+
+/// A directory that is ours until this is dropped, or the process ends in whatever way.
+#[derive(Debug)]
+pub struct DirectoryLock {
+    file: File,
+    /// The directory, if it was made for this and is to go with it as long as it is empty.
+    made: Option<PathBuf>,
+}
+
+impl DirectoryLock {
+    /// Takes a directory for the broker of an instance alone.
+    ///
+    /// # Errors
+    /// [`LockError`]; each says what to do.
+    pub fn take(
+        directory: &Path,
+        purpose: Purpose,
+        instance: &str,
+    ) -> Result<DirectoryLock, LockError> {
+        let mut file = open(directory, purpose)?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Err(refusal(&mut file, directory, purpose)),
+            Err(TryLockError::Error(error)) => without_locks(directory, &error),
+        }
+        // Only for whoever is refused: on a full disk the lock holds without it.
+        let _ = introduce(&mut file, directory, purpose, instance);
+        Ok(DirectoryLock { file, made: None })
+    }
+
+    /// Takes a directory of results together with others that do the same: runs of `check`.
+    ///
+    /// # Errors
+    /// [`LockError`]; each says what to do.
+    pub fn share(directory: &Path) -> Result<DirectoryLock, LockError> {
+        let made = (!directory.exists()).then(|| directory.to_path_buf());
+        let mut file = open(directory, Purpose::Results)?;
+        match file.try_lock_shared() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                return Err(refusal(&mut file, directory, Purpose::Results));
+            }
+            Err(TryLockError::Error(error)) => without_locks(directory, &error),
+        }
+        Ok(DirectoryLock { file, made })
+    }
+}
+
+impl Drop for DirectoryLock {
+    fn drop(&mut self) {
+        // It stays when there is anything in it, or somebody else uses it.
+        if let Some(made) = &self.made
+            && self.file.try_lock().is_ok()
+        {
+            let _ = std::fs::remove_dir(made);
+        }
+    }
+}
+
+/// What is locked. Of results that is the directory itself: locking must not need any room, and
+/// must leave nothing behind.
+fn open(directory: &Path, purpose: Purpose) -> Result<File, LockError> {
+    let fail = |path: &Path, source| LockError::Unusable {
+        path: path.to_path_buf(),
+        purpose,
+        source,
+    };
+    std::fs::create_dir_all(directory).map_err(|source| fail(directory, source))?;
+    if purpose == Purpose::Results {
+        return File::open(directory).map_err(|source| fail(directory, source));
+    }
+    let path = directory.join(purpose.file());
+    OpenOptions::new()
+        .read(true)
+        .write(true)
+        .create(true)
+        .truncate(false)
+        .open(&path)
+        .map_err(|source| fail(&path, source))
+}
+
+/// A file system without locks is no reason to refuse the work.
+fn without_locks(directory: &Path, error: &io::Error) {
+    let directory = to_text(directory);
+    tracing::warn!("cannot lock {directory}, see to it that nobody else uses it: {error}");
+}
+
+fn introduce(
+    file: &mut File,
+    directory: &Path,
+    purpose: Purpose,
+    instance: &str,
+) -> io::Result<()> {
+    let text = format!("{} {instance}\n", std::process::id());
+    if purpose == Purpose::Results {
+        let path = directory.join(purpose.file());
+        path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
+        return std::fs::write(path, text);
+    }
+    file.set_len(0)?;
+    file.write_all(text.as_bytes())
+}
+
+fn refusal(file: &mut File, directory: &Path, purpose: Purpose) -> LockError {
+    let directory = directory.to_path_buf();
+    if purpose == Purpose::Results && file.try_lock_shared().is_ok() {
+        return LockError::Shared { directory };
+    }
+    let mut text = String::new();
+    if purpose == Purpose::Results {
+        text = std::fs::read_to_string(directory.join(purpose.file())).unwrap_or_default();
+    } else {
+        // Whoever cannot be asked has not said.
+        let _ = file.read_to_string(&mut text);
+    }
+    let holder = match text.trim().split_once(' ') {
+        Some((pid, instance)) => format!("instance `{instance}`, process {pid}"),
+        None => "it has not said which".to_owned(),
+    };
+    LockError::Held {
+        directory,
+        purpose,
+        holder,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_has_it_and_says_who() {
+        for purpose in [Purpose::State, Purpose::Results, Purpose::Gate] {
+            let dir = tempfile::tempdir().unwrap();
+            let take = |instance| DirectoryLock::take(dir.path(), purpose, instance);
+            let first = take("first").unwrap();
+            let refused = take("second").unwrap_err().to_string();
+            let holder = format!("instance `first`, process {}", std::process::id());
+            assert!(refused.contains(&holder), "{refused}");
+            drop(first);
+            let _second = take("second").unwrap();
+            let refused = take("third").unwrap_err().to_string();
+            assert!(refused.contains("instance `second`"), "{refused}");
+        }
+    }
+
+    #[test]
+    fn runs_share_results_and_a_broker_does_not() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        let broker = || DirectoryLock::take(&out, Purpose::Results, "farm");
+        let one = DirectoryLock::share(&out).unwrap();
+        let other = DirectoryLock::share(&out).unwrap();
+        assert!(matches!(broker(), Err(LockError::Shared { .. })));
+        drop(one);
+        assert!(matches!(broker(), Err(LockError::Shared { .. })));
+        drop(other);
+        let held = broker().unwrap();
+        let refused = DirectoryLock::share(&out).unwrap_err().to_string();
+        assert!(refused.contains("instance `farm`"), "{refused}");
+        drop(held);
+        drop(DirectoryLock::share(&out).unwrap());
+        let nothing = dir.path().join("nothing");
+        drop(DirectoryLock::share(&nothing).unwrap());
+        assert!(!nothing.exists(), "nothing was written");
+    }
+}

@@ -1,0 +1,457 @@
+//! The claims, and what lies behind the gate because of them. No bytes are read or written here:
+//! files that have been written aside get their names, or lose them.
+
+use std::collections::{BTreeSet, HashMap, HashSet};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use qcbus_messages::Digest;
+use qcbus_messages::path_text::to_text;
+use tempfile::TempPath;
+
+use crate::disk::remove;
+use crate::result_paths::ResultPaths;
+
+/// A file that an acceptance rests on, besides the accepted one.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Part {
+    pub(super) path: Arc<Path>,
+    pub(super) digest: Digest,
+    /// In bytes.
+    pub(super) size: u64,
+    /// It gets a verdict of its own; otherwise it lies behind the gate for those who need it.
+    pub(super) judged: bool,
+}
+
+/// An acceptance.
+#[derive(Debug, Clone)]
+pub(super) struct Claim {
+    pub(super) digest: Digest,
+    /// In bytes.
+    pub(super) size: u64,
+    pub(super) parts: Vec<Part>,
+    /// Why it is never published as it is, if so: for a person.
+    pub(super) refused: Option<String>,
+    /// It lies behind the gate with everything that it rests on.
+    pub(super) published: bool,
+    /// It was said that it is held back.
+    pub(super) told: bool,
+    /// Tells this claim from others on the same file.
+    pub(super) serial: u64,
+}
+
+impl Claim {
+    /// Whether both say the same of the same bytes.
+    pub(super) fn agrees(&self, other: &Claim) -> bool {
+        (self.digest, &self.parts, &self.refused) == (other.digest, &other.parts, &other.refused)
+    }
+}
+
+/// A file behind the gate.
+#[derive(Debug)]
+struct Lying {
+    digest: Digest,
+    /// The published files that it is there for, itself among them if it is one.
+    users: BTreeSet<Arc<Path>>,
+}
+
+/// What is to be published in one step.
+#[derive(Debug)]
+pub(super) struct Plan {
+    /// The accepted files with the numbers of their claims, each after those that it rests on.
+    roots: Vec<(Arc<Path>, u64)>,
+    /// The files that do not lie behind the gate yet.
+    pub(super) lacking: Vec<(Arc<Path>, Digest)>,
+}
+
+/// What is to be done about a claim.
+#[derive(Debug)]
+pub(super) enum Standing {
+    /// Nothing: there is none, or it is published.
+    Settled,
+    /// It can be published.
+    Ready(Plan),
+    /// It is held back.
+    Held {
+        /// Why: for a person.
+        why: String,
+        /// It will stay so until another verdict comes.
+        lasting: bool,
+    },
+}
+
+/// Copies that have been written and have no names yet.
+pub(super) type Copies = HashMap<Arc<Path>, (Digest, TempPath)>;
+
+/// All claims.
+#[derive(Debug)]
+pub(super) struct Claims {
+    directory: PathBuf,
+    paths: ResultPaths,
+    claims: HashMap<Arc<Path>, Claim>,
+    /// By file: the claims that rest on it.
+    resting: HashMap<Arc<Path>, BTreeSet<Arc<Path>>>,
+    lying: HashMap<Arc<Path>, Lying>,
+    /// Files whose verdict is no acceptance.
+    refused: HashSet<Arc<Path>>,
+    /// Copies that nobody needs and that could not be removed.
+    litter: BTreeSet<PathBuf>,
+    next_serial: u64,
+}
+
+impl Claims {
+    pub(super) fn new(directory: PathBuf, paths: ResultPaths) -> Claims {
+        Claims {
+            directory,
+            paths,
+            claims: HashMap::new(),
+            resting: HashMap::new(),
+            lying: HashMap::new(),
+            refused: HashSet::new(),
+            litter: BTreeSet::new(),
+            next_serial: 0,
+        }
+    }
+
+    /// Where a file lies behind the gate.
+    pub(super) fn place(&self, path: &Path) -> PathBuf {
+        self.directory.join(self.paths.relative(path))
+    }
+
+    pub(super) fn get(&self, path: &Path) -> Option<&Claim> {
+        self.claims.get(path)
+    }
+
+    pub(super) fn get_mut(&mut self, path: &Path) -> Option<&mut Claim> {
+        self.claims.get_mut(path)
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = (&Arc<Path>, &Claim)> {
+        self.claims.iter()
+    }
+
+    pub(super) fn is_published(&self, path: &Path) -> bool {
+        self.get(path).is_some_and(|claim| claim.published)
+    }
+
+    /// Puts a claim in; there must be none of this file.
+    pub(super) fn insert(&mut self, path: &Arc<Path>, claim: Claim) {
+        self.next_serial += 1;
+        for part in &claim.parts {
+            let resting = self.resting.entry(part.path.clone()).or_default();
+            resting.insert(path.clone());
+        }
+        let claim = Claim {
+            serial: self.next_serial,
+            ..claim
+        };
+        self.refused.remove(path);
+        self.claims.insert(path.clone(), claim);
+    }
+
+    /// The claims that rest on a file.
+    pub(super) fn resting_on(&self, path: &Path) -> Vec<Arc<Path>> {
+        let resting = self.resting.get(path).into_iter().flatten();
+        resting.cloned().collect()
+    }
+
+    /// A file has another verdict than an acceptance.
+    pub(super) fn refuse(&mut self, path: &Arc<Path>) {
+        self.refused.insert(path.clone());
+    }
+
+    /// Nothing is known of a file any more.
+    pub(super) fn forget(&mut self, path: &Path) {
+        self.refused.remove(path);
+    }
+
+    /// What is to be done about a claim: it is published with those that it rests on and that are
+    /// not published yet.
+    pub(super) fn standing(&self, root: &Arc<Path>) -> Standing {
+        if self.get(root).is_none_or(|claim| claim.published) {
+            return Standing::Settled;
+        }
+        let unpublished = |path: &Path| -> Vec<Arc<Path>> {
+            let parts = self.get(path).map_or(&[][..], |claim| &claim.parts);
+            let parts = parts.iter().filter(|part| self.is_judged(part));
+            let parts = parts.filter(|part| !self.is_published(&part.path));
+            parts.map(|part| part.path.clone()).collect()
+        };
+        let order = each_after(vec![root.clone()], unpublished);
+        let mut plan = Plan {
+            roots: Vec::new(),
+            lacking: Vec::new(),
+        };
+        for path in order {
+            let Some(claim) = self.get(&path) else {
+                return self.held_by(&path);
+            };
+            if let Some(held) = self.held(claim) {
+                return held;
+            }
+            for (file, digest) in self.files_of(&path, claim) {
+                let lies = self.lying.get(&file).is_some_and(|it| it.digest == digest);
+                if !lies && !plan.lacking.iter().any(|(other, _)| *other == file) {
+                    plan.lacking.push((file, digest));
+                }
+            }
+            plan.roots.push((path, claim.serial));
+        }
+        Standing::Ready(plan)
+    }
+
+    /// Why a claim cannot be published for its own sake, or for a claim that is not what it needs.
+    fn held(&self, claim: &Claim) -> Option<Standing> {
+        if let Some(why) = &claim.refused {
+            return Some(Standing::Held {
+                why: why.clone(),
+                lasting: true,
+            });
+        }
+        let mut judged = claim.parts.iter().filter(|part| self.is_judged(part));
+        let differs = |part: &&Part| {
+            let there = self.get(&part.path);
+            there.is_none_or(|claim| claim.digest != part.digest)
+        };
+        judged.find(differs).map(|part| self.held_by(&part.path))
+    }
+
+    fn held_by(&self, path: &Path) -> Standing {
+        let (shown, lasting) = (to_text(path), self.refused.contains(path));
+        let why = if lasting {
+            format!("it rests on {shown}, which is not accepted")
+        } else {
+            format!("it waits for {shown} to be accepted")
+        };
+        Standing::Held { why, lasting }
+    }
+
+    /// Whether a part must have a claim of its own.
+    fn is_judged(&self, part: &Part) -> bool {
+        part.judged || self.claims.contains_key(&part.path) || self.refused.contains(&part.path)
+    }
+
+    /// The files that lie behind the gate for the sake of one claim, the accepted one last.
+    fn files_of(&self, path: &Arc<Path>, claim: &Claim) -> Vec<(Arc<Path>, Digest)> {
+        let fragments = claim.parts.iter().filter(|part| !self.is_judged(part));
+        let fragments = fragments.map(|part| (part.path.clone(), part.digest));
+        let own = (path.clone(), claim.digest);
+        fragments.chain([own]).collect()
+    }
+
+    /// Publishes what was planned, unless the claims have changed meanwhile: then `false`, and
+    /// nothing of it lies behind the gate.
+    ///
+    /// # Errors
+    /// When a file cannot get or lose its name; what is published then is complete.
+    pub(super) fn publish(&mut self, plan: &Plan, mut copies: Copies) -> io::Result<bool> {
+        // Other bytes in these places are older: whatever is published with them goes first.
+        for (path, digest) in &plan.lacking {
+            let other = self.lying.get(path).filter(|it| it.digest != *digest);
+            let users: Vec<Arc<Path>> = other
+                .into_iter()
+                .flat_map(|it| it.users.iter().cloned())
+                .collect();
+            for user in users {
+                self.close(&user)?;
+            }
+        }
+        if !self.still_holds(plan, &copies) {
+            return Ok(false);
+        }
+        for (root, _) in &plan.roots {
+            if let Err(error) = self.put(root, &mut copies) {
+                // What was put there for it is needed by nobody; what rests on it, if files refer to
+                // each other, is not complete.
+                self.drop_user(root);
+                self.close(root)?;
+                return Err(error);
+            }
+        }
+        Ok(true)
+    }
+
+    fn still_holds(&self, plan: &Plan, copies: &Copies) -> bool {
+        plan.roots.iter().all(|(root, serial)| {
+            let Some(claim) = self.get(root).filter(|it| it.serial == *serial) else {
+                return false;
+            };
+            let there = |(path, digest): &(Arc<Path>, Digest)| {
+                let lies = self.lying.get(path).map(|it| it.digest);
+                let copied = copies.get(path).map(|it| it.0);
+                lies == Some(*digest) || copied == Some(*digest)
+            };
+            let accepted = |part: &Part| {
+                let planned = plan.roots.iter().any(|(root, _)| *root == part.path);
+                planned || self.is_published(&part.path)
+            };
+            let mut judged = claim.parts.iter().filter(|part| self.is_judged(part));
+            self.held(claim).is_none()
+                && judged.all(accepted)
+                && self.files_of(root, claim).iter().all(there)
+        })
+    }
+
+    /// Gives the files of one claim their names, the accepted one last: with that it is published.
+    fn put(&mut self, root: &Arc<Path>, copies: &mut Copies) -> io::Result<()> {
+        let Some(claim) = self.get(root) else {
+            return Ok(());
+        };
+        for (path, digest) in self.files_of(root, claim) {
+            if !self.lying.contains_key(&path)
+                && let Some((_, copy)) = copies.remove(&path)
+            {
+                let place = self.place(&path);
+                name(copy, &place)?;
+                self.litter.remove(&place);
+            }
+            let lying = self.lying.entry(path).or_insert_with(|| Lying {
+                digest,
+                users: BTreeSet::new(),
+            });
+            lying.users.insert(root.clone());
+        }
+        if let Some(claim) = self.get_mut(root) {
+            claim.published = true;
+            claim.told = false;
+        }
+        Ok(())
+    }
+
+    /// Takes a file from behind the gate: everything that rests on it goes first, then it goes
+    /// itself, then what nobody needs any more. The claims stay.
+    ///
+    /// # Errors
+    /// When something cannot be removed; what is still published then is complete.
+    pub(super) fn close(&mut self, path: &Arc<Path>) -> io::Result<()> {
+        let published = |path: &Path| -> Vec<Arc<Path>> {
+            let mut resting = self.resting_on(path);
+            resting.retain(|it| self.is_published(it));
+            resting
+        };
+        let order = each_after(vec![path.clone()], published);
+        for root in order {
+            if !self.is_published(&root) {
+                continue;
+            }
+            remove(&self.place(&root))?;
+            self.lying.remove(&root);
+            if let Some(claim) = self.get_mut(&root) {
+                claim.published = false;
+            }
+            self.drop_user(&root);
+        }
+        self.tidy()
+    }
+
+    /// Closes, and drops the claim.
+    ///
+    /// # Errors
+    /// As [`Claims::close`]; the claim stays then.
+    pub(super) fn revoke(&mut self, path: &Arc<Path>) -> io::Result<()> {
+        self.close(path)?;
+        let Some(claim) = self.claims.remove(path) else {
+            return Ok(());
+        };
+        for part in claim.parts {
+            if let Some(resting) = self.resting.get_mut(&part.path) {
+                resting.remove(path);
+                if resting.is_empty() {
+                    self.resting.remove(&part.path);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A claim is not published any more: what lay there for it alone is litter.
+    fn drop_user(&mut self, root: &Arc<Path>) {
+        let parts = self.get(root).map_or(&[][..], |claim| &claim.parts);
+        let paths: Vec<Arc<Path>> = parts.iter().map(|part| part.path.clone()).collect();
+        for path in paths.into_iter().chain([root.clone()]) {
+            let Some(lying) = self.lying.get_mut(&path) else {
+                continue;
+            };
+            lying.users.remove(root);
+            if lying.users.is_empty() {
+                self.lying.remove(&path);
+                self.litter.insert(self.place(&path));
+            }
+        }
+    }
+
+    fn tidy(&mut self) -> io::Result<()> {
+        while let Some(litter) = self.litter.first().cloned() {
+            remove(&litter)?;
+            self.litter.remove(&litter);
+        }
+        Ok(())
+    }
+
+    /// Takes for published whatever lies behind the gate completely. `lies` says whether a file
+    /// of this size is in its place. Returns the claims that are left.
+    pub(super) fn take_over(&mut self, lies: impl Fn(&Path, u64) -> bool) -> Vec<Arc<Path>> {
+        let by_themselves = |(path, claim): (&Arc<Path>, &Claim)| {
+            let fragments = claim.parts.iter().filter(|part| !self.is_judged(part));
+            let mut files = fragments
+                .map(|part| (&part.path, part.size))
+                .chain([(path, claim.size)]);
+            (self.held(claim).is_none() && files.all(|(path, size)| lies(path, size)))
+                .then(|| path.clone())
+        };
+        let mut complete: HashSet<Arc<Path>> =
+            self.claims.iter().filter_map(by_themselves).collect();
+        // Whatever rests on what is not complete is not complete either.
+        let mut open: Vec<Arc<Path>> = self.claims.keys().cloned().collect();
+        open.retain(|path| !complete.contains(path));
+        let mut left = open.clone();
+        while let Some(path) = open.pop() {
+            for resting in self.resting_on(&path) {
+                if complete.remove(&resting) {
+                    left.push(resting.clone());
+                    open.push(resting);
+                }
+            }
+        }
+        let complete: BTreeSet<Arc<Path>> = complete.into_iter().collect();
+        for root in complete {
+            // All of it lies there, so that nothing is named.
+            let _ = self.put(&root, &mut Copies::new());
+        }
+        left
+    }
+
+    /// Where everything lies that belongs behind the gate.
+    pub(super) fn places(&self) -> HashSet<PathBuf> {
+        self.lying.keys().map(|path| self.place(path)).collect()
+    }
+}
+
+/// Gives a copy its name. A directory that was left empty is no hindrance.
+fn name(copy: TempPath, place: &Path) -> io::Result<()> {
+    match copy.persist(place) {
+        Ok(()) => Ok(()),
+        Err(refused) if std::fs::remove_dir(place).is_ok() => {
+            refused.path.persist(place).map_err(|again| again.error)
+        }
+        Err(refused) => Err(refused.error),
+    }
+}
+
+/// All paths that can be reached by `before`, each after those that `before` gives for it.
+fn each_after(start: Vec<Arc<Path>>, before: impl Fn(&Path) -> Vec<Arc<Path>>) -> Vec<Arc<Path>> {
+    let mut order = Vec::new();
+    let mut seen: HashSet<Arc<Path>> = HashSet::new();
+    let mut open: Vec<(Arc<Path>, bool)> = start.into_iter().map(|it| (it, false)).collect();
+    while let Some((path, is_next)) = open.pop() {
+        if is_next {
+            order.push(path);
+        } else if seen.insert(path.clone()) {
+            let first = before(&path);
+            open.push((path, true));
+            open.extend(first.into_iter().map(|it| (it, false)));
+        }
+    }
+    order
+}

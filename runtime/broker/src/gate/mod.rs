@@ -1,0 +1,419 @@
+//! The gate: a directory in which accepted files lie, and nothing else. What lies there is complete
+//! and judged as it lies there.
+//!
+//! A *claim* is an acceptance with the digests of all that it depends on. A file is published if it
+//! has a claim, and each file below the watched directories that it depends on and that is judged
+//! by itself has a claim on the same bytes and is published, too. What it depends on and nobody
+//! judges by itself (an included part, a file that is ignored) is published with it. The accepted
+//! file gets its name last and loses it first, so that it is never there without what it needs.
+//! Only files that refer to each other come one after the other.
+
+mod claims;
+mod contents;
+
+use std::collections::VecDeque;
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use qcbus_messages::control::{GateStatus, HeldBack};
+use qcbus_messages::path_text::to_text;
+
+use crate::core::{Input, Judged};
+use crate::directory_lock::{DirectoryLock, Purpose};
+use crate::disk::{is_for_good, write_ahead};
+use crate::journal::Remembered;
+use crate::result_paths::ResultPaths;
+use crate::stamp::is_listing;
+use crate::store::digest_of;
+
+use claims::{Claim, Claims, Copies, Part, Plan, Standing};
+pub use contents::GateError;
+
+/// What becomes of an accepted file that depends on one outside of the watched directories.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Outside {
+    /// It is published; the verdict file names the other.
+    #[default]
+    Name,
+    /// It is not published.
+    Refuse,
+}
+
+/// Whether a file gets a verdict of its own.
+pub type IsJudged = Box<dyn Fn(&Path) -> bool + Send + Sync>;
+
+/// Tells a person.
+pub type Say = Box<dyn Fn(String) + Send + Sync>;
+
+/// How a gate is to be.
+pub struct GateOptions {
+    /// The directory.
+    pub directory: PathBuf,
+    /// What lies where.
+    pub paths: ResultPaths,
+    /// Whether copies are on the disk before they get their names.
+    pub durable: bool,
+    /// What depends on files outside.
+    pub outside: Outside,
+    /// Whether a file gets a verdict of its own.
+    pub is_judged: IsJudged,
+    /// Tells a person.
+    pub say: Say,
+}
+
+/// The gate. Shared by the threads that write.
+pub struct Gate {
+    options: GateOptions,
+    claims: Mutex<Claims>,
+    _lock: DirectoryLock,
+}
+
+impl fmt::Debug for Gate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Gate")
+            .field("directory", &self.options.directory)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Gate {
+    /// Takes the directory for the broker of an instance.
+    ///
+    /// # Errors
+    /// See [`GateError`]; each says what to do.
+    pub fn open(options: GateOptions, instance: &str) -> Result<Gate, GateError> {
+        contents::refuse_foreign(&options.directory)?;
+        let lock = DirectoryLock::take(&options.directory, Purpose::Gate, instance)?;
+        let claims = Claims::new(options.directory.clone(), options.paths.clone());
+        Ok(Gate {
+            options,
+            claims: Mutex::new(claims),
+            _lock: lock,
+        })
+    }
+
+    /// Brings the directory in agreement with the verdicts that still stand: what belongs to none of
+    /// them is removed. Returns the accepted files that are to be published, see [`Gate::follow`].
+    ///
+    /// # Errors
+    /// When the directory cannot be read, or something in it cannot be removed.
+    pub fn take_over(&self, standing: &[Remembered]) -> Result<Vec<Arc<Path>>, GateError> {
+        let taken = self.clear(standing);
+        taken.map_err(|source| GateError::Contents {
+            directory: self.options.directory.clone(),
+            source,
+        })
+    }
+
+    fn clear(&self, standing: &[Remembered]) -> io::Result<Vec<Arc<Path>>> {
+        let mut claims = self.claims();
+        for file in standing {
+            if file.judged.is_accepted() {
+                claims.insert(&file.path, self.claim(&file.judged));
+            } else {
+                claims.refuse(&file.path);
+            }
+        }
+        let there = contents::files(&self.options.directory)?;
+        let waiting = {
+            let place = |path: &Path| {
+                self.options
+                    .directory
+                    .join(self.options.paths.relative(path))
+            };
+            claims.take_over(|path, size| there.get(&place(path)) == Some(&size))
+        };
+        contents::remove_others(&self.options.directory, &there, &claims.places())?;
+        Ok(waiting)
+    }
+
+    /// The files outside of the watched directories that a verdict depends on.
+    pub fn outside<'i>(&self, inputs: &'i [Input]) -> Vec<&'i Path> {
+        let files = inputs.iter().filter(|input| is_file(input));
+        let outside = files.filter(|input| !self.options.paths.contains(&input.path));
+        outside.map(|input| &*input.path).collect()
+    }
+
+    /// Before a new acceptance is written: what lies there of other bytes goes, with everything
+    /// that rests on it.
+    ///
+    /// # Errors
+    /// When something cannot be removed.
+    pub fn make_way(&self, path: &Arc<Path>, judged: &Judged) -> io::Result<()> {
+        let claim = self.claim(judged);
+        self.make_way_for(path, &claim).map(|_| ())
+    }
+
+    fn make_way_for(&self, path: &Arc<Path>, claim: &Claim) -> io::Result<MutexGuard<'_, Claims>> {
+        let mut claims = self.claims();
+        if !claims.get(path).is_some_and(|there| there.agrees(claim)) {
+            claims.revoke(path)?;
+        }
+        Ok(claims)
+    }
+
+    /// A file is accepted: it is published if everything that it needs is. The files that waited
+    /// for it come with [`Gate::follow`].
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn accept(&self, path: &Arc<Path>, judged: &Judged) -> io::Result<()> {
+        let claim = self.claim(judged);
+        let mut claims = self.make_way_for(path, &claim)?;
+        if claims.get(path).is_none() {
+            claims.insert(path, claim);
+        }
+        drop(claims);
+        self.publish(path)
+    }
+
+    /// Before another verdict than an acceptance is written: the file goes, with everything that
+    /// rests on it.
+    ///
+    /// # Errors
+    /// When something cannot be removed.
+    pub fn refuse(&self, path: &Arc<Path>) -> io::Result<()> {
+        let mut claims = self.claims();
+        claims.revoke(path)?;
+        claims.refuse(path);
+        let mut held: Vec<Arc<Path>> = Vec::new();
+        for resting in claims.resting_on(path) {
+            let claim = claims.get_mut(&resting);
+            if let Some(claim) = claim.filter(|it| !it.told && it.refused.is_none()) {
+                claim.told = true;
+                held.push(resting);
+            }
+        }
+        drop(claims);
+        if let Some(text) = held_by(path, &held) {
+            (self.options.say)(text);
+        }
+        Ok(())
+    }
+
+    /// The file goes, with everything that rests on it, until it is accepted again.
+    ///
+    /// # Errors
+    /// When something cannot be removed.
+    pub fn revoke(&self, path: &Arc<Path>) -> io::Result<()> {
+        self.claims().revoke(path)
+    }
+
+    /// As [`Gate::revoke`] for a file that is no more.
+    ///
+    /// # Errors
+    /// When something cannot be removed.
+    pub fn forget(&self, path: &Arc<Path>) -> io::Result<()> {
+        let mut claims = self.claims();
+        claims.forget(path);
+        claims.revoke(path)
+    }
+
+    /// Publishes an accepted file if that has not been done, and then whatever waited for it.
+    ///
+    /// # Errors
+    /// When something cannot be written now, with the first such file; all others were tried.
+    pub fn follow(&self, path: &Arc<Path>) -> Result<(), (Arc<Path>, io::Error)> {
+        let mut failed = None;
+        let mut open = VecDeque::from([path.clone()]);
+        while let Some(next) = open.pop_front() {
+            if let Err(error) = self.publish(&next) {
+                self.not_published(&next, error, &mut failed);
+            }
+            let claims = self.claims();
+            if claims.is_published(&next) {
+                let mut waiting = claims.resting_on(&next);
+                waiting.retain(|it| !claims.is_published(it));
+                open.extend(waiting);
+            }
+        }
+        failed.map_or(Ok(()), Err)
+    }
+
+    /// No waiting brings a file to a place where something else is in the way.
+    fn not_published(
+        &self,
+        path: &Arc<Path>,
+        error: io::Error,
+        failed: &mut Option<(Arc<Path>, io::Error)>,
+    ) {
+        if !is_for_good(&error) {
+            failed.get_or_insert((path.clone(), error));
+            return;
+        }
+        let why = format!("it cannot be written there: {error}");
+        if let Some(claim) = self.claims().get_mut(path) {
+            claim.refused = Some(why.clone());
+            claim.told = true;
+        }
+        (self.options.say)(held(path, &why));
+    }
+
+    /// How many files are published, and which accepted ones are not.
+    pub fn status(&self) -> GateStatus {
+        let claims = self.claims();
+        let mut status = GateStatus {
+            directory: self.options.directory.clone(),
+            ..GateStatus::default()
+        };
+        let mut held: Vec<&Arc<Path>> = Vec::new();
+        for (path, claim) in claims.iter() {
+            if claim.published {
+                status.published += 1;
+            } else {
+                held.push(path);
+            }
+        }
+        status.held_back = held.len() as u64;
+        held.sort();
+        for path in held.into_iter().take(SHOWN) {
+            if let Standing::Held { why, .. } = claims.standing(path) {
+                let file = path.to_path_buf();
+                status.examples.push(HeldBack { file, why });
+            }
+        }
+        status
+    }
+
+    /// Publishes one file with what it needs, if it may be.
+    fn publish(&self, path: &Arc<Path>) -> io::Result<()> {
+        loop {
+            // A name for it, because a lock in the scrutinee would be held in the arms.
+            let standing = self.claims().standing(path);
+            let plan = match standing {
+                Standing::Settled => return Ok(()),
+                Standing::Ready(plan) => plan,
+                Standing::Held { why, lasting } => {
+                    if lasting {
+                        self.say_once(path, &why);
+                    }
+                    return Ok(());
+                }
+            };
+            // Outside of the lock, because it takes its time.
+            let Some(copies) = self.copy(&plan)? else {
+                return Ok(());
+            };
+            // Otherwise the claims have changed meanwhile, and it is looked at anew.
+            if self.claims().publish(&plan, copies)? {
+                return Ok(());
+            }
+        }
+    }
+
+    /// The very bytes that were accepted; `None` when others are there by now. They get a verdict
+    /// of their own.
+    fn copy(&self, plan: &Plan) -> io::Result<Option<Copies>> {
+        let mut copies = Copies::new();
+        for (path, digest) in &plan.lacking {
+            let bytes = match std::fs::read(path) {
+                Ok(bytes) => bytes,
+                Err(error) if error.kind() == io::ErrorKind::NotFound || is_for_good(&error) => {
+                    return Ok(None);
+                }
+                Err(error) => return Err(error),
+            };
+            if digest_of(&bytes) != *digest {
+                return Ok(None);
+            }
+            // A copy, not a link: a hard link would follow a writer who changes the file in place.
+            let place = self.claims().place(path);
+            let copy = write_ahead(&place, &bytes, self.options.durable)?;
+            copies.insert(path.clone(), (*digest, copy));
+        }
+        Ok(Some(copies))
+    }
+
+    fn say_once(&self, path: &Arc<Path>, why: &str) {
+        let mut claims = self.claims();
+        let claim = claims.get_mut(path).filter(|claim| !claim.told);
+        let Some(claim) = claim else { return };
+        claim.told = true;
+        (self.options.say)(held(path, why));
+    }
+
+    /// What an acceptance claims.
+    fn claim(&self, judged: &Judged) -> Claim {
+        let parts = judged.inputs.iter().skip(1);
+        let inside = |input: &&Input| self.options.paths.contains(&input.path);
+        let part = |input: &Input| {
+            let (stamp, digest) = input.content?;
+            Some(Part {
+                path: input.path.clone(),
+                digest,
+                size: stamp.size,
+                judged: (self.options.is_judged)(&input.path),
+            })
+        };
+        Claim {
+            digest: judged.digest,
+            size: size_of_root(judged),
+            parts: parts
+                .filter(|input| is_file(input))
+                .filter(inside)
+                .filter_map(part)
+                .collect(),
+            refused: self.refusal(judged),
+            published: false,
+            told: false,
+            serial: 0,
+        }
+    }
+
+    /// Why an acceptance does not lead behind the gate, whatever else comes.
+    fn refusal(&self, judged: &Judged) -> Option<String> {
+        let inputs = judged.inputs.iter();
+        let mut unread = inputs.filter(|it| it.content.is_some() && it.digest().is_none());
+        if let Some(unread) = unread.find(|it| self.options.paths.contains(&it.path)) {
+            let shown = to_text(&unread.path);
+            return Some(format!("it depends on {shown}, which could not be read"));
+        }
+        let outside = self.outside(&judged.inputs);
+        let first = outside.first().map(|path| to_text(path));
+        let first = first.filter(|_| self.options.outside == Outside::Refuse)?;
+        Some(format!(
+            "it depends on {first}, which lies outside of the watched directories \
+             (--gate-outside refuse)"
+        ))
+    }
+
+    fn claims(&self) -> MutexGuard<'_, Claims> {
+        self.claims.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Files that are named where there may be thousands.
+const SHOWN: usize = 10;
+
+fn size_of_root(judged: &Judged) -> u64 {
+    let root = judged.inputs.first().and_then(|root| root.content);
+    root.map_or(0, |(stamp, _)| stamp.size)
+}
+
+/// Whether bytes of a file were read: directories are looked through, not read.
+fn is_file(input: &Input) -> bool {
+    input.digest().is_some() && !input.content.is_some_and(|(stamp, _)| is_listing(&stamp))
+}
+
+fn held(path: &Path, why: &str) -> String {
+    format!("{} is accepted and not published: {why}", to_text(path))
+}
+
+/// One line for all that a verdict keeps from being published.
+fn held_by(path: &Path, held: &[Arc<Path>]) -> Option<String> {
+    let (first, others) = held.split_first()?;
+    let others = match others.len() {
+        0 => String::new(),
+        count => format!(" and {count} more"),
+    };
+    Some(format!(
+        "{}{others} not published: {} is not accepted",
+        to_text(first),
+        to_text(path)
+    ))
+}
+
+#[cfg(test)]
+mod tests;

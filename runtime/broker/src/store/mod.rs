@@ -1,0 +1,334 @@
+//! From outcomes to files on disk: pooling, the result, the verdict file, the gate.
+
+mod earlier;
+mod leftovers;
+mod pooling;
+mod reconcile;
+mod refresh;
+mod withdraw;
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use qcbus_formats::config::Config;
+use qcbus_formats::pool::{BundleOutcome, Pooled};
+use qcbus_formats::xqar::{self, Dialect, Status};
+use qcbus_messages::Verdict;
+use qcbus_messages::path_text::to_text;
+
+use crate::core::{FinishedJob, Judged, StoreOutcome};
+use crate::disk::{FileMark, is_for_good, write_both, write_whole};
+use crate::gate::Gate;
+use crate::journal::{Entry, History, Journal, JournalError, Remembered, Void};
+use crate::result_paths::ResultPaths;
+use crate::stages::reached;
+use crate::stamp::stamp_through_links;
+use crate::verdict_file;
+
+pub use earlier::remove_earlier_results;
+use pooling::{reasons, taken};
+pub use reconcile::Reconciled;
+pub use refresh::digest_of;
+use refresh::refresh;
+
+/// Writes results. Shared by the threads that do so.
+#[derive(Debug)]
+pub struct Store {
+    /// Where results go.
+    pub places: ResultPaths,
+    /// The form of the results.
+    pub dialect: Dialect,
+    /// Whether results are on the disk before they are announced.
+    pub durable: bool,
+    /// Whether `NAME.verdict.json` is written.
+    pub verdict_files: bool,
+    /// Whether what cannot be written now is tried again.
+    pub retries: bool,
+    /// Where accepted files are published.
+    pub gate: Option<Gate>,
+    /// What is remembered.
+    pub journal: Mutex<Journal>,
+    /// The epoch of who must judge: what was judged in an earlier one is not stored.
+    pub epoch: AtomicU64,
+}
+
+impl Store {
+    /// Pools, writes, publishes, records. The findings are taken out of the job.
+    pub fn store(
+        &self,
+        job: &mut FinishedJob,
+        config: Option<&Config>,
+        root: Option<&[u8]>,
+    ) -> StoreOutcome {
+        if !refresh(job) {
+            return StoreOutcome::Stale;
+        }
+        let outcomes: Vec<BundleOutcome> = job.bundles.iter_mut().map(taken).collect();
+        let pooled = self.pool(job, outcomes, config, root);
+        reached("pooled", &job.path);
+        let verdict = pooled.verdict();
+        let why = reasons(job, &pooled, verdict);
+        let judged = judged(job, &pooled, verdict, why, self.places.xqar(&job.path));
+        // At the last moment: from here on a verdict is on its way to where others see it.
+        if self.epoch.load(Ordering::Acquire) != job.epoch.0 {
+            return StoreOutcome::Outdated;
+        }
+        if let Err(failed) = self.write(job, &pooled, &judged) {
+            return self.not_written(job, judged, failed);
+        }
+        // The file may have gone between the look and the rename: nothing may lie there then.
+        if stamp_through_links(&job.path).is_none() {
+            let _ = self.withdraw_files(&job.path);
+            return StoreOutcome::Stale;
+        }
+        StoreOutcome::Stored(Box::new(judged))
+    }
+
+    /// A result that can never be written leaves its file undetermined: nobody may take what is
+    /// not there for an acceptance, and nobody should wait for it.
+    fn not_written(
+        &self,
+        job: &mut FinishedJob,
+        mut judged: Judged,
+        failed: Unwritten,
+    ) -> StoreOutcome {
+        if !refresh(job) {
+            return StoreOutcome::Stale;
+        }
+        if self.retries && !failed.for_good {
+            return StoreOutcome::Failed(failed.what + failed.further);
+        }
+        // As far as it goes: what lies there is not of these bytes.
+        let _ = self.withdraw(&job.path, &[]);
+        judged.verdict = Verdict::Undetermined;
+        judged.why.insert(0, failed.what);
+        judged.xqar = PathBuf::new();
+        StoreOutcome::Stored(Box::new(judged))
+    }
+
+    fn write(&self, job: &FinishedJob, pooled: &Pooled, judged: &Judged) -> Result<(), Unwritten> {
+        if let Some(gate) = &self.gate {
+            let made_way = if judged.is_accepted() {
+                gate.make_way(&job.path, judged)
+            } else {
+                gate.refuse(&job.path)
+            };
+            made_way.map_err(|error| unwritten(&job.path, &error))?;
+        }
+        let written = self.write_files(job, pooled, judged)?;
+        if let Some(gate) = self.gate.as_ref().filter(|_| judged.is_accepted()) {
+            let published = gate.accept(&job.path, judged);
+            published.map_err(|error| unwritten(&job.path, &error))?;
+        }
+        reached("written", &job.path);
+        let entry = Entry::Judged {
+            path: job.path.clone(),
+            judged: Arc::new(judged.clone()),
+            history: Some(Box::new(history(job, pooled))),
+            written,
+        };
+        self.record(&[entry]).map_err(|what| Unwritten {
+            what,
+            further: "",
+            for_good: false,
+        })
+    }
+
+    /// Writes the result and the verdict file, and gives the mark of the latter.
+    fn write_files(
+        &self,
+        job: &FinishedJob,
+        pooled: &Pooled,
+        judged: &Judged,
+    ) -> Result<Option<FileMark>, Unwritten> {
+        let text = xqar::write(&pooled.results, self.dialect);
+        let result = (&*judged.xqar, text.as_bytes());
+        if !self.verdict_files {
+            let written = write_whole(result.0, result.1, self.durable);
+            written.map_err(|error| unwritten(&judged.xqar, &error))?;
+            return Ok(None);
+        }
+        let outside = self.gate.as_ref().map(|gate| gate.outside(&judged.inputs));
+        let verdict = verdict_file::render(job, pooled, judged, outside);
+        let path = self.places.verdict(&job.path);
+        // Whoever sees the new result sees its verdict.
+        write_both((&path, &verdict), result, self.durable)
+            .map(Some)
+            .map_err(|(path, error)| unwritten(path, &error))
+    }
+
+    /// The verdict stands after all, or got fresh stamps: the file lies behind the gate again.
+    ///
+    /// # Errors
+    /// What a person should know; it is to be tried again.
+    pub fn open_gate(&self, path: &Arc<Path>, judged: &Judged) -> Result<(), Trouble> {
+        match self.gate.as_ref().filter(|_| judged.is_accepted()) {
+            None => Ok(()),
+            Some(gate) => gate
+                .accept(path, judged)
+                .map_err(|error| Trouble::not_published(path, &error)),
+        }
+    }
+
+    /// The file goes from behind the gate with everything that rests on it.
+    ///
+    /// # Errors
+    /// What a person should know; it is to be tried again.
+    pub fn close_gate(&self, path: &Arc<Path>) -> Result<(), Trouble> {
+        let revoked = self.gate.as_ref().map_or(Ok(()), |gate| gate.revoke(path));
+        revoked.map_err(|error| Trouble {
+            what: format!("cannot take {} from the gate: {error}", to_text(path)),
+            concerns_all: false,
+        })
+    }
+
+    /// Publishes an accepted file if that has not been done, and what waited for it.
+    ///
+    /// # Errors
+    /// What a person should know; it is to be tried again.
+    pub fn follow(&self, path: &Arc<Path>) -> Result<(), Trouble> {
+        let followed = self.gate.as_ref().map_or(Ok(()), |gate| gate.follow(path));
+        followed.map_err(|(path, error)| Trouble::not_published(&path, &error))
+    }
+
+    /// Writes to the journal.
+    ///
+    /// # Errors
+    /// What a person should know; the entries are not written then.
+    pub fn record(&self, entries: &[Entry]) -> Result<(), String> {
+        let written = self.journal().write(entries);
+        written.map_err(|error| error.to_string())
+    }
+
+    /// Everything that is remembered of files.
+    ///
+    /// # Errors
+    /// When the journal cannot be read.
+    pub fn remembered(&self) -> Result<Vec<Remembered>, JournalError> {
+        self.journal().remembered()
+    }
+
+    /// What reporters are still to take back.
+    ///
+    /// # Errors
+    /// When the journal cannot be read.
+    pub fn voids(&self) -> Result<Vec<Void>, JournalError> {
+        self.journal().voids()
+    }
+
+    /// Forgets the history of jobs older than `keep`.
+    ///
+    /// # Errors
+    /// What a person should know.
+    pub fn prune(&self, keep: std::time::Duration) -> Result<(), String> {
+        let pruned = self.journal().prune(keep);
+        pruned.map(|_| ()).map_err(|error| error.to_string())
+    }
+
+    fn journal(&self) -> MutexGuard<'_, Journal> {
+        self.journal.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Why something that is to be tried again could not be done.
+#[derive(Debug)]
+pub struct Trouble {
+    /// For a person.
+    pub what: String,
+    /// It is not about one file: the journal cannot be written.
+    pub concerns_all: bool,
+}
+
+impl Trouble {
+    fn not_published(path: &Path, error: &io::Error) -> Trouble {
+        Trouble {
+            what: format!("cannot publish {}: {error}", to_text(path)),
+            concerns_all: false,
+        }
+    }
+
+    /// The journal cannot be written.
+    pub fn of_all(what: String) -> Trouble {
+        Trouble {
+            what,
+            concerns_all: true,
+        }
+    }
+}
+
+/// Why a result is not there.
+struct Unwritten {
+    /// For a person.
+    what: String,
+    /// What is said besides when it is tried again.
+    further: &'static str,
+    /// No waiting helps.
+    for_good: bool,
+}
+
+fn unwritten(path: &Path, error: &io::Error) -> Unwritten {
+    Unwritten {
+        what: format!("cannot write {}: {error}", to_text(path)),
+        further: "; it is tried again",
+        for_good: is_for_good(error),
+    }
+}
+
+fn judged(
+    job: &FinishedJob,
+    pooled: &Pooled,
+    verdict: Verdict,
+    why: Vec<String>,
+    xqar: PathBuf,
+) -> Judged {
+    let prepared = job.prepared.as_deref();
+    let root = prepared.and_then(crate::core::PreparedJob::root);
+    Judged {
+        job: job.job,
+        verdict,
+        digest: root.map(|(_, digest)| digest).unwrap_or_default(),
+        basis: prepared.map(|it| it.basis).unwrap_or_default(),
+        config: job.config,
+        jury: job.jury.clone(),
+        epoch: job.epoch,
+        inputs: prepared.map(|it| it.inputs.clone()).unwrap_or_default(),
+        racy: prepared.is_none_or(|it| it.racy),
+        counts: [
+            pooled.counts.errors,
+            pooled.counts.warnings,
+            pooled.counts.information,
+        ],
+        why,
+        xqar,
+    }
+}
+
+fn history(job: &FinishedJob, pooled: &Pooled) -> History {
+    let bundles = job.bundles.iter().map(|it| {
+        (
+            it.said.name.clone(),
+            it.said.version.clone(),
+            it.micros,
+            it.failure.clone().unwrap_or_default(),
+        )
+    });
+    let mut checkers = Vec::new();
+    for bundle in &pooled.results.bundles {
+        for checker in &bundle.checkers {
+            let status = checker.status.unwrap_or(Status::Error);
+            if status != Status::Completed || !checker.issues.is_empty() {
+                let status = format!("{status:?}").to_lowercase();
+                let issues = checker.issues.len() as u64;
+                checkers.push((bundle.name.clone(), checker.id.clone(), status, issues));
+            }
+        }
+    }
+    History {
+        bytes: job.prepared.as_ref().map_or(0, |it| it.bytes),
+        micros: u64::try_from(job.elapsed.as_micros()).unwrap_or(u64::MAX),
+        bundles: bundles.collect(),
+        checkers,
+    }
+}

@@ -1,0 +1,114 @@
+//! From what the bundles said of a file to what its result says.
+
+use qcbus_document::Document;
+use qcbus_formats::config::Config;
+use qcbus_formats::pool::{
+    self, BundleOutcome, Ending, NoPlaces, PoolInput, Pooled, Remark, Resolver, Scope, Unfinished,
+};
+use qcbus_messages::path_text::to_text;
+use qcbus_messages::{BUILD_DATE, Verdict};
+
+use super::Store;
+use crate::core::{FinishedJob, ShareOutcome};
+
+impl Store {
+    pub(super) fn pool(
+        &self,
+        job: &FinishedJob,
+        bundles: Vec<BundleOutcome>,
+        config: Option<&Config>,
+        root: Option<&[u8]>,
+    ) -> Pooled {
+        let document = root.and_then(|bytes| Document::open(bytes).ok());
+        let mut remarks: Vec<Remark> = unanswered(job).into_iter().collect();
+        if let (Some(document), Some(prepared)) = (&document, &job.prepared) {
+            remarks.extend(qcbus_ingest::remarks(document, &prepared.missing, &bundles));
+        }
+        let input = PoolInput {
+            input_file: &to_text(&job.path),
+            config,
+            bundles,
+            remarks,
+            scope: Scope::Whole,
+            version: env!("CARGO_PKG_VERSION"),
+            build_date: BUILD_DATE,
+        };
+        match document {
+            Some(document) => pool::pool(input, &mut InDocument { document }),
+            None => pool::pool(input, &mut NoPlaces),
+        }
+    }
+}
+
+/// The remark that nobody could answer for the file: it cannot be read, or nobody checks its kind.
+fn unanswered(job: &FinishedJob) -> Option<Remark> {
+    let takes = |it: &ShareOutcome| {
+        let catalogue = it.catalogue.as_ref();
+        catalogue.is_some_and(|it| it.kinds.contains(&job.kind))
+    };
+    let (checker, description, open) = if let Some(why) = &job.unreadable {
+        (
+            "qcbus_file",
+            "The file is whole and can be read.",
+            why.clone(),
+        )
+    } else if job.bundles.iter().any(takes) {
+        return None;
+    } else {
+        let kind = job.kind.as_str();
+        let why = format!("no bundle that is running checks .{kind} files");
+        ("qcbus_bundles", "A bundle checks files of this kind.", why)
+    };
+    Some(Remark {
+        checker: checker.to_owned(),
+        description: description.to_owned(),
+        issue: None,
+        open: Some(open),
+    })
+}
+
+/// Reasons shown to a person; more than these are counted.
+const REASONS: usize = 20;
+
+/// What a person is told of a verdict: what keeps it open. Beside an error only what failed counts:
+/// that the error kept others from looking goes without saying.
+pub(super) fn reasons(job: &FinishedJob, pooled: &Pooled, verdict: Verdict) -> Vec<String> {
+    if let Some(open) = unanswered(job).and_then(|remark| remark.open) {
+        return vec![open];
+    }
+    let told = |it: &&Unfinished| {
+        verdict != Verdict::Rejected || matches!(it.ending, Ending::Failed { .. })
+    };
+    let open: Vec<&Unfinished> = pooled.open().filter(told).collect();
+    let mut why: Vec<String> = open.iter().take(REASONS).map(ToString::to_string).collect();
+    if open.len() > REASONS {
+        why.push(format!("and {} more", open.len() - REASONS));
+    }
+    why
+}
+
+/// What a bundle said, taken out of the job: there can be megabytes of it.
+pub(super) fn taken(share: &mut ShareOutcome) -> BundleOutcome {
+    let checkers = std::mem::take(&mut share.said.checkers);
+    BundleOutcome {
+        checkers,
+        ..share.said.clone()
+    }
+}
+
+/// Finds the row and column of an XPath in the image.
+struct InDocument<'a> {
+    document: Document<'a>,
+}
+
+impl Resolver for InDocument<'_> {
+    fn resolve(&mut self, xpath: &str) -> Option<pool::XPathPlace> {
+        let nodes = self.document.evaluate(xpath).ok()?;
+        let position = nodes.first()?.position();
+        Some(pool::XPathPlace {
+            row: position.row.into(),
+            column: position.column.into(),
+            offset: Some(position.offset.into()),
+        })
+    }
+}

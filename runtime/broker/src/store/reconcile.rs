@@ -1,0 +1,261 @@
+//! Before anything is judged: what lies on the disk, what the journal knows and what stands are
+//! brought in agreement. A broker may have been killed between writing a result and recording it,
+//! the journal may have been moved away, and other directories may be watched than before.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use qcbus_messages::Digest;
+use qcbus_messages::path_text::to_text;
+
+use super::leftovers::{Leftover, leftovers};
+use super::refresh::as_it_is;
+use super::{Store, Trouble};
+use crate::core::{Input, Judged, Stamp};
+use crate::disk::{FileMark, remove};
+use crate::gate::GateError;
+use crate::journal::{Entry, Remembered};
+use crate::result_paths::verdict_beside;
+use crate::stamp::{stamp_of, stamp_through_links};
+
+/// What stands after all was looked through.
+#[derive(Debug, Default)]
+pub struct Reconciled {
+    /// Files with their verdicts.
+    pub standing: Vec<Remembered>,
+    /// Accepted files that are to be published.
+    pub unpublished: Vec<Arc<Path>>,
+    /// The present stamps of everything that verdicts depend on.
+    pub stamps: BTreeMap<Arc<Path>, Option<Stamp>>,
+    /// For a person.
+    pub said: Vec<String>,
+    /// Of files whose stamps alone do not tell: whether they still have the bytes that were read.
+    reread: HashMap<(Arc<Path>, Digest), bool>,
+}
+
+/// Why a result does not stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Fall {
+    /// Nobody watches its file today.
+    Unwatched,
+    /// It would be written elsewhere today.
+    Moved,
+    /// It is not all there, or it is not the one that the journal knows.
+    Incomplete,
+}
+
+impl Store {
+    /// Withdraws from the disk what does not stand, and remembers it. `reporters` are those that
+    /// may have reported results that the journal knows nothing of.
+    ///
+    /// # Errors
+    /// When the gate cannot be cleared.
+    pub fn reconcile(
+        &self,
+        rows: Vec<Remembered>,
+        reporters: &[String],
+    ) -> Result<Reconciled, GateError> {
+        let mut found = Reconciled::default();
+        let mut fallen: Vec<(Remembered, Fall)> = Vec::new();
+        let (mut owned, mut claims) = (HashSet::new(), Vec::new());
+        for row in rows {
+            if let Some(fall) = self.fall_of(&row) {
+                fallen.push((row, fall));
+                continue;
+            }
+            owned.insert(row.judged.xqar.clone());
+            // What cannot be looked at now says nothing: its result is kept.
+            let lookable = stamp_of(&row.path);
+            let as_read = found.as_read(&row.judged, lookable.as_ref().ok());
+            if as_read || !row.judged.is_accepted() {
+                claims.push(row.clone());
+            }
+            if lookable.is_ok() {
+                found.standing.push(row);
+            }
+        }
+        if let Some(gate) = &self.gate {
+            found.unpublished = gate.take_over(&claims)?;
+        }
+        self.let_fall(fallen, &owned, reporters, &mut found);
+        self.clear_leftovers(&owned, reporters, &mut found);
+        Ok(found)
+    }
+
+    fn fall_of(&self, row: &Remembered) -> Option<Fall> {
+        let (path, judged) = (&row.path, &row.judged);
+        if !self.places.contains(path) {
+            return Some(Fall::Unwatched);
+        }
+        // One that could not be written anywhere is tried anew.
+        if judged.xqar != self.places.xqar(path) {
+            return Some(Fall::Moved);
+        }
+        let now = FileMark::at(&self.places.verdict(path));
+        // What older versions have written has no mark.
+        let same = now.is_some() && (row.written.is_none() || row.written == now);
+        (!same || !judged.xqar.exists()).then_some(Fall::Incomplete)
+    }
+
+    /// Removes results, and records that they are gone and who is to take back reports.
+    fn let_fall(
+        &self,
+        fallen: Vec<(Remembered, Fall)>,
+        owned: &HashSet<PathBuf>,
+        reporters: &[String],
+        found: &mut Reconciled,
+    ) {
+        let mut entries = Vec::new();
+        let mut by_reason: BTreeMap<Fall, Vec<Arc<Path>>> = BTreeMap::new();
+        for (row, fall) in fallen {
+            let xqar = &row.judged.xqar;
+            // By now the result of another file may lie there.
+            let mine = !xqar.as_os_str().is_empty() && !owned.contains(xqar);
+            if let Some(error) = mine.then(|| remove_result(xqar).err()).flatten() {
+                found.cannot_withdraw(&row.path, &error);
+                continue;
+            }
+            // A reporter may have written its report, and nobody lived to record it.
+            let delivered = row.delivered.into_iter().map(|(name, _)| name);
+            let all: BTreeSet<String> = delivered.chain(reporters.iter().cloned()).collect();
+            let reporters = all.into_iter().filter(|_| mine).collect();
+            if row.judged.is_written() {
+                by_reason.entry(fall).or_default().push(row.path.clone());
+            }
+            entries.push(Entry::Withdrawn {
+                path: row.path,
+                reporters,
+            });
+        }
+        self.recorded(&entries, found);
+        for (fall, paths) in by_reason {
+            found.said.push(said(fall, &paths));
+        }
+    }
+
+    /// Removes results of ours that the journal does not know.
+    fn clear_leftovers(
+        &self,
+        owned: &HashSet<PathBuf>,
+        reporters: &[String],
+        found: &mut Reconciled,
+    ) {
+        let known: HashSet<&Path> = found.standing.iter().map(|row| &*row.path).collect();
+        let mut entries = Vec::new();
+        let mut removed: Vec<Arc<Path>> = Vec::new();
+        let mut failed = Vec::new();
+        for Leftover { path, xqar } in leftovers(&self.places.out, owned) {
+            if let Err(error) = remove_result(&xqar) {
+                failed.push((path, error));
+                continue;
+            }
+            // Reports of a file that has a verdict are about that.
+            if !known.contains(&*path) {
+                entries.push(Entry::Left {
+                    path: path.clone(),
+                    xqar,
+                    reporters: reporters.to_vec(),
+                });
+            }
+            removed.push(path);
+        }
+        for (path, error) in failed {
+            found.cannot_withdraw(&path, &error);
+        }
+        self.recorded(&entries, found);
+        if !removed.is_empty() {
+            let results = some_of(&removed);
+            let why = "the journal knows nothing of them";
+            found
+                .said
+                .push(format!("results withdrawn: {results}: {why}"));
+        }
+    }
+
+    fn recorded(&self, entries: &[Entry], found: &mut Reconciled) {
+        if entries.is_empty() {
+            return;
+        }
+        // The next start finds the same and tries again.
+        if let Err(why) = self.record(entries).map_err(Trouble::of_all) {
+            found.said.push(why.what);
+        }
+    }
+}
+
+impl Reconciled {
+    /// Nothing stands; `said` is for a person.
+    pub fn nothing(said: Vec<String>) -> Reconciled {
+        Reconciled {
+            said,
+            ..Reconciled::default()
+        }
+    }
+
+    /// Whether everything that a verdict depends on is as it was read; `root` is what `stat` says of
+    /// the file itself, if it can be looked at.
+    fn as_read(&mut self, judged: &Judged, root: Option<&Option<Stamp>>) -> bool {
+        let mut same = true;
+        for (number, input) in judged.inputs.iter().enumerate() {
+            let now = match (number, root) {
+                (0, None) => continue,
+                (0, Some(stamp)) => *stamp,
+                _ => *self
+                    .stamps
+                    .entry(input.path.clone())
+                    .or_insert_with(|| stamp_through_links(&input.path)),
+            };
+            let read = input.content.map(|content| content.0);
+            same &= now == read || self.has_same_bytes(input, now);
+        }
+        same
+    }
+
+    /// Another link to a file, or other rights, make no other bytes of it.
+    fn has_same_bytes(&mut self, input: &Input, now: Option<Stamp>) -> bool {
+        let (Some((read, digest)), Some(now)) = (input.content, now) else {
+            return false;
+        };
+        let key = (input.path.clone(), digest);
+        now.differs_in_ctime_only(&read)
+            && *self
+                .reread
+                .entry(key)
+                .or_insert_with(|| as_it_is(input).is_some())
+    }
+
+    fn cannot_withdraw(&mut self, path: &Path, error: &io::Error) {
+        let path = to_text(path);
+        self.said.push(format!(
+            "cannot withdraw the result of {path}: {error}; it is tried again when qcbus is started anew"
+        ));
+    }
+}
+
+/// Removes a result, and last the verdict file, which tells that there was one.
+fn remove_result(xqar: &Path) -> io::Result<()> {
+    remove(xqar)?;
+    verdict_beside(xqar).map_or(Ok(()), |verdict| remove(&verdict))
+}
+
+fn said(fall: Fall, paths: &[Arc<Path>]) -> String {
+    let why = match fall {
+        Fall::Unwatched => "their files are not watched any more",
+        Fall::Moved => "they lay elsewhere than results of these directories do now",
+        Fall::Incomplete => "they were not complete, and their files are judged anew",
+    };
+    format!("results withdrawn: {}: {why}", some_of(paths))
+}
+
+/// The first of many.
+fn some_of(paths: &[Arc<Path>]) -> String {
+    const SHOWN: usize = 3;
+    let shown = paths.iter().take(SHOWN);
+    let shown: Vec<String> = shown.map(|path| to_text(path)).collect();
+    match paths.len().saturating_sub(SHOWN) {
+        0 => shown.join(", "),
+        more => format!("{} and {more} more", shown.join(", ")),
+    }
+}

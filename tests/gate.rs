@@ -1,0 +1,470 @@
+//! What lies behind the gate is complete and judged as it lies there; results belong to the one who
+//! wrote them, and none stays that nobody remembers.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use qcbus_messages::Verdict;
+use support::broker::Broker;
+use support::content::Content;
+use support::desk::{Desk, files_below, sample_farm};
+use support::farm::{Farm, tail};
+use support::watchdog::{until_or, until_so};
+
+const MAP: &str = "maps/quay_straight.xodr";
+const SCENARIO: &str = "scenarios/van_follows.xosc";
+const CATALOG: &str = "catalogs/vehicles.xosc";
+const ISLAND: &str = "maps/island/island.xodr";
+const ISLAND_ROADS: &str = "maps/island/island_roads.xml";
+
+/// A farm with a gate and these files of the sample farm.
+fn farm_of(names: &[&str], arguments: &[&str]) -> Farm {
+    let mut farm = Farm::with(arguments);
+    let gate = gate(&farm).to_string_lossy().into_owned();
+    farm.arguments.extend(["--gate".to_owned(), gate]);
+    names.iter().for_each(|name| bring(&farm, name));
+    farm
+}
+
+/// Puts a file of the sample farm there at once.
+fn bring(farm: &Farm, name: &str) {
+    put(
+        farm,
+        name,
+        &std::fs::read(sample_farm().join(name)).unwrap(),
+    );
+}
+
+fn put(farm: &Farm, name: &str, bytes: &[u8]) {
+    let (to, aside) = (farm.root().join(name), farm.base().join("aside"));
+    std::fs::create_dir_all(to.parent().unwrap()).unwrap();
+    std::fs::write(&aside, bytes).unwrap();
+    std::fs::rename(aside, to).unwrap();
+}
+
+fn gate(farm: &Farm) -> PathBuf {
+    farm.base().join("gate")
+}
+
+/// What is published, in order.
+fn published(farm: &Farm) -> Vec<String> {
+    let files = files_below(&gate(farm)).into_iter();
+    let names = files.map(|it| it.to_string_lossy().into_owned());
+    names
+        .filter(|it| !it.contains("/.qcbus-") && !it.starts_with(".qcbus-"))
+        .collect()
+}
+
+fn publishes(farm: &Farm, expected: &[&str]) {
+    until_or(
+        "exactly that is published",
+        || (published(farm) == expected).then_some(()),
+        || {
+            format!(
+                "{:?}, not {expected:?}\n{}",
+                published(farm),
+                tail(&farm.log())
+            )
+        },
+    );
+}
+
+/// A single run accepts everything that lies behind the gate, as it lies there.
+fn is_sound(farm: &Farm) {
+    let desk = Desk::new();
+    let said = desk.check_in(&gate(farm), &["."], "out");
+    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+}
+
+#[test]
+fn all_that_is_accepted_is_published_with_what_it_needs() {
+    let all = files_below(&sample_farm());
+    let names: Vec<String> = all
+        .iter()
+        .map(|it| it.to_string_lossy().into_owned())
+        .collect();
+    let names: Vec<&str> = names.iter().map(|it| &**it).collect();
+    let farm = farm_of(&names, &[]);
+    let _broker = farm.serve_ready();
+    let sound: Vec<&str> = names
+        .into_iter()
+        .filter(|it| it.contains('/') && !it.starts_with("faulty"))
+        .collect();
+    publishes(&farm, &sound);
+    is_sound(&farm);
+    let gate = farm.status().unwrap().gate.unwrap();
+    assert_eq!((gate.published, gate.held_back), (10, 0), "{gate:?}");
+}
+
+#[test]
+fn a_map_goes_with_what_it_includes_and_comes_back_with_it() {
+    let farm = farm_of(&[ISLAND, ISLAND_ROADS], &[]);
+    let _broker = farm.serve_ready();
+    publishes(&farm, &[ISLAND, ISLAND_ROADS]);
+    is_sound(&farm);
+    put(&farm, ISLAND_ROADS, b"<no roads");
+    publishes(&farm, &[]);
+    assert_eq!(farm.verdict(ISLAND).verdict, Verdict::Rejected);
+    bring(&farm, ISLAND_ROADS);
+    publishes(&farm, &[ISLAND, ISLAND_ROADS]);
+    std::fs::remove_file(farm.root().join(ISLAND)).unwrap();
+    publishes(&farm, &[]);
+}
+
+#[test]
+fn a_scenario_goes_with_its_map_and_comes_back_with_it() {
+    let farm = farm_of(&[MAP, SCENARIO, CATALOG], &[]);
+    let _broker = farm.serve_ready();
+    publishes(&farm, &[CATALOG, MAP, SCENARIO]);
+    is_sound(&farm);
+    // The map is rejected: the scenario is accepted, and nobody gets it.
+    put(&farm, MAP, &Content::NoHeader(1).bytes());
+    assert_eq!(farm.verdict(MAP).verdict, Verdict::Rejected);
+    publishes(&farm, &[CATALOG]);
+    until_so("it is said why", || {
+        let status = farm.status().unwrap();
+        let why = |text: &str| text.contains(MAP) && text.contains("not accepted");
+        let mut said = status.notices.iter();
+        said.any(|it| it.kind == "held-back" && why(&it.text))
+    });
+    let held = farm.status().unwrap().gate.unwrap();
+    assert_eq!(held.held_back, held.examples.len() as u64, "{held:?}");
+    // Another map that is accepted.
+    put(&farm, MAP, &Content::Good(2).bytes());
+    publishes(&farm, &[CATALOG, MAP, SCENARIO]);
+    let there = std::fs::read(gate(&farm).join(MAP)).unwrap();
+    assert_eq!(there, Content::Good(2).bytes());
+    // No map at all: what was published with it does not stay.
+    std::fs::remove_file(farm.root().join(MAP)).unwrap();
+    until_so("the map has gone", || !gate(&farm).join(MAP).exists());
+    bring(&farm, MAP);
+    publishes(&farm, &[CATALOG, MAP, SCENARIO]);
+    std::fs::write(farm.root().join(CATALOG), "<no catalog").unwrap();
+    publishes(&farm, &[MAP]);
+}
+
+#[test]
+fn a_map_outside_is_named_and_by_option_refused() {
+    for refused in [false, true] {
+        let arguments: &[&str] = if refused {
+            &["--gate-outside", "refuse"]
+        } else {
+            &[]
+        };
+        let farm = farm_of(&[CATALOG], arguments);
+        let library = farm.base().join("library.xodr");
+        std::fs::copy(sample_farm().join(MAP), &library).unwrap();
+        let text = std::fs::read_to_string(sample_farm().join(SCENARIO)).unwrap();
+        let text = text.replace("../maps/quay_straight.xodr", "../../library.xodr");
+        put(&farm, SCENARIO, text.as_bytes());
+        let _broker = farm.serve_ready();
+        assert_eq!(farm.verdict(SCENARIO).verdict, Verdict::Accepted);
+        let named = farm.verdict_file(SCENARIO)["outside_gate"].clone();
+        assert_eq!(named, serde_json::json!([library.to_string_lossy()]));
+        if refused {
+            publishes(&farm, &[CATALOG]);
+            until_so("it is said", || {
+                farm.log().contains("--gate-outside refuse")
+            });
+        } else {
+            publishes(&farm, &[CATALOG, SCENARIO]);
+        }
+    }
+}
+
+/// Kills a broker whose farm has come to rest.
+fn stopped(farm: &Farm, mut broker: Broker, total: usize) {
+    farm.settle(total);
+    broker.kill();
+}
+
+#[test]
+fn a_start_clears_the_gate_of_what_nobody_claims() {
+    let farm = farm_of(&[MAP, SCENARIO, CATALOG], &[]);
+    let broker = farm.serve_ready();
+    publishes(&farm, &[CATALOG, MAP, SCENARIO]);
+    stopped(&farm, broker, 3);
+    std::fs::write(
+        gate(&farm).join("maps/stale.xodr"),
+        Content::Good(1).bytes(),
+    )
+    .unwrap();
+    std::fs::remove_file(gate(&farm).join(CATALOG)).unwrap();
+    // It is changed while nobody watches.
+    put(&farm, MAP, &Content::NoHeader(1).bytes());
+    let broker = farm.serve_ready();
+    publishes(&farm, &[CATALOG]);
+    assert_eq!(farm.verdict(MAP).verdict, Verdict::Rejected);
+    bring(&farm, MAP);
+    publishes(&farm, &[CATALOG, MAP, SCENARIO]);
+    is_sound(&farm);
+    drop(broker);
+}
+
+fn refused(command: &mut Command) -> String {
+    let output = command.output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    said
+}
+
+#[test]
+fn a_directory_with_files_of_others_is_no_gate() {
+    let farm = farm_of(&[MAP], &[]);
+    std::fs::create_dir(gate(&farm)).unwrap();
+    let precious = gate(&farm).join("precious.txt");
+    std::fs::write(&precious, "").unwrap();
+    let said = refused(&mut farm.serve_command());
+    assert!(
+        said.contains("touch") && said.contains(".qcbus-gate"),
+        "{said}"
+    );
+    assert!(precious.exists());
+    std::fs::write(gate(&farm).join(".qcbus-gate"), "").unwrap();
+    let _broker = farm.serve_ready();
+    publishes(&farm, &[MAP]);
+}
+
+#[test]
+fn results_and_gate_are_apart() {
+    for (gate, out) in [("out", "out"), ("out/gate", "out"), ("gate", "gate/out")] {
+        let farm = Farm::new();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+        command
+            .arg("serve")
+            .arg(farm.root())
+            .current_dir(farm.base());
+        let said = refused(command.args(["--gate", gate, "--out", out]));
+        assert!(said.contains("directory of its own"), "{said}");
+    }
+}
+
+/// Another broker beside that of the farm, with everything of its own but what is given.
+fn another(farm: &Farm, shared: &[(&str, &Path)]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+    let other = farm.base().join("other");
+    std::fs::create_dir_all(other.join("farm")).unwrap();
+    command.arg("serve").arg(other.join("farm"));
+    for option in ["--out", "--gate", "--state", "--instance-dir"] {
+        let given = shared.iter().find(|it| it.0 == option);
+        let own = other.join(&option[2..]);
+        command.arg(option).arg(given.map_or(&*own, |it| it.1));
+    }
+    command
+}
+
+#[test]
+fn gate_results_and_state_are_held_by_one_broker() {
+    let farm = farm_of(&[MAP], &[]);
+    let broker = farm.serve_ready();
+    publishes(&farm, &[MAP]);
+    let holder = format!("instance `instance`, process {}", broker.pid());
+    for (option, what) in [
+        ("--gate", "the gate"),
+        ("--out", "the directory of results"),
+    ] {
+        let path = if option == "--gate" {
+            gate(&farm)
+        } else {
+            farm.out()
+        };
+        let said = refused(&mut another(&farm, &[(option, &path)]));
+        for words in [what, &holder, option, "qcbus down"] {
+            assert!(said.contains(words), "{words}: {said}");
+        }
+    }
+    // Nor does a single run write among them.
+    let desk = Desk::new();
+    desk.write("a.xodr", Content::Good(1).bytes());
+    let out = farm.out().to_string_lossy().into_owned();
+    let said = desk.qcbus(&["check", "a.xodr", "--out", &out]);
+    assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
+    assert!(said.stderr.contains(&holder), "{}", said.stderr);
+    assert!(!farm.out().join("a.xodr.xqar").exists());
+    assert_eq!(published(&farm), [MAP]);
+}
+
+/// Names of results, verdict files and reports.
+fn results(out: &Path) -> Vec<String> {
+    let files = files_below(out).into_iter();
+    let names = files.map(|it| it.to_string_lossy().into_owned());
+    names.filter(|it| !it.starts_with(".qcbus")).collect()
+}
+
+#[test]
+fn earlier_results_of_a_run_do_not_look_current() {
+    let desk = Desk::new();
+    for name in ["in/a.xodr", "in/b.xodr", "else/c.xodr"] {
+        desk.write(name, Content::Good(1).bytes());
+    }
+    let out = desk.path().join("qcbus-out");
+    let foreign = desk.write(
+        "qcbus-out/in/Result.xqar",
+        "<CheckerResults version=\"1\"/>",
+    );
+    desk.qcbus(&["check", "in", "else"]);
+    let all = [
+        "else/c.xodr.xqar",
+        "in/Result.xqar",
+        "in/a.xodr.xqar",
+        "in/b.xodr.xqar",
+    ];
+    assert_eq!(results(&out), all);
+    std::fs::remove_file(desk.path().join("in/a.xodr")).unwrap();
+    desk.write("else/.qcignore", "*.xodr\n");
+    let said = desk.qcbus(&["check", "in"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    assert_eq!(
+        results(&out),
+        ["else/c.xodr.xqar", "in/Result.xqar", "in/b.xodr.xqar"]
+    );
+    // A run that never comes to a verdict leaves none of an earlier one.
+    desk.write("config.xml", "<Config/>");
+    let said = desk.qcbus(&[
+        "check",
+        "in/b.xodr",
+        "--job-deadline",
+        "0ms",
+        "--max-file",
+        "0",
+    ]);
+    assert_ne!(said.code, Some(0), "{}", said.whole(&desk));
+    let left = results(&out);
+    let read = || std::fs::read_to_string(out.join("in/b.xodr.xqar")).unwrap();
+    assert!(
+        !left.contains(&"in/b.xodr.xqar".to_owned()) || read().contains("status=\"error\""),
+        "{left:?}"
+    );
+    desk.qcbus(&["check", "else"]);
+    assert_eq!(
+        results(&out).first().unwrap(),
+        "in/Result.xqar",
+        "it is ignored"
+    );
+    assert!(foreign.exists());
+}
+
+/// The journal as a file; the broker must be dead.
+fn journal_files(farm: &Farm) -> Vec<PathBuf> {
+    ["", "-wal", "-shm"]
+        .map(|suffix| {
+            let mut name = farm.journal().into_os_string();
+            name.push(suffix);
+            PathBuf::from(name)
+        })
+        .into_iter()
+        .filter(|it| it.exists())
+        .collect()
+}
+
+/// As a broker leaves it that is killed between writing results and recording them: everything is
+/// written, and the journal is the one from before.
+fn killed_before_the_journal(farm: &Farm, change: impl Fn()) {
+    let before = farm.base().join("before");
+    std::fs::create_dir(&before).unwrap();
+    for file in journal_files(farm) {
+        std::fs::copy(&file, before.join(file.file_name().unwrap())).unwrap();
+    }
+    let mut broker = farm.serve_ready();
+    change();
+    broker.kill();
+    for file in journal_files(farm) {
+        std::fs::remove_file(file).unwrap();
+    }
+    for file in files_below(&before) {
+        std::fs::copy(before.join(&file), farm.journal().with_file_name(&file)).unwrap();
+    }
+}
+
+fn comes_to(farm: &Farm, expected: &[&str]) {
+    let written = || results(&farm.out());
+    until_or(
+        "exactly these results are there",
+        || (written() == expected).then_some(()),
+        || format!("{:?}\n{}", written(), tail(&farm.log())),
+    );
+}
+
+/// Everything that belongs to a file.
+fn all_of(name: &str) -> [String; 3] {
+    ["json", "verdict.json", "xqar"].map(|suffix| format!("{name}.{suffix}"))
+}
+
+#[test]
+fn a_result_that_the_journal_does_not_know_goes_with_its_file() {
+    let farm = farm_of(&[], &["--report", "json"]);
+    put(&farm, "old.xodr", &Content::Good(1).bytes());
+    let broker = farm.serve_ready();
+    stopped(&farm, broker, 1);
+    killed_before_the_journal(&farm, || {
+        put(&farm, "old.xodr", &Content::Good(2).bytes());
+        put(&farm, "new.xodr", &Content::Good(3).bytes());
+        farm.settle(2);
+        publishes(&farm, &["new.xodr", "old.xodr"]);
+        let all = [all_of("new.xodr"), all_of("old.xodr")].concat();
+        comes_to(&farm, &all.iter().map(|it| &**it).collect::<Vec<_>>());
+    });
+    for name in ["old.xodr", "new.xodr"] {
+        std::fs::remove_file(farm.root().join(name)).unwrap();
+    }
+    let _broker = farm.serve_ready();
+    comes_to(&farm, &[]);
+    publishes(&farm, &[]);
+    assert!(farm.log().contains("results withdrawn"), "{}", farm.log());
+}
+
+#[test]
+fn a_verdict_that_the_journal_does_not_know_is_given_anew() {
+    let farm = farm_of(&[], &[]);
+    put(&farm, "a.xodr", &Content::Good(1).bytes());
+    let broker = farm.serve_ready();
+    stopped(&farm, broker, 1);
+    let good = std::fs::read(farm.root().join("a.xodr")).unwrap();
+    killed_before_the_journal(&farm, || {
+        put(&farm, "a.xodr", &Content::NoHeader(2).bytes());
+        assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Rejected);
+    });
+    // Exactly the file of the old verdict is back, so that the journal seems to be right.
+    put(&farm, "a.xodr", &good);
+    let _broker = farm.serve_ready();
+    farm.settle(1);
+    assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Accepted);
+    assert_eq!(farm.verdict_file("a.xodr")["verdict"], "accepted");
+    publishes(&farm, &["a.xodr"]);
+}
+
+#[test]
+fn nothing_stays_when_the_journal_was_moved_away() {
+    let farm = farm_of(&[MAP, CATALOG], &["--report", "json"]);
+    let broker = farm.serve_ready();
+    let json = farm.out().join(format!("{MAP}.json"));
+    until_so("it is reported", || json.exists());
+    stopped(&farm, broker, 2);
+    for file in journal_files(&farm) {
+        std::fs::remove_file(file).unwrap();
+    }
+    std::fs::remove_file(farm.root().join(MAP)).unwrap();
+    // Not ours, or that of another broker.
+    let kept = ["Result.xqar", "nested/x.xodr.xqar", "x.verdict.json"];
+    let result = std::fs::read(farm.out().join(format!("{CATALOG}.xqar"))).unwrap();
+    for name in kept {
+        let path = farm.out().join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, &result).unwrap();
+    }
+    std::fs::create_dir(farm.out().join("nested/.qcbus")).unwrap();
+    let _broker = farm.serve_ready();
+    let mut expected = all_of(CATALOG).to_vec();
+    expected.extend(kept.map(str::to_owned));
+    expected.sort();
+    comes_to(&farm, &expected.iter().map(|it| &**it).collect::<Vec<_>>());
+    publishes(&farm, &[CATALOG]);
+}
