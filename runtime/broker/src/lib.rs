@@ -7,7 +7,7 @@
 //! gives back what was taken.
 
 pub mod control;
-pub mod core;
+mod core;
 pub mod deliveries;
 mod demand;
 mod directory_lock;
@@ -28,6 +28,7 @@ mod verdict_file;
 pub mod watch;
 mod writers;
 
+pub use core::{ChildSpec, Delivery, Judged, Notice, Restart, Settings};
 pub use demand::InForce;
 pub use directory_lock::LockError;
 pub use disk::write_whole;

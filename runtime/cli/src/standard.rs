@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use qcbus_broker::core::{ChildSpec, Restart};
+use qcbus_broker::{ChildSpec, Restart};
 use qcbus_document::FileKind;
 use qcbus_formats::config::{Known, KnownBundle, KnownChecker};
 use qcbus_messages::Role;

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use qcbus_broker::core::{Delivery, Judged, Notice, Settings};
 use qcbus_broker::{Broker, Options, Outside, ResultPaths, StartError, Told};
+use qcbus_broker::{Delivery, Judged, Notice, Settings};
 use qcbus_bus::{HostOptions, Instance};
 use qcbus_document::{FileKind, Suffix};
 use qcbus_formats::config::Config;
@@ -136,9 +136,9 @@ fn writable(out: &Path) -> Result<(), Refusal> {
 
 /// A configuration runs what it names and nothing else.
 fn wanted_bundles(
-    specs: Vec<qcbus_broker::core::ChildSpec>,
+    specs: Vec<qcbus_broker::ChildSpec>,
     config: Option<&Config>,
-) -> Vec<qcbus_broker::core::ChildSpec> {
+) -> Vec<qcbus_broker::ChildSpec> {
     let Some(config) = config else { return specs };
     let named = |name: &str| {
         let alias = standard::bundle(name).map_or("", |bundle| bundle.alias);

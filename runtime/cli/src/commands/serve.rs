@@ -222,7 +222,7 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         memory_limit: memory_limit(&args.limits),
         limits: limits(&args.limits),
         host: HostOptions::default(),
-        settings: qcbus_broker::core::Settings {
+        settings: qcbus_broker::Settings {
             drain_limit: args.drain_limit,
             ..settings(&args.limits)
         },

@@ -2,7 +2,7 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use qcbus_broker::core::Settings;
+use qcbus_broker::Settings;
 use qcbus_bus::Instance;
 use qcbus_formats::xqar::Dialect;
 use qcbus_ingest::Limits;

@@ -1,0 +1,71 @@
+//! Why the journal cannot be used.
+
+use std::path::{Path, PathBuf};
+
+use super::SCHEMA_VERSION;
+use crate::directory_lock::LockError;
+
+/// Why the journal cannot be used, with the way out.
+#[derive(Debug, thiserror::Error)]
+pub enum JournalError {
+    /// Another process holds it.
+    #[error(
+        "the journal {path} is locked by another process ({source}); stop the other broker on this state directory, or give this one another with --state"
+    )]
+    Locked {
+        /// The journal.
+        path: PathBuf,
+        /// What SQLite says.
+        source: rusqlite::Error,
+    },
+    /// Another broker works with this state directory, or it cannot be taken.
+    #[error("{0}")]
+    State(#[from] LockError),
+    /// Its disk is full.
+    #[error(
+        "the journal {path} cannot be written: its disk is full; make room, it is tried again until there is some"
+    )]
+    Full {
+        /// The journal.
+        path: PathBuf,
+    },
+    /// It is no journal, or a broken one.
+    #[error(
+        "the journal {path} cannot be used: {source}. It only remembers which files are finished: move it away (`mv {path} {path}.broken`) and start again, everything is then judged anew; `qcbus doctor` looks into it"
+    )]
+    Broken {
+        /// The journal.
+        path: PathBuf,
+        /// What SQLite says.
+        source: rusqlite::Error,
+    },
+    /// It was written by a newer version of qcbus.
+    #[error(
+        "the journal {path} has schema {found}, this version of qcbus knows {SCHEMA_VERSION}: use the newer qcbus, or give this one another directory with --state"
+    )]
+    Newer {
+        /// The journal.
+        path: PathBuf,
+        /// Its schema.
+        found: i64,
+    },
+    /// Its directory cannot be made.
+    #[error("cannot make the state directory {path}: {source}; choose another with --state")]
+    Directory {
+        /// The directory.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+}
+
+/// What SQLite says, as what it means for the journal.
+pub(super) fn classify(path: &Path, source: rusqlite::Error) -> JournalError {
+    use rusqlite::ErrorCode::{DatabaseBusy, DatabaseLocked};
+    let path = path.to_path_buf();
+    match source.sqlite_error_code() {
+        Some(DatabaseBusy | DatabaseLocked) => JournalError::Locked { path, source },
+        Some(rusqlite::ErrorCode::DiskFull) => JournalError::Full { path },
+        _ => JournalError::Broken { path, source },
+    }
+}

@@ -1,0 +1,340 @@
+//! The journal: what must survive the broker, in SQLite. The schema is in `journal.sql`.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use qcbus_messages::JobId;
+use qcbus_messages::path_text::from_text;
+use rusqlite::{Connection, OpenFlags, params};
+
+use crate::core::{Judged, Member, Origin};
+use crate::directory_lock::{DirectoryLock, Purpose};
+use crate::disk::FileMark;
+
+mod error;
+mod rows;
+#[cfg(test)]
+mod tests;
+mod write;
+
+pub use error::JournalError;
+
+use error::classify;
+use rows::{judged_of, millis, number};
+use write::put;
+
+/// Version of the schema, kept in SQLite's `user_version`.
+pub const SCHEMA_VERSION: i64 = 3;
+
+const SCHEMA: &str = include_str!("journal.sql");
+
+/// A file with its verdict, as the journal remembers it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Remembered {
+    /// Absolute path.
+    pub path: Arc<Path>,
+    /// The verdict and what it depends on.
+    pub judged: Judged,
+    /// The mark of the verdict file as it was written, where that was remembered.
+    pub written: Option<FileMark>,
+    /// The reporters that have it, each with the job whose result it has.
+    pub delivered: Vec<(String, JobId)>,
+}
+
+/// A file that has gone, and a reporter that has not yet taken back what it said of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Void {
+    /// Absolute path of the file.
+    pub path: Arc<Path>,
+    /// The reporter.
+    pub reporter: String,
+    /// Where the result lay, if that is known.
+    pub xqar: Option<PathBuf>,
+}
+
+/// What one job did, for the history.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct History {
+    /// Source bytes.
+    pub bytes: u64,
+    /// Microseconds from the queue to the stored result.
+    pub micros: u64,
+    /// By bundle: name, version, microseconds, failure.
+    pub bundles: Vec<(String, String, u64, String)>,
+    /// Bundle, checker, status, number of issues, of checkers worth mentioning.
+    pub checkers: Vec<(String, String, String, u64)>,
+}
+
+/// Something to remember.
+#[derive(Debug)]
+pub enum Entry {
+    /// A verdict.
+    Judged {
+        /// The file.
+        path: Arc<Path>,
+        /// Its verdict.
+        judged: Arc<Judged>,
+        /// How it came about; absent when the verdict only got fresh stamps.
+        history: Option<Box<History>>,
+        /// The mark of the verdict file; absent when none was written now.
+        written: Option<FileMark>,
+    },
+    /// A file has gone.
+    Withdrawn {
+        /// The file.
+        path: Arc<Path>,
+        /// Who is to take back a report about it.
+        reporters: Vec<String>,
+    },
+    /// A result was withdrawn that nothing was remembered of.
+    Left {
+        /// The file.
+        path: Arc<Path>,
+        /// Where the result lay.
+        xqar: PathBuf,
+        /// Who is to take back a report about it.
+        reporters: Vec<String>,
+    },
+    /// A reporter has taken back its report about a file that has gone.
+    Voided {
+        /// The file.
+        path: Arc<Path>,
+        /// The reporter.
+        reporter: String,
+    },
+    /// A bundle must judge from now on.
+    Enrolled(Member),
+    /// A bundle need not judge any more.
+    Struck {
+        /// Its name.
+        name: String,
+    },
+    /// A reporter has a result.
+    Delivered {
+        /// The file.
+        path: Arc<Path>,
+        /// The reporter.
+        reporter: String,
+        /// The job.
+        job: JobId,
+    },
+}
+
+/// The open journal.
+#[derive(Debug)]
+pub struct Journal {
+    connection: Connection,
+    path: PathBuf,
+    /// Kept as long as the journal is.
+    _lock: Option<DirectoryLock>,
+}
+
+impl Journal {
+    /// Opens or makes the journal in a state directory, which is this instance's alone as long as
+    /// the journal is open.
+    ///
+    /// # Errors
+    /// See [`JournalError`]; each says what to do.
+    pub fn open(state: &Path, instance: &str) -> Result<Journal, JournalError> {
+        std::fs::create_dir_all(state).map_err(|source| JournalError::Directory {
+            path: state.to_path_buf(),
+            source,
+        })?;
+        let lock = DirectoryLock::take(state, Purpose::State, instance)?;
+        let path = state.join("journal.sqlite");
+        let fail = |source| classify(&path, source);
+        let connection = Connection::open(&path).map_err(fail)?;
+        connection
+            .busy_timeout(Duration::from_secs(5))
+            .map_err(fail)?;
+        prepare(&connection, &path)?;
+        Ok(Journal {
+            connection,
+            path,
+            _lock: Some(lock),
+        })
+    }
+
+    /// A journal that is forgotten with the process, for a single run.
+    ///
+    /// # Errors
+    /// When SQLite cannot even do that.
+    pub fn in_memory() -> Result<Journal, JournalError> {
+        let path = PathBuf::from(":memory:");
+        let connection = Connection::open_in_memory().map_err(|source| classify(&path, source))?;
+        prepare(&connection, &path)?;
+        Ok(Journal {
+            connection,
+            path,
+            _lock: None,
+        })
+    }
+
+    /// Looks a journal through without changing it: `None` when it is sound, else what is wrong.
+    pub fn examine(state: &Path) -> Option<String> {
+        let path = state.join("journal.sqlite");
+        if !path.exists() {
+            return None;
+        }
+        let check = || -> rusqlite::Result<String> {
+            let connection = Connection::open_with_flags(&path, OpenFlags::SQLITE_OPEN_READ_ONLY)?;
+            connection.query_row("PRAGMA quick_check", [], |row| row.get(0))
+        };
+        match check() {
+            Ok(answer) if answer == "ok" => None,
+            Ok(answer) => Some(answer),
+            Err(source) => Some(classify(&path, source).to_string()),
+        }
+    }
+
+    /// Everything that is remembered of files.
+    ///
+    /// # Errors
+    /// When the journal cannot be read. Rows that make no sense are left out: their files are
+    /// judged anew.
+    pub fn remembered(&self) -> Result<Vec<Remembered>, JournalError> {
+        self.read_all()
+            .map_err(|source| classify(&self.path, source))
+    }
+
+    fn read_all(&self) -> rusqlite::Result<Vec<Remembered>> {
+        let mut delivered: HashMap<String, Vec<(String, JobId)>> = HashMap::new();
+        let mut query = self
+            .connection
+            .prepare("SELECT path, reporter, job FROM deliveries")?;
+        let mut rows = query.query([])?;
+        while let Some(row) = rows.next()? {
+            let entry = (row.get(1)?, JobId(number(row.get(2)?)));
+            delivered.entry(row.get(0)?).or_default().push(entry);
+        }
+        let mut query = self.connection.prepare(
+            "SELECT path, job, verdict, digest, basis, config, jury, errors, warnings, \
+             information, why, xqar, inputs, racy, epoch, written FROM files ORDER BY path",
+        )?;
+        let mut rows = query.query([])?;
+        let mut all = Vec::new();
+        while let Some(row) = rows.next()? {
+            let path: String = row.get(0)?;
+            if let Some(judged) = judged_of(row)? {
+                let delivered = delivered.remove(&path).unwrap_or_default();
+                all.push(Remembered {
+                    path: from_text(&path).into(),
+                    judged,
+                    written: Some(row.get(15)?)
+                        .filter(|it: &String| !it.is_empty())
+                        .map(FileMark),
+                    delivered,
+                });
+            }
+        }
+        Ok(all)
+    }
+
+    /// Files that have gone and the reporters that have not yet taken back what they said of them.
+    ///
+    /// # Errors
+    /// When the journal cannot be read.
+    pub fn voids(&self) -> Result<Vec<Void>, JournalError> {
+        let read = || -> rusqlite::Result<Vec<Void>> {
+            let mut query = self.connection.prepare(
+                "SELECT path, reporter, gone.xqar FROM deliveries LEFT JOIN gone USING (path) \
+                 LEFT JOIN files USING (path) \
+                 WHERE deliveries.job = 0 AND (files.path IS NULL OR files.xqar <> gone.xqar)",
+            )?;
+            let rows = query.query_map([], |row| {
+                let path: String = row.get(0)?;
+                Ok(Void {
+                    path: from_text(&path).into(),
+                    reporter: row.get(1)?,
+                    xqar: row.get::<_, Option<String>>(2)?.map(|it| from_text(&it)),
+                })
+            })?;
+            rows.collect()
+        };
+        read().map_err(|source| classify(&self.path, source))
+    }
+
+    /// The bundles that must judge. One whose catalogue cannot be read any more is among them: it
+    /// must judge nevertheless.
+    ///
+    /// # Errors
+    /// When the journal cannot be read.
+    pub fn members(&self) -> Result<Vec<Member>, JournalError> {
+        let read = || -> rusqlite::Result<Vec<Member>> {
+            let mut query = self
+                .connection
+                .prepare("SELECT name, version, origin, catalogue FROM members ORDER BY name")?;
+            let rows = query.query_map([], |row| {
+                let origin: String = row.get(2)?;
+                Ok(Member {
+                    name: row.get(0)?,
+                    version: row.get(1)?,
+                    catalogue: serde_json::from_str(&row.get::<_, String>(3)?)
+                        .ok()
+                        .map(Arc::new),
+                    origin: Origin::of(&origin).unwrap_or(Origin::Joined),
+                })
+            })?;
+            rows.collect()
+        };
+        read().map_err(|source| classify(&self.path, source))
+    }
+
+    /// Writes entries in one transaction: all of them or none.
+    ///
+    /// # Errors
+    /// When SQLite cannot write, a full disk for instance; the entries are the caller's to keep.
+    pub fn write(&mut self, entries: &[Entry]) -> Result<(), JournalError> {
+        let path = self.path.clone();
+        let mut write = || -> rusqlite::Result<()> {
+            let transaction = self.connection.transaction()?;
+            for entry in entries {
+                put(&transaction, entry)?;
+            }
+            transaction.commit()
+        };
+        write().map_err(|source| classify(&path, source))
+    }
+
+    /// Forgets the history of jobs older than `keep`.
+    ///
+    /// # Errors
+    /// When SQLite cannot write.
+    pub fn prune(&mut self, keep: Duration) -> Result<usize, JournalError> {
+        let before = millis().saturating_sub(i64::try_from(keep.as_millis()).unwrap_or(i64::MAX));
+        self.connection
+            .execute("DELETE FROM jobs WHERE at < ?1", params![before])
+            .map_err(|source| classify(&self.path, source))
+    }
+}
+
+fn prepare(connection: &Connection, path: &Path) -> Result<(), JournalError> {
+    let fail = |source| classify(path, source);
+    let found: i64 = connection
+        .query_row("PRAGMA user_version", [], |row| row.get(0))
+        .map_err(fail)?;
+    if found > SCHEMA_VERSION {
+        return Err(JournalError::Newer {
+            path: path.to_path_buf(),
+            found,
+        });
+    }
+    if found == 1 || found == 2 {
+        // What is in the old column is no jury, so that every verdict is looked at again.
+        let newer = "BEGIN; ALTER TABLE files RENAME COLUMN bundles TO jury; \
+                     ALTER TABLE files ADD COLUMN epoch INTEGER NOT NULL DEFAULT 0; \
+                     ALTER TABLE files ADD COLUMN written TEXT NOT NULL DEFAULT ''; \
+                     PRAGMA user_version = 3; COMMIT;";
+        connection.execute_batch(newer).map_err(fail)?;
+    }
+    // WAL with synchronous=NORMAL survives a killed process; after a power cut the last verdicts
+    // may be missing, and their files are judged anew.
+    connection
+        .execute_batch(&format!(
+            "PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL; PRAGMA foreign_keys = ON; \
+             {SCHEMA} PRAGMA user_version = {SCHEMA_VERSION};"
+        ))
+        .map_err(fail)
+}

@@ -1,0 +1,148 @@
+//! What rows hold, as text and numbers that SQLite knows.
+
+use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use qcbus_messages::path_text::{from_text, to_text as text};
+use qcbus_messages::{Digest, JobId, Verdict};
+
+use crate::core::{Epoch, Input, Judged, Juror, Jury, Mark, Stamp};
+
+pub(super) fn jury_to_text(jury: &Jury) -> String {
+    let row = |juror: &Juror| {
+        (
+            juror.name.clone(),
+            juror.mark.map(|it| format!("{:016x}", it.0)),
+        )
+    };
+    let rows: Vec<(String, Option<String>)> = jury.0.iter().map(row).collect();
+    serde_json::to_string(&rows).unwrap_or_default()
+}
+
+fn jury_from_text(text: &str) -> Jury {
+    let read = || -> Option<Vec<Juror>> {
+        let rows: Vec<(String, Option<String>)> = serde_json::from_str(text).ok()?;
+        let juror = |(name, mark): (String, Option<String>)| {
+            let mark = match mark {
+                Some(mark) => Some(Mark(u64::from_str_radix(&mark, 16).ok()?)),
+                None => None,
+            };
+            Some(Juror { name, mark })
+        };
+        rows.into_iter().map(juror).collect()
+    };
+    read().map_or_else(Jury::unknown, Jury)
+}
+
+/// A path, and of its content size, time of modification, inode, digest, time of change.
+type InputRow = (String, Option<(u64, i128, u64, String, i128)>);
+
+/// The same in schema 1, which knew no time of change.
+type InputRowOfSchema1 = (String, Option<(u64, i128, u64, String)>);
+
+pub(super) fn inputs_to_text(inputs: &[Input]) -> String {
+    let rows: Vec<InputRow> = inputs
+        .iter()
+        .map(|input| {
+            let content = input.content.map(|(stamp, digest)| {
+                (
+                    stamp.size,
+                    stamp.mtime_ns,
+                    stamp.inode,
+                    digest.to_string(),
+                    stamp.ctime_ns,
+                )
+            });
+            (text(&input.path), content)
+        })
+        .collect();
+    serde_json::to_string(&rows).unwrap_or_default()
+}
+
+fn inputs_from_text(text: &str) -> Option<Vec<Input>> {
+    let rows = serde_json::from_str(text).ok();
+    let rows: Vec<InputRow> = rows.or_else(|| rows_of_schema_1(text))?;
+    let input = |(path, content): InputRow| {
+        let content = match content {
+            None => None,
+            Some((size, mtime_ns, inode, digest, ctime_ns)) => Some((
+                Stamp {
+                    size,
+                    mtime_ns,
+                    ctime_ns,
+                    inode,
+                },
+                digest.parse().ok()?,
+            )),
+        };
+        Some(Input {
+            path: from_text(&path).into(),
+            content,
+        })
+    };
+    rows.into_iter().map(input).collect()
+}
+
+/// Without a time of change a stamp fits no file, which is then read once more and found to be the
+/// same, or not.
+fn rows_of_schema_1(text: &str) -> Option<Vec<InputRow>> {
+    let rows: Vec<InputRowOfSchema1> = serde_json::from_str(text).ok()?;
+    let row = |(path, content): InputRowOfSchema1| {
+        let content = content.map(|(size, mtime, inode, digest)| (size, mtime, inode, digest, 0));
+        (path, content)
+    };
+    Some(rows.into_iter().map(row).collect())
+}
+
+pub(super) fn judged_of(row: &rusqlite::Row<'_>) -> rusqlite::Result<Option<Judged>> {
+    let digest = |index| -> rusqlite::Result<Option<Digest>> {
+        Ok(row.get::<_, String>(index)?.parse().ok())
+    };
+    let verdict = match row.get::<_, String>(2)?.as_str() {
+        "accepted" => Verdict::Accepted,
+        "rejected" => Verdict::Rejected,
+        "undetermined" => Verdict::Undetermined,
+        _ => return Ok(None),
+    };
+    let (own, basis, config) = (digest(3)?, digest(4)?, digest(5)?);
+    let inputs = inputs_from_text(&row.get::<_, String>(12)?);
+    let (Some(digest), Some(basis), Some(config), Some(inputs)) = (own, basis, config, inputs)
+    else {
+        return Ok(None);
+    };
+    Ok(Some(Judged {
+        job: JobId(number(row.get(1)?)),
+        verdict,
+        digest,
+        basis,
+        config,
+        jury: Arc::new(jury_from_text(&row.get::<_, String>(6)?)),
+        epoch: Epoch(number(row.get(14)?)),
+        inputs,
+        racy: row.get(13)?,
+        counts: [
+            number(row.get(7)?),
+            number(row.get(8)?),
+            number(row.get(9)?),
+        ],
+        why: serde_json::from_str(&row.get::<_, String>(10)?).unwrap_or_default(),
+        xqar: from_text(&row.get::<_, String>(11)?),
+    }))
+}
+
+pub(super) fn signed(number: u64) -> i64 {
+    i64::try_from(number).unwrap_or(i64::MAX)
+}
+
+pub(super) fn number(signed: i64) -> u64 {
+    u64::try_from(signed).unwrap_or(0)
+}
+
+/// Milliseconds since 1970. Only ever shown or compared with the retention time, so a clock that
+/// jumps does no harm.
+pub(super) fn millis() -> i64 {
+    let since = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default();
+    i64::try_from(since.as_millis()).unwrap_or(i64::MAX)
+}

@@ -1,0 +1,212 @@
+//! What was written is remembered, also of earlier schemas.
+
+use qcbus_messages::{Catalogue, Digest, Verdict};
+
+use std::sync::Arc;
+
+use super::*;
+use crate::core::{Epoch, Input, Juror, Jury, Mark, Stamp};
+
+fn judged(job: u64) -> Judged {
+    Judged {
+        job: JobId(job),
+        verdict: Verdict::Undetermined,
+        digest: Digest([1; 32]),
+        basis: Digest([2; 32]),
+        config: Digest([3; 32]),
+        jury: Arc::new(Jury(vec![
+            Juror {
+                name: "mine".to_owned(),
+                mark: None,
+            },
+            Juror {
+                name: "xodrBundle".to_owned(),
+                mark: Some(Mark(u64::MAX)),
+            },
+        ])),
+        epoch: Epoch(1 << 40),
+        inputs: vec![
+            Input {
+                path: Path::new("/a.xosc").into(),
+                content: Some((
+                    Stamp {
+                        size: 1,
+                        mtime_ns: -(1 << 70),
+                        ctime_ns: 1 << 71,
+                        inode: 3,
+                    },
+                    Digest([1; 32]),
+                )),
+            },
+            Input {
+                path: Path::new("/a.xodr").into(),
+                content: None,
+            },
+        ],
+        racy: true,
+        counts: [1, 2, 3],
+        why: vec!["xodrBundle: it died".to_owned()],
+        xqar: PathBuf::from("/out/a.xosc.xqar"),
+    }
+}
+
+#[test]
+fn what_was_written_is_remembered() {
+    let dir = tempfile::tempdir().unwrap();
+    let path: Arc<Path> = Path::new("/a.xosc").into();
+    let expected = Arc::new(judged(5));
+    {
+        let mut journal = Journal::open(dir.path(), "test").unwrap();
+        let history = Some(Box::new(History::default()));
+        journal
+            .write(&[
+                Entry::Judged {
+                    path: path.clone(),
+                    judged: expected.clone(),
+                    history,
+                    written: Some(FileMark("7 8 9".to_owned())),
+                },
+                // Only fresh stamps.
+                Entry::Judged {
+                    path: path.clone(),
+                    judged: expected.clone(),
+                    history: None,
+                    written: None,
+                },
+                Entry::Delivered {
+                    path: path.clone(),
+                    reporter: "json".into(),
+                    job: JobId(5),
+                },
+            ])
+            .unwrap();
+    }
+    let mut journal = Journal::open(dir.path(), "test").unwrap();
+    let all = journal.remembered().unwrap();
+    assert_eq!(all.len(), 1);
+    assert_eq!(all[0].judged, *expected);
+    assert_eq!(all[0].written, Some(FileMark("7 8 9".to_owned())));
+    assert_eq!(all[0].delivered, [("json".to_owned(), JobId(5))]);
+    let reporters = vec!["json".to_owned(), "text".to_owned()];
+    let gone = path.clone();
+    journal
+        .write(&[Entry::Withdrawn {
+            path: gone,
+            reporters,
+        }])
+        .unwrap();
+    assert!(journal.remembered().unwrap().is_empty());
+    let void = |reporter: &str| Void {
+        path: path.clone(),
+        reporter: reporter.to_owned(),
+        xqar: Some("/out/a.xosc.xqar".into()),
+    };
+    let (json, text) = (void("json"), void("text"));
+    assert_eq!(journal.voids().unwrap(), [json, text.clone()]);
+    let reporter = "json".to_owned();
+    let path = path.clone();
+    journal.write(&[Entry::Voided { path, reporter }]).unwrap();
+    assert_eq!(journal.voids().unwrap(), [text]);
+    assert_eq!(Journal::examine(dir.path()), None);
+}
+
+#[test]
+fn a_journal_of_schema_1_opens_and_its_stamps_fit_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let path: Arc<Path> = Path::new("/a.xosc").into();
+    let written = judged(5);
+    let mut journal = Journal::open(dir.path(), "default").unwrap();
+    journal
+        .write(&[Entry::Judged {
+            path,
+            judged: Arc::new(written.clone()),
+            history: None,
+            written: None,
+        }])
+        .unwrap();
+    let digest = Digest([1; 32]);
+    let inputs = format!("[[\"/a.xosc\",[1,7,3,\"{digest}\"]],[\"/a.xodr\",null]]");
+    journal
+        .connection
+        .execute("UPDATE files SET inputs = ?1", params![inputs])
+        .unwrap();
+    journal
+        .connection
+        .execute_batch(
+            "ALTER TABLE files RENAME COLUMN jury TO bundles; \
+             ALTER TABLE files DROP COLUMN epoch; ALTER TABLE files DROP COLUMN written; \
+             UPDATE files SET bundles = 'ffffffffffffffff'; PRAGMA user_version = 1",
+        )
+        .unwrap();
+    drop(journal);
+    let all = Journal::open(dir.path(), "default")
+        .unwrap()
+        .remembered()
+        .unwrap();
+    assert_eq!(all.len(), 1);
+    let (stamp, known) = all[0].judged.inputs[0].content.unwrap();
+    assert_eq!((stamp.size, stamp.mtime_ns, stamp.inode), (1, 7, 3));
+    assert_eq!(stamp.ctime_ns, 0);
+    assert_eq!(known, digest);
+    assert_eq!(all[0].judged.inputs[1], written.inputs[1]);
+    assert_eq!(all[0].judged.basis, written.basis);
+    assert_eq!(*all[0].judged.jury, Jury::unknown());
+    assert_eq!(all[0].written, None);
+}
+
+#[test]
+fn who_must_judge_is_remembered_until_struck() {
+    let dir = tempfile::tempdir().unwrap();
+    let catalogue = Catalogue {
+        alias: "mine".to_owned(),
+        kinds: vec![qcbus_document::FileKind::Xodr],
+        ..Catalogue::default()
+    };
+    let member = |version: &str| Member {
+        name: "mine".to_owned(),
+        version: version.to_owned(),
+        catalogue: Some(Arc::new(catalogue.clone())),
+        origin: Origin::Joined,
+    };
+    let mut journal = Journal::open(dir.path(), "test").unwrap();
+    journal.write(&[Entry::Enrolled(member("1"))]).unwrap();
+    journal.write(&[Entry::Enrolled(member("2"))]).unwrap();
+    drop(journal);
+    let mut journal = Journal::open(dir.path(), "test").unwrap();
+    assert_eq!(journal.members().unwrap(), [member("2")]);
+    // Of another version of qcbus, perhaps: it must judge nevertheless.
+    let spoilt = "UPDATE members SET catalogue = '{\"kinds\": 7}'";
+    journal.connection.execute_batch(spoilt).unwrap();
+    assert_eq!(journal.members().unwrap()[0].catalogue, None);
+    let name = "mine".to_owned();
+    journal.write(&[Entry::Struck { name }]).unwrap();
+    assert_eq!(journal.members().unwrap(), []);
+}
+
+#[test]
+fn a_broken_journal_says_so_and_what_to_do() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(
+        dir.path().join("journal.sqlite"),
+        "this is no database at all, is it?",
+    )
+    .unwrap();
+    let error = Journal::open(dir.path(), "test").unwrap_err().to_string();
+    assert!(error.contains("move it away"), "{error}");
+    assert!(Journal::examine(dir.path()).is_some());
+}
+
+#[test]
+fn a_newer_journal_is_left_alone() {
+    let dir = tempfile::tempdir().unwrap();
+    drop(Journal::open(dir.path(), "test").unwrap());
+    let connection = Connection::open(dir.path().join("journal.sqlite")).unwrap();
+    connection
+        .execute_batch("PRAGMA user_version = 99")
+        .unwrap();
+    drop(connection);
+    assert!(matches!(
+        Journal::open(dir.path(), "test"),
+        Err(JournalError::Newer { found: 99, .. })
+    ));
+}

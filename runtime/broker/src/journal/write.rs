@@ -1,0 +1,182 @@
+//! How entries become rows.
+
+use std::path::Path;
+
+use qcbus_messages::JobId;
+use qcbus_messages::path_text::to_text as text;
+use rusqlite::{Transaction, params};
+
+use super::rows::{inputs_to_text, jury_to_text, millis, signed};
+use super::{Entry, History};
+use crate::core::{Judged, Member};
+use crate::disk::FileMark;
+
+pub(super) fn put(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> {
+    match entry {
+        Entry::Judged {
+            path,
+            judged,
+            history,
+            written,
+        } => {
+            put_file(transaction, path, judged, written.as_ref())?;
+            if let Some(history) = history {
+                put_history(transaction, path, judged, history)?;
+            }
+        }
+        Entry::Withdrawn { path, reporters } => {
+            let path = text(path);
+            if !reporters.is_empty() {
+                transaction.execute(
+                    "INSERT OR REPLACE INTO gone (path, xqar) \
+                     SELECT path, xqar FROM files WHERE path = ?1",
+                    params![path],
+                )?;
+            }
+            transaction.execute("DELETE FROM files WHERE path = ?1", params![path])?;
+            transaction.execute("DELETE FROM deliveries WHERE path = ?1", params![path])?;
+            for reporter in reporters {
+                deliver(transaction, &path, reporter, JobId(0))?;
+            }
+        }
+        Entry::Left {
+            path,
+            xqar,
+            reporters,
+        } => {
+            let path = text(path);
+            for reporter in reporters {
+                transaction.execute(
+                    "INSERT OR REPLACE INTO gone (path, xqar) VALUES (?1, ?2)",
+                    params![path, text(xqar)],
+                )?;
+                deliver(transaction, &path, reporter, JobId(0))?;
+            }
+        }
+        Entry::Voided { path, reporter } => {
+            transaction.execute(
+                "DELETE FROM deliveries WHERE path = ?1 AND reporter = ?2 AND job = 0",
+                params![text(path), reporter],
+            )?;
+            transaction.execute(
+                "DELETE FROM gone WHERE path = ?1 AND path NOT IN \
+                 (SELECT path FROM deliveries WHERE path = ?1 AND job = 0)",
+                params![text(path)],
+            )?;
+        }
+        Entry::Enrolled(member) => put_member(transaction, member)?,
+        Entry::Struck { name } => {
+            transaction.execute("DELETE FROM members WHERE name = ?1", params![name])?;
+        }
+        Entry::Delivered {
+            path,
+            reporter,
+            job,
+        } => {
+            deliver(transaction, &text(path), reporter, *job)?;
+        }
+    }
+    Ok(())
+}
+
+fn deliver(
+    transaction: &Transaction<'_>,
+    path: &str,
+    reporter: &str,
+    job: JobId,
+) -> rusqlite::Result<()> {
+    let mut statement = transaction.prepare_cached(
+        "INSERT OR REPLACE INTO deliveries (path, reporter, job) VALUES (?1, ?2, ?3)",
+    )?;
+    statement
+        .execute(params![path, reporter, signed(job.0)])
+        .map(|_| ())
+}
+
+fn put_file(
+    transaction: &Transaction<'_>,
+    path: &Path,
+    judged: &Judged,
+    written: Option<&FileMark>,
+) -> rusqlite::Result<()> {
+    // Whoever writes no verdict file leaves the mark of the one that is there.
+    let mut statement = transaction.prepare_cached(
+        "INSERT OR REPLACE INTO files (path, job, verdict, digest, basis, config, jury, errors, \
+         warnings, information, why, xqar, inputs, racy, at, epoch, written) \
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, \
+         coalesce(?17, (SELECT written FROM files WHERE path = ?1), ''))",
+    )?;
+    statement.execute(params![
+        text(path),
+        signed(judged.job.0),
+        judged.verdict.as_str(),
+        judged.digest.to_string(),
+        judged.basis.to_string(),
+        judged.config.to_string(),
+        jury_to_text(&judged.jury),
+        signed(judged.counts[0]),
+        signed(judged.counts[1]),
+        signed(judged.counts[2]),
+        serde_json::to_string(&judged.why).unwrap_or_default(),
+        text(&judged.xqar),
+        inputs_to_text(&judged.inputs),
+        judged.racy,
+        millis(),
+        signed(judged.epoch.0),
+        written.map(|it| &it.0),
+    ])?;
+    Ok(())
+}
+
+fn put_member(transaction: &Transaction<'_>, member: &Member) -> rusqlite::Result<()> {
+    let catalogue = serde_json::to_string(&member.catalogue.as_deref()).unwrap_or_default();
+    transaction.execute(
+        "INSERT OR REPLACE INTO members (name, version, origin, catalogue, at) \
+         VALUES (?1, ?2, ?3, ?4, ?5)",
+        params![
+            member.name,
+            member.version,
+            member.origin.as_str(),
+            catalogue,
+            millis()
+        ],
+    )?;
+    Ok(())
+}
+
+fn put_history(
+    transaction: &Transaction<'_>,
+    path: &Path,
+    judged: &Judged,
+    history: &History,
+) -> rusqlite::Result<()> {
+    let job = signed(judged.job.0);
+    let mut statement = transaction.prepare_cached(
+        "INSERT OR REPLACE INTO jobs (job, path, digest, config, verdict, errors, warnings, \
+         information, bytes, micros, at) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
+    )?;
+    statement.execute(params![
+        job,
+        text(path),
+        judged.digest.to_string(),
+        judged.config.to_string(),
+        judged.verdict.as_str(),
+        signed(judged.counts[0]),
+        signed(judged.counts[1]),
+        signed(judged.counts[2]),
+        signed(history.bytes),
+        signed(history.micros),
+        millis(),
+    ])?;
+    let mut bundles = transaction
+        .prepare_cached("INSERT OR REPLACE INTO job_bundles VALUES (?1, ?2, ?3, ?4, ?5)")?;
+    for (bundle, version, micros, failure) in &history.bundles {
+        bundles.execute(params![job, bundle, version, signed(*micros), failure])?;
+    }
+    let mut checkers = transaction
+        .prepare_cached("INSERT OR REPLACE INTO job_checkers VALUES (?1, ?2, ?3, ?4, ?5)")?;
+    for (bundle, checker, status, issues) in &history.checkers {
+        checkers.execute(params![job, bundle, checker, status, signed(*issues)])?;
+    }
+    Ok(())
+}
