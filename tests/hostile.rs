@@ -442,7 +442,7 @@ fn a_check_ends_when_its_result_cannot_be_written() {
     desk.write("in/a.xodr", Content::NoHeader(1).bytes());
     let said = desk.qcbus(&["check", "in", "--out", "out"]);
     assert_eq!(said.code, Some(5), "{}", said.whole(&desk));
-    let told = format!("error: {long} has no result: cannot write ");
+    let told = format!("error: in/{long} has no result: cannot write ");
     assert!(said.stderr.contains(&told), "{}", said.whole(&desk));
     assert!(
         said.stderr.contains("1 rejected, 1 undetermined"),

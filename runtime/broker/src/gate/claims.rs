@@ -15,7 +15,7 @@ use crate::result_paths::ResultPaths;
 
 /// A file that an acceptance rests on, besides the accepted one.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Part {
+pub(super) struct Need {
     pub(super) path: Arc<Path>,
     pub(super) digest: Digest,
     /// In bytes.
@@ -30,7 +30,7 @@ pub(super) struct Claim {
     pub(super) digest: Digest,
     /// In bytes.
     pub(super) size: u64,
-    pub(super) parts: Vec<Part>,
+    pub(super) needs: Vec<Need>,
     /// Why it is never published as it is, if so: for a person.
     pub(super) refused: Option<String>,
     /// It lies behind the gate with everything that it rests on.
@@ -44,7 +44,7 @@ pub(super) struct Claim {
 impl Claim {
     /// Whether both say the same of the same bytes.
     pub(super) fn agrees(&self, other: &Claim) -> bool {
-        (self.digest, &self.parts, &self.refused) == (other.digest, &other.parts, &other.refused)
+        (self.digest, &self.needs, &self.refused) == (other.digest, &other.needs, &other.refused)
     }
 }
 
@@ -138,8 +138,8 @@ impl Claims {
     /// Puts a claim in; there must be none of this file.
     pub(super) fn insert(&mut self, path: &Arc<Path>, claim: Claim) {
         self.next_serial += 1;
-        for part in &claim.parts {
-            let resting = self.resting.entry(part.path.clone()).or_default();
+        for need in &claim.needs {
+            let resting = self.resting.entry(need.path.clone()).or_default();
             resting.insert(path.clone());
         }
         let claim = Claim {
@@ -173,10 +173,10 @@ impl Claims {
             return Standing::Settled;
         }
         let unpublished = |path: &Path| -> Vec<Arc<Path>> {
-            let parts = self.get(path).map_or(&[][..], |claim| &claim.parts);
-            let parts = parts.iter().filter(|part| self.is_judged(part));
-            let parts = parts.filter(|part| !self.is_published(&part.path));
-            parts.map(|part| part.path.clone()).collect()
+            let needs = self.get(path).map_or(&[][..], |claim| &claim.needs);
+            let needs = needs.iter().filter(|need| self.is_judged(need));
+            let needs = needs.filter(|need| !self.is_published(&need.path));
+            needs.map(|need| need.path.clone()).collect()
         };
         let order = each_after(vec![root.clone()], unpublished);
         let mut plan = Plan {
@@ -209,12 +209,12 @@ impl Claims {
                 lasting: true,
             });
         }
-        let mut judged = claim.parts.iter().filter(|part| self.is_judged(part));
-        let differs = |part: &&Part| {
-            let there = self.get(&part.path);
-            there.is_none_or(|claim| claim.digest != part.digest)
+        let mut judged = claim.needs.iter().filter(|need| self.is_judged(need));
+        let differs = |need: &&Need| {
+            let there = self.get(&need.path);
+            there.is_none_or(|claim| claim.digest != need.digest)
         };
-        judged.find(differs).map(|part| self.held_by(&part.path))
+        judged.find(differs).map(|need| self.held_by(&need.path))
     }
 
     fn held_by(&self, path: &Path) -> Standing {
@@ -227,15 +227,15 @@ impl Claims {
         Standing::Held { why, lasting }
     }
 
-    /// Whether a part must have a claim of its own.
-    fn is_judged(&self, part: &Part) -> bool {
-        part.judged || self.claims.contains_key(&part.path) || self.refused.contains(&part.path)
+    /// Whether a need must have a claim of its own.
+    fn is_judged(&self, need: &Need) -> bool {
+        need.judged || self.claims.contains_key(&need.path) || self.refused.contains(&need.path)
     }
 
     /// The files that lie behind the gate for the sake of one claim, the accepted one last.
     fn files_of(&self, path: &Arc<Path>, claim: &Claim) -> Vec<(Arc<Path>, Digest)> {
-        let fragments = claim.parts.iter().filter(|part| !self.is_judged(part));
-        let fragments = fragments.map(|part| (part.path.clone(), part.digest));
+        let fragments = claim.needs.iter().filter(|need| !self.is_judged(need));
+        let fragments = fragments.map(|need| (need.path.clone(), need.digest));
         let own = (path.clone(), claim.digest);
         fragments.chain([own]).collect()
     }
@@ -282,11 +282,11 @@ impl Claims {
                 let copied = copies.get(path).map(|it| it.0);
                 lies == Some(*digest) || copied == Some(*digest)
             };
-            let accepted = |part: &Part| {
-                let planned = plan.roots.iter().any(|(root, _)| *root == part.path);
-                planned || self.is_published(&part.path)
+            let accepted = |need: &Need| {
+                let planned = plan.roots.iter().any(|(root, _)| *root == need.path);
+                planned || self.is_published(&need.path)
             };
-            let mut judged = claim.parts.iter().filter(|part| self.is_judged(part));
+            let mut judged = claim.needs.iter().filter(|need| self.is_judged(need));
             self.held(claim).is_none()
                 && judged.all(accepted)
                 && self.files_of(root, claim).iter().all(there)
@@ -354,11 +354,11 @@ impl Claims {
         let Some(claim) = self.claims.remove(path) else {
             return Ok(());
         };
-        for part in claim.parts {
-            if let Some(resting) = self.resting.get_mut(&part.path) {
+        for need in claim.needs {
+            if let Some(resting) = self.resting.get_mut(&need.path) {
                 resting.remove(path);
                 if resting.is_empty() {
-                    self.resting.remove(&part.path);
+                    self.resting.remove(&need.path);
                 }
             }
         }
@@ -367,8 +367,8 @@ impl Claims {
 
     /// A claim is not published any more: what lay there for it alone is litter.
     fn drop_user(&mut self, root: &Arc<Path>) {
-        let parts = self.get(root).map_or(&[][..], |claim| &claim.parts);
-        let paths: Vec<Arc<Path>> = parts.iter().map(|part| part.path.clone()).collect();
+        let needs = self.get(root).map_or(&[][..], |claim| &claim.needs);
+        let paths: Vec<Arc<Path>> = needs.iter().map(|need| need.path.clone()).collect();
         for path in paths.into_iter().chain([root.clone()]) {
             let Some(lying) = self.lying.get_mut(&path) else {
                 continue;
@@ -393,9 +393,9 @@ impl Claims {
     /// of this size is in its place. Returns the claims that are left.
     pub(super) fn take_over(&mut self, lies: impl Fn(&Path, u64) -> bool) -> Vec<Arc<Path>> {
         let by_themselves = |(path, claim): (&Arc<Path>, &Claim)| {
-            let fragments = claim.parts.iter().filter(|part| !self.is_judged(part));
+            let fragments = claim.needs.iter().filter(|need| !self.is_judged(need));
             let mut files = fragments
-                .map(|part| (&part.path, part.size))
+                .map(|need| (&need.path, need.size))
                 .chain([(path, claim.size)]);
             (self.held(claim).is_none() && files.all(|(path, size)| lies(path, size)))
                 .then(|| path.clone())

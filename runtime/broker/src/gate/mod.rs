@@ -4,7 +4,7 @@
 //! A *claim* is an acceptance with the digests of all that it depends on. A file is published if it
 //! has a claim, and each file below the watched directories that it depends on and that is judged
 //! by itself has a claim on the same bytes and is published, too. What it depends on and nobody
-//! judges by itself (an included part, a file that is ignored) is published with it. The accepted
+//! judges by itself (an included file, one that is ignored) is published with it. The accepted
 //! file gets its name last and loses it first, so that it is never there without what it needs.
 //! Only files that refer to each other come one after the other.
 
@@ -28,7 +28,7 @@ use crate::result_paths::ResultPaths;
 use crate::stamp::is_listing;
 use crate::store::digest_of;
 
-use claims::{Claim, Claims, Copies, Part, Plan, Standing};
+use claims::{Claim, Claims, Copies, Need, Plan, Standing};
 pub use contents::GateError;
 
 /// What becomes of an accepted file that depends on one outside of the watched directories.
@@ -336,11 +336,11 @@ impl Gate {
 
     /// What an acceptance claims.
     fn claim(&self, judged: &Judged) -> Claim {
-        let parts = judged.inputs.iter().skip(1);
+        let needs = judged.inputs.iter().skip(1);
         let inside = |input: &&Input| self.options.paths.contains(&input.path);
-        let part = |input: &Input| {
+        let need = |input: &Input| {
             let (stamp, digest) = input.content?;
-            Some(Part {
+            Some(Need {
                 path: input.path.clone(),
                 digest,
                 size: stamp.size,
@@ -350,10 +350,10 @@ impl Gate {
         Claim {
             digest: judged.digest,
             size: size_of_root(judged),
-            parts: parts
+            needs: needs
                 .filter(|input| is_file(input))
                 .filter(inside)
-                .filter_map(part)
+                .filter_map(need)
                 .collect(),
             refused: self.refusal(judged),
             published: false,
