@@ -287,15 +287,27 @@ impl Journal {
     /// # Errors
     /// When SQLite cannot write, a full disk for instance; the entries are the caller's to keep.
     pub fn write(&mut self, entries: &[Entry]) -> Result<(), JournalError> {
-        let path = self.path.clone();
-        let mut write = || -> rusqlite::Result<()> {
-            let transaction = self.connection.transaction()?;
-            for entry in entries {
-                put(&transaction, entry)?;
-            }
-            transaction.commit()
+        let written = self.try_to_write(entries);
+        // What was written before may take twice its room until it is put where it belongs.
+        let full = |error: &rusqlite::Error| {
+            error.sqlite_error_code() == Some(rusqlite::ErrorCode::DiskFull)
         };
-        write().map_err(|source| classify(&path, source))
+        let written = match written {
+            Err(error) if full(&error) => self
+                .connection
+                .execute_batch("PRAGMA wal_checkpoint(TRUNCATE)")
+                .and_then(|()| self.try_to_write(entries)),
+            written => written,
+        };
+        written.map_err(|source| classify(&self.path, source))
+    }
+
+    fn try_to_write(&mut self, entries: &[Entry]) -> rusqlite::Result<()> {
+        let transaction = self.connection.transaction()?;
+        for entry in entries {
+            put(&transaction, entry)?;
+        }
+        transaction.commit()
     }
 
     /// Forgets the history of jobs older than `keep`.
