@@ -179,7 +179,7 @@ impl Victim {
         // What is withdrawn late is withdrawn: only what stays is a complaint.
         let complaints = || {
             let mut judgement = judge(&self.farm, &self.files, &[]);
-            judgement.gate(&self.farm, &self.files, &self.farm.gate());
+            judgement.gate(&self.farm, &self.files, &Files::new(), &self.farm.gate());
             assert!(judgement.condemned.is_empty());
             judgement.complaints
         };

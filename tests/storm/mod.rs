@@ -127,7 +127,12 @@ fn judged_again_for_nothing(driver: &mut Driver) -> u64 {
 fn demand(mut driver: Driver, seen: usize, start_kib: u64, end_kib: u64, seconds: u64) {
     let mut judgement = judge_with(&driver.farm, &driver.files, &driver.parts, &[]);
     let lost = driver.files.len() - judgement.with_result;
-    judgement.gate(&driver.farm, &driver.files, &driver.farm.gate());
+    judgement.gate(
+        &driver.farm,
+        &driver.files,
+        &driver.parts,
+        &driver.farm.gate(),
+    );
     let log = format!(
         "{}\n{}",
         driver.tally.last_lines(),

@@ -147,3 +147,86 @@ pub fn innocent_dead<'h>(
         _ => None,
     })
 }
+
+/// The judge is judged: what it must not let pass.
+mod tests {
+    use super::super::ledger::digest;
+    use super::*;
+    use crate::support::content::Mark;
+
+    /// A map was written, then what it includes got the word, and all that is told to the judge.
+    struct Case {
+        ledger: Ledger,
+        told: Told,
+        at: Duration,
+    }
+
+    fn accepted(part: &Content) -> Case {
+        let mut ledger = Ledger::new();
+        let map = Content::Including(1, "part.xml".to_owned());
+        ledger.note("part.xml", Duration::ZERO, Some(part));
+        ledger.note("a.xodr", Duration::ZERO, Some(&map));
+        let told = Told {
+            name: "a.xodr".to_owned(),
+            verdict: "accepted".to_owned(),
+            digest: digest(&map.bytes()),
+            depends_on: vec![("/farm/part.xml".to_owned(), Some(digest(&part.bytes())))],
+            bundles: vec!["xodrBundle".to_owned(), JUDGE.to_owned()],
+            failed: Vec::new(),
+            demanded: None,
+            epoch: None,
+        };
+        let at = ledger.now();
+        Case { ledger, told, at }
+    }
+
+    fn is_wrong(case: &Case) -> bool {
+        let (from, at) = (Duration::ZERO, case.at);
+        let what = What::Told(Box::new(case.told.clone()));
+        !complaints(&[Seen { from, at, what }], &case.ledger).is_empty()
+    }
+
+    #[test]
+    fn a_wrong_acceptance_is_seen() {
+        let clean = accepted(&Content::Part(2, Mark::Clean));
+        assert!(!is_wrong(&clean));
+        assert!(is_wrong(&accepted(&Content::Part(2, Mark::Marked))));
+        let changes: [fn(&mut Told); 6] = [
+            |told| told.bundles.truncate(1),
+            |told| told.failed.push(JUDGE.to_owned()),
+            |told| told.demanded = Some(vec![JUDGE.to_owned(), "absent".to_owned()]),
+            |told| told.demanded = Some(vec!["xodrBundle".to_owned()]),
+            |told| told.depends_on.clear(),
+            |told| told.digest = digest(b"never written"),
+        ];
+        for (number, change) in changes.into_iter().enumerate() {
+            let mut case = accepted(&Content::Part(2, Mark::Clean));
+            change(&mut case.told);
+            assert!(is_wrong(&case), "change {number} is let pass");
+        }
+    }
+
+    #[test]
+    fn an_answer_about_bytes_that_had_gone_is_seen() {
+        let mut ledger = Ledger::new();
+        let (old, new) = (Content::Good(1), Content::Good(2));
+        ledger.note("a.xodr", Duration::ZERO, Some(&old));
+        let begun = ledger.now();
+        ledger.note("a.xodr", begun, Some(&new));
+        let from = ledger.now() + Duration::from_millis(1);
+        let answer = |content: &Content| {
+            let what = What::Answer {
+                name: "a.xodr".to_owned(),
+                verdict: Verdict::Accepted,
+                digest: digest(&content.bytes()),
+            };
+            let seen = Seen {
+                from,
+                at: from,
+                what,
+            };
+            complaints(&[seen], &ledger).len()
+        };
+        assert_eq!((answer(&old), answer(&new)), (1, 0));
+    }
+}

@@ -25,6 +25,9 @@ pub struct Judgement {
     pub condemned: BTreeMap<String, u64>,
 }
 
+/// What a broker puts into a directory that is its gate.
+const GATE_MARK: &str = ".qcbus-gate";
+
 /// The words with which the broker condemns.
 const CONDEMNED: &str = "times on this file alone in a fresh process";
 
@@ -140,8 +143,10 @@ impl Judgement {
         (complete, foreign)
     }
 
-    /// Behind the gate lies what was accepted, byte for byte, and nothing else.
-    pub fn gate(&mut self, farm: &Farm, files: &Files, gate: &Path) {
+    /// Behind the gate lies what was accepted, byte for byte, with all that it depends on, and nothing
+    /// else.
+    pub fn gate(&mut self, farm: &Farm, files: &Files, parts: &Files, gate: &Path) {
+        let mut needed = BTreeSet::from([GATE_MARK.to_owned()]);
         for (name, content) in files {
             let published = std::fs::read(gate.join(name)).ok();
             let accepted = farm.out().join(format!("{name}.verdict.json")).exists()
@@ -157,11 +162,20 @@ impl Judgement {
                 None if accepted => self.complain(name, "accepted, and not behind the gate"),
                 _ => {}
             }
+            if accepted {
+                needed.insert(name.clone());
+                needed.extend(content.parts());
+            }
+        }
+        for (name, content) in parts.iter().filter(|(name, _)| needed.contains(*name)) {
+            if std::fs::read(gate.join(name)).ok() != Some(content.bytes()) {
+                self.complain(name, "is needed behind the gate, and does not lie there so");
+            }
         }
         for path in files_below(gate) {
             let name = path.to_string_lossy().into_owned();
-            if !files.contains_key(&name) {
-                self.complain(&name, "lies behind the gate, and no file is there for it");
+            if !needed.contains(&name) {
+                self.complain(&name, "lies behind the gate, and nothing accepted needs it");
             }
         }
     }
