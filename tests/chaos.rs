@@ -19,7 +19,7 @@ use std::time::Instant;
 
 use support::content::Content;
 use support::dice::{Dice, seed};
-use support::farm::{Farm, shm_segments, tail};
+use support::farm::{Farm, shm_segments, tail, zoo};
 use support::inside::{is_inside, run_inside};
 use support::judge::{Files, judge, verdicts_in_journal};
 use support::processes::memory_kib;
@@ -33,6 +33,8 @@ fn nothing_is_lost_whatever_dies() {
     if is_inside() {
         return storm::rage(seed(), storm::seconds());
     }
+    // Inside, nothing is built.
+    zoo();
     match run_inside("nothing_is_lost_whatever_dies", SMALL_SHM) {
         Some(status) => assert!(status.success(), "see above"),
         // Without a shared memory of its own, it is not filled; the rest is the same.

@@ -1,14 +1,16 @@
 //! The driver: it knows what is in every file, and what it has done to whom.
 
-use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant, UNIX_EPOCH};
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
 
+use qcbus_messages::control::{PeerStatus, Request, Response};
 use rustix::process::Signal;
 
+use super::ledger::Ledger;
 use super::tally::Tally;
 use super::trouble::{self, ANIMALS, Trouble};
+use super::verdicts::JUDGE;
 use crate::support::broker::Broker;
-use crate::support::content::Content;
 use crate::support::dice::Dice;
 use crate::support::farm::Farm;
 use crate::support::inside::is_inside;
@@ -16,14 +18,13 @@ use crate::support::judge::Files;
 use crate::support::processes::{Process, ProcessKind, signal_pid};
 use crate::support::watchdog::{pause, until_or};
 
-/// Files that there are about.
-const FILES: usize = 80;
 /// Longest pause between two deeds, in milliseconds.
 const PAUSE: u64 = 90;
-/// Before and after 1970: times that some files say they are from.
-const LONG_AGO: Duration = Duration::from_secs(1_000_000);
 /// What the filler leaves of the shared memory, in bytes.
 const LEFT: u64 = 2 << 20;
+/// So long after the shared memory was full, a broker may still have ended by it: its end is seen
+/// between two deeds.
+const LATE: Duration = Duration::from_secs(2);
 /// Where the filler lies.
 const FILLER: &str = "/dev/shm/filler-of-the-chaos-test";
 
@@ -32,18 +33,29 @@ pub struct Driver {
     pub farm: Farm,
     pub broker: Option<Broker>,
     pub files: Files,
+    /// What files depend on and is no file to check itself.
+    pub parts: Files,
+    pub ledger: Ledger,
     pub dice: Dice,
     pub tally: Tally,
     pub peak_kib: u64,
+    /// Standard bundles killed or stopped, by name.
+    pub harmed: BTreeMap<String, u64>,
+    /// When a standard bundle stood still, or the shared memory was full.
+    pub(super) stops: Vec<(Duration, Duration)>,
     /// When the broker is started again.
     start_at: Option<Instant>,
     stopped: Vec<(i32, Instant)>,
-    animals: Vec<&'static str>,
+    pub(super) animals: Vec<&'static str>,
     full_until: Option<Instant>,
-    /// The shared memory has been full at some time.
-    filled: bool,
-    config: &'static str,
-    next_file: u64,
+    /// When the shared memory was last full.
+    full_at: Option<Instant>,
+    pub(super) config: &'static str,
+    pub(super) next_file: u64,
+    /// Of the bundle of one's own.
+    pub(super) version: u64,
+    /// When its program comes back.
+    pub(super) gone_until: Option<Instant>,
 }
 
 impl Driver {
@@ -52,6 +64,10 @@ impl Driver {
             farm,
             broker: None,
             files: Files::new(),
+            parts: Files::new(),
+            ledger: Ledger::new(),
+            harmed: BTreeMap::new(),
+            stops: Vec::new(),
             dice: Dice::new(seed),
             tally: Tally::new(),
             peak_kib: 0,
@@ -59,9 +75,11 @@ impl Driver {
             stopped: Vec::new(),
             animals: Vec::new(),
             full_until: None,
-            filled: false,
+            full_at: None,
             config: trouble::CALM,
             next_file: 0,
+            version: 0,
+            gone_until: None,
         }
     }
 
@@ -72,12 +90,6 @@ impl Driver {
         }
         self.broker = Some(self.farm.serve());
         self.start_at = None;
-    }
-
-    pub fn write_some(&mut self, count: usize) {
-        for _ in 0..count {
-            self.write_new();
-        }
     }
 
     /// One deed.
@@ -101,6 +113,10 @@ impl Driver {
             Trouble::Delete => self.delete(),
             Trouble::Rewrite => self.rewrite(),
             Trouble::Fill => self.fill(),
+            Trouble::Share => self.share(),
+            Trouble::Reload => self.reload(),
+            Trouble::Upgrade => self.upgrade(),
+            Trouble::Vanish => self.vanish(),
         }
     }
 
@@ -126,13 +142,14 @@ impl Driver {
         if self.full_until.is_some_and(|until| until <= now) {
             self.empty();
         }
+        self.bring_back_when_due(now);
     }
 
     /// It did not end by our hand. A shared memory that somebody else fills may take it down (a
     /// page that cannot be had is a bus error); nothing else may.
     fn ended_by_itself(&mut self, how: std::process::ExitStatus) {
         use std::os::unix::process::ExitStatusExt;
-        if how.signal() == Some(Signal::BUS.as_raw()) && self.filled {
+        if how.signal() == Some(Signal::BUS.as_raw()) && self.is_full() {
             self.tally
                 .note("kill broker by full memory", &how.to_string());
         } else if self.is_refusal(how) {
@@ -155,9 +172,14 @@ impl Driver {
         let said = |words: &str| log.lines().rev().take(20).any(|line| line.contains(words));
         match how.code() {
             Some(2) => said("config.xml:"),
-            Some(5) => self.filled && said("error: not enough shared memory"),
+            Some(5) => self.is_full() && said("error: not enough shared memory"),
             _ => false,
         }
+    }
+
+    fn is_full(&self) -> bool {
+        let lately = |at: Instant| at.elapsed() < LATE;
+        self.full_until.is_some() || self.full_at.is_some_and(lately)
     }
 
     /// Everything goes on as it should, and the farm comes to rest.
@@ -169,10 +191,19 @@ impl Driver {
         for animal in std::mem::take(&mut self.animals) {
             self.farm.send_away(animal);
         }
+        self.bring_back();
         self.write_config(trouble::CALM);
         if self.broker.as_mut().is_none_or(|broker| !broker.is_alive()) {
             self.start_broker();
         }
+        until_or(
+            "a broker answers",
+            || self.farm.status(),
+            || self.farm.log(),
+        );
+        // A new version is started at once, also where the one before keeps failing. While no broker
+        // runs an upgrade would go unseen, if a process of the version before is about.
+        self.upgrade();
         self.tally.note("calm", "");
         let explain = || format!("{}\n{:#?}", self.tally.last_lines(), self.farm.status());
         until_or(
@@ -190,12 +221,14 @@ impl Driver {
             .peers
             .iter()
             .filter(|it| it.pid != 0 && it.state != "down");
+        let version = format!("{}.0.0", self.version);
+        let judge = |it: &PeerStatus| it.name == JUDGE && it.version == version;
         let calm = there.clone().all(|it| !animal(&it.name))
+            && there.clone().any(judge)
             && there.filter(|it| it.name.ends_with("Bundle")).count() >= 2;
         // Asking to reload answers when the present files of the configuration are in force.
-        let reload = qcbus_messages::control::Request::Reload;
-        let answer = self.farm.ask(&reload)?;
-        let reloaded = matches!(answer, qcbus_messages::control::Response::Reloaded { .. });
+        let answer = self.farm.ask(&Request::Reload)?;
+        let reloaded = matches!(answer, Response::Reloaded { .. });
         (calm && reloaded).then_some(())
     }
 
@@ -218,18 +251,28 @@ impl Driver {
         self.start_at = Some(Instant::now() + self.dice.millis(late));
     }
 
-    fn kill(&mut self, part: ProcessKind, kind: &'static str) {
-        let Some(process) = self.any_process(|it| it.kind() == part) else {
+    fn kill(&mut self, whom: ProcessKind, kind: &'static str) {
+        let Some(process) = self.any_process(|it| it.kind() == whom) else {
             return;
         };
         process.signal(Signal::KILL);
+        self.harm(&process);
         self.tally.note(
             kind,
             &format!("{} {}", process.pid, process.words[1..].join(" ")),
         );
     }
 
-    fn any_process(&mut self, wanted: impl Fn(&Process) -> bool) -> Option<Process> {
+    /// Counts what was done to a standard bundle.
+    fn harm(&mut self, process: &Process) {
+        let names = [("xodr", "xodrBundle"), ("xosc", "xoscBundle")];
+        let whose = |word: &str| process.words.iter().any(|it| it == word);
+        for (_, name) in names.iter().filter(|(word, _)| whose(word)) {
+            *self.harmed.entry((*name).to_owned()).or_default() += 1;
+        }
+    }
+
+    pub(super) fn any_process(&mut self, wanted: impl Fn(&Process) -> bool) -> Option<Process> {
         let all: Vec<Process> = self.farm.processes().into_iter().filter(wanted).collect();
         self.dice.pick(&all).cloned()
     }
@@ -242,164 +285,14 @@ impl Driver {
         let long = if self.dice.below(6) == 0 { 7000 } else { 900 };
         let until = Instant::now() + self.dice.millis(long);
         self.stopped.push((process.pid, until));
+        if process.kind() == ProcessKind::Bundle {
+            let now = self.ledger.now();
+            self.stops
+                .push((now, now + until.duration_since(Instant::now())));
+            self.harm(&process);
+        }
         self.tally
             .note("stop", &format!("{} {:?}", process.pid, process.kind()));
-    }
-
-    fn animal(&mut self) {
-        if self.animals.len() >= 3 || (!self.animals.is_empty() && self.dice.below(2) == 0) {
-            let at = usize::try_from(self.dice.below(self.animals.len() as u64)).unwrap();
-            let animal = self.animals.swap_remove(at);
-            self.farm.send_away(animal);
-            self.tally.note("animal goes", animal);
-        } else if let Some(animal) = self.dice.pick(ANIMALS).copied()
-            && !self.animals.contains(&animal)
-        {
-            let arguments = if animal == "slow" { "--millis 5" } else { "" };
-            self.farm.let_in(animal, arguments);
-            self.animals.push(animal);
-            self.tally.note("animal comes", animal);
-        }
-    }
-
-    fn configure(&mut self) {
-        let texts = [trouble::CALM, trouble::WILD, trouble::BROKEN];
-        let Some(text) = self.dice.pick(&texts).copied() else {
-            return;
-        };
-        self.write_config(text);
-        self.tally
-            .note("configure", text.lines().nth(2).unwrap_or("broken"));
-    }
-
-    fn write_config(&mut self, text: &'static str) {
-        self.config = text;
-        std::fs::write(self.farm.base().join("config.xml"), text).unwrap();
-    }
-
-    fn write(&mut self) {
-        if self.files.len() < FILES {
-            self.write_new();
-        } else if let Some(name) = self.any_file() {
-            let content = Content::any(&mut self.dice);
-            self.put(&name, content, "write");
-        }
-    }
-
-    fn write_new(&mut self) {
-        let name = self.new_name();
-        let content = Content::any(&mut self.dice);
-        self.put(&name, content, "write");
-    }
-
-    fn put(&mut self, name: &str, content: Content, kind: &'static str) {
-        self.farm.write(name, &content.bytes());
-        let path = self.path(name);
-        self.age(&path);
-        self.tally.note(kind, name);
-        self.files.insert(name.to_owned(), content);
-    }
-
-    /// One file in three says that it was last written to long ago, as a copy may; all these say the
-    /// same, some that it was before 1970.
-    fn age(&mut self, path: &Path) {
-        let time = match self.dice.below(6) {
-            0 => UNIX_EPOCH - LONG_AGO,
-            1 => UNIX_EPOCH + LONG_AGO,
-            _ => return,
-        };
-        let file = std::fs::File::options().write(true).open(path).unwrap();
-        file.set_modified(time).unwrap();
-    }
-
-    fn new_name(&mut self) -> String {
-        self.next_file += 1;
-        format!("{}.xodr", self.next_file)
-    }
-
-    fn any_file(&mut self) -> Option<String> {
-        let names: Vec<String> = self.files.keys().cloned().collect();
-        self.dice.pick(&names).cloned()
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.farm.root().join(name)
-    }
-
-    fn write_torn(&mut self) {
-        use std::io::Write;
-        let Some(name) = self.any_file() else { return };
-        let content = Content::any(&mut self.dice);
-        let bytes = content.bytes();
-        let (first, second) = bytes.split_at(bytes.len() / 2);
-        let mut file = std::fs::File::create(self.path(&name)).unwrap();
-        file.write_all(first).unwrap();
-        let wait = self.dice.millis(400);
-        pause(wait);
-        file.write_all(second).unwrap();
-        self.tally.note("write torn", &name);
-        self.files.insert(name, content);
-    }
-
-    fn rename_into_place(&mut self) {
-        let name = match self.any_file() {
-            Some(name) if self.dice.below(2) == 0 => name,
-            _ => self.new_name(),
-        };
-        let content = Content::any(&mut self.dice);
-        let unfinished = self.path(&format!("{name}.part"));
-        std::fs::write(&unfinished, content.bytes()).unwrap();
-        self.age(&unfinished);
-        std::fs::rename(&unfinished, self.path(&name)).unwrap();
-        self.tally.note("rename into place", &name);
-        self.files.insert(name, content);
-    }
-
-    fn move_file(&mut self) {
-        let Some(from) = self.any_file() else { return };
-        let to = self.new_name();
-        std::fs::rename(self.path(&from), self.path(&to)).unwrap();
-        if let Some(content) = self.files.remove(&from) {
-            self.files.insert(to.clone(), content);
-        }
-        self.tally.note("move", &format!("{from} {to}"));
-    }
-
-    fn truncate(&mut self) {
-        let Some(name) = self.any_file() else { return };
-        let Some(torn) = self
-            .files
-            .get(&name)
-            .cloned()
-            .map(|it| it.torn(&mut self.dice))
-        else {
-            return;
-        };
-        let file = std::fs::OpenOptions::new()
-            .write(true)
-            .open(self.path(&name))
-            .unwrap();
-        file.set_len(u64::try_from(torn.bytes().len()).unwrap())
-            .unwrap();
-        self.tally.note("truncate", &name);
-        self.files.insert(name, torn);
-    }
-
-    fn delete(&mut self) {
-        let Some(name) = self.any_file() else { return };
-        std::fs::remove_file(self.path(&name)).unwrap();
-        self.files.remove(&name);
-        self.tally.note("delete", &name);
-    }
-
-    fn rewrite(&mut self) {
-        let Some(name) = self.any_file() else { return };
-        for _ in 0..self.dice.below(6) + 2 {
-            let content = Content::any(&mut self.dice);
-            self.put(&name, content, "rewrite");
-            let wait = self.dice.millis(30);
-            pause(wait);
-        }
     }
 
     fn fill(&mut self) {
@@ -416,13 +309,16 @@ impl Driver {
             self.tally
                 .note("fill", &format!("{size} bytes of /dev/shm"));
         }
-        self.filled = true;
-        self.full_until = Some(Instant::now() + self.dice.millis(1500));
+        let long = self.dice.millis(1500);
+        let now = self.ledger.now();
+        self.stops.push((now, now + long));
+        self.full_until = Some(Instant::now() + long);
     }
 
     fn empty(&mut self) {
         if self.full_until.take().is_some() {
             let _ = std::fs::remove_file(FILLER);
+            self.full_at = Some(Instant::now());
         }
     }
 }

@@ -2,17 +2,25 @@
 //! when it is over.
 
 mod driver;
+mod files;
+mod history;
+mod ledger;
 mod tally;
 mod trouble;
+mod verdicts;
+mod visitors;
 
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use driver::Driver;
+use history::{Seen, Watchers};
 
 use crate::support::content::Content;
+use crate::support::desk::files_below;
 use crate::support::farm::{Farm, shm_segments, tail};
 use crate::support::inside::is_inside;
-use crate::support::judge::{judge, verdicts_in_journal};
+use crate::support::judge::{judge_with, verdicts_in_journal};
 use crate::support::processes::{peak_private_kib, private_kib};
 use crate::support::watchdog::{until, until_or};
 use crate::{end, report};
@@ -33,8 +41,11 @@ pub fn rage(seed: u64, seconds: u64) {
     let mut farm = Farm::new();
     let config = farm.base().join("config.xml");
     std::fs::write(&config, trouble::CALM).unwrap();
-    farm.arguments = arguments(&config);
+    farm.arguments = arguments(&farm, &config);
     let mut driver = Driver::new(farm, seed);
+    driver.install();
+    driver.write_shared();
+    let watchers = Watchers::start(&driver.farm, driver.ledger.start, seed);
     driver.start_broker();
     driver.write_some(40);
     driver.calm_down();
@@ -45,16 +56,22 @@ pub fn rage(seed: u64, seconds: u64) {
     }
     driver.calm_down();
     let end_kib = driver.memory_kib();
-    demand(driver, start_kib, end_kib, seconds);
+    let history = watchers.end();
+    at_every_moment(&driver, &history);
+    demand(driver, history.len(), start_kib, end_kib, seconds);
 }
 
-fn arguments(config: &std::path::Path) -> Vec<String> {
-    let config = config.to_string_lossy();
+fn arguments(farm: &Farm, config: &std::path::Path) -> Vec<String> {
+    let (config, gate) = (config.to_string_lossy(), farm.gate());
     let words = [
         "-c",
         &config,
+        "--gate",
+        &gate.to_string_lossy(),
         "--report",
         "text",
+        "--report",
+        "json",
         "--silence-limit",
         "4s",
         "--job-deadline",
@@ -67,22 +84,73 @@ fn arguments(config: &std::path::Path) -> Vec<String> {
     words.iter().map(|it| (*it).to_owned()).collect()
 }
 
-fn demand(mut driver: Driver, start_kib: u64, end_kib: u64, seconds: u64) {
-    let judgement = judge(&driver.farm, &driver.files, &[]);
+/// What must be so of everything that was seen while it stormed.
+fn at_every_moment(driver: &Driver, history: &[Seen]) {
+    let wrong = verdicts::complaints(history, &driver.ledger);
+    let dead = verdicts::innocent_dead(history, |_, at| driver.was_stopped(at));
+    let all: Vec<String> = wrong.into_iter().chain(dead).collect();
+    let first: Vec<&String> = all.iter().take(20).collect();
+    let (deeds, log) = (driver.tally.last_lines(), tail(&driver.farm.log()));
+    assert!(
+        all.is_empty(),
+        "{} of what was seen may not be: {first:#?}\n{deeds}\n{log}",
+        all.len()
+    );
+}
+
+/// A pair is condemned for two deaths alone: no bundle has more of them than half its deaths.
+fn condemned_are_few(driver: &Driver, condemned: &BTreeMap<String, u64>) {
+    for (bundle, count) in condemned {
+        let harmed = driver.harmed.get(bundle).copied().unwrap_or_default();
+        assert!(
+            count * 2 <= harmed,
+            "{bundle} is condemned for {count} files, and came to harm {harmed} times\n{}",
+            driver.tally.last_lines()
+        );
+    }
+}
+
+/// What has its verdict keeps it over a restart: how many files are judged a second time though
+/// nothing has changed.
+fn judged_again_for_nothing(driver: &mut Driver) -> u64 {
+    let jobs =
+        |driver: &Driver| -> u64 { verdicts_in_journal(&driver.farm.journal()).values().sum() };
+    let before = jobs(driver);
+    if let Some(broker) = &mut driver.broker {
+        broker.kill();
+    }
+    driver.start_broker();
+    driver.farm.settle(driver.files.len());
+    jobs(driver) - before
+}
+
+fn demand(mut driver: Driver, seen: usize, start_kib: u64, end_kib: u64, seconds: u64) {
+    let mut judgement = judge_with(&driver.farm, &driver.files, &driver.parts, &[]);
+    let lost = driver.files.len() - judgement.with_result;
+    judgement.gate(
+        &driver.farm,
+        &driver.files,
+        &driver.parts,
+        &driver.farm.gate(),
+    );
     let log = format!(
         "{}\n{}",
         driver.tally.last_lines(),
         tail(&driver.farm.log())
     );
     judgement.demand(&log);
+    condemned_are_few(&driver, &judgement.condemned);
     reports_are_there(&driver);
     let fresh = Content::Good(driver.dice.roll());
     driver.farm.write("fresh.xodr", &fresh.bytes());
+    driver.files.insert("fresh.xodr".to_owned(), fresh.clone());
     let verdict = driver.farm.verdict("fresh.xodr");
     assert_eq!(verdict.verdict, fresh.verdict(), "{verdict:?}");
     driver.sample();
+    let doubled = judged_again_for_nothing(&mut driver);
     let verdicts: u64 = verdicts_in_journal(&driver.farm.journal()).values().sum();
-    let (files, condemned, peak) = (driver.files.len(), judgement.condemned, driver.peak_kib);
+    let condemned: u64 = judgement.condemned.values().sum();
+    let (files, peak) = (driver.files.len(), driver.peak_kib);
     let tally = driver.tally.clone();
     let broker = driver.broker.take().unwrap();
     let everything = is_inside();
@@ -93,19 +161,30 @@ fn demand(mut driver: Driver, start_kib: u64, end_kib: u64, seconds: u64) {
         });
     }
     assert!(peak < PEAK_KIB, "a broker took {peak} KiB");
+    assert_eq!(
+        (lost, doubled),
+        (0, 0),
+        "lost and doubled\n{}",
+        tally.last_lines()
+    );
     report(&format!(
         "chaos: {seconds} s: {} kills survived ({tally}); {files} files in the end, {verdicts} \
-         verdicts in the journal, 0 lost, {condemned} undetermined because a bundle was killed \
+         verdicts in the journal, {lost} lost, {doubled} judged again for nothing, {seen} things seen \
+         on the way; {condemned} undetermined because a bundle was killed \
          twice while alone with the file; 0 segments and 0 processes left; private memory of the \
          broker {start_kib} KiB before, {end_kib} KiB after, {peak} KiB at most",
         tally.kills()
     ));
 }
 
-/// The reporter has everything, too, and nothing about files that have gone.
+/// What the standard reporters put behind a file's name.
+const REPORTS: [&str; 2] = [".txt", ".json"];
+
+/// The reporters have everything, too, and nothing about files that have gone.
 fn reports_are_there(driver: &Driver) {
-    for name in driver.files.keys() {
-        let path = driver.farm.out().join(format!("{name}.txt"));
+    let with_suffixes = |name: &String| REPORTS.map(|suffix| format!("{name}{suffix}"));
+    for name in driver.files.keys().flat_map(with_suffixes) {
+        let path = driver.farm.out().join(name);
         until_or(
             "a report",
             || path.exists().then_some(()),
@@ -113,11 +192,12 @@ fn reports_are_there(driver: &Driver) {
         );
     }
     let left = || -> Vec<String> {
-        let entries = std::fs::read_dir(driver.farm.out()).unwrap().flatten();
-        let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+        let files = files_below(&driver.farm.out()).into_iter();
+        let names = files.map(|it| it.to_string_lossy().into_owned());
         let gone = |name: &String| {
-            let file = name.strip_suffix(".txt");
-            file.is_some_and(|file| !driver.files.contains_key(file))
+            let file = REPORTS.iter().find_map(|suffix| name.strip_suffix(suffix));
+            let verdict = name.ends_with(".verdict.json");
+            !verdict && file.is_some_and(|file| !driver.files.contains_key(file))
         };
         names.filter(gone).collect()
     };

@@ -4,10 +4,13 @@ use crate::support::dice::Dice;
 
 /// The configuration under which everything is judged in the end.
 pub const CALM: &str = "<Config>\n  <CheckerBundle application=\"xodrBundle\"/>\n  \
-    <CheckerBundle application=\"xoscBundle\"/>\n</Config>\n";
+    <CheckerBundle application=\"xoscBundle\"/>\n  \
+    <CheckerBundle application=\"judges_strictly\"/>\n</Config>\n";
 
 /// A configuration that demands animals, too, whether they are there or not.
 pub const WILD: &str = "<Config>\n  <CheckerBundle application=\"xodrBundle\"/>\n  \
+    <CheckerBundle application=\"xoscBundle\"/>\n  \
+    <CheckerBundle application=\"judges_strictly\"/>\n  \
     <CheckerBundle application=\"dies_on_every_job\"/>\n  \
     <CheckerBundle application=\"sends_garbage\"/>\n  \
     <CheckerBundle application=\"lies_about_job_id\"/>\n  \
@@ -66,6 +69,14 @@ pub enum Trouble {
     Rewrite,
     /// Shared memory runs full for a while.
     Fill,
+    /// Something that others depend on is written.
+    Share,
+    /// The configuration and the manifests are read again.
+    Reload,
+    /// The bundle of one's own gets another version.
+    Upgrade,
+    /// The program of the bundle of one's own goes from the disk for a while.
+    Vanish,
 }
 
 /// Every trouble with its share.
@@ -85,6 +96,10 @@ const SHARES: &[(u64, Trouble)] = &[
     (6, Trouble::Delete),
     (6, Trouble::Rewrite),
     (2, Trouble::Fill),
+    (8, Trouble::Share),
+    (4, Trouble::Reload),
+    (2, Trouble::Upgrade),
+    (2, Trouble::Vanish),
 ];
 
 /// What comes next.

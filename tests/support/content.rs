@@ -17,10 +17,36 @@ pub enum Content {
     WrongRoot(u64),
     /// The first bytes of something.
     Torn(Vec<u8>),
+    /// A road with the word that `judges_strictly` rejects, and nothing else wrong.
+    Marked(u64),
+    /// A road, and another one that comes from a part.
+    Including(u64, String),
+    /// A road for others to include, with the word or without. No file to check.
+    Part(u64, Mark),
+    /// A catalog, with the word or without.
+    Catalog(u64, Mark),
+    /// A scenario on a map; its vehicles come from the catalogs in [`CATALOGS`].
+    Scenario(u64, String),
 }
 
+/// Whether the word that `judges_strictly` rejects is there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mark {
+    /// It is not.
+    Clean,
+    /// It is.
+    Marked,
+}
+
+/// The word that `judges_strictly` rejects.
+const MARK: &str = "forbidden";
+/// Where scenarios take their vehicles from.
+pub const CATALOGS: &str = "catalogs";
+/// The one file there.
+pub const CATALOG: &str = "catalogs/vehicles.xosc";
+
 impl Content {
-    /// One of them; every second one is good.
+    /// A map that stands alone; every second one is good.
     pub fn any(dice: &mut Dice) -> Content {
         let number = dice.roll() >> 8;
         match dice.below(8) {
@@ -48,46 +74,112 @@ impl Content {
     /// The bytes.
     pub fn bytes(&self) -> Vec<u8> {
         let text = match self {
-            Content::Good(number) => road(HEADER, *number),
-            Content::NoHeader(number) => road("", *number),
-            Content::NoVersion(number) => road("<header name=\"nameless\"/>", *number),
+            Content::Good(number) => road(HEADER, &name(*number, Mark::Clean), ""),
+            Content::NoHeader(number) => road("", &name(*number, Mark::Clean), ""),
+            Content::NoVersion(number) => {
+                let header = "<header name=\"nameless\"/>";
+                road(header, &name(*number, Mark::Clean), "")
+            }
             Content::WrongRoot(number) => format!("{XML}<Kitchen sink=\"{number}\"/>\n"),
             Content::Torn(bytes) => return bytes.clone(),
+            Content::Marked(number) => road(HEADER, &name(*number, Mark::Marked), ""),
+            Content::Including(number, part) => {
+                let include = format!("<include file=\"{part}\"/>\n");
+                road(HEADER, &name(*number, Mark::Clean), &include)
+            }
+            Content::Part(number, mark) => {
+                let road = one_road(2, 200, &name(*number, *mark));
+                format!("{XML}<OpenDRIVE>\n{road}</OpenDRIVE>\n")
+            }
+            Content::Catalog(number, mark) => CATALOG_TEXT.replace("NUMBER", &name(*number, *mark)),
+            Content::Scenario(number, map) => SCENARIO_TEXT
+                .replace("NUMBER", &number.to_string())
+                .replace("MAP", map),
         };
         text.into_bytes()
     }
 
-    /// What must be found.
+    /// What must be found, whatever its parts are.
     pub fn verdict(&self) -> Verdict {
-        match self {
-            Content::Good(_) => Verdict::Accepted,
-            _ => Verdict::Rejected,
+        if self.is_clean() && self.checker().is_none() {
+            Verdict::Accepted
+        } else {
+            Verdict::Rejected
         }
     }
 
-    /// The checker that must find it.
+    /// The checker that must find it, or how its name ends: each standard has one of its own.
     pub fn checker(&self) -> Option<&'static str> {
         match self {
-            Content::Good(_) => None,
             Content::NoHeader(_) => Some("check_asam_xodr_xml_fileheader_is_present"),
             Content::NoVersion(_) => Some("check_asam_xodr_xml_version_is_defined"),
             Content::WrongRoot(_) => Some("check_asam_xodr_xml_root_tag_is_opendrive"),
-            Content::Torn(_) => Some("check_asam_xodr_xml_valid_xml_document"),
+            Content::Torn(_) => Some("xml_valid_xml_document"),
+            Content::Good(_) | Content::Including(..) | Content::Scenario(..) => None,
+            Content::Marked(_) => Some(STRICT),
+            Content::Part(_, mark) | Content::Catalog(_, mark) => match mark {
+                Mark::Clean => None,
+                Mark::Marked => Some(STRICT),
+            },
+        }
+    }
+
+    /// Whether the word that `judges_strictly` rejects is not in it.
+    pub fn is_clean(&self) -> bool {
+        !matches!(
+            self,
+            Content::Marked(_) | Content::Part(_, Mark::Marked) | Content::Catalog(_, Mark::Marked)
+        )
+    }
+
+    /// What else its verdict depends on, by name.
+    pub fn parts(&self) -> Vec<String> {
+        match self {
+            Content::Including(_, part) => vec![part.clone()],
+            Content::Scenario(_, map) => vec![map.clone(), CATALOG.to_owned()],
+            _ => Vec::new(),
+        }
+    }
+
+    /// The standard bundle that must judge a file of this name.
+    pub fn bundle(name: &str) -> &'static str {
+        if name.ends_with(".xosc") {
+            "xoscBundle"
+        } else {
+            "xodrBundle"
         }
     }
 }
 
+/// The checker of `judges_strictly` that finds the word.
+pub const STRICT: &str = "check_zoo_0";
+
 const XML: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
 const HEADER: &str = "<header revMajor=\"1\" revMinor=\"8\"/>";
+const CATALOG_TEXT: &str = include_str!("catalog.xml");
+const SCENARIO_TEXT: &str = include_str!("scenario.xml");
 
-fn road(header: &str, number: u64) -> String {
+/// A name that no other file has, with the word or without.
+fn name(number: u64, mark: Mark) -> String {
+    match mark {
+        Mark::Clean => format!("n{number}"),
+        Mark::Marked => format!("n{number} {MARK}"),
+    }
+}
+
+fn road(header: &str, name: &str, more: &str) -> String {
+    let road = one_road(1, 0, name);
+    format!("{XML}<OpenDRIVE>\n{header}\n{road}{more}</OpenDRIVE>\n")
+}
+
+fn one_road(id: u64, x: u64, name: &str) -> String {
     format!(
-        "{XML}<OpenDRIVE>\n{header}\n<road id=\"1\" name=\"n{number}\" length=\"100\" junction=\"-1\">\n\
-         <planView><geometry s=\"0\" x=\"0\" y=\"0\" hdg=\"0\" length=\"100\"><line/></geometry></planView>\n\
+        "<road id=\"{id}\" name=\"{name}\" length=\"100\" junction=\"-1\">\n\
+         <planView><geometry s=\"0\" x=\"{x}\" y=\"0\" hdg=\"0\" length=\"100\"><line/></geometry></planView>\n\
          <lanes><laneSection s=\"0\">\n\
          <center><lane id=\"0\" type=\"none\" level=\"false\"/></center>\n\
          <right><lane id=\"-1\" type=\"driving\" level=\"false\">\
          <width sOffset=\"0\" a=\"3.5\" b=\"0\" c=\"0\" d=\"0\"/></lane></right>\n\
-         </laneSection></lanes>\n</road>\n</OpenDRIVE>\n"
+         </laneSection></lanes>\n</road>\n"
     )
 }

@@ -168,13 +168,13 @@ pub fn sample_farm() -> PathBuf {
         .unwrap()
 }
 
-/// All files below a directory, relative to it, in order.
+/// All files below a directory, relative to it, in order; none, if it is not there.
 pub fn files_below(directory: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut open = vec![directory.to_path_buf()];
     while let Some(next) = open.pop() {
-        for entry in std::fs::read_dir(&next).unwrap() {
-            let path = entry.unwrap().path();
+        for entry in std::fs::read_dir(&next).into_iter().flatten().flatten() {
+            let path = entry.path();
             if path.is_dir() {
                 open.push(path);
             } else {

@@ -211,6 +211,11 @@ impl Farm {
 
     /// Lets an animal in.
     pub fn let_in(&self, animal: &str, arguments: &str) {
+        self.let_in_by(&zoo(), animal, arguments);
+    }
+
+    /// Lets an animal in whose program lies elsewhere.
+    pub fn let_in_by(&self, program: &Path, animal: &str, arguments: &str) {
         let module_type = if animal.starts_with("reporter") {
             "report_module"
         } else {
@@ -220,7 +225,7 @@ impl Farm {
             "name": animal,
             "exec_type": "executable",
             "module_type": module_type,
-            "exec_command": format!("{} {animal} {arguments}", zoo().display()),
+            "exec_command": format!("{} {animal} {arguments}", program.display()),
             "mode": "bus",
         }]});
         let path = self.bundles_d().join(format!("{animal}.json"));

@@ -1,13 +1,14 @@
 //! The judge: what must be so once a farm has come to rest.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use qcbus_formats::xqar::Status;
 use qcbus_messages::Verdict;
 use sha2::{Digest, Sha256};
 
-use super::content::Content;
+use super::content::{Content, STRICT};
+use super::desk::files_below;
 use super::farm::Farm;
 
 /// The files that are there, by name.
@@ -18,18 +19,33 @@ pub type Files = BTreeMap<String, Content>;
 pub struct Judgement {
     /// What is not as it must be.
     pub complaints: Vec<String>,
-    /// Pairs of file and bundle that are condemned: the bundle died twice with the file alone.
-    pub condemned: usize,
+    /// Files that have a result.
+    pub with_result: usize,
+    /// How many files are condemned for each bundle: it died twice with the file alone.
+    pub condemned: BTreeMap<String, u64>,
 }
+
+/// What a broker puts into a directory that is its gate.
+const GATE_MARK: &str = ".qcbus-gate";
 
 /// The words with which the broker condemns.
 const CONDEMNED: &str = "times on this file alone in a fresh process";
 
 /// Looks at everything. `strangers` are bundles whose checkers may be in error.
 pub fn judge(farm: &Farm, files: &Files, strangers: &[&str]) -> Judgement {
+    judge_with(farm, files, &Files::new(), strangers)
+}
+
+/// As [`judge`], with what files depend on and is no file to check itself.
+pub fn judge_with(farm: &Farm, files: &Files, parts: &Files, strangers: &[&str]) -> Judgement {
     let mut judgement = Judgement::default();
     for (name, content) in files {
-        judgement.file(farm, name, content, strangers);
+        let clean = |name: &String| {
+            let part = files.get(name).or_else(|| parts.get(name));
+            part.is_some_and(Content::is_clean)
+        };
+        let parts_are_clean = content.parts().iter().all(clean);
+        judgement.file(farm, name, content, parts_are_clean, strangers);
     }
     judgement.nothing_else(farm, files);
     judgement
@@ -47,7 +63,14 @@ impl Judgement {
         self.complaints.push(format!("{name}: {what}"));
     }
 
-    fn file(&mut self, farm: &Farm, name: &str, content: &Content, strangers: &[&str]) {
+    fn file(
+        &mut self,
+        farm: &Farm,
+        name: &str,
+        content: &Content,
+        parts_are_clean: bool,
+        strangers: &[&str],
+    ) {
         let bytes = content.bytes();
         if std::fs::read(farm.root().join(name)).ok().as_ref() != Some(&bytes) {
             return self.complain(name, "the test does not know what is in it");
@@ -57,6 +80,7 @@ impl Judgement {
         }
         let told = farm.verdict_file(name);
         let digest = hex(&Sha256::digest(&bytes));
+        self.with_result += 1;
         if told["sha256"].as_str() != Some(&digest) {
             self.complain(
                 name,
@@ -64,11 +88,16 @@ impl Judgement {
             );
         }
         let (complete, foreign) = self.is_complete(farm, name, strangers);
-        if complete && !expected_rule_fired(farm, name, content) {
+        let by_parts = (!parts_are_clean).then_some(STRICT);
+        let checker = content.checker().or(by_parts);
+        if complete && !expected_rule_fired(farm, name, checker) {
             self.complain(name, format!("the fault was not found: {content:?}"));
         }
         let verdict = told["verdict"].as_str().unwrap_or_default();
-        let expected = content.verdict();
+        let expected = match checker {
+            None => Verdict::Accepted,
+            Some(_) => Verdict::Rejected,
+        };
         let allowed = match expected {
             _ if !complete => verdict != Verdict::Accepted.as_str(),
             Verdict::Accepted if foreign => verdict == Verdict::Undetermined.as_str(),
@@ -86,9 +115,10 @@ impl Judgement {
     fn is_complete(&mut self, farm: &Farm, name: &str, strangers: &[&str]) -> (bool, bool) {
         let results = farm.result(name);
         let (mut complete, mut foreign, mut seen) = (true, false, false);
+        let mut condemned = BTreeSet::new();
         for bundle in &results.bundles {
             let stranger = strangers.contains(&bundle.name.as_str());
-            seen |= bundle.name == "xodrBundle";
+            seen |= bundle.name == Content::bundle(name);
             for checker in &bundle.checkers {
                 if matches!(checker.status, Some(Status::Completed | Status::Skipped)) {
                     continue;
@@ -97,20 +127,26 @@ impl Judgement {
                     foreign = true;
                 } else if checker.summary.contains(CONDEMNED) {
                     complete = false;
+                    condemned.insert(bundle.name.clone());
                 } else {
                     self.complain(name, format!("{}: {}", checker.id, checker.summary));
                 }
             }
         }
         if !seen {
-            self.complain(name, "xodrBundle is not in its result");
+            let what = format!("{} is not in its result", Content::bundle(name));
+            self.complain(name, what);
         }
-        self.condemned += usize::from(!complete);
+        for bundle in condemned {
+            *self.condemned.entry(bundle).or_default() += 1;
+        }
         (complete, foreign)
     }
 
-    /// Behind the gate lies what was accepted, byte for byte, and nothing else.
-    pub fn gate(&mut self, farm: &Farm, files: &Files, gate: &Path) {
+    /// Behind the gate lies what was accepted, byte for byte, with all that it depends on, and nothing
+    /// else.
+    pub fn gate(&mut self, farm: &Farm, files: &Files, parts: &Files, gate: &Path) {
+        let mut needed = BTreeSet::from([GATE_MARK.to_owned()]);
         for (name, content) in files {
             let published = std::fs::read(gate.join(name)).ok();
             let accepted = farm.out().join(format!("{name}.verdict.json")).exists()
@@ -126,21 +162,31 @@ impl Judgement {
                 None if accepted => self.complain(name, "accepted, and not behind the gate"),
                 _ => {}
             }
+            if accepted {
+                needed.insert(name.clone());
+                needed.extend(content.parts());
+            }
         }
-        for name in files_in(gate) {
-            if !files.contains_key(&name) {
-                self.complain(&name, "lies behind the gate, and no file is there for it");
+        for (name, content) in parts.iter().filter(|(name, _)| needed.contains(*name)) {
+            if std::fs::read(gate.join(name)).ok() != Some(content.bytes()) {
+                self.complain(name, "is needed behind the gate, and does not lie there so");
+            }
+        }
+        for path in files_below(gate) {
+            let name = path.to_string_lossy().into_owned();
+            if !needed.contains(&name) {
+                self.complain(&name, "lies behind the gate, and nothing accepted needs it");
             }
         }
     }
 
     /// No result without a file, nothing half-written.
     fn nothing_else(&mut self, farm: &Farm, files: &Files) {
-        for entry in std::fs::read_dir(farm.out()).unwrap().flatten() {
-            let name = entry.file_name().to_string_lossy().into_owned();
-            if name == ".qcbus" {
+        for path in files_below(&farm.out()) {
+            if path.starts_with(".qcbus") {
                 continue;
             }
+            let name = path.to_string_lossy().into_owned();
             let results = [".xqar", ".verdict.json"];
             let file = results.iter().find_map(|suffix| name.strip_suffix(suffix));
             // Reports are withdrawn by their reporters, later than results.
@@ -152,20 +198,14 @@ impl Judgement {
     }
 }
 
-fn files_in(directory: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();
-    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
-    names.collect()
-}
-
 /// Whether the rule that the oracle expects has an issue.
-fn expected_rule_fired(farm: &Farm, name: &str, content: &Content) -> bool {
-    let Some(expected) = content.checker() else {
+fn expected_rule_fired(farm: &Farm, name: &str, checker: Option<&str>) -> bool {
+    let Some(expected) = checker else {
         return true;
     };
     let results = farm.result(name);
     let mut checkers = results.bundles.iter().flat_map(|bundle| &bundle.checkers);
-    checkers.any(|checker| checker.id == expected && !checker.issues.is_empty())
+    checkers.any(|checker| checker.id.ends_with(expected) && !checker.issues.is_empty())
 }
 
 /// Verdicts in the journal by what they are about: path, digest, configuration.

@@ -1,0 +1,271 @@
+//! The history of a storm: what could be seen from outside, and when. It is written down while the
+//! storm rages, and judged afterwards: a wrong acceptance that healed counts as well.
+
+use std::collections::BTreeMap;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use qcbus_broker::control::ask_broker;
+use qcbus_messages::Verdict;
+use qcbus_messages::control::{Request, Response, Status};
+
+use super::ledger;
+use crate::support::desk::files_below;
+use crate::support::dice::Dice;
+use crate::support::farm::Farm;
+use crate::support::watchdog::pause;
+
+/// Something that was seen.
+#[derive(Debug, Clone)]
+pub struct Seen {
+    /// Since when it may have been so: the last look before, or when it was asked for.
+    pub from: Duration,
+    /// When it was seen.
+    pub at: Duration,
+    pub what: What,
+}
+
+/// What was seen.
+#[derive(Debug, Clone)]
+pub enum What {
+    /// A verdict file.
+    Told(Box<Told>),
+    /// A file behind the gate.
+    Published { name: String, digest: String },
+    /// An answer to `qcbus wait`.
+    Answer {
+        name: String,
+        verdict: Verdict,
+        digest: String,
+    },
+    /// The broker has ended a session and killed its process, and says why.
+    Killed { name: String, why: String },
+}
+
+/// A verdict file.
+#[derive(Debug, Clone)]
+pub struct Told {
+    pub name: String,
+    pub verdict: String,
+    pub digest: String,
+    /// Path and digest; none of what was not there.
+    pub depends_on: Vec<(String, Option<String>)>,
+    /// Bundles that took part.
+    pub bundles: Vec<String>,
+    /// Bundles with a checker that failed.
+    pub failed: Vec<String>,
+    /// Bundles that had to judge; absent where brokers do not say so.
+    pub demanded: Option<Vec<String>>,
+    /// In which this was so.
+    pub epoch: Option<u64>,
+}
+
+impl Told {
+    fn read(name: &str, bytes: &[u8]) -> Option<Told> {
+        let json: serde_json::Value = serde_json::from_slice(bytes).ok()?;
+        let text = |value: &serde_json::Value| value.as_str().map(str::to_owned);
+        let names = |list: &str, field: &str| -> Vec<String> {
+            let list = json[list].as_array().into_iter().flatten();
+            list.filter_map(|it| text(&it[field])).collect()
+        };
+        let depends_on = json["depends_on"].as_array().into_iter().flatten();
+        // A list of names, or of objects that say more of each.
+        let demanded = |it: &serde_json::Value| text(it).or_else(|| text(&it["name"]));
+        Some(Told {
+            name: name.to_owned(),
+            verdict: text(&json["verdict"])?,
+            digest: text(&json["sha256"])?,
+            depends_on: depends_on
+                .filter_map(|it| Some((text(&it["path"])?, text(&it["sha256"]))))
+                .collect(),
+            bundles: names("bundles", "name"),
+            failed: names("failed", "bundle"),
+            demanded: json["demanded"]
+                .as_array()
+                .map(|list| list.iter().filter_map(demanded).collect()),
+            epoch: json["epoch"].as_u64(),
+        })
+    }
+}
+
+/// Those who look while it storms.
+#[derive(Debug)]
+pub struct Watchers {
+    shared: Arc<Shared>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+#[derive(Debug)]
+struct Shared {
+    start: Instant,
+    over: AtomicBool,
+    seen: Mutex<Vec<Seen>>,
+    root: PathBuf,
+    out: PathBuf,
+    gate: PathBuf,
+    instance: PathBuf,
+}
+
+impl Shared {
+    fn seen(&self) -> MutexGuard<'_, Vec<Seen>> {
+        self.seen.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn saw(&self, from: Duration, what: What) {
+        let at = self.start.elapsed();
+        self.seen().push(Seen { from, at, what });
+    }
+
+    fn is_over(&self) -> bool {
+        self.over.load(Ordering::Relaxed)
+    }
+}
+
+impl Watchers {
+    /// Begins to look; `start` is the beginning of all times.
+    pub fn start(farm: &Farm, start: Instant, seed: u64) -> Watchers {
+        let shared = Arc::new(Shared {
+            start,
+            over: AtomicBool::new(false),
+            seen: Mutex::default(),
+            root: farm.root(),
+            out: farm.out(),
+            gate: farm.gate(),
+            instance: farm.instance(),
+        });
+        let looker = shared.clone();
+        let asker = shared.clone();
+        let threads = vec![
+            std::thread::spawn(move || look(&looker)),
+            std::thread::spawn(move || ask(&asker, Dice::new(seed))),
+        ];
+        Watchers { shared, threads }
+    }
+
+    /// Ends the looking. What was seen, in order.
+    pub fn end(mut self) -> Vec<Seen> {
+        self.stop();
+        std::mem::take(&mut self.shared.seen())
+    }
+
+    fn stop(&mut self) {
+        self.shared.over.store(true, Ordering::Relaxed);
+        for thread in self.threads.drain(..) {
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Drop for Watchers {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
+/// How often the results and the gate are looked through.
+const LOOK: Duration = Duration::from_millis(5);
+/// Every so many looks the broker is asked what it has to say.
+const ASK_STATUS: u32 = 20;
+
+/// Files seen before, by what would be different had they changed.
+type Marks = BTreeMap<PathBuf, (u64, i64, i64, u64)>;
+
+fn look(shared: &Shared) {
+    let (mut results, mut gate) = (Marks::new(), Marks::new());
+    let (mut from, mut round) = (Duration::ZERO, 0);
+    let mut told: Vec<(String, String)> = Vec::new();
+    while !shared.is_over() {
+        let begun = shared.start.elapsed();
+        for (name, bytes) in changed(&shared.out, &mut results, ".verdict.json") {
+            if let Some(told) = Told::read(&name, &bytes) {
+                shared.saw(from, What::Told(Box::new(told)));
+            }
+        }
+        for (name, bytes) in changed(&shared.gate, &mut gate, "") {
+            let digest = ledger::digest(&bytes);
+            shared.saw(from, What::Published { name, digest });
+        }
+        if round % ASK_STATUS == 0
+            && let Ok(Response::Status(status)) = ask_broker(&shared.instance, &Request::Status)
+        {
+            for killed in killed(&status) {
+                if !told.contains(&killed) {
+                    let (name, why) = killed.clone();
+                    shared.saw(from, What::Killed { name, why });
+                    told.push(killed);
+                }
+            }
+        }
+        (from, round) = (begun, round + 1);
+        pause(LOOK);
+    }
+}
+
+/// Whom a broker has killed, and why.
+fn killed(status: &Status) -> Vec<(String, String)> {
+    let killed = status.notices.iter().filter(|it| it.kind == "killed");
+    let named = killed.filter_map(|it| Some((it.about.clone()?, it.text.clone())));
+    named.collect()
+}
+
+/// Files that are not as they were at the last look, without their suffix, with their bytes.
+fn changed(directory: &Path, marks: &mut Marks, suffix: &str) -> Vec<(String, Vec<u8>)> {
+    let mut found = Vec::new();
+    let mut now = Marks::new();
+    for path in files_below(directory) {
+        let name = path.to_string_lossy().into_owned();
+        let temporary = path
+            .file_name()
+            .is_some_and(|it| it.to_string_lossy().starts_with('.'));
+        let wanted = name.strip_suffix(suffix).filter(|_| !temporary);
+        let Some((name, whole)) = wanted.map(|name| (name.to_owned(), directory.join(&path)))
+        else {
+            continue;
+        };
+        let Ok(is) = std::fs::metadata(&whole) else {
+            continue;
+        };
+        let mark = (is.ino(), is.mtime(), is.mtime_nsec(), is.size());
+        let known = marks.get(&path) == Some(&mark);
+        // What went while it was looked at is looked for again.
+        if let Ok(bytes) = (!known).then(|| std::fs::read(&whole)).transpose() {
+            found.extend(bytes.map(|bytes| (name, bytes)));
+            now.insert(path, mark);
+        }
+    }
+    *marks = now;
+    found
+}
+
+/// Asks for verdicts as a farm does, one file after another.
+fn ask(shared: &Shared, mut dice: Dice) {
+    while !shared.is_over() {
+        let wait = dice.millis(60);
+        pause(wait);
+        let files = files_below(&shared.root);
+        let Some(name) = dice
+            .pick(&files)
+            .map(|it| it.to_string_lossy().into_owned())
+        else {
+            continue;
+        };
+        let (from, file) = (shared.start.elapsed(), shared.root.join(&name));
+        let timeout_ms = Some(1000);
+        let answer = ask_broker(&shared.instance, &Request::Wait { file, timeout_ms });
+        if let Ok(Response::Verdict(told)) = answer {
+            let (verdict, digest) = (told.verdict, told.digest);
+            shared.saw(
+                from,
+                What::Answer {
+                    name,
+                    verdict,
+                    digest,
+                },
+            );
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! What the driver does to the configuration, to animals, and to the bundle of one's own.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use qcbus_broker::control::ask_broker;
+use qcbus_messages::control::Request;
+
+use super::driver::Driver;
+use super::trouble::{self, ANIMALS};
+use super::verdicts::JUDGE;
+use crate::support::farm::zoo;
+
+impl Driver {
+    pub fn animal(&mut self) {
+        if self.animals.len() >= 3 || (!self.animals.is_empty() && self.dice.below(2) == 0) {
+            let at = usize::try_from(self.dice.below(self.animals.len() as u64)).unwrap();
+            let animal = self.animals.swap_remove(at);
+            self.farm.send_away(animal);
+            self.tally.note("animal goes", animal);
+        } else if let Some(animal) = self.dice.pick(ANIMALS).copied()
+            && !self.animals.contains(&animal)
+        {
+            let arguments = if animal == "slow" { "--millis 5" } else { "" };
+            self.farm.let_in(animal, arguments);
+            self.animals.push(animal);
+            self.tally.note("animal comes", animal);
+        }
+    }
+
+    pub fn configure(&mut self) {
+        let texts = [trouble::CALM, trouble::WILD, trouble::BROKEN];
+        let Some(text) = self.dice.pick(&texts).copied() else {
+            return;
+        };
+        self.write_config(text);
+        self.tally
+            .note("configure", text.lines().nth(2).unwrap_or("broken"));
+    }
+
+    pub fn write_config(&mut self, text: &'static str) {
+        self.config = text;
+        std::fs::write(self.farm.base().join("config.xml"), text).unwrap();
+    }
+
+    /// Somebody asks for the configuration and the manifests to be read again, though nothing is new.
+    /// The driver does not wait for the answer: the broker may stand still until the driver lets it go.
+    pub fn reload(&mut self) {
+        let instance = self.farm.instance();
+        std::thread::spawn(move || drop(ask_broker(&instance, &Request::Reload)));
+        self.tally.note("reload", "");
+    }
+
+    /// The program of the bundle of one's own: a link to the zoo's, which can be taken away.
+    fn program(&self) -> PathBuf {
+        self.farm.base().join("program/zoo")
+    }
+
+    /// The bundle of one's own, in its next version.
+    pub fn install(&mut self) {
+        std::fs::create_dir_all(self.farm.base().join("program")).unwrap();
+        self.bring_back();
+        self.upgrade();
+    }
+
+    pub fn upgrade(&mut self) {
+        self.version += 1;
+        let (program, version) = (self.program(), self.version);
+        let arguments = format!("--version {version}.0.0");
+        self.farm.let_in_by(&program, JUDGE, &arguments);
+        self.tally.note("upgrade", &version.to_string());
+    }
+
+    /// The program goes from the disk for a while, mostly with the process that runs.
+    pub fn vanish(&mut self) {
+        if self.gone_until.is_some() {
+            return;
+        }
+        std::fs::remove_file(self.program()).unwrap();
+        let limit = if self.dice.below(6) == 0 {
+            15_000
+        } else {
+            2500
+        };
+        self.gone_until = Some(Instant::now() + self.dice.millis(limit));
+        self.tally.note("program goes", JUDGE);
+        if self.dice.below(4) > 0
+            && let Some(process) = self.any_process(|it| it.words.iter().any(|it| it == JUDGE))
+        {
+            process.signal(rustix::process::Signal::KILL);
+            self.tally.note("kill judge", &process.pid.to_string());
+        }
+    }
+
+    pub fn bring_back_when_due(&mut self, now: Instant) {
+        if self.gone_until.is_some_and(|until| until <= now) {
+            self.bring_back();
+        }
+    }
+
+    pub fn bring_back(&mut self) {
+        self.gone_until = None;
+        if !self.program().exists() {
+            std::os::unix::fs::symlink(zoo(), self.program()).unwrap();
+            self.tally.note("program comes", JUDGE);
+        }
+    }
+
+    /// Whether the driver had a hand in the death of a bundle that the broker killed at this time.
+    pub fn was_stopped(&self, at: Duration) -> bool {
+        let hand = |(from, to): &(Duration, Duration)| *from <= at && at <= *to + AFTERMATH;
+        self.stops.iter().any(hand)
+    }
+}
+
+/// So long after a process was stopped, or the shared memory was full, it may be killed for it.
+const AFTERMATH: Duration = Duration::from_secs(10);
