@@ -6,6 +6,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::super::*;
+use super::behind_the_gate::Published;
+use super::reporting::{Desk, REPORTER, reporter};
 use crate::InForce;
 use qcbus_document::FileKind;
 use qcbus_formats::pool::Ending;
@@ -85,12 +87,24 @@ pub struct World {
     pub reconfigured: u8,
     pub tickets: u64,
     pub waiting: BTreeMap<Ticket, u8>,
+    /// Until when those wait who do not wait for ever.
+    pub until: BTreeMap<Ticket, Duration>,
+    /// What writers have done and the state machine has not heard.
+    pub told: Vec<((u8, JobId), StoreOutcome)>,
+    pub gate: Published,
+    pub desk: Desk,
+    /// Why bundles have failed on each file, as stored.
+    pub failures: BTreeMap<u8, Vec<String>>,
+    /// How often the state machine has ended.
+    pub stopped: u8,
 }
 
 /// A process of a bundle.
 pub struct Process {
     pub name: &'static str,
     pub jobs: BTreeSet<JobId>,
+    /// Those of them of which it has said something.
+    pub begun: BTreeSet<JobId>,
     /// It was told to finish and go.
     pub drained: bool,
 }
@@ -204,6 +218,12 @@ impl World {
             reconfigured: 0,
             tickets: 0,
             waiting: BTreeMap::new(),
+            until: BTreeMap::new(),
+            told: Vec::new(),
+            gate: Published::new(),
+            desk: Desk::default(),
+            failures: BTreeMap::new(),
+            stopped: 0,
         };
         world.event(Event::Scanned);
         world
@@ -211,8 +231,11 @@ impl World {
 
     pub fn event(&mut self, event: Event) {
         for action in self.state.handle(self.now, event) {
+            self.desk_hears(&action);
+            self.gate_follows(&action);
             self.act(action);
         }
+        self.gate_must_be_true();
     }
 
     pub fn act(&mut self, action: Action) {
@@ -254,7 +277,11 @@ impl World {
             Action::Disconnect { session } | Action::Refuse { session, .. } => {
                 self.peers.remove(&session);
             }
-            Action::Spawn { launch, .. } => self.launched.push((launch, CHILD)),
+            Action::Spawn { launch, spec } => {
+                let bundle = spec.role == Role::Bundle;
+                self.launched
+                    .push((launch, if bundle { CHILD } else { REPORTER }));
+            }
             Action::Kill { launch, .. } => {
                 self.killed.extend(launch);
                 self.launched.retain(|(it, _)| Some(*it) != launch);
@@ -282,16 +309,38 @@ impl World {
                         2,
                         "every demanded checker is there"
                     );
+                    let mut checkers = bundle.said.checkers.iter();
+                    assert!(
+                        checkers.all(|it| it.issues.len() <= 2),
+                        "what a session said that has ended counts for nothing"
+                    );
                 }
                 self.storing.push(*job);
             }
-            Action::Judged { path, judged, .. } => {
-                self.must_be_earned(&judged);
+            Action::Judged {
+                path,
+                judged,
+                fresh,
+            } => {
+                // One that others must judge by now may be heard of late, where it is on its way.
+                if !fresh || judged.epoch == self.state.epoch() {
+                    self.must_be_earned(&judged);
+                }
+                let known = self.journal.get(&file_of(&path)).map(|it| it.job);
+                assert_eq!(
+                    known,
+                    Some(judged.job),
+                    "nothing is told before it is stored"
+                );
                 let verdict = (judged.inputs.clone(), judged.verdict);
                 self.judged.insert(file_of(&path), verdict);
             }
             Action::Answer { ticket, response } => {
                 let file = self.waiting.remove(&ticket).expect("one answer for each");
+                let until = self.until.remove(&ticket);
+                if response == Response::TimedOut {
+                    assert!(until.is_some_and(|until| until <= self.now), "not too soon");
+                }
                 if matches!(response, Response::Verdict(_)) {
                     let judged = self.verdict_on(file);
                     self.must_be_earned(&judged);
@@ -303,6 +352,7 @@ impl World {
                 self.journal.remove(&file_of(&path));
                 self.judged.remove(&file_of(&path));
             }
+            Action::Stop => self.stopped += 1,
             _ => {}
         }
     }
@@ -346,10 +396,12 @@ impl World {
         self.stamps += 1;
         self.contents.insert(self.stamps, content);
         self.there.insert(path_of(file), self.stamps);
-        let stamp = stamp(self.stamps);
-        self.event(Event::Settled {
-            path: path_of(file),
-            stamp,
+        let (path, stamp) = (path_of(file), stamp(self.stamps));
+        // As the engine does with what lies outside of the watched directories.
+        self.event(if file == 7 && self.state.is_only_a_dependency(&path) {
+            Event::Touched { path, stamp }
+        } else {
+            Event::Settled { path, stamp }
         });
     }
 
@@ -367,15 +419,22 @@ impl World {
     }
 
     pub fn wait(&mut self, file: u8) {
+        self.wait_until(file, None);
+    }
+
+    pub fn wait_until(&mut self, file: u8, timeout: Option<Duration>) {
         self.tickets += 1;
         self.waiting.insert(Ticket(self.tickets), file);
+        if let Some(timeout) = timeout {
+            self.until.insert(Ticket(self.tickets), self.now + timeout);
+        }
         let path = path_of(file);
         self.event(Event::Wait {
             ticket: Ticket(self.tickets),
             stamp: self.there.get(&path).map(|number| stamp(*number)),
             path,
             unwatched: None,
-            timeout: None,
+            timeout,
         });
     }
 
@@ -410,7 +469,11 @@ impl World {
     pub fn child_joins(&mut self) {
         if !self.launched.is_empty() {
             let (launch, name) = self.launched.remove(0);
-            self.join_as(name, Some(launch.0));
+            if name == REPORTER {
+                self.reporter_joins(launch);
+            } else {
+                self.join_as(name, Some(launch.0));
+            }
         }
     }
 
@@ -423,6 +486,7 @@ impl World {
             Process {
                 name,
                 jobs: BTreeSet::new(),
+                begun: BTreeSet::new(),
                 drained: false,
             },
         );
@@ -492,9 +556,13 @@ impl World {
             self.demanded.remove(CHILD);
         }
         self.manifest = version.is_some();
-        self.event(Event::Children {
-            specs: version.map(child).into_iter().collect(),
-        });
+        self.children_are(version);
+    }
+
+    fn children_are(&mut self, version: Option<u8>) {
+        let reporter = self.desk.open.then(reporter);
+        let specs = version.map(child).into_iter().chain(reporter).collect();
+        self.event(Event::Children { specs });
     }
 
     /// Somebody takes a bundle off the roster.
@@ -517,8 +585,23 @@ impl World {
         }
     }
 
+    /// The broker is killed, something happens to a file, and the next one knows what the journal
+    /// knows. `unsettled`: what is there may still be written to when it is first seen.
+    pub fn restart_after(&mut self, file: u8, unsettled: bool) {
+        self.stamps += 1;
+        if self.there.remove(&path_of(file)).is_none() {
+            self.contents.insert(self.stamps, self.stamps);
+            self.there.insert(path_of(file), self.stamps);
+        }
+        self.restart_with(unsettled);
+    }
+
     /// The broker is killed, and the next one knows what the journal knows.
     pub fn restart(&mut self) {
+        self.restart_with(false);
+    }
+
+    fn restart_with(&mut self, unsettled: bool) {
         self.generation += 1;
         self.state = fresh_state(self.generation, self.reconfigured);
         self.preparing.clear();
@@ -526,7 +609,10 @@ impl World {
         self.peers.clear();
         self.launched.clear();
         self.waiting.clear();
+        self.until.clear();
+        self.told.clear();
         self.judged.clear();
+        self.gate_is_taken_over();
         for member in self.members.values() {
             self.state.remember_member(member.clone());
         }
@@ -534,17 +620,61 @@ impl World {
             let mut judged = judged;
             // As the engine does: what has changed while nobody watched is looked at again.
             judged.racy |= judged.inputs[1..] != self.inputs(file)[1..];
-            self.state.remember(&path_of(file), judged, &[]);
+            let delivered = self.delivered(file);
+            self.state.remember(&path_of(file), judged, &delivered);
         }
+        self.desk_restarts();
         let version = self.versions.get(CHILD).copied().filter(|_| self.manifest);
-        let specs = version.map(child).into_iter().collect();
-        self.event(Event::Children { specs });
+        self.children_are(version);
         let there: Vec<(Arc<Path>, u64)> = self.there.clone().into_iter().collect();
+        if unsettled {
+            for (path, _) in there.clone() {
+                self.event(Event::Present { path });
+            }
+            self.event(Event::Scanned);
+        }
         for (path, number) in there {
             let stamp = stamp(number);
             self.event(Event::Settled { path, stamp });
         }
-        self.event(Event::Scanned);
+        if !unsettled {
+            self.event(Event::Scanned);
+        }
+    }
+
+    /// A bundle says something of a job, and does not end it.
+    pub fn begin(&mut self, n: u8) {
+        let Some(session) = self.nth_peer(n) else {
+            return;
+        };
+        let process = self.peers.get_mut(&session).unwrap();
+        let new = process.jobs.difference(&process.begun).next().copied();
+        if let Some(job) = new {
+            process.begun.insert(job);
+            self.says_on(session, job, 0, 2);
+        }
+    }
+
+    fn says_on(&mut self, session: SessionId, job: JobId, checker: u32, findings: usize) {
+        let issues = vec![finding(); findings];
+        self.say(
+            session,
+            FromPeer::Issues {
+                job,
+                checker,
+                issues,
+            },
+        );
+        self.say(
+            session,
+            FromPeer::CheckerDone {
+                job,
+                checker,
+                ending: Ending::Completed,
+                params: Vec::new(),
+                metadata: Vec::new(),
+            },
+        );
     }
 
     pub fn answer(&mut self, n: u8) {
@@ -562,27 +692,10 @@ impl World {
         else {
             return;
         };
-        for checker in 0..2 {
+        let process = self.peers.get_mut(&session).unwrap();
+        for checker in u32::from(process.begun.remove(&job))..2 {
             // Some have much to say, so that the room for findings runs out now and then.
-            let issues = vec![finding(); usize::from(n % 3)];
-            self.say(
-                session,
-                FromPeer::Issues {
-                    job,
-                    checker,
-                    issues,
-                },
-            );
-            self.say(
-                session,
-                FromPeer::CheckerDone {
-                    job,
-                    checker,
-                    ending: Ending::Completed,
-                    params: Vec::new(),
-                    metadata: Vec::new(),
-                },
-            );
+            self.says_on(session, job, checker, usize::from(n % 3));
         }
         self.say(session, FromPeer::JobDone { job, micros: 1 });
     }
@@ -618,6 +731,22 @@ impl World {
     }
 
     pub fn store(&mut self, n: u8, room: bool) {
+        self.write_out(n, room);
+        while !self.told.is_empty() {
+            self.tell();
+        }
+    }
+
+    /// The state machine hears what a writer has done.
+    pub fn tell(&mut self) {
+        if !self.told.is_empty() {
+            let ((_, job), outcome) = self.told.remove(0);
+            self.event(Event::Stored { job, outcome });
+        }
+    }
+
+    /// A writer does its work, and nobody hears of it yet.
+    pub fn write_out(&mut self, n: u8, room: bool) {
         if self.storing.is_empty() {
             return;
         }
@@ -634,7 +763,10 @@ impl World {
             self.stored.push(file);
             let names = job.bundles.iter().map(|it| it.said.name.clone());
             self.judges.insert(file, names.collect());
-            let failed = job.bundles.iter().any(|bundle| bundle.failure.is_some());
+            let why = job.bundles.iter().filter_map(|it| it.failure.clone());
+            let why: Vec<String> = why.collect();
+            let failed = !why.is_empty();
+            self.failures.insert(file, why);
             let judged = Judged {
                 job: job.job,
                 verdict: if failed {
@@ -653,35 +785,58 @@ impl World {
                 why: Vec::new(),
                 xqar: "/out".into(),
             };
+            self.must_be_earned(&judged);
             self.journal.insert(file, judged.clone());
+            self.publish(file, &judged);
             StoreOutcome::Stored(Box::new(judged))
         };
-        self.event(Event::Stored {
-            job: job.job,
-            outcome,
-        });
+        self.told.push(((file, job.job), outcome));
     }
 
     pub fn pass(&mut self, time: Duration) {
         self.now += time;
         self.event(Event::Tick);
+        let late = self.until.values().any(|until| *until <= self.now);
+        assert!(
+            !late,
+            "whoever does not wait for ever is told when it is over"
+        );
+    }
+
+    /// Everybody is there and does something.
+    fn go_on(&mut self) {
+        self.join("First");
+        self.join("Second");
+        self.child_joins();
+        for n in 0..4 {
+            self.prepare(n, true);
+            self.answer(n);
+            self.store(n, true);
+            self.report(true);
+        }
+        self.pass(Duration::from_millis(300));
+    }
+
+    /// The broker is told to stop.
+    pub fn drain(&mut self) {
+        self.event(Event::Drain);
+        for _ in 0..2000 {
+            if self.stopped > 0 {
+                return;
+            }
+            self.go_on();
+        }
+        panic!("it does not stop: {:#?}", self.state.jobs);
     }
 
     /// Lets everything that is under way come to its end, with both bundles there.
     pub fn settle(&mut self) {
         for _ in 0..2000 {
-            self.join("First");
-            self.join("Second");
-            self.child_joins();
-            for n in 0..4 {
-                self.prepare(n, true);
-                self.answer(n);
-                self.store(n, true);
-            }
-            self.pass(Duration::from_millis(300));
+            self.go_on();
             let all = self.demanded.values().all(Option::is_some) && self.launched.is_empty();
             let all = all && self.demanded.keys().all(|name| self.is_there(name));
-            if all && self.state.files.is_quiet() && self.state.jobs.is_empty() {
+            let all = all && self.state.files.is_quiet() && self.state.jobs.is_empty();
+            if all && self.reporter_rests() {
                 return;
             }
         }
