@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use qcbus_messages::Verdict;
 
 use super::super::*;
-use super::world::{World, file_of};
+use super::things::file_of;
+use super::world::World;
 
 /// Each published file with what its acceptance rests on.
 pub type Published = BTreeMap<u8, Vec<Input>>;
@@ -53,6 +54,6 @@ impl World {
     }
 }
 
-fn bytes(inputs: &[Input]) -> Vec<Option<qcbus_messages::Digest>> {
+fn bytes(inputs: &[Input]) -> Vec<Option<Digest>> {
     inputs.iter().map(Input::digest).collect()
 }

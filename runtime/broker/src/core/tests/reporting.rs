@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use qcbus_messages::{FromPeer, Hello, JobId, PROTOCOL_VERSION, PeerReport, Role};
 
 use super::super::*;
-use super::world::{World, file_of, path_of};
+use super::things::{file_of, path_of};
+use super::world::World;
 
 pub const REPORTER: &str = "text";
 
