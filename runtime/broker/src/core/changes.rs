@@ -128,6 +128,8 @@ impl State {
         };
         entry.present = false;
         if let Stage::Active(job) = *entry.stage() {
+            // The result stays until the job is over, what lies behind the gate does not.
+            self.shut(id, actions);
             // Nothing is stored for a file that is not there; a job at the writers' will notice.
             if self
                 .jobs

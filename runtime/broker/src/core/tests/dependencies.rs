@@ -94,3 +94,15 @@ fn a_dependency_that_changes_before_the_first_scan_sees_its_file_is_not_forgotte
     world.settle();
     assert_eq!(world.judged[&2].0, world.inputs(2));
 }
+
+#[test]
+fn a_file_that_goes_while_it_is_read_again_leaves_the_gate_at_once() {
+    let mut world = judged_world();
+    assert!(world.gate.contains_key(&1));
+    world.step(&Step::Reconfigure(1));
+    assert_eq!(world.preparing.len(), 1);
+    world.delete(1);
+    assert!(!world.gate.contains_key(&1));
+    world.settle();
+    assert!(!world.journal.contains_key(&1));
+}

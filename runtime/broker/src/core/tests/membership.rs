@@ -46,11 +46,7 @@ fn world_that_is_busy() -> World {
     for file in 0..6 {
         world.write(file);
     }
-    while world.judged.len() < 6 {
-        world.prepare(0, true);
-        world.answer(0);
-        world.store(0, true);
-    }
+    world.until_judged(6);
     world
 }
 

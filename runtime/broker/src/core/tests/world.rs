@@ -6,50 +6,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::super::*;
-use crate::InForce;
-use qcbus_document::FileKind;
-use qcbus_formats::pool::Ending;
-use qcbus_formats::xqar::{Issue, Level};
+use super::behind_the_gate::Published;
+use super::reporting::{Desk, REPORTER};
+use super::things::*;
 use qcbus_messages::control::Response;
-use qcbus_messages::{
-    Catalogue, CheckerInfo, Digest, DocId, DocumentRole, FromPeer, Hello, JobDocument, JobId,
-    PROTOCOL_VERSION, Role, ToPeer, Verdict,
-};
-
-pub const CAPACITY: usize = 2;
-
-/// The bundle that a manifest brings; the others join by hand.
-pub const CHILD: &str = "Child";
-
-fn child(version: u8) -> ChildSpec {
-    ChildSpec {
-        name: CHILD.to_owned(),
-        role: Role::Bundle,
-        version: Some(version.to_string()),
-        command: vec!["child".to_owned()],
-        restart: Restart::Always,
-    }
-}
-
-fn fresh_state(generation: u64, configuration: u8) -> State {
-    let in_force = InForce::new(None).unwrap();
-    let settings = Settings {
-        generation,
-        collect: Duration::ZERO,
-        max_active: 4,
-        max_preparing: 2,
-        max_storing: 2,
-        max_findings_bytes: 1000,
-        ..Settings::default()
-    };
-    State::new(settings, digest(configuration.into()), in_force.demand())
-}
-
-/// A jury as it can be compared.
-pub fn named(jury: &Jury) -> Vec<(String, Option<Mark>)> {
-    let juror = |it: &Juror| (it.name.clone(), it.mark);
-    jury.0.iter().map(juror).collect()
-}
+use qcbus_messages::{JobId, Role, ToPeer, Verdict};
 
 /// A world around the state machine: it answers actions when it pleases.
 pub struct World {
@@ -85,96 +46,26 @@ pub struct World {
     pub reconfigured: u8,
     pub tickets: u64,
     pub waiting: BTreeMap<Ticket, u8>,
+    /// Until when those wait who do not wait for ever.
+    pub until: BTreeMap<Ticket, Duration>,
+    /// What writers have done and the state machine has not heard.
+    pub told: Vec<((u8, JobId), StoreOutcome)>,
+    pub gate: Published,
+    pub desk: Desk,
+    /// Why bundles have failed on each file, as stored.
+    pub failures: BTreeMap<u8, Vec<String>>,
+    /// How often the state machine has ended.
+    pub stopped: u8,
 }
 
 /// A process of a bundle.
 pub struct Process {
     pub name: &'static str,
     pub jobs: BTreeSet<JobId>,
+    /// Those of them of which it has said something.
+    pub begun: BTreeSet<JobId>,
     /// It was told to finish and go.
     pub drained: bool,
-}
-
-/// The first six are checked, the others are only dependencies of them.
-pub fn path_of(file: u8) -> Arc<Path> {
-    let ending = if file < 6 { "xodr" } else { "part" };
-    Path::new(&format!("/farm/{file}.{ending}")).into()
-}
-
-/// What a verdict depends on besides the file: on another that has a verdict itself, on a part of
-/// its own, on a part that it shares, on all of these, or on nothing.
-pub fn dependencies_of(file: u8) -> &'static [u8] {
-    match file {
-        1 => &[0, 6],
-        2 => &[6],
-        3 => &[4],
-        5 => &[4, 6, 7],
-        _ => &[],
-    }
-}
-
-pub fn file_of(path: &Path) -> u8 {
-    path.file_stem()
-        .and_then(|it| it.to_str())
-        .and_then(|it| it.parse().ok())
-        .unwrap()
-}
-
-pub fn stamp(number: u64) -> Stamp {
-    Stamp {
-        size: number,
-        mtime_ns: i128::from(number),
-        ctime_ns: i128::from(number),
-        inode: 1,
-    }
-}
-
-pub fn digest(number: u64) -> Digest {
-    let mut digest = Digest::default();
-    digest.0[..8].copy_from_slice(&number.to_le_bytes());
-    digest
-}
-
-pub fn basis(inputs: &[Input]) -> Digest {
-    let mut basis = Digest::default();
-    for (at, input) in inputs.iter().enumerate() {
-        if let Some((_, digest)) = input.content {
-            basis.0[at * 8..][..8].copy_from_slice(&digest.0[..8]);
-        }
-    }
-    basis
-}
-
-pub fn catalogue(name: &str) -> Catalogue {
-    let checker = |id: String| CheckerInfo {
-        id,
-        description: String::new(),
-        rule_uids: Vec::new(),
-        kinds: vec![FileKind::Xodr],
-        default_on: true,
-        level: Level::Error,
-        params: Vec::new(),
-    };
-    Catalogue {
-        alias: name.to_lowercase(),
-        kinds: vec![FileKind::Xodr],
-        checkers: vec![
-            checker(format!("{name}.one")),
-            checker(format!("{name}.two")),
-        ],
-        ..Catalogue::default()
-    }
-}
-
-pub fn finding() -> Issue {
-    Issue {
-        id: 0,
-        description: "too much".to_owned(),
-        level: Level::Warning,
-        rule_uid: String::new(),
-        locations: Vec::new(),
-        domain_info: Vec::new(),
-    }
 }
 
 impl World {
@@ -204,6 +95,12 @@ impl World {
             reconfigured: 0,
             tickets: 0,
             waiting: BTreeMap::new(),
+            until: BTreeMap::new(),
+            told: Vec::new(),
+            gate: Published::new(),
+            desk: Desk::default(),
+            failures: BTreeMap::new(),
+            stopped: 0,
         };
         world.event(Event::Scanned);
         world
@@ -211,8 +108,11 @@ impl World {
 
     pub fn event(&mut self, event: Event) {
         for action in self.state.handle(self.now, event) {
+            self.desk_hears(&action);
+            self.gate_follows(&action);
             self.act(action);
         }
+        self.gate_must_be_true();
     }
 
     pub fn act(&mut self, action: Action) {
@@ -254,7 +154,11 @@ impl World {
             Action::Disconnect { session } | Action::Refuse { session, .. } => {
                 self.peers.remove(&session);
             }
-            Action::Spawn { launch, .. } => self.launched.push((launch, CHILD)),
+            Action::Spawn { launch, spec } => {
+                let bundle = spec.role == Role::Bundle;
+                self.launched
+                    .push((launch, if bundle { CHILD } else { REPORTER }));
+            }
             Action::Kill { launch, .. } => {
                 self.killed.extend(launch);
                 self.launched.retain(|(it, _)| Some(*it) != launch);
@@ -282,16 +186,38 @@ impl World {
                         2,
                         "every demanded checker is there"
                     );
+                    let mut checkers = bundle.said.checkers.iter();
+                    assert!(
+                        checkers.all(|it| it.issues.len() <= 2),
+                        "what a session said that has ended counts for nothing"
+                    );
                 }
                 self.storing.push(*job);
             }
-            Action::Judged { path, judged, .. } => {
-                self.must_be_earned(&judged);
+            Action::Judged {
+                path,
+                judged,
+                fresh,
+            } => {
+                // One that others must judge by now may be heard of late, where it is on its way.
+                if !fresh || judged.epoch == self.state.epoch() {
+                    self.must_be_earned(&judged);
+                }
+                let known = self.journal.get(&file_of(&path)).map(|it| it.job);
+                assert_eq!(
+                    known,
+                    Some(judged.job),
+                    "nothing is told before it is stored"
+                );
                 let verdict = (judged.inputs.clone(), judged.verdict);
                 self.judged.insert(file_of(&path), verdict);
             }
             Action::Answer { ticket, response } => {
                 let file = self.waiting.remove(&ticket).expect("one answer for each");
+                let until = self.until.remove(&ticket);
+                if response == Response::TimedOut {
+                    assert!(until.is_some_and(|until| until <= self.now), "not too soon");
+                }
                 if matches!(response, Response::Verdict(_)) {
                     let judged = self.verdict_on(file);
                     self.must_be_earned(&judged);
@@ -303,6 +229,7 @@ impl World {
                 self.journal.remove(&file_of(&path));
                 self.judged.remove(&file_of(&path));
             }
+            Action::Stop => self.stopped += 1,
             _ => {}
         }
     }
@@ -314,7 +241,7 @@ impl World {
     }
 
     /// Nothing is accepted, and nobody is told so, unless all judged who must at this moment.
-    fn must_be_earned(&self, judged: &Judged) {
+    pub fn must_be_earned(&self, judged: &Judged) {
         if judged.verdict == Verdict::Accepted {
             assert_eq!(named(&judged.jury), self.expected_jury());
         }
@@ -346,10 +273,12 @@ impl World {
         self.stamps += 1;
         self.contents.insert(self.stamps, content);
         self.there.insert(path_of(file), self.stamps);
-        let stamp = stamp(self.stamps);
-        self.event(Event::Settled {
-            path: path_of(file),
-            stamp,
+        let (path, stamp) = (path_of(file), stamp(self.stamps));
+        // As the engine does with what lies outside of the watched directories.
+        self.event(if file == 7 && self.state.is_only_a_dependency(&path) {
+            Event::Touched { path, stamp }
+        } else {
+            Event::Settled { path, stamp }
         });
     }
 
@@ -361,21 +290,28 @@ impl World {
         }
     }
 
-    fn is_there(&self, name: &str) -> bool {
+    pub fn is_there(&self, name: &str) -> bool {
         let mut peers = self.peers.values();
         peers.any(|it| it.name == name && !it.drained)
     }
 
     pub fn wait(&mut self, file: u8) {
+        self.wait_until(file, None);
+    }
+
+    pub fn wait_until(&mut self, file: u8, timeout: Option<Duration>) {
         self.tickets += 1;
         self.waiting.insert(Ticket(self.tickets), file);
+        if let Some(timeout) = timeout {
+            self.until.insert(Ticket(self.tickets), self.now + timeout);
+        }
         let path = path_of(file);
         self.event(Event::Wait {
             ticket: Ticket(self.tickets),
             stamp: self.there.get(&path).map(|number| stamp(*number)),
             path,
             unwatched: None,
-            timeout: None,
+            timeout,
         });
     }
 
@@ -399,289 +335,63 @@ impl World {
         all.map(|it| self.input(*it)).collect()
     }
 
-    pub fn join(&mut self, name: &'static str) {
-        let there = |it: &Process| it.name == name && !it.drained;
-        if !self.peers.values().any(there) {
-            self.join_as(name, None);
-        }
-    }
-
-    /// A process that was started for the child says hello.
-    pub fn child_joins(&mut self) {
-        if !self.launched.is_empty() {
-            let (launch, name) = self.launched.remove(0);
-            self.join_as(name, Some(launch.0));
-        }
-    }
-
-    fn join_as(&mut self, name: &'static str, launch: Option<u64>) {
-        let version = *self.versions.entry(name).or_insert(1);
-        self.sessions += 1;
-        let session = SessionId(self.sessions);
-        self.peers.insert(
-            session,
-            Process {
-                name,
-                jobs: BTreeSet::new(),
-                drained: false,
-            },
-        );
-        let hello = Hello {
-            protocol: PROTOCOL_VERSION,
-            role: Role::Bundle,
-            name: name.to_owned(),
-            version: version.to_string(),
-            incarnation: self.sessions,
-            pid: u32::try_from(self.sessions).unwrap() + 1000,
-            launch,
-            capacity: u16::try_from(CAPACITY).unwrap(),
-        };
-        self.event(Event::Hello { session, hello });
-        if !self.peers.contains_key(&session) {
-            return;
-        }
-        let wanted = launch.is_none() || self.manifest;
-        if wanted {
-            self.demanded.insert(name.to_owned(), Some(version));
-        }
-        self.say(session, FromPeer::Catalogue(Box::new(catalogue(name))));
-    }
-
-    pub fn say(&mut self, session: SessionId, message: FromPeer) {
-        if self.peers.contains_key(&session) {
-            self.event(Event::Message { session, message });
-        }
-    }
-
-    pub fn nth_peer(&self, n: u8) -> Option<SessionId> {
-        let count = self.peers.len();
-        (count > 0).then(|| *self.peers.keys().nth(usize::from(n) % count).unwrap())
-    }
-
-    pub fn kill(&mut self, n: u8) {
-        if let Some(session) = self.nth_peer(n) {
-            self.peers.remove(&session);
-            self.event(Event::Gone { session });
-        }
-    }
-
-    /// A bundle goes of its own will, or because it was told to.
-    pub fn leave(&mut self, n: u8) {
-        let Some(session) = self.nth_peer(n) else {
-            return;
-        };
-        let Process { name, drained, .. } = self.peers[&session];
-        // One that somebody else has replaced leaves nothing.
-        let current = self.state.sessions.contains_key(&session);
-        if current && !(name == CHILD && self.manifest && !drained) {
-            self.demanded.remove(name);
-        }
-        self.say(session, FromPeer::Leaving);
-    }
-
-    /// The manifest of the child comes, changes or goes.
-    pub fn manifest(&mut self, version: Option<u8>) {
-        if let Some(version) = version {
-            self.versions.insert(CHILD, version);
-            // Its last process may not have left yet: what that one said counts.
-            let known = self.state.bundles.get(CHILD);
-            let known = known.filter(|it| it.catalogue.is_some());
-            let known = known.and_then(|it| it.version.parse().ok());
-            self.demanded.entry(CHILD.to_owned()).or_insert(known);
-        } else {
-            self.demanded.remove(CHILD);
-        }
-        self.manifest = version.is_some();
-        self.event(Event::Children {
-            specs: version.map(child).into_iter().collect(),
-        });
-    }
-
-    /// Somebody takes a bundle off the roster.
-    pub fn remove(&mut self, name: &'static str) {
-        if name != CHILD || !self.manifest {
-            self.demanded.remove(name);
-        }
-        self.tickets += 1;
-        let ticket = Ticket(self.tickets);
-        self.waiting.insert(ticket, 0);
-        let name = name.to_owned();
-        self.event(Event::RemoveBundle { ticket, name });
-    }
-
-    /// What a child's process that has not joined comes to.
-    pub fn child_ends(&mut self, end: ChildEnd) {
-        if !self.launched.is_empty() {
-            let (launch, _) = self.launched.remove(0);
-            self.event(Event::Exited { launch, end });
-        }
-    }
-
-    /// The broker is killed, and the next one knows what the journal knows.
-    pub fn restart(&mut self) {
-        self.generation += 1;
-        self.state = fresh_state(self.generation, self.reconfigured);
-        self.preparing.clear();
-        self.storing.clear();
-        self.peers.clear();
-        self.launched.clear();
-        self.waiting.clear();
-        self.judged.clear();
-        for member in self.members.values() {
-            self.state.remember_member(member.clone());
-        }
-        for (file, judged) in self.journal.clone() {
-            let mut judged = judged;
-            // As the engine does: what has changed while nobody watched is looked at again.
-            judged.racy |= judged.inputs[1..] != self.inputs(file)[1..];
-            self.state.remember(&path_of(file), judged, &[]);
-        }
-        let version = self.versions.get(CHILD).copied().filter(|_| self.manifest);
-        let specs = version.map(child).into_iter().collect();
-        self.event(Event::Children { specs });
-        let there: Vec<(Arc<Path>, u64)> = self.there.clone().into_iter().collect();
-        for (path, number) in there {
-            let stamp = stamp(number);
-            self.event(Event::Settled { path, stamp });
-        }
-        self.event(Event::Scanned);
-    }
-
-    pub fn answer(&mut self, n: u8) {
-        let Some(session) = self.nth_peer(n) else {
-            return;
-        };
-        let bundle = &self.peers[&session];
-        if bundle.drained && bundle.jobs.is_empty() {
-            return self.leave(n);
-        }
-        let Some(job) = self
-            .peers
-            .get_mut(&session)
-            .and_then(|it| it.jobs.pop_first())
-        else {
-            return;
-        };
-        for checker in 0..2 {
-            // Some have much to say, so that the room for findings runs out now and then.
-            let issues = vec![finding(); usize::from(n % 3)];
-            self.say(
-                session,
-                FromPeer::Issues {
-                    job,
-                    checker,
-                    issues,
-                },
-            );
-            self.say(
-                session,
-                FromPeer::CheckerDone {
-                    job,
-                    checker,
-                    ending: Ending::Completed,
-                    params: Vec::new(),
-                    metadata: Vec::new(),
-                },
-            );
-        }
-        self.say(session, FromPeer::JobDone { job, micros: 1 });
-    }
-
-    pub fn prepare(&mut self, n: u8, room: bool) {
-        if self.preparing.is_empty() {
-            return;
-        }
-        let (job, file) = self.preparing.remove(usize::from(n) % self.preparing.len());
-        let inputs = self.inputs(file);
-        let result = match inputs[0].content {
-            None => Err(PrepareFailure::Vanished),
-            Some(_) if !room => Err(PrepareFailure::NoRoom("full".to_owned())),
-            Some((_, digest)) => {
-                let document = JobDocument {
-                    doc: DocId(job.0),
-                    role: DocumentRole::Root,
-                    path: String::new(),
-                    digest,
-                    referred_at: 0,
-                };
-                Ok(Box::new(PreparedJob {
-                    basis: basis(&inputs),
-                    inputs,
-                    racy: false,
-                    documents: vec![document],
-                    missing: Vec::new(),
-                    bytes: 1,
-                }))
-            }
-        };
-        self.event(Event::Prepared { job, result });
-    }
-
-    pub fn store(&mut self, n: u8, room: bool) {
-        if self.storing.is_empty() {
-            return;
-        }
-        let job = self.storing.remove(usize::from(n) % self.storing.len());
-        let file = file_of(&job.path);
-        let prepared = job.prepared.as_ref().unwrap();
-        let outcome = if prepared.inputs != self.inputs(file) {
-            StoreOutcome::Stale
-        } else if job.epoch != self.state.epoch() {
-            StoreOutcome::Outdated
-        } else if !room {
-            StoreOutcome::Failed("full".to_owned())
-        } else {
-            self.stored.push(file);
-            let names = job.bundles.iter().map(|it| it.said.name.clone());
-            self.judges.insert(file, names.collect());
-            let failed = job.bundles.iter().any(|bundle| bundle.failure.is_some());
-            let judged = Judged {
-                job: job.job,
-                verdict: if failed {
-                    Verdict::Undetermined
-                } else {
-                    Verdict::Accepted
-                },
-                digest: prepared.root().unwrap().1,
-                basis: prepared.basis,
-                config: job.config,
-                jury: job.jury.clone(),
-                epoch: job.epoch,
-                inputs: prepared.inputs.clone(),
-                racy: false,
-                counts: [0; 3],
-                why: Vec::new(),
-                xqar: "/out".into(),
-            };
-            self.journal.insert(file, judged.clone());
-            StoreOutcome::Stored(Box::new(judged))
-        };
-        self.event(Event::Stored {
-            job: job.job,
-            outcome,
-        });
-    }
-
     pub fn pass(&mut self, time: Duration) {
         self.now += time;
         self.event(Event::Tick);
+        let late = self.until.values().any(|until| *until <= self.now);
+        assert!(
+            !late,
+            "whoever does not wait for ever is told when it is over"
+        );
+    }
+
+    /// Lets the bundles that are there work until so many files are judged.
+    pub fn until_judged(&mut self, files: usize) {
+        for _ in 0..100 {
+            self.prepare(0, true);
+            self.answer(0);
+            self.store(0, true);
+            if self.judged.len() >= files {
+                return;
+            }
+        }
+        panic!("{files} are not judged: {:?}", self.judged);
+    }
+
+    /// Everybody is there and does something.
+    fn go_on(&mut self) {
+        self.join("First");
+        self.join("Second");
+        self.child_joins();
+        for n in 0..4 {
+            self.prepare(n, true);
+            self.answer(n);
+            self.store(n, true);
+            self.report(true);
+        }
+        self.pass(Duration::from_millis(300));
+    }
+
+    /// The broker is told to stop.
+    pub fn drain(&mut self) {
+        self.event(Event::Drain);
+        for _ in 0..2000 {
+            if self.stopped > 0 {
+                return;
+            }
+            self.go_on();
+        }
+        panic!("it does not stop: {:#?}", self.state.jobs);
     }
 
     /// Lets everything that is under way come to its end, with both bundles there.
     pub fn settle(&mut self) {
         for _ in 0..2000 {
-            self.join("First");
-            self.join("Second");
-            self.child_joins();
-            for n in 0..4 {
-                self.prepare(n, true);
-                self.answer(n);
-                self.store(n, true);
-            }
-            self.pass(Duration::from_millis(300));
+            self.go_on();
             let all = self.demanded.values().all(Option::is_some) && self.launched.is_empty();
             let all = all && self.demanded.keys().all(|name| self.is_there(name));
-            if all && self.state.files.is_quiet() && self.state.jobs.is_empty() {
+            let all = all && self.state.files.is_quiet() && self.state.jobs.is_empty();
+            if all && self.reporter_rests() {
                 return;
             }
         }

@@ -1,0 +1,59 @@
+//! The gate of a random world: what lies behind it, as the writers put it there.
+
+use std::collections::BTreeMap;
+
+use qcbus_messages::Verdict;
+
+use super::super::*;
+use super::things::file_of;
+use super::world::World;
+
+/// Each published file with what its acceptance rests on.
+pub type Published = BTreeMap<u8, Vec<Input>>;
+
+impl World {
+    /// What becomes of the gate by an action.
+    pub fn gate_follows(&mut self, action: &Action) {
+        match action {
+            Action::CloseGate { path } | Action::Withdraw { path, .. } => {
+                self.gate.remove(&file_of(path));
+            }
+            Action::OpenGate { path, judged } | Action::Restamp { path, judged } => {
+                self.publish(file_of(path), judged);
+            }
+            _ => {}
+        }
+    }
+
+    /// A verdict has been written: an acceptance is published, anything else ends the last one.
+    pub fn publish(&mut self, file: u8, judged: &Judged) {
+        if judged.verdict == Verdict::Accepted {
+            self.gate.insert(file, judged.inputs.clone());
+        } else {
+            self.gate.remove(&file);
+        }
+    }
+
+    /// What lies behind the gate is what was accepted, or somebody is about to hear of it.
+    pub fn gate_must_be_true(&self) {
+        for (file, inputs) in &self.gate {
+            let on_the_way = self.told.iter().any(|(it, _)| it.0 == *file);
+            if !on_the_way {
+                let now = self.inputs(*file);
+                assert_eq!(bytes(inputs), bytes(&now), "{file} stays published");
+            }
+        }
+    }
+
+    /// When a broker starts, what is not as it was read goes from behind the gate.
+    pub fn gate_is_taken_over(&mut self) {
+        let journal = self.journal.iter();
+        let accepted = journal.filter(|(_, it)| it.verdict == Verdict::Accepted);
+        let stand = accepted.filter(|(file, it)| bytes(&it.inputs) == bytes(&self.inputs(**file)));
+        self.gate = stand.map(|(file, it)| (*file, it.inputs.clone())).collect();
+    }
+}
+
+fn bytes(inputs: &[Input]) -> Vec<Option<Digest>> {
+    inputs.iter().map(Input::digest).collect()
+}

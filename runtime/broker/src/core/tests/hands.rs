@@ -1,0 +1,162 @@
+//! The hands of a random world: files are read and results written, and a broker is killed.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::super::*;
+use super::things::*;
+use qcbus_messages::{DocId, DocumentRole, JobDocument, Verdict};
+
+use super::world::World;
+
+impl World {
+    pub fn prepare(&mut self, n: u8, room: bool) {
+        if self.preparing.is_empty() {
+            return;
+        }
+        let (job, file) = self.preparing.remove(usize::from(n) % self.preparing.len());
+        let inputs = self.inputs(file);
+        let result = match inputs[0].content {
+            None => Err(PrepareFailure::Vanished),
+            Some(_) if !room => Err(PrepareFailure::NoRoom("full".to_owned())),
+            Some((_, digest)) => {
+                let document = JobDocument {
+                    doc: DocId(job.0),
+                    role: DocumentRole::Root,
+                    path: String::new(),
+                    digest,
+                    referred_at: 0,
+                };
+                Ok(Box::new(PreparedJob {
+                    basis: basis(&inputs),
+                    inputs,
+                    racy: false,
+                    documents: vec![document],
+                    missing: Vec::new(),
+                    bytes: 1,
+                }))
+            }
+        };
+        self.event(Event::Prepared { job, result });
+    }
+
+    pub fn store(&mut self, n: u8, room: bool) {
+        self.write_out(n, room);
+        while !self.told.is_empty() {
+            self.tell();
+        }
+    }
+
+    /// The state machine hears what a writer has done.
+    pub fn tell(&mut self) {
+        if !self.told.is_empty() {
+            let ((_, job), outcome) = self.told.remove(0);
+            self.event(Event::Stored { job, outcome });
+        }
+    }
+
+    /// A writer does its work, and nobody hears of it yet.
+    pub fn write_out(&mut self, n: u8, room: bool) {
+        if self.storing.is_empty() {
+            return;
+        }
+        let job = self.storing.remove(usize::from(n) % self.storing.len());
+        let file = file_of(&job.path);
+        let prepared = job.prepared.as_ref().unwrap();
+        let outcome = if prepared.inputs != self.inputs(file) {
+            StoreOutcome::Stale
+        } else if job.epoch != self.state.epoch() {
+            StoreOutcome::Outdated
+        } else if !room {
+            StoreOutcome::Failed("full".to_owned())
+        } else {
+            self.stored.push(file);
+            let names = job.bundles.iter().map(|it| it.said.name.clone());
+            self.judges.insert(file, names.collect());
+            let why = job.bundles.iter().filter_map(|it| it.failure.clone());
+            let why: Vec<String> = why.collect();
+            let failed = !why.is_empty();
+            self.failures.insert(file, why);
+            let judged = Judged {
+                job: job.job,
+                verdict: if failed {
+                    Verdict::Undetermined
+                } else {
+                    Verdict::Accepted
+                },
+                digest: prepared.root().unwrap().1,
+                basis: prepared.basis,
+                config: job.config,
+                jury: job.jury.clone(),
+                epoch: job.epoch,
+                inputs: prepared.inputs.clone(),
+                racy: false,
+                counts: [0; 3],
+                why: Vec::new(),
+                xqar: "/out".into(),
+            };
+            self.must_be_earned(&judged);
+            self.journal.insert(file, judged.clone());
+            self.publish(file, &judged);
+            StoreOutcome::Stored(Box::new(judged))
+        };
+        self.told.push(((file, job.job), outcome));
+    }
+
+    /// The broker is killed, something happens to a file, and the next one knows what the journal
+    /// knows. `unsettled`: what is there may still be written to when it is first seen.
+    pub fn restart_after(&mut self, file: u8, unsettled: bool) {
+        self.stamps += 1;
+        if self.there.remove(&path_of(file)).is_none() {
+            self.contents.insert(self.stamps, self.stamps);
+            self.there.insert(path_of(file), self.stamps);
+        }
+        self.restart_with(unsettled);
+    }
+
+    /// The broker is killed, and the next one knows what the journal knows.
+    pub fn restart(&mut self) {
+        self.restart_with(false);
+    }
+
+    fn restart_with(&mut self, unsettled: bool) {
+        self.generation += 1;
+        self.state = fresh_state(self.generation, self.reconfigured);
+        self.preparing.clear();
+        self.storing.clear();
+        self.peers.clear();
+        self.launched.clear();
+        self.waiting.clear();
+        self.until.clear();
+        self.told.clear();
+        self.judged.clear();
+        self.gate_is_taken_over();
+        for member in self.members.values() {
+            self.state.remember_member(member.clone());
+        }
+        for (file, judged) in self.journal.clone() {
+            let mut judged = judged;
+            // As the engine does: what has changed while nobody watched is looked at again.
+            judged.racy |= judged.inputs[1..] != self.inputs(file)[1..];
+            let delivered = self.delivered(file);
+            self.state.remember(&path_of(file), judged, &delivered);
+        }
+        self.desk_restarts();
+        let version = self.versions.get(CHILD).copied().filter(|_| self.manifest);
+        self.children_are(version);
+        let there: Vec<(Arc<Path>, u64)> = self.there.clone().into_iter().collect();
+        if unsettled {
+            for (path, _) in there.clone() {
+                self.event(Event::Present { path });
+            }
+            self.event(Event::Scanned);
+        }
+        for (path, number) in there {
+            let stamp = stamp(number);
+            self.event(Event::Settled { path, stamp });
+        }
+        if !unsettled {
+            self.event(Event::Scanned);
+        }
+    }
+}

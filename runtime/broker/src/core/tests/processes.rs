@@ -1,0 +1,198 @@
+//! The bundles of a random world: processes that come, speak and go.
+
+use std::collections::BTreeSet;
+
+use super::super::*;
+use super::reporting::{REPORTER, reporter};
+use super::things::*;
+use qcbus_formats::pool::Ending;
+use qcbus_messages::{FromPeer, Hello, JobId, PROTOCOL_VERSION, Role};
+
+use super::world::{Process, World};
+
+impl World {
+    pub fn join(&mut self, name: &'static str) {
+        let there = |it: &Process| it.name == name && !it.drained;
+        if !self.peers.values().any(there) {
+            self.join_as(name, None);
+        }
+    }
+
+    /// A process that was started for the child says hello.
+    pub fn child_joins(&mut self) {
+        if !self.launched.is_empty() {
+            let (launch, name) = self.launched.remove(0);
+            if name == REPORTER {
+                self.reporter_joins(launch);
+            } else {
+                self.join_as(name, Some(launch.0));
+            }
+        }
+    }
+
+    fn join_as(&mut self, name: &'static str, launch: Option<u64>) {
+        let version = *self.versions.entry(name).or_insert(1);
+        self.sessions += 1;
+        let session = SessionId(self.sessions);
+        self.peers.insert(
+            session,
+            Process {
+                name,
+                jobs: BTreeSet::new(),
+                begun: BTreeSet::new(),
+                drained: false,
+            },
+        );
+        let hello = Hello {
+            protocol: PROTOCOL_VERSION,
+            role: Role::Bundle,
+            name: name.to_owned(),
+            version: version.to_string(),
+            incarnation: self.sessions,
+            pid: u32::try_from(self.sessions).unwrap() + 1000,
+            launch,
+            capacity: u16::try_from(CAPACITY).unwrap(),
+        };
+        self.event(Event::Hello { session, hello });
+        if !self.peers.contains_key(&session) {
+            return;
+        }
+        let wanted = launch.is_none() || self.manifest;
+        if wanted {
+            self.demanded.insert(name.to_owned(), Some(version));
+        }
+        self.say(session, FromPeer::Catalogue(Box::new(catalogue(name))));
+    }
+
+    pub fn say(&mut self, session: SessionId, message: FromPeer) {
+        if self.peers.contains_key(&session) {
+            self.event(Event::Message { session, message });
+        }
+    }
+
+    pub fn nth_peer(&self, n: u8) -> Option<SessionId> {
+        let count = self.peers.len();
+        (count > 0).then(|| *self.peers.keys().nth(usize::from(n) % count).unwrap())
+    }
+
+    pub fn kill(&mut self, n: u8) {
+        if let Some(session) = self.nth_peer(n) {
+            self.peers.remove(&session);
+            self.event(Event::Gone { session });
+        }
+    }
+
+    /// A bundle goes of its own will, or because it was told to.
+    pub fn leave(&mut self, n: u8) {
+        let Some(session) = self.nth_peer(n) else {
+            return;
+        };
+        let Process { name, drained, .. } = self.peers[&session];
+        // One that somebody else has replaced leaves nothing.
+        let current = self.state.sessions.contains_key(&session);
+        if current && !(name == CHILD && self.manifest && !drained) {
+            self.demanded.remove(name);
+        }
+        self.say(session, FromPeer::Leaving);
+    }
+
+    /// The manifest of the child comes, changes or goes.
+    pub fn manifest(&mut self, version: Option<u8>) {
+        if let Some(version) = version {
+            self.versions.insert(CHILD, version);
+            // Its last process may not have left yet: what that one said counts.
+            let known = self.state.bundles.get(CHILD);
+            let known = known.filter(|it| it.catalogue.is_some());
+            let known = known.and_then(|it| it.version.parse().ok());
+            self.demanded.entry(CHILD.to_owned()).or_insert(known);
+        } else {
+            self.demanded.remove(CHILD);
+        }
+        self.manifest = version.is_some();
+        self.children_are(version);
+    }
+
+    pub fn children_are(&mut self, version: Option<u8>) {
+        let reporter = self.desk.open.then(reporter);
+        let specs = version.map(child).into_iter().chain(reporter).collect();
+        self.event(Event::Children { specs });
+    }
+
+    /// Somebody takes a bundle off the roster.
+    pub fn remove(&mut self, name: &'static str) {
+        if name != CHILD || !self.manifest {
+            self.demanded.remove(name);
+        }
+        self.tickets += 1;
+        let ticket = Ticket(self.tickets);
+        self.waiting.insert(ticket, 0);
+        let name = name.to_owned();
+        self.event(Event::RemoveBundle { ticket, name });
+    }
+
+    /// What a child's process that has not joined comes to.
+    pub fn child_ends(&mut self, end: ChildEnd) {
+        if !self.launched.is_empty() {
+            let (launch, _) = self.launched.remove(0);
+            self.event(Event::Exited { launch, end });
+        }
+    }
+
+    /// A bundle says something of a job, and does not end it.
+    pub fn begin(&mut self, n: u8) {
+        let Some(session) = self.nth_peer(n) else {
+            return;
+        };
+        let process = self.peers.get_mut(&session).unwrap();
+        let new = process.jobs.difference(&process.begun).next().copied();
+        if let Some(job) = new {
+            process.begun.insert(job);
+            self.says_on(session, job, 0, 2);
+        }
+    }
+
+    fn says_on(&mut self, session: SessionId, job: JobId, checker: u32, findings: usize) {
+        let issues = vec![finding(); findings];
+        self.say(
+            session,
+            FromPeer::Issues {
+                job,
+                checker,
+                issues,
+            },
+        );
+        self.say(
+            session,
+            FromPeer::CheckerDone {
+                job,
+                checker,
+                ending: Ending::Completed,
+                params: Vec::new(),
+                metadata: Vec::new(),
+            },
+        );
+    }
+
+    pub fn answer(&mut self, n: u8) {
+        let Some(session) = self.nth_peer(n) else {
+            return;
+        };
+        let bundle = &self.peers[&session];
+        if bundle.drained && bundle.jobs.is_empty() {
+            return self.leave(n);
+        }
+        let Some(job) = self
+            .peers
+            .get_mut(&session)
+            .and_then(|it| it.jobs.pop_first())
+        else {
+            return;
+        };
+        let process = self.peers.get_mut(&session).unwrap();
+        for checker in u32::from(process.begun.remove(&job))..2 {
+            // Some have much to say, so that the room for findings runs out now and then.
+            self.says_on(session, job, checker, usize::from(n % 3));
+        }
+        self.say(session, FromPeer::JobDone { job, micros: 1 });
+    }
+}

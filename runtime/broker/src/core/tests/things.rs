@@ -1,0 +1,128 @@
+//! What a random world is made of: files, bytes, bundles.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::super::*;
+use crate::InForce;
+use qcbus_document::FileKind;
+use qcbus_formats::xqar::{Issue, Level};
+use qcbus_messages::{Catalogue, CheckerInfo, Digest, Role};
+
+pub const CAPACITY: usize = 2;
+
+/// The bundle that a manifest brings; the others join by hand.
+pub const CHILD: &str = "Child";
+
+pub fn child(version: u8) -> ChildSpec {
+    ChildSpec {
+        name: CHILD.to_owned(),
+        role: Role::Bundle,
+        version: Some(version.to_string()),
+        command: vec!["child".to_owned()],
+        restart: Restart::Always,
+    }
+}
+
+pub fn fresh_state(generation: u64, configuration: u8) -> State {
+    let in_force = InForce::new(None).unwrap();
+    let settings = Settings {
+        generation,
+        collect: Duration::ZERO,
+        max_active: 4,
+        max_preparing: 2,
+        max_storing: 2,
+        max_findings_bytes: 1000,
+        ..Settings::default()
+    };
+    State::new(settings, digest(configuration.into()), in_force.demand())
+}
+
+/// A jury as it can be compared.
+pub fn named(jury: &Jury) -> Vec<(String, Option<Mark>)> {
+    let juror = |it: &Juror| (it.name.clone(), it.mark);
+    jury.0.iter().map(juror).collect()
+}
+
+/// The first six are checked, the others are only dependencies of them.
+pub fn path_of(file: u8) -> Arc<Path> {
+    let ending = if file < 6 { "xodr" } else { "part" };
+    Path::new(&format!("/farm/{file}.{ending}")).into()
+}
+
+/// What a verdict depends on besides the file: on another that has a verdict itself, on a part of
+/// its own, on a part that it shares, on all of these, or on nothing.
+pub fn dependencies_of(file: u8) -> &'static [u8] {
+    match file {
+        1 => &[0, 6],
+        2 => &[6],
+        3 => &[4],
+        5 => &[4, 6, 7],
+        _ => &[],
+    }
+}
+
+pub fn file_of(path: &Path) -> u8 {
+    path.file_stem()
+        .and_then(|it| it.to_str())
+        .and_then(|it| it.parse().ok())
+        .unwrap()
+}
+
+pub fn stamp(number: u64) -> Stamp {
+    Stamp {
+        size: number,
+        mtime_ns: i128::from(number),
+        ctime_ns: i128::from(number),
+        inode: 1,
+    }
+}
+
+pub fn digest(number: u64) -> Digest {
+    let mut digest = Digest::default();
+    digest.0[..8].copy_from_slice(&number.to_le_bytes());
+    digest
+}
+
+pub fn basis(inputs: &[Input]) -> Digest {
+    let mut basis = Digest::default();
+    for (at, input) in inputs.iter().enumerate() {
+        if let Some((_, digest)) = input.content {
+            basis.0[at * 8..][..8].copy_from_slice(&digest.0[..8]);
+        }
+    }
+    basis
+}
+
+pub fn catalogue(name: &str) -> Catalogue {
+    let checker = |id: String| CheckerInfo {
+        id,
+        description: String::new(),
+        rule_uids: Vec::new(),
+        kinds: vec![FileKind::Xodr],
+        default_on: true,
+        level: Level::Error,
+        params: Vec::new(),
+    };
+    Catalogue {
+        alias: name.to_lowercase(),
+        kinds: vec![FileKind::Xodr],
+        checkers: vec![
+            checker(format!("{name}.one")),
+            checker(format!("{name}.two")),
+        ],
+        ..Catalogue::default()
+    }
+}
+
+pub fn finding() -> Issue {
+    Issue {
+        id: 0,
+        description: "too much".to_owned(),
+        level: Level::Warning,
+        rule_uid: String::new(),
+        locations: Vec::new(),
+        domain_info: Vec::new(),
+    }
+}
