@@ -7,8 +7,8 @@ use std::time::Duration;
 use qcbus_messages::{Catalogue, FromPeer, Hello, JobId, Role, ToPeer};
 
 use super::action::Action;
-use super::children::LEAVE_LIMIT;
 use super::jury::{Mark, Member, Origin};
+use super::leaving::LEAVE_LIMIT;
 use super::notice::Notice;
 use super::types::{Launch, SessionId};
 use super::{Actions, State};

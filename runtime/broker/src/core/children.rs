@@ -1,13 +1,14 @@
 //! Children: the bundles and reporters that the broker itself keeps running.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::time::Duration;
 
-use qcbus_messages::{Role, ToPeer};
+use qcbus_messages::Role;
 
 use super::action::Action;
 use super::notice::Notice;
-use super::types::{ChildEnd, ChildSpec, Launch, Restart, SessionId};
+use super::types::{ChildEnd, ChildSpec, Launch, Restart};
+use super::upgrades::Upgrade;
 use super::{Actions, State};
 
 /// A child by name.
@@ -18,12 +19,12 @@ pub(super) struct Child {
     /// Starts within the restart window.
     starts: VecDeque<Duration>,
     /// Failures in a row.
-    failures: u32,
+    pub failures: u32,
     /// Why it does not get as far as to join; nobody waits for it meanwhile.
     stuck: Option<String>,
     pub restarts: u32,
     /// A newer process that will take over once it has joined.
-    upgrade: Option<Upgrade>,
+    pub upgrade: Option<Upgrade>,
 }
 
 /// Where a child stands.
@@ -41,28 +42,8 @@ pub(super) enum ChildState {
     Ended,
 }
 
-/// How far the newer process of a child is, beside the older that goes on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Upgrade {
-    /// To be started then.
-    Due(Duration),
-    /// Started, has not said hello.
-    Starting(Launch, Duration),
-}
-
-/// A process that has been told to go.
-#[derive(Debug)]
-pub(super) struct Retired {
-    pub launch: Option<Launch>,
-    pub pid: u32,
-    pub since: Duration,
-}
-
 /// How long a child may take until it says hello.
-const START_LIMIT: Duration = Duration::from_secs(15);
-
-/// How long a process may take to leave after it was told to drain.
-pub(super) const LEAVE_LIMIT: Duration = Duration::from_secs(10);
+pub(super) const START_LIMIT: Duration = Duration::from_secs(15);
 
 /// Failures in a row, without ever having joined, after which nobody waits for a child.
 const STUCK_AFTER: u32 = 3;
@@ -92,12 +73,8 @@ impl Child {
         }
     }
 
-    fn is_upgraded_by(&self, launch: Launch) -> bool {
-        matches!(self.upgrade, Some(Upgrade::Starting(it, _)) if it == launch)
-    }
-
     /// The pause before the next start; children that fell together should not get up together.
-    fn pause(&self, backoff: Duration, most: Duration) -> Duration {
+    pub fn pause(&self, backoff: Duration, most: Duration) -> Duration {
         let doubled = backoff * 2_u32.saturating_pow(self.failures.saturating_sub(1).min(16));
         let pause = doubled.min(most);
         pause + pause.mul_f64(f64::from(jitter_of(&self.spec.name, self.restarts)) / 1024.0)
@@ -151,56 +128,6 @@ impl State {
         self.drain_peer(name, actions);
     }
 
-    /// Tells a peer to finish and go, and forgets that it was wanted.
-    pub(super) fn drain_peer(&mut self, name: &str, actions: &mut Actions) {
-        let now = self.now;
-        if let Some(bundle) = self.bundles.get_mut(name) {
-            bundle.leaving = true;
-            bundle.moved = now;
-            // From now on nobody misses it, also when the broker ends before it has left.
-            if bundle.origin.take().is_some() {
-                let name = name.to_owned();
-                actions.push(Action::Strike { name });
-            }
-            match bundle.session {
-                Some(session) => actions.push(Action::Send {
-                    session,
-                    message: ToPeer::Drain,
-                }),
-                None => self.drop_bundle(name, actions),
-            }
-            self.begin_epoch();
-            return;
-        }
-        let reporter = self.reporter_named(name);
-        let process = reporter.and_then(|it| Some((it.session?, it.launch, it.pid)));
-        if let Some((session, launch, pid)) = process {
-            self.retire(session, launch, pid);
-            actions.push(Action::Send {
-                session,
-                message: ToPeer::Drain,
-            });
-        }
-    }
-
-    /// A process that a former broker started and that nobody wants any more is told to go.
-    pub(super) fn drain_unwanted(
-        &mut self,
-        name: &str,
-        launch: Option<Launch>,
-        actions: &mut Actions,
-    ) {
-        if launch.is_some() && !self.children.contains_key(name) {
-            self.drain_peer(name, actions);
-        }
-    }
-
-    /// Whether this launch is the newer one of a child that runs.
-    pub(super) fn is_successor(&self, name: &str, launch: Launch) -> bool {
-        let child = self.children.get(name);
-        child.is_some_and(|child| child.is_upgraded_by(launch))
-    }
-
     /// A child has said hello.
     pub(super) fn child_joined(&mut self, name: &str, launch: Option<Launch>) {
         let Some(child) = self.children.get_mut(name) else {
@@ -225,18 +152,6 @@ impl State {
         } else {
             ChildState::Ended
         };
-    }
-
-    /// A process that should go: it is killed when it does not.
-    pub(super) fn retire(&mut self, session: SessionId, launch: Option<Launch>, pid: u32) {
-        self.retired.insert(
-            session,
-            Retired {
-                launch,
-                pid,
-                since: self.now,
-            },
-        );
     }
 
     /// A child is down: when is it started again?
@@ -345,20 +260,6 @@ impl State {
         self.fail_absent();
     }
 
-    /// The newer process of a child has ended, or hangs, before it joined: it is tried again.
-    fn upgrade_failed(&mut self, name: &str, why: &str, actions: &mut Actions) {
-        let (now, draining, settings) = (self.now, self.draining(), &self.settings);
-        let Some(child) = self.children.get_mut(name) else {
-            return;
-        };
-        child.failures += 1;
-        let pause = child.pause(settings.backoff, settings.backoff_max);
-        let again = child.spec.restart != Restart::Never && !draining;
-        child.upgrade = again.then(|| Upgrade::Due(now + pause));
-        let (name, why) = (name.to_owned(), why.to_owned());
-        self.notice(Notice::NotUpgraded { name, why }, actions);
-    }
-
     /// Starts what is due, and kills what does not get going or does not go.
     pub(super) fn watch_children(&mut self, actions: &mut Actions) {
         if self.draining() {
@@ -381,20 +282,8 @@ impl State {
                 }
                 _ => {}
             }
-            match child.upgrade {
-                Some(Upgrade::Due(at)) if at <= now => {
-                    let launch = next_launch(&mut self.next_launch);
-                    child.upgrade = Some(Upgrade::Starting(launch, now));
-                    let spec = child.spec.clone();
-                    actions.push(Action::Spawn { launch, spec });
-                }
-                Some(Upgrade::Starting(launch, since))
-                    if now.saturating_sub(since) > START_LIMIT =>
-                {
-                    late.push((name.clone(), launch));
-                }
-                _ => {}
-            }
+            let upgrade = child.watch_upgrade(now, &mut self.next_launch, actions);
+            late.extend(upgrade.map(|launch| (name.clone(), launch)));
         }
         for (name, launch) in late {
             self.does_not_join(&name, launch, actions);
@@ -418,19 +307,6 @@ impl State {
         }
         self.child_down(name, false, why, actions);
         self.fail_absent();
-    }
-
-    fn kill_overdue(&mut self, actions: &mut Actions) {
-        let now = self.now;
-        let overdue = |it: &Retired| now.saturating_sub(it.since) > LEAVE_LIMIT;
-        let (over, rest): (BTreeMap<_, _>, BTreeMap<_, _>) = std::mem::take(&mut self.retired)
-            .into_iter()
-            .partition(|(_, retired)| overdue(retired));
-        self.retired = rest;
-        for (session, Retired { launch, pid, .. }) in over {
-            actions.push(Action::Kill { launch, pid });
-            self.retired_has_gone(session, actions);
-        }
     }
 
     /// Whether a child of this name is being started, or will be soon.
@@ -464,7 +340,7 @@ impl State {
     }
 }
 
-fn next_launch(next: &mut u64) -> Launch {
+pub(super) fn next_launch(next: &mut u64) -> Launch {
     *next += 1;
     Launch(*next - 1)
 }

@@ -10,12 +10,14 @@ mod bundles;
 mod changes;
 mod checking;
 mod children;
+mod delivering;
 mod ending;
 mod event;
 mod files;
 mod finishing;
 mod jobs;
 mod jury;
+mod leaving;
 mod notice;
 mod outcome;
 mod reporters;
@@ -25,6 +27,7 @@ mod staging;
 mod status;
 mod suspects;
 mod types;
+mod upgrades;
 mod waits;
 
 #[cfg(test)]
@@ -49,9 +52,10 @@ pub use settings::Settings;
 pub use types::*;
 
 use bundles::Bundle;
-use children::{Child, Retired};
+use children::Child;
 use files::Files;
 use jobs::ActiveJob;
+use leaving::Retired;
 use reporters::Reporter;
 use roster::Seats;
 use status::Rate;

@@ -1,4 +1,4 @@
-//! Reporters: every result reaches every reporter at least once, and none can hold up a verdict.
+//! Reporters: who is there, what they say, and what they are to take back.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::Path;
@@ -6,24 +6,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use qcbus_messages::path_text::from_text;
-use qcbus_messages::{FromPeer, Hello, JobId, PeerReport, Role, ToPeer};
+use qcbus_messages::{FromPeer, Hello, JobId, Role, ToPeer};
 
 use super::action::Action;
+use super::delivering::Sent;
 use super::files::FileId;
 use super::notice::Notice;
-use super::types::{Delivery, Launch, SessionId};
+use super::types::{Launch, SessionId};
 use super::{Actions, State};
-
-/// Findings under way to one reporter. A result with more of them travels alone: otherwise a bundle
-/// that reports far too much would fill the broker with results that are waiting to be read.
-const FINDINGS_UNDER_WAY: u64 = 2_000;
-
-/// A result that was sent and is not acknowledged.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Sent {
-    pub file: FileId,
-    pub findings: u64,
-}
 
 /// A reporter by name.
 #[derive(Debug, Default)]
@@ -54,13 +44,13 @@ pub(super) struct Reporter {
 
 impl Reporter {
     /// Whether something was sent that it has not answered.
-    fn owes(&self) -> bool {
+    pub fn owes(&self) -> bool {
         !self.active.is_empty() || !self.voiding.is_empty()
     }
 
     /// Takes the next file out of the queue. A file of which a result is under way waits for its
     /// turn: results are read back side by side, and the older one must not come last.
-    fn next_in_queue(&mut self) -> Option<FileId> {
+    pub fn next_in_queue(&mut self) -> Option<FileId> {
         let under_way = |file: &FileId| {
             self.active.values().any(|sent| sent.file == *file)
                 || self.finishing.values().any(|begun| begun.contains(file))
@@ -218,88 +208,7 @@ impl State {
         }
     }
 
-    /// Whether a result that was read back for a reporter is still to be sent: its file may have
-    /// gone meanwhile.
-    pub fn awaits_result(&self, session: SessionId, job: JobId) -> bool {
-        let mut reporters = self.reporters.iter();
-        reporters.any(|it| it.session == Some(session) && it.active.contains_key(&job))
-    }
-
-    pub(super) fn deliver_everything(&mut self, actions: &mut Actions) {
-        for index in 0..self.reporters.len() {
-            self.deliver(u32::try_from(index).unwrap_or(u32::MAX), actions);
-        }
-    }
-
-    /// A new result: every reporter that is there gets it.
-    pub(super) fn deliver_to_all(&mut self, file: FileId, actions: &mut Actions) {
-        for index in 0..self.reporters.len() {
-            let Some(reporter) = self.reporters.get_mut(index) else {
-                continue;
-            };
-            // One that is away gets everything that it lacks when it joins.
-            if reporter.session.is_some() {
-                reporter.queue.push_back(file);
-                self.deliver(u32::try_from(index).unwrap_or(u32::MAX), actions);
-            }
-        }
-    }
-
-    pub(super) fn deliver(&mut self, index: u32, actions: &mut Actions) {
-        while let Some(reporter) = self.reporters.get_mut(index as usize) {
-            let Some(session) = reporter.session else {
-                return;
-            };
-            if reporter.active.len() + reporter.voiding.len() >= reporter.capacity {
-                return;
-            }
-            // Before any result: a file that is there again has its new report written after this.
-            if let Some(path) = reporter.void.pop_first() {
-                reporter.voiding.insert(path.clone());
-                reporter.moved = self.now;
-                actions.push(Action::Void {
-                    session,
-                    reporter: reporter.name.clone(),
-                    path,
-                });
-                continue;
-            }
-            let Some(file) = reporter.next_in_queue() else {
-                return;
-            };
-            let Some(entry) = self.files.get(file) else {
-                continue;
-            };
-            let Some(judged) = entry.judged.clone() else {
-                continue;
-            };
-            if entry.delivered.contains(&(index, judged.job))
-                || reporter.active.contains_key(&judged.job)
-            {
-                continue;
-            }
-            let findings = judged.counts.iter().sum();
-            let under_way: u64 = reporter.active.values().map(|sent| sent.findings).sum();
-            if !reporter.active.is_empty() && under_way + findings > FINDINGS_UNDER_WAY {
-                reporter.queue.push_front(file);
-                return;
-            }
-            reporter.active.insert(judged.job, Sent { file, findings });
-            reporter.moved = self.now;
-            let delivery = Delivery {
-                job: judged.job,
-                path: entry.path.clone(),
-                judged,
-            };
-            let reporter = reporter.name.clone();
-            actions.push(Action::Deliver {
-                session,
-                reporter,
-                delivery,
-            });
-        }
-    }
-
+    /// Something from a reporter.
     pub(super) fn reporter_says(&mut self, name: &str, message: FromPeer, actions: &mut Actions) {
         let now = self.now;
         let index = self.reporter_index(name);
@@ -308,55 +217,9 @@ impl State {
         };
         reporter.heard = now;
         match message {
-            FromPeer::ResultDone { job, report } => {
-                let Some(Sent { file, .. }) = reporter.active.remove(&job) else {
-                    return;
-                };
-                reporter.moved = now;
-                reporter.done += 1;
-                let failed = match report {
-                    PeerReport::Written => None,
-                    PeerReport::Failed(why) => Some(why),
-                };
-                if let Some(why) = failed {
-                    reporter.failed += 1;
-                    reporter.note.clone_from(&why);
-                    self.notice(
-                        Notice::not_reported(name, format!("could not report: {why}")),
-                        actions,
-                    );
-                }
-                if let Some(entry) = self.files.get_mut(file) {
-                    entry.delivered.retain(|(other, _)| *other != index);
-                    entry.delivered.push((index, job));
-                    let path = entry.path.clone();
-                    actions.push(Action::Delivered {
-                        reporter: name.to_owned(),
-                        path,
-                        job,
-                    });
-                }
-                self.deliver(index, actions);
-            }
+            FromPeer::ResultDone { job, report } => self.result_done(index, job, report, actions),
             FromPeer::WithdrawalDone { input, report } => {
-                let Some(path) = reporter.voiding.take(from_text(&input).as_path()) else {
-                    return;
-                };
-                reporter.moved = now;
-                let again = reporter.void.contains(&path);
-                if let PeerReport::Failed(why) = report {
-                    reporter.failed += 1;
-                    reporter.note.clone_from(&why);
-                    self.notice(
-                        Notice::not_reported(name, format!("could not withdraw: {why}")),
-                        actions,
-                    );
-                }
-                if !again {
-                    let reporter = name.to_owned();
-                    actions.push(Action::Voided { reporter, path });
-                }
-                self.deliver(index, actions);
+                self.withdrawal_done(index, &from_text(&input), report, actions);
             }
             FromPeer::Leaving => {
                 if let Some(session) = reporter.session.take() {
@@ -368,27 +231,6 @@ impl State {
             }
             _ => {}
         }
-    }
-
-    /// A result could not be read back: it was withdrawn or replaced, or the disk is in trouble.
-    pub(super) fn undeliverable(
-        &mut self,
-        session: SessionId,
-        job: JobId,
-        why: String,
-        actions: &mut Actions,
-    ) {
-        let Some((Role::Reporter, name)) = self.sessions.get(&session).cloned() else {
-            return;
-        };
-        let index = self.reporter_index(&name);
-        if let Some(reporter) = self.reporters.get_mut(index as usize)
-            && let Some(Sent { file, .. }) = reporter.active.remove(&job)
-            && self.files.get(file).is_some_and(|it| it.present)
-        {
-            self.notice(Notice::NotDelivered(why), actions);
-        }
-        self.deliver(index, actions);
     }
 
     pub(super) fn reporter_died(&mut self, name: &str, why: &str, actions: &mut Actions) {
@@ -433,12 +275,5 @@ impl State {
             let notice = Notice::killed(&name, "it does not acknowledge results");
             self.reporter_is_down(&name, notice, actions);
         }
-    }
-
-    /// Whether every reporter that is there has everything.
-    pub(super) fn all_delivered(&self) -> bool {
-        self.reporters.iter().all(|it| {
-            it.session.is_none() || (!it.owes() && it.queue.is_empty() && it.void.is_empty())
-        })
     }
 }

@@ -6,96 +6,37 @@ use std::sync::Arc;
 use qcbus_messages::{JobId, ToPeer};
 
 use super::{Announcement, Broker, Ready, Told};
-use crate::core::{Action, Delivery, Event, Notice, SessionId};
+use crate::core::{Action, Delivery, Event, FinishedJob, Judged, Notice, SessionId};
 use crate::journal::Entry;
 use crate::stages::reached;
 use crate::writers::Order;
 
 impl Broker {
+    /// Does what the state machine wants. `false`: it was to stop.
     pub(super) fn act(&mut self, action: Action) -> bool {
         match action {
+            Action::Stop => return false,
             Action::Prepare { job, path } => self.prepare(job, path),
             Action::Release { job } => self.intake.release(job),
             Action::PublishAgain { job, doc } => {
                 let intake = self.intake.clone();
                 tokio::task::spawn_blocking(move || intake.publish_again(job, doc));
             }
-            Action::Send { session, message } => {
-                if let Some(peer) = self.sessions.peers.get(&session) {
-                    self.host.send(*peer, &message);
-                }
-            }
-            Action::Accept { session } => self.accept(session),
-            Action::Refuse { session, reason } => {
-                tracing::debug!("a peer was turned away: {reason}");
-                if let Some(peer) = self.sessions.remove(session) {
-                    self.host.refuse(peer, &reason);
-                }
-            }
-            Action::Disconnect { session } => {
-                if let Some(peer) = self.sessions.remove(session) {
-                    self.host.disconnect(peer);
-                }
-            }
             Action::Spawn { launch, spec } => self.children.spawn(launch, &spec),
             Action::Kill { launch, pid } => self.children.kill(launch, pid),
-            Action::Store(job) => {
-                let root = self.intake.root(job.job);
-                let config = self.in_force.config.clone();
-                let path = job.path.clone();
-                reached("checked", &path);
-                self.intake.release(job.job);
-                self.untrimmed = true;
-                self.writers
-                    .order(&path, Order::Store { job, config, root });
-            }
-            Action::Withdraw { path, reporters } => {
-                let at = path.clone();
-                self.writers.order(&at, Order::Withdraw { path, reporters });
-            }
-            Action::Void {
-                session,
-                reporter,
-                path,
-            } => self.void(session, &reporter, &path),
-            Action::Voided { reporter, path } => {
-                self.left.remove(&(reporter.clone(), path.clone()));
-                let at = path.clone();
-                self.writers
-                    .order(&at, Order::Record(Entry::Voided { path, reporter }));
-            }
-            Action::Restamp { path, judged } => {
-                let at = path.clone();
-                self.writers.order(&at, Order::Restamp { path, judged });
-            }
-            Action::CloseGate { path } => {
-                let at = path.clone();
-                self.writers.order(&at, Order::CloseGate { path });
-            }
-            Action::OpenGate { path, judged } => {
-                let at = path.clone();
-                self.writers.order(&at, Order::OpenGate { path, judged });
-            }
-            Action::Deliver {
-                session,
-                reporter,
-                delivery,
-            } => {
-                self.untrimmed = true;
-                self.deliver(session, reporter, delivery);
-            }
-            Action::Delivered {
-                reporter,
-                path,
-                job,
-            } => {
-                let entry = Entry::Delivered {
-                    path: path.clone(),
-                    reporter,
-                    job,
-                };
-                self.writers.order(&path, Order::Record(entry));
-            }
+            Action::Store(job) => self.order_store(job),
+            Action::Withdraw { .. }
+            | Action::Restamp { .. }
+            | Action::CloseGate { .. }
+            | Action::OpenGate { .. }
+            | Action::Delivered { .. }
+            | Action::Voided { .. } => self.order(action),
+            Action::Send { .. }
+            | Action::Accept { .. }
+            | Action::Refuse { .. }
+            | Action::Disconnect { .. }
+            | Action::Void { .. }
+            | Action::Deliver { .. } => self.act_on_peer(action),
             Action::Answer { ticket, response } => {
                 if let Some(answer) = self.tickets.remove(&ticket) {
                     // A client that has left needs no answer.
@@ -118,18 +59,99 @@ impl Broker {
                 path,
                 judged,
                 fresh,
-            } => {
-                reached("judged", &path);
-                (self.tell)(Told::Verdict(Announcement {
-                    path,
-                    judged,
-                    fresh,
-                }));
-            }
+            } => self.announce(path, judged, fresh),
             Action::Notice(notice) => (self.tell)(Told::Notice(notice)),
-            Action::Stop => return false,
         }
         true
+    }
+
+    /// What concerns one file on the disk or in the journal is done by its writer, in order.
+    fn order(&mut self, action: Action) {
+        let (path, order) = match action {
+            Action::Withdraw { path, reporters } => {
+                (path.clone(), Order::Withdraw { path, reporters })
+            }
+            Action::Restamp { path, judged } => (path.clone(), Order::Restamp { path, judged }),
+            Action::CloseGate { path } => (path.clone(), Order::CloseGate { path }),
+            Action::OpenGate { path, judged } => (path.clone(), Order::OpenGate { path, judged }),
+            Action::Delivered {
+                reporter,
+                path,
+                job,
+            } => {
+                let at = path.clone();
+                let entry = Entry::Delivered {
+                    path,
+                    reporter,
+                    job,
+                };
+                (at, Order::Record(entry))
+            }
+            Action::Voided { reporter, path } => {
+                self.left.remove(&(reporter.clone(), path.clone()));
+                let at = path.clone();
+                (at, Order::Record(Entry::Voided { path, reporter }))
+            }
+            _ => return,
+        };
+        self.writers.order(&path, order);
+    }
+
+    fn order_store(&mut self, job: Box<FinishedJob>) {
+        let root = self.intake.root(job.job);
+        let config = self.in_force.config.clone();
+        let path = job.path.clone();
+        reached("checked", &path);
+        self.intake.release(job.job);
+        self.untrimmed = true;
+        self.writers
+            .order(&path, Order::Store { job, config, root });
+    }
+
+    /// What concerns one peer.
+    fn act_on_peer(&mut self, action: Action) {
+        match action {
+            Action::Send { session, message } => {
+                if let Some(peer) = self.sessions.peers.get(&session) {
+                    self.host.send(*peer, &message);
+                }
+            }
+            Action::Accept { session } => self.accept(session),
+            Action::Refuse { session, reason } => {
+                tracing::debug!("a peer was turned away: {reason}");
+                if let Some(peer) = self.sessions.remove(session) {
+                    self.host.refuse(peer, &reason);
+                }
+            }
+            Action::Disconnect { session } => {
+                if let Some(peer) = self.sessions.remove(session) {
+                    self.host.disconnect(peer);
+                }
+            }
+            Action::Void {
+                session,
+                reporter,
+                path,
+            } => self.void(session, &reporter, &path),
+            Action::Deliver {
+                session,
+                reporter,
+                delivery,
+            } => {
+                self.untrimmed = true;
+                self.deliver(session, reporter, delivery);
+            }
+            _ => {}
+        }
+    }
+
+    fn announce(&mut self, path: Arc<Path>, judged: Arc<Judged>, fresh: bool) {
+        reached("judged", &path);
+        (self.tell)(Told::Verdict(Announcement {
+            path,
+            judged,
+            fresh,
+        }));
     }
 
     /// Who must judge is in the journal before anybody has judged. It happens seldom, so the loop

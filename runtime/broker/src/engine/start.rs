@@ -13,13 +13,13 @@ use tokio::sync::mpsc;
 
 use super::{Broker, Inbox, Sessions, StartError, Told};
 use crate::control::ControlSocket;
-use crate::core::{Notice, Stamp, State};
+use crate::core::{Member, Notice, Stamp, State};
 use crate::demand::InForce;
 use crate::directory_lock::{DirectoryLock, LockError, Purpose};
 use crate::disk::sweep;
 use crate::gate::{Gate, GateError, GateOptions};
 use crate::intake::Intake;
-use crate::journal::Journal;
+use crate::journal::{Journal, JournalError, Void};
 use crate::options::Options;
 use crate::reload::{LoadError, Loaded, Sources};
 use crate::result_paths::ResultPaths;
@@ -39,20 +39,11 @@ impl Broker {
         mut options: Options,
         tell: impl FnMut(Told) + Send + 'static,
     ) -> Result<Broker, StartError> {
-        let sources = Sources {
-            config: options.config.clone(),
-            bundles_d: options.bundles_d.clone(),
-            standard: options.standard.clone(),
-            reporters: options.reporters.clone(),
-            known: options.known.clone(),
-        };
+        let sources = sources_of(&options);
         let loaded = sources.load()?;
         let mut host = Host::start(&options.instance, options.host)?;
         options.settings.generation = host.generation();
-        let journal = match &options.state {
-            Some(state) => Journal::open(state, options.instance.name())?,
-            None => Journal::in_memory()?,
-        };
+        let journal = journal_of(&options)?;
         let results = results_of(&options)?;
         let members = journal.members()?;
         let in_force = Arc::new(in_force(&loaded)?);
@@ -64,13 +55,7 @@ impl Broker {
         let store = Arc::new(store(&options, journal, &senders.notices)?);
         let reconciled = reconcile(&options, &loaded, &store)?;
         let voids = store.voids()?;
-        let writers = Writers::start(
-            options.settings.max_storing,
-            &store,
-            &inbox.events_in,
-            &senders.notices,
-        )
-        .map_err(|source| system("start writing", source))?;
+        let writers = writers(&options, &store, &inbox, &senders.notices)?;
         let intake = intake(&options, &host);
         let children = Children::new(surroundings(&options), inbox.events_in.clone());
         let mut broker = Broker {
@@ -99,21 +84,23 @@ impl Broker {
             _results: results,
             options,
         };
-        for member in members {
-            broker.state.remember_member(member);
-        }
-        for void in voids {
-            broker.remember_void(&void.path, &void.reporter, void.xqar);
-        }
+        broker.take_up(members, voids);
         for said in &reconciled.said {
             let _ = senders.notices.send(Notice::Storing(said.clone()));
         }
         let dependencies = broker.remember(reconciled);
-        broker.look(senders.seen)?;
-        if let Some(watcher) = &broker.watcher {
-            watcher.depend(dependencies);
-        }
+        broker.look(dependencies, senders.seen)?;
         Ok(broker)
+    }
+
+    /// Takes over from the journal who must judge, and what reporters are to take back.
+    fn take_up(&mut self, members: Vec<Member>, voids: Vec<Void>) {
+        for member in members {
+            self.state.remember_member(member);
+        }
+        for void in voids {
+            self.remember_void(&void.path, &void.reporter, void.xqar);
+        }
     }
 
     /// Takes over what stands; what has changed while nobody watched is looked at again. Returns
@@ -142,8 +129,12 @@ impl Broker {
         self.state.remember_void(path, reporter);
     }
 
-    /// Begins to look at the files: by watching, or once.
-    fn look(&mut self, seen: mpsc::UnboundedSender<Seen>) -> Result<(), StartError> {
+    /// Begins to look at the files: by watching, together with what verdicts depend on, or once.
+    fn look(
+        &mut self,
+        dependencies: Vec<(Arc<Path>, Option<Stamp>)>,
+        seen: mpsc::UnboundedSender<Seen>,
+    ) -> Result<(), StartError> {
         if self.options.watch {
             let options = WatchOptions {
                 roots: self.options.roots.clone(),
@@ -154,12 +145,31 @@ impl Broker {
                 // After the end of the loop nobody listens.
                 let _ = seen.send(what);
             });
-            self.watcher = Some(watcher.map_err(|source| system("watch", source))?);
+            let watcher = watcher.map_err(|source| system("watch", source))?;
+            watcher.depend(dependencies);
+            self.watcher = Some(watcher);
             return Ok(());
         }
         let (roots, files) = (self.options.roots.clone(), self.options.files.clone());
         tokio::task::spawn_blocking(move || look_once(&roots, &files, &seen));
         Ok(())
+    }
+}
+
+fn sources_of(options: &Options) -> Sources {
+    Sources {
+        config: options.config.clone(),
+        bundles_d: options.bundles_d.clone(),
+        standard: options.standard.clone(),
+        reporters: options.reporters.clone(),
+        known: options.known.clone(),
+    }
+}
+
+fn journal_of(options: &Options) -> Result<Journal, JournalError> {
+    match &options.state {
+        Some(state) => Journal::open(state, options.instance.name()),
+        None => Journal::in_memory(),
     }
 }
 
@@ -199,6 +209,17 @@ fn store(
         journal: Mutex::new(journal),
         epoch: AtomicU64::new(0),
     })
+}
+
+fn writers(
+    options: &Options,
+    store: &Arc<Store>,
+    inbox: &Inbox,
+    notices: &mpsc::UnboundedSender<Notice>,
+) -> Result<Writers, StartError> {
+    let threads = options.settings.max_storing;
+    Writers::start(threads, store, &inbox.events_in, notices)
+        .map_err(|source| system("start writing", source))
 }
 
 fn gate_of(

@@ -24,46 +24,17 @@ pub(super) fn put(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Res
                 put_history(transaction, path, judged, history)?;
             }
         }
-        Entry::Withdrawn { path, reporters } => {
-            let path = text(path);
-            if !reporters.is_empty() {
-                transaction.execute(
-                    "INSERT OR REPLACE INTO gone (path, xqar) \
-                     SELECT path, xqar FROM files WHERE path = ?1",
-                    params![path],
-                )?;
-            }
-            transaction.execute("DELETE FROM files WHERE path = ?1", params![path])?;
-            transaction.execute("DELETE FROM deliveries WHERE path = ?1", params![path])?;
-            for reporter in reporters {
-                deliver(transaction, &path, reporter, JobId(0))?;
-            }
-        }
+        Entry::Withdrawn { path, reporters } => withdraw(transaction, &text(path), reporters)?,
         Entry::Left {
             path,
             xqar,
             reporters,
         } => {
-            let path = text(path);
             for reporter in reporters {
-                transaction.execute(
-                    "INSERT OR REPLACE INTO gone (path, xqar) VALUES (?1, ?2)",
-                    params![path, text(xqar)],
-                )?;
-                deliver(transaction, &path, reporter, JobId(0))?;
+                put_gone(transaction, &text(path), &text(xqar), reporter)?;
             }
         }
-        Entry::Voided { path, reporter } => {
-            transaction.execute(
-                "DELETE FROM deliveries WHERE path = ?1 AND reporter = ?2 AND job = 0",
-                params![text(path), reporter],
-            )?;
-            transaction.execute(
-                "DELETE FROM gone WHERE path = ?1 AND path NOT IN \
-                 (SELECT path FROM deliveries WHERE path = ?1 AND job = 0)",
-                params![text(path)],
-            )?;
-        }
+        Entry::Voided { path, reporter } => voided(transaction, &text(path), reporter)?,
         Entry::Enrolled(member) => put_member(transaction, member)?,
         Entry::Struck { name } => {
             transaction.execute("DELETE FROM members WHERE name = ?1", params![name])?;
@@ -76,6 +47,54 @@ pub(super) fn put(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Res
             deliver(transaction, &text(path), reporter, *job)?;
         }
     }
+    Ok(())
+}
+
+/// The file has gone, and with it all but where its result lay, for those who reported about it.
+fn withdraw(
+    transaction: &Transaction<'_>,
+    path: &str,
+    reporters: &[String],
+) -> rusqlite::Result<()> {
+    if !reporters.is_empty() {
+        transaction.execute(
+            "INSERT OR REPLACE INTO gone (path, xqar) \
+             SELECT path, xqar FROM files WHERE path = ?1",
+            params![path],
+        )?;
+    }
+    transaction.execute("DELETE FROM files WHERE path = ?1", params![path])?;
+    transaction.execute("DELETE FROM deliveries WHERE path = ?1", params![path])?;
+    for reporter in reporters {
+        deliver(transaction, path, reporter, JobId(0))?;
+    }
+    Ok(())
+}
+
+fn put_gone(
+    transaction: &Transaction<'_>,
+    path: &str,
+    xqar: &str,
+    reporter: &str,
+) -> rusqlite::Result<()> {
+    transaction.execute(
+        "INSERT OR REPLACE INTO gone (path, xqar) VALUES (?1, ?2)",
+        params![path, xqar],
+    )?;
+    deliver(transaction, path, reporter, JobId(0))
+}
+
+/// A reporter has taken back what it said. Once all have, nobody asks where the result lay.
+fn voided(transaction: &Transaction<'_>, path: &str, reporter: &str) -> rusqlite::Result<()> {
+    transaction.execute(
+        "DELETE FROM deliveries WHERE path = ?1 AND reporter = ?2 AND job = 0",
+        params![path, reporter],
+    )?;
+    transaction.execute(
+        "DELETE FROM gone WHERE path = ?1 AND path NOT IN \
+         (SELECT path FROM deliveries WHERE path = ?1 AND job = 0)",
+        params![path],
+    )?;
     Ok(())
 }
 

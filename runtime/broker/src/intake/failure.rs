@@ -1,0 +1,130 @@
+//! What went wrong on the way to a published image, and what that means for the root.
+
+use std::path::Path;
+
+use qcbus_bus::LoanError;
+use qcbus_ingest::IngestError;
+use qcbus_messages::Absence;
+use qcbus_messages::path_text::to_text;
+
+use crate::core::PrepareFailure;
+use crate::stamp::stamp_of;
+
+/// Why a file is not on the bus.
+#[derive(Debug)]
+pub(super) enum Failure {
+    /// It could not be read.
+    Ingest(IngestError),
+    /// No image could be built of it.
+    Build(String),
+    /// The image is there, and the bus did not take it.
+    Publish(String),
+    /// The bus has no room for the image.
+    Loan(LoanError),
+}
+
+impl Failure {
+    /// What the failure means for a file that a root refers to: that it cannot be had, or that the
+    /// whole is to be tried again.
+    pub fn of_linked(self, path: &Path) -> Result<Absence, PrepareFailure> {
+        match self {
+            Failure::Loan(LoanError::TooLarge(_)) => Ok(Absence::TooLarge {
+                why: "it does not fit on the bus".to_owned(),
+            }),
+            Failure::Loan(LoanError::Busy) => Err(PrepareFailure::Busy),
+            Failure::Loan(error) => Err(unpublished(path, &error)),
+            Failure::Publish(error) => Err(unpublished(path, &error)),
+            // It is written to this very moment: the whole is read again shortly.
+            Failure::Ingest(error @ IngestError::Unsettled { .. }) => {
+                Err(PrepareFailure::NoRoom(error.to_string()))
+            }
+            Failure::Ingest(error) => Ok(error.to_absence()),
+            Failure::Build(why) => Ok(Absence::Unreadable { why }),
+        }
+    }
+}
+
+impl From<IngestError> for Failure {
+    fn from(error: IngestError) -> Self {
+        Failure::Ingest(error)
+    }
+}
+
+impl From<LoanError> for Failure {
+    fn from(error: LoanError) -> Self {
+        Failure::Loan(error)
+    }
+}
+
+/// What the failure means for the root.
+pub(super) fn explained(failure: Failure, path: &Path) -> PrepareFailure {
+    match failure {
+        Failure::Ingest(IngestError::Missing { .. } | IngestError::Unsettled { .. }) => {
+            match stamp_of(path) {
+                Ok(None) => PrepareFailure::Vanished,
+                // It is written to this very moment: it is read again shortly.
+                _ => PrepareFailure::NoRoom(format!("{} changes while it is read", to_text(path))),
+            }
+        }
+        Failure::Ingest(error) => unreadable(path, error.to_string()),
+        Failure::Build(error) => unreadable(path, error),
+        Failure::Loan(LoanError::TooLarge(_)) => {
+            unreadable(path, format!("{} is too large for the bus", to_text(path)))
+        }
+        Failure::Loan(LoanError::Busy) => PrepareFailure::Busy,
+        Failure::Loan(error) => unpublished(path, &error),
+        Failure::Publish(error) => unpublished(path, &error),
+    }
+}
+
+/// The bus has no room, or could not take it: nothing that is the file's fault, or that stays.
+fn unpublished(path: &Path, error: &dyn std::fmt::Display) -> PrepareFailure {
+    PrepareFailure::NoRoom(format!("cannot publish {}: {error}", to_text(path)))
+}
+
+fn unreadable(path: &Path, reason: String) -> PrepareFailure {
+    match stamp_of(path) {
+        Ok(None) => PrepareFailure::Vanished,
+        // What cannot even be looked at may be there.
+        seen => PrepareFailure::Unreadable {
+            reason,
+            stamp: seen.ok().flatten(),
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_becomes_of_a_linked_file_never_makes_the_root_vanish() {
+        let path = Path::new("/farm/map.xodr");
+        let of = |failure: Failure| failure.of_linked(path);
+        let unsettled = IngestError::Unsettled {
+            path: path.to_owned(),
+            what: "was removed",
+        };
+        let again = of(unsettled.into());
+        assert!(matches!(again, Err(PrepareFailure::NoRoom(_))), "{again:?}");
+        let missing = IngestError::Missing {
+            path: path.to_owned(),
+        };
+        assert_eq!(of(missing.into()), Ok(Absence::NotThere));
+        let large = of(LoanError::TooLarge(1).into());
+        assert!(matches!(large, Ok(Absence::TooLarge { .. })), "{large:?}");
+    }
+
+    #[test]
+    fn what_the_bus_does_not_take_now_is_tried_again() {
+        let path = Path::new("/farm/map.xodr");
+        let refused = || Failure::Publish("no subscriber slot".to_owned());
+        let linked = refused().of_linked(path);
+        assert!(
+            matches!(linked, Err(PrepareFailure::NoRoom(_))),
+            "{linked:?}"
+        );
+        let root = explained(refused(), path);
+        assert!(matches!(root, PrepareFailure::NoRoom(_)), "{root:?}");
+    }
+}

@@ -1,0 +1,206 @@
+//! What one job depends on: the documents it brings to the bus, and every file that was looked at.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use qcbus_bus::Held;
+use qcbus_ingest::{Limits, Look, Prepared, Source};
+use qcbus_messages::path_text::to_text;
+use qcbus_messages::{Absence, Digest, DocId, DocumentRole, JobDocument, MissingDocument};
+use sha2::{Digest as _, Sha256};
+
+use super::{Intake, Published};
+use crate::core::{Input, PrepareFailure, PreparedJob, Stamp};
+use crate::stamp::{from_content, is_racy, stamp_through_links};
+
+/// What has been found for one job so far.
+pub(super) struct Gathered {
+    documents: Vec<JobDocument>,
+    pub missing: Vec<MissingDocument>,
+    inputs: BTreeMap<PathBuf, Input>,
+    root: Vec<Input>,
+    pub held: Vec<(DocId, Held)>,
+    bytes: u64,
+}
+
+impl Gathered {
+    pub fn new(path: &Path, root: &Published) -> Gathered {
+        let mut gathered = Gathered {
+            documents: Vec::new(),
+            missing: Vec::new(),
+            inputs: BTreeMap::new(),
+            root: root.inputs.iter().take(1).cloned().collect(),
+            held: Vec::new(),
+            bytes: 0,
+        };
+        gathered.push(path, DocumentRole::Root, 0, root);
+        gathered
+    }
+
+    fn push(&mut self, path: &Path, role: DocumentRole, referred_at: u32, published: &Published) {
+        self.documents.push(JobDocument {
+            doc: published.doc,
+            role,
+            path: to_text(path),
+            digest: published.digest,
+            referred_at,
+        });
+        for input in &published.inputs {
+            self.inputs.insert(input.path.to_path_buf(), input.clone());
+        }
+        self.held.push((published.doc, published.held.clone()));
+        self.bytes += published.bytes;
+    }
+
+    /// Something that is there and could not be had: when it changes, the verdict is void.
+    fn unread(&mut self, path: &Path, stamp: Option<Stamp>) {
+        if let Some(stamp) = stamp {
+            self.inputs
+                .entry(path.to_path_buf())
+                .or_insert_with(|| Input {
+                    path: path.into(),
+                    content: Some((stamp, Input::UNREAD)),
+                });
+        }
+    }
+
+    /// A file that was looked for and not found: when it appears, the verdict is void.
+    fn absent(&mut self, path: &Path) {
+        self.inputs
+            .entry(path.to_path_buf())
+            .or_insert_with(|| Input {
+                path: path.into(),
+                content: None,
+            });
+    }
+
+    /// A directory whose files count: when one comes or goes, the verdict is void.
+    fn listing(&mut self, directory: &Path) {
+        let stamp = stamp_through_links(directory);
+        let content = stamp.map(|stamp| {
+            let digest =
+                Sha256::digest(format!("{} {}", stamp.size, stamp.mtime_ns.unsigned_abs()));
+            (stamp, Digest(digest.into()))
+        });
+        self.inputs.insert(
+            directory.to_path_buf(),
+            Input {
+                path: directory.into(),
+                content,
+            },
+        );
+    }
+
+    pub fn finish(&self) -> PreparedJob {
+        let root = self.root.first().map(|input| input.path.clone());
+        let others = self
+            .inputs
+            .values()
+            .filter(|input| Some(&input.path) != root.as_ref());
+        let inputs: Vec<Input> = self.root.iter().chain(others).cloned().collect();
+        PreparedJob {
+            basis: basis(&inputs),
+            racy: inputs
+                .iter()
+                .any(|input| input.content.is_some_and(|(stamp, _)| is_racy(stamp))),
+            inputs,
+            documents: self.documents.clone(),
+            missing: self.missing.clone(),
+            bytes: self.bytes,
+        }
+    }
+}
+
+/// Digest over the paths and contents of all inputs.
+fn basis(inputs: &[Input]) -> Digest {
+    let mut hash = Sha256::new();
+    for input in inputs {
+        hash.update(input.path.as_os_str().as_encoded_bytes());
+        match input.content {
+            Some((_, digest)) => {
+                hash.update([0, 1]);
+                hash.update(digest.0);
+            }
+            None => hash.update([0, 0]),
+        }
+    }
+    Digest(hash.finalize().into())
+}
+
+/// The documents that a root refers to, on their way to the bus. Whatever becomes of them, it is the
+/// root's verdict that is at stake: none of them can make the root vanish or unreadable.
+pub(super) struct Links<'i> {
+    pub intake: &'i Intake,
+    pub gathered: &'i mut Gathered,
+}
+
+impl Source for Links<'_> {
+    type Document = Published;
+    type Halt = PrepareFailure;
+
+    fn fetch(&mut self, path: &Path) -> Result<Result<Published, Absence>, PrepareFailure> {
+        // Looked at before: when it changes while it is tried, this stamp fits no more.
+        let before = stamp_through_links(path);
+        let absence = match self.intake.publish_shared(path) {
+            Ok(published) => return Ok(Ok(published)),
+            Err(failure) => failure.of_linked(path)?,
+        };
+        if absence != Absence::NotThere {
+            self.gathered.unread(path, before);
+        }
+        Ok(Err(absence))
+    }
+
+    fn image(document: &Published) -> &[u8] {
+        &document.held
+    }
+
+    fn keep(&mut self, path: &Path, role: DocumentRole, referred_at: u32, document: Published) {
+        self.gathered.push(path, role, referred_at, &document);
+    }
+
+    fn looked(&mut self, look: Look<'_>) {
+        match look {
+            Look::NotHad(path) => self.gathered.absent(path),
+            Look::NotRead(path) => {
+                self.gathered.unread(path, stamp_through_links(path));
+                self.gathered.absent(path);
+            }
+            Look::Listed(directory) => self.gathered.listing(directory),
+        }
+    }
+}
+
+/// The files that one image was built of.
+pub(super) fn inputs_of(prepared: &Prepared, limits: &Limits) -> Vec<Input> {
+    prepared
+        .files()
+        .iter()
+        .map(|file| Input {
+            path: file.path.as_path().into(),
+            content: match &file.content {
+                Some(it) => Some((from_content(it), Digest(it.digest))),
+                None => unreadable_now(&file.path, limits).map(|stamp| (stamp, Input::UNREAD)),
+            },
+        })
+        .collect()
+}
+
+/// The stamp of something that could not be read and still cannot. What can be read by now is
+/// taken for missing, as it was; that it has come is noticed before the result is stored.
+fn unreadable_now(path: &Path, limits: &Limits) -> Option<Stamp> {
+    let stamp = stamp_through_links(path)?;
+    let is_readable = std::fs::metadata(path).is_ok_and(|data| data.is_file())
+        && stamp.size <= limits.max_file
+        && File::open(path).is_ok();
+    (!is_readable).then_some(stamp)
+}
+
+/// Whether a file certainly is what it was when it was read.
+pub(super) fn is_unchanged(input: &Input) -> bool {
+    match input.content {
+        Some((stamp, _)) => !is_racy(stamp) && stamp_through_links(&input.path) == Some(stamp),
+        None => stamp_through_links(&input.path).is_none(),
+    }
+}

@@ -1,0 +1,238 @@
+//! From a path to published document images: the only place where the broker reads what it checks.
+
+use std::collections::{HashMap, VecDeque};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use qcbus_bus::{Documents, Held, Loan};
+use qcbus_document::{Document, FileKind};
+use qcbus_ingest::{BuildError, Limits, Prepared};
+use qcbus_messages::{Digest, DocId, JobId};
+
+use crate::core::{Input, PrepareFailure, PreparedJob};
+use crate::stages::reached;
+
+mod failure;
+mod gathered;
+
+use failure::{Failure, explained};
+use gathered::{Gathered, Links, inputs_of, is_unchanged};
+
+/// Reads files and publishes their images. Shared by the threads that do so.
+pub struct Intake {
+    documents: Documents,
+    limits: Limits,
+    roots: Vec<PathBuf>,
+    max_documents: usize,
+    next_doc: AtomicU64,
+    cache: Mutex<Cache>,
+    held: Mutex<HashMap<JobId, Vec<(DocId, Held)>>>,
+    recent: Mutex<VecDeque<(JobId, DocId)>>,
+}
+
+impl std::fmt::Debug for Intake {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Intake")
+            .field("roots", &self.roots)
+            .finish_non_exhaustive()
+    }
+}
+
+/// A published document.
+#[derive(Debug, Clone)]
+struct Published {
+    doc: DocId,
+    held: Held,
+    digest: Digest,
+    inputs: Vec<Input>,
+    bytes: u64,
+}
+
+/// Documents that are on the bus, so that a thousand scenarios on one map publish the map once.
+#[derive(Debug, Default)]
+struct Cache {
+    by_path: HashMap<PathBuf, Published>,
+    order: VecDeque<PathBuf>,
+}
+
+/// Shared documents (maps, catalogs) that are kept on the bus beyond the job that needed them.
+const CACHED: usize = 8;
+
+/// Ended jobs whose root document reporters may still find on the bus.
+const RECENT: usize = 256;
+
+impl Intake {
+    /// An intake that publishes through `documents`. `roots` are the watched or given directories:
+    /// includes and archives stay inside them.
+    pub fn new(
+        documents: Documents,
+        limits: Limits,
+        roots: Vec<PathBuf>,
+        max_documents: usize,
+    ) -> Intake {
+        Intake {
+            documents,
+            limits,
+            roots,
+            max_documents,
+            next_doc: AtomicU64::new(1),
+            cache: Mutex::default(),
+            held: Mutex::default(),
+            recent: Mutex::default(),
+        }
+    }
+
+    /// Reads a file with everything it refers to and publishes the images.
+    ///
+    /// # Errors
+    /// See [`PrepareFailure`].
+    pub fn prepare(&self, job: JobId, path: &Path) -> Result<Box<PreparedJob>, PrepareFailure> {
+        let root = self
+            .publish_fresh(path)
+            .map_err(|failure| explained(failure, path))?;
+        let mut gathered = Gathered::new(path, &root);
+        self.gather(&root.held, &mut gathered)?;
+        let prepared = gathered.finish();
+        self.hold(job, gathered.held);
+        Ok(Box::new(prepared))
+    }
+
+    /// Publishes a document of a job once more.
+    pub fn publish_again(&self, job: JobId, doc: DocId) {
+        let held = lock(&self.held).get(&job).and_then(|all| {
+            all.iter()
+                .find(|(it, _)| *it == doc)
+                .map(|(_, held)| held.clone())
+        });
+        if let Some(held) = held
+            && let Err(error) = self.documents.publish_again(&held)
+        {
+            // The peer asks again while it lacks the document.
+            tracing::warn!("document {} cannot be published again: {error}", doc.0);
+        }
+    }
+
+    /// The root image of a job, while it is held.
+    pub fn root(&self, job: JobId) -> Option<Held> {
+        lock(&self.held)
+            .get(&job)
+            .and_then(|all| all.first().map(|(_, held)| held.clone()))
+    }
+
+    /// The root document of a job that has ended lately; it may still be on the bus.
+    pub fn recent_root(&self, job: JobId) -> Option<DocId> {
+        lock(&self.recent)
+            .iter()
+            .find(|(it, _)| *it == job)
+            .map(|(_, doc)| *doc)
+    }
+
+    /// Lets go of a job's documents.
+    pub fn release(&self, job: JobId) {
+        let held = lock(&self.held).remove(&job);
+        if let Some((doc, _)) = held.as_ref().and_then(|all| all.first()) {
+            let mut recent = lock(&self.recent);
+            recent.push_back((job, *doc));
+            if recent.len() > RECENT {
+                recent.pop_front();
+            }
+        }
+    }
+
+    fn hold(&self, job: JobId, held: Vec<(DocId, Held)>) {
+        lock(&self.held).insert(job, held);
+    }
+
+    /// Follows the root's references.
+    fn gather(&self, root: &Held, gathered: &mut Gathered) -> Result<(), PrepareFailure> {
+        let Ok(document) = Document::open(root) else {
+            return Ok(());
+        };
+        let mut links = Links {
+            intake: self,
+            gathered,
+        };
+        let missing = qcbus_ingest::gather(&document, self.max_documents, &mut links)?;
+        gathered.missing = missing;
+        Ok(())
+    }
+
+    /// A map or catalog: from the cache as long as nothing has changed.
+    fn publish_shared(&self, path: &Path) -> Result<Published, Failure> {
+        let cached = lock(&self.cache).by_path.get(path).cloned();
+        if let Some(published) = cached
+            && published.inputs.iter().all(is_unchanged)
+        {
+            return Ok(published);
+        }
+        let published = self.publish_fresh(path)?;
+        let mut cache = lock(&self.cache);
+        if cache
+            .by_path
+            .insert(path.to_path_buf(), published.clone())
+            .is_none()
+        {
+            cache.order.push_back(path.to_path_buf());
+        }
+        while cache.order.len() > CACHED {
+            if let Some(oldest) = cache.order.pop_front() {
+                cache.by_path.remove(&oldest);
+            }
+        }
+        Ok(published)
+    }
+
+    fn publish_fresh(&self, path: &Path) -> Result<Published, Failure> {
+        let prepared = qcbus_ingest::prepare(path, self.boundary(path), &self.limits)?;
+        reached("read", path);
+        let digest = Digest(prepared.digest());
+        let inputs = inputs_of(&prepared, &self.limits);
+        let kind = FileKind::of_path(path).unwrap_or(FileKind::Xosc);
+        let (loan, used) = self.build(&prepared)?;
+        reached("built", path);
+        let doc = DocId(self.next_doc.fetch_add(1, Ordering::Relaxed));
+        let held = loan
+            .publish(doc, used, digest, kind)
+            .map_err(|error| Failure::Publish(error.to_string()))?;
+        reached("published", path);
+        let bytes = inputs
+            .iter()
+            .filter(|it| it.digest().is_some())
+            .filter_map(|it| it.content)
+            .map(|(stamp, _)| stamp.size)
+            .sum();
+        Ok(Published {
+            doc,
+            held,
+            digest,
+            inputs,
+            bytes,
+        })
+    }
+
+    /// Parses straight into shared memory. The bound is an estimate that many resolved entities
+    /// can exceed; then the builder says how much it takes.
+    fn build(&self, prepared: &Prepared) -> Result<(Loan, usize), Failure> {
+        let mut room = prepared.upper_bound();
+        loop {
+            let mut loan = self.documents.loan(room)?;
+            match prepared.build_into(&mut loan) {
+                Ok(used) => return Ok((loan, used)),
+                Err(BuildError::SmallBuffer { needed, .. }) if needed > room => room = needed,
+                Err(error) => return Err(Failure::Build(error.to_string())),
+            }
+        }
+    }
+
+    /// The directory that includes may not leave.
+    fn boundary<'a>(&'a self, path: &'a Path) -> &'a Path {
+        let root = self.roots.iter().filter(|root| path.starts_with(root));
+        root.max_by_key(|root| root.as_os_str().len())
+            .map_or_else(|| path.parent().unwrap_or(path), PathBuf::as_path)
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
