@@ -208,8 +208,8 @@ fn a_state_disk_that_is_full() {
         let mut farm = Farm::new();
         let state = farm.base().join("state");
         std::fs::create_dir(&state).unwrap();
-        // Room enough for the journal, once there is room.
-        mount(&state, "size=1m");
+        // Room enough for the journal with what bundles offer (0.2 MiB) and its log, once there is room.
+        mount(&state, "size=4m");
         farm.arguments = vec!["--state".to_owned(), state.to_string_lossy().into_owned()];
         let _broker = farm.serve_ready();
         let filler = std::fs::File::create(state.join("filler")).unwrap();
