@@ -138,7 +138,7 @@ pub fn digest(number: u64) -> Digest {
 pub fn basis(inputs: &[Input]) -> Digest {
     let mut basis = Digest::default();
     for (at, input) in inputs.iter().enumerate() {
-        if let Some((_, digest)) = input.content {
+        if let Some(digest) = input.digest() {
             basis.0[at * 8..][..8].copy_from_slice(&digest.0[..8]);
         }
     }
@@ -387,7 +387,9 @@ impl World {
         let path = path_of(file);
         let number = self.there.get(&path);
         Input {
-            content: number.map(|it| (stamp(*it), digest(self.contents[it]))),
+            content: number.map_or(Reading::Absent, |it| {
+                Reading::Read(stamp(*it), digest(self.contents[it]))
+            }),
             path,
         }
     }
@@ -593,10 +595,10 @@ impl World {
         }
         let (job, file) = self.preparing.remove(usize::from(n) % self.preparing.len());
         let inputs = self.inputs(file);
-        let result = match inputs[0].content {
+        let result = match inputs[0].digest() {
             None => Err(PrepareFailure::Vanished),
             Some(_) if !room => Err(PrepareFailure::NoRoom("full".to_owned())),
-            Some((_, digest)) => {
+            Some(digest) => {
                 let document = JobDocument {
                     doc: DocId(job.0),
                     role: DocumentRole::Root,
@@ -651,7 +653,7 @@ impl World {
                 racy: false,
                 counts: [0; 3],
                 why: Vec::new(),
-                xqar: "/out".into(),
+                xqar: Some("/out".into()),
             };
             self.journal.insert(file, judged.clone());
             StoreOutcome::Stored(Box::new(judged))
