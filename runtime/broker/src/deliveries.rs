@@ -26,17 +26,15 @@ pub fn message(
     config: Option<&Arc<Config>>,
 ) -> Result<ResultMessage, String> {
     let judged = &delivery.judged;
-    let fail = |error: &dyn std::fmt::Display| {
-        format!(
-            "cannot read {} back for {reporter}: {error}",
-            to_text(&judged.xqar)
-        )
-    };
-    if !judged.is_written() {
+    let Some(xqar) = &judged.xqar else {
         let (path, why) = (to_text(&delivery.path), judged.why.join("; "));
         return Err(format!("{path} has no result for {reporter}: {why}"));
-    }
-    let bytes = std::fs::read(&judged.xqar).map_err(|error| fail(&error))?;
+    };
+    let fail = |error: &dyn std::fmt::Display| {
+        let xqar = to_text(xqar);
+        format!("cannot read {xqar} back for {reporter}: {error}")
+    };
+    let bytes = std::fs::read(xqar).map_err(|error| fail(&error))?;
     let mut results = xqar::read(&bytes).map_err(|error| fail(&error))?;
     drop(bytes);
     cut_to(&mut results, MOST_BYTES);
@@ -44,7 +42,7 @@ pub fn message(
         job: delivery.job,
         input: to_text(&delivery.path),
         display_path: to_text(&places.display(&delivery.path)),
-        xqar: to_text(&judged.xqar),
+        xqar: to_text(xqar),
         verdict: judged.verdict,
         digest: judged.digest,
         config: judged.config,

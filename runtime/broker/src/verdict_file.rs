@@ -116,7 +116,7 @@ pub fn render(
             .into_iter()
             .map(not_asked)
             .collect(),
-        result: to_text(&judged.xqar),
+        result: judged.xqar.as_deref().map(to_text).unwrap_or_default(),
         outside_gate: outside_gate.map(|paths| paths.into_iter().map(to_text).collect()),
     };
     let mut text = serde_json::to_vec_pretty(&file).unwrap_or_default();

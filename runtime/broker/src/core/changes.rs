@@ -33,7 +33,7 @@ impl State {
             let judged = self.files.get(dependent).and_then(|it| it.judged.clone());
             let read = judged.as_ref().and_then(|judged| {
                 let input = judged.inputs.iter().find(|input| input.path == *path);
-                input.and_then(|it| it.content).map(|it| it.0)
+                input.and_then(|it| it.content.stamp())
             });
             if read != Some(stamp) {
                 self.doubt(dependent, actions);
@@ -55,9 +55,9 @@ impl State {
             return;
         };
         let judged = entry.judged.as_ref();
-        let read = judged.and_then(|it| it.inputs.first()?.content);
+        let read = judged.and_then(|it| it.inputs.first()?.content.stamp());
         let racy = judged.is_some_and(|it| it.racy);
-        let as_judged = read.map(|it| it.0) == Some(stamp);
+        let as_judged = read == Some(stamp);
         let at_work = !matches!(entry.stage(), Stage::Idle);
         let same = entry.present && entry.stamp == stamp && (as_judged || at_work);
         entry.present = true;

@@ -7,7 +7,7 @@ use qcbus_messages::{JobId, PeerReport, Role};
 use super::action::Action;
 use super::files::FileId;
 use super::notice::Notice;
-use super::types::{Delivery, SessionId};
+use super::types::{Delivery, Reported, SessionId};
 use super::{Actions, State};
 
 /// Findings under way to one reporter. A result with more of them travels alone: otherwise a bundle
@@ -77,9 +77,7 @@ impl State {
             let Some(judged) = entry.judged.clone() else {
                 continue;
             };
-            if entry.delivered.contains(&(index, judged.job))
-                || reporter.active.contains_key(&judged.job)
-            {
+            if entry.has(index, judged.job) || reporter.active.contains_key(&judged.job) {
                 continue;
             }
             let findings = judged.counts.iter().sum();
@@ -130,7 +128,7 @@ impl State {
         }
         if let Some(entry) = self.files.get_mut(file) {
             entry.delivered.retain(|(other, _)| *other != index);
-            entry.delivered.push((index, job));
+            entry.delivered.push((index, Reported::Of(job)));
             let path = entry.path.clone();
             actions.push(Action::Delivered {
                 reporter: name,

@@ -10,7 +10,7 @@ use std::time::Duration;
 use qcbus_document::FileKind;
 use qcbus_messages::JobId;
 
-use super::types::{Judged, Stamp};
+use super::types::{Judged, Reported, Stamp};
 
 /// Index of a file in the table; never reused within a generation.
 pub type FileId = u32;
@@ -56,8 +56,15 @@ pub struct FileEntry {
     pub not_before: Duration,
     /// The verdict on some bytes, not always the present ones.
     pub judged: Option<Arc<Judged>>,
-    /// Which reporters have which job's result, by index into the reporters' table.
-    pub delivered: Vec<(u32, JobId)>,
+    /// What reporters have said of it, by index into the reporters' table.
+    pub delivered: Vec<(u32, Reported)>,
+}
+
+impl FileEntry {
+    /// Whether a reporter has the result of this job.
+    pub fn has(&self, reporter: u32, job: JobId) -> bool {
+        self.delivered.contains(&(reporter, Reported::Of(job)))
+    }
 }
 
 /// The table.

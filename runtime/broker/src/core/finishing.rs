@@ -56,7 +56,7 @@ impl State {
             path: job.path.clone(),
             kind: job.kind,
             config: job.config,
-            prepared: job.prepared.clone().filter(|_| job.unreadable.is_none()),
+            prepared: job.prepared.clone(),
             unreadable: job.unreadable.clone(),
             bundles: job
                 .shares

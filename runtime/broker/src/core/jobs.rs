@@ -145,9 +145,8 @@ impl State {
             return;
         };
         if let Some(judged) = &entry.judged {
-            let known = judged.inputs.first().and_then(|root| root.content);
-            let same_bytes =
-                !judged.racy && !entry.doubted && known.map(|it| it.0) == Some(entry.stamp);
+            let known = judged.inputs.first().and_then(|root| root.content.stamp());
+            let same_bytes = !judged.racy && !entry.doubted && known == Some(entry.stamp);
             if same_bytes && self.stands(entry.kind, judged) {
                 let judged = judged.clone();
                 self.confirm(id, &judged, actions);
@@ -211,22 +210,9 @@ impl State {
             Err(PrepareFailure::Busy) => {
                 self.requeue_later(id, self.settings.busy_pause, actions);
             }
-            Err(PrepareFailure::Unreadable { reason, stamp }) => {
+            Err(PrepareFailure::Unreadable(reason)) => {
                 if let Some(job) = self.jobs.get_mut(&id) {
                     job.unreadable = Some(reason);
-                    let stamp = stamp.map(|stamp| (stamp, Digest::default()));
-                    let input = Input {
-                        path: job.path.clone(),
-                        content: stamp,
-                    };
-                    job.prepared = Some(Arc::new(PreparedJob {
-                        inputs: vec![input],
-                        basis: Digest::default(),
-                        racy: true,
-                        documents: Vec::new(),
-                        missing: Vec::new(),
-                        bytes: 0,
-                    }));
                 }
                 self.give_out(id, actions);
             }
@@ -317,7 +303,7 @@ impl State {
         self.forget_dependencies(actions);
         if !new.is_empty() {
             let stamps = inputs.iter().skip(1);
-            let stamps = stamps.map(|it| it.content.map(|content| content.0));
+            let stamps = stamps.map(|it| it.content.stamp());
             let files = new.into_iter().zip(stamps).collect();
             actions.push(Action::Depend { files });
         }

@@ -147,13 +147,13 @@ impl State {
     }
 
     /// Puts in what the journal knows of a file. It counts as present only once a scan has seen it.
-    pub fn remember(&mut self, path: &Arc<Path>, judged: Judged, delivered: &[(String, JobId)]) {
+    pub fn remember(&mut self, path: &Arc<Path>, judged: Judged, delivered: &[(String, Reported)]) {
         let Some(kind) = FileKind::of_path(path) else {
             return;
         };
-        let delivered: Vec<(u32, JobId)> = delivered
+        let delivered: Vec<(u32, Reported)> = delivered
             .iter()
-            .map(|(name, job)| (self.reporter_index(name), *job))
+            .map(|(name, reported)| (self.reporter_index(name), *reported))
             .collect();
         let id = self.files.insert(path, kind, Stamp::default());
         let paths: Vec<Arc<Path>> = judged

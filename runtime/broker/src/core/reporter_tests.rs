@@ -38,9 +38,9 @@ impl Desk {
             racy: false,
             counts: [0; 3],
             why: Vec::new(),
-            xqar: "/out/a.xodr.xqar".into(),
+            xqar: Some("/out/a.xodr.xqar".into()),
         };
-        let by = [(TEXT.to_owned(), JobId(7))];
+        let by = [(TEXT.to_owned(), Reported::Of(JobId(7)))];
         state.remember(&path, judged, if delivered { &by } else { &[] });
         Desk {
             state,

@@ -12,7 +12,7 @@ use super::action::Action;
 use super::delivering::Sent;
 use super::files::FileId;
 use super::notice::Notice;
-use super::types::{Launch, SessionId};
+use super::types::{Launch, Reported, SessionId};
 use super::{Actions, State};
 
 /// A reporter by name.
@@ -165,7 +165,7 @@ impl State {
                 entry
                     .judged
                     .as_ref()
-                    .is_some_and(|judged| !entry.delivered.contains(&(index, judged.job)))
+                    .is_some_and(|judged| !entry.has(index, judged.job))
             })
             .map(|(id, _)| id)
             .collect();
@@ -184,7 +184,7 @@ impl State {
         let judged = entry.judged.is_some();
         let mut names = Vec::new();
         for (index, reporter) in self.reporters.iter_mut().enumerate() {
-            let has = |it: &(u32, JobId)| usize::try_from(it.0) == Ok(index);
+            let has = |it: &(u32, Reported)| usize::try_from(it.0) == Ok(index);
             let under_way = reporter.active.values().any(|sent| sent.file == id);
             reporter.active.retain(|_, sent| sent.file != id);
             let pending =

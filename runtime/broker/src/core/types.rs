@@ -54,19 +54,43 @@ impl Stamp {
 pub struct Input {
     /// Absolute path.
     pub path: Arc<Path>,
-    /// Its stamp and digest; `None` when it was looked for and not there. Where something is there
-    /// that could not be read (a directory, say), the digest is [`Input::UNREAD`].
-    pub content: Option<(Stamp, Digest)>,
+    /// What was found there.
+    pub content: Reading,
 }
 
 impl Input {
-    /// The digest of what is there and could not be read.
-    pub const UNREAD: Digest = Digest([0; 32]);
-
     /// The digest of the bytes that were read, if any were.
     pub fn digest(&self) -> Option<Digest> {
-        let digest = self.content.map(|(_, digest)| digest);
-        digest.filter(|digest| *digest != Input::UNREAD)
+        self.content.read().map(|(_, digest)| digest)
+    }
+}
+
+/// What was found where a file was to be read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reading {
+    /// It was looked for and not there.
+    Absent,
+    /// Something is there that could not be read: a directory, say.
+    Unread(Stamp),
+    /// Its bytes were read, or its names if it is a directory whose files count.
+    Read(Stamp, Digest),
+}
+
+impl Reading {
+    /// The stamp of what is there.
+    pub fn stamp(&self) -> Option<Stamp> {
+        match *self {
+            Reading::Absent => None,
+            Reading::Unread(stamp) | Reading::Read(stamp, _) => Some(stamp),
+        }
+    }
+
+    /// Stamp and digest of what was read.
+    pub fn read(&self) -> Option<(Stamp, Digest)> {
+        match *self {
+            Reading::Absent | Reading::Unread(_) => None,
+            Reading::Read(stamp, digest) => Some((stamp, digest)),
+        }
     }
 }
 
@@ -90,7 +114,7 @@ pub struct PreparedJob {
 impl PreparedJob {
     /// Stamp and digest of the root.
     pub fn root(&self) -> Option<(Stamp, Digest)> {
-        self.inputs.first().and_then(|input| input.content)
+        self.inputs.first().and_then(|input| input.content.read())
     }
 }
 
@@ -100,12 +124,7 @@ pub enum PrepareFailure {
     /// It is no longer there.
     Vanished,
     /// It is there and cannot be checked; the reason is for a person.
-    Unreadable {
-        /// Why.
-        reason: String,
-        /// What `stat` said, if it said anything.
-        stamp: Option<Stamp>,
-    },
+    Unreadable(String),
     /// No room for its image now; worth another try later.
     NoRoom(String),
     /// As many documents as the bus carries are in use; worth another try at once.
@@ -137,8 +156,8 @@ pub struct Judged {
     pub counts: [u64; 3],
     /// For undetermined: which checkers failed and why.
     pub why: Vec<String>,
-    /// Where the result lies; empty when it could not be written anywhere.
-    pub xqar: PathBuf,
+    /// Where the result lies; `None` when it could not be written anywhere.
+    pub xqar: Option<PathBuf>,
 }
 
 impl Judged {
@@ -149,8 +168,17 @@ impl Judged {
 
     /// Whether there is a result.
     pub fn is_written(&self) -> bool {
-        !self.xqar.as_os_str().is_empty()
+        self.xqar.is_some()
     }
+}
+
+/// What a reporter has said of a file, as far as the broker knows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reported {
+    /// It has the result of this job.
+    Of(JobId),
+    /// The file had gone, and the report is not known to have been taken back.
+    OfGone,
 }
 
 /// What one bundle's share of a job came to.
@@ -280,7 +308,7 @@ pub fn file_verdict(path: &Path, judged: &Judged) -> FileVerdict {
         file: path.to_path_buf(),
         verdict: judged.verdict,
         digest: judged.digest.to_string(),
-        xqar: judged.xqar.clone(),
+        xqar: judged.xqar.clone().unwrap_or_default(),
         errors: judged.counts[0],
         warnings: judged.counts[1],
         information: judged.counts[2],

@@ -101,7 +101,7 @@ impl Broker {
     pub(super) fn look_at_inputs(&mut self, file: &Path) {
         for input in self.state.inputs_of(file).into_iter().skip(1) {
             let stamp = stamp_through_links(&input.path);
-            if stamp == input.content.map(|content| content.0) {
+            if stamp == input.content.stamp() {
                 continue;
             }
             let path = input.path;

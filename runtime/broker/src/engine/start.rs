@@ -109,7 +109,7 @@ impl Broker {
         for mut file in found.standing {
             for input in file.judged.inputs.iter().skip(1) {
                 let now = found.stamps.get(&input.path).copied().flatten();
-                file.judged.racy |= now != input.content.map(|content| content.0);
+                file.judged.racy |= now != input.content.stamp();
             }
             self.state
                 .remember(&file.path, file.judged, &file.delivered);
@@ -123,7 +123,7 @@ impl Broker {
 
     /// A reporter is to take back its report; `left` says where the result lay.
     fn remember_void(&mut self, path: &Arc<Path>, reporter: &str, left: Option<PathBuf>) {
-        if let Some(xqar) = left.filter(|it| !it.as_os_str().is_empty()) {
+        if let Some(xqar) = left {
             self.left.insert((reporter.to_owned(), path.clone()), xqar);
         }
         self.state.remember_void(path, reporter);

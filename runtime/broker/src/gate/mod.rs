@@ -20,7 +20,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use qcbus_messages::control::{GateStatus, HeldBack};
 use qcbus_messages::path_text::to_text;
 
-use crate::core::{Input, Judged};
+use crate::core::{Input, Judged, Reading};
 use crate::directory_lock::{DirectoryLock, Purpose};
 use crate::disk::{is_for_good, write_ahead};
 use crate::journal::Remembered;
@@ -339,7 +339,7 @@ impl Gate {
         let needs = judged.inputs.iter().skip(1);
         let inside = |input: &&Input| self.options.paths.contains(&input.path);
         let need = |input: &Input| {
-            let (stamp, digest) = input.content?;
+            let (stamp, digest) = input.content.read()?;
             Some(Need {
                 path: input.path.clone(),
                 digest,
@@ -365,7 +365,7 @@ impl Gate {
     /// Why an acceptance does not lead behind the gate, whatever else comes.
     fn refusal(&self, judged: &Judged) -> Option<String> {
         let inputs = judged.inputs.iter();
-        let mut unread = inputs.filter(|it| it.content.is_some() && it.digest().is_none());
+        let mut unread = inputs.filter(|it| matches!(it.content, Reading::Unread(_)));
         if let Some(unread) = unread.find(|it| self.options.paths.contains(&it.path)) {
             let shown = to_text(&unread.path);
             return Some(format!("it depends on {shown}, which could not be read"));
@@ -388,13 +388,14 @@ impl Gate {
 const SHOWN: usize = 10;
 
 fn size_of_root(judged: &Judged) -> u64 {
-    let root = judged.inputs.first().and_then(|root| root.content);
-    root.map_or(0, |(stamp, _)| stamp.size)
+    let root = judged.inputs.first();
+    let stamp = root.and_then(|root| root.content.stamp());
+    stamp.map_or(0, |stamp| stamp.size)
 }
 
 /// Whether bytes of a file were read: directories are looked through, not read.
 fn is_file(input: &Input) -> bool {
-    input.digest().is_some() && !input.content.is_some_and(|(stamp, _)| is_listing(&stamp))
+    matches!(input.content, Reading::Read(stamp, _) if !is_listing(&stamp))
 }
 
 fn held(path: &Path, why: &str) -> String {

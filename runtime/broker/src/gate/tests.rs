@@ -7,7 +7,7 @@ use qcbus_messages::{Digest, JobId, Verdict};
 use tempfile::TempDir;
 
 use super::*;
-use crate::core::{Epoch, Jury};
+use crate::core::{Epoch, Jury, Reading};
 use crate::stamp::stamp_through_links;
 
 /// What a file is built from, by name. Maps include fragments, scenarios have maps and scenarios;
@@ -54,7 +54,7 @@ impl Bench {
         let stamp = stamp_through_links(&path);
         let digest = std::fs::read(&path).map_or(Digest([7; 32]), |bytes| digest_of(&bytes));
         Input {
-            content: stamp.map(|stamp| (stamp, digest)),
+            content: stamp.map_or(Reading::Absent, |stamp| Reading::Read(stamp, digest)),
             path,
         }
     }
@@ -129,7 +129,7 @@ fn accepted(inputs: Vec<Input>) -> Judged {
         racy: false,
         counts: [0; 3],
         why: Vec::new(),
-        xqar: PathBuf::new(),
+        xqar: None,
     }
 }
 

@@ -86,10 +86,7 @@ fn unreadable(path: &Path, reason: String) -> PrepareFailure {
     match stamp_of(path) {
         Ok(None) => PrepareFailure::Vanished,
         // What cannot even be looked at may be there.
-        seen => PrepareFailure::Unreadable {
-            reason,
-            stamp: seen.ok().flatten(),
-        },
+        _ => PrepareFailure::Unreadable(reason),
     }
 }
 

@@ -11,7 +11,7 @@ use qcbus_messages::{Absence, Digest, DocId, DocumentRole, JobDocument, MissingD
 use sha2::{Digest as _, Sha256};
 
 use super::{Intake, Published};
-use crate::core::{Input, PrepareFailure, PreparedJob, Stamp};
+use crate::core::{Input, PrepareFailure, PreparedJob, Reading, Stamp};
 use crate::stamp::{from_content, is_racy, stamp_through_links};
 
 /// What has been found for one job so far.
@@ -60,7 +60,7 @@ impl Gathered {
                 .entry(path.to_path_buf())
                 .or_insert_with(|| Input {
                     path: path.into(),
-                    content: Some((stamp, Input::UNREAD)),
+                    content: Reading::Unread(stamp),
                 });
         }
     }
@@ -71,17 +71,17 @@ impl Gathered {
             .entry(path.to_path_buf())
             .or_insert_with(|| Input {
                 path: path.into(),
-                content: None,
+                content: Reading::Absent,
             });
     }
 
     /// A directory whose files count: when one comes or goes, the verdict is void.
     fn listing(&mut self, directory: &Path) {
         let stamp = stamp_through_links(directory);
-        let content = stamp.map(|stamp| {
+        let content = stamp.map_or(Reading::Absent, |stamp| {
             let digest =
                 Sha256::digest(format!("{} {}", stamp.size, stamp.mtime_ns.unsigned_abs()));
-            (stamp, Digest(digest.into()))
+            Reading::Read(stamp, Digest(digest.into()))
         });
         self.inputs.insert(
             directory.to_path_buf(),
@@ -103,7 +103,7 @@ impl Gathered {
             basis: basis(&inputs),
             racy: inputs
                 .iter()
-                .any(|input| input.content.is_some_and(|(stamp, _)| is_racy(stamp))),
+                .any(|input| input.content.stamp().is_some_and(is_racy)),
             inputs,
             documents: self.documents.clone(),
             missing: self.missing.clone(),
@@ -118,11 +118,15 @@ fn basis(inputs: &[Input]) -> Digest {
     for input in inputs {
         hash.update(input.path.as_os_str().as_encoded_bytes());
         match input.content {
-            Some((_, digest)) => {
+            Reading::Absent => hash.update([0, 0]),
+            Reading::Unread(_) => {
+                hash.update([0, 1]);
+                hash.update([0; 32]);
+            }
+            Reading::Read(_, digest) => {
                 hash.update([0, 1]);
                 hash.update(digest.0);
             }
-            None => hash.update([0, 0]),
         }
     }
     Digest(hash.finalize().into())
@@ -180,8 +184,8 @@ pub(super) fn inputs_of(prepared: &Prepared, limits: &Limits) -> Vec<Input> {
         .map(|file| Input {
             path: file.path.as_path().into(),
             content: match &file.content {
-                Some(it) => Some((from_content(it), Digest(it.digest))),
-                None => unreadable_now(&file.path, limits).map(|stamp| (stamp, Input::UNREAD)),
+                Some(it) => Reading::Read(from_content(it), Digest(it.digest)),
+                None => unreadable_now(&file.path, limits).map_or(Reading::Absent, Reading::Unread),
             },
         })
         .collect()
@@ -199,8 +203,7 @@ fn unreadable_now(path: &Path, limits: &Limits) -> Option<Stamp> {
 
 /// Whether a file certainly is what it was when it was read.
 pub(super) fn is_unchanged(input: &Input) -> bool {
-    match input.content {
-        Some((stamp, _)) => !is_racy(stamp) && stamp_through_links(&input.path) == Some(stamp),
-        None => stamp_through_links(&input.path).is_none(),
-    }
+    let now = stamp_through_links(&input.path);
+    let racy = input.content.stamp().is_some_and(is_racy);
+    !racy && now == input.content.stamp()
 }

@@ -198,8 +198,7 @@ impl Intake {
         reached("published", path);
         let bytes = inputs
             .iter()
-            .filter(|it| it.digest().is_some())
-            .filter_map(|it| it.content)
+            .filter_map(|it| it.content.read())
             .map(|(stamp, _)| stamp.size)
             .sum();
         Ok(Published {

@@ -15,8 +15,8 @@ CREATE TABLE IF NOT EXISTS files (
     warnings INTEGER NOT NULL,
     information INTEGER NOT NULL,
     why      TEXT NOT NULL,         -- JSON list: for undetermined, the checkers that failed
-    xqar     TEXT NOT NULL,         -- where the result lies
-    inputs   TEXT NOT NULL,         -- JSON list of [path, [size, mtime_ns, inode, digest, ctime_ns]]; null: absent
+    xqar     TEXT NOT NULL,         -- where the result lies; empty: it could not be written anywhere
+    inputs   TEXT NOT NULL,         -- JSON list of [path, [size, mtime_ns, inode, digest, ctime_ns]]; null: absent, digest null: not readable
     racy     INTEGER NOT NULL,      -- 1: read so soon after a write that the stamps prove nothing
     at       INTEGER NOT NULL,
     epoch    INTEGER NOT NULL DEFAULT 0, -- of who had to judge
@@ -75,11 +75,11 @@ CREATE TABLE IF NOT EXISTS job_checkers (
     PRIMARY KEY (job, bundle, checker)
 ) WITHOUT ROWID;
 
--- Which reporter has acknowledged which result. Job 0: the file has gone, and the reporter has not
--- yet taken back its report about it.
+-- What each reporter has said of a file.
 CREATE TABLE IF NOT EXISTS deliveries (
     path     TEXT NOT NULL,
     reporter TEXT NOT NULL,
-    job      INTEGER NOT NULL,
+    job      INTEGER,               -- whose result it has acknowledged; null: the file has gone, and the
+                                    -- reporter has not yet taken back its report about it
     PRIMARY KEY (path, reporter)
 ) WITHOUT ROWID;

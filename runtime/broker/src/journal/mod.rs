@@ -9,7 +9,7 @@ use qcbus_messages::JobId;
 use qcbus_messages::path_text::from_text;
 use rusqlite::{Connection, OpenFlags, params};
 
-use crate::core::{Judged, Member, Origin};
+use crate::core::{Judged, Member, Origin, Reported};
 use crate::directory_lock::{DirectoryLock, Purpose};
 use crate::disk::FileMark;
 
@@ -39,8 +39,8 @@ pub struct Remembered {
     pub judged: Judged,
     /// The mark of the verdict file as it was written, where that was remembered.
     pub written: Option<FileMark>,
-    /// The reporters that have it, each with the job whose result it has.
-    pub delivered: Vec<(String, JobId)>,
+    /// The reporters that have said something of it.
+    pub delivered: Vec<(String, Reported)>,
 }
 
 /// A file that has gone, and a reporter that has not yet taken back what it said of it.
@@ -200,13 +200,15 @@ impl Journal {
     }
 
     fn read_all(&self) -> rusqlite::Result<Vec<Remembered>> {
-        let mut delivered: HashMap<String, Vec<(String, JobId)>> = HashMap::new();
+        let mut delivered: HashMap<String, Vec<(String, Reported)>> = HashMap::new();
         let mut query = self
             .connection
             .prepare("SELECT path, reporter, job FROM deliveries")?;
         let mut rows = query.query([])?;
         while let Some(row) = rows.next()? {
-            let entry = (row.get(1)?, JobId(number(row.get(2)?)));
+            let job: Option<i64> = row.get(2)?;
+            let reported = job.map_or(Reported::OfGone, |job| Reported::Of(JobId(number(job))));
+            let entry = (row.get(1)?, reported);
             delivered.entry(row.get(0)?).or_default().push(entry);
         }
         let mut query = self.connection.prepare(
@@ -241,14 +243,17 @@ impl Journal {
             let mut query = self.connection.prepare(
                 "SELECT path, reporter, gone.xqar FROM deliveries LEFT JOIN gone USING (path) \
                  LEFT JOIN files USING (path) \
-                 WHERE deliveries.job = 0 AND (files.path IS NULL OR files.xqar <> gone.xqar)",
+                 WHERE deliveries.job IS NULL AND (files.path IS NULL OR files.xqar <> gone.xqar)",
             )?;
             let rows = query.query_map([], |row| {
                 let path: String = row.get(0)?;
                 Ok(Void {
                     path: from_text(&path).into(),
                     reporter: row.get(1)?,
-                    xqar: row.get::<_, Option<String>>(2)?.map(|it| from_text(&it)),
+                    xqar: row
+                        .get::<_, Option<String>>(2)?
+                        .filter(|it| !it.is_empty())
+                        .map(|it| from_text(&it)),
                 })
             })?;
             rows.collect()
@@ -338,6 +343,11 @@ fn prepare(connection: &Connection, path: &Path) -> Result<(), JournalError> {
         let newer = "BEGIN; ALTER TABLE files RENAME COLUMN bundles TO jury; \
                      ALTER TABLE files ADD COLUMN epoch INTEGER NOT NULL DEFAULT 0; \
                      ALTER TABLE files ADD COLUMN written TEXT NOT NULL DEFAULT ''; \
+                     ALTER TABLE deliveries RENAME TO deliveries_before; \
+                     CREATE TABLE deliveries (path TEXT NOT NULL, reporter TEXT NOT NULL, \
+                     job INTEGER, PRIMARY KEY (path, reporter)) WITHOUT ROWID; \
+                     INSERT INTO deliveries SELECT path, reporter, nullif(job, 0) \
+                     FROM deliveries_before; DROP TABLE deliveries_before; \
                      PRAGMA user_version = 3; COMMIT;";
         connection.execute_batch(newer).map_err(fail)?;
     }

@@ -6,7 +6,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use qcbus_messages::path_text::{from_text, to_text as text};
 use qcbus_messages::{Digest, JobId, Verdict};
 
-use crate::core::{Epoch, Input, Judged, Juror, Jury, Mark, Stamp};
+use crate::core::{Epoch, Input, Judged, Juror, Jury, Mark, Reading, Stamp};
 
 pub(super) fn jury_to_text(jury: &Jury) -> String {
     let row = |juror: &Juror| {
@@ -34,22 +34,27 @@ fn jury_from_text(text: &str) -> Jury {
     read().map_or_else(Jury::unknown, Jury)
 }
 
-/// A path, and of its content size, time of modification, inode, digest, time of change.
-type InputRow = (String, Option<(u64, i128, u64, String, i128)>);
+/// A path, and of what is there size, time of modification, inode, digest if it was read, time of
+/// change.
+type InputRow = (String, Option<(u64, i128, u64, Option<String>, i128)>);
 
 /// The same in schema 1, which knew no time of change.
-type InputRowOfSchema1 = (String, Option<(u64, i128, u64, String)>);
+type InputRowOfSchema1 = (String, Option<(u64, i128, u64, Option<String>)>);
+
+/// The digest of what could not be read, in the schemas before 3.
+const UNREAD: Digest = Digest([0; 32]);
 
 pub(super) fn inputs_to_text(inputs: &[Input]) -> String {
     let rows: Vec<InputRow> = inputs
         .iter()
         .map(|input| {
-            let content = input.content.map(|(stamp, digest)| {
+            let digest = input.digest().map(|digest| digest.to_string());
+            let content = input.content.stamp().map(|stamp| {
                 (
                     stamp.size,
                     stamp.mtime_ns,
                     stamp.inode,
-                    digest.to_string(),
+                    digest,
                     stamp.ctime_ns,
                 )
             });
@@ -64,16 +69,19 @@ fn inputs_from_text(text: &str) -> Option<Vec<Input>> {
     let rows: Vec<InputRow> = rows.or_else(|| rows_of_schema_1(text))?;
     let input = |(path, content): InputRow| {
         let content = match content {
-            None => None,
-            Some((size, mtime_ns, inode, digest, ctime_ns)) => Some((
-                Stamp {
+            None => Reading::Absent,
+            Some((size, mtime_ns, inode, digest, ctime_ns)) => {
+                let stamp = Stamp {
                     size,
                     mtime_ns,
                     ctime_ns,
                     inode,
-                },
-                digest.parse().ok()?,
-            )),
+                };
+                match digest.map(|digest| digest.parse()).transpose().ok()? {
+                    None | Some(UNREAD) => Reading::Unread(stamp),
+                    Some(digest) => Reading::Read(stamp, digest),
+                }
+            }
         };
         Some(Input {
             path: from_text(&path).into(),
@@ -126,7 +134,9 @@ pub(super) fn judged_of(row: &rusqlite::Row<'_>) -> rusqlite::Result<Option<Judg
             number(row.get(9)?),
         ],
         why: serde_json::from_str(&row.get::<_, String>(10)?).unwrap_or_default(),
-        xqar: from_text(&row.get::<_, String>(11)?),
+        xqar: Some(row.get::<_, String>(11)?)
+            .filter(|it| !it.is_empty())
+            .map(|it| from_text(&it)),
     }))
 }
 

@@ -5,7 +5,7 @@ use qcbus_messages::{Catalogue, Digest, Verdict};
 use std::sync::Arc;
 
 use super::*;
-use crate::core::{Epoch, Input, Juror, Jury, Mark, Stamp};
+use crate::core::{Epoch, Input, Juror, Jury, Mark, Reading, Stamp};
 
 fn judged(job: u64) -> Judged {
     Judged {
@@ -28,7 +28,7 @@ fn judged(job: u64) -> Judged {
         inputs: vec![
             Input {
                 path: Path::new("/a.xosc").into(),
-                content: Some((
+                content: Reading::Read(
                     Stamp {
                         size: 1,
                         mtime_ns: -(1 << 70),
@@ -36,17 +36,17 @@ fn judged(job: u64) -> Judged {
                         inode: 3,
                     },
                     Digest([1; 32]),
-                )),
+                ),
             },
             Input {
                 path: Path::new("/a.xodr").into(),
-                content: None,
+                content: Reading::Absent,
             },
         ],
         racy: true,
         counts: [1, 2, 3],
         why: vec!["xodrBundle: it died".to_owned()],
-        xqar: PathBuf::from("/out/a.xosc.xqar"),
+        xqar: Some(PathBuf::from("/out/a.xosc.xqar")),
     }
 }
 
@@ -86,7 +86,10 @@ fn what_was_written_is_remembered() {
     assert_eq!(all.len(), 1);
     assert_eq!(all[0].judged, *expected);
     assert_eq!(all[0].written, Some(FileMark("7 8 9".to_owned())));
-    assert_eq!(all[0].delivered, [("json".to_owned(), JobId(5))]);
+    assert_eq!(
+        all[0].delivered,
+        [("json".to_owned(), Reported::Of(JobId(5)))]
+    );
     let reporters = vec!["json".to_owned(), "text".to_owned()];
     let gone = path.clone();
     journal
@@ -135,7 +138,9 @@ fn a_journal_of_schema_1_opens_and_its_stamps_fit_nothing() {
         .execute_batch(
             "ALTER TABLE files RENAME COLUMN jury TO bundles; \
              ALTER TABLE files DROP COLUMN epoch; ALTER TABLE files DROP COLUMN written; \
-             UPDATE files SET bundles = 'ffffffffffffffff'; PRAGMA user_version = 1",
+             UPDATE files SET bundles = 'ffffffffffffffff'; \
+             INSERT INTO deliveries VALUES ('/a.xosc', 'json', 5), ('/a.xosc', 'text', 0); \
+             PRAGMA user_version = 1",
         )
         .unwrap();
     drop(journal);
@@ -144,7 +149,7 @@ fn a_journal_of_schema_1_opens_and_its_stamps_fit_nothing() {
         .remembered()
         .unwrap();
     assert_eq!(all.len(), 1);
-    let (stamp, known) = all[0].judged.inputs[0].content.unwrap();
+    let (stamp, known) = all[0].judged.inputs[0].content.read().unwrap();
     assert_eq!((stamp.size, stamp.mtime_ns, stamp.inode), (1, 7, 3));
     assert_eq!(stamp.ctime_ns, 0);
     assert_eq!(known, digest);
@@ -152,6 +157,44 @@ fn a_journal_of_schema_1_opens_and_its_stamps_fit_nothing() {
     assert_eq!(all[0].judged.basis, written.basis);
     assert_eq!(*all[0].judged.jury, Jury::unknown());
     assert_eq!(all[0].written, None);
+    let json = ("json".to_owned(), Reported::Of(JobId(5)));
+    let text = ("text".to_owned(), Reported::OfGone);
+    assert_eq!(all[0].delivered, [json, text]);
+}
+
+#[test]
+fn what_was_not_read_and_what_has_no_result_are_remembered_so() {
+    let path: Arc<Path> = Path::new("/a.xosc").into();
+    let mut expected = judged(5);
+    expected.xqar = None;
+    let stamp = expected.inputs[0].content.stamp().unwrap();
+    expected.inputs[1].content = Reading::Unread(stamp);
+    let entry = |judged: Judged| Entry::Judged {
+        path: path.clone(),
+        judged: Arc::new(judged),
+        history: None,
+        written: None,
+    };
+    let mut journal = Journal::in_memory().unwrap();
+    journal.write(&[entry(expected.clone())]).unwrap();
+    assert_eq!(journal.remembered().unwrap()[0].judged, expected);
+    // It goes, and is there again before the report was taken back.
+    let gone = Entry::Withdrawn {
+        path: path.clone(),
+        reporters: vec!["text".to_owned()],
+    };
+    journal.write(&[gone]).unwrap();
+    assert_eq!(journal.voids().unwrap()[0].xqar, None);
+    journal.write(&[entry(expected)]).unwrap();
+    let text = ("text".to_owned(), Reported::OfGone);
+    assert_eq!(journal.remembered().unwrap()[0].delivered, [text]);
+    // As the schemas before wrote it.
+    let zeros = Digest([0; 32]);
+    let inputs = format!("[[\"/a.xosc\",[1,7,3,\"{zeros}\",9]]]");
+    let update = "UPDATE files SET inputs = ?1";
+    journal.connection.execute(update, params![inputs]).unwrap();
+    let read = journal.remembered().unwrap()[0].judged.inputs[0].content;
+    assert!(matches!(read, Reading::Unread(_)), "{read:?}");
 }
 
 #[test]

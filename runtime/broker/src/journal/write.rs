@@ -2,13 +2,12 @@
 
 use std::path::Path;
 
-use qcbus_messages::JobId;
 use qcbus_messages::path_text::to_text as text;
 use rusqlite::{Transaction, params};
 
 use super::rows::{inputs_to_text, jury_to_text, millis, signed};
 use super::{Entry, History};
-use crate::core::{Judged, Member};
+use crate::core::{Judged, Member, Reported};
 use crate::disk::FileMark;
 
 pub(super) fn put(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> {
@@ -44,7 +43,7 @@ pub(super) fn put(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Res
             reporter,
             job,
         } => {
-            deliver(transaction, &text(path), reporter, *job)?;
+            deliver(transaction, &text(path), reporter, Reported::Of(*job))?;
         }
     }
     Ok(())
@@ -66,7 +65,7 @@ fn withdraw(
     transaction.execute("DELETE FROM files WHERE path = ?1", params![path])?;
     transaction.execute("DELETE FROM deliveries WHERE path = ?1", params![path])?;
     for reporter in reporters {
-        deliver(transaction, path, reporter, JobId(0))?;
+        deliver(transaction, path, reporter, Reported::OfGone)?;
     }
     Ok(())
 }
@@ -81,18 +80,18 @@ fn put_gone(
         "INSERT OR REPLACE INTO gone (path, xqar) VALUES (?1, ?2)",
         params![path, xqar],
     )?;
-    deliver(transaction, path, reporter, JobId(0))
+    deliver(transaction, path, reporter, Reported::OfGone)
 }
 
 /// A reporter has taken back what it said. Once all have, nobody asks where the result lay.
 fn voided(transaction: &Transaction<'_>, path: &str, reporter: &str) -> rusqlite::Result<()> {
     transaction.execute(
-        "DELETE FROM deliveries WHERE path = ?1 AND reporter = ?2 AND job = 0",
+        "DELETE FROM deliveries WHERE path = ?1 AND reporter = ?2 AND job IS NULL",
         params![path, reporter],
     )?;
     transaction.execute(
         "DELETE FROM gone WHERE path = ?1 AND path NOT IN \
-         (SELECT path FROM deliveries WHERE path = ?1 AND job = 0)",
+         (SELECT path FROM deliveries WHERE path = ?1 AND job IS NULL)",
         params![path],
     )?;
     Ok(())
@@ -102,14 +101,16 @@ fn deliver(
     transaction: &Transaction<'_>,
     path: &str,
     reporter: &str,
-    job: JobId,
+    reported: Reported,
 ) -> rusqlite::Result<()> {
     let mut statement = transaction.prepare_cached(
         "INSERT OR REPLACE INTO deliveries (path, reporter, job) VALUES (?1, ?2, ?3)",
     )?;
-    statement
-        .execute(params![path, reporter, signed(job.0)])
-        .map(|_| ())
+    let job = match reported {
+        Reported::Of(job) => Some(signed(job.0)),
+        Reported::OfGone => None,
+    };
+    statement.execute(params![path, reporter, job]).map(|_| ())
 }
 
 fn put_file(
@@ -137,7 +138,7 @@ fn put_file(
         signed(judged.counts[1]),
         signed(judged.counts[2]),
         serde_json::to_string(&judged.why).unwrap_or_default(),
-        text(&judged.xqar),
+        judged.xqar.as_deref().map(text).unwrap_or_default(),
         inputs_to_text(&judged.inputs),
         judged.racy,
         millis(),

@@ -104,7 +104,7 @@ impl Store {
         let _ = self.withdraw(&job.path, &[]);
         judged.verdict = Verdict::Undetermined;
         judged.why.insert(0, failed.what);
-        judged.xqar = PathBuf::new();
+        judged.xqar = None;
         StoreOutcome::Stored(Box::new(judged))
     }
 
@@ -144,10 +144,11 @@ impl Store {
         judged: &Judged,
     ) -> Result<Option<FileMark>, Unwritten> {
         let text = xqar::write(&pooled.results, self.dialect);
-        let result = (&*judged.xqar, text.as_bytes());
+        let xqar = self.places.xqar(&job.path);
+        let result = (&*xqar, text.as_bytes());
         if !self.verdict_files {
             let written = write_whole(result.0, result.1, self.durable);
-            written.map_err(|error| unwritten(&judged.xqar, &error))?;
+            written.map_err(|error| unwritten(&xqar, &error))?;
             return Ok(None);
         }
         let outside = self.gate.as_ref().map(|gate| gate.outside(&judged.inputs));
@@ -301,7 +302,7 @@ fn judged(
             pooled.counts.information,
         ],
         why,
-        xqar,
+        xqar: Some(xqar),
     }
 }
 

@@ -65,7 +65,7 @@ impl Store {
                 fallen.push((row, fall));
                 continue;
             }
-            owned.insert(row.judged.xqar.clone());
+            owned.extend(row.judged.xqar.clone());
             // What cannot be looked at now says nothing: its result is kept.
             let lookable = stamp_of(&row.path);
             let as_read = found.as_read(&row.judged, lookable.as_ref().ok());
@@ -90,13 +90,14 @@ impl Store {
             return Some(Fall::Unwatched);
         }
         // One that could not be written anywhere is tried anew.
-        if judged.xqar != self.places.xqar(path) {
+        let xqar = judged.xqar.as_deref();
+        let Some(xqar) = xqar.filter(|it| *it == self.places.xqar(path)) else {
             return Some(Fall::Moved);
-        }
+        };
         let now = FileMark::at(&self.places.verdict(path));
         // What older versions have written has no mark.
         let same = now.is_some() && (row.written.is_none() || row.written == now);
-        (!same || !judged.xqar.exists()).then_some(Fall::Incomplete)
+        (!same || !xqar.exists()).then_some(Fall::Incomplete)
     }
 
     /// Removes results, and records that they are gone and who is to take back reports.
@@ -110,10 +111,11 @@ impl Store {
         let mut entries = Vec::new();
         let mut by_reason: BTreeMap<Fall, Vec<Arc<Path>>> = BTreeMap::new();
         for (row, fall) in fallen {
-            let xqar = &row.judged.xqar;
             // By now the result of another file may lie there.
-            let mine = !xqar.as_os_str().is_empty() && !owned.contains(xqar);
-            if let Some(error) = mine.then(|| remove_result(xqar).err()).flatten() {
+            let xqar = row.judged.xqar.as_ref();
+            let xqar = xqar.filter(|xqar| !owned.contains(*xqar));
+            let mine = xqar.is_some();
+            if let Some(error) = xqar.and_then(|xqar| remove_result(xqar).err()) {
                 found.cannot_withdraw(&row.path, &error);
                 continue;
             }
@@ -207,7 +209,7 @@ impl Reconciled {
                     .entry(input.path.clone())
                     .or_insert_with(|| stamp_through_links(&input.path)),
             };
-            let read = input.content.map(|content| content.0);
+            let read = input.content.stamp();
             same &= now == read || self.has_same_bytes(input, now);
         }
         same
@@ -215,7 +217,7 @@ impl Reconciled {
 
     /// Another link to a file, or other rights, make no other bytes of it.
     fn has_same_bytes(&mut self, input: &Input, now: Option<Stamp>) -> bool {
-        let (Some((read, digest)), Some(now)) = (input.content, now) else {
+        let (Some((read, digest)), Some(now)) = (input.content.read(), now) else {
             return false;
         };
         let key = (input.path.clone(), digest);

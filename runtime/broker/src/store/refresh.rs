@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use qcbus_messages::Digest;
 
-use crate::core::{FinishedJob, Input};
+use crate::core::{FinishedJob, Input, Reading};
 use crate::stamp::stamp_through_links;
 
 /// Whether everything that the verdict depends on is what it was when it was read. Stamps that
@@ -30,8 +30,8 @@ pub(super) fn refresh(job: &mut FinishedJob) -> bool {
 /// The input with its present stamp, if it still has the bytes that were read.
 pub(super) fn as_it_is(input: &Input) -> Option<Input> {
     let now = stamp_through_links(&input.path);
-    let Some((read, digest)) = input.content else {
-        return now.is_none().then(|| input.clone());
+    let Some((read, digest)) = input.content.read() else {
+        return (now == input.content.stamp()).then(|| input.clone());
     };
     let now = now?;
     let same = now == read
@@ -39,7 +39,7 @@ pub(super) fn as_it_is(input: &Input) -> Option<Input> {
             && std::fs::read(&input.path).is_ok_and(|bytes| digest_of(&bytes) == digest));
     same.then(|| Input {
         path: input.path.clone(),
-        content: Some((now, digest)),
+        content: Reading::Read(now, digest),
     })
 }
 
@@ -70,7 +70,7 @@ mod tests {
         let read = stamp().unwrap();
         let input = Input {
             path: path.as_path().into(),
-            content: Some((read, digest_of(b"one"))),
+            content: Reading::Read(read, digest_of(b"one")),
         };
         assert_eq!(as_it_is(&input), Some(input.clone()));
 
@@ -83,7 +83,7 @@ mod tests {
         });
         let linked = { linked }.find(|it| *it != read).unwrap();
         let now = as_it_is(&input).unwrap();
-        assert_eq!(now.content, Some((linked, digest_of(b"one"))));
+        assert_eq!(now.content, Reading::Read(linked, digest_of(b"one")));
 
         // Other bytes of the same size, with the time put back.
         rewrite(&path, b"two");
@@ -93,7 +93,7 @@ mod tests {
         std::fs::remove_file(&path).unwrap();
         assert_eq!(as_it_is(&input), None);
         let absent = Input {
-            content: None,
+            content: Reading::Absent,
             ..input
         };
         assert_eq!(as_it_is(&absent), Some(absent.clone()));

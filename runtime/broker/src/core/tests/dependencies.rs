@@ -45,7 +45,7 @@ fn a_dependency_that_is_looked_for_and_comes_later_has_its_file_judged_again() {
     world.join("First");
     world.write(2);
     world.settle();
-    assert_eq!(world.judged[&2].0[1].content, None);
+    assert_eq!(world.judged[&2].0[1].content, Reading::Absent);
     world.write(6);
     world.settle();
     assert_eq!(world.judged[&2].0, world.inputs(2));

@@ -16,10 +16,10 @@ impl World {
         }
         let (job, file) = self.preparing.remove(usize::from(n) % self.preparing.len());
         let inputs = self.inputs(file);
-        let result = match inputs[0].content {
+        let result = match inputs[0].digest() {
             None => Err(PrepareFailure::Vanished),
             Some(_) if !room => Err(PrepareFailure::NoRoom("full".to_owned())),
-            Some((_, digest)) => {
+            Some(digest) => {
                 let document = JobDocument {
                     doc: DocId(job.0),
                     role: DocumentRole::Root,
@@ -93,7 +93,7 @@ impl World {
                 racy: false,
                 counts: [0; 3],
                 why: Vec::new(),
-                xqar: "/out".into(),
+                xqar: Some("/out".into()),
             };
             self.must_be_earned(&judged);
             self.journal.insert(file, judged.clone());

@@ -167,9 +167,9 @@ impl World {
     }
 
     /// What the journal says that the reporter has of a file.
-    pub fn delivered(&self, file: u8) -> Vec<(String, JobId)> {
+    pub fn delivered(&self, file: u8) -> Vec<(String, Reported)> {
         let job = self.desk.delivered.get(&file);
-        job.map(|job| (REPORTER.to_owned(), *job))
+        job.map(|job| (REPORTER.to_owned(), Reported::Of(*job)))
             .into_iter()
             .collect()
     }

@@ -88,7 +88,7 @@ pub fn digest(number: u64) -> Digest {
 pub fn basis(inputs: &[Input]) -> Digest {
     let mut basis = Digest::default();
     for (at, input) in inputs.iter().enumerate() {
-        if let Some((_, digest)) = input.content {
+        if let Some(digest) = input.digest() {
             basis.0[at * 8..][..8].copy_from_slice(&digest.0[..8]);
         }
     }

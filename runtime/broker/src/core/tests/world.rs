@@ -323,7 +323,9 @@ impl World {
         let path = path_of(file);
         let number = self.there.get(&path);
         Input {
-            content: number.map(|it| (stamp(*it), digest(self.contents[it]))),
+            content: number.map_or(Reading::Absent, |it| {
+                Reading::Read(stamp(*it), digest(self.contents[it]))
+            }),
             path,
         }
     }
