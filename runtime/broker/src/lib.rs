@@ -26,6 +26,8 @@ mod store;
 mod supervise;
 mod verdict_file;
 pub mod watch;
+#[cfg(test)]
+mod writer_tests;
 mod writers;
 
 pub use core::{ChildSpec, Delivery, Judged, Notice, Restart, Settings};
