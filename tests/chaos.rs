@@ -1,7 +1,7 @@
 //! Chaos: whatever dies, every file gets exactly one complete verdict for its exact bytes.
 //!
 //! `QCBUS_CHAOS_SECONDS` makes the storm longer (20 by default), `QCBUS_CHAOS_SEED` brings one
-//! back, `QCBUS_MANY_FILES` sets how many files are dropped at once (2,000 by default).
+//! back, `QCBUS_MANY_FILES` sets how many files are dropped at once (1,500 by default).
 
 #![allow(
     clippy::unwrap_used,
@@ -78,7 +78,7 @@ fn a_broker_killed_under_load_loses_nothing_and_doubles_nothing() {
 
 #[test]
 fn memory_does_not_follow_the_number_of_files() {
-    let many = number_from("QCBUS_MANY_FILES", 2000);
+    let many = number_from("QCBUS_MANY_FILES", 1500);
     let (few_kib, few) = (peak_with(many / 5), many / 5);
     let many_kib = peak_with(many);
     report(&format!(

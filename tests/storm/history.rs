@@ -167,9 +167,9 @@ impl Drop for Watchers {
 }
 
 /// How often the results and the gate are looked through.
-const LOOK: Duration = Duration::from_millis(5);
+const LOOK: Duration = Duration::from_millis(10);
 /// Every so many looks the broker is asked what it has to say.
-const ASK_STATUS: u32 = 20;
+const ASK_STATUS: u32 = 10;
 
 /// Files seen before, by what would be different had they changed.
 type Marks = BTreeMap<PathBuf, (u64, i64, i64, u64)>;
