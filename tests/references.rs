@@ -270,7 +270,7 @@ fn what_a_scenario_refers_to_counts() {
     let said = desk.qcbus(&["check", "scenarios", "--out", "out"]);
     assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
     for case in &cases {
-        let name = format!("{}.xosc", case.name);
+        let name = format!("scenarios/{}.xosc", case.name);
         let line = format!("{}: {name}: ", case.verdict);
         assert!(said.stdout.contains(&line), "{line}\n{}", said.whole(&desk));
         let results = desk.result(&format!("out/{name}.xqar"));

@@ -131,8 +131,8 @@ fn hangs_after_hello() {
     });
     assert_eq!(
         farm.verdict("0.xodr").verdict,
-        Verdict::Accepted,
-        "it was never demanded"
+        Verdict::Undetermined,
+        "its manifest demands it"
     );
 }
 
@@ -209,8 +209,8 @@ fn another_protocol_is_refused_with_both_versions() {
     until_so("it is said", || notices(&farm).contains("speaks protocol"));
     assert_eq!(
         farm.verdict("0.xodr").verdict,
-        Verdict::Accepted,
-        "it never took part"
+        Verdict::Undetermined,
+        "its manifest demands it"
     );
 }
 

@@ -128,16 +128,32 @@ impl State {
         self.drain_peer(name, actions);
     }
 
-    /// A child has said hello.
-    pub(super) fn child_joined(&mut self, name: &str, launch: Option<Launch>) {
+    /// A child has said hello. One that a former broker started may be of another version than the
+    /// manifest says by now: then it goes on until a newer one has joined.
+    pub(super) fn child_joined(&mut self, name: &str, launch: Option<Launch>, version: &str) {
+        let (now, first) = (self.now, self.first_launch());
         let Some(child) = self.children.get_mut(name) else {
             return;
         };
         if launch.is_some_and(|launch| child.is_upgraded_by(launch)) {
             child.upgrade = None;
         }
+        let adopted = launch.is_some_and(|launch| launch < first);
+        let outdated = child
+            .spec
+            .version
+            .as_ref()
+            .is_some_and(|wanted| wanted != version);
+        if adopted && outdated && child.upgrade.is_none() {
+            child.upgrade = Some(Upgrade::Due(now));
+        }
         child.state = ChildState::Joined;
         child.stuck = None;
+    }
+
+    /// The first launch of this generation: those before it were of former brokers.
+    fn first_launch(&self) -> Launch {
+        Launch(self.settings.generation << 20)
     }
 
     /// A child has left as it was told, or of its own will.

@@ -136,3 +136,25 @@ fn a_bundle_that_joined_by_hand_must_judge_after_a_restart() {
     }
     assert_eq!(world.judged[&0].1, Verdict::Accepted);
 }
+
+#[test]
+fn a_manifest_that_changed_while_no_broker_ran_is_carried_out() {
+    let mut world = World::new();
+    world.manifest(Some(1));
+    world.pass(Duration::ZERO);
+    world.child_joins();
+    world.write(0);
+    world.settle();
+    world.manifest = false;
+    world.restart();
+    world.manifest(Some(2));
+    world.launched.clear();
+    // The process of the former broker has outlived it, and joins the next.
+    world.versions.insert(CHILD, 1);
+    world.child_of_a_former_broker_joins(7);
+    assert_eq!(child_version(&world), "1");
+    world.versions.insert(CHILD, 2);
+    world.pass(Duration::from_secs(1));
+    world.child_joins();
+    assert_eq!(child_version(&world), "2");
+}

@@ -30,6 +30,11 @@ impl World {
         }
     }
 
+    /// One that a former broker started, under this number, has outlived it.
+    pub fn child_of_a_former_broker_joins(&mut self, launch: u64) {
+        self.join_as(CHILD, Some(launch));
+    }
+
     fn join_as(&mut self, name: &'static str, launch: Option<u64>) {
         let version = *self.versions.entry(name).or_insert(1);
         self.sessions += 1;
