@@ -10,6 +10,7 @@ use qcbus_messages::{FromPeer, Hello, JobId, PROTOCOL_VERSION, Role, ToPeer, Ver
 use super::*;
 use crate::InForce;
 
+mod acts;
 mod behind_the_gate;
 mod children;
 mod dependencies;

@@ -86,10 +86,8 @@ fn what_was_written_is_remembered() {
     assert_eq!(all.len(), 1);
     assert_eq!(all[0].judged, *expected);
     assert_eq!(all[0].written, Some(FileMark("7 8 9".to_owned())));
-    assert_eq!(
-        all[0].delivered,
-        [("json".to_owned(), Reported::Of(JobId(5)))]
-    );
+    let json = ("json".to_owned(), Reported::Of(JobId(5)));
+    assert_eq!(all[0].delivered, [json]);
     let reporters = vec!["json".to_owned(), "text".to_owned()];
     let gone = path.clone();
     journal

@@ -7,10 +7,9 @@ use std::time::Duration;
 
 use super::super::*;
 use super::behind_the_gate::Published;
-use super::reporting::{Desk, REPORTER};
+use super::reporting::Desk;
 use super::things::*;
-use qcbus_messages::control::Response;
-use qcbus_messages::{JobId, Role, ToPeer, Verdict};
+use qcbus_messages::{JobId, Verdict};
 
 /// A world around the state machine: it answers actions when it pleases.
 pub struct World {
@@ -113,140 +112,6 @@ impl World {
             self.act(action);
         }
         self.gate_must_be_true();
-    }
-
-    pub fn act(&mut self, action: Action) {
-        match action {
-            Action::Prepare { job, path } => self.preparing.push((job, file_of(&path))),
-            Action::Release { job } => {
-                self.released.insert(job);
-            }
-            Action::Send {
-                session,
-                message: ToPeer::Job(job),
-            } => {
-                let bundle = self
-                    .peers
-                    .get_mut(&session)
-                    .expect("no job goes to a closed session");
-                assert!(
-                    bundle.jobs.insert(job.job),
-                    "a job is given out once per session"
-                );
-                assert!(bundle.jobs.len() <= CAPACITY, "the credit window is kept");
-            }
-            Action::Send {
-                session,
-                message: ToPeer::Cancel { job },
-            } => {
-                if let Some(bundle) = self.peers.get_mut(&session) {
-                    bundle.jobs.remove(&job);
-                }
-            }
-            Action::Send {
-                session,
-                message: ToPeer::Drain,
-            } => {
-                if let Some(bundle) = self.peers.get_mut(&session) {
-                    bundle.drained = true;
-                }
-            }
-            Action::Disconnect { session } | Action::Refuse { session, .. } => {
-                self.peers.remove(&session);
-            }
-            Action::Spawn { launch, spec } => {
-                let bundle = spec.role == Role::Bundle;
-                self.launched
-                    .push((launch, if bundle { CHILD } else { REPORTER }));
-            }
-            Action::Kill { launch, .. } => {
-                self.killed.extend(launch);
-                self.launched.retain(|(it, _)| Some(*it) != launch);
-            }
-            Action::Enrol(member) => {
-                self.members.insert(member.name.clone(), member);
-            }
-            Action::Strike { name } => {
-                self.members.remove(&name);
-            }
-            Action::Restamp { path, judged } => {
-                self.journal.insert(file_of(&path), (*judged).clone());
-            }
-            Action::Store(job) => {
-                let names: BTreeSet<_> =
-                    job.bundles.iter().map(|it| it.said.name.clone()).collect();
-                assert_eq!(
-                    names.len(),
-                    job.bundles.len(),
-                    "no bundle is in a result twice"
-                );
-                for bundle in job.bundles.iter().filter(|it| it.catalogue.is_some()) {
-                    assert_eq!(
-                        bundle.said.checkers.len(),
-                        2,
-                        "every demanded checker is there"
-                    );
-                    let mut checkers = bundle.said.checkers.iter();
-                    assert!(
-                        checkers.all(|it| it.issues.len() <= 2),
-                        "what a session said that has ended counts for nothing"
-                    );
-                }
-                self.storing.push(*job);
-            }
-            Action::Judged {
-                path,
-                judged,
-                fresh,
-            } => {
-                // One that others must judge by now may be heard of late, where it is on its way.
-                if !fresh || judged.epoch == self.state.epoch() {
-                    self.must_be_earned(&judged);
-                }
-                let known = self.journal.get(&file_of(&path)).map(|it| it.job);
-                assert_eq!(
-                    known,
-                    Some(judged.job),
-                    "nothing is told before it is stored"
-                );
-                let verdict = (judged.inputs.clone(), judged.verdict);
-                self.judged.insert(file_of(&path), verdict);
-            }
-            Action::Answer { ticket, response } => {
-                let file = self.waiting.remove(&ticket).expect("one answer for each");
-                let until = self.until.remove(&ticket);
-                if response == Response::TimedOut {
-                    assert!(until.is_some_and(|until| until <= self.now), "not too soon");
-                }
-                if matches!(response, Response::Verdict(_)) {
-                    let judged = self.verdict_on(file);
-                    self.must_be_earned(&judged);
-                    let told = self.state.inputs_of(&path_of(file));
-                    assert_eq!(told, self.inputs(file), "the answer is true at that moment");
-                }
-            }
-            Action::Withdraw { path, .. } => {
-                self.journal.remove(&file_of(&path));
-                self.judged.remove(&file_of(&path));
-            }
-            Action::Stop => self.stopped += 1,
-            _ => {}
-        }
-    }
-
-    fn verdict_on(&self, file: u8) -> Arc<Judged> {
-        let id = self.state.files.id(&path_of(file)).unwrap();
-        let entry = self.state.files.get(id).unwrap();
-        entry.judged.clone().unwrap()
-    }
-
-    /// Nothing is accepted, and nobody is told so, unless all judged who must at this moment.
-    pub fn must_be_earned(&self, judged: &Judged) {
-        if judged.verdict == Verdict::Accepted {
-            assert_eq!(named(&judged.jury), self.expected_jury());
-        }
-        let config = digest(self.reconfigured.into());
-        assert_eq!(judged.config, config, "of the configuration in force");
     }
 
     /// Who must judge, each as what it is.
