@@ -8,6 +8,8 @@
 
 #[path = "house/documents.rs"]
 mod documents;
+#[path = "house/sizes.rs"]
+mod sizes;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
