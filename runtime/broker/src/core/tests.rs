@@ -18,6 +18,7 @@ mod membership;
 mod processes;
 mod reporting;
 mod things;
+mod words;
 mod world;
 
 use things::*;
