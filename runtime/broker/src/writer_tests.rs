@@ -9,7 +9,7 @@ use qcbus_document::FileKind;
 use qcbus_formats::xqar::Dialect;
 use qcbus_messages::{Digest, JobId};
 
-use crate::core::{Epoch, FinishedJob, Input, Jury, PreparedJob, StoreOutcome};
+use crate::core::{Epoch, FinishedJob, Input, Jury, PreparedJob, Reading, StoreOutcome};
 use crate::journal::Journal;
 use crate::result_paths::ResultPaths;
 use crate::stamp::stamp_through_links;
@@ -38,7 +38,7 @@ fn finished(dir: &Path, epoch: u64) -> FinishedJob {
     std::fs::write(&path, bytes).unwrap();
     let input = Input {
         path: path.clone(),
-        content: Some((stamp_through_links(&path).unwrap(), digest_of(bytes))),
+        content: Reading::Read(stamp_through_links(&path).unwrap(), digest_of(bytes)),
     };
     let prepared = PreparedJob {
         inputs: vec![input],
