@@ -170,6 +170,7 @@ fn a_bundle_that_only_the_configuration_names_is_missed_at_once() {
     world.until_judged(1);
     assert_eq!(world.judged[&0].1, Verdict::Accepted);
     world.reconfigured = 1;
+    world.demanded.insert("Second".to_owned(), None);
     let event = Event::Configured {
         digest: digest(1),
         demand: Arc::new(Naming("Second")),
