@@ -56,6 +56,8 @@ pub struct FileEntry {
     pub not_before: Duration,
     /// The verdict on some bytes, not always the present ones.
     pub judged: Option<Arc<Judged>>,
+    /// What else was read with it, or looked for, the last time; also where no verdict came of it.
+    depends_on: Vec<Arc<Path>>,
     /// What reporters have said of it, by index into the reporters' table.
     pub delivered: Vec<(u32, Reported)>,
 }
@@ -156,6 +158,7 @@ impl Files {
                 shut: false,
                 not_before: Duration::ZERO,
                 judged: None,
+                depends_on: Vec::new(),
                 delivered: Vec::new(),
             },
         );
@@ -164,13 +167,10 @@ impl Files {
 
     /// Forgets a file for good.
     pub fn remove(&mut self, id: FileId) {
-        self.set_dependencies(id, &[], &[]);
+        self.set_dependencies(id, Vec::new());
         self.set_stage(id, Stage::Idle);
         if let Some(entry) = self.entries.remove(&id) {
             self.counts.idle -= 1;
-            for input in entry.judged.iter().flat_map(|judged| &judged.inputs) {
-                self.forget_dependent(&input.path, id);
-            }
             if self.by_path.get(&entry.path) == Some(&id) {
                 self.by_path.remove(&entry.path);
             }
@@ -266,13 +266,17 @@ impl Files {
     }
 
     /// Remembers what a file depends on, so that [`Files::dependents`] finds it.
-    pub fn set_dependencies(&mut self, id: FileId, old: &[Arc<Path>], new: &[Arc<Path>]) {
+    pub fn set_dependencies(&mut self, id: FileId, new: Vec<Arc<Path>>) {
+        let Some(entry) = self.entries.get_mut(&id) else {
+            return;
+        };
+        let old = std::mem::replace(&mut entry.depends_on, new.clone());
         for path in old {
-            self.forget_dependent(path, id);
+            self.forget_dependent(&path, id);
         }
         for path in new {
-            self.forgotten.remove(path);
-            let ids = self.dependents.entry(path.clone()).or_default();
+            self.forgotten.remove(&path);
+            let ids = self.dependents.entry(path).or_default();
             if !ids.contains(&id) {
                 ids.push(id);
             }

@@ -237,12 +237,7 @@ impl State {
             return;
         }
         let old = entry.judged.clone();
-        self.depend(
-            file,
-            old.as_deref().map_or(&[], |it| &it.inputs),
-            &prepared.inputs,
-            actions,
-        );
+        self.depend(file, &prepared.inputs, actions);
         let same = |judged: &Judged| judged.basis == prepared.basis;
         match old {
             Some(judged) if same(&judged) && self.stands(kind, &judged) => {
@@ -293,13 +288,10 @@ impl State {
         });
     }
 
-    fn depend(&mut self, file: FileId, old: &[Input], inputs: &[Input], actions: &mut Actions) {
-        let others = |inputs: &[Input]| -> Vec<Arc<Path>> {
-            let others = inputs.iter().skip(1);
-            others.map(|input| input.path.clone()).collect()
-        };
-        let new = others(inputs);
-        self.files.set_dependencies(file, &others(old), &new);
+    fn depend(&mut self, file: FileId, inputs: &[Input], actions: &mut Actions) {
+        let others = inputs.iter().skip(1);
+        let new: Vec<Arc<Path>> = others.map(|input| input.path.clone()).collect();
+        self.files.set_dependencies(file, new.clone());
         self.forget_dependencies(actions);
         if !new.is_empty() {
             let stamps = inputs.iter().skip(1);

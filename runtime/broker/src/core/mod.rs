@@ -162,7 +162,7 @@ impl State {
             .skip(1)
             .map(|input| input.path.clone())
             .collect();
-        self.files.set_dependencies(id, &[], &paths);
+        self.files.set_dependencies(id, paths);
         if let Some(entry) = self.files.get_mut(id) {
             entry.present = false;
             entry.judged = Some(Arc::new(judged));

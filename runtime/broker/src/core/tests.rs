@@ -19,6 +19,7 @@ mod membership;
 mod processes;
 mod reporting;
 mod things;
+mod words;
 mod world;
 
 use things::*;
@@ -221,6 +222,11 @@ impl World {
         assert_eq!(self.desk.reports, newest, "the reporter has every result");
         assert_eq!(self.desk.delivered, newest, "and the journal knows");
         assert_eq!(self.desk.voids, BTreeSet::new());
+        let judged = self.judged.keys();
+        let needed: BTreeSet<u8> = judged
+            .flat_map(|file| dependencies_of(*file).iter().copied())
+            .collect();
+        assert_eq!(self.watched, needed, "what verdicts depend on is watched");
         let members = self.members.iter();
         let members: BTreeMap<String, Option<u8>> = members
             .map(|(name, it)| (name.clone(), it.version.parse().ok()))

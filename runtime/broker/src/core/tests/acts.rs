@@ -50,6 +50,15 @@ impl World {
                 self.journal.remove(&file_of(&path));
                 self.judged.remove(&file_of(&path));
             }
+            Action::Depend { files } => {
+                let files = files.iter().map(|(path, _)| file_of(path));
+                self.watched.extend(files);
+            }
+            Action::Undepend { paths } => {
+                for path in paths {
+                    self.watched.remove(&file_of(&path));
+                }
+            }
             Action::Stop => self.stopped += 1,
             _ => {}
         }
@@ -141,9 +150,15 @@ impl World {
 
     /// Nothing is accepted, and nobody is told so, unless all judged who must at this moment.
     pub fn must_be_earned(&self, judged: &Judged) {
+        let (jury, expected) = (named(&judged.jury), self.expected_jury());
         if judged.verdict == Verdict::Accepted {
-            assert_eq!(named(&judged.jury), self.expected_jury());
+            assert_eq!(jury, expected);
         }
+        // Who was not there has a place in the jury nevertheless.
+        for (juror, must) in jury.iter().zip(&expected) {
+            assert!(juror.0 == must.0 && (juror.1.is_none() || juror.1 == must.1));
+        }
+        assert_eq!(jury.len(), expected.len());
         let config = digest(self.reconfigured.into());
         assert_eq!(judged.config, config, "of the configuration in force");
     }

@@ -106,6 +106,8 @@ fn a_child_that_never_joins_is_waited_for_once() {
     world.answer(0);
     world.store(0, true);
     assert_eq!(world.judged[&0].1, Verdict::Undetermined);
+    let why = &world.failures[&0][0];
+    assert!(!why.contains("bundle remove"), "it has a manifest: {why}");
     // When it comes at last, it judges.
     world.pass(Duration::from_secs(60));
     world.child_joins();
@@ -128,6 +130,8 @@ fn a_bundle_that_joined_by_hand_must_judge_after_a_restart() {
     world.pass(Duration::from_secs(25));
     world.store(0, true);
     assert_eq!(world.judged[&0].1, Verdict::Undetermined);
+    let why = &world.failures[&0][0];
+    assert!(why.contains("qcbus bundle remove Second"), "{why}");
     world.remove("Second");
     for _ in 0..4 {
         world.prepare(0, true);

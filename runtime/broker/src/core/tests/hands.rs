@@ -131,6 +131,10 @@ impl World {
         self.told.clear();
         self.judged.clear();
         self.gate_is_taken_over();
+        let known = self.journal.keys();
+        self.watched = known
+            .flat_map(|file| dependencies_of(*file).iter().copied())
+            .collect();
         for member in self.members.values() {
             self.state.remember_member(member.clone());
         }

@@ -1,5 +1,8 @@
 //! Who must judge: joins, leaves and upgrades while files are at work.
 
+use qcbus_document::FileKind;
+use qcbus_messages::Catalogue;
+
 use super::*;
 
 /// The session of a bundle that is there.
@@ -26,6 +29,12 @@ fn a_file_at_work_while_a_bundle_joins_gets_its_judgement_too() {
     world.write(1);
     world.prepare(0, true);
     world.join("Second");
+    let second = session_of(&world, "Second");
+    assert_eq!(
+        world.peers[&second].jobs.len(),
+        1,
+        "it gets its share at once"
+    );
     world.settle();
     assert_eq!(world.names_that_judged(1), ["First", "Second"]);
 }
@@ -129,4 +138,48 @@ fn a_job_that_is_forgotten_while_others_are_finished_is_noticed() {
         world.pass(Duration::from_secs(5));
         passed += Duration::from_secs(5);
     }
+}
+
+/// A configuration that names a bundle.
+#[derive(Debug)]
+struct Naming(&'static str);
+
+impl Demand for Naming {
+    fn wants_bundle(&self, _: &str, _: &str) -> bool {
+        true
+    }
+
+    fn checkers(&self, _: &str, catalogue: &Catalogue, _: FileKind) -> Vec<u32> {
+        (0..).take(catalogue.checkers.len()).collect()
+    }
+
+    fn named(&self) -> Vec<String> {
+        vec![self.0.to_owned()]
+    }
+
+    fn means(&self, named: &str, name: &str, _: &str) -> bool {
+        named == name
+    }
+}
+
+#[test]
+fn a_bundle_that_only_the_configuration_names_is_missed_at_once() {
+    let mut world = World::new();
+    world.join("First");
+    world.write(0);
+    world.until_judged(1);
+    assert_eq!(world.judged[&0].1, Verdict::Accepted);
+    world.reconfigured = 1;
+    world.demanded.insert("Second".to_owned(), None);
+    let event = Event::Configured {
+        digest: digest(1),
+        demand: Arc::new(Naming("Second")),
+    };
+    world.event(event);
+    world.until_stored(2);
+    assert_eq!(world.judged[&0].1, Verdict::Undetermined);
+    world.join("Second");
+    world.until_stored(3);
+    assert_eq!(world.judged[&0].1, Verdict::Accepted);
+    assert_eq!(world.names_that_judged(0), ["First", "Second"]);
 }

@@ -49,6 +49,8 @@ pub struct World {
     pub until: BTreeMap<Ticket, Duration>,
     /// What writers have done and the state machine has not heard.
     pub told: Vec<((u8, JobId), StoreOutcome)>,
+    /// What is watched because verdicts depend on it.
+    pub watched: BTreeSet<u8>,
     pub gate: Published,
     pub desk: Desk,
     /// Why bundles have failed on each file, as stored.
@@ -96,6 +98,7 @@ impl World {
             waiting: BTreeMap::new(),
             until: BTreeMap::new(),
             told: Vec::new(),
+            watched: BTreeSet::new(),
             gate: Published::new(),
             desk: Desk::default(),
             failures: BTreeMap::new(),
@@ -223,6 +226,20 @@ impl World {
             }
         }
         panic!("{files} are not judged: {:?}", self.judged);
+    }
+
+    /// Lets them work until so many results are stored.
+    pub fn until_stored(&mut self, results: usize) {
+        for _ in 0..100 {
+            if self.stored.len() >= results {
+                return;
+            }
+            self.prepare(0, true);
+            self.answer(0);
+            self.answer(1);
+            self.store(0, true);
+        }
+        panic!("only {:?} are stored", self.stored);
     }
 
     /// Everybody is there and does something.

@@ -1,0 +1,330 @@
+//! What is said, by bundles and to clients, and what comes of it.
+
+use qcbus_messages::control::Response;
+
+use super::*;
+
+/// Everything that comes of an event; the world goes on.
+fn comes_of(world: &mut World, event: Event) -> Vec<Action> {
+    world.state.handle(world.now, event)
+}
+
+fn a_hello(name: &str) -> Hello {
+    Hello {
+        protocol: PROTOCOL_VERSION,
+        role: Role::Bundle,
+        name: name.to_owned(),
+        version: "1".to_owned(),
+        incarnation: 99,
+        pid: 99,
+        launch: None,
+        capacity: 1,
+    }
+}
+
+fn is_refused(actions: &[Action]) -> bool {
+    let refused = actions.iter().any(|it| matches!(it, Action::Refuse { .. }));
+    let accepted = actions.iter().any(|it| matches!(it, Action::Accept { .. }));
+    assert_ne!(refused, accepted);
+    refused
+}
+
+#[test]
+fn who_cannot_take_part_is_turned_away() {
+    let strange = Hello {
+        protocol: PROTOCOL_VERSION + 1,
+        ..a_hello("Mine")
+    };
+    let long = "x".repeat(65);
+    let hellos = [
+        (a_hello("Mine"), false),
+        (a_hello("M1.n-e_"), false),
+        (a_hello(&long[1..]), false),
+        (strange, true),
+        (a_hello(""), true),
+        (a_hello(&long), true),
+        (a_hello("my own"), true),
+        (a_hello("First"), true),
+    ];
+    for (hello, refused) in hellos {
+        let mut world = World::new();
+        world.join("First");
+        let shown = format!("{hello:?}");
+        let session = SessionId(99);
+        let actions = comes_of(&mut world, Event::Hello { session, hello });
+        assert_eq!(is_refused(&actions), refused, "{shown}");
+    }
+}
+
+#[test]
+fn a_process_that_says_hello_again_takes_its_own_place() {
+    let mut world = World::new();
+    world.join("First");
+    let (incarnation, pid) = (
+        world.sessions,
+        u32::try_from(world.sessions).unwrap() + 1000,
+    );
+    for (incarnation, pid) in [(incarnation, 99), (99, pid)] {
+        let hello = Hello {
+            incarnation,
+            pid,
+            ..a_hello("First")
+        };
+        let session = SessionId(99);
+        let actions = world
+            .state
+            .handle(world.now, Event::Hello { session, hello });
+        assert!(!is_refused(&actions));
+        world = World::new();
+        world.join("First");
+    }
+}
+
+#[test]
+fn a_catalogue_that_names_a_checker_twice_is_no_catalogue() {
+    let mut unsound = [catalogue("First"), catalogue("First")];
+    unsound[0].checkers[1].id = unsound[0].checkers[0].id.clone();
+    unsound[1].checkers[0].id = String::new();
+    for catalogue in unsound {
+        let mut world = World::new();
+        world.join("First");
+        let (session, _) = world.peers.first_key_value().unwrap();
+        let session = *session;
+        world.say(session, FromPeer::Catalogue(Box::new(catalogue)));
+        assert!(!world.peers.contains_key(&session));
+    }
+}
+
+#[test]
+fn a_document_is_published_again_for_who_has_its_job() {
+    let mut world = World::new();
+    world.join("First");
+    world.write(0);
+    world.prepare(0, true);
+    let (session, process) = world.peers.first_key_value().unwrap();
+    let (session, job) = (*session, *process.jobs.first().unwrap());
+    for (doc, known) in [(job.0, true), (job.0 + 1, false)] {
+        let doc = qcbus_messages::DocId(doc);
+        let message = FromPeer::NeedDocument { doc };
+        let actions = comes_of(&mut world, Event::Message { session, message });
+        let again = |it: &Action| matches!(it, Action::PublishAgain { job: of, doc: it } if (*of, *it) == (job, doc));
+        assert_eq!(actions.iter().any(again), known, "{actions:?}");
+    }
+}
+
+#[test]
+fn what_is_no_message_ends_a_session() {
+    let mut world = World::new();
+    world.join("First");
+    let (session, _) = world.peers.first_key_value().unwrap();
+    let known = *session;
+    for session in [known, SessionId(99)] {
+        let what = "noise".to_owned();
+        let actions = comes_of(&mut world, Event::Garbage { session, what });
+        let closed =
+            |it: &Action| matches!(it, Action::Disconnect { session: it } if *it == session);
+        assert!(actions.iter().any(closed), "{actions:?}");
+    }
+    assert!(world.state.bundles["First"].session.is_none());
+    assert!(
+        world.state.bundles["First"].origin.is_some(),
+        "it must judge"
+    );
+}
+
+#[test]
+fn a_file_that_cannot_be_read_is_undetermined() {
+    let mut world = World::new();
+    world.join("First");
+    world.write(0);
+    let (job, _) = world.preparing.remove(0);
+    let failure = PrepareFailure::Unreadable("it is a directory".to_owned());
+    let result = Err(failure);
+    world.event(Event::Prepared { job, result });
+    let finished = &world.storing[0];
+    assert_eq!(finished.unreadable.as_deref(), Some("it is a directory"));
+    assert!(finished.prepared.is_none(), "there is nothing to refer to");
+    assert_eq!(named(&finished.jury), world.expected_jury());
+    let failure = finished.bundles[0].failure.as_deref();
+    assert_eq!(failure, Some("it is a directory"));
+}
+
+#[test]
+fn a_file_without_room_on_the_bus_is_tried_again_after_a_pause() {
+    let failures = [
+        PrepareFailure::Busy,
+        PrepareFailure::NoRoom("full".to_owned()),
+    ];
+    for failure in failures {
+        let mut world = World::new();
+        world.join("First");
+        world.write(0);
+        let (job, _) = world.preparing.remove(0);
+        let pause = match failure {
+            PrepareFailure::Busy => world.state.settings.busy_pause,
+            _ => world.state.settings.retry_after,
+        };
+        let result = Err(failure);
+        world.event(Event::Prepared { job, result });
+        let moment = Duration::from_millis(1);
+        world.pass(pause - moment);
+        assert!(world.preparing.is_empty(), "not yet");
+        world.pass(moment);
+        assert_eq!(world.preparing.len(), 1);
+    }
+}
+
+#[test]
+fn more_findings_than_a_checker_may_report_are_no_judgement() {
+    let mut world = World::new();
+    world.state.settings.max_issues = 1;
+    world.join("First");
+    for (file, findings, completed) in [(0, 1, true), (4, 2, false)] {
+        world.write(file);
+        world.prepare(0, true);
+        world.answer(findings);
+        let finished = world.storing.pop().unwrap();
+        for checker in &finished.bundles[0].said.checkers {
+            assert_eq!(checker.issues.len(), 1);
+            let ending = checker.ending.as_ref().unwrap();
+            let is_completed = *ending == qcbus_formats::pool::Ending::Completed;
+            assert_eq!(is_completed, completed, "{ending:?}");
+        }
+    }
+}
+
+fn answer(action: &Action) -> Option<&Response> {
+    match action {
+        Action::Answer { response, .. } => Some(response),
+        _ => None,
+    }
+}
+
+fn answers(actions: &[Action]) -> Vec<&Response> {
+    actions.iter().filter_map(answer).collect()
+}
+
+fn waits(file: u8, unwatched: Option<String>, stamp: Option<Stamp>) -> Event {
+    Event::Wait {
+        ticket: Ticket(9),
+        path: path_of(file),
+        stamp,
+        unwatched,
+        timeout: None,
+    }
+}
+
+#[test]
+fn who_waits_for_a_file_that_nobody_checks_is_told_so() {
+    let mut world = judged_world();
+    let why = Some("it is ignored".to_owned());
+    let actions = comes_of(&mut world, waits(4, why, None));
+    assert!(matches!(
+        answers(&actions)[..],
+        [Response::Unwatched { .. }]
+    ));
+    let actions = comes_of(&mut world, waits(4, None, None));
+    assert!(answers(&actions).is_empty());
+    world.write(4);
+    let path = path_of(4);
+    let actions = comes_of(&mut world, Event::Vanished { path });
+    assert!(answers(&actions).is_empty(), "it is being read");
+    let (job, _) = world.preparing.remove(0);
+    let result = Err(PrepareFailure::Vanished);
+    let actions = comes_of(&mut world, Event::Prepared { job, result });
+    assert!(matches!(
+        answers(&actions)[..],
+        [Response::Unwatched { .. }]
+    ));
+}
+
+#[test]
+fn who_waits_for_a_verdict_that_stands_is_answered_at_once() {
+    let mut world = judged_world();
+    let now = stamp(world.there[&path_of(1)]);
+    let actions = comes_of(&mut world, waits(1, None, Some(now)));
+    assert!(matches!(answers(&actions)[..], [Response::Verdict(_)]));
+    let changed = Some(stamp(1000));
+    let actions = comes_of(&mut world, waits(1, None, changed));
+    assert!(answers(&actions).is_empty());
+}
+
+#[test]
+fn whoever_waits_comes_before_those_for_whom_nobody_does() {
+    let mut world = World::new();
+    world.state.settings.max_active = 1;
+    world.join("First");
+    for file in 0..6 {
+        world.write(file);
+    }
+    world.until_judged(6);
+    world.join("Second");
+    let under_way = world.preparing[0].1;
+    let last = (0..6).rev().find(|file| *file != under_way).unwrap();
+    world.wait(last);
+    world.until_stored(8);
+    assert!(!world.waiting.values().any(|file| *file == last));
+}
+
+#[test]
+fn a_broker_that_is_told_to_stop_finishes_what_it_has_and_begins_nothing() {
+    let mut world = World::new();
+    world.join("First");
+    world.write(0);
+    world.prepare(0, true);
+    world.event(Event::Drain);
+    world.write(4);
+    assert!(world.preparing.is_empty(), "nothing is begun");
+    assert_eq!(world.stopped, 0);
+    world.answer(0);
+    world.store(0, true);
+    assert_eq!(world.judged[&0].1, Verdict::Accepted);
+    world.pass(Duration::ZERO);
+    assert_eq!(world.stopped, 1);
+    assert!(!world.judged.contains_key(&4));
+}
+
+#[test]
+fn a_broker_that_cannot_finish_stops_nevertheless() {
+    let mut world = World::new();
+    world.join("First");
+    world.write(0);
+    world.prepare(0, true);
+    world.state.settings.job_deadline = Duration::from_secs(1000);
+    world.state.settings.silence_limit = Duration::from_secs(1000);
+    world.event(Event::Drain);
+    world.pass(world.state.settings.drain_limit);
+    assert_eq!(world.stopped, 0);
+    world.pass(Duration::from_millis(1));
+    world.pass(Duration::ZERO);
+    assert_eq!(world.stopped, 1);
+}
+
+#[test]
+fn a_broker_that_runs_once_stops_when_everything_was_judged() {
+    let mut world = World::new();
+    world.join("First");
+    world.state.settings.once = true;
+    world.state.settings.max_active = 1;
+    world.state.scanned = false;
+    world.write(0);
+    world.write(4);
+    world.until_judged(2);
+    world.pass(Duration::ZERO);
+    assert_eq!(world.stopped, 0, "there may be more");
+    world.event(Event::Scanned);
+    world.pass(Duration::ZERO);
+    assert_eq!(world.stopped, 1);
+    let mut world = World::new();
+    world.join("First");
+    world.write(0);
+    world.write(4);
+    world.state.settings.once = true;
+    world.state.settings.max_active = 1;
+    world.until_judged(1);
+    world.pass(Duration::ZERO);
+    assert_eq!(world.stopped, 0);
+    world.until_judged(2);
+    world.pass(Duration::ZERO);
+    assert_eq!(world.stopped, 1);
+}
