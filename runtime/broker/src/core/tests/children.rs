@@ -132,6 +132,7 @@ fn a_bundle_that_joined_by_hand_must_judge_after_a_restart() {
     assert_eq!(world.judged[&0].1, Verdict::Undetermined);
     let why = &world.failures[&0][0];
     assert!(why.contains("qcbus bundle remove Second"), "{why}");
+    assert!(why.contains("since the broker was started"), "{why}");
     world.remove("Second");
     for _ in 0..4 {
         world.prepare(0, true);
@@ -161,4 +162,38 @@ fn a_manifest_that_changed_while_no_broker_ran_is_carried_out() {
     world.pass(Duration::from_secs(1));
     world.child_joins();
     assert_eq!(child_version(&world), "2");
+}
+
+#[test]
+fn a_restart_judges_nothing_again_that_stands() {
+    let mut world = World::new();
+    world.join("First");
+    world.join("Second");
+    world.manifest(Some(1));
+    world.pass(Duration::ZERO);
+    world.child_joins();
+    world.write(0);
+    world.write(1);
+    world.settle();
+    let (stored, members) = (world.stored.len(), world.members.clone());
+    world.restart();
+    world.members.clear();
+    world.settle();
+    assert_eq!(world.stored.len(), stored);
+    assert!(world.members.is_empty(), "they are what the journal knows");
+    world.members = members;
+}
+
+#[test]
+fn what_an_absent_bundle_would_check_is_in_the_result() {
+    let mut world = World::new();
+    world.versions.insert("Second", 3);
+    world.join("Second");
+    world.restart();
+    world.write(0);
+    world.prepare(0, true);
+    world.pass(world.state.settings.absence_limit);
+    let said = &world.storing[0].bundles[0].said;
+    assert_eq!((said.name.as_str(), said.version.as_str()), ("Second", "3"));
+    assert_eq!(said.checkers.len(), 2);
 }

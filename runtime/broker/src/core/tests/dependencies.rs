@@ -118,3 +118,19 @@ fn a_file_that_goes_while_it_is_read_again_leaves_the_gate_at_once() {
     world.settle();
     assert!(!world.journal.contains_key(&1));
 }
+
+#[test]
+fn a_file_that_a_writer_finds_changed_is_read_again() {
+    let mut world = judged_world();
+    world.write(1);
+    world.prepare(0, true);
+    world.answer(0);
+    world.answer(1);
+    assert_eq!(world.storing.len(), 1);
+    // Nobody has reported the next change yet.
+    world.stamps += 1;
+    world.contents.insert(world.stamps, world.stamps);
+    world.there.insert(path_of(1), world.stamps);
+    world.store(0, true);
+    assert_eq!(world.preparing.len(), 1);
+}
