@@ -197,3 +197,33 @@ fn what_an_absent_bundle_would_check_is_in_the_result() {
     assert_eq!((said.name.as_str(), said.version.as_str()), ("Second", "3"));
     assert_eq!(said.checkers.len(), 2);
 }
+
+#[test]
+fn a_child_whose_manifest_went_while_no_broker_ran_need_not_judge() {
+    let mut world = world_with_an_upgrade();
+    world.child_joins();
+    world.settle();
+    world.manifest = false;
+    world.demanded.remove(CHILD);
+    world.restart();
+    assert!(!world.members.contains_key(CHILD));
+    world.settle();
+    assert_eq!(world.names_that_judged(0), ["First", "Second"]);
+}
+
+#[test]
+fn a_child_that_is_wanted_again_before_it_has_left_is_replaced() {
+    let mut world = World::new();
+    world.manifest(Some(1));
+    world.pass(Duration::ZERO);
+    world.child_joins();
+    world.manifest(None);
+    world.manifest(Some(1));
+    world.child_joins();
+    let there = world.peers.values().filter(|it| it.name == CHILD);
+    let drained: Vec<bool> = there.map(|it| it.drained).collect();
+    assert_eq!(drained, [true, false], "the older goes, the newer is there");
+    world.leave(0);
+    world.settle();
+    assert_eq!(world.members[CHILD].version, "1");
+}

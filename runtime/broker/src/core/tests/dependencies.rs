@@ -134,3 +134,20 @@ fn a_file_that_a_writer_finds_changed_is_read_again() {
     world.store(0, true);
     assert_eq!(world.preparing.len(), 1);
 }
+
+#[test]
+fn a_file_that_is_put_back_is_published_again() {
+    let mut world = judged_world();
+    world.state.settings.max_active = 0;
+    let (path, before) = (path_of(1), stamp(world.there[&path_of(1)]));
+    let changed = stamp(1000);
+    for (stamp, published) in [(changed, false), (before, false)] {
+        let path = path.clone();
+        world.event(Event::Settled { path, stamp });
+        assert_eq!(world.gate.contains_key(&1), published);
+    }
+    world.state.settings.max_active = 4;
+    world.pass(Duration::ZERO);
+    assert!(world.preparing.is_empty(), "nothing need be read");
+    assert!(world.gate.contains_key(&1));
+}
