@@ -227,3 +227,14 @@ fn a_child_that_is_wanted_again_before_it_has_left_is_replaced() {
     world.settle();
     assert_eq!(world.members[CHILD].version, "1");
 }
+
+#[test]
+fn a_process_that_is_replaced_and_does_not_go_is_killed() {
+    let mut world = world_with_an_upgrade();
+    let old = world.state.bundles[CHILD].launch.unwrap();
+    world.child_joins();
+    world.pass(Duration::from_secs(10));
+    assert!(!world.killed.contains(&old), "it may finish");
+    world.pass(Duration::from_millis(1));
+    assert!(world.killed.contains(&old));
+}

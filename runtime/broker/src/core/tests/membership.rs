@@ -183,3 +183,53 @@ fn a_bundle_that_only_the_configuration_names_is_missed_at_once() {
     assert_eq!(world.judged[&0].1, Verdict::Accepted);
     assert_eq!(world.names_that_judged(0), ["First", "Second"]);
 }
+
+/// A process says hello, and what it offers, if it does.
+fn comes(world: &mut World, name: &'static str, offer: Option<Catalogue>) {
+    world.sessions += 1;
+    let session = SessionId(world.sessions);
+    let hello = Hello {
+        protocol: PROTOCOL_VERSION,
+        role: Role::Bundle,
+        name: name.to_owned(),
+        version: "1".to_owned(),
+        incarnation: 77,
+        pid: 77,
+        launch: None,
+        capacity: 1,
+    };
+    world.event(Event::Hello { session, hello });
+    if let Some(offer) = offer {
+        let message = FromPeer::Catalogue(Box::new(offer));
+        world.event(Event::Message { session, message });
+    }
+}
+
+#[test]
+fn who_has_not_said_what_it_checks_is_not_missed() {
+    let mut world = World::new();
+    comes(&mut world, "Mute", None);
+    world.join("First");
+    world.write(0);
+    world.until_judged(1);
+    assert_eq!(world.names_that_judged(0), ["First"]);
+}
+
+#[test]
+fn a_bundle_that_is_named_for_files_that_it_does_not_take_does_not_apply() {
+    let mut world = World::new();
+    world.reconfigured = 1;
+    let event = Event::Configured {
+        digest: digest(1),
+        demand: Arc::new(Naming("Scenes")),
+    };
+    world.event(event);
+    let mut scenes = catalogue("Scenes");
+    scenes.kinds = vec![FileKind::Xosc];
+    comes(&mut world, "Scenes", Some(scenes));
+    world.join("First");
+    world.write(0);
+    world.until_judged(1);
+    assert_eq!(world.judged[&0].1, Verdict::Accepted);
+    assert_eq!(world.names_that_judged(0), ["First", "Scenes"]);
+}
