@@ -151,3 +151,12 @@ fn a_file_that_is_put_back_is_published_again() {
     assert!(world.preparing.is_empty(), "nothing need be read");
     assert!(world.gate.contains_key(&1));
 }
+
+#[test]
+fn a_file_that_is_still_written_to_at_the_first_scan_keeps_its_result() {
+    let mut world = judged_world();
+    world.restart_after(4, true);
+    world.settle();
+    let of_it = world.stored.iter().filter(|file| **file == 1);
+    assert_eq!(of_it.count(), 1);
+}

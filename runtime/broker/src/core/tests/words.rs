@@ -328,3 +328,18 @@ fn a_broker_that_runs_once_stops_when_everything_was_judged() {
     world.pass(Duration::ZERO);
     assert_eq!(world.stopped, 1);
 }
+
+#[test]
+fn a_broker_that_runs_once_does_not_leave_a_file_that_must_rest() {
+    let mut world = World::new();
+    world.join("First");
+    world.state.settings.once = true;
+    world.write(0);
+    world.prepare(0, false);
+    world.pass(Duration::ZERO);
+    assert_eq!(world.stopped, 0, "there was no room for it");
+    world.pass(world.state.settings.retry_after);
+    world.until_judged(1);
+    world.pass(Duration::ZERO);
+    assert_eq!(world.stopped, 1);
+}
