@@ -195,7 +195,7 @@ mod tests {
                 text: "cannot write /farm/out/a.xqar: No space left on device".into(),
             }],
             unseen: vec![Unseen {
-                path: "/farm/in/closed".into(),
+                path: "/farm/closed".into(),
                 why: "cannot look into this directory: Permission denied".into(),
             }],
             ..Status::default()
