@@ -95,7 +95,21 @@ fn a_bundle_of_another_version() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     farm.let_in("speaks_another_protocol", "");
-    insta::assert_snapshot!(notice(&farm, "turned away"));
+    let said = notice(&farm, "turned away");
+    let ours = qcbus_messages::PROTOCOL_VERSION;
+    // The animal's is far from it; neither number is what this is about.
+    let words: Vec<&str> = said.split(' ').collect();
+    let number = |word: &str| word.trim_end_matches([':', ',']).parse::<u32>().is_ok();
+    assert!(words.contains(&&*format!("{ours}:")), "{said}");
+    let shown = |word: &&str| {
+        if number(word) {
+            word.replace(|c: char| c.is_ascii_digit(), "N")
+        } else {
+            (*word).to_owned()
+        }
+    };
+    let shown: Vec<String> = words.iter().map(shown).collect();
+    insta::assert_snapshot!(shown.join(" ").replace("NN", "N"));
 }
 
 #[test]
