@@ -90,6 +90,23 @@ fn a_filter_on_what_a_checker_rests_on_makes_no_acceptance() {
 }
 
 #[test]
+fn where_no_demanded_checker_applies_nobody_looked() {
+    let desk = Desk::new();
+    // Of a later version than the file.
+    let later = "check_asam_xodr_road_lane_layer_lane_group_width_temporary";
+    let plain = sample_farm().join("maps/ring.xodr");
+    let said = check_with(&desk, "xodrBundle", &[later], &plain);
+    let whole = said.whole(&desk);
+    assert_eq!(said.code, Some(3), "{whole}");
+    assert!(
+        said.stdout.contains("does not apply to this file"),
+        "{whole}"
+    );
+    let both = check_with(&desk, "xodrBundle", &[later, IDS], &plain);
+    assert_eq!(both.code, Some(0), "{}", both.whole(&desk));
+}
+
+#[test]
 fn how_little_was_asked_is_said_in_one_line() {
     let desk = Desk::new();
     let good = sample_farm().join("maps/ring.xodr");

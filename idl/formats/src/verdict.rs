@@ -4,31 +4,33 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::pool::BLOCKED;
-use crate::xqar::{Checker, Level, Results, Status};
+use crate::pool::{BLOCKED, OWN_BUNDLE};
+use crate::xqar::{Checker, CheckerBundle, Level, Results, Status};
 
 /// What a farm may do with a file. `Undetermined` is never `Accepted`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
-    /// Every demanded checker ran or did not apply, and none of the issues kept is an error.
+    /// Every demanded checker ran or did not apply, at least one ran, and none of the issues kept is
+    /// an error.
     Accepted,
     /// At least one of the issues kept is an error.
     Rejected,
-    /// A demanded checker crashed, hung, was absent or could not look, and no error was found.
+    /// A demanded checker crashed, hung, was absent or could not look, or none of them applied, and
+    /// no error was found.
     Undetermined,
 }
 
 impl Verdict {
     /// The verdict that a result stands for: rejected by an error; undetermined by a checker that
-    /// should have answered and did not; else accepted. A checker without status, as other tools
-    /// write it, is taken at its issues.
+    /// should have answered and did not, and when nobody looked; else accepted. A checker without
+    /// status, as other tools write it, is taken at its issues.
     pub fn of(results: &Results) -> Verdict {
         let mut checkers = results.bundles.iter().flat_map(|bundle| &bundle.checkers);
         let mut issues = checkers.clone().flat_map(|checker| &checker.issues);
         if issues.any(|issue| issue.level == Level::Error) {
             Verdict::Rejected
-        } else if checkers.any(is_open) {
+        } else if checkers.any(is_open) || !results.bundles.iter().any(has_looked) {
             Verdict::Undetermined
         } else {
             Verdict::Accepted
@@ -57,9 +59,16 @@ fn is_open(checker: &Checker) -> bool {
     checker.status == Some(Status::Error) || checker.metadata.iter().any(|fact| fact.key == BLOCKED)
 }
 
+/// Whether one of the bundle's checkers has looked at the file. What qcbus says of a check is no
+/// look at the file.
+pub(crate) fn has_looked(bundle: &CheckerBundle) -> bool {
+    let looked = |checker: &Checker| matches!(checker.status, None | Some(Status::Completed));
+    bundle.name != OWN_BUNDLE && bundle.checkers.iter().any(looked)
+}
+
 #[cfg(test)]
 mod tests {
-    use crate::xqar::{CheckerBundle, Issue, Metadata};
+    use crate::xqar::{Issue, Metadata};
 
     use super::*;
 
@@ -96,7 +105,6 @@ mod tests {
     fn the_verdict_follows_from_issues_and_statuses() {
         let of = |status, level| Verdict::of(&results(status, level, false));
         assert_eq!(of(Some(Status::Completed), None), Verdict::Accepted);
-        assert_eq!(of(Some(Status::Skipped), None), Verdict::Accepted);
         assert_eq!(of(None, None), Verdict::Accepted);
         assert_eq!(of(Some(Status::Error), None), Verdict::Undetermined);
         assert_eq!(of(None, Some(Level::Warning)), Verdict::Accepted);
@@ -104,6 +112,20 @@ mod tests {
             of(Some(Status::Error), Some(Level::Error)),
             Verdict::Rejected
         );
+    }
+
+    #[test]
+    fn where_nobody_looked_nothing_is_accepted() {
+        let skipped = results(Some(Status::Skipped), None, false);
+        assert_eq!(Verdict::of(&skipped), Verdict::Undetermined);
+        assert_eq!(Verdict::of(&Results::default()), Verdict::Undetermined);
+        let mut own = results(Some(Status::Completed), None, false);
+        own.bundles[0].name = OWN_BUNDLE.to_owned();
+        assert_eq!(Verdict::of(&own), Verdict::Undetermined);
+        own.bundles.extend(skipped.bundles);
+        own.bundles
+            .extend(results(Some(Status::Completed), None, false).bundles);
+        assert_eq!(Verdict::of(&own), Verdict::Accepted, "one has looked");
     }
 
     #[test]

@@ -10,6 +10,7 @@ use super::{
     Resolver, Scope, Unfinished, absent, in_the_answer,
 };
 use crate::config::{BundleConfig, Config, INPUT_PARAMS, Selection, same_bundle};
+use crate::verdict;
 use crate::xqar::{Checker, CheckerBundle, FORMAT_VERSION, Level, Param};
 
 pub(super) fn pool(input: PoolInput<'_>, resolver: &mut dyn Resolver) -> Pooled {
@@ -40,7 +41,15 @@ pub(super) fn pool(input: PoolInput<'_>, resolver: &mut dyn Resolver) -> Pooled 
         description: String::from("What qcbus itself has to say about this check."),
         ..BundleOutcome::default()
     };
-    pool.add_own(own, remarks);
+    let nobody = pool.nobody_looked().filter(|_| scope == Scope::Whole);
+    let silent = remarks.iter().all(|remark| remark.open.is_none());
+    pool.add_own(
+        own,
+        remarks
+            .into_iter()
+            .chain(nobody.filter(|_| silent))
+            .collect(),
+    );
     pool.finish()
 }
 
@@ -269,6 +278,13 @@ impl<'a> Pool<'a, '_> {
             }
         }
         params
+    }
+
+    /// The remark that no checker looked at the file, where nothing else tells why.
+    fn nobody_looked(&self) -> Option<Remark> {
+        let looked = self.pooled.results.bundles.iter().any(verdict::has_looked);
+        let told = self.pooled.open().next().is_some();
+        (!looked && !told).then(|| remarks::nobody_looked(&self.pooled))
     }
 
     /// The bundle `qcbus`, when it has something to say.

@@ -1,6 +1,6 @@
 //! What qcbus itself has to say: the bundle `qcbus`.
 
-use super::{CheckerOutcome, Counts, Ending, OWN_BUNDLE, Remark};
+use super::{CheckerOutcome, Counts, Ending, OWN_BUNDLE, Pooled, Remark};
 use crate::config::{Config, Levels};
 use crate::xqar::{Issue, Level};
 
@@ -78,6 +78,27 @@ pub(super) fn level_order(config: &Config) -> Option<Remark> {
         issue: Some(information(LEVEL_ORDER, text)),
         open: None,
     })
+}
+
+/// The remark that everything that was demanded was passed over.
+pub(super) fn nobody_looked(pooled: &Pooled) -> Remark {
+    let open = match pooled.unfinished.as_slice() {
+        [] => String::from("no checker is demanded of this file"),
+        [only] => format!(
+            "the only demanded checker, `{}`, does not apply to this file",
+            only.checker
+        ),
+        all => format!(
+            "none of the {} demanded checkers applies to this file",
+            all.len()
+        ),
+    };
+    Remark {
+        checker: String::from("qcbus_checkers"),
+        description: String::from("At least one demanded checker looks at the file."),
+        issue: None,
+        open: Some(open),
+    }
 }
 
 fn information(rule: &str, description: String) -> Issue {
