@@ -171,3 +171,13 @@ pub enum Action {
     /// Everything is drained: leave the loop.
     Stop,
 }
+
+impl Action {
+    /// Kill a process that has not joined: there is nothing that it could finish.
+    pub(super) fn kill_unjoined(launch: Launch) -> Action {
+        Action::Kill {
+            launch: Some(launch),
+            pid: 0,
+        }
+    }
+}

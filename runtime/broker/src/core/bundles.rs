@@ -200,7 +200,7 @@ impl State {
             let same_process = old.pid == hello.pid;
             self.replace_session(&hello.name, same_process, actions);
         }
-        self.child_joined(&hello.name, launch, &hello.version);
+        self.child_joined(&hello.name, launch, &hello.version, actions);
         let now = self.now;
         let bundle = self.bundles.entry(hello.name.clone()).or_default();
         bundle.version.clone_from(&hello.version);

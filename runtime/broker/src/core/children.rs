@@ -61,8 +61,10 @@ impl Child {
         }
     }
 
-    /// Takes a new manifest. A process that runs goes on until a newer one has joined.
-    fn respecify(&mut self, spec: ChildSpec, now: Duration) {
+    /// Takes a new manifest. A process that runs goes on until a newer one has joined; one that was
+    /// started and has not joined is of the manifest before, and is returned: nobody wants it.
+    fn respecify(&mut self, spec: ChildSpec, now: Duration) -> Option<Launch> {
+        let unwanted = self.starting().map(|(launch, _)| launch);
         self.spec = spec;
         self.failures = 0;
         self.stuck = None;
@@ -70,6 +72,25 @@ impl Child {
         match self.state {
             ChildState::Joined => self.upgrade = Some(Upgrade::Due(now)),
             _ => self.state = ChildState::Due(now),
+        }
+        unwanted
+    }
+
+    /// The process that was started and has not joined, and since when.
+    fn starting(&self) -> Option<(Launch, Duration)> {
+        match (self.state, self.upgrade) {
+            (ChildState::Starting(launch, since), _)
+            | (_, Some(Upgrade::Starting(launch, since))) => Some((launch, since)),
+            _ => None,
+        }
+    }
+
+    /// The process that is to take over from one that has joined and is not the one wanted.
+    fn successor(&self, now: Duration) -> Upgrade {
+        match (self.starting(), self.state) {
+            (Some((launch, since)), _) => Upgrade::Starting(launch, since),
+            (None, ChildState::Due(at) | ChildState::GaveUp(at)) => Upgrade::Due(at.max(now)),
+            (None, _) => Upgrade::Due(now),
         }
     }
 
@@ -98,7 +119,10 @@ impl State {
         for spec in specs {
             match self.children.get_mut(&spec.name) {
                 Some(child) if child.spec == spec => {}
-                Some(child) => child.respecify(spec, self.now),
+                Some(child) => {
+                    let unwanted = child.respecify(spec, self.now);
+                    actions.extend(unwanted.map(Action::kill_unjoined));
+                }
                 None => {
                     let name = spec.name.clone();
                     self.children.insert(name, Child::new(spec, due));
@@ -114,38 +138,35 @@ impl State {
         let Some(child) = self.children.remove(name) else {
             return;
         };
-        let starting = match (child.state, child.upgrade) {
-            (ChildState::Starting(launch, _), _) | (_, Some(Upgrade::Starting(launch, _))) => {
-                Some(launch)
-            }
-            _ => None,
-        };
-        if let Some(launch) = starting {
-            // It has not joined, so there is nothing that it could finish.
-            let (launch, pid) = (Some(launch), 0);
-            actions.push(Action::Kill { launch, pid });
-        }
+        let starting = child.starting();
+        actions.extend(starting.map(|(launch, _)| Action::kill_unjoined(launch)));
         self.drain_peer(name, actions);
     }
 
-    /// A child has said hello. One that a former broker started may be of another version than the
-    /// manifest says by now: then it goes on until a newer one has joined.
-    pub(super) fn child_joined(&mut self, name: &str, launch: Option<Launch>, version: &str) {
+    /// A process of a child has said hello. It need not be the one that is wanted: a former broker
+    /// may have started it by an older manifest, and of one that was killed the last words may come
+    /// now. Then it goes on until the one that is wanted has joined.
+    pub(super) fn child_joined(
+        &mut self,
+        name: &str,
+        launch: Option<Launch>,
+        version: &str,
+        actions: &mut Actions,
+    ) {
         let (now, first) = (self.now, self.first_launch());
         let Some(child) = self.children.get_mut(name) else {
             return;
         };
-        if launch.is_some_and(|launch| child.is_upgraded_by(launch)) {
+        let starting = child.starting();
+        if starting.is_some_and(|(wanted, _)| Some(wanted) == launch) {
             child.upgrade = None;
-        }
-        let adopted = launch.is_some_and(|launch| launch < first);
-        let outdated = child
-            .spec
-            .version
-            .as_ref()
-            .is_some_and(|wanted| wanted != version);
-        if adopted && outdated && child.upgrade.is_none() {
-            child.upgrade = Some(Upgrade::Due(now));
+        } else if child.state != ChildState::Joined {
+            let as_wanted = child.spec.version.as_deref().is_none_or(|it| it == version);
+            let goes_on = launch.is_none_or(|launch| launch < first && as_wanted);
+            if goes_on {
+                actions.extend(starting.map(|(launch, _)| Action::kill_unjoined(launch)));
+            }
+            child.upgrade = (!goes_on).then(|| child.successor(now));
         }
         child.state = ChildState::Joined;
         child.stuck = None;
@@ -185,8 +206,7 @@ impl State {
         };
         // The next start is of the newest manifest anyway.
         if let Some(Upgrade::Starting(launch, _)) = child.upgrade.take() {
-            let (launch, pid) = (Some(launch), 0);
-            actions.push(Action::Kill { launch, pid });
+            actions.push(Action::kill_unjoined(launch));
         }
         if child.spec.restart == Restart::Never || draining {
             child.state = ChildState::Ended;
@@ -309,11 +329,7 @@ impl State {
 
     fn does_not_join(&mut self, name: &str, launch: Launch, actions: &mut Actions) {
         let why = "it was started and did not join";
-        let (killed, pid) = (Some(launch), 0);
-        actions.push(Action::Kill {
-            launch: killed,
-            pid,
-        });
+        actions.push(Action::kill_unjoined(launch));
         if self.is_successor(name, launch) {
             return self.upgrade_failed(name, why, actions);
         }

@@ -95,7 +95,7 @@ impl State {
         actions: &mut Actions,
     ) {
         let launch = hello.launch.map(Launch);
-        self.child_joined(&hello.name, launch, &hello.version);
+        self.child_joined(&hello.name, launch, &hello.version, actions);
         let index = self.reporter_index(&hello.name);
         let now = self.now;
         let Some(reporter) = self.reporters.get_mut(index as usize) else {

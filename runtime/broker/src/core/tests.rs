@@ -52,6 +52,7 @@ enum Step {
     Remove(u8),
     Manifest(u8),
     ChildJoins,
+    ChildJoinsTooLate(bool),
     ChildEnds(u8),
     Restart,
     RestartAfter(u8, bool),
@@ -84,6 +85,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
         1 => (0..3_u8).prop_map(Step::Remove),
         2 => (0..3_u8).prop_map(Step::Manifest),
         2 => Just(Step::ChildJoins),
+        1 => any::<bool>().prop_map(Step::ChildJoinsTooLate),
         1 => (0..4_u8).prop_map(Step::ChildEnds),
         1 => Just(Step::Restart),
         1 => ((0..8_u8), any::<bool>()).prop_map(|(file, late)| Step::RestartAfter(file, late)),
@@ -127,6 +129,7 @@ impl World {
             // Absent, or one of two versions.
             Step::Manifest(n) => self.manifest((n > 0).then_some(n)),
             Step::ChildJoins => self.child_joins(),
+            Step::ChildJoinsTooLate(known) => self.child_joins_too_late(known),
             Step::ChildEnds(n) => self.child_ends(match n {
                 0 => ChildEnd::NotStarted("no such program".to_owned()),
                 1 => ChildEnd::Done("it ended".to_owned()),

@@ -23,12 +23,20 @@ impl World {
             }
             Action::Spawn { launch, spec } => {
                 let bundle = spec.role == Role::Bundle;
-                self.launched
-                    .push((launch, if bundle { CHILD } else { REPORTER }));
+                self.launched.push(Launched {
+                    launch,
+                    name: if bundle { CHILD } else { REPORTER },
+                    version: spec.version.and_then(|it| it.parse().ok()).unwrap_or(1),
+                });
             }
             Action::Kill { launch, .. } => {
                 self.killed.extend(launch);
-                self.launched.retain(|(it, _)| Some(*it) != launch);
+                let killed = self
+                    .launched
+                    .iter()
+                    .position(|it| Some(it.launch) == launch);
+                let killed = killed.map(|at| self.launched.remove(at));
+                self.dying.extend(killed.filter(|it| it.name == CHILD));
             }
             Action::Enrol(member) => {
                 self.members.insert(member.name.clone(), member);

@@ -35,6 +35,40 @@ fn an_upgrade_takes_over_and_the_old_process_goes() {
 }
 
 #[test]
+fn a_manifest_that_changes_while_its_child_starts_is_carried_out() {
+    for late in [None, Some(false), Some(true)] {
+        let mut world = World::new();
+        world.manifest(Some(1));
+        world.pass(Duration::ZERO);
+        let old = world.launched[0].launch;
+        world.manifest(Some(2));
+        world.pass(Duration::ZERO);
+        assert!(world.killed.contains(&old), "nobody wants it any more");
+        if let Some(known) = late {
+            world.child_joins_too_late(known);
+        }
+        world.settle();
+        assert_eq!(child_version(&world), "2", "{late:?}");
+    }
+}
+
+#[test]
+fn an_upgrade_that_another_overtakes_is_killed() {
+    for late in [None, Some(false), Some(true)] {
+        let mut world = world_with_an_upgrade();
+        let old = world.launched[0].launch;
+        world.manifest(Some(3));
+        world.pass(Duration::ZERO);
+        assert!(world.killed.contains(&old), "nobody wants it any more");
+        if let Some(known) = late {
+            world.child_joins_too_late(known);
+        }
+        world.settle();
+        assert_eq!(child_version(&world), "3", "{late:?}");
+    }
+}
+
+#[test]
 fn an_upgrade_that_dies_before_it_joins_is_said_and_tried_again() {
     let mut world = world_with_an_upgrade();
     world.child_ends(ChildEnd::Failed("it crashed".to_owned()));
@@ -49,7 +83,7 @@ fn an_upgrade_that_dies_before_it_joins_is_said_and_tried_again() {
 #[test]
 fn an_upgrade_that_hangs_is_killed_and_tried_again() {
     let mut world = world_with_an_upgrade();
-    let (launch, _) = world.launched[0];
+    let launch = world.launched[0].launch;
     world.pass(Duration::from_secs(16));
     assert!(world.killed.contains(&launch), "{:?}", world.killed);
     assert!(notices(&world).contains(&"not-upgraded"));
@@ -150,15 +184,12 @@ fn a_manifest_that_changed_while_no_broker_ran_is_carried_out() {
     world.child_joins();
     world.write(0);
     world.settle();
-    world.manifest = false;
+    world.manifest = None;
     world.restart();
     world.manifest(Some(2));
-    world.launched.clear();
     // The process of the former broker has outlived it, and joins the next.
-    world.versions.insert(CHILD, 1);
-    world.child_of_a_former_broker_joins(7);
+    world.child_of_a_former_broker_joins(1, 7);
     assert_eq!(child_version(&world), "1");
-    world.versions.insert(CHILD, 2);
     world.pass(Duration::from_secs(1));
     world.child_joins();
     assert_eq!(child_version(&world), "2");
@@ -203,7 +234,7 @@ fn a_child_whose_manifest_went_while_no_broker_ran_need_not_judge() {
     let mut world = world_with_an_upgrade();
     world.child_joins();
     world.settle();
-    world.manifest = false;
+    world.manifest = None;
     world.demanded.remove(CHILD);
     world.restart();
     assert!(!world.members.contains_key(CHILD));

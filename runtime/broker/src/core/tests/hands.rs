@@ -126,6 +126,7 @@ impl World {
         self.storing.clear();
         self.peers.clear();
         self.launched.clear();
+        self.dying.clear();
         self.waiting.clear();
         self.until.clear();
         self.told.clear();
@@ -146,8 +147,7 @@ impl World {
             self.state.remember(&path_of(file), judged, &delivered);
         }
         self.desk_restarts();
-        let version = self.versions.get(CHILD).copied().filter(|_| self.manifest);
-        self.children_are(version);
+        self.children_are(self.manifest);
         let there: Vec<(Arc<Path>, u64)> = self.there.clone().into_iter().collect();
         if unsettled {
             for (path, _) in there.clone() {

@@ -8,35 +8,61 @@ use super::things::*;
 use qcbus_formats::pool::Ending;
 use qcbus_messages::{FromPeer, Hello, JobId, PROTOCOL_VERSION, Role};
 
-use super::world::{Process, World};
+use super::world::{Launched, Process, World};
 
 impl World {
     pub fn join(&mut self, name: &'static str) {
         let there = |it: &Process| it.name == name && !it.drained;
         if !self.peers.values().any(there) {
-            self.join_as(name, None);
+            let version = *self.versions.entry(name).or_insert(1);
+            self.join_as(name, version, None);
         }
     }
 
     /// A process that was started for the child says hello.
     pub fn child_joins(&mut self) {
         if !self.launched.is_empty() {
-            let (launch, name) = self.launched.remove(0);
-            if name == REPORTER {
-                self.reporter_joins(launch);
+            let it = self.launched.remove(0);
+            if it.name == REPORTER {
+                self.reporter_joins(it.launch);
             } else {
-                self.join_as(name, Some(launch.0));
+                self.join_as(it.name, it.version, Some(it.launch.0));
             }
         }
     }
 
-    /// One that a former broker started, under this number, has outlived it.
-    pub fn child_of_a_former_broker_joins(&mut self, launch: u64) {
-        self.join_as(CHILD, Some(launch));
+    /// What a process had said before it was killed comes only now; `known`: after its end.
+    pub fn child_joins_too_late(&mut self, known: bool) {
+        let Some(Launched {
+            launch,
+            name,
+            version,
+        }) = self.dying.pop()
+        else {
+            return;
+        };
+        let end = ChildEnd::Failed("it was killed by signal 9".to_owned());
+        if known {
+            self.event(Event::Exited {
+                launch,
+                end: end.clone(),
+            });
+        }
+        let session = self.join_as(name, version, Some(launch.0));
+        if self.peers.remove(&session).is_some() {
+            self.event(Event::Gone { session });
+        }
+        if !known {
+            self.event(Event::Exited { launch, end });
+        }
     }
 
-    fn join_as(&mut self, name: &'static str, launch: Option<u64>) {
-        let version = *self.versions.entry(name).or_insert(1);
+    /// One that a former broker started, under this number, has outlived it.
+    pub fn child_of_a_former_broker_joins(&mut self, version: u8, launch: u64) {
+        self.join_as(CHILD, version, Some(launch));
+    }
+
+    fn join_as(&mut self, name: &'static str, version: u8, launch: Option<u64>) -> SessionId {
         self.sessions += 1;
         let session = SessionId(self.sessions);
         self.peers.insert(
@@ -60,13 +86,14 @@ impl World {
         };
         self.event(Event::Hello { session, hello });
         if !self.peers.contains_key(&session) {
-            return;
+            return session;
         }
-        let wanted = launch.is_none() || self.manifest;
+        let wanted = launch.is_none() || self.manifest.is_some();
         if wanted {
             self.demanded.insert(name.to_owned(), Some(version));
         }
         self.say(session, FromPeer::Catalogue(Box::new(catalogue(name))));
+        session
     }
 
     pub fn say(&mut self, session: SessionId, message: FromPeer) {
@@ -95,7 +122,7 @@ impl World {
         let Process { name, drained, .. } = self.peers[&session];
         // One that somebody else has replaced leaves nothing.
         let current = self.state.sessions.contains_key(&session);
-        if current && !(name == CHILD && self.manifest && !drained) {
+        if current && !(name == CHILD && self.manifest.is_some() && !drained) {
             self.demanded.remove(name);
         }
         self.say(session, FromPeer::Leaving);
@@ -103,8 +130,7 @@ impl World {
 
     /// The manifest of the child comes, changes or goes.
     pub fn manifest(&mut self, version: Option<u8>) {
-        if let Some(version) = version {
-            self.versions.insert(CHILD, version);
+        if version.is_some() {
             // Its last process may not have left yet: what that one said counts.
             let known = self.state.bundles.get(CHILD);
             let known = known.filter(|it| it.catalogue.is_some());
@@ -113,7 +139,7 @@ impl World {
         } else {
             self.demanded.remove(CHILD);
         }
-        self.manifest = version.is_some();
+        self.manifest = version;
         self.children_are(version);
     }
 
@@ -125,7 +151,7 @@ impl World {
 
     /// Somebody takes a bundle off the roster.
     pub fn remove(&mut self, name: &'static str) {
-        if name != CHILD || !self.manifest {
+        if name != CHILD || self.manifest.is_none() {
             self.demanded.remove(name);
         }
         self.tickets += 1;
@@ -138,7 +164,7 @@ impl World {
     /// What a child's process that has not joined comes to.
     pub fn child_ends(&mut self, end: ChildEnd) {
         if !self.launched.is_empty() {
-            let (launch, _) = self.launched.remove(0);
+            let Launched { launch, .. } = self.launched.remove(0);
             self.event(Event::Exited { launch, end });
         }
     }

@@ -34,10 +34,12 @@ pub struct World {
     /// The version of each bundle's next process.
     pub versions: BTreeMap<&'static str, u8>,
     /// Children that were started and have not joined.
-    pub launched: Vec<(Launch, &'static str)>,
+    pub launched: Vec<Launched>,
+    /// Those of them that were killed. What they have said before may still come.
+    pub dying: Vec<Launched>,
     pub killed: Vec<Launch>,
-    /// Whether the manifest of the child is there.
-    pub manifest: bool,
+    /// Which version the manifest of the child brings, if it is there.
+    pub manifest: Option<u8>,
     /// What the journal has been told.
     pub members: BTreeMap<String, Member>,
     pub journal: BTreeMap<u8, Judged>,
@@ -57,6 +59,15 @@ pub struct World {
     pub failures: BTreeMap<u8, Vec<String>>,
     /// How often the state machine has ended.
     pub stopped: u8,
+}
+
+/// A process that was started and has not joined.
+#[derive(Clone)]
+pub struct Launched {
+    pub launch: Launch,
+    pub name: &'static str,
+    /// Of the manifest that it was started by.
+    pub version: u8,
 }
 
 /// A process of a bundle.
@@ -88,8 +99,9 @@ impl World {
             demanded: BTreeMap::new(),
             versions: BTreeMap::new(),
             launched: Vec::new(),
+            dying: Vec::new(),
             killed: Vec::new(),
-            manifest: false,
+            manifest: None,
             members: BTreeMap::new(),
             journal: BTreeMap::new(),
             generation: 1,
@@ -274,6 +286,10 @@ impl World {
             self.go_on();
             let all = self.demanded.values().all(Option::is_some) && self.launched.is_empty();
             let all = all && self.demanded.keys().all(|name| self.is_there(name));
+            let all = all
+                && self
+                    .manifest
+                    .is_none_or(|it| self.demanded[CHILD] == Some(it));
             let all = all && self.state.files.is_quiet() && self.state.jobs.is_empty();
             if all && self.reporter_rests() {
                 return;
