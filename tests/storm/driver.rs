@@ -10,6 +10,7 @@ use super::ledger::Ledger;
 use super::tally::Tally;
 use super::trouble::{self, ANIMALS, Trouble};
 use super::verdicts::JUDGE;
+use super::visitors::Stop;
 use crate::support::broker::Broker;
 use crate::support::dice::Dice;
 use crate::support::farm::Farm;
@@ -42,7 +43,7 @@ pub struct Driver {
     /// Standard bundles killed or stopped, by name.
     pub harmed: BTreeMap<String, u64>,
     /// When a standard bundle stood still, or the shared memory was full.
-    pub(super) stops: Vec<(Duration, Duration)>,
+    pub(super) stops: Vec<Stop>,
     /// When the broker is started again.
     start_at: Option<Instant>,
     stopped: Vec<(i32, Instant)>,
@@ -56,6 +57,10 @@ pub struct Driver {
     pub(super) version: u64,
     /// When its program comes back.
     pub(super) gone_until: Option<Instant>,
+    /// When its manifest comes back.
+    pub(super) removed_until: Option<Instant>,
+    /// When its manifest was away: from when to when.
+    pub(super) removals: Vec<(Duration, Duration)>,
 }
 
 impl Driver {
@@ -80,6 +85,8 @@ impl Driver {
             next_file: 0,
             version: 0,
             gone_until: None,
+            removed_until: None,
+            removals: Vec::new(),
         }
     }
 
@@ -114,9 +121,12 @@ impl Driver {
             Trouble::Rewrite => self.rewrite(),
             Trouble::Fill => self.fill(),
             Trouble::Share => self.share(),
+            Trouble::Unshare => self.unshare(),
+            Trouble::Link => self.link(),
             Trouble::Reload => self.reload(),
             Trouble::Upgrade => self.upgrade(),
             Trouble::Vanish => self.vanish(),
+            Trouble::Remove => self.remove(),
         }
     }
 
@@ -143,6 +153,7 @@ impl Driver {
             self.empty();
         }
         self.bring_back_when_due(now);
+        self.want_again_when_due(now);
     }
 
     /// It did not end by our hand. A shared memory that somebody else fills may take it down (a
@@ -192,6 +203,7 @@ impl Driver {
             self.farm.send_away(animal);
         }
         self.bring_back();
+        self.share_what_has_gone();
         self.write_config(trouble::CALM);
         if self.broker.as_mut().is_none_or(|broker| !broker.is_alive()) {
             self.start_broker();
@@ -203,13 +215,13 @@ impl Driver {
         );
         // A new version is started at once, also where the one before keeps failing. While no broker
         // runs an upgrade would go unseen, if a process of the version before is about.
+        self.want_again();
         self.upgrade();
         self.tally.note("calm", "");
-        let explain = || format!("{}\n{:#?}", self.tally.last_lines(), self.farm.status());
         until_or(
             "the animals have gone and the calm is in force",
             || self.is_calm(),
-            explain,
+            || self.what_is(),
         );
         self.farm.settle(self.files.len());
     }
@@ -230,6 +242,17 @@ impl Driver {
         let answer = self.farm.ask(&Request::Reload)?;
         let reloaded = matches!(answer, Response::Reloaded { .. });
         (calm && reloaded).then_some(())
+    }
+
+    /// What was done, what the broker said, and, last, how it is.
+    fn what_is(&self) -> String {
+        let status = self.farm.status();
+        let peers = status.iter().flat_map(|it| &it.peers);
+        let peers: Vec<String> = peers.map(|it| format!("{it:?}")).collect();
+        let (deeds, log) = (self.tally.last_lines(), crate::tail(&self.farm.log()));
+        let (peers, version) = (peers.join("\n"), self.version);
+        let reload = self.farm.ask(&Request::Reload);
+        format!("{deeds}\n{log}\n{JUDGE} should be {version}\n{reload:?}\n{peers}")
     }
 
     fn kill_broker(&mut self) {
@@ -263,13 +286,13 @@ impl Driver {
         );
     }
 
-    /// Counts what was done to a standard bundle.
-    fn harm(&mut self, process: &Process) {
+    /// Counts what was done to a standard bundle. Its name, if it is one.
+    fn harm(&mut self, process: &Process) -> Option<&'static str> {
         let names = [("xodr", "xodrBundle"), ("xosc", "xoscBundle")];
         let whose = |word: &str| process.words.iter().any(|it| it == word);
-        for (_, name) in names.iter().filter(|(word, _)| whose(word)) {
-            *self.harmed.entry((*name).to_owned()).or_default() += 1;
-        }
+        let (_, name) = names.into_iter().find(|(word, _)| whose(word))?;
+        *self.harmed.entry(name.to_owned()).or_default() += 1;
+        Some(name)
     }
 
     pub(super) fn any_process(&mut self, wanted: impl Fn(&Process) -> bool) -> Option<Process> {
@@ -286,10 +309,10 @@ impl Driver {
         let until = Instant::now() + self.dice.millis(long);
         self.stopped.push((process.pid, until));
         if process.kind() == ProcessKind::Bundle {
-            let now = self.ledger.now();
-            self.stops
-                .push((now, now + until.duration_since(Instant::now())));
-            self.harm(&process);
+            let from = self.ledger.now();
+            let to = from + until.duration_since(Instant::now());
+            let name = self.harm(&process);
+            self.stops.push(Stop { name, from, to });
         }
         self.tally
             .note("stop", &format!("{} {:?}", process.pid, process.kind()));
@@ -310,8 +333,9 @@ impl Driver {
                 .note("fill", &format!("{size} bytes of /dev/shm"));
         }
         let long = self.dice.millis(1500);
-        let now = self.ledger.now();
-        self.stops.push((now, now + long));
+        let (name, from) = (None, self.ledger.now());
+        let to = from + long;
+        self.stops.push(Stop { name, from, to });
         self.full_until = Some(Instant::now() + long);
     }
 

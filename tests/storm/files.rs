@@ -12,7 +12,7 @@ use crate::support::watchdog::pause;
 const FILES: usize = 80;
 /// Before and after 1970: times that some files say they are from.
 const LONG_AGO: Duration = Duration::from_secs(1_000_000);
-/// Maps that scenarios share. They are rewritten, and never go.
+/// Maps that scenarios share.
 const SHARED_MAPS: &[&str] = &["shared-0.xodr", "shared-1.xodr", "shared-2.xodr"];
 /// What maps include. No files to check.
 const SHARED_PARTS: &[&str] = &["part-0.xml", "part-1.xml"];
@@ -50,6 +50,52 @@ impl Driver {
         if let Some(name) = self.dice.pick(&all).copied() {
             self.write_one_shared(name);
         }
+    }
+
+    /// Something that others depend on goes.
+    pub fn unshare(&mut self) {
+        let all = [SHARED_PARTS, SHARED_MAPS, &[CATALOG]].concat();
+        let Some(name) = self.dice.pick(&all).copied() else {
+            return;
+        };
+        let begun = self.ledger.now();
+        if std::fs::remove_file(self.path(name)).is_ok() {
+            self.ledger.note(name, begun, None);
+            self.files.remove(name);
+            self.parts.remove(name);
+            self.tally.note("unshare", name);
+        }
+    }
+
+    /// Whatever others depend on is there again.
+    pub fn share_what_has_gone(&mut self) {
+        for name in SHARED_PARTS.iter().chain(SHARED_MAPS).chain(&[CATALOG]) {
+            if !self.path(name).exists() {
+                self.write_one_shared(name);
+            }
+        }
+    }
+
+    /// A link to a file in a directory that nobody watches takes the place of a file, or of a link.
+    /// What is written to that place from then on goes through the link.
+    pub fn link(&mut self) {
+        let name = match self.any_file() {
+            Some(name) if self.dice.below(2) == 0 => name,
+            _ => self.new_name(),
+        };
+        let content = self.content_for(&name);
+        self.next_file += 1;
+        let store = self.farm.base().join("store");
+        let target = store.join(format!("{}-{name}", self.next_file));
+        std::fs::create_dir_all(&store).unwrap();
+        std::fs::write(&target, content.bytes()).unwrap();
+        self.age(&target);
+        let unfinished = self.path(&format!("{name}.part"));
+        std::os::unix::fs::symlink(&target, &unfinished).unwrap();
+        let begun = self.ledger.now();
+        std::fs::rename(&unfinished, self.path(&name)).unwrap();
+        self.tally.note("link", &name);
+        self.now_holds(&name, begun, content);
     }
 
     pub fn write_some(&mut self, count: usize) {

@@ -11,9 +11,10 @@ use std::time::{Duration, Instant};
 
 use qcbus_broker::control::ask_broker;
 use qcbus_messages::Verdict;
-use qcbus_messages::control::{Request, Response, Status};
+use qcbus_messages::control::{PeerStatus, Request, Response, Status};
 
 use super::ledger;
+use super::verdicts::JUDGE;
 use crate::support::desk::files_below;
 use crate::support::dice::Dice;
 use crate::support::farm::Farm;
@@ -42,6 +43,8 @@ pub enum What {
         verdict: Verdict,
         digest: String,
     },
+    /// The bundle of one's own is among those who must judge.
+    Demanded,
     /// The broker has ended a session and killed its process, and says why.
     Killed { name: String, why: String },
 }
@@ -192,6 +195,10 @@ fn look(shared: &Shared) {
         if round % ASK_STATUS == 0
             && let Ok(Response::Status(status)) = ask_broker(&shared.instance, &Request::Status)
         {
+            let wanted = |it: &PeerStatus| it.name == JUDGE && it.state != "draining";
+            if status.peers.iter().any(wanted) {
+                shared.saw(begun, What::Demanded);
+            }
             for killed in killed(&status) {
                 if !told.contains(&killed) {
                     let (name, why) = killed.clone();

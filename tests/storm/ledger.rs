@@ -7,6 +7,17 @@ use sha2::{Digest, Sha256};
 
 use crate::support::content::Content;
 
+/// What somebody may have read at a place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Held<'l> {
+    /// Bytes with this digest.
+    Bytes(&'l str),
+    /// Something half-written.
+    Unfinished,
+    /// Nothing lay there.
+    Nothing,
+}
+
 /// What was done to a file.
 #[derive(Debug, Clone)]
 struct Change {
@@ -61,18 +72,18 @@ impl Ledger {
         self.known.get(digest)
     }
 
-    /// Everything that may have been read at a place in this time; `None` among it: something
-    /// half-written, or nothing.
-    pub fn seen(&self, name: &str, from: Duration, to: Duration) -> Vec<Option<&str>> {
+    /// Everything that may have been read at a place in this time.
+    pub fn seen(&self, name: &str, from: Duration, to: Duration) -> Vec<Held<'_>> {
         let changes = self.changes.get(name).map_or(&[][..], Vec::as_slice);
         let mut seen = Vec::new();
         for (at, change) in changes.iter().enumerate() {
             let over = changes.get(at + 1).map_or(Duration::MAX, |next| next.done);
             if change.begun <= to && over >= from {
-                seen.push(change.digest.as_deref());
+                let digest = change.digest.as_deref();
+                seen.push(digest.map_or(Held::Nothing, Held::Bytes));
             }
             if change.begun <= to && change.done >= from {
-                seen.push(None);
+                seen.push(Held::Unfinished);
             }
         }
         seen
@@ -81,7 +92,7 @@ impl Ledger {
     /// Whether these bytes lay at a place before this time.
     pub fn has_held(&self, name: &str, digest: &str, to: Duration) -> bool {
         let seen = self.seen(name, Duration::ZERO, to);
-        seen.contains(&Some(digest))
+        seen.contains(&Held::Bytes(digest))
     }
 }
 

@@ -15,6 +15,7 @@ use std::time::{Duration, Instant};
 
 use driver::Driver;
 use history::{Seen, Watchers};
+use verdicts::Removals;
 
 use crate::support::content::Content;
 use crate::support::desk::files_below;
@@ -33,15 +34,33 @@ pub fn seconds() -> u64 {
 /// More private memory than this, at its peak, and the broker's memory is not bounded.
 const PEAK_KIB: u64 = 500 << 10;
 
-/// Lets the storm rage, waits until it is calm, and judges.
+/// Lets two storms rage, one after another: with a configuration, and without one, where whoever is on
+/// the roster must judge and nobody else says so. Waits until it is calm, and judges.
 pub fn rage(seed: u64, seconds: u64) {
     report(&format!(
         "chaos: QCBUS_CHAOS_SEED={seed} QCBUS_CHAOS_SECONDS={seconds}"
     ));
+    let half = Duration::from_secs(seconds) / 2;
+    rage_under(Demands::Configuration, seed, half);
+    rage_under(Demands::Roster, seed.wrapping_add(1), half);
+}
+
+/// What says who must judge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Demands {
+    Configuration,
+    Roster,
+}
+
+fn rage_under(demands: Demands, seed: u64, length: Duration) {
     let mut farm = Farm::new();
     let config = farm.base().join("config.xml");
     std::fs::write(&config, trouble::CALM).unwrap();
-    farm.arguments = arguments(&farm, &config);
+    farm.arguments = arguments(&farm);
+    if demands == Demands::Configuration {
+        let words = ["-c".to_owned(), config.to_string_lossy().into_owned()];
+        farm.arguments.extend(words);
+    }
     let mut driver = Driver::new(farm, seed);
     driver.install();
     driver.write_shared();
@@ -50,22 +69,26 @@ pub fn rage(seed: u64, seconds: u64) {
     driver.write_some(40);
     driver.calm_down();
     let start_kib = driver.memory_kib();
-    let until = Instant::now() + Duration::from_secs(seconds);
+    let until = Instant::now() + length;
     while Instant::now() < until {
         driver.step();
     }
     driver.calm_down();
     let end_kib = driver.memory_kib();
     let history = watchers.end();
-    at_every_moment(&driver, &history);
-    demand(driver, history.len(), start_kib, end_kib, seconds);
+    // What a configuration demands is demanded also while its manifest is away.
+    let removals = match demands {
+        Demands::Configuration => Removals::default(),
+        Demands::Roster => Removals::new(&driver.removals, &history),
+    };
+    at_every_moment(&driver, &history, &removals);
+    report(&format!("chaos: who must judge says the {demands:?}"));
+    demand(driver, history.len(), start_kib, end_kib, length.as_secs());
 }
 
-fn arguments(farm: &Farm, config: &std::path::Path) -> Vec<String> {
-    let (config, gate) = (config.to_string_lossy(), farm.gate());
+fn arguments(farm: &Farm) -> Vec<String> {
+    let gate = farm.gate();
     let words = [
-        "-c",
-        &config,
         "--gate",
         &gate.to_string_lossy(),
         "--report",
@@ -85,9 +108,9 @@ fn arguments(farm: &Farm, config: &std::path::Path) -> Vec<String> {
 }
 
 /// What must be so of everything that was seen while it stormed.
-fn at_every_moment(driver: &Driver, history: &[Seen]) {
-    let wrong = verdicts::complaints(history, &driver.ledger);
-    let dead = verdicts::innocent_dead(history, |_, at| driver.was_stopped(at));
+fn at_every_moment(driver: &Driver, history: &[Seen], removals: &Removals) {
+    let wrong = verdicts::complaints(history, &driver.ledger, removals);
+    let dead = verdicts::innocent_dead(history, |name, at| driver.was_stopped(name, at));
     let all: Vec<String> = wrong.into_iter().chain(dead).collect();
     let first: Vec<&String> = all.iter().take(20).collect();
     let (deeds, log) = (driver.tally.last_lines(), tail(&driver.farm.log()));

@@ -71,12 +71,18 @@ pub enum Trouble {
     Fill,
     /// Something that others depend on is written.
     Share,
+    /// Something that others depend on goes; it comes back when it is written again.
+    Unshare,
+    /// A link to a file elsewhere takes the place of a file.
+    Link,
     /// The configuration and the manifests are read again.
     Reload,
     /// The bundle of one's own gets another version.
     Upgrade,
     /// The program of the bundle of one's own goes from the disk for a while.
     Vanish,
+    /// The manifest of the bundle of one's own goes for a while.
+    Remove,
 }
 
 /// Every trouble with its share.
@@ -96,10 +102,13 @@ const SHARES: &[(u64, Trouble)] = &[
     (6, Trouble::Delete),
     (6, Trouble::Rewrite),
     (2, Trouble::Fill),
-    (8, Trouble::Share),
+    (10, Trouble::Share),
+    (2, Trouble::Unshare),
+    (5, Trouble::Link),
     (4, Trouble::Reload),
     (2, Trouble::Upgrade),
     (2, Trouble::Vanish),
+    (2, Trouble::Remove),
 ];
 
 /// What comes next.

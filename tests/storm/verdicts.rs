@@ -6,14 +6,41 @@ use std::time::Duration;
 use qcbus_messages::Verdict;
 
 use super::history::{Seen, Told, What};
-use super::ledger::Ledger;
-use crate::support::content::Content;
+use super::ledger::{Held, Ledger};
+use crate::support::content::{Content, STRICT};
 
 /// The bundle of one's own that must judge everything, whatever happens to it.
 pub const JUDGE: &str = "judges_strictly";
 
+/// A writer that had begun when the bundle of one's own was demanded again may end so much later.
+const WRITES: Duration = Duration::from_secs(2);
+
+/// When the bundle of one's own need not judge.
+#[derive(Debug, Default)]
+pub struct Removals(Vec<(Duration, Duration)>);
+
+impl Removals {
+    /// From when its manifest went until a broker demands it again: that was seen.
+    pub fn new(manifests: &[(Duration, Duration)], history: &[Seen]) -> Removals {
+        let demanded = |back: Duration| {
+            let after = |seen: &&Seen| seen.from >= back && matches!(seen.what, What::Demanded);
+            let seen = history.iter().find(after);
+            seen.map_or(Duration::MAX, |seen| seen.at + WRITES)
+        };
+        let times = manifests
+            .iter()
+            .map(|(gone, back)| (*gone, demanded(*back)));
+        Removals(times.collect())
+    }
+
+    fn excuse(&self, seen: &Seen) -> bool {
+        let times = &mut self.0.iter();
+        times.any(|(from, to)| *from <= seen.at && seen.from <= *to)
+    }
+}
+
 /// What was seen and may not be.
-pub fn complaints(history: &[Seen], ledger: &Ledger) -> Vec<String> {
+pub fn complaints(history: &[Seen], ledger: &Ledger, removals: &Removals) -> Vec<String> {
     let mut complaints = Vec::new();
     let mut epochs: BTreeMap<&str, u64> = BTreeMap::new();
     for seen in history {
@@ -25,15 +52,20 @@ pub fn complaints(history: &[Seen], ledger: &Ledger) -> Vec<String> {
             let name = &told.name;
             complaints.push(format!("{name}: of epoch {epoch}, after one of {before}"));
         }
+        let judge = Judge {
+            ledger,
+            seen,
+            strict: !removals.excuse(seen),
+        };
         let wrong = match &seen.what {
-            What::Told(told) => wrong_verdict(told, seen, ledger),
-            What::Published { name, digest } => wrong_acceptance(name, digest, ledger, seen.at),
+            What::Told(told) => judge.wrong_verdict(told),
+            What::Published { name, digest } => judge.wrong_acceptance(name, digest),
             What::Answer {
                 name,
                 verdict,
                 digest,
-            } => wrong_answer(name, *verdict, digest, seen, ledger),
-            What::Killed { .. } => None,
+            } => judge.wrong_answer(name, *verdict, digest),
+            What::Demanded | What::Killed { .. } => None,
         };
         let at = seen.at.as_secs_f64();
         complaints.extend(wrong.map(|wrong| format!("{at:9.3} {wrong}: {:?}", seen.what)));
@@ -41,98 +73,114 @@ pub fn complaints(history: &[Seen], ledger: &Ledger) -> Vec<String> {
     complaints
 }
 
-/// What is wrong with these bytes of a file being accepted at some time before `to`.
-fn wrong_acceptance(
-    name: &str,
-    digest: &str,
-    ledger: &Ledger,
-    to: Duration,
-) -> Option<&'static str> {
-    match ledger.content(digest) {
-        None => Some("nobody has written these bytes, and they are accepted"),
-        Some(content) if content.verdict() != Verdict::Accepted => Some("it is accepted"),
-        Some(_) if !ledger.has_held(name, digest, to) => {
-            Some("accepted, and these bytes never lay there")
+/// Judges one thing that was seen.
+struct Judge<'a> {
+    ledger: &'a Ledger,
+    seen: &'a Seen,
+    /// Whether the bundle of one's own had to judge.
+    strict: bool,
+}
+
+impl Judge<'_> {
+    /// Whether nobody who had to judge would have found a fault in this by itself.
+    fn passes(&self, content: &Content) -> bool {
+        let checker = content.checker();
+        checker.is_none_or(|it| it == STRICT && !self.strict)
+    }
+
+    /// What is wrong with these bytes of a file being accepted.
+    fn wrong_acceptance(&self, name: &str, digest: &str) -> Option<&'static str> {
+        match self.ledger.content(digest) {
+            None => Some("nobody has written these bytes, and they are accepted"),
+            Some(content) if !self.passes(content) => Some("it is accepted"),
+            Some(_) if !self.ledger.has_held(name, digest, self.seen.at) => {
+                Some("accepted, and these bytes never lay there")
+            }
+            Some(_) => None,
         }
-        Some(_) => None,
     }
-}
 
-fn wrong_verdict(told: &Told, seen: &Seen, ledger: &Ledger) -> Option<&'static str> {
-    if told.verdict != Verdict::Accepted.as_str() {
-        return None;
-    }
-    if let wrong @ Some(_) = wrong_acceptance(&told.name, &told.digest, ledger, seen.at) {
-        return wrong;
-    }
-    let took_part = |bundle: &str| {
-        told.bundles.iter().any(|it| it == bundle) && told.failed.iter().all(|it| it != bundle)
-    };
-    if !took_part(Content::bundle(&told.name)) || !took_part(JUDGE) {
-        return Some("accepted without a bundle that had to judge");
-    }
-    let demanded = told.demanded.iter().flatten();
-    if !demanded.clone().all(|it| took_part(it)) {
-        return Some("accepted without a bundle that it says had to judge");
-    }
-    if told.demanded.is_some() && !demanded.clone().any(|it| it == JUDGE) {
-        return Some("a bundle that nobody removed was not demanded");
-    }
-    let content = ledger.content(&told.digest)?;
-    let parts = content.parts();
-    parts
-        .iter()
-        .find_map(|part| wrong_part(told, part, seen, ledger))
-}
-
-/// What is wrong with an acceptance that depends on this part.
-fn wrong_part(told: &Told, part: &str, seen: &Seen, ledger: &Ledger) -> Option<&'static str> {
-    let below = format!("/{part}");
-    let mut of_part = told
-        .depends_on
-        .iter()
-        .filter(|(path, _)| path.ends_with(&below));
-    let Some((_, Some(digest))) = of_part.next() else {
-        return Some("accepted without something that it refers to");
-    };
-    match ledger.content(digest) {
-        // Half-written.
-        None => None,
-        Some(content) if !content.is_clean() => Some("accepted, and a part of it is marked"),
-        Some(_) if !ledger.has_held(part, digest, seen.at) => {
-            Some("accepted, and these bytes of a part never lay there")
+    fn wrong_verdict(&self, told: &Told) -> Option<&'static str> {
+        if told.verdict != Verdict::Accepted.as_str() {
+            return None;
         }
-        Some(_) => None,
+        if let wrong @ Some(_) = self.wrong_acceptance(&told.name, &told.digest) {
+            return wrong;
+        }
+        let took_part = |bundle: &str| {
+            told.bundles.iter().any(|it| it == bundle) && told.failed.iter().all(|it| it != bundle)
+        };
+        if !took_part(Content::bundle(&told.name)) || (self.strict && !took_part(JUDGE)) {
+            return Some("accepted without a bundle that had to judge");
+        }
+        let demanded = told.demanded.iter().flatten();
+        if !demanded.clone().all(|it| took_part(it)) {
+            return Some("accepted without a bundle that it says had to judge");
+        }
+        if self.strict && told.demanded.is_some() && !demanded.clone().any(|it| it == JUDGE) {
+            return Some("a bundle that nobody removed was not demanded");
+        }
+        let content = self.ledger.content(&told.digest)?;
+        let parts = content.parts();
+        parts.iter().find_map(|part| self.wrong_part(told, part))
     }
-}
 
-/// An answer is about what lay there between the question and the answer.
-fn wrong_answer(
-    name: &str,
-    verdict: Verdict,
-    digest: &str,
-    seen: &Seen,
-    ledger: &Ledger,
-) -> Option<&'static str> {
-    let there = ledger.seen(name, seen.from, seen.at);
-    if !there.contains(&Some(digest)) && !there.contains(&None) {
-        return Some("the answer is about bytes that did not lie there when it was asked for");
+    /// What is wrong with an acceptance that depends on this part.
+    fn wrong_part(&self, told: &Told, part: &str) -> Option<&'static str> {
+        let below = format!("/{part}");
+        let mut of_part = told
+            .depends_on
+            .iter()
+            .filter(|(path, _)| path.ends_with(&below));
+        let Some((_, Some(digest))) = of_part.next() else {
+            return Some("accepted without something that it refers to");
+        };
+        match self.ledger.content(digest) {
+            // Half-written.
+            None => None,
+            Some(content) if self.strict && !content.is_clean() => {
+                Some("accepted, and a part of it is marked")
+            }
+            Some(_) if !self.ledger.has_held(part, digest, self.seen.at) => {
+                Some("accepted, and these bytes of a part never lay there")
+            }
+            Some(_) => None,
+        }
     }
-    if verdict != Verdict::Accepted {
-        return None;
+
+    /// An answer is about what lay there between the question and the answer.
+    fn wrong_answer(&self, name: &str, verdict: Verdict, digest: &str) -> Option<&'static str> {
+        let there = self.ledger.seen(name, self.seen.from, self.seen.at);
+        if there
+            .iter()
+            .all(|it| matches!(it, Held::Bytes(other) if *other != digest))
+        {
+            return Some("the answer is about bytes that did not lie there when it was asked for");
+        }
+        if verdict != Verdict::Accepted {
+            return None;
+        }
+        if let wrong @ Some(_) = self.wrong_acceptance(name, digest) {
+            return wrong;
+        }
+        let may_pass = |part: &String| {
+            let mut there = self
+                .ledger
+                .seen(part, self.seen.from, self.seen.at)
+                .into_iter();
+            there.any(|it| match it {
+                Held::Bytes(digest) => {
+                    let content = self.ledger.content(digest);
+                    !self.strict || content.is_none_or(Content::is_clean)
+                }
+                Held::Unfinished => true,
+                Held::Nothing => false,
+            })
+        };
+        let parts = self.ledger.content(digest)?.parts();
+        let wrong = "accepted, and all the time a part of it was marked or not there";
+        (!parts.iter().all(may_pass)).then_some(wrong)
     }
-    if let wrong @ Some(_) = wrong_acceptance(name, digest, ledger, seen.at) {
-        return wrong;
-    }
-    let clean = |part: &String| {
-        let mut there = ledger.seen(part, seen.from, seen.at).into_iter();
-        there.any(|it| {
-            it.and_then(|it| ledger.content(it))
-                .is_none_or(Content::is_clean)
-        })
-    };
-    let parts = ledger.content(digest)?.parts();
-    (!parts.iter().all(clean)).then_some("accepted, and all the time a part of it was marked")
 }
 
 /// Standard bundles that the broker killed and the driver had not stopped: name, when, why.
@@ -183,7 +231,8 @@ mod tests {
     fn is_wrong(case: &Case) -> bool {
         let (from, at) = (Duration::ZERO, case.at);
         let what = What::Told(Box::new(case.told.clone()));
-        !complaints(&[Seen { from, at, what }], &case.ledger).is_empty()
+        let removals = Removals::default();
+        !complaints(&[Seen { from, at, what }], &case.ledger, &removals).is_empty()
     }
 
     #[test]
@@ -207,6 +256,26 @@ mod tests {
     }
 
     #[test]
+    fn a_bundle_that_was_removed_need_not_judge_until_it_is_demanded_again() {
+        let mut case = accepted(&Content::Part(2, Mark::Marked));
+        case.told.bundles.truncate(1);
+        let second = Duration::from_secs(1);
+        let seen = |at: u32, what| Seen {
+            from: second * at,
+            at: second * at,
+            what,
+        };
+        let complaints_at = |at: u32| {
+            let told = What::Told(Box::new(case.told.clone()));
+            let history = [seen(20, What::Demanded), seen(at, told)];
+            let removals = Removals::new(&[(second * 10, second * 15)], &history);
+            complaints(&history, &case.ledger, &removals).len()
+        };
+        let counts = [9, 10, 16, 20, 30].map(complaints_at);
+        assert_eq!(counts, [1, 0, 0, 0, 1]);
+    }
+
+    #[test]
     fn an_answer_about_bytes_that_had_gone_is_seen() {
         let mut ledger = Ledger::new();
         let (old, new) = (Content::Good(1), Content::Good(2));
@@ -225,7 +294,7 @@ mod tests {
                 at: from,
                 what,
             };
-            complaints(&[seen], &ledger).len()
+            complaints(&[seen], &ledger, &Removals::default()).len()
         };
         assert_eq!((answer(&old), answer(&new)), (1, 0));
     }

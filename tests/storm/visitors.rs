@@ -63,12 +63,44 @@ impl Driver {
         self.upgrade();
     }
 
+    /// It gets another version, if anybody wants it.
     pub fn upgrade(&mut self) {
+        if self.removed_until.is_some() {
+            return;
+        }
         self.version += 1;
         let (program, version) = (self.program(), self.version);
         let arguments = format!("--version {version}.0.0");
         self.farm.let_in_by(&program, JUDGE, &arguments);
         self.tally.note("upgrade", &version.to_string());
+    }
+
+    /// Nobody wants the bundle of one's own for a while.
+    pub fn remove(&mut self) {
+        if self.removed_until.is_some() {
+            return;
+        }
+        let begun = self.ledger.now();
+        self.farm.send_away(JUDGE);
+        self.removals.push((begun, Duration::MAX));
+        self.removed_until = Some(Instant::now() + self.dice.millis(5000));
+        self.tally.note("manifest goes", JUDGE);
+    }
+
+    /// It is wanted again.
+    pub fn want_again(&mut self) {
+        if self.removed_until.take().is_some() {
+            self.upgrade();
+            if let Some((_, back)) = self.removals.last_mut() {
+                *back = self.ledger.now();
+            }
+        }
+    }
+
+    pub fn want_again_when_due(&mut self, now: Instant) {
+        if self.removed_until.is_some_and(|until| until <= now) {
+            self.want_again();
+        }
     }
 
     /// The program goes from the disk for a while, mostly with the process that runs.
@@ -107,10 +139,21 @@ impl Driver {
     }
 
     /// Whether the driver had a hand in the death of a bundle that the broker killed at this time.
-    pub fn was_stopped(&self, at: Duration) -> bool {
-        let hand = |(from, to): &(Duration, Duration)| *from <= at && at <= *to + AFTERMATH;
+    pub fn was_stopped(&self, name: &str, at: Duration) -> bool {
+        let hand = |stop: &Stop| {
+            let whose = stop.name.is_none_or(|it| it == name);
+            whose && stop.from <= at && at <= stop.to + AFTERMATH
+        };
         self.stops.iter().any(hand)
     }
+}
+
+/// A time in which a bundle could not go on.
+pub struct Stop {
+    /// Which bundle; all of them if it is not said.
+    pub name: Option<&'static str>,
+    pub from: Duration,
+    pub to: Duration,
 }
 
 /// So long after a process was stopped, or the shared memory was full, it may be killed for it.
