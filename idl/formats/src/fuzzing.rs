@@ -12,7 +12,7 @@ pub fn config(bytes: &[u8]) {
     let config = parsed.config;
     assert!(
         parsed
-            .notices
+            .oddities
             .iter()
             .all(|notice| notice.row > 0 && notice.column > 0)
     );

@@ -9,7 +9,7 @@ mod common;
 
 use common::param;
 use qcbus_formats::config::{
-    Config, Known, KnownBundle, KnownChecker, Levels, Notice, Parsed, Selected, Selection,
+    Config, Known, KnownBundle, KnownChecker, Levels, Oddity, Parsed, Selected, Selection,
     reporter_for, same_bundle,
 };
 use qcbus_formats::xqar::Level;
@@ -40,15 +40,15 @@ fn parse(text: &str) -> Parsed {
     Config::parse(text.as_bytes()).unwrap()
 }
 
-fn told(notices: &[Notice]) -> String {
-    let line = |n: &Notice| format!("{}:{}: {}: {}", n.row, n.column, n.level.as_str(), n.text);
-    notices.iter().map(line).collect::<Vec<_>>().join("\n")
+fn told(oddities: &[Oddity]) -> String {
+    let line = |n: &Oddity| format!("{}:{}: {}: {}", n.row, n.column, n.level.as_str(), n.text);
+    oddities.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
 #[test]
 fn children_in_any_order_and_levels_by_number_or_missing() {
-    let Parsed { config, notices } = parse(GOOD);
-    assert_eq!(told(&notices), "");
+    let Parsed { config, oddities } = parse(GOOD);
+    assert_eq!(told(&oddities), "");
     assert_eq!(config.input_file(), Some("myTrack.xodr"));
     let bundle = config.bundle("xodrBundle", "xodr").unwrap();
     let ids: Vec<&str> = bundle
@@ -135,7 +135,7 @@ fn both_orders_of_levels_mean_the_interval() {
         (2, 1, "12"),
         (2, 2, "2"),
     ] {
-        let Parsed { config, notices } = parse(&text(min, max));
+        let Parsed { config, oddities } = parse(&text(min, max));
         let kept = config.bundles[0].checkers[0].levels;
         let all = [Level::Error, Level::Warning, Level::Information];
         let numbers = all
@@ -143,10 +143,10 @@ fn both_orders_of_levels_mean_the_interval() {
             .filter(|l| kept.contains(**l))
             .map(|l| (*l as u8).to_string());
         assert_eq!(numbers.collect::<String>(), levels, "{min} {max}");
-        assert_eq!(notices.len(), usize::from(min < max));
-        assert_eq!(config.old_order_notices(), notices);
+        assert_eq!(oddities.len(), usize::from(min < max));
+        assert_eq!(config.old_order_oddities(), oddities);
     }
-    insta::assert_snapshot!(told(&parse(&text(1, 3)).notices));
+    insta::assert_snapshot!(told(&parse(&text(1, 3)).oddities));
 }
 
 #[test]
@@ -157,9 +157,9 @@ fn the_example_of_2023_is_refused_at_its_stray_quotation_mark() {
                   </CheckerBundle>\n</Config>\n";
     insta::assert_snapshot!(Config::parse(broken.as_bytes()).unwrap_err().to_string());
     let repaired = broken.replace("\"e\"myTrack.xodr\">", "\"myTrack.xodr\"/>");
-    let Parsed { config, notices } = parse(&repaired);
+    let Parsed { config, oddities } = parse(&repaired);
     assert_eq!(config.input_file(), Some("myTrack.xodr"));
-    assert_eq!(notices.len(), 1, "the old order of levels");
+    assert_eq!(oddities.len(), 1, "the old order of levels");
 }
 
 #[test]
@@ -178,8 +178,8 @@ fn odd_things_are_told_with_their_place() {
   </CheckerBundle>
   <Param name="InputFile" value="a"/><Param name="InputFile" value="b"/>
 </Config>"#;
-    let Parsed { config, notices } = parse(text);
-    insta::assert_snapshot!(told(&notices));
+    let Parsed { config, oddities } = parse(text);
+    insta::assert_snapshot!(told(&oddities));
     let ids: Vec<&str> = config.bundles[0]
         .checkers
         .iter()
@@ -218,7 +218,7 @@ fn what_cannot_be_used_is_refused_with_place_and_hint() {
     let lines = cases
         .iter()
         .map(|case| match Config::parse(case.as_bytes()) {
-            Ok(parsed) => format!("{case:?}\n  accepted: {:?}", parsed.notices),
+            Ok(parsed) => format!("{case:?}\n  accepted: {:?}", parsed.oddities),
             Err(error) => format!("{case:?}\n  {error}"),
         });
     let mut lines: Vec<String> = lines.collect();
@@ -290,7 +290,7 @@ fn what_nobody_knows_is_told() {
   <ReportModule application="qc-report-json"/>
 </Config>"#;
     let parsed = parse(text);
-    assert_eq!(parsed.notices, []);
+    assert_eq!(parsed.oddities, []);
     insta::assert_snapshot!(told(&parsed.config.check(&known)));
     let none = parse("<Config><CheckerBundle application='qc_opendrive'/></Config>").config;
     insta::assert_snapshot!(told(&none.check(&Known::default())));
@@ -327,11 +327,11 @@ fn two_names_of_one_bundle_are_told() {
         reporters: vec![],
     };
     let text = "<Config><CheckerBundle application='mine'/>\n<CheckerBundle application='mineBundle'/></Config>";
-    let notices = parse(text).config.check(&known);
-    assert_eq!(notices.len(), 1);
+    let oddities = parse(text).config.check(&known);
+    assert_eq!(oddities.len(), 1);
     assert!(
-        notices[0].row == 2 && notices[0].text.contains("the same bundle"),
-        "{notices:?}"
+        oddities[0].row == 2 && oddities[0].text.contains("the same bundle"),
+        "{oddities:?}"
     );
 }
 
@@ -354,11 +354,11 @@ fn what_only_a_bundle_can_tell_is_said_to_be_unknown() {
   <Param name="of_mine" value="1"/><Param name="tolerence" value="1"/>
   <CheckerBundle application="mine"><Checker checkerId="any"/></CheckerBundle>
 </Config>"#;
-    let remarks = parse(text).remarks(&known);
-    let found: Vec<_> = remarks.iter().map(|it| (it.row, it.level)).collect();
+    let oddities = parse(text).all_oddities(&known);
+    let found: Vec<_> = oddities.iter().map(|it| (it.row, it.level)).collect();
     assert_eq!(found, [(2, Level::Warning), (3, Level::Information)]);
-    assert!(remarks[0].text.contains("tolerence"), "{remarks:?}");
-    let line = remarks[1].line(std::path::Path::new("c.xml"));
+    assert!(oddities[0].text.contains("tolerence"), "{oddities:?}");
+    let line = oddities[1].line(std::path::Path::new("c.xml"));
     assert!(
         line.starts_with("c.xml:3:3: information: what `mine` offers"),
         "{line}"

@@ -86,9 +86,9 @@ fn configured(path: &Path, name: &str) -> Result<Vec<Param>, OnceError> {
     };
     let bytes = std::fs::read(path).map_err(|error| wrong(error.to_string()))?;
     let parsed = Config::parse(&bytes).map_err(|error| wrong(error.to_string()))?;
-    for notice in &parsed.notices {
-        let (row, column) = (notice.row, notice.column);
-        tracing::warn!("{}:{row}:{column}: {}", path.display(), notice.text);
+    for oddity in &parsed.oddities {
+        let (row, column) = (oddity.row, oddity.column);
+        tracing::warn!("{}:{row}:{column}: {}", path.display(), oddity.text);
     }
     let config = parsed.config;
     let global = config

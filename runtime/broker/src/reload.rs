@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use qcbus_formats::config::{
-    BundleConfig, Config, Known, KnownBundle, Notice, Parsed, reporter_for,
+    BundleConfig, Config, Known, KnownBundle, Oddity, Parsed, reporter_for,
 };
 use qcbus_formats::manifest::{self, Mode, Module, ModuleType};
 use qcbus_messages::Role;
@@ -36,7 +36,7 @@ pub struct Loaded {
     /// Everything that is to run.
     pub children: Vec<ChildSpec>,
     /// What is odd about the configuration.
-    pub remarks: Vec<Notice>,
+    pub oddities: Vec<Oddity>,
     /// What is odd about anything, that included, for a person.
     pub notices: Vec<String>,
 }
@@ -75,8 +75,8 @@ impl Sources {
             }
         }
         if let Some((path, parsed)) = parsed {
-            loaded.remarks = parsed.remarks(&self.known_with(&loaded.children));
-            let lines = loaded.remarks.iter().map(|remark| remark.line(path));
+            loaded.oddities = parsed.all_oddities(&self.known_with(&loaded.children));
+            let lines = loaded.oddities.iter().map(|oddity| oddity.line(path));
             loaded.notices.splice(0..0, lines);
             loaded.config = Some(parsed.config);
         }

@@ -61,13 +61,13 @@ fn module(
         path: path.display().to_string(),
         error,
     })?;
-    for notice in &parsed.notices {
+    for oddity in &parsed.oddities {
         tracing::warn!(
             "{}:{}:{}: {}",
             path.display(),
-            notice.row,
-            notice.column,
-            notice.text
+            oddity.row,
+            oddity.column,
+            oddity.text
         );
     }
     let config = parsed.config;

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use super::lookup::{canonical_bundle, reporter_names};
 use super::{
-    BundleConfig, CheckerConfig, Config, ConfigParam, INPUT_PARAMS, LEVEL_PARAM, Notice, Parsed,
+    BundleConfig, CheckerConfig, Config, ConfigParam, INPUT_PARAMS, LEVEL_PARAM, Oddity, Parsed,
     ReportConfig, TextPosition, reporter_for, same_bundle,
 };
 use crate::distance::{DID_YOU_MEAN, did_you_mean};
@@ -55,34 +55,34 @@ impl Parsed {
     /// All that is to be said of a configuration before it is used: what is odd about the file,
     /// and what it names that nobody knows; in the order of the file. A warning stands for
     /// something that is not done as the file says.
-    pub fn remarks(&self, known: &Known) -> Vec<Notice> {
-        let mut notices = self.notices.clone();
-        notices.extend(self.config.check(known));
-        notices.sort_by_key(|notice| (notice.row, notice.column));
-        notices.dedup();
-        notices
+    pub fn all_oddities(&self, known: &Known) -> Vec<Oddity> {
+        let mut oddities = self.oddities.clone();
+        oddities.extend(self.config.check(known));
+        oddities.sort_by_key(|oddity| (oddity.row, oddity.column));
+        oddities.dedup();
+        oddities
     }
 }
 
 impl Config {
     /// What the configuration names and nobody knows: bundles, checkers, parameters, reports;
     /// in the order of the file.
-    pub fn check(&self, known: &Known) -> Vec<Notice> {
-        let mut notices = Vec::new();
-        self.check_global_params(known, &mut notices);
+    pub fn check(&self, known: &Known) -> Vec<Oddity> {
+        let mut oddities = Vec::new();
+        self.check_global_params(known, &mut oddities);
         for (i, bundle) in self.bundles.iter().enumerate() {
-            check_bundle(bundle, known, &mut notices);
-            notices.extend(named_before(bundle, &self.bundles[..i], known));
+            check_bundle(bundle, known, &mut oddities);
+            oddities.extend(named_before(bundle, &self.bundles[..i], known));
         }
         for report in &self.reports {
-            notices.extend(check_report(report, known));
+            oddities.extend(check_report(report, known));
         }
-        notices.sort_by_key(|notice| (notice.row, notice.column));
-        notices
+        oddities.sort_by_key(|oddity| (oddity.row, oddity.column));
+        oddities
     }
 
     /// A global parameter may be meant for any bundle or report.
-    fn check_global_params(&self, known: &Known, notices: &mut Vec<Notice>) {
+    fn check_global_params(&self, known: &Known, oddities: &mut Vec<Oddity>) {
         let mut names: HashSet<&str> = FRAMEWORK_PARAMS
             .into_iter()
             .chain(INPUT_PARAMS)
@@ -96,8 +96,8 @@ impl Config {
         let all_known = known.bundles.iter().all(|it| it.checkers.is_some());
         let mut found = Vec::new();
         check_params(&self.params, &names, what, &mut found);
-        found.retain(|notice| all_known || notice.text.contains(DID_YOU_MEAN));
-        notices.append(&mut found);
+        found.retain(|oddity| all_known || oddity.text.contains(DID_YOU_MEAN));
+        oddities.append(&mut found);
     }
 }
 
@@ -108,41 +108,41 @@ impl KnownBundle {
     }
 }
 
-fn check_bundle(bundle: &BundleConfig, known: &Known, notices: &mut Vec<Notice>) {
+fn check_bundle(bundle: &BundleConfig, known: &Known, oddities: &mut Vec<Oddity>) {
     let application = &bundle.application;
     let found = known
         .bundles
         .iter()
         .find(|b| same_bundle(application, &b.name, &b.alias));
     let Some(found) = found else {
-        notices.push(unknown_bundle(application, bundle.position, known));
+        oddities.push(unknown_bundle(application, bundle.position, known));
         return;
     };
     let Some(checkers) = &found.checkers else {
-        notices.push(unknown_catalogue(bundle));
+        oddities.push(unknown_catalogue(bundle));
         return;
     };
     let mut names: HashSet<&str> = FRAMEWORK_PARAMS.into_iter().chain(INPUT_PARAMS).collect();
     names.extend(found.param_names());
     names.remove(LEVEL_PARAM);
     let what = format!("no checker of bundle `{}` reads a parameter", found.name);
-    check_params(&bundle.params, &names, &what, notices);
+    check_params(&bundle.params, &names, &what, oddities);
     for checker in &bundle.checkers {
-        check_checker(checker, (found, checkers), known, notices);
+        check_checker(checker, (found, checkers), known, oddities);
     }
 }
 
-fn unknown_catalogue(bundle: &BundleConfig) -> Notice {
+fn unknown_catalogue(bundle: &BundleConfig) -> Oddity {
     let text = format!(
         "what `{}` offers is known only when it has joined: its checkers and parameters were not \
          looked at",
         bundle.application
     );
-    Notice::information(bundle.position, text)
+    Oddity::information(bundle.position, text)
 }
 
 /// Two names of one bundle that only its catalogue tells to be the same.
-fn named_before(bundle: &BundleConfig, before: &[BundleConfig], known: &Known) -> Option<Notice> {
+fn named_before(bundle: &BundleConfig, before: &[BundleConfig], known: &Known) -> Option<Oddity> {
     let found = known
         .bundles
         .iter()
@@ -155,10 +155,10 @@ fn named_before(bundle: &BundleConfig, before: &[BundleConfig], known: &Known) -
          counts",
         first.application, first.position.row, bundle.application
     );
-    Some(Notice::warning(bundle.position, text))
+    Some(Oddity::warning(bundle.position, text))
 }
 
-fn unknown_bundle(application: &str, position: TextPosition, known: &Known) -> Notice {
+fn unknown_bundle(application: &str, position: TextPosition, known: &Known) -> Oddity {
     let names = known
         .bundles
         .iter()
@@ -177,7 +177,7 @@ fn unknown_bundle(application: &str, position: TextPosition, known: &Known) -> N
         Some((name, _)) if name != application => format!(" (ASAM's `{name}`)"),
         _ => String::new(),
     };
-    Notice::warning(
+    Oddity::warning(
         position,
         format!("no bundle is called `{application}`{meant}{there}"),
     )
@@ -187,23 +187,23 @@ fn check_checker(
     checker: &CheckerConfig,
     (bundle, checkers): (&KnownBundle, &[KnownChecker]),
     known: &Known,
-    notices: &mut Vec<Notice>,
+    oddities: &mut Vec<Oddity>,
 ) {
     let Some(found) = checkers.iter().find(|c| c.id == checker.id) else {
-        notices.push(unknown_checker(checker, (bundle, checkers), known));
+        oddities.push(unknown_checker(checker, (bundle, checkers), known));
         return;
     };
     let mut names: HashSet<&str> = found.params.iter().map(String::as_str).collect();
     names.insert(LEVEL_PARAM);
     let what = format!("checker `{}` reads no parameter", found.id);
-    check_params(&checker.params, &names, &what, notices);
+    check_params(&checker.params, &names, &what, oddities);
 }
 
 fn unknown_checker(
     checker: &CheckerConfig,
     (bundle, checkers): (&KnownBundle, &[KnownChecker]),
     known: &Known,
-) -> Notice {
+) -> Oddity {
     let elsewhere = known
         .bundles
         .iter()
@@ -216,14 +216,14 @@ fn unknown_checker(
         "bundle `{}` has no checker `{}`{hint}",
         bundle.name, checker.id
     );
-    Notice::warning(checker.position, text)
+    Oddity::warning(checker.position, text)
 }
 
 fn check_params(
     params: &[ConfigParam],
     names: &HashSet<&str>,
     what: &str,
-    notices: &mut Vec<Notice>,
+    oddities: &mut Vec<Oddity>,
 ) {
     for param in params
         .iter()
@@ -233,14 +233,14 @@ fn check_params(
         let mut near: Vec<&str> = names.iter().copied().collect();
         near.sort_unstable();
         let hint = did_you_mean(&param.name, near);
-        notices.push(Notice::warning(
+        oddities.push(Oddity::warning(
             param.position,
             format!("{what} `{}`{hint}", param.name),
         ));
     }
 }
 
-fn check_report(report: &ReportConfig, known: &Known) -> Option<Notice> {
+fn check_report(report: &ReportConfig, known: &Known) -> Option<Oddity> {
     let name = report.application.as_str();
     if reporter_for(name).is_some() || known.reporters.iter().any(|known| known == name) {
         return None;
@@ -255,7 +255,7 @@ fn check_report(report: &ReportConfig, known: &Known) -> Option<Notice> {
         }
         hint => hint,
     };
-    Some(Notice::warning(
+    Some(Oddity::warning(
         report.position,
         format!("no reporter is called `{name}`{hint}"),
     ))

@@ -1,7 +1,7 @@
 //! The questions that a broker or a bundle asks a configuration.
 
 use super::{
-    BundleConfig, CheckerConfig, Config, ConfigParam, INPUT_PARAMS, Levels, Notice, ReportConfig,
+    BundleConfig, CheckerConfig, Config, ConfigParam, INPUT_PARAMS, Levels, Oddity, ReportConfig,
 };
 use crate::xqar::{Level, Param};
 
@@ -176,11 +176,11 @@ impl Config {
 
     /// The information that the old order of `minLevel` and `maxLevel` was read as an interval,
     /// one for each checker concerned.
-    pub fn old_order_notices(&self) -> Vec<Notice> {
+    pub fn old_order_oddities(&self) -> Vec<Oddity> {
         let checkers = self.bundles.iter().flat_map(|bundle| &bundle.checkers);
         checkers
             .filter(|checker| checker.old_order)
-            .map(CheckerConfig::old_order_notice)
+            .map(CheckerConfig::old_order_oddity)
             .collect()
     }
 }
@@ -212,9 +212,9 @@ impl CheckerConfig {
         }
     }
 
-    pub(super) fn old_order_notice(&self) -> Notice {
+    pub(super) fn old_order_oddity(&self) -> Oddity {
         let (worst, mildest) = (self.levels.worst() as u8, self.levels.mildest() as u8);
-        Notice::information(
+        Oddity::information(
             self.position,
             format!(
                 "checker `{}`: minLevel=\"{worst}\" maxLevel=\"{mildest}\" is the order of 2023; \

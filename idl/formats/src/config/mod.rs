@@ -106,12 +106,12 @@ pub struct Parsed {
     /// The configuration.
     pub config: Config,
     /// What is odd about the file, in the order of the file.
-    pub notices: Vec<Notice>,
+    pub oddities: Vec<Oddity>,
 }
 
 /// Something odd about a configuration that does not keep it from being used.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Notice {
+pub struct Oddity {
     /// [`Level::Warning`], or [`Level::Information`] for older ways to write things.
     pub level: Level,
     /// Line, from 1.
@@ -154,10 +154,10 @@ impl ConfigParam {
     }
 }
 
-impl Notice {
+impl Oddity {
     /// As a line: `FILE:ROW:COLUMN: LEVEL: TEXT`.
     pub fn line(&self, file: &std::path::Path) -> String {
-        let Notice {
+        let Oddity {
             level,
             row,
             column,
@@ -170,8 +170,8 @@ impl Notice {
         )
     }
 
-    pub(crate) fn warning(position: TextPosition, text: String) -> Notice {
-        Notice {
+    pub(crate) fn warning(position: TextPosition, text: String) -> Oddity {
+        Oddity {
             level: Level::Warning,
             row: position.row,
             column: position.column,
@@ -179,8 +179,8 @@ impl Notice {
         }
     }
 
-    pub(crate) fn information(position: TextPosition, text: String) -> Notice {
-        Notice {
+    pub(crate) fn information(position: TextPosition, text: String) -> Oddity {
+        Oddity {
             level: Level::Information,
             row: position.row,
             column: position.column,

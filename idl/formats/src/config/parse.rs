@@ -1,8 +1,8 @@
-//! From bytes to a configuration, with notices for what is odd.
+//! From bytes to a configuration, with what is odd about it.
 
 use super::lookup::canonical_bundle;
 use super::{
-    BundleConfig, CheckerConfig, Config, ConfigError, ConfigParam, LEVEL_PARAM, Levels, Notice,
+    BundleConfig, CheckerConfig, Config, ConfigError, ConfigParam, LEVEL_PARAM, Levels, Oddity,
     Parsed, ReportConfig, TextPosition, reporter_for,
 };
 use crate::distance::did_you_mean;
@@ -14,7 +14,7 @@ impl Config {
     ///
     /// # Errors
     /// The file is not well-formed XML, its root is not `Config`, or a bundle, checker, report or
-    /// parameter has no name. Everything else that is odd becomes a notice.
+    /// parameter has no name. Everything else that is odd becomes an oddity.
     pub fn parse(bytes: &[u8]) -> Result<Parsed, ConfigError> {
         let document = xml::parse(bytes).map_err(|error| ConfigError {
             row: error.row,
@@ -24,18 +24,18 @@ impl Config {
         })?;
         let mut parser = Parser {
             document: &document,
-            notices: Vec::new(),
+            oddities: Vec::new(),
         };
         let config = parser.config(&document.root)?;
-        let mut notices = parser.notices;
-        notices.sort_by_key(|notice| (notice.row, notice.column));
-        Ok(Parsed { config, notices })
+        let mut oddities = parser.oddities;
+        oddities.sort_by_key(|oddity| (oddity.row, oddity.column));
+        Ok(Parsed { config, oddities })
     }
 }
 
 struct Parser<'d> {
     document: &'d Document,
-    notices: Vec<Notice>,
+    oddities: Vec<Oddity>,
 }
 
 impl Parser<'_> {
@@ -112,7 +112,7 @@ impl Parser<'_> {
             position: self.position(element.offset),
         };
         if checker.old_order {
-            self.notices.push(checker.old_order_notice());
+            self.oddities.push(checker.old_order_oddity());
         }
         Ok(checker)
     }
@@ -174,10 +174,10 @@ impl Parser<'_> {
         let level = level.and_then(Level::from_number);
         if level.is_none() {
             let value = if name == "minLevel" { 3 } else { 1 };
-            let notice = format!(
+            let text = format!(
                 "{name}=\"{text}\" is no level (1 error, 2 warning, 3 information); {value} is used"
             );
-            self.warn(attribute.offset, notice);
+            self.warn(attribute.offset, text);
         }
         level
     }
@@ -192,7 +192,7 @@ impl Parser<'_> {
                 "`{LEVEL_PARAM}` is `{value}`, which is no level (error, warning, information) \
                  and has no effect{hint}"
             );
-            self.notices.push(Notice::warning(param.position, text));
+            self.oddities.push(Oddity::warning(param.position, text));
         }
         level
     }
@@ -202,7 +202,7 @@ impl Parser<'_> {
         for param in params.iter().filter(|param| param.name == LEVEL_PARAM) {
             let text =
                 format!("`{LEVEL_PARAM}` has no effect on a {what}: it belongs to a checker");
-            self.notices.push(Notice::warning(param.position, text));
+            self.oddities.push(Oddity::warning(param.position, text));
         }
     }
 
@@ -212,7 +212,7 @@ impl Parser<'_> {
                 "checker `{}` is configured twice in this bundle; the first one, in row {}, counts",
                 checker.id, first.position.row
             );
-            self.notices.push(Notice::warning(checker.position, text));
+            self.oddities.push(Oddity::warning(checker.position, text));
             return;
         }
         bundle.checkers.push(checker);
@@ -234,7 +234,7 @@ impl Parser<'_> {
             "bundle `{}` is configured twice; what is new here is added to the first one, in row {}",
             bundle.application, first.position.row
         );
-        self.notices.push(Notice::warning(bundle.position, text));
+        self.oddities.push(Oddity::warning(bundle.position, text));
         merge(first, bundle, self);
     }
 
@@ -296,8 +296,8 @@ impl Parser<'_> {
     }
 
     fn warn(&mut self, offset: usize, text: String) {
-        self.notices
-            .push(Notice::warning(self.position(offset), text));
+        self.oddities
+            .push(Oddity::warning(self.position(offset), text));
     }
 
     fn error(&self, offset: usize, text: String, hint: &str) -> ConfigError {

@@ -64,9 +64,9 @@ impl Removal {
 
 /// The remark that a configuration uses the order of levels of 2023.
 pub(super) fn level_order(config: &Config) -> Option<Remark> {
-    let notices = config.old_order_notices();
-    let first = notices.first()?;
-    let more = match notices.len() - 1 {
+    let oddities = config.old_order_oddities();
+    let first = oddities.first()?;
+    let more = match oddities.len() - 1 {
         0 => String::new(),
         1 => String::from("; the same holds for one more checker"),
         n => format!("; the same holds for {n} more checkers"),

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use qcbus_broker::reload::{Loaded, Sources};
-use qcbus_formats::config::Notice;
+use qcbus_formats::config::Oddity;
 use qcbus_formats::xqar::Level;
 use qcbus_messages::Exit;
 
@@ -40,8 +40,8 @@ fn tell(file: &Path, loaded: &Loaded) -> Exit {
         talk::print(&format!("{line}\n"));
     }
     let shown = file.display();
-    let is_warning = |notice: &&Notice| notice.level <= Level::Warning;
-    let warnings = loaded.remarks.iter().filter(is_warning).count();
+    let is_warning = |oddity: &&Oddity| oddity.level <= Level::Warning;
+    let warnings = loaded.oddities.iter().filter(is_warning).count();
     if warnings == 0 {
         talk::say(&format!("{shown}: in order"));
         return Exit::Accepted;
