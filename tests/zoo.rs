@@ -93,7 +93,7 @@ fn is_known(farm: &Farm, animal: &str) -> Option<()> {
     let status = farm.status()?;
     let named =
         |it: &qcbus_messages::control::PeerStatus| it.name == animal && it.state != "starting";
-    let told = |notice: &qcbus_messages::control::Notice| {
+    let told = |notice: &qcbus_messages::control::NoticeStatus| {
         notice.kind != "loading" && notice.text.contains(animal)
     };
     (status.peers.iter().any(named) || status.notices.iter().any(told)).then_some(())

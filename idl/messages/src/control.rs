@@ -133,12 +133,12 @@ pub struct Status {
     #[serde(default)]
     pub unseen: Vec<Unseen>,
     /// Things a person should look at, newest last.
-    pub notices: Vec<Notice>,
+    pub notices: Vec<NoticeStatus>,
 }
 
 /// Something that a person should look at.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Notice {
+pub struct NoticeStatus {
     /// What kind of thing happened, for programs: `ended`, `killed`, `no-room` and so on.
     pub kind: String,
     /// The bundle or reporter that it is about.

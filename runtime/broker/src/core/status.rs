@@ -227,8 +227,8 @@ impl State {
     }
 }
 
-fn told(notice: &Notice) -> control::Notice {
-    control::Notice {
+fn told(notice: &Notice) -> control::NoticeStatus {
+    control::NoticeStatus {
         kind: notice.kind().to_owned(),
         about: notice.about().map(str::to_owned),
         text: notice.to_string(),

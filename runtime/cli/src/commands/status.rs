@@ -149,7 +149,7 @@ fn span(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use qcbus_messages::control::{FileCounts, Notice, QueueStatus, Unseen};
+    use qcbus_messages::control::{FileCounts, NoticeStatus, QueueStatus, Unseen};
 
     #[test]
     fn a_busy_broker_as_a_person_sees_it() {
@@ -189,7 +189,7 @@ mod tests {
                 note: "slow: 16 jobs wait for it and for nobody else".into(),
             }],
             epoch: (3 << 32) + 2,
-            notices: vec![Notice {
+            notices: vec![NoticeStatus {
                 kind: "not-written".into(),
                 about: None,
                 text: "cannot write /farm/out/a.xqar: No space left on device".into(),
