@@ -114,6 +114,13 @@ impl Share {
 }
 
 impl State {
+    /// The jobs that have not gone to the writers.
+    pub(super) fn under_way(&self) -> Vec<JobId> {
+        let jobs = self.jobs.iter();
+        let under_way = jobs.filter(|(_, job)| job.stage.is_before_storing());
+        under_way.map(|(id, _)| *id).collect()
+    }
+
     /// Starts as many jobs as there is room for.
     pub(super) fn pump(&mut self, actions: &mut Actions) {
         if !self.may_judge() {

@@ -272,12 +272,7 @@ impl State {
         self.demand = demand;
         self.begin_epoch();
         // What is being checked is checked under the old configuration: it starts anew.
-        let under_way = self
-            .jobs
-            .iter()
-            .filter(|(_, job)| job.stage.is_before_storing());
-        let ids: Vec<JobId> = under_way.map(|(id, _)| *id).collect();
-        for id in ids {
+        for id in self.under_way() {
             self.begin_anew(id, actions);
         }
     }

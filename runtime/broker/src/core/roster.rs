@@ -192,9 +192,8 @@ impl State {
     }
 
     fn seat_of(&self, name: &str, bundle: &Bundle, kind: FileKind) -> Option<Seat> {
-        if bundle.leaving || bundle.origin.is_none() {
-            return None;
-        }
+        // Whoever leaves is off the roster.
+        bundle.origin?;
         let alias = bundle.catalogue.as_ref().map_or("", |it| it.alias.as_str());
         if !self.demand.wants_bundle(name, alias) {
             return None;
@@ -286,12 +285,7 @@ impl State {
         if !std::mem::take(&mut self.reseat) {
             return;
         }
-        let under_way = self
-            .jobs
-            .iter()
-            .filter(|(_, job)| job.stage.is_before_storing());
-        let ids: Vec<JobId> = under_way.map(|(id, _)| *id).collect();
-        for id in ids {
+        for id in self.under_way() {
             self.reseat(id, actions);
         }
         self.requeue_outdated();
