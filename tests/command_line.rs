@@ -161,17 +161,6 @@ fn quiet_and_json_say_no_more_than_asked() {
     }
 }
 
-/// What the manifest of a bundle says is to be run.
-fn command_of(desk: &Desk, name: &str) -> String {
-    let path = desk.path().join(format!("bundles/{name}.json"));
-    let manifest: serde_json::Value =
-        serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
-    manifest["module"][0]["exec_command"]
-        .as_str()
-        .unwrap()
-        .to_owned()
-}
-
 #[test]
 fn a_bundle_is_added_where_the_options_say_and_gets_what_follows_two_dashes() {
     let desk = Desk::new();
@@ -182,11 +171,11 @@ fn a_bundle_is_added_where_the_options_say_and_gets_what_follows_two_dashes() {
     };
     let said = add("mine", &["--bundles-d", "bundles"]);
     assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
-    assert_eq!(command_of(&desk, "mine"), "/bin/sh");
+    assert_eq!(desk.command_in("bundles/mine.json"), "/bin/sh");
     let own = ["a", "--bundles-d", "bundles", "--", "--bundles-d", "x"];
     assert_eq!(add("other", &own).code, Some(0));
     let command = "/bin/sh a --bundles-d x";
-    assert_eq!(command_of(&desk, "other"), command);
+    assert_eq!(desk.command_in("bundles/other.json"), command);
     let unclear = add("third", &["--bundles-d", "bundles", "--its-own-flag"]);
     assert_eq!(unclear.code, Some(2));
     assert!(

@@ -108,13 +108,7 @@ fn a_program_is_written_by_its_whole_path() {
     let add = |program: &str| {
         let said = desk.qcbus(&["bundle", "add", "mine", program, "--offline"]);
         assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
-        let path = desk.path().join("qcbus-out/.qcbus/bundles.d/mine.json");
-        let manifest: serde_json::Value =
-            serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
-        manifest["module"][0]["exec_command"]
-            .as_str()
-            .unwrap()
-            .to_owned()
+        desk.command_in("qcbus-out/.qcbus/bundles.d/mine.json")
     };
     let beside = desk.path().join("./idler");
     assert_eq!(Path::new(&add("./idler")), beside);

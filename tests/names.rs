@@ -154,20 +154,6 @@ fn a_directory_keeps_its_name_however_many_links_lead_to_it() {
     assert_eq!(published, [Path::new("maps/a.xodr")]);
 }
 
-/// A road whose plan view is included from `view.xml`, and what must be in there.
-fn road_in_two_parts() -> (String, String) {
-    let whole = String::from_utf8(Content::Good(1).bytes()).unwrap();
-    let (begin, end) = (
-        whole.find("<planView>").unwrap(),
-        whole.find("<lanes>").unwrap(),
-    );
-    let (before, view, after) = (&whole[..begin], &whole[begin..end], &whole[end..]);
-    (
-        format!("{before}<include file=\"view.xml\"/>{after}"),
-        format!("<road>{view}</road>"),
-    )
-}
-
 fn check(desk: &Desk, more: &[&str]) -> Said {
     desk.qcbus(&[&["check"][..], more, &["--out", "out"]].concat())
 }
@@ -175,7 +161,7 @@ fn check(desk: &Desk, more: &[&str]) -> Said {
 #[test]
 fn what_a_linked_file_includes_lies_beside_the_link() {
     let desk = Desk::new();
-    let (outer, view) = road_in_two_parts();
+    let (outer, view) = Content::road_in_two_parts();
     let target = desk.write("store/4711", outer);
     desk.write("maps/view.xml", view);
     symlink(&target, desk.path().join("maps/a.xodr")).unwrap();

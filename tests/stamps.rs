@@ -80,24 +80,10 @@ fn verdict_becomes(farm: &Farm, name: &str, verdict: Verdict) {
     });
 }
 
-/// A road whose plan view is included from `view.xml`, and what must be in there.
-fn road_in_two_parts() -> (String, String) {
-    let whole = String::from_utf8(Content::Good(1).bytes()).unwrap();
-    let (begin, end) = (
-        whole.find("<planView>").unwrap(),
-        whole.find("<lanes>").unwrap(),
-    );
-    let (before, view, after) = (&whole[..begin], &whole[begin..end], &whole[end..]);
-    (
-        format!("{before}<include file=\"view.xml\"/>{after}"),
-        format!("<road>{view}</road>"),
-    )
-}
-
 /// A farm whose broker has judged an old map with an old include; and the bytes of the latter.
 fn old_map_that_was_judged() -> (Farm, Broker, String) {
     let farm = farm_with_gate();
-    let (outer, view) = road_in_two_parts();
+    let (outer, view) = Content::road_in_two_parts();
     put_old(&farm, "a.xodr", outer.as_bytes());
     put_old(&farm, "view.xml", view.as_bytes());
     rest(&farm);
@@ -259,7 +245,7 @@ fn another_link_or_other_rights_cost_no_new_verdict() {
 #[test]
 fn files_from_before_1970_are_judged() {
     let farm = farm_with_gate();
-    let (outer, view) = road_in_two_parts();
+    let (outer, view) = Content::road_in_two_parts();
     for (name, bytes) in [("a.xodr", &outer), ("view.xml", &view)] {
         farm.write(name, bytes.as_bytes());
         set_modified(&farm.root().join(name), UNIX_EPOCH - HOUR);
@@ -285,7 +271,7 @@ fn what_is_there_and_cannot_be_read_does_not_keep_a_file_from_its_verdict() {
     for name in ["map.xodr", "view.xml"] {
         std::fs::create_dir(farm.root().join(name)).unwrap();
     }
-    let (outer, view) = road_in_two_parts();
+    let (outer, view) = Content::road_in_two_parts();
     put_old(&farm, "a.xodr", outer.as_bytes());
     put_old(&farm, "s.xosc", SCENARIO.as_bytes());
     let _broker = farm.serve_ready();

@@ -71,6 +71,20 @@ impl Content {
         Content::Torn(text[..usize::try_from(end).unwrap()].to_vec())
     }
 
+    /// A road whose plan view is included from `view.xml`, and what must be in there.
+    pub fn road_in_two_parts() -> (String, String) {
+        let whole = String::from_utf8(Content::Good(1).bytes()).unwrap();
+        let (begin, end) = (
+            whole.find("<planView>").unwrap(),
+            whole.find("<lanes>").unwrap(),
+        );
+        let (before, view, after) = (&whole[..begin], &whole[begin..end], &whole[end..]);
+        (
+            format!("{before}<include file=\"view.xml\"/>{after}"),
+            format!("<road>{view}</road>"),
+        )
+    }
+
     /// The bytes.
     pub fn bytes(&self) -> Vec<u8> {
         let text = match self {

@@ -48,6 +48,14 @@ impl Desk {
         path
     }
 
+    /// What a manifest says is to be run.
+    pub fn command_in(&self, manifest: &str) -> String {
+        let bytes = std::fs::read(self.path().join(manifest)).unwrap();
+        let manifest: serde_json::Value = serde_json::from_slice(&bytes).unwrap();
+        let command = &manifest["module"][0]["exec_command"];
+        command.as_str().unwrap().to_owned()
+    }
+
     /// Types `qcbus …` and waits for its end.
     pub fn qcbus(&self, arguments: &[&str]) -> Said {
         self.run(Command::new(env!("CARGO_BIN_EXE_qcbus")).args(arguments))

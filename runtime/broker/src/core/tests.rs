@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use proptest::prelude::*;
-use qcbus_messages::{FromPeer, Hello, JobId, PROTOCOL_VERSION, Role, ToPeer, Verdict};
+use qcbus_messages::{FromPeer, JobId, ToPeer, Verdict};
 
 use super::*;
 use crate::InForce;
@@ -358,22 +358,13 @@ fn world_with_an_unwanted_bundle() -> (World, SessionId) {
     world.peers.insert(
         session,
         Process {
-            name: "Left over",
+            name: "LeftOver",
             jobs: BTreeSet::new(),
             begun: BTreeSet::new(),
             drained: false,
         },
     );
-    let hello = Hello {
-        protocol: PROTOCOL_VERSION,
-        role: Role::Bundle,
-        name: "LeftOver".to_owned(),
-        version: "1".to_owned(),
-        incarnation: 77,
-        pid: 7777,
-        launch: Some(77),
-        capacity: 1,
-    };
+    let hello = hello(session, "LeftOver", 1, Some(77));
     let actions = world
         .state
         .handle(world.now, Event::Hello { session, hello });

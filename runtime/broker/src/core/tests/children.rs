@@ -6,12 +6,18 @@ fn notices(world: &World) -> Vec<&'static str> {
     world.state.notices.iter().map(Notice::kind).collect()
 }
 
-/// The child runs as version 1, and a manifest of version 2 has come.
-fn world_with_an_upgrade() -> World {
+/// A manifest has come, and its child runs as version 1.
+fn world_with_a_child() -> World {
     let mut world = World::new();
     world.manifest(Some(1));
     world.pass(Duration::ZERO);
     world.child_joins();
+    world
+}
+
+/// The child runs as version 1, and a manifest of version 2 has come.
+fn world_with_an_upgrade() -> World {
+    let mut world = world_with_a_child();
     world.write(0);
     world.settle();
     world.manifest(Some(2));
@@ -35,36 +41,26 @@ fn an_upgrade_takes_over_and_the_old_process_goes() {
 }
 
 #[test]
-fn a_manifest_that_changes_while_its_child_starts_is_carried_out() {
-    for late in [None, Some(false), Some(true)] {
+fn a_process_that_a_newer_manifest_overtakes_before_it_joins_is_killed() {
+    let first_start = || {
         let mut world = World::new();
         world.manifest(Some(1));
         world.pass(Duration::ZERO);
-        let old = world.launched[0].launch;
-        world.manifest(Some(2));
-        world.pass(Duration::ZERO);
-        assert!(world.killed.contains(&old), "nobody wants it any more");
-        if let Some(known) = late {
-            world.child_joins_too_late(known);
-        }
-        world.settle();
-        assert_eq!(child_version(&world), "2", "{late:?}");
-    }
-}
-
-#[test]
-fn an_upgrade_that_another_overtakes_is_killed() {
+        world
+    };
+    // What it had said before may come not at all, before its end is known, or after.
     for late in [None, Some(false), Some(true)] {
-        let mut world = world_with_an_upgrade();
-        let old = world.launched[0].launch;
-        world.manifest(Some(3));
-        world.pass(Duration::ZERO);
-        assert!(world.killed.contains(&old), "nobody wants it any more");
-        if let Some(known) = late {
-            world.child_joins_too_late(known);
+        for mut world in [first_start(), world_with_an_upgrade()] {
+            let old = world.launched[0].launch;
+            world.manifest(Some(3));
+            world.pass(Duration::ZERO);
+            assert!(world.killed.contains(&old), "nobody wants it any more");
+            if let Some(known) = late {
+                world.child_joins_too_late(known);
+            }
+            world.settle();
+            assert_eq!(child_version(&world), "3", "{late:?}");
         }
-        world.settle();
-        assert_eq!(child_version(&world), "3", "{late:?}");
     }
 }
 
@@ -178,10 +174,7 @@ fn a_bundle_that_joined_by_hand_must_judge_after_a_restart() {
 
 #[test]
 fn a_manifest_that_changed_while_no_broker_ran_is_carried_out() {
-    let mut world = World::new();
-    world.manifest(Some(1));
-    world.pass(Duration::ZERO);
-    world.child_joins();
+    let mut world = world_with_a_child();
     world.write(0);
     world.settle();
     world.manifest = None;
@@ -244,10 +237,7 @@ fn a_child_whose_manifest_went_while_no_broker_ran_need_not_judge() {
 
 #[test]
 fn a_child_that_is_wanted_again_before_it_has_left_is_replaced() {
-    let mut world = World::new();
-    world.manifest(Some(1));
-    world.pass(Duration::ZERO);
-    world.child_joins();
+    let mut world = world_with_a_child();
     world.manifest(None);
     world.manifest(Some(1));
     world.child_joins();

@@ -188,16 +188,7 @@ fn a_bundle_that_only_the_configuration_names_is_missed_at_once() {
 fn comes(world: &mut World, name: &'static str, offer: Option<Catalogue>) {
     world.sessions += 1;
     let session = SessionId(world.sessions);
-    let hello = Hello {
-        protocol: PROTOCOL_VERSION,
-        role: Role::Bundle,
-        name: name.to_owned(),
-        version: "1".to_owned(),
-        incarnation: 77,
-        pid: 77,
-        launch: None,
-        capacity: 1,
-    };
+    let hello = hello(session, name, 1, None);
     world.event(Event::Hello { session, hello });
     if let Some(offer) = offer {
         let message = FromPeer::Catalogue(Box::new(offer));

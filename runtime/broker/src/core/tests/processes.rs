@@ -6,7 +6,7 @@ use super::super::*;
 use super::reporting::{REPORTER, reporter};
 use super::things::*;
 use qcbus_formats::pool::Ending;
-use qcbus_messages::{FromPeer, Hello, JobId, PROTOCOL_VERSION, Role};
+use qcbus_messages::{FromPeer, JobId};
 
 use super::world::{Launched, Process, World};
 
@@ -74,16 +74,7 @@ impl World {
                 drained: false,
             },
         );
-        let hello = Hello {
-            protocol: PROTOCOL_VERSION,
-            role: Role::Bundle,
-            name: name.to_owned(),
-            version: version.to_string(),
-            incarnation: self.sessions,
-            pid: u32::try_from(self.sessions).unwrap() + 1000,
-            launch,
-            capacity: u16::try_from(CAPACITY).unwrap(),
-        };
+        let hello = hello(session, name, version, launch);
         self.event(Event::Hello { session, hello });
         if !self.peers.contains_key(&session) {
             return session;

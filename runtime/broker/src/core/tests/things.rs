@@ -8,12 +8,26 @@ use super::super::*;
 use crate::InForce;
 use qcbus_document::FileKind;
 use qcbus_formats::xqar::{Issue, Level};
-use qcbus_messages::{Catalogue, CheckerInfo, Digest, Role};
+use qcbus_messages::{Catalogue, CheckerInfo, Digest, Hello, PROTOCOL_VERSION, Role};
 
 pub const CAPACITY: usize = 2;
 
 /// The bundle that a manifest brings; the others join by hand.
 pub const CHILD: &str = "Child";
+
+/// What the process of a bundle says first.
+pub fn hello(session: SessionId, name: &str, version: u8, launch: Option<u64>) -> Hello {
+    Hello {
+        protocol: PROTOCOL_VERSION,
+        role: Role::Bundle,
+        name: name.to_owned(),
+        version: version.to_string(),
+        incarnation: session.0,
+        pid: u32::try_from(session.0).unwrap() + 1000,
+        launch,
+        capacity: u16::try_from(CAPACITY).unwrap(),
+    }
+}
 
 pub fn child(version: u8) -> ChildSpec {
     ChildSpec {

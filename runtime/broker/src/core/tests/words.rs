@@ -1,6 +1,7 @@
 //! What is said, by bundles and to clients, and what comes of it.
 
 use qcbus_messages::control::Response;
+use qcbus_messages::{Hello, PROTOCOL_VERSION};
 
 use super::*;
 
@@ -10,16 +11,7 @@ fn comes_of(world: &mut World, event: Event) -> Vec<Action> {
 }
 
 fn a_hello(name: &str) -> Hello {
-    Hello {
-        protocol: PROTOCOL_VERSION,
-        role: Role::Bundle,
-        name: name.to_owned(),
-        version: "1".to_owned(),
-        incarnation: 99,
-        pid: 99,
-        launch: None,
-        capacity: 1,
-    }
+    hello(SessionId(99), name, 1, None)
 }
 
 fn is_refused(actions: &[Action]) -> bool {
@@ -64,7 +56,7 @@ fn a_process_that_says_hello_again_takes_its_own_place() {
         world.sessions,
         u32::try_from(world.sessions).unwrap() + 1000,
     );
-    for (incarnation, pid) in [(incarnation, 99), (99, pid)] {
+    for (incarnation, pid) in [(incarnation, 1099), (99, pid)] {
         let hello = Hello {
             incarnation,
             pid,
