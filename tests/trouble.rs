@@ -13,6 +13,7 @@ mod support;
 use std::path::Path;
 use std::process::Output;
 
+use qcbus_messages::control::{Request, Response};
 use support::content::Content;
 use support::farm::Farm;
 use support::inside::{is_inside, run_inside};
@@ -136,7 +137,18 @@ fn a_watched_directory_that_goes_and_comes_back() {
         farm.out().join("a.xodr.xqar").exists(),
         "its results are kept"
     );
-    std::fs::rename(&aside, farm.root()).unwrap();
+    // What was accepted is not there: nobody is told that it is.
+    let wait = |timeout_ms| Request::Wait {
+        file: farm.root().join("a.xodr"),
+        timeout_ms: Some(timeout_ms),
+    };
+    assert_eq!(farm.ask(&wait(300)), Some(Response::TimedOut));
+    let told = std::thread::scope(|scope| {
+        let waiting = scope.spawn(|| farm.ask(&wait(120_000)));
+        std::fs::rename(&aside, farm.root()).unwrap();
+        waiting.join().unwrap()
+    });
+    assert!(matches!(told, Some(Response::Verdict(_))), "{told:?}");
     insta::assert_snapshot!(notice(&farm, "is back"));
     farm.write("b.xodr", &Content::Good(2).bytes());
     farm.verdict("b.xodr");

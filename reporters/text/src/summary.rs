@@ -64,7 +64,7 @@ fn checkers(result: &ResultMessage) -> String {
     };
     let rest = [
         (of(Some(Status::Skipped)), "skipped"),
-        (of(Some(Status::Error)), "did not end"),
+        (of(Some(Status::Error)), "gave no answer"),
         (of(None), "without a status"),
     ];
     let mut text = format!("{} completed", of(Some(Status::Completed)));
@@ -87,7 +87,7 @@ impl Group {
         let width = options.width;
         let word = match self.status {
             Status::Skipped => "skipped",
-            Status::Completed | Status::Error => "did not end",
+            Status::Completed | Status::Error => "gave no answer",
         };
         let reason = match self.reason.as_str() {
             "" => "no reason given",

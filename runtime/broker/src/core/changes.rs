@@ -68,6 +68,7 @@ impl State {
         if !same || racy {
             self.changed(id);
         }
+        self.seen(id, actions);
     }
 
     /// Something that the verdict on a file depends on is not what it was. The file's own stamp

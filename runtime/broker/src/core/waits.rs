@@ -19,6 +19,9 @@ pub(super) struct Waiter {
     ticket: Ticket,
     path: Arc<Path>,
     until: Option<Duration>,
+    /// Whether the file has been seen to be there since it was asked for. A verdict is kept while a
+    /// watched directory is away, and nobody may be told that what is not there was accepted.
+    seen: bool,
 }
 
 impl State {
@@ -40,23 +43,47 @@ impl State {
             });
             return;
         }
-        if let Some(stamp) = stamp
-            && FileKind::of_path(path).is_some()
-        {
-            self.settled(path, stamp, actions);
-        }
         let until = timeout.map(|timeout| self.now + timeout);
         self.waiters.push(Waiter {
             ticket,
             path: path.clone(),
             until,
+            seen: false,
         });
-        if let Some(id) = self.files.id(path) {
-            self.settle_waits(id, actions);
-            if self.is_awaited(path) {
-                self.hurry(id);
-            }
+        if let Some(stamp) = stamp
+            && FileKind::of_path(path).is_some()
+        {
+            self.settled(path, stamp, actions);
         }
+        if let Some(id) = self.files.id(path)
+            && stamp.is_some()
+            && self.is_awaited(path)
+        {
+            self.hurry(id);
+        }
+    }
+
+    /// A file is there: who waits for it is told what stands.
+    pub(super) fn seen(&mut self, id: FileId, actions: &mut Actions) {
+        let Some(path) = self.files.get(id).map(|entry| entry.path.clone()) else {
+            return;
+        };
+        let mut awaited = false;
+        for waiter in self.waiters.iter_mut().filter(|it| it.path == path) {
+            (waiter.seen, awaited) = (true, true);
+        }
+        if awaited {
+            self.settle_waits(id, actions);
+        }
+    }
+
+    /// Files that somebody waits for, that were not there when they were asked for, and of which
+    /// nobody has said that they have gone; as they were when they were there.
+    pub fn awaited_back(&self) -> Vec<(Arc<Path>, Stamp)> {
+        let unseen = self.waiters.iter().filter(|it| !it.seen);
+        let known = unseen.filter_map(|it| self.files.get(self.files.id(&it.path)?));
+        let kept = known.filter(|entry| entry.present);
+        kept.map(|it| (it.path.clone(), it.stamp)).collect()
     }
 
     /// Whether somebody waits for the verdict on this file.
@@ -90,8 +117,9 @@ impl State {
             return;
         };
         let path = entry.path.clone();
-        self.answer_all(&path, actions, |path| {
-            Response::Verdict(file_verdict(path, &judged))
+        let told = |waiter: &Waiter| waiter.seen && waiter.path == path;
+        self.answer(actions, told, || {
+            Response::Verdict(file_verdict(&path, &judged))
         });
     }
 
@@ -105,26 +133,26 @@ impl State {
     }
 
     pub(super) fn answer_gone(&mut self, path: &Path, actions: &mut Actions) {
-        self.answer_all(path, actions, |path| Response::Unwatched {
-            reason: format!("{} has been deleted", to_text(path)),
-        });
+        let reason = || format!("{} has been deleted", to_text(path));
+        let told = |waiter: &Waiter| *waiter.path == *path;
+        self.answer(actions, told, || Response::Unwatched { reason: reason() });
     }
 
-    fn answer_all(
+    fn answer(
         &mut self,
-        path: &Path,
         actions: &mut Actions,
-        response: impl Fn(&Path) -> Response,
+        told: impl Fn(&Waiter) -> bool,
+        response: impl Fn() -> Response,
     ) {
         let (answered, rest) = std::mem::take(&mut self.waiters)
             .into_iter()
-            .partition(|it| *it.path == *path);
+            .partition(told);
         self.waiters = rest;
         let answered: Vec<Waiter> = answered;
         for waiter in answered {
             actions.push(Action::Answer {
                 ticket: waiter.ticket,
-                response: response(path),
+                response: response(),
             });
         }
     }

@@ -117,6 +117,10 @@ impl Looker {
 
     /// Compares a path with what was last said of it, and says what is new.
     pub fn look(&mut self, path: &Path) {
+        // What lies in a directory that has gone as a whole is kept until it is back.
+        if self.lost_roots.iter().any(|root| path.starts_with(root)) {
+            return;
+        }
         let sight = look_at(path, &self.options.roots);
         let is_checkable = FileKind::of_path(path).is_some() && !self.ignored(path, false);
         if is_checkable && path.is_symlink() {

@@ -335,3 +335,32 @@ fn a_broker_that_runs_once_does_not_leave_a_file_that_must_rest() {
     world.pass(Duration::ZERO);
     assert_eq!(world.stopped, 1);
 }
+
+#[test]
+fn who_waits_for_what_is_not_there_is_not_told_what_was() {
+    let came_back: fn(&mut World) = |world| {
+        let (path, stamp) = (path_of(1), stamp(world.there[&path_of(1)]));
+        world.event(Event::Settled { path, stamp });
+    };
+    let went: fn(&mut World) = |world| world.delete(1);
+    for ends in [came_back, went] {
+        let mut world = judged_world();
+        let ticket = Ticket(7);
+        world.waiting.insert(ticket, 1);
+        // Its directory is away, so the verdict is kept.
+        world.event(Event::Wait {
+            ticket,
+            path: path_of(1),
+            stamp: None,
+            unwatched: None,
+            timeout: None,
+        });
+        world.pass(Duration::from_secs(30));
+        assert!(world.waiting.contains_key(&ticket));
+        ends(&mut world);
+        assert!(
+            !world.waiting.contains_key(&ticket),
+            "now there is an answer"
+        );
+    }
+}
