@@ -150,8 +150,24 @@ fn a_watched_directory_that_goes_and_comes_back() {
     });
     assert!(matches!(told, Some(Response::Verdict(_))), "{told:?}");
     insta::assert_snapshot!(notice(&farm, "is back"));
+    what_must_be_judged_again_while_its_directory_is_away(&farm, &aside);
     farm.write("b.xodr", &Content::Good(2).bytes());
     farm.verdict("b.xodr");
+}
+
+/// A bundle comes, so that every verdict is outdated, and nothing can be read.
+fn what_must_be_judged_again_while_its_directory_is_away(farm: &Farm, aside: &Path) {
+    std::fs::rename(farm.root(), aside).unwrap();
+    farm.let_in("polite", "");
+    until_or(
+        "the file has gone with its directory",
+        || farm.status().filter(|it| it.files.total == 0),
+        || format!("{:#?}", farm.status()),
+    );
+    std::fs::rename(aside, farm.root()).unwrap();
+    farm.settle(1);
+    let bundles = farm.result("a.xodr").bundles;
+    assert!(bundles.iter().any(|it| it.name == "polite"), "{bundles:?}");
 }
 
 #[test]

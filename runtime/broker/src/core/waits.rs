@@ -77,15 +77,6 @@ impl State {
         }
     }
 
-    /// Files that somebody waits for, that were not there when they were asked for, and of which
-    /// nobody has said that they have gone; as they were when they were there.
-    pub fn awaited_back(&self) -> Vec<(Arc<Path>, Stamp)> {
-        let unseen = self.waiters.iter().filter(|it| !it.seen);
-        let known = unseen.filter_map(|it| self.files.get(self.files.id(&it.path)?));
-        let kept = known.filter(|entry| entry.present);
-        kept.map(|it| (it.path.clone(), it.stamp)).collect()
-    }
-
     /// Whether somebody waits for the verdict on this file.
     pub(super) fn is_awaited(&self, path: &Path) -> bool {
         self.waiters.iter().any(|it| *it.path == *path)

@@ -86,18 +86,6 @@ impl Broker {
         })
     }
 
-    /// A directory that was away may be back with its files as they were: no watcher tells of that.
-    pub(super) fn look_for_the_awaited(&mut self) -> bool {
-        for (path, stamp) in self.state.awaited_back() {
-            if stamp_of(&path).ok().flatten() == Some(stamp)
-                && !self.handle(Event::Settled { path, stamp })
-            {
-                return false;
-            }
-        }
-        true
-    }
-
     /// A link from elsewhere to a watched file means that file.
     fn as_watched<'f>(&self, file: &'f Path) -> Cow<'f, Path> {
         if self.store.places.contains(file) {

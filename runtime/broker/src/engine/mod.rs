@@ -215,7 +215,7 @@ impl Broker {
                     Stop::Drain => { self.notify_stopping(); self.handle(Event::Drain) }
                     Stop::Quit => { quit = true; false }
                 },
-                _ = tick.tick() => self.look_for_the_awaited() && self.handle(Event::Tick),
+                _ = tick.tick() => self.handle(Event::Tick),
             };
             if !go_on {
                 break;

@@ -87,6 +87,7 @@ impl Looker {
         }
         for root in back {
             self.lost_roots.remove(&root);
+            self.tell_again_below(&root);
             (self.tell)(Seen::Notice(format!(
                 "the watched directory {} is back",
                 root.display()

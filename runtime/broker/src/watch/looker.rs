@@ -158,6 +158,15 @@ impl Looker {
         });
     }
 
+    /// What was said of the files below may not count any more: the next scan says it again.
+    pub fn tell_again_below(&mut self, directory: &Path) {
+        let below = self
+            .known
+            .iter_mut()
+            .filter(|(path, _)| path.starts_with(directory));
+        below.for_each(|(_, stamp)| *stamp = Stamp::default());
+    }
+
     /// Says that something cannot be looked at, once.
     pub fn unseen(&mut self, path: &Path, why: String) {
         let before = self.unseen.insert(path.to_path_buf(), why.clone());
