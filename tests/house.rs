@@ -25,22 +25,26 @@ const MAY_KNOW: &[(&str, Option<&[&str]>)] = &[
     ("qcbus-formats", Some(&[])),
     ("qcbus-messages", Some(&[])),
     ("qcbus-bus", Some(&[])),
+    ("qcbus-disk", Some(&[])),
     ("qcbus-ingest", Some(&[])),
-    ("qcbus-broker", Some(&["qcbus-bus", "qcbus-ingest"])),
-    ("qcbus-sdk", Some(&["qcbus-bus", "qcbus-ingest"])),
+    ("qcbus-broker", Some(PROCESS)),
+    ("qcbus-sdk", Some(PROCESS)),
     ("qcbus-opendrive", Some(&[])),
     ("qcbus-schema", Some(&[])),
     // What the schema rules of all bundles have in common: for bundles, from their parts.
     ("qcbus-schema-rule", Some(&["qcbus-sdk", "qcbus-schema"])),
     ("qcbus-xodr", Some(BUNDLE)),
     ("qcbus-xosc", Some(BUNDLE)),
-    ("qcbus-reporter-sdk", Some(&["qcbus-bus", "qcbus-ingest"])),
+    ("qcbus-reporter-sdk", Some(PROCESS)),
     ("qcbus-report-text", Some(&["qcbus-reporter-sdk"])),
     ("qcbus-report-json", Some(&["qcbus-reporter-sdk"])),
     ("qcbus", None),
     ("qcbus-zoo", None),
     ("qcbus-benches", None),
 ];
+
+/// What every kind of process is made of.
+const PROCESS: &[&str] = &["qcbus-bus", "qcbus-disk", "qcbus-ingest"];
 
 /// What a bundle may link: its sdk, the models and the schema rule.
 const BUNDLE: &[&str] = &[

@@ -1,6 +1,5 @@
 //! Where reports go, and how a file is replaced so that nobody sees half of it.
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use qcbus_formats::xqar::Param;
@@ -66,40 +65,15 @@ pub fn param<'p>(params: &'p [Param], name: &str) -> Option<&'p str> {
     named.next().map(|param| param.value.as_str())
 }
 
-/// Replaces a file in one step: a temporary file in the same directory is written, synced and
-/// renamed. Missing directories are made.
+/// Replaces a file in one step, and makes missing directories.
 ///
 /// # Errors
 /// [`ReportError::Write`] with the name of the file.
 pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
-    replace(path, bytes).map_err(|source| ReportError::Write {
+    qcbus_disk::write_whole(path, bytes, true).map_err(|source| ReportError::Write {
         path: path.to_owned(),
         source,
     })
-}
-
-fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let directory = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    std::fs::create_dir_all(directory)?;
-    // The name says who writes, so that a broker can sweep what a killed process has left.
-    let mut file = tempfile::Builder::new()
-        .prefix(&format!(".qcbus-{}-", std::process::id()))
-        .suffix(".tmp")
-        .permissions(open_to_readers())
-        .tempfile_in(directory)?;
-    file.write_all(bytes)?;
-    file.as_file().sync_data()?;
-    file.persist(path)?;
-    Ok(())
-}
-
-/// Temporary files are private by default; a report is for whoever the umask lets read it.
-fn open_to_readers() -> std::fs::Permissions {
-    use std::os::unix::fs::PermissionsExt as _;
-    std::fs::Permissions::from_mode(0o666)
 }
 
 /// The path without what would lead out of the directory that it is joined to.

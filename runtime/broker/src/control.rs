@@ -46,7 +46,7 @@ impl ControlSocket {
         inbox: mpsc::UnboundedSender<Asked>,
     ) -> std::io::Result<ControlSocket> {
         let path = directory.join(SOCKET);
-        crate::disk::remove(&path)?;
+        qcbus_disk::remove(&path)?;
         let listener = UnixListener::bind(&path)?;
         std::fs::set_permissions(&path, std::os::unix::fs::PermissionsExt::from_mode(0o600))?;
         let busy = Arc::new(AtomicUsize::new(0));
@@ -66,7 +66,7 @@ impl ControlSocket {
 impl Drop for ControlSocket {
     fn drop(&mut self) {
         // The directory may have been removed already.
-        let _ = crate::disk::remove(&self.path);
+        let _ = qcbus_disk::remove(&self.path);
     }
 }
 

@@ -154,27 +154,9 @@ fn result_path(bundle: &Bundle, config: &Config) -> PathBuf {
     )
 }
 
-/// Whole or not at all: a reader never sees half a result.
 fn write(path: &Path, text: &str) -> Result<(), ModuleError> {
-    let failed = |source| ModuleError::Write {
+    qcbus_disk::write_whole(path, text.as_bytes(), true).map_err(|source| ModuleError::Write {
         path: path.to_owned(),
         source,
-    };
-    let folder = path
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
-    std::fs::create_dir_all(folder).map_err(failed)?;
-    // Readable for everybody whom the umask allows, unlike other temporary files.
-    let readable = std::os::unix::fs::PermissionsExt::from_mode(0o666);
-    let temporary = tempfile::Builder::new()
-        .permissions(readable)
-        .tempfile_in(folder)
-        .map_err(failed)?;
-    std::fs::write(temporary.path(), text).map_err(failed)?;
-    temporary.as_file().sync_all().map_err(failed)?;
-    temporary
-        .persist(path)
-        .map_err(|error| failed(error.error))?;
-    Ok(())
+    })
 }

@@ -288,7 +288,7 @@ impl Broker {
     /// removed, off the loop.
     fn sweep_dead(&self) {
         let out = self.options.out.clone();
-        tokio::task::spawn_blocking(move || crate::disk::sweep_dead(&out));
+        tokio::task::spawn_blocking(move || qcbus_disk::sweep_dead(&out));
     }
 
     fn bus_event(&mut self, event: HostEvent) -> bool {

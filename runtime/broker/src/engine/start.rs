@@ -16,7 +16,6 @@ use crate::control::ControlSocket;
 use crate::core::{Member, Notice, Stamp, State};
 use crate::demand::InForce;
 use crate::directory_lock::{DirectoryLock, LockError, Purpose};
-use crate::disk::sweep;
 use crate::gate::{Gate, GateError, GateOptions};
 use crate::intake::Intake;
 use crate::journal::{Journal, JournalError, Void};
@@ -28,6 +27,7 @@ use crate::store::{Reconciled, Store, remove_earlier_results};
 use crate::supervise::{Children, Surroundings};
 use crate::watch::{Seen, WatchOptions, Watcher, is_looked_at, scan_directory};
 use crate::writers::{Order, Writers};
+use qcbus_disk::sweep;
 
 impl Broker {
     /// Takes the instance, opens the journal, reads the configuration. Must be called within a

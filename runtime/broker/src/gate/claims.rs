@@ -10,8 +10,8 @@ use qcbus_messages::Digest;
 use qcbus_messages::path_text::to_text;
 use tempfile::TempPath;
 
-use crate::disk::remove;
 use crate::result_paths::ResultPaths;
+use qcbus_disk::remove;
 
 /// A file that an acceptance rests on, besides the accepted one.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -8,7 +8,7 @@ use qcbus_document::FileKind;
 use qcbus_messages::path_text::to_text;
 
 use crate::directory_lock::{GATE_FILE, LockError};
-use crate::disk::remove;
+use qcbus_disk::remove;
 
 /// Why a directory cannot be a gate, with the way out.
 #[derive(Debug, thiserror::Error)]

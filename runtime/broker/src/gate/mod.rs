@@ -22,11 +22,11 @@ use qcbus_messages::path_text::to_text;
 
 use crate::core::{Input, Judged, Reading};
 use crate::directory_lock::{DirectoryLock, Purpose};
-use crate::disk::{is_for_good, write_ahead};
 use crate::journal::Remembered;
 use crate::result_paths::ResultPaths;
 use crate::stamp::is_listing;
 use crate::store::digest_of;
+use qcbus_disk::{is_for_good, write_ahead};
 
 use claims::{Claim, Claims, Copies, Need, Plan, Standing};
 pub use contents::GateError;

@@ -11,7 +11,7 @@ use rusqlite::{Connection, OpenFlags, params};
 
 use crate::core::{Judged, Member, Origin, Reported};
 use crate::directory_lock::{DirectoryLock, Purpose};
-use crate::disk::FileMark;
+use qcbus_disk::FileMark;
 
 mod error;
 mod rows;

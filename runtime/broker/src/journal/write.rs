@@ -8,7 +8,7 @@ use rusqlite::{Transaction, params};
 use super::rows::{inputs_to_text, jury_to_text, millis, signed};
 use super::{Entry, History};
 use crate::core::{Judged, Member, Reported};
-use crate::disk::FileMark;
+use qcbus_disk::FileMark;
 
 pub(super) fn put(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> {
     match entry {

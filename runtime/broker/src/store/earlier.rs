@@ -8,8 +8,8 @@ use qcbus_messages::path_text::{from_text, to_text};
 use serde::Deserialize;
 
 use super::leftovers::{input_of, named_by_result, walk};
-use crate::disk::remove;
 use crate::result_paths::ResultPaths;
+use qcbus_disk::remove;
 
 /// Removes the results of earlier runs that are about the files and directories of this one, with
 /// the reports beside them: of files that are no more, and of those to be checked now, because a

@@ -19,13 +19,13 @@ use qcbus_messages::Verdict;
 use qcbus_messages::path_text::to_text;
 
 use crate::core::{FinishedJob, Judged, StoreOutcome};
-use crate::disk::{FileMark, is_for_good, write_both, write_whole};
 use crate::gate::Gate;
 use crate::journal::{Entry, History, Journal, JournalError, Remembered, Void};
 use crate::result_paths::ResultPaths;
 use crate::stages::reached;
 use crate::stamp::stamp_through_links;
 use crate::verdict_file;
+use qcbus_disk::{FileMark, is_for_good, write_both, write_whole};
 
 pub use earlier::remove_earlier_results;
 use pooling::{reasons, taken};

@@ -14,11 +14,11 @@ use super::leftovers::{Leftover, leftovers};
 use super::refresh::as_it_is;
 use super::{Store, Trouble};
 use crate::core::{Input, Judged, Stamp};
-use crate::disk::{FileMark, remove};
 use crate::gate::GateError;
 use crate::journal::{Entry, Remembered};
 use crate::result_paths::verdict_beside;
 use crate::stamp::{stamp_of, stamp_through_links};
+use qcbus_disk::{FileMark, remove};
 
 /// What stands after all was looked through.
 #[derive(Debug, Default)]

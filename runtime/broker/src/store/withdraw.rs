@@ -7,8 +7,8 @@ use std::sync::Arc;
 use qcbus_messages::path_text::to_text;
 
 use super::{Store, Trouble};
-use crate::disk::remove;
 use crate::journal::Entry;
+use qcbus_disk::remove;
 
 impl Store {
     /// Removes what was written for a file that has gone, and remembers who is to take back a

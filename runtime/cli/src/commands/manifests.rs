@@ -4,8 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use qcbus_broker::control::{AskError, ask_broker};
-use qcbus_broker::write_whole;
 use qcbus_bus::Instance;
+use qcbus_disk::write_whole;
 use qcbus_messages::Exit;
 use qcbus_messages::control::{Request, Response};
 use rustix::fs::{Access, access};

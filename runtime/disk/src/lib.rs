@@ -1,4 +1,5 @@
-//! Writing files so that nobody ever sees half of one.
+//! Writing files so that nobody ever sees half of one: results, reports, manifests, and what a bundle
+//! that is run by itself writes. The broker sweeps what writers that were killed have left.
 
 use std::fs::{File, Metadata};
 use std::io::{self, Write};
@@ -12,8 +13,8 @@ const PREFIX: &str = ".qcbus-";
 /// And end like this.
 const SUFFIX: &str = ".tmp";
 
-/// Writes `content` under a temporary name in the same directory and renames it into place.
-/// With `durable`, the content is on the disk before the name is.
+/// Writes `content` under a temporary name in the same directory and renames it into place. Missing
+/// directories are made. With `durable`, the content is on the disk before the name is.
 ///
 /// # Errors
 /// Whatever the file system says; the temporary file is removed then.
@@ -105,19 +106,20 @@ fn sync_both(first: &File, second: &File) -> io::Result<()> {
 
 /// Writes `content` under a temporary name beside `path`.
 fn write_aside(path: &Path, content: &[u8]) -> io::Result<NamedTempFile> {
-    let directory = path
-        .parent()
-        .ok_or_else(|| io::Error::other("a result needs a directory"))?;
+    let directory = match path.parent() {
+        Some(directory) if !directory.as_os_str().is_empty() => directory,
+        _ => Path::new("."),
+    };
     std::fs::create_dir_all(directory)?;
+    // For whoever the umask lets read it, unlike most temporary files.
+    let readable = std::os::unix::fs::PermissionsExt::from_mode(0o666);
     let mut file = tempfile::Builder::new()
         .prefix(&format!("{PREFIX}{}-", std::process::id()))
         .suffix(SUFFIX)
+        .permissions(readable)
         .tempfile_in(directory)
         .map_err(without_path)?;
     file.as_file_mut().write_all(content)?;
-    // Results are for others to read, unlike most temporary files.
-    let mode = std::os::unix::fs::PermissionsExt::from_mode(0o644);
-    file.as_file().set_permissions(mode)?;
     Ok(file)
 }
 
