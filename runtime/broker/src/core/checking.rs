@@ -68,7 +68,7 @@ impl State {
         let waiting = self
             .bundles
             .iter()
-            .filter(|(_, it)| it.ready && !(it.queue.is_empty() && it.suspects.is_empty()));
+            .filter(|(_, it)| !(it.queue.is_empty() && it.suspects.is_empty()));
         let names: Vec<String> = waiting.map(|(name, _)| name.clone()).collect();
         for name in names {
             self.dispatch(&name, actions);

@@ -197,6 +197,32 @@ fn comes(world: &mut World, name: &'static str, offer: Option<Catalogue>) {
 }
 
 #[test]
+fn who_has_not_said_what_it_checks_gets_no_job() {
+    let mut world = World::new();
+    world.join("Second");
+    world.restart();
+    world.write(0);
+    world.prepare(0, true);
+    // The journal knows what it offered last; it may offer something else by now.
+    let session = SessionId(99);
+    let hello = hello(session, "Second", 1, None);
+    let event = Event::Hello { session, hello };
+    let is_job = |action: &Action| {
+        let Action::Send { message, .. } = action else {
+            return false;
+        };
+        matches!(message, ToPeer::Job(_))
+    };
+    let mut said = world.state.handle(world.now, event);
+    said.extend(world.state.handle(world.now, Event::Tick));
+    assert!(!said.iter().any(is_job), "{said:?}");
+    let message = FromPeer::Catalogue(Box::new(catalogue("Second")));
+    let event = Event::Message { session, message };
+    let said = world.state.handle(world.now, event);
+    assert!(said.iter().any(is_job), "{said:?}");
+}
+
+#[test]
 fn who_has_not_said_what_it_checks_is_not_missed() {
     let mut world = World::new();
     comes(&mut world, "Mute", None);
