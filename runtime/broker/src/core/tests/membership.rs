@@ -197,6 +197,24 @@ fn comes(world: &mut World, name: &'static str, offer: Option<Catalogue>) {
 }
 
 #[test]
+fn what_was_found_is_kept_when_a_bundle_joins_before_it_is_written() {
+    let mut world = World::new();
+    world.join("First");
+    world.write(0);
+    world.prepare(0, true);
+    world.answer(0);
+    assert_eq!(world.storing.len(), 1);
+    world.join("Second");
+    world.store(0, true);
+    assert!(world.judged.is_empty(), "it is of an older epoch");
+    assert!(world.preparing.is_empty(), "nothing is read again");
+    let first = world.peers.values().find(|it| it.name == "First").unwrap();
+    assert!(first.jobs.is_empty(), "nor is anybody asked twice");
+    world.settle();
+    assert_eq!(world.names_that_judged(0), ["First", "Second"]);
+}
+
+#[test]
 fn who_has_not_said_what_it_checks_gets_no_job() {
     let mut world = World::new();
     world.join("Second");
