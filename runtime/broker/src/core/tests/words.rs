@@ -364,3 +364,39 @@ fn who_waits_for_what_is_not_there_is_not_told_what_was() {
         );
     }
 }
+
+#[test]
+fn what_a_process_said_before_it_died_is_not_said_twice() {
+    let mut world = World::new();
+    world.join("First");
+    world.write(0);
+    world.prepare(0, true);
+    world.begin(0);
+    world.kill(0);
+    world.join("First");
+    world.pass(Duration::from_secs(1));
+    world.answer(0);
+    let said = &world.storing[0].bundles[0].said;
+    let found: Vec<usize> = said.checkers.iter().map(|it| it.issues.len()).collect();
+    assert_eq!(found, [0, 0], "the second process has found nothing");
+}
+
+#[test]
+fn no_more_is_read_than_there_is_room_for() {
+    // All together, being read, documents of all.
+    for (documents, at_once) in [(48, 4), (3, 3)] {
+        let mut world = World::new();
+        world.state.settings.max_documents = documents;
+        world.join("First");
+        for file in [0, 4, 6, 7, 2, 1] {
+            world.write(file);
+        }
+        assert_eq!(world.preparing.len(), 2, "more are not read at a time");
+        while !world.preparing.is_empty() {
+            world.prepare(0, true);
+            assert!(world.preparing.len() <= 2);
+        }
+        assert_eq!(world.state.jobs.len(), at_once);
+        world.settle();
+    }
+}
