@@ -400,3 +400,31 @@ fn no_more_is_read_than_there_is_room_for() {
         world.settle();
     }
 }
+
+#[test]
+fn that_there_is_no_room_is_said_once_in_a_while() {
+    let mut world = World::new();
+    world.join("First");
+    let said = |world: &World| {
+        let notices = world.state.notices.iter();
+        notices.filter(|it| it.kind() == "no-room").count()
+    };
+    for file in [0, 4] {
+        world.write(file);
+        world.prepare(0, false);
+        assert_eq!(said(&world), 1);
+    }
+    world.settle();
+}
+
+#[test]
+fn a_file_that_changes_while_it_is_read_is_given_to_nobody() {
+    let mut world = World::new();
+    world.join("First");
+    world.write(0);
+    world.write(0);
+    world.prepare(0, true);
+    assert!(world.peers.values().all(|it| it.jobs.is_empty()));
+    world.prepare(0, true);
+    assert!(world.peers.values().any(|it| !it.jobs.is_empty()));
+}
