@@ -95,7 +95,8 @@ fn spec(program: &Path, command: &str, alias: &str, name: &str, role: Role) -> C
     ChildSpec {
         name: name.to_owned(),
         role,
-        version: None,
+        // A process of another build that is still about is replaced.
+        version: Some(env!("CARGO_PKG_VERSION").to_owned()),
         command: vec![
             program,
             command.to_owned(),

@@ -21,12 +21,6 @@ impl State {
         }
     }
 
-    /// Whether verdicts depend on a file that is not there for a verdict of its own.
-    pub fn is_only_a_dependency(&self, path: &Path) -> bool {
-        let entry = self.files.id(path).and_then(|id| self.files.get(id));
-        !entry.is_some_and(|it| it.present) && !self.files.dependents(path).is_empty()
-    }
-
     /// A file is there and quiet: whose verdict depends on it?
     pub(super) fn touched(&mut self, path: &Arc<Path>, stamp: Stamp, actions: &mut Actions) {
         for dependent in self.files.dependents(path) {

@@ -6,8 +6,9 @@ use std::time::Duration;
 use qcbus_messages::Role;
 
 use super::action::Action;
+use super::leaving::Retired;
 use super::notice::Notice;
-use super::types::{ChildEnd, ChildSpec, Launch, Restart};
+use super::types::{ChildEnd, ChildSpec, Launch, Restart, SessionId};
 use super::upgrades::Upgrade;
 use super::{Actions, State};
 
@@ -153,7 +154,7 @@ impl State {
         version: &str,
         actions: &mut Actions,
     ) {
-        let (now, first) = (self.now, self.first_launch());
+        let (now, first) = (self.now, Launch::first_of(self.settings.generation));
         let Some(child) = self.children.get_mut(name) else {
             return;
         };
@@ -162,7 +163,8 @@ impl State {
             child.upgrade = None;
         } else if child.state != ChildState::Joined {
             let as_wanted = child.spec.version.as_deref().is_none_or(|it| it == version);
-            let goes_on = launch.is_none_or(|launch| launch < first && as_wanted);
+            let former = |it: Launch| it < first && it.is_of(&child.spec) && as_wanted;
+            let goes_on = launch.is_none_or(former);
             if goes_on {
                 actions.extend(starting.map(|(launch, _)| Action::kill_unjoined(launch)));
             }
@@ -170,11 +172,6 @@ impl State {
         }
         child.state = ChildState::Joined;
         child.stuck = None;
-    }
-
-    /// The first launch of this generation: those before it were of former brokers.
-    fn first_launch(&self) -> Launch {
-        Launch(self.settings.generation << 20)
     }
 
     /// A child has left as it was told, or of its own will.
@@ -235,8 +232,17 @@ impl State {
 
     /// A child process has ended or could not be started.
     pub(super) fn exited(&mut self, launch: Launch, end: &ChildEnd, actions: &mut Actions) {
-        self.retired
-            .retain(|_, retired| retired.launch != Some(launch));
+        let gone = |it: &(&SessionId, &Retired)| it.1.launch == Some(launch);
+        let gone: Vec<SessionId> = self
+            .retired
+            .iter()
+            .filter(gone)
+            .map(|(it, _)| *it)
+            .collect();
+        for session in gone {
+            self.retired.remove(&session);
+            self.retired_has_gone(session, actions);
+        }
         let is_it =
             |child: &Child| matches!(child.state, ChildState::Starting(it, _) if it == launch);
         let mut children = self.children.iter();
@@ -306,7 +312,8 @@ impl State {
         for (name, child) in &mut self.children {
             match child.state {
                 ChildState::Due(at) | ChildState::GaveUp(at) if at <= now => {
-                    let launch = next_launch(&mut self.next_launch);
+                    let launch = self.last_launch.next(&child.spec);
+                    self.last_launch = launch;
                     child.restarts += u32::from(!child.starts.is_empty());
                     child.starts.push_back(now);
                     child.state = ChildState::Starting(launch, now);
@@ -318,7 +325,7 @@ impl State {
                 }
                 _ => {}
             }
-            let upgrade = child.watch_upgrade(now, &mut self.next_launch, actions);
+            let upgrade = child.watch_upgrade(now, &mut self.last_launch, actions);
             late.extend(upgrade.map(|launch| (name.clone(), launch)));
         }
         for (name, launch) in late {
@@ -370,11 +377,6 @@ impl State {
             ready || self.hopeless(name).is_some()
         })
     }
-}
-
-pub(super) fn next_launch(next: &mut u64) -> Launch {
-    *next += 1;
-    Launch(*next - 1)
 }
 
 /// A number below 256 that differs from child to child and from start to start, yet is the same

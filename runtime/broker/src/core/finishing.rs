@@ -121,8 +121,13 @@ impl State {
             StoreOutcome::Outdated => self.begin_anew(id, actions),
             StoreOutcome::Failed(why) => {
                 job.stage = JobStage::Finished(self.now + self.settings.retry_after);
+                let same = job.config == self.config;
                 self.notice(Notice::NotWritten(why), actions);
-                self.reseat(id, actions);
+                if same {
+                    self.reseat(id, actions);
+                } else {
+                    self.begin_anew(id, actions);
+                }
             }
         }
     }

@@ -29,10 +29,12 @@ impl Mark {
     /// The mark of a version with what it offers.
     pub fn of(version: &str, catalogue: &Catalogue) -> Mark {
         let mut hash = Sha256::new();
+        let (alias, kinds) = (&catalogue.alias, &catalogue.kinds);
         hash.update(format!("{version}\0{}\0", catalogue.build_date));
+        hash.update(format!("{alias}\0{kinds:?}\0"));
         for checker in &catalogue.checkers {
             let (id, uids, on) = (&checker.id, &checker.rule_uids, checker.default_on);
-            hash.update(format!("{id}\0{uids:?}\0{on}\0"));
+            hash.update(format!("{id}\0{uids:?}\0{on}\0{:?}\0", checker.kinds));
             // Another default is another result.
             for param in &checker.params {
                 hash.update(format!("{}={}\0", param.name, param.default));
@@ -114,4 +116,67 @@ pub struct Member {
     pub catalogue: Option<Arc<Catalogue>>,
     /// What brought it.
     pub origin: Origin,
+}
+
+#[cfg(test)]
+mod tests {
+    use qcbus_document::FileKind;
+    use qcbus_formats::xqar::Level;
+    use qcbus_messages::{CheckerInfo, ParamInfo};
+
+    use super::*;
+
+    #[test]
+    fn epochs_go_up_over_every_restart() {
+        let (first, second) = (Epoch::first_of(1), Epoch::first_of(2));
+        assert!(Epoch::default() < first && first < first.next());
+        assert!(first.next().next() < second);
+    }
+
+    #[test]
+    fn whatever_a_bundle_would_judge_otherwise_has_another_mark() {
+        let checker = CheckerInfo {
+            id: "one".to_owned(),
+            description: String::new(),
+            rule_uids: vec!["uid".to_owned()],
+            kinds: vec![FileKind::Xodr],
+            default_on: true,
+            level: Level::Error,
+            params: vec![ParamInfo {
+                name: "tolerance".to_owned(),
+                default: "1".to_owned(),
+                description: String::new(),
+            }],
+        };
+        let catalogue = Catalogue {
+            alias: "mine".to_owned(),
+            build_date: "2026-11-22".to_owned(),
+            kinds: vec![FileKind::Xodr],
+            checkers: vec![checker],
+            ..Catalogue::default()
+        };
+        let changes: [fn(&mut Catalogue); 8] = [
+            |it| it.alias.push('r'),
+            |it| it.build_date.push('1'),
+            |it| it.kinds.push(FileKind::Xosc),
+            |it| it.checkers[0].id.push('r'),
+            |it| it.checkers[0].rule_uids.clear(),
+            |it| it.checkers[0].kinds.push(FileKind::Xosc),
+            |it| it.checkers[0].default_on = false,
+            |it| it.checkers[0].params[0].default.push('0'),
+        ];
+        let mut marks = vec![Mark::of("1", &catalogue), Mark::of("2", &catalogue)];
+        for change in changes {
+            let mut changed = catalogue.clone();
+            change(&mut changed);
+            marks.push(Mark::of("1", &changed));
+        }
+        assert_eq!(Mark::of("1", &catalogue), marks[0]);
+        // All of a mark's bits tell them apart.
+        let halves = |shift: u32| marks.iter().map(move |it| it.0 >> shift & 0xffff_ffff);
+        for shift in [0, 32] {
+            let different: std::collections::BTreeSet<u64> = halves(shift).collect();
+            assert_eq!(different.len(), marks.len());
+        }
+    }
 }

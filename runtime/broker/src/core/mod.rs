@@ -88,7 +88,7 @@ pub struct State {
     preparing: usize,
     storing: usize,
     next_job: u64,
-    next_launch: u64,
+    last_launch: Launch,
     notices: VecDeque<Notice>,
     rate: Rate,
     judged_once: bool,
@@ -112,8 +112,8 @@ const NOTICES: usize = 50;
 impl State {
     /// A broker that knows nothing yet.
     pub fn new(settings: Settings, config: Digest, demand: Arc<dyn Demand>) -> State {
-        // Launch numbers differ from those of earlier generations, whose children may be adopted.
-        let next_launch = (settings.generation << 20) + 1;
+        // Launches differ from those of earlier generations, whose children may be adopted.
+        let last_launch = Launch::first_of(settings.generation);
         let epoch = Epoch::first_of(settings.generation);
         let mut state = State {
             settings,
@@ -136,7 +136,7 @@ impl State {
             preparing: 0,
             storing: 0,
             next_job: 0,
-            next_launch,
+            last_launch,
             notices: VecDeque::new(),
             rate: Rate::default(),
             judged_once: false,

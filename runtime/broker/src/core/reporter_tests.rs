@@ -54,9 +54,13 @@ impl Desk {
     }
 
     fn join(&mut self) -> (SessionId, Vec<Action>) {
+        self.join_as(None)
+    }
+
+    fn join_as(&mut self, launch: Option<u64>) -> (SessionId, Vec<Action>) {
         self.sessions += 1;
         let session = SessionId(self.sessions);
-        let hello = hello(self.sessions, None);
+        let hello = hello(self.sessions, launch);
         (session, self.event(Event::Hello { session, hello }))
     }
 
@@ -206,24 +210,36 @@ fn a_newer_result_waits_until_the_one_before_it_has_arrived() {
 
 #[test]
 fn a_reporter_that_is_upgraded_finishes_what_it_has_begun() {
+    // It goes as it was told, or is killed meanwhile: its end may be known before its session's.
+    let leaves: fn(&mut Desk, SessionId, Launch) -> Vec<Action> =
+        |desk, session, _| desk.say(session, FromPeer::Leaving);
+    let is_killed: fn(&mut Desk, SessionId, Launch) -> Vec<Action> = |desk, session, launch| {
+        let end = ChildEnd::Failed("it was killed by signal 9".to_owned());
+        let mut actions = desk.event(Event::Exited { launch, end });
+        actions.extend(desk.event(Event::Gone { session }));
+        actions
+    };
+    for ends in [leaves, is_killed] {
+        an_upgraded_reporter_finishes(ends);
+    }
+}
+
+fn an_upgraded_reporter_finishes(ends: fn(&mut Desk, SessionId, Launch) -> Vec<Action>) {
     let mut desk = Desk::new(false);
-    desk.event(Event::Children {
+    let launched = |actions: &[Action]| {
+        let launch = actions.iter().find_map(|it| match it {
+            Action::Spawn { launch, .. } => Some(*launch),
+            _ => None,
+        });
+        launch.unwrap()
+    };
+    let first = launched(&desk.event(Event::Children {
         specs: vec![spec(1)],
-    });
-    let (old, _) = desk.join();
+    }));
+    let (old, _) = desk.join_as(Some(first.0));
     let specs = vec![spec(2)];
     let actions = desk.event(Event::Children { specs });
-    let launch = actions.iter().find_map(|it| match it {
-        Action::Spawn { launch, .. } => Some(*launch),
-        _ => None,
-    });
-    desk.sessions += 1;
-    let hello = hello(desk.sessions, Some(launch.unwrap().0));
-    let new = SessionId(desk.sessions);
-    let actions = desk.event(Event::Hello {
-        session: new,
-        hello,
-    });
+    let (new, actions) = desk.join_as(Some(launched(&actions).0));
     let drained = |it: &Action| matches!(it, Action::Send { session, message: ToPeer::Drain } if *session == old);
     assert!(
         actions.iter().any(drained),
@@ -236,6 +252,6 @@ fn a_reporter_that_is_upgraded_finishes_what_it_has_begun() {
         !actions.iter().any(given),
         "the older may still write the same report"
     );
-    let actions = desk.say(old, FromPeer::Leaving);
+    let actions = ends(&mut desk, old, first);
     assert!(actions.iter().any(given), "{actions:?}");
 }

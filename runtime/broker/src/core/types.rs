@@ -9,15 +9,42 @@ use qcbus_formats::pool::BundleOutcome;
 use qcbus_messages::control::FileVerdict;
 use qcbus_messages::{Catalogue, Digest, Job, JobDocument, JobId, MissingDocument, Role, Verdict};
 
+use sha2::{Digest as _, Sha256};
+
 use super::jury::{Epoch, Jury};
 
 /// A peer's session on the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SessionId(pub u64);
 
-/// One start of a child process.
+/// One start of a child process. The number counts up over all brokers of an instance: the generation,
+/// the how manieth start, and in the last [`SPEC_BITS`] bits what was started, so that a broker knows
+/// of a process that a former one has started whether it still is what is wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Launch(pub u64);
+
+/// Bits of a launch that tell manifests apart.
+const SPEC_BITS: u32 = 16;
+/// Bits that count the starts of one broker; above them is its generation.
+const START_BITS: u32 = 24;
+
+impl Launch {
+    /// Where the launches of a generation begin.
+    pub fn first_of(generation: u64) -> Launch {
+        Launch(generation << (START_BITS + SPEC_BITS))
+    }
+
+    /// The launch that follows.
+    pub fn next(self, spec: &ChildSpec) -> Launch {
+        let start = (self.0 >> SPEC_BITS) + 1;
+        Launch((start << SPEC_BITS) | spec.digest())
+    }
+
+    /// Whether it was one of this very command and version.
+    pub fn is_of(self, spec: &ChildSpec) -> bool {
+        self.0 & ((1 << SPEC_BITS) - 1) == spec.digest()
+    }
+}
 
 /// A client of the control socket that waits for an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -256,6 +283,17 @@ pub struct ChildSpec {
     pub command: Vec<String>,
     /// When to start it again.
     pub restart: Restart,
+}
+
+impl ChildSpec {
+    /// As many bits as a launch has for it.
+    fn digest(&self) -> u64 {
+        let mut hash = Sha256::new();
+        hash.update(format!("{:?}{:?}", self.version, self.command));
+        let digest = hash.finalize();
+        let first = digest.iter().take(8);
+        first.fold(0, |number, byte| (number << 8) + u64::from(*byte)) >> (u64::BITS - SPEC_BITS)
+    }
 }
 
 /// How a child process has ended.

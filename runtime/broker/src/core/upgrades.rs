@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::action::Action;
-use super::children::{Child, START_LIMIT, next_launch};
+use super::children::{Child, START_LIMIT};
 use super::notice::Notice;
 use super::types::{Launch, Restart};
 use super::{Actions, State};
@@ -26,12 +26,13 @@ impl Child {
     pub fn watch_upgrade(
         &mut self,
         now: Duration,
-        next: &mut u64,
+        last: &mut Launch,
         actions: &mut Actions,
     ) -> Option<Launch> {
         match self.upgrade? {
             Upgrade::Due(at) if at <= now => {
-                let launch = next_launch(next);
+                let launch = last.next(&self.spec);
+                *last = launch;
                 self.upgrade = Some(Upgrade::Starting(launch, now));
                 let spec = self.spec.clone();
                 actions.push(Action::Spawn { launch, spec });

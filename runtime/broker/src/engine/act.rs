@@ -25,8 +25,13 @@ impl Broker {
             Action::Spawn { launch, spec } => self.children.spawn(launch, &spec),
             Action::Kill { launch, pid } => self.children.kill(launch, pid),
             Action::Store(job) => self.order_store(job),
-            Action::Withdraw { .. }
-            | Action::Restamp { .. }
+            Action::Withdraw { ref path, .. } => {
+                if let Some(watcher) = &self.watcher {
+                    watcher.forget(path.clone());
+                }
+                self.order(action);
+            }
+            Action::Restamp { .. }
             | Action::CloseGate { .. }
             | Action::OpenGate { .. }
             | Action::Delivered { .. }

@@ -76,6 +76,10 @@ impl Broker {
         self.look_at_inputs(file);
         let stamp: Option<Stamp> = stamp_of(file).ok().flatten();
         let unwatched = self.why_unwatched(file, stamp);
+        if let (Some(stamp), None, Some(watcher)) = (stamp, &unwatched, &self.watcher) {
+            // The watcher may not have come to it, and must tell when it goes.
+            watcher.learn(file.into(), stamp);
+        }
         let timeout = timeout_ms.map(Duration::from_millis);
         self.handle(Event::Wait {
             ticket,
@@ -106,22 +110,10 @@ impl Broker {
             }
             let path = input.path;
             let event = match stamp {
-                Some(stamp) => self.settled(path, stamp),
+                Some(stamp) => Event::Touched { path, stamp },
                 None => Event::Vanished { path },
             };
             self.handle(event);
-        }
-    }
-
-    /// What it means that a file is there and quiet. One outside of the watched directories, or that
-    /// is to be left alone, gets no verdict; it may be a part of one.
-    pub(super) fn settled(&self, path: Arc<Path>, stamp: Stamp) -> Event {
-        let unwatched = self.state.is_only_a_dependency(&path)
-            && self.why_unwatched(&path, Some(stamp)).is_some();
-        if unwatched {
-            Event::Touched { path, stamp }
-        } else {
-            Event::Settled { path, stamp }
         }
     }
 
@@ -136,6 +128,10 @@ impl Broker {
             Some(format!("{shown} lies outside the watched directories"))
         } else if stamp.is_some() && crate::watch::is_left_alone(&self.options.roots, file) {
             Some(format!("{shown} is ignored (by its name or a .qcignore)"))
+        } else if stamp.is_some() && !crate::watch::is_looked_at(&self.options.roots, file) {
+            Some(format!(
+                "{shown} lies behind a symbolic link to a directory, and such links are not followed"
+            ))
         } else {
             None
         }

@@ -321,9 +321,9 @@ impl Broker {
         match seen {
             Seen::Settled(path, stamp) => {
                 reached("settled", &path);
-                let event = self.settled(path, stamp);
-                self.handle(event)
+                self.handle(Event::Settled { path, stamp })
             }
+            Seen::Touched(path, stamp) => self.handle(Event::Touched { path, stamp }),
             Seen::Present(path) => self.handle(Event::Present { path }),
             Seen::Vanished(path) => self.handle(Event::Vanished { path }),
             Seen::Unseen(unseen) => {

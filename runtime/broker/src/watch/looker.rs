@@ -76,6 +76,8 @@ impl Looker {
                 Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => return,
                 Ok(Order::Depend(files)) => self.dependencies.add(files),
                 Ok(Order::Undepend(paths)) => self.dependencies.remove(&paths),
+                Ok(Order::Forget(path)) => self.forget(&path),
+                Ok(Order::Learn(path, stamp)) => drop(self.known.entry(path).or_insert(stamp)),
                 Ok(Order::Event(event)) => self.event(event),
                 Err(RecvTimeoutError::Timeout) => {}
             }
@@ -130,6 +132,13 @@ impl Looker {
         }
         let changed = self.dependencies.look(path);
         match sight {
+            Sight::File(stamp) if !is_checkable => {
+                self.seen_again(path);
+                if self.dependencies.contains(path) {
+                    (self.tell)(Seen::Touched(path.into(), stamp));
+                }
+                return;
+            }
             Sight::File(stamp) => {
                 self.seen_again(path);
                 let path: Arc<Path> = path.into();
@@ -153,9 +162,16 @@ impl Looker {
 
     fn tell_changed(&mut self, (path, stamp): Changed) {
         (self.tell)(match stamp {
-            Some(stamp) => Seen::Settled(path, stamp),
+            Some(stamp) => Seen::Touched(path, stamp),
             None => Seen::Vanished(path),
         });
+    }
+
+    /// The broker found a file gone, of which no event told, and knows nothing of it any more.
+    fn forget(&mut self, path: &Path) {
+        if self.known.remove(path).is_some() {
+            self.look(path);
+        }
     }
 
     /// What was said of the files below may not count any more: the next scan says it again.
@@ -303,6 +319,8 @@ impl Looker {
         if first {
             // Or what is remembered of it would be taken back when the scan is over.
             (self.tell)(Seen::Present(path.into()));
+            // And should it go before it has settled, that is told.
+            self.known.insert(path.into(), Stamp::default());
         }
         self.settling.seen(path, stamp, Instant::now());
     }

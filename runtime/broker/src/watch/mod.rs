@@ -65,6 +65,8 @@ pub enum Seen {
     Settled(Arc<Path>, Stamp),
     /// A file was there in the first scan, and may still be written to.
     Present(Arc<Path>),
+    /// Something that a verdict depends on has become another. It need not be a file to check.
+    Touched(Arc<Path>, Stamp),
     /// A file has gone.
     Vanished(Arc<Path>),
     /// Something cannot be looked at; said once, until it can.
@@ -99,6 +101,8 @@ pub struct Watcher {
 enum Order {
     Depend(Vec<(Arc<Path>, Option<Stamp>)>),
     Undepend(Vec<Arc<Path>>),
+    Forget(Arc<Path>),
+    Learn(Arc<Path>, Stamp),
     Event(notify::Result<notify::Event>),
     Stop,
 }
@@ -132,6 +136,18 @@ impl Watcher {
     pub fn depend(&self, files: Vec<(Arc<Path>, Option<Stamp>)>) {
         // The thread only ends when this is dropped.
         let _ = self.orders.send(Order::Depend(files));
+    }
+
+    /// The broker has let go of a file that it found gone. Should it be there again, that is told.
+    pub fn forget(&self, path: Arc<Path>) {
+        // The thread only ends when this is dropped.
+        let _ = self.orders.send(Order::Forget(path));
+    }
+
+    /// The broker has heard of a file from somebody else: when it goes, that is told.
+    pub fn learn(&self, path: Arc<Path>, stamp: Stamp) {
+        // The thread only ends when this is dropped.
+        let _ = self.orders.send(Order::Learn(path, stamp));
     }
 
     /// Lets go of files on which no verdict depends any more.

@@ -174,18 +174,35 @@ fn a_bundle_that_joined_by_hand_must_judge_after_a_restart() {
 
 #[test]
 fn a_manifest_that_changed_while_no_broker_ran_is_carried_out() {
-    let mut world = world_with_a_child();
-    world.write(0);
-    world.settle();
-    world.manifest = None;
-    world.restart();
-    world.manifest(Some(2));
-    // The process of the former broker has outlived it, and joins the next.
-    world.child_of_a_former_broker_joins(1, 7);
-    assert_eq!(child_version(&world), "1");
-    world.pass(Duration::from_secs(1));
-    world.child_joins();
-    assert_eq!(child_version(&world), "2");
+    let other_command = ChildSpec {
+        command: vec!["other".to_owned()],
+        ..child(2)
+    };
+    // What had been started, what it says that it is, and whether that is what is wanted.
+    let cases = [
+        (child(1), 1, false),
+        (child(2), 1, false),
+        (other_command, 2, false),
+        (child(2), 2, true),
+    ];
+    for (spec, version, wanted) in cases {
+        let mut world = world_with_a_child();
+        world.write(0);
+        world.settle();
+        world.manifest = None;
+        world.restart();
+        world.manifest(Some(2));
+        // The process of the former broker has outlived it, and joins the next.
+        world.child_of_a_former_broker_joins(version, &spec);
+        assert_eq!(child_version(&world), version.to_string());
+        let adopted = world.state.bundles[CHILD].pid;
+        world.pass(Duration::from_secs(1));
+        world.child_joins();
+        world.pass(Duration::from_secs(1));
+        assert_eq!(child_version(&world), "2");
+        let stays = world.state.bundles[CHILD].pid == adopted;
+        assert_eq!(stays, wanted, "{spec:?}");
+    }
 }
 
 #[test]

@@ -96,18 +96,6 @@ fn a_dependency_that_changes_before_the_first_scan_sees_its_file_is_not_forgotte
 }
 
 #[test]
-fn what_is_there_for_a_verdict_of_its_own_is_more_than_a_dependency() {
-    let mut world = world_with_dependencies(5);
-    let only = |world: &World, file| world.state.is_only_a_dependency(&path_of(file));
-    let others = [(7, true), (6, true), (4, false), (0, false), (3, false)];
-    for (file, expected) in others {
-        assert_eq!(only(&world, file), expected, "{file}");
-    }
-    world.delete(4);
-    assert!(only(&world, 4), "it is looked for");
-}
-
-#[test]
 fn a_file_that_goes_while_it_is_read_again_leaves_the_gate_at_once() {
     let mut world = judged_world();
     assert!(world.gate.contains_key(&1));

@@ -57,9 +57,10 @@ impl World {
         }
     }
 
-    /// One that a former broker started, under this number, has outlived it.
-    pub fn child_of_a_former_broker_joins(&mut self, version: u8, launch: u64) {
-        self.join_as(CHILD, version, Some(launch));
+    /// One that a former broker started has outlived it. It says that it is of this version.
+    pub fn child_of_a_former_broker_joins(&mut self, version: u8, spec: &ChildSpec) {
+        let launch = Launch::first_of(self.generation - 1).next(spec);
+        self.join_as(CHILD, version, Some(launch.0));
     }
 
     fn join_as(&mut self, name: &'static str, version: u8, launch: Option<u64>) -> SessionId {

@@ -155,7 +155,7 @@ impl World {
         self.there.insert(path_of(file), self.stamps);
         let (path, stamp) = (path_of(file), stamp(self.stamps));
         // As the engine does with what lies outside of the watched directories.
-        self.event(if file == 7 && self.state.is_only_a_dependency(&path) {
+        self.event(if file == 7 {
             Event::Touched { path, stamp }
         } else {
             Event::Settled { path, stamp }
