@@ -37,6 +37,20 @@ impl State {
         }
     }
 
+    /// An event tells that a file is there and quiet.
+    pub(super) fn written(&mut self, path: &Arc<Path>, stamp: Stamp, actions: &mut Actions) {
+        let id = self.files.id(path);
+        let entry = id.and_then(|id| self.files.get_mut(id));
+        if let Some(entry) = entry.filter(|it| it.stamp == stamp)
+            && let Stage::Active(job) = *entry.stage()
+        {
+            entry.touched = true;
+            let read = self.jobs.get(&job).and_then(|job| job.prepared.as_ref());
+            entry.doubted |= read.is_some_and(|it| it.racy);
+        }
+        self.settled(path, stamp, actions);
+    }
+
     /// A file is there and quiet.
     pub(super) fn settled(&mut self, path: &Arc<Path>, stamp: Stamp, actions: &mut Actions) {
         self.touched(path, stamp, actions);

@@ -50,6 +50,9 @@ pub struct FileEntry {
     /// It changed while it was being checked, or something that it depends on changed at any time:
     /// its verdict must not be taken to stand because its stamp is the same.
     pub doubted: bool,
+    /// An event told of it while it was being read, under the stamp that it has: of a young file that
+    /// is what another write looks like.
+    pub touched: bool,
     /// What it is accepted for was taken from behind the gate, until it is known to stand.
     pub shut: bool,
     /// Not before then, after something failed for want of room or disk.
@@ -155,6 +158,7 @@ impl Files {
                 present: true,
                 stage: Stage::Idle,
                 doubted: false,
+                touched: false,
                 shut: false,
                 not_before: Duration::ZERO,
                 judged: None,

@@ -9,11 +9,11 @@ use qcbus_document::FileKind;
 use qcbus_messages::{Catalogue, Digest, JobId};
 
 use super::action::Action;
-use super::files::{FileId, Stage};
+use super::files::{FileId, Priority, Stage};
 use super::jury::{Epoch, Mark, Seat};
 use super::notice::Notice;
 use super::staging::Staged;
-use super::types::{Input, Judged, PrepareFailure, PreparedJob};
+use super::types::{Input, Judged, PrepareFailure, PreparedJob, Reading};
 use super::{Actions, State};
 
 /// Between two notices that there is no room.
@@ -165,7 +165,7 @@ impl State {
         let job = self.next_job();
         self.files.set_stage(id, Stage::Active(job));
         if let Some(entry) = self.files.get_mut(id) {
-            entry.doubted = false;
+            (entry.doubted, entry.touched) = (false, false);
         }
         self.preparing += 1;
         self.jobs.insert(
@@ -217,12 +217,46 @@ impl State {
             Err(PrepareFailure::Busy) => {
                 self.requeue_later(id, self.settings.busy_pause, actions);
             }
-            Err(PrepareFailure::Unreadable(reason)) => {
-                if let Some(job) = self.jobs.get_mut(&id) {
-                    job.unreadable = Some(reason);
-                }
-                self.give_out(id, actions);
+            Err(PrepareFailure::Unreadable(reason)) => self.not_read(id, reason, actions),
+        }
+    }
+
+    /// The file cannot be read. That may be known, and said.
+    fn not_read(&mut self, id: JobId, reason: String, actions: &mut Actions) {
+        let Some(job) = self.jobs.get_mut(&id) else {
+            return;
+        };
+        let (file, kind) = (job.file, job.kind);
+        let entry = self.files.get(file).filter(|entry| !entry.doubted);
+        let known = entry.and_then(|entry| entry.judged.as_ref());
+        let same = known.is_some_and(|it| it.inputs.is_empty() && it.why == [reason.as_str()]);
+        if same && known.is_some_and(|judged| self.stands(kind, judged)) {
+            return self.end_job(id, actions);
+        }
+        if let Some(job) = self.jobs.get_mut(&id) {
+            job.unreadable = Some(reason);
+        }
+        self.give_out(id, actions);
+    }
+
+    /// What kept a file or a part of it from being read may have passed without an event: it is tried
+    /// again from time to time.
+    pub(super) fn read_again_what_was_unreadable(&mut self) {
+        if self.settings.once || self.now < self.next_reading {
+            return;
+        }
+        self.next_reading = self.now + self.settings.read_again_after;
+        let unread = |input: &Input| matches!(input.content, Reading::Unread(_));
+        let open = |it: &Judged| it.inputs.is_empty() || it.inputs.iter().any(unread);
+        let files = self.files.iter();
+        let open = files.filter(|(_, it)| it.present && it.judged.as_deref().is_some_and(open));
+        let idle = open.filter(|(_, it)| matches!(it.stage(), Stage::Idle));
+        let ids: Vec<FileId> = idle.map(|(id, _)| id).collect();
+        for id in ids {
+            if let Some(entry) = self.files.get_mut(id) {
+                entry.doubted = true;
             }
+            self.files.enqueue(id, Priority::Background, self.now);
         }
     }
 
@@ -239,6 +273,7 @@ impl State {
         if let Some((stamp, _)) = prepared.root() {
             entry.stamp = stamp;
         }
+        entry.doubted |= entry.touched && prepared.racy;
         if entry.doubted || !entry.present {
             self.end_job(id, actions);
             return;

@@ -89,6 +89,8 @@ pub struct State {
     storing: usize,
     next_job: u64,
     last_launch: Launch,
+    /// When what could not be read is tried again.
+    next_reading: Duration,
     notices: VecDeque<Notice>,
     rate: Rate,
     judged_once: bool,
@@ -137,6 +139,7 @@ impl State {
             storing: 0,
             next_job: 0,
             last_launch,
+            next_reading: Duration::ZERO,
             notices: VecDeque::new(),
             rate: Rate::default(),
             judged_once: false,
@@ -176,7 +179,7 @@ impl State {
         self.now = self.now.max(now);
         let mut actions = Vec::new();
         match event {
-            Event::Settled { path, stamp } => self.settled(&path, stamp, &mut actions),
+            Event::Settled { path, stamp } => self.written(&path, stamp, &mut actions),
             Event::Present { path } => self.present(&path),
             Event::Touched { path, stamp } => self.touched(&path, stamp, &mut actions),
             Event::Vanished { path } => self.vanished(&path, &mut actions),
@@ -296,6 +299,7 @@ impl State {
         self.watch_bundles(actions);
         self.watch_reporters(actions);
         self.fail_absent();
+        self.read_again_what_was_unreadable();
         self.expire_waits(actions);
     }
 

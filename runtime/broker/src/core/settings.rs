@@ -46,6 +46,8 @@ pub struct Settings {
     pub retry_after: Duration,
     /// Pause before a file is tried again for which the bus had no place.
     pub busy_pause: Duration,
+    /// How often what could not be read is tried again though nothing tells of a change.
+    pub read_again_after: Duration,
     /// Drain limit after which unfinished work is given up.
     pub drain_limit: Duration,
     /// Stop by itself once the scan is complete and everything has a verdict.
@@ -75,6 +77,7 @@ impl Default for Settings {
             max_text: 8 << 10,
             retry_after: Duration::from_secs(1),
             busy_pause: Duration::from_millis(20),
+            read_again_after: Duration::from_secs(60),
             drain_limit: Duration::from_secs(30),
             once: false,
         }

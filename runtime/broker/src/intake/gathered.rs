@@ -21,6 +21,8 @@ pub(super) struct Gathered {
     inputs: BTreeMap<PathBuf, Input>,
     root: Vec<Input>,
     pub held: Vec<(DocId, Held)>,
+    /// Something was so young when it was read that its stamp proves nothing.
+    racy: bool,
     bytes: u64,
 }
 
@@ -32,6 +34,7 @@ impl Gathered {
             inputs: BTreeMap::new(),
             root: root.inputs.iter().take(1).cloned().collect(),
             held: Vec::new(),
+            racy: false,
             bytes: 0,
         };
         gathered.push(path, DocumentRole::Root, 0, root);
@@ -50,6 +53,7 @@ impl Gathered {
             self.inputs.insert(input.path.to_path_buf(), input.clone());
         }
         self.held.push((published.doc, published.held.clone()));
+        self.racy |= published.racy;
         self.bytes += published.bytes;
     }
 
@@ -101,9 +105,7 @@ impl Gathered {
         let inputs: Vec<Input> = self.root.iter().chain(others).cloned().collect();
         PreparedJob {
             basis: basis(&inputs),
-            racy: inputs
-                .iter()
-                .any(|input| input.content.stamp().is_some_and(is_racy)),
+            racy: self.racy || inputs.iter().any(was_racy),
             inputs,
             documents: self.documents.clone(),
             missing: self.missing.clone(),
@@ -201,9 +203,13 @@ fn unreadable_now(path: &Path, limits: &Limits) -> Option<Stamp> {
     (!is_readable).then_some(stamp)
 }
 
+/// Whether it had changed so recently that its stamp proves nothing: to be asked when it is read.
+pub(super) fn was_racy(input: &Input) -> bool {
+    input.content.stamp().is_some_and(is_racy)
+}
+
 /// Whether a file certainly is what it was when it was read.
 pub(super) fn is_unchanged(input: &Input) -> bool {
     let now = stamp_through_links(&input.path);
-    let racy = input.content.stamp().is_some_and(is_racy);
-    !racy && now == input.content.stamp()
+    !was_racy(input) && now == input.content.stamp()
 }

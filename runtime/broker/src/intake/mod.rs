@@ -17,7 +17,7 @@ mod failure;
 mod gathered;
 
 use failure::{Failure, explained};
-use gathered::{Gathered, Links, inputs_of, is_unchanged};
+use gathered::{Gathered, Links, inputs_of, is_unchanged, was_racy};
 
 /// Reads files and publishes their images. Shared by the threads that do so.
 pub struct Intake {
@@ -46,6 +46,8 @@ struct Published {
     held: Held,
     digest: Digest,
     inputs: Vec<Input>,
+    /// Some of them were so young when they were read that their stamps prove nothing.
+    racy: bool,
     bytes: u64,
 }
 
@@ -162,6 +164,7 @@ impl Intake {
     fn publish_shared(&self, path: &Path) -> Result<Published, Failure> {
         let cached = lock(&self.cache).by_path.get(path).cloned();
         if let Some(published) = cached
+            && !published.racy
             && published.inputs.iter().all(is_unchanged)
         {
             return Ok(published);
@@ -188,6 +191,7 @@ impl Intake {
         reached("read", path);
         let digest = Digest(prepared.digest());
         let inputs = inputs_of(&prepared, &self.limits);
+        let racy = inputs.iter().any(was_racy);
         let kind = FileKind::of_path(path).unwrap_or(FileKind::Xosc);
         let (loan, used) = self.build(&prepared)?;
         reached("built", path);
@@ -205,6 +209,7 @@ impl Intake {
             doc,
             held,
             digest,
+            racy,
             inputs,
             bytes,
         })

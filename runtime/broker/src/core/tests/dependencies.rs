@@ -148,3 +148,92 @@ fn a_file_that_is_still_written_to_at_the_first_scan_keeps_its_result() {
     let of_it = world.stored.iter().filter(|file| **file == 1);
     assert_eq!(of_it.count(), 1);
 }
+
+/// A file that is being read is written again within the very step of the clock.
+fn written_again(world: &mut World) {
+    let (path, stamp) = (path_of(0), stamp(world.there[&path_of(0)]));
+    world.event(Event::Settled { path, stamp });
+}
+
+#[test]
+fn a_young_file_that_is_written_again_under_the_same_stamp_is_read_again() {
+    for young in [true, false] {
+        let mut world = World::new();
+        world.young = young;
+        world.join("First");
+        world.write(0);
+        written_again(&mut world);
+        world.prepare(0, true);
+        assert_eq!(
+            world.preparing.len(),
+            usize::from(young),
+            "while it is read"
+        );
+        world.prepare(0, true);
+        written_again(&mut world);
+        world.answer(0);
+        world.store(0, true);
+        assert_eq!(
+            world.preparing.len(),
+            usize::from(young),
+            "while it is checked"
+        );
+        world.settle();
+    }
+}
+
+#[test]
+fn what_could_not_be_read_is_tried_again_and_said_once() {
+    let mut world = World::new();
+    world.join("First");
+    world.write(0);
+    let not_read = |world: &mut World| {
+        let (job, _) = world.preparing.remove(0);
+        let result = Err(PrepareFailure::Unreadable("an old disk".to_owned()));
+        world.event(Event::Prepared { job, result });
+    };
+    not_read(&mut world);
+    let FinishedJob {
+        job,
+        jury,
+        config,
+        epoch,
+        ..
+    } = world.storing.remove(0);
+    let judged = Judged {
+        job,
+        verdict: Verdict::Undetermined,
+        config,
+        jury,
+        epoch,
+        why: vec!["an old disk".to_owned()],
+        ..unread()
+    };
+    world.journal.insert(0, judged.clone());
+    let outcome = StoreOutcome::Stored(Box::new(judged));
+    world.event(Event::Stored { job, outcome });
+    world.pass(Duration::from_secs(61));
+    not_read(&mut world);
+    assert!(world.storing.is_empty(), "it is known");
+    world.pass(Duration::from_secs(61));
+    world.settle();
+    assert_eq!(world.judged[&0].1, Verdict::Accepted);
+}
+
+/// The verdict on a file that could not be read.
+fn unread() -> Judged {
+    Judged {
+        job: JobId(0),
+        verdict: Verdict::Undetermined,
+        digest: Digest::default(),
+        basis: Digest::default(),
+        config: Digest::default(),
+        jury: Arc::default(),
+        epoch: Epoch::default(),
+        inputs: Vec::new(),
+        racy: true,
+        counts: [0; 3],
+        why: Vec::new(),
+        xqar: None,
+    }
+}

@@ -30,7 +30,7 @@ impl World {
                 Ok(Box::new(PreparedJob {
                     basis: basis(&inputs),
                     inputs,
-                    racy: false,
+                    racy: self.young,
                     documents: vec![document],
                     missing: Vec::new(),
                     bytes: 1,

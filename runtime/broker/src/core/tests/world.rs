@@ -57,6 +57,8 @@ pub struct World {
     pub desk: Desk,
     /// Why bundles have failed on each file, as stored.
     pub failures: BTreeMap<u8, Vec<String>>,
+    /// Whether files are so young that their stamps prove nothing.
+    pub young: bool,
     /// How often the state machine has ended.
     pub stopped: u8,
 }
@@ -114,6 +116,7 @@ impl World {
             gate: Published::new(),
             desk: Desk::default(),
             failures: BTreeMap::new(),
+            young: false,
             stopped: 0,
         };
         world.event(Event::Scanned);
