@@ -108,6 +108,41 @@ fn nothing_is_accepted_without_mine(farm: &Farm) {
 }
 
 #[test]
+fn nothing_is_accepted_while_the_directory_of_manifests_is_away() {
+    let farm = farm();
+    let program = zoo();
+    let command = format!("{} judges_strictly --name mine", program.display());
+    manifest(&farm.bundles_d(), &command);
+    let _broker = farm.serve_ready();
+    is_ready(&farm, "mine");
+    farm.write("forbidden.xodr", &forbidden());
+    assert_eq!(farm.verdict("forbidden.xodr").verdict, Verdict::Rejected);
+    let aside = farm.base().join("aside");
+    std::fs::rename(farm.bundles_d(), &aside).unwrap();
+    let answer = farm.ask(&Request::Reload);
+    assert!(
+        matches!(answer, Some(Response::Failed { .. })),
+        "{answer:?}"
+    );
+    std::fs::create_dir(farm.bundles_d()).unwrap();
+    let answer = farm.ask(&Request::Reload);
+    assert!(
+        matches!(answer, Some(Response::Failed { .. })),
+        "{answer:?}"
+    );
+    assert_eq!(farm.verdict("forbidden.xodr").verdict, Verdict::Rejected);
+    farm.write("new.xodr", &forbidden());
+    assert_eq!(farm.verdict("new.xodr").verdict, Verdict::Rejected);
+    std::fs::remove_dir(farm.bundles_d()).unwrap();
+    std::fs::rename(&aside, farm.bundles_d()).unwrap();
+    let answer = farm.ask(&Request::Reload);
+    assert!(
+        matches!(answer, Some(Response::Reloaded { .. })),
+        "{answer:?}"
+    );
+}
+
+#[test]
 fn nothing_is_accepted_after_the_program_of_a_bundle_has_gone() {
     let farm = farm();
     let program = own_program(farm.base());

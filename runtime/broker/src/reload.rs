@@ -1,7 +1,9 @@
 //! The configuration and the bundle manifests: read, validate, compare, apply. The start of a
 //! broker is its first reload; a mistake never takes down what is in force.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use qcbus_formats::config::{
@@ -39,7 +41,14 @@ pub struct Loaded {
     pub oddities: Vec<Oddity>,
     /// What is odd about anything, that included, for a person.
     pub notices: Vec<String>,
+    /// Every file that was read for it, with its stamp from before.
+    pub read: Fingerprint,
+    /// Device and inode of the directory of manifests, and how many there were.
+    manifests: Option<(u64, u64, usize)>,
 }
+
+/// Files with their stamps: differs as soon as any of the files does.
+pub type Fingerprint = BTreeMap<PathBuf, Option<Stamp>>;
 
 /// Why nothing was applied.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -62,15 +71,28 @@ impl Sources {
             children: self.standard.clone(),
             ..Loaded::default()
         };
+        let note = |loaded: &mut Loaded, path: &Path| {
+            let stamp = stamp_through_links(path);
+            loaded.read.insert(path.to_path_buf(), stamp);
+        };
         let parsed = match &self.config {
-            Some(path) => Some((path, read_config(path)?)),
+            Some(path) => {
+                note(&mut loaded, path);
+                Some((path, read_config(path)?))
+            }
             None => None,
         };
         if let Some((_, parsed)) = &parsed {
             self.add_reporters(&parsed.config, &mut loaded);
         }
-        for path in self.manifests()? {
-            for module in read_manifest(&path)? {
+        let manifests = self.manifests()?;
+        loaded.manifests = self
+            .directory()
+            .map(|(device, inode)| (device, inode, manifests.len()));
+        for path in manifests {
+            let read = RefCell::new(&mut loaded);
+            let modules = read_manifest(&path, &|path| note(&mut read.borrow_mut(), path))?;
+            for module in modules {
                 add_module(module, &mut loaded);
             }
         }
@@ -116,19 +138,23 @@ impl Sources {
         let Some(directory) = &self.bundles_d else {
             return Ok(Vec::new());
         };
+        let cannot_look = |error: &std::io::Error| {
+            LoadError::Manifest(format!("cannot look into {}: {error}", directory.display()))
+        };
         let entries = match std::fs::read_dir(directory) {
             Ok(entries) => entries,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-            Err(error) => {
-                return Err(LoadError::Manifest(format!(
-                    "cannot look into {}: {error}",
-                    directory.display()
-                )));
-            }
+            Err(error) => return Err(cannot_look(&error)),
         };
-        let mut paths: Vec<PathBuf> = entries
-            .flatten()
-            .map(|entry| entry.path())
+        let all: Result<Vec<PathBuf>, LoadError> = entries
+            .map(|entry| {
+                entry
+                    .map(|it| it.path())
+                    .map_err(|error| cannot_look(&error))
+            })
+            .collect();
+        let mut paths: Vec<PathBuf> = all?
+            .into_iter()
             .filter(|path| path.extension().is_some_and(|it| it == "json"))
             .filter(|path| {
                 !path
@@ -140,13 +166,45 @@ impl Sources {
         Ok(paths)
     }
 
-    /// Something that differs as soon as any of the files does.
-    pub fn fingerprint(&self) -> BTreeMap<PathBuf, Option<Stamp>> {
+    /// The directory of manifests, if it is there.
+    fn directory(&self) -> Option<(u64, u64)> {
+        let data = std::fs::metadata(self.bundles_d.as_ref()?).ok()?;
+        Some((data.dev(), data.ino()))
+    }
+
+    /// All files that count, as they are now: `loaded` knows those that manifests list.
+    pub fn fingerprint(&self, loaded: &Loaded) -> Fingerprint {
         let manifests = self.manifests().unwrap_or_default();
         let paths = self.config.iter().cloned().chain(manifests);
         paths
+            .chain(loaded.read.keys().cloned())
             .map(|path| (path.clone(), stamp_through_links(&path)))
             .collect()
+    }
+
+    /// Whether the directory of manifests is away: gone, or an empty one in its place as where nothing
+    /// is mounted. Nobody has removed the bundles that it brought.
+    ///
+    /// # Errors
+    /// [`LoadError::Manifest`] when it is.
+    pub fn still_has(&self, old: &Loaded, new: &Loaded) -> Result<(), LoadError> {
+        let (Some(directory), Some((device, inode, 1..))) = (&self.bundles_d, old.manifests) else {
+            return Ok(());
+        };
+        let is_away = match new.manifests {
+            None => true,
+            Some((other_device, other_inode, count)) => {
+                count == 0 && (device, inode) != (other_device, other_inode)
+            }
+        };
+        if !is_away {
+            return Ok(());
+        }
+        let shown = directory.display();
+        Err(LoadError::Manifest(format!(
+            "{shown} is not the directory that it was, and there is no manifest in it; its bundles stay \
+             demanded until it is back (to do without them, start the broker anew)"
+        )))
     }
 }
 
@@ -160,9 +218,12 @@ pub fn read_config(path: &Path) -> Result<Parsed, LoadError> {
     Config::parse(&bytes).map_err(|error| LoadError::Config(format!("{}:{error}", path.display())))
 }
 
-fn read_manifest(path: &Path) -> Result<Vec<Module>, LoadError> {
+fn read_manifest(path: &Path, note: &dyn Fn(&Path)) -> Result<Vec<Module>, LoadError> {
     let sources = manifest::Sources {
-        read: &|path| std::fs::read(path).map_err(|error| error.to_string()),
+        read: &|path| {
+            note(path);
+            std::fs::read(path).map_err(|error| error.to_string())
+        },
         variable: &|name| std::env::var(name).ok(),
     };
     manifest::load(path, &sources).map_err(|error| LoadError::Manifest(error.to_string()))
@@ -406,11 +467,12 @@ mod tests {
         let sources = sources(dir.path());
         let (mine, yours) = (manifest("mine", "bus"), manifest("yours", "bus"));
         put(dir.path(), CONFIG, &[("a.json", &mine)]);
-        let (old, looks) = (sources.load().unwrap(), sources.fingerprint());
+        let old = sources.load().unwrap();
+        assert_eq!(sources.fingerprint(&old), old.read);
         assert_eq!(differences(&old, &old), Vec::<String>::new());
         let config = CONFIG.replace("xodrBundle", "xoscBundle");
         put(dir.path(), &config, &[("b.json", &yours)]);
-        assert_ne!(sources.fingerprint(), looks);
+        assert_ne!(sources.fingerprint(&old), old.read);
         let mut lines = differences(&old, &sources.load().unwrap());
         lines.sort();
         let expected = [
@@ -420,5 +482,42 @@ mod tests {
             "xoscBundle is demanded",
         ];
         assert_eq!(lines, expected);
+    }
+
+    #[test]
+    fn a_manifest_that_another_lists_is_looked_at_too() {
+        let dir = tempfile::tempdir().unwrap();
+        let sources = sources(dir.path());
+        let listed = dir.path().join("mine.manifest");
+        std::fs::write(&listed, manifest("mine", "bus")).unwrap();
+        let list = format!(r#"{{"manifest_file_path": ["{}"]}}"#, listed.display());
+        put(dir.path(), CONFIG, &[("all.json", &list)]);
+        let old = sources.load().unwrap();
+        assert!(old.children.iter().any(|it| it.name == "mine"));
+        assert_eq!(sources.fingerprint(&old), old.read);
+        std::fs::write(&listed, manifest("another", "bus")).unwrap();
+        assert_ne!(sources.fingerprint(&old), old.read);
+    }
+
+    #[test]
+    fn a_directory_of_manifests_that_is_away_takes_no_bundle_along() {
+        let dir = tempfile::tempdir().unwrap();
+        let sources = sources(dir.path());
+        let (bundles_d, aside) = (dir.path().join("bundles.d"), dir.path().join("aside"));
+        let mine = manifest("mine", "bus");
+        put(dir.path(), CONFIG, &[("a.json", &mine)]);
+        let old = sources.load().unwrap();
+        let still_has = || sources.still_has(&old, &sources.load().unwrap());
+        assert_eq!(still_has(), Ok(()));
+        std::fs::rename(&bundles_d, &aside).unwrap();
+        assert!(still_has().is_err(), "gone");
+        std::fs::create_dir(&bundles_d).unwrap();
+        assert!(still_has().is_err(), "an empty one in its place");
+        std::fs::write(bundles_d.join("b.json"), &mine).unwrap();
+        assert_eq!(still_has(), Ok(()), "somebody has put another there");
+        std::fs::remove_dir_all(&bundles_d).unwrap();
+        std::fs::rename(&aside, &bundles_d).unwrap();
+        std::fs::remove_file(bundles_d.join("a.json")).unwrap();
+        assert_eq!(still_has(), Ok(()), "somebody has taken it out");
     }
 }

@@ -162,13 +162,15 @@ impl Broker {
     /// Who must judge is in the journal before anybody has judged. It happens seldom, so the loop
     /// can wait for it; where the journal cannot be written now, a writer tries until it can.
     fn remember_at_once(&mut self, entry: Entry) {
-        let entries = [entry];
-        if let Err(why) = self.store.record(&entries) {
+        if !self.journal_is_behind {
+            let Err(why) = self.store.record(std::slice::from_ref(&entry)) else {
+                return;
+            };
             self.say(Notice::Storing(why));
-            for entry in entries {
-                self.writers.order(Path::new(""), Order::Record(entry));
-            }
+            // What comes next must not overtake what waits.
+            self.journal_is_behind = true;
         }
+        self.writers.order(Path::new(""), Order::Record(entry));
     }
 
     pub(super) fn accept(&mut self, session: SessionId) {

@@ -1,7 +1,6 @@
 //! What commands ask, and what a change of configuration or manifests sets off.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,7 +14,7 @@ use super::start::in_force;
 use crate::control::Asked;
 use crate::core::{Event, Notice, Stamp, Ticket};
 use crate::gate::Gate;
-use crate::reload::{LoadError, differences};
+use crate::reload::{Fingerprint, LoadError, differences};
 use crate::stamp::{stamp_of, stamp_through_links};
 
 /// Most that is told of what could not be looked at.
@@ -140,6 +139,7 @@ impl Broker {
     /// Reads configuration and manifests again and applies them as a whole, or not at all.
     pub(super) fn reload(&mut self) -> Result<Vec<String>, LoadError> {
         let loaded = self.sources.load()?;
+        self.sources.still_has(&self.loaded, &loaded)?;
         let changes = differences(&self.loaded, &loaded);
         let in_force = Arc::new(in_force(&loaded)?);
         let children = (loaded.children != self.loaded.children).then(|| loaded.children.clone());
@@ -167,8 +167,8 @@ impl Broker {
         Ok(changes)
     }
 
-    pub(super) fn reload_if_changed(&mut self, fingerprint: &mut BTreeMap<PathBuf, Option<Stamp>>) {
-        let now = self.sources.fingerprint();
+    pub(super) fn reload_if_changed(&mut self, fingerprint: &mut Fingerprint) {
+        let now = self.sources.fingerprint(&self.loaded);
         if now == *fingerprint {
             return;
         }

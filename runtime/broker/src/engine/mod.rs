@@ -97,6 +97,7 @@ pub enum Told {
 pub struct Broker {
     options: Options,
     started: Instant,
+    clock: AttendedTime,
     host: Host,
     state: State,
     intake: Arc<Intake>,
@@ -119,6 +120,8 @@ pub struct Broker {
     left: HashMap<(String, Arc<Path>), PathBuf>,
     /// Results were stored or delivered since free memory was last given back.
     untrimmed: bool,
+    /// Who must judge could not be recorded at once: from then on a writer does it, in order.
+    journal_is_behind: bool,
     inbox: Inbox,
     tell: Box<dyn FnMut(Told) + Send>,
     control: ControlSocket,
@@ -176,6 +179,33 @@ impl Sessions {
     }
 }
 
+/// The time in which the loop was about. While the broker stands still, nobody can hear what bundles
+/// say: they are not silent for that, and no deadline of theirs passes.
+#[derive(Debug)]
+struct AttendedTime {
+    last: Instant,
+    sum: Duration,
+}
+
+impl AttendedTime {
+    /// Longer than any turn of the loop takes.
+    const LONGEST_TURN: Duration = Duration::from_secs(1);
+
+    fn new() -> AttendedTime {
+        AttendedTime {
+            last: Instant::now(),
+            sum: Duration::ZERO,
+        }
+    }
+
+    fn now(&mut self, now: Instant) -> Duration {
+        let turn = now.saturating_duration_since(self.last);
+        self.last = self.last.max(now);
+        self.sum += turn.min(AttendedTime::LONGEST_TURN);
+        self.sum
+    }
+}
+
 /// How often the loop looks at the clock.
 const TICK: Duration = Duration::from_millis(50);
 
@@ -198,7 +228,8 @@ impl Broker {
         }
         let mut tick = tokio::time::interval(TICK);
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
-        let mut fingerprint = self.sources.fingerprint();
+        // From before it was read: what has changed since is not in force.
+        let mut fingerprint = self.loaded.read.clone();
         let mut next_reload = Instant::now() + RELOAD_INTERVAL;
         let mut next_prune = Instant::now();
         let mut next_trim = Instant::now() + TRIM_INTERVAL;
@@ -266,7 +297,8 @@ impl Broker {
 
     /// Gives one event to the state machine and does what it wants. `false`: the end.
     fn handle(&mut self, event: Event) -> bool {
-        let actions = self.state.handle(self.started.elapsed(), event);
+        let now = self.clock.now(Instant::now());
+        let actions = self.state.handle(now, event);
         // Before any of the actions: what is stored from now on is of this epoch.
         self.store
             .epoch
@@ -393,5 +425,21 @@ impl Inbox {
                 notices: notices_in,
             },
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_in_which_the_broker_stands_still_does_not_pass() {
+        let mut clock = AttendedTime::new();
+        let start = clock.last;
+        let at = |millis| start + Duration::from_millis(millis);
+        assert_eq!(clock.now(at(50)), Duration::from_millis(50));
+        assert_eq!(clock.now(at(40)), Duration::from_millis(50), "never back");
+        assert_eq!(clock.now(at(30_050)), Duration::from_millis(1050));
+        assert_eq!(clock.now(at(30_150)), Duration::from_millis(1150));
     }
 }

@@ -11,7 +11,7 @@ use qcbus_messages::Role;
 use qcbus_messages::control::Unseen;
 use tokio::sync::mpsc;
 
-use super::{Broker, Inbox, Sessions, StartError, Told};
+use super::{AttendedTime, Broker, Inbox, Sessions, StartError, Told};
 use crate::control::ControlSocket;
 use crate::core::{Member, Notice, Stamp, State};
 use crate::demand::InForce;
@@ -60,6 +60,7 @@ impl Broker {
         let children = Children::new(surroundings(&options), inbox.events_in.clone());
         let mut broker = Broker {
             started: Instant::now(),
+            clock: AttendedTime::new(),
             host,
             state,
             intake,
@@ -77,6 +78,7 @@ impl Broker {
             downs: Vec::new(),
             next_ticket: 0,
             left: HashMap::new(),
+            journal_is_behind: false,
             untrimmed: false,
             inbox,
             tell: Box::new(tell),

@@ -168,7 +168,7 @@ impl Looker {
     }
 
     /// The broker found a file gone, of which no event told, and knows nothing of it any more.
-    fn forget(&mut self, path: &Path) {
+    pub fn forget(&mut self, path: &Path) {
         if self.known.remove(path).is_some() {
             self.look(path);
         }

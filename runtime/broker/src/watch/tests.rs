@@ -186,3 +186,49 @@ fn looking_through_everything_reads_the_rules_afresh() {
     looker.scan_all(false);
     assert_eq!(vanished(&told), [file]);
 }
+
+#[test]
+fn a_young_file_that_goes_before_it_has_settled_is_told() {
+    let (_dir, root) = farm();
+    let file = root.join("a.xodr");
+    std::fs::write(&file, "half of").unwrap();
+    let (mut looker, told) = looker(&root);
+    looker.scan_all(true);
+    assert_eq!(words(&root, &told), ["present a.xodr"]);
+    std::fs::remove_file(&file).unwrap();
+    looker.scan_all(false);
+    assert_eq!(words(&root, &told), ["vanished a.xodr"]);
+}
+
+#[test]
+fn what_the_broker_found_gone_is_told_again_if_it_is_there() {
+    let (_dir, root) = farm();
+    let file = root.join("a.xodr");
+    let (mut looker, told) = looker(&root);
+    std::fs::write(&file, "one").unwrap();
+    looker.look(&file);
+    assert_eq!(words(&root, &told), ["settled a.xodr"]);
+    // It was away for a moment in which the broker tried to read it.
+    looker.forget(&file);
+    assert_eq!(words(&root, &told), ["settled a.xodr"]);
+    std::fs::remove_file(&file).unwrap();
+    looker.forget(&file);
+    looker.scan_all(false);
+    assert!(
+        words(&root, &told).is_empty(),
+        "it is known that it has gone"
+    );
+}
+
+#[test]
+fn what_is_no_file_to_check_is_only_told_to_have_become_another() {
+    let (_dir, root) = farm();
+    let (ignored, map) = (root.join(IGNORE_FILE), root.join("map.xodr"));
+    std::fs::write(&ignored, "map.xodr\n").unwrap();
+    std::fs::write(&map, "one").unwrap();
+    let (mut looker, told) = looker(&root);
+    looker.dependencies.add(vec![(map.as_path().into(), None)]);
+    looker.look(&map);
+    let said: Vec<Seen> = told.try_iter().collect();
+    assert!(matches!(said[..], [Seen::Touched(..)]), "{said:?}");
+}
