@@ -13,10 +13,13 @@ mod support;
 use std::path::Path;
 use std::process::Output;
 
+use qcbus_messages::Verdict;
 use qcbus_messages::control::{Request, Response};
+use rustix::process::Signal;
 use support::content::Content;
 use support::farm::Farm;
 use support::inside::{is_inside, run_inside};
+use support::processes::signal_pid;
 use support::watchdog::until_or;
 
 /// The words of a run, with this test's own paths, process ids and numbers taken out.
@@ -111,6 +114,21 @@ fn a_bundle_of_another_version() {
     };
     let shown: Vec<String> = words.iter().map(shown).collect();
     insta::assert_snapshot!(shown.join(" ").replace("NN", "N"));
+}
+
+#[test]
+fn a_broker_that_stands_still_keeps_nobody_who_has_a_limit() {
+    let farm = Farm::new();
+    let broker = farm.serve_ready();
+    farm.write("a.xodr", &Content::Good(1).bytes());
+    farm.verdict("a.xodr");
+    let pid = i32::try_from(broker.pid()).unwrap();
+    signal_pid(pid, Signal::STOP);
+    let file = farm.root().join("a.xodr");
+    let said = farm.qcbus(&["wait", "--timeout", "300ms", &file.to_string_lossy()]);
+    signal_pid(pid, Signal::CONT);
+    assert_eq!(said.status.code(), Some(3), "{said:?}");
+    assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Accepted);
 }
 
 #[test]

@@ -169,12 +169,45 @@ pub fn ask_broker(directory: &Path, request: &Request) -> Result<Response, AskEr
         serde_json::to_vec(request).map_err(|error| AskError::NoAnswer(error.to_string()))?;
     text.push(b'\n');
     stream.write_all(&text).map_err(lost)?;
+    let limit = limit_of(request);
+    stream.set_read_timeout(limit).map_err(lost)?;
     let mut line = String::new();
-    let read = std::io::BufReader::new(stream)
-        .read_line(&mut line)
-        .map_err(lost)?;
+    let read = match std::io::BufReader::new(stream).read_line(&mut line) {
+        Ok(read) => read,
+        // The broker stands still: whoever asked for a limit gets it all the same.
+        Err(error) if is_timeout(&error) && matches!(request, Request::Wait { .. }) => {
+            return Ok(Response::TimedOut);
+        }
+        Err(error) if is_timeout(&error) => {
+            let seconds = limit.unwrap_or_default().as_secs();
+            let why = format!("nothing came within {seconds} s; is its process stopped?");
+            return Err(AskError::NoAnswer(why));
+        }
+        Err(error) => return Err(lost(error)),
+    };
     if read == 0 {
         return Err(AskError::Left("it closed the connection".to_owned()));
     }
     serde_json::from_str(&line).map_err(|error| AskError::NoAnswer(error.to_string()))
+}
+
+/// Beyond its own limit, how long a request waits for a broker that stands still.
+const GRACE: Duration = Duration::from_secs(2);
+/// How long a broker may take for what needs no waiting.
+const AT_ONCE: Duration = Duration::from_secs(30);
+
+/// How long to wait for an answer; `None`: as long as it takes.
+fn limit_of(request: &Request) -> Option<Duration> {
+    match request {
+        Request::Wait { timeout_ms, .. } => {
+            timeout_ms.map(|limit| Duration::from_millis(limit) + GRACE)
+        }
+        Request::Status | Request::Reload | Request::RemoveBundle { .. } => Some(AT_ONCE),
+        Request::Down => None,
+    }
+}
+
+fn is_timeout(error: &std::io::Error) -> bool {
+    use std::io::ErrorKind::{TimedOut, WouldBlock};
+    matches!(error.kind(), TimedOut | WouldBlock)
 }

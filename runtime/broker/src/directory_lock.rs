@@ -104,6 +104,9 @@ impl DirectoryLock {
         instance: &str,
     ) -> Result<DirectoryLock, LockError> {
         let mut file = open(directory, purpose)?;
+        if purpose != Purpose::State {
+            is_free_above(directory, purpose)?;
+        }
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => return Err(refusal(&mut file, directory, purpose)),
@@ -121,6 +124,7 @@ impl DirectoryLock {
     pub fn share(directory: &Path) -> Result<DirectoryLock, LockError> {
         let made = (!directory.exists()).then(|| directory.to_path_buf());
         let mut file = open(directory, Purpose::Results)?;
+        is_free_above(directory, Purpose::Results)?;
         match file.try_lock_shared() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
@@ -163,6 +167,30 @@ fn open(directory: &Path, purpose: Purpose) -> Result<File, LockError> {
         .truncate(false)
         .open(&path)
         .map_err(|source| fail(&path, source))
+}
+
+/// No broker may have a directory above, or this one as something else: what lies below is its
+/// results, too, or what it has not published and removes.
+fn is_free_above(directory: &Path, wanted: Purpose) -> Result<(), LockError> {
+    for above in directory.ancestors() {
+        for purpose in [Purpose::Results, Purpose::Gate] {
+            if above == directory && purpose == wanted {
+                continue;
+            }
+            let locked = match purpose {
+                Purpose::Results => above.to_path_buf(),
+                _ => above.join(purpose.file()),
+            };
+            // What cannot be opened is nothing that a broker has.
+            let Ok(mut file) = File::open(locked) else {
+                continue;
+            };
+            if let Err(TryLockError::WouldBlock) = file.try_lock_shared() {
+                return Err(refusal(&mut file, above, purpose));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// A file system without locks is no reason to refuse the work.
@@ -249,5 +277,28 @@ mod tests {
         let nothing = dir.path().join("nothing");
         drop(DirectoryLock::share(&nothing).unwrap());
         assert!(!nothing.exists(), "nothing was written");
+    }
+
+    #[test]
+    fn nobody_gets_a_directory_below_one_of_another_broker() {
+        let dir = tempfile::tempdir().unwrap();
+        let below = dir.path().join("maps/new");
+        for held in [Purpose::Results, Purpose::Gate] {
+            let lock = DirectoryLock::take(dir.path(), held, "first").unwrap();
+            for wanted in [Purpose::Results, Purpose::Gate] {
+                let refused = DirectoryLock::take(&below, wanted, "second").unwrap_err();
+                assert!(
+                    refused.to_string().contains("instance `first`"),
+                    "{refused}"
+                );
+            }
+            assert!(DirectoryLock::share(&below).is_err());
+            let state = DirectoryLock::take(&below, Purpose::State, "first");
+            assert!(state.is_ok(), "a broker's state lies below its results");
+            let in_both = DirectoryLock::share(dir.path());
+            assert!(in_both.is_err(), "results of a check behind a gate");
+            drop(lock);
+            assert!(DirectoryLock::take(&below, held, "second").is_ok());
+        }
     }
 }

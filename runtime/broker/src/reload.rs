@@ -10,6 +10,7 @@ use qcbus_formats::config::{
     BundleConfig, Config, Known, KnownBundle, Oddity, Parsed, reporter_for,
 };
 use qcbus_formats::manifest::{self, Mode, Module, ModuleType};
+use qcbus_formats::pool::OWN_BUNDLE;
 use qcbus_messages::Role;
 
 use crate::core::{ChildSpec, Restart, Stamp};
@@ -43,6 +44,8 @@ pub struct Loaded {
     pub notices: Vec<String>,
     /// Every file that was read for it, with its stamp from before.
     pub read: Fingerprint,
+    /// Which manifest brought which child.
+    brought: BTreeMap<String, String>,
     /// Device and inode of the directory of manifests, and how many there were.
     manifests: Option<(u64, u64, usize)>,
 }
@@ -85,7 +88,7 @@ impl Sources {
         if let Some((_, parsed)) = &parsed {
             self.add_reporters(&parsed.config, &mut loaded);
         }
-        let manifests = self.manifests()?;
+        let manifests = self.manifests(&mut loaded.notices)?;
         loaded.manifests = self
             .directory()
             .map(|(device, inode)| (device, inode, manifests.len()));
@@ -93,7 +96,7 @@ impl Sources {
             let read = RefCell::new(&mut loaded);
             let modules = read_manifest(&path, &|path| note(&mut read.borrow_mut(), path))?;
             for module in modules {
-                add_module(module, &mut loaded);
+                add_module(module, &mut loaded)?;
             }
         }
         if let Some((path, parsed)) = parsed {
@@ -134,7 +137,8 @@ impl Sources {
         }
     }
 
-    fn manifests(&self) -> Result<Vec<PathBuf>, LoadError> {
+    /// The manifests, by name. What lies beside them and looks as if somebody took it for one is said.
+    fn manifests(&self, notices: &mut Vec<String>) -> Result<Vec<PathBuf>, LoadError> {
         let Some(directory) = &self.bundles_d else {
             return Ok(Vec::new());
         };
@@ -153,15 +157,18 @@ impl Sources {
                     .map_err(|error| cannot_look(&error))
             })
             .collect();
-        let mut paths: Vec<PathBuf> = all?
-            .into_iter()
-            .filter(|path| path.extension().is_some_and(|it| it == "json"))
-            .filter(|path| {
-                !path
-                    .file_name()
-                    .is_some_and(|it| it.to_string_lossy().starts_with('.'))
-            })
-            .collect();
+        let hidden = |path: &PathBuf| {
+            let name = path.file_name();
+            name.is_some_and(|it| it.to_string_lossy().starts_with('.'))
+        };
+        let is_manifest = |path: &PathBuf| path.extension().is_some_and(|it| it == "json");
+        let all = all?.into_iter().filter(|path| !hidden(path));
+        let (mut paths, mut others): (Vec<PathBuf>, Vec<PathBuf>) = all.partition(is_manifest);
+        others.sort();
+        notices.extend(others.iter().map(|path| {
+            let shown = path.display();
+            format!("{shown}: is no manifest, those are files of this directory that end in .json")
+        }));
         paths.sort();
         Ok(paths)
     }
@@ -174,7 +181,7 @@ impl Sources {
 
     /// All files that count, as they are now: `loaded` knows those that manifests list.
     pub fn fingerprint(&self, loaded: &Loaded) -> Fingerprint {
-        let manifests = self.manifests().unwrap_or_default();
+        let manifests = self.manifests(&mut Vec::new()).unwrap_or_default();
         let paths = self.config.iter().cloned().chain(manifests);
         paths
             .chain(loaded.read.keys().cloned())
@@ -229,7 +236,7 @@ fn read_manifest(path: &Path, note: &dyn Fn(&Path)) -> Result<Vec<Module>, LoadE
     manifest::load(path, &sources).map_err(|error| LoadError::Manifest(error.to_string()))
 }
 
-fn add_module(module: Module, loaded: &mut Loaded) {
+fn add_module(module: Module, loaded: &mut Loaded) -> Result<(), LoadError> {
     let manifest = module.manifest.display().to_string();
     let role = match module.module_type {
         ModuleType::CheckerBundle => Role::Bundle,
@@ -239,7 +246,7 @@ fn add_module(module: Module, loaded: &mut Loaded) {
                 "{manifest}: `{}`: qcbus pools results itself",
                 module.name
             ));
-            return;
+            return Ok(());
         }
     };
     if module.mode != Mode::Bus {
@@ -247,7 +254,7 @@ fn add_module(module: Module, loaded: &mut Loaded) {
             "{manifest}: `{}` has no \"mode\": \"bus\" and is not started: it does not speak on the bus",
             module.name
         ));
-        return;
+        return Ok(());
     }
     let extra = |key: &str| {
         module
@@ -274,14 +281,22 @@ fn add_module(module: Module, loaded: &mut Loaded) {
         role,
         restart,
     };
-    match loaded
-        .children
-        .iter_mut()
-        .find(|child| child.name == spec.name)
-    {
-        Some(child) => *child = spec,
-        None => loaded.children.push(spec),
+    let name = &spec.name;
+    if let Some(other) = loaded.brought.get(name) {
+        return Err(LoadError::Manifest(format!(
+            "{manifest}: `{name}` is the name of a module in {other}, too: one of them would not run; give \
+             it another name"
+        )));
     }
+    if name == OWN_BUNDLE || loaded.children.iter().any(|child| child.name == *name) {
+        return Err(LoadError::Manifest(format!(
+            "{manifest}: `{name}` comes with qcbus and would be replaced; give it another name (to do \
+             without the bundles that come with qcbus, start it with --no-standard-bundles)"
+        )));
+    }
+    loaded.brought.insert(name.clone(), manifest);
+    loaded.children.push(spec);
+    Ok(())
 }
 
 /// What changed, line by line.
@@ -519,5 +534,39 @@ mod tests {
         std::fs::rename(&aside, &bundles_d).unwrap();
         std::fs::remove_file(bundles_d.join("a.json")).unwrap();
         assert_eq!(still_has(), Ok(()), "somebody has taken it out");
+    }
+
+    #[test]
+    fn a_name_is_not_taken_twice() {
+        let dir = tempfile::tempdir().unwrap();
+        let sources = sources(dir.path());
+        let (mine, standard) = (manifest("mine", "bus"), manifest("xodrBundle", "bus"));
+        let own = manifest("qcbus", "bus");
+        let cases = [
+            vec![("a.json", &*mine), ("b.json", &*mine)],
+            vec![("a.json", &*standard)],
+            vec![("a.json", &*own)],
+        ];
+        for manifests in cases {
+            put(dir.path(), CONFIG, &manifests);
+            let refused = sources.load().unwrap_err().to_string();
+            assert!(refused.contains("another name"), "{refused}");
+        }
+    }
+
+    #[test]
+    fn what_looks_like_a_manifest_and_is_none_is_said() {
+        let dir = tempfile::tempdir().unwrap();
+        let mine = manifest("mine", "bus");
+        put(dir.path(), CONFIG, &[("mine.JSON", &mine), (".hidden", "")]);
+        let notices = sources(dir.path()).load().unwrap().notices;
+        let said: Vec<&String> = notices
+            .iter()
+            .filter(|it| it.contains("no manifest"))
+            .collect();
+        assert!(
+            matches!(said[..], [one] if one.contains("mine.JSON")),
+            "{notices:?}"
+        );
     }
 }

@@ -72,6 +72,8 @@ pub fn log(default: &str) {
     let filter = EnvFilter::try_from_env("QCBUS_LOG").unwrap_or_else(|_| EnvFilter::new(default));
     let builder = tracing_subscriber::fmt()
         .with_env_filter(filter)
+        // Where nobody reads the log any more, there is nobody to tell, and no reason to end.
+        .log_internal_errors(false)
         .with_writer(io::stderr);
     let json = std::env::var("QCBUS_LOG_FORMAT").is_ok_and(|it| it == "json");
     // A second subscriber cannot be set; the first stays then.

@@ -56,9 +56,11 @@ impl State {
 
     /// Whether a reporter that was to be started may still join.
     fn reporters_coming(&self) -> bool {
-        self.children
-            .iter()
-            .any(|(name, child)| child.spec.role == Role::Reporter && self.child_is_coming(name))
+        self.children.iter().any(|(name, child)| {
+            child.spec.role == Role::Reporter
+                && self.child_is_coming(name)
+                && self.child_cannot_start(name).is_none()
+        })
     }
 
     fn say_goodbye(&mut self, actions: &mut Actions) {

@@ -26,9 +26,11 @@ impl Epoch {
 pub struct Mark(pub u64);
 
 impl Mark {
-    /// The mark of a version with what it offers.
-    pub fn of(version: &str, catalogue: &Catalogue) -> Mark {
+    /// The mark of a version with what it offers; of a child, with what its manifest starts: scripts
+    /// and arguments change without a version.
+    pub fn of(version: &str, catalogue: &Catalogue, started: Option<u64>) -> Mark {
         let mut hash = Sha256::new();
+        hash.update(format!("{started:?}\0"));
         let (alias, kinds) = (&catalogue.alias, &catalogue.kinds);
         hash.update(format!("{version}\0{}\0", catalogue.build_date));
         hash.update(format!("{alias}\0{kinds:?}\0"));
@@ -165,13 +167,18 @@ mod tests {
             |it| it.checkers[0].default_on = false,
             |it| it.checkers[0].params[0].default.push('0'),
         ];
-        let mut marks = vec![Mark::of("1", &catalogue), Mark::of("2", &catalogue)];
+        let mut marks = vec![
+            Mark::of("1", &catalogue, None),
+            Mark::of("2", &catalogue, None),
+            Mark::of("1", &catalogue, Some(7)),
+            Mark::of("1", &catalogue, Some(8)),
+        ];
         for change in changes {
             let mut changed = catalogue.clone();
             change(&mut changed);
-            marks.push(Mark::of("1", &changed));
+            marks.push(Mark::of("1", &changed, None));
         }
-        assert_eq!(Mark::of("1", &catalogue), marks[0]);
+        assert_eq!(Mark::of("1", &catalogue, None), marks[0]);
         // All of a mark's bits tell them apart.
         let halves = |shift: u32| marks.iter().map(move |it| it.0 >> shift & 0xffff_ffff);
         for shift in [0, 32] {

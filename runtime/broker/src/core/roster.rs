@@ -13,7 +13,7 @@ use super::bundles::Bundle;
 use super::files::Priority;
 use super::jobs::{JobStage, Share, ShareState};
 use super::jury::{Epoch, Juror, Jury, Mark, Member, Origin, Seat};
-use super::types::Judged;
+use super::types::{Judged, Launch};
 use super::{Actions, State};
 
 /// The seats by kind of file, made anew with every epoch.
@@ -32,7 +32,7 @@ impl State {
             mark: member
                 .catalogue
                 .as_ref()
-                .map(|it| Mark::of(&member.version, it)),
+                .map(|it| Mark::of(&member.version, it, None)),
             version: member.version,
             catalogue: member.catalogue,
             origin: Some(member.origin),
@@ -68,6 +68,11 @@ impl State {
                 note: "it has never joined".to_owned(),
                 ..Bundle::default()
             });
+            // One that is not there would be started by the manifest as it is now.
+            if let (None, Some(catalogue)) = (bundle.session, &bundle.catalogue) {
+                let child = self.children.get(&name).map(|it| it.spec.digest());
+                bundle.mark = Some(Mark::of(&bundle.version, catalogue, child));
+            }
             if bundle.origin.replace(Origin::Supervised).is_none() {
                 actions.extend(bundle.as_member(&name).map(Action::Enrol));
             }
@@ -106,7 +111,8 @@ impl State {
         } else {
             Origin::Joined
         };
-        let mark = Mark::of(&bundle.version, catalogue);
+        let launch = bundle.launch.filter(|_| supervised);
+        let mark = Mark::of(&bundle.version, catalogue, launch.map(Launch::started));
         let known = bundle.mark.replace(mark) == Some(mark) && bundle.origin == Some(origin);
         if bundle.leaving {
             return;

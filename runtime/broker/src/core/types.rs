@@ -42,7 +42,12 @@ impl Launch {
 
     /// Whether it was one of this very command and version.
     pub fn is_of(self, spec: &ChildSpec) -> bool {
-        self.0 & ((1 << SPEC_BITS) - 1) == spec.digest()
+        self.started() == spec.digest()
+    }
+
+    /// What was started, as [`ChildSpec::digest`] has it.
+    pub fn started(self) -> u64 {
+        self.0 & ((1 << SPEC_BITS) - 1)
     }
 }
 
@@ -286,8 +291,8 @@ pub struct ChildSpec {
 }
 
 impl ChildSpec {
-    /// As many bits as a launch has for it.
-    fn digest(&self) -> u64 {
+    /// Tells command and version from others, in as many bits as a launch has for it.
+    pub fn digest(&self) -> u64 {
         let mut hash = Sha256::new();
         hash.update(format!("{:?}{:?}", self.version, self.command));
         let digest = hash.finalize();

@@ -31,7 +31,7 @@ pub enum JournalError {
     },
     /// It is no journal, or a broken one.
     #[error(
-        "the journal {path} cannot be used: {source}. It only remembers which files are finished: move it away (`mv {path} {path}.broken`) and start again, everything is then judged anew; `qcbus doctor` looks into it"
+        "the journal {path} cannot be used: {source}. It remembers which files are finished, and which bundles joined that were started by hand: move it away (`mv {path} {path}.broken`) and start again, everything is then judged anew, and bundles that were started by hand must judge once they have joined again; `qcbus doctor` looks into it"
     )]
     Broken {
         /// The journal.

@@ -119,8 +119,7 @@ impl Looker {
 
     /// Compares a path with what was last said of it, and says what is new.
     pub fn look(&mut self, path: &Path) {
-        // What lies in a directory that has gone as a whole is kept until it is back.
-        if self.lost_roots.iter().any(|root| path.starts_with(root)) {
+        if self.is_away(path) {
             return;
         }
         let sight = look_at(path, &self.options.roots);
@@ -161,10 +160,18 @@ impl Looker {
     }
 
     fn tell_changed(&mut self, (path, stamp): Changed) {
+        if stamp.is_none() && self.is_away(&path) {
+            return;
+        }
         (self.tell)(match stamp {
             Some(stamp) => Seen::Touched(path, stamp),
             None => Seen::Vanished(path),
         });
+    }
+
+    /// What lies in a watched directory that has gone as a whole is kept until it is back.
+    fn is_away(&self, path: &Path) -> bool {
+        self.lost_roots.iter().any(|root| path.starts_with(root))
     }
 
     /// The broker found a file gone, of which no event told, and knows nothing of it any more.

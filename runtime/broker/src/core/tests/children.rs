@@ -41,6 +41,31 @@ fn an_upgrade_takes_over_and_the_old_process_goes() {
 }
 
 #[test]
+fn a_bundle_that_another_command_starts_judges_anew() {
+    let mut world = world_with_a_child();
+    world.write(0);
+    world.settle();
+    let stored = world.stored.len();
+    let specs = vec![ChildSpec {
+        command: vec!["child".to_owned(), "--strict".to_owned()],
+        ..child(1)
+    }];
+    world.event(Event::Children { specs });
+    world.child_joins();
+    let waits = Event::Wait {
+        ticket: Ticket(9),
+        path: path_of(0),
+        stamp: Some(stamp(world.there[&path_of(0)])),
+        unwatched: None,
+        timeout: None,
+    };
+    let answered = |it: &Action| matches!(it, Action::Answer { .. });
+    assert!(!world.state.handle(world.now, waits).iter().any(answered));
+    assert_eq!(world.preparing.len(), 1, "it is judged again");
+    assert_eq!(world.stored.len(), stored);
+}
+
+#[test]
 fn a_process_that_a_newer_manifest_overtakes_before_it_joins_is_killed() {
     let first_start = || {
         let mut world = World::new();

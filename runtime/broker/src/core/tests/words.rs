@@ -428,3 +428,19 @@ fn a_file_that_changes_while_it_is_read_is_given_to_nobody() {
     world.prepare(0, true);
     assert!(world.peers.values().any(|it| !it.jobs.is_empty()));
 }
+
+#[test]
+fn a_run_does_not_wait_for_a_reporter_that_cannot_start() {
+    let mut world = World::with_a_reporter();
+    world.state.settings.once = true;
+    world.join("First");
+    world.write(0);
+    world.until_judged(1);
+    world.pass(Duration::ZERO);
+    assert_eq!(world.stopped, 0, "it may come yet");
+    world.child_ends(ChildEnd::NotStarted("no such program".to_owned()));
+    world.pass(Duration::ZERO);
+    world.answer(0);
+    world.pass(Duration::from_secs(4));
+    assert_eq!(world.stopped, 1);
+}

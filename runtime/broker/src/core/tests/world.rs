@@ -135,7 +135,10 @@ impl World {
     /// Who must judge, each as what it is.
     pub fn expected_jury(&self) -> Vec<(String, Option<Mark>)> {
         let mark = |(name, version): (&String, &Option<u8>)| {
-            let mark = version.map(|it| Mark::of(&it.to_string(), &catalogue(name)));
+            let mark = version.map(|it| {
+                let started = (*name == CHILD).then(|| child(it).digest());
+                Mark::of(&it.to_string(), &catalogue(name), started)
+            });
             (name.clone(), mark)
         };
         self.demanded.iter().map(mark).collect()
