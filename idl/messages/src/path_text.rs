@@ -1,8 +1,9 @@
 //! Paths as text. On disk a name is bytes; in messages, JSON and the journal it is text.
 //!
-//! A path that is UTF-8 is written as it is. Any other is written as `bytes:` and the path, in
-//! which every byte that is no UTF-8, and every `%`, stands as `%` and two hexadecimal digits. So
-//! two paths never share a text, and every text leads back to its path.
+//! A path that is UTF-8 is written as it is. Any other, and one that would move a cursor or begin a
+//! line, is written as `bytes:` and the path, in which every byte that is no UTF-8 or part of such a
+//! character, and every `%`, stands as `%` and two hexadecimal digits. So two paths never share a text,
+//! every text leads back to its path, and no name can pass for a line of a report.
 
 use std::ffi::OsString;
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
@@ -14,17 +15,37 @@ const ESCAPED: &str = "bytes:";
 /// The text of a path.
 pub fn to_text(path: &Path) -> String {
     // A plain path that looks like an escaped one would be mistaken for it.
-    if let Some(plain) = path.to_str().filter(|text| !text.starts_with(ESCAPED)) {
+    let plain = |text: &&str| !text.starts_with(ESCAPED) && !text.chars().any(moves);
+    if let Some(plain) = path.to_str().filter(plain) {
         return plain.to_owned();
     }
     let mut text = ESCAPED.to_owned();
     for chunk in path.as_os_str().as_bytes().utf8_chunks() {
-        text.push_str(&chunk.valid().replace('%', "%25"));
-        for byte in chunk.invalid() {
-            text.push_str(&format!("%{byte:02X}"));
+        for c in chunk.valid().chars() {
+            if c == '%' || moves(c) {
+                escape(c.encode_utf8(&mut [0; 4]).as_bytes(), &mut text);
+            } else {
+                text.push(c);
+            }
         }
+        escape(chunk.invalid(), &mut text);
     }
     text
+}
+
+/// Whether a terminal or a reader line by line takes this for more than a character: control
+/// characters, line and paragraph separators, changes of the direction of writing.
+fn moves(c: char) -> bool {
+    let directed = ['\u{202a}'..='\u{202e}', '\u{2066}'..='\u{2069}'];
+    c.is_control()
+        || matches!(c, '\u{2028}' | '\u{2029}')
+        || directed.iter().any(|it| it.contains(&c))
+}
+
+fn escape(bytes: &[u8], text: &mut String) {
+    for byte in bytes {
+        text.push_str(&format!("%{byte:02X}"));
+    }
 }
 
 /// The path of a text. Text that nobody gets from [`to_text`] is taken as it is.
@@ -118,7 +139,7 @@ mod tests {
 
     #[test]
     fn utf8_is_written_as_it_is_and_the_rest_by_its_bytes() {
-        let cases: [(&[u8], &str); 6] = [
+        let cases: [(&[u8], &str); 9] = [
             (b"/farm/a.xodr", "/farm/a.xodr"),
             (
                 "/farm/straße 100%.xodr".as_bytes(),
@@ -127,6 +148,9 @@ mod tests {
             (b"/farm/stra\xDFe.xodr", "bytes:/farm/stra%DFe.xodr"),
             (b"/farm/\xFF%DF.xodr", "bytes:/farm/%FF%25DF.xodr"),
             (b"bytes:a", "bytes:bytes:a"),
+            (b"a: accepted\nb.xodr", "bytes:a: accepted%0Ab.xodr"),
+            (b"\x1b[2Ka.xodr", "bytes:%1B[2Ka.xodr"),
+            ("\u{202e}a".as_bytes(), "bytes:%E2%80%AEa"),
             (b"", ""),
         ];
         for (bytes, text) in cases {

@@ -56,7 +56,10 @@ fn unanswered(job: &FinishedJob) -> Option<Remark> {
         return None;
     } else {
         let kind = job.kind.as_str();
-        let why = format!("no bundle that is running checks .{kind} files");
+        let why = format!(
+            "nobody must check .{kind} files: no bundle that takes them is known, or the configuration \
+             asks none of its checkers"
+        );
         ("qcbus_bundles", "A bundle checks files of this kind.", why)
     };
     Some(Remark {

@@ -62,8 +62,16 @@ fn try_add(args: &BundleAddArgs) -> Result<String, Refusal> {
         (Exit::Internal, why)
     })?;
     match home.reload() {
-        Ok(true) => Ok(format!("{shown} written; the broker starts the bundle")),
-        Ok(false) => Ok(format!("{shown} written, but {}", home.unwatched)),
+        Ok(Some(notices)) => {
+            let about = format!("`{name}`");
+            let about = notices.iter().filter(|it| it.contains(&about));
+            let said: Vec<String> = about.map(|it| format!("\n{it}")).collect();
+            let said = said.concat();
+            Ok(format!(
+                "{shown} written; the broker starts the bundle{said}"
+            ))
+        }
+        Ok(None) => Ok(format!("{shown} written, but {}", home.unwatched)),
         Err((exit, why)) => {
             put_back(&path, before.as_deref());
             Err((exit, format!("nothing was added: {why}")))
@@ -85,8 +93,8 @@ fn try_remove(args: &BundleRemoveArgs) -> Result<String, Refusal> {
     std::fs::remove_file(&path)
         .map_err(|error| usage(format!("cannot remove {shown}: {error}")))?;
     match home.reload() {
-        Ok(true) => Ok(format!("{shown} removed; the broker drains the bundle")),
-        Ok(false) => Ok(format!("{shown} removed, but {}", home.unwatched)),
+        Ok(Some(_)) => Ok(format!("{shown} removed; the broker drains the bundle")),
+        Ok(None) => Ok(format!("{shown} removed, but {}", home.unwatched)),
         Err((exit, why)) => {
             put_back(&path, Some(&before));
             Err((exit, format!("nothing was removed: {why}")))
@@ -173,13 +181,13 @@ impl Home {
         self.directory.join(format!("{name}.json"))
     }
 
-    /// Whether a broker has taken what was done.
-    fn reload(&self) -> Result<bool, Refusal> {
+    /// Whether a broker has taken what was done, and what it has to say then.
+    fn reload(&self) -> Result<Option<Vec<String>>, Refusal> {
         let Some(broker) = &self.broker else {
-            return Ok(false);
+            return Ok(None);
         };
         match ask_broker(broker, &Request::Reload) {
-            Ok(Response::Reloaded { .. }) => Ok(true),
+            Ok(Response::Reloaded { notices, .. }) => Ok(Some(notices)),
             Ok(Response::Failed { reason }) => Err(usage(reason)),
             Ok(other) => Err((Exit::Internal, format!("unexpected answer: {other:?}"))),
             Err(error) => Err((Exit::NoBroker, error.to_string())),

@@ -1,0 +1,253 @@
+//! The configuration and the bundle manifests: read, validate, compare, apply. The start of a
+//! broker is its first reload; a mistake never takes down what is in force.
+
+mod differences;
+mod modules;
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+use qcbus_formats::config::{
+    Config, Known, KnownBundle, Oddity, Parsed, reporter_for, same_bundle,
+};
+use qcbus_messages::Role;
+
+use crate::core::{ChildSpec, Stamp};
+use crate::stamp::stamp_through_links;
+
+pub use differences::differences;
+use modules::{add_module, read_manifest};
+
+/// Where the configuration and the children come from.
+#[derive(Debug, Clone)]
+pub struct Sources {
+    /// The configuration file.
+    pub config: Option<PathBuf>,
+    /// Directory of manifests.
+    pub bundles_d: Option<PathBuf>,
+    /// The children that come with the program.
+    pub standard: Vec<ChildSpec>,
+    /// Reporters that run when the configuration names them.
+    pub reporters: Vec<ChildSpec>,
+    /// What can be said beforehand of the bundles that come with the program.
+    pub known: Known,
+}
+
+/// What was read, valid as a whole.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Loaded {
+    /// The configuration.
+    pub config: Option<Config>,
+    /// Everything that is to run.
+    pub children: Vec<ChildSpec>,
+    /// What is odd about the configuration.
+    pub oddities: Vec<Oddity>,
+    /// What is odd about anything, that included, for a person.
+    pub notices: Vec<String>,
+    /// Every file that was read for it, with its stamp from before.
+    pub read: Fingerprint,
+    /// Which manifest brought which child.
+    brought: BTreeMap<String, String>,
+    /// Device and inode of the directory of manifests, and how many there were.
+    manifests: Option<(u64, u64, usize)>,
+}
+
+/// Files with their stamps: differs as soon as any of the files does.
+pub type Fingerprint = BTreeMap<PathBuf, Option<Stamp>>;
+
+/// Why nothing was applied.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum LoadError {
+    /// The configuration cannot be used.
+    #[error("{0}")]
+    Config(String),
+    /// A manifest cannot be used.
+    #[error("{0}")]
+    Manifest(String),
+}
+
+impl Sources {
+    /// Reads everything.
+    ///
+    /// # Errors
+    /// The first thing that cannot be used, with file, row and column where there is one.
+    pub fn load(&self) -> Result<Loaded, LoadError> {
+        let mut loaded = Loaded {
+            children: self.standard.clone(),
+            ..Loaded::default()
+        };
+        let note = |loaded: &mut Loaded, path: &Path| {
+            let stamp = stamp_through_links(path);
+            loaded.read.insert(path.to_path_buf(), stamp);
+        };
+        let parsed = match &self.config {
+            Some(path) => {
+                note(&mut loaded, path);
+                Some((path, read_config(path)?))
+            }
+            None => None,
+        };
+        if let Some((_, parsed)) = &parsed {
+            self.add_reporters(&parsed.config, &mut loaded);
+        }
+        let manifests = self.manifests(&mut loaded.notices)?;
+        loaded.manifests = self
+            .directory()
+            .map(|(device, inode)| (device, inode, manifests.len()));
+        for path in manifests {
+            let read = RefCell::new(&mut loaded);
+            let modules = read_manifest(&path, &|path| note(&mut read.borrow_mut(), path))?;
+            for module in modules {
+                add_module(module, &mut loaded)?;
+            }
+        }
+        if let Some((path, parsed)) = parsed {
+            loaded.oddities = parsed.all_oddities(&self.known_with(&loaded.children));
+            let lines = loaded.oddities.iter().map(|oddity| oddity.line(path));
+            loaded.notices.splice(0..0, lines);
+            let unasked = unasked(path, &parsed.config, &loaded);
+            loaded.notices.extend(unasked);
+            loaded.config = Some(parsed.config);
+        }
+        Ok(loaded)
+    }
+
+    /// What there is to be named: what comes with the program, and what manifests bring.
+    fn known_with(&self, children: &[ChildSpec]) -> Known {
+        let mut known = self.known.clone();
+        for child in children {
+            let name = &child.name;
+            if child.role == Role::Reporter {
+                known.reporters.push(name.clone());
+            } else if known.bundles.iter().all(|bundle| bundle.name != *name) {
+                known.bundles.push(KnownBundle {
+                    name: name.clone(),
+                    ..KnownBundle::default()
+                });
+            }
+        }
+        known
+    }
+
+    fn add_reporters(&self, config: &Config, loaded: &mut Loaded) {
+        for report in &config.reports {
+            let name = reporter_for(&report.application).unwrap_or(&report.application);
+            let spec = self.reporters.iter().find(|spec| spec.name == name);
+            if let Some(spec) = spec
+                && loaded.children.iter().all(|child| child.name != name)
+            {
+                loaded.children.push(spec.clone());
+            }
+        }
+    }
+
+    /// The manifests, by name. What lies beside them and looks as if somebody took it for one is said.
+    fn manifests(&self, notices: &mut Vec<String>) -> Result<Vec<PathBuf>, LoadError> {
+        let Some(directory) = &self.bundles_d else {
+            return Ok(Vec::new());
+        };
+        let cannot_look = |error: &std::io::Error| {
+            LoadError::Manifest(format!("cannot look into {}: {error}", directory.display()))
+        };
+        let entries = match std::fs::read_dir(directory) {
+            Ok(entries) => entries,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+            Err(error) => return Err(cannot_look(&error)),
+        };
+        let all: Result<Vec<PathBuf>, LoadError> = entries
+            .map(|entry| {
+                entry
+                    .map(|it| it.path())
+                    .map_err(|error| cannot_look(&error))
+            })
+            .collect();
+        let hidden = |path: &PathBuf| {
+            let name = path.file_name();
+            name.is_some_and(|it| it.to_string_lossy().starts_with('.'))
+        };
+        let is_manifest = |path: &PathBuf| path.extension().is_some_and(|it| it == "json");
+        let all = all?.into_iter().filter(|path| !hidden(path));
+        let (mut paths, mut others): (Vec<PathBuf>, Vec<PathBuf>) = all.partition(is_manifest);
+        others.sort();
+        notices.extend(others.iter().map(|path| {
+            let shown = path.display();
+            format!("{shown}: is no manifest, those are files of this directory that end in .json")
+        }));
+        paths.sort();
+        Ok(paths)
+    }
+
+    /// The directory of manifests, if it is there.
+    fn directory(&self) -> Option<(u64, u64)> {
+        let data = std::fs::metadata(self.bundles_d.as_ref()?).ok()?;
+        Some((data.dev(), data.ino()))
+    }
+
+    /// All files that count, as they are now: `loaded` knows those that manifests list.
+    pub fn fingerprint(&self, loaded: &Loaded) -> Fingerprint {
+        let manifests = self.manifests(&mut Vec::new()).unwrap_or_default();
+        let paths = self.config.iter().cloned().chain(manifests);
+        paths
+            .chain(loaded.read.keys().cloned())
+            .map(|path| (path.clone(), stamp_through_links(&path)))
+            .collect()
+    }
+
+    /// Whether the directory of manifests is away: gone, or an empty one in its place as where nothing
+    /// is mounted. Nobody has removed the bundles that it brought.
+    ///
+    /// # Errors
+    /// [`LoadError::Manifest`] when it is.
+    pub fn still_has(&self, old: &Loaded, new: &Loaded) -> Result<(), LoadError> {
+        let (Some(directory), Some((device, inode, 1..))) = (&self.bundles_d, old.manifests) else {
+            return Ok(());
+        };
+        let is_away = match new.manifests {
+            None => true,
+            Some((other_device, other_inode, count)) => {
+                count == 0 && (device, inode) != (other_device, other_inode)
+            }
+        };
+        if !is_away {
+            return Ok(());
+        }
+        let shown = directory.display();
+        Err(LoadError::Manifest(format!(
+            "{shown} is not the directory that it was, and there is no manifest in it; its bundles stay \
+             demanded until it is back (to do without them, start the broker anew)"
+        )))
+    }
+}
+
+/// Bundles that somebody has brought, and of which the configuration asks nothing.
+fn unasked(path: &Path, config: &Config, loaded: &Loaded) -> Vec<String> {
+    let named = |name: &str| {
+        let mut bundles = config.bundles.iter();
+        bundles.any(|it| same_bundle(&it.application, name, ""))
+    };
+    let bundles = loaded.children.iter().filter(|it| it.role == Role::Bundle);
+    let brought = bundles.filter_map(|it| Some((&it.name, loaded.brought.get(&it.name)?)));
+    let unasked = brought.filter(|(name, _)| !config.bundles.is_empty() && !named(name));
+    let (shown, note) = (
+        path.display(),
+        "it judges nothing, unless it is named by its short name",
+    );
+    unasked
+        .map(|(name, manifest)| format!("{manifest}: {shown} does not name `{name}`: {note}"))
+        .collect()
+}
+
+/// Reads one configuration file.
+///
+/// # Errors
+/// [`LoadError::Config`] with path, row and column.
+pub fn read_config(path: &Path) -> Result<Parsed, LoadError> {
+    let bytes = std::fs::read(path)
+        .map_err(|error| LoadError::Config(format!("cannot read {}: {error}", path.display())))?;
+    Config::parse(&bytes).map_err(|error| LoadError::Config(format!("{}:{error}", path.display())))
+}
+
+#[cfg(test)]
+mod tests;

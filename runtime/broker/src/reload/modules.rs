@@ -1,0 +1,99 @@
+//! Manifests: what is to run beside what comes with the program.
+
+use std::path::Path;
+
+use qcbus_formats::manifest::{self, Mode, Module, ModuleType};
+use qcbus_formats::pool::OWN_BUNDLE;
+use qcbus_messages::Role;
+
+use super::{LoadError, Loaded};
+use crate::core::{ChildSpec, Restart};
+
+/// The modules of a manifest; every file that is read for it is told to `note` first.
+pub(super) fn read_manifest(path: &Path, note: &dyn Fn(&Path)) -> Result<Vec<Module>, LoadError> {
+    let sources = manifest::Sources {
+        read: &|path| {
+            note(path);
+            std::fs::read(path).map_err(|error| error.to_string())
+        },
+        variable: &|name| std::env::var(name).ok(),
+    };
+    manifest::load(path, &sources).map_err(|error| LoadError::Manifest(error.to_string()))
+}
+
+/// Adds the module of a manifest to what is to run.
+///
+/// # Errors
+/// [`LoadError::Manifest`] when its name is taken, or it would have to judge and cannot be asked.
+pub(super) fn add_module(module: Module, loaded: &mut Loaded) -> Result<(), LoadError> {
+    let manifest = module.manifest.display().to_string();
+    let role = match module.module_type {
+        ModuleType::CheckerBundle => Role::Bundle,
+        ModuleType::ReportModule => Role::Reporter,
+        ModuleType::ResultPooling => {
+            let name = &module.name;
+            let notice = format!("{manifest}: `{name}`: qcbus pools results itself");
+            loaded.notices.push(notice);
+            return Ok(());
+        }
+    };
+    if module.mode != Mode::Bus {
+        return not_on_the_bus(&module, role, loaded);
+    }
+    let name = module.name.clone();
+    if let Some(other) = loaded.brought.get(&name) {
+        return Err(LoadError::Manifest(format!(
+            "{manifest}: `{name}` is the name of a module in {other}, too: one of them would not run; give \
+             it another name"
+        )));
+    }
+    if name == OWN_BUNDLE || loaded.children.iter().any(|child| child.name == name) {
+        return Err(LoadError::Manifest(format!(
+            "{manifest}: `{name}` comes with qcbus and would be replaced; give it another name (to do \
+             without the bundles that come with qcbus, start it with --no-standard-bundles)"
+        )));
+    }
+    loaded.brought.insert(name, manifest);
+    loaded.children.push(spec_of(module, role));
+    Ok(())
+}
+
+/// Nobody misses a reporter that is not started. A bundle would have to judge.
+fn not_on_the_bus(module: &Module, role: Role, loaded: &mut Loaded) -> Result<(), LoadError> {
+    let (manifest, name) = (module.manifest.display(), &module.name);
+    if role == Role::Bundle {
+        return Err(LoadError::Manifest(format!(
+            "{manifest}: `{name}` has no \"mode\": \"bus\", so it cannot be asked, and what it would reject \
+             would be accepted; add the mode if it speaks on the bus, or take the manifest out"
+        )));
+    }
+    loaded.notices.push(format!(
+        "{manifest}: `{name}` has no \"mode\": \"bus\" and is not started: it does not speak on the bus"
+    ));
+    Ok(())
+}
+
+fn spec_of(module: Module, role: Role) -> ChildSpec {
+    let extra = |key: &str| {
+        let mut found = module.extra.iter().filter(|(name, _)| name == key);
+        found.next().map(|(_, value)| value.as_str())
+    };
+    let restart = match extra("restart") {
+        Some("never") => Restart::Never,
+        Some("on-failure") => Restart::OnFailure,
+        _ => Restart::Always,
+    };
+    ChildSpec {
+        version: extra("version").map(str::to_owned),
+        // As ASAM's framework does, the command is the shell's to take apart.
+        command: vec![
+            "sh".into(),
+            "-c".into(),
+            format!("exec {} \"$@\"", module.exec_command),
+            "sh".into(),
+        ],
+        name: module.name,
+        role,
+        restart,
+    }
+}

@@ -1,0 +1,179 @@
+//! What a start reads, and what of a change is taken.
+
+use super::*;
+use crate::core::Restart;
+
+fn sources(directory: &Path) -> Sources {
+    Sources {
+        config: Some(directory.join("config.xml")),
+        bundles_d: Some(directory.join("bundles.d")),
+        standard: vec![child("xodrBundle")],
+        reporters: vec![child("qc-report-text")],
+        known: Known::default(),
+    }
+}
+
+fn child(name: &str) -> ChildSpec {
+    ChildSpec {
+        name: name.to_owned(),
+        role: Role::Bundle,
+        version: None,
+        command: vec!["program".to_owned()],
+        restart: Restart::Always,
+    }
+}
+
+fn put(directory: &Path, config: &str, manifests: &[(&str, &str)]) {
+    let bundles_d = directory.join("bundles.d");
+    let _ = std::fs::remove_dir_all(&bundles_d);
+    std::fs::create_dir(&bundles_d).unwrap();
+    std::fs::write(directory.join("config.xml"), config).unwrap();
+    for (name, text) in manifests {
+        std::fs::write(bundles_d.join(name), text).unwrap();
+    }
+}
+
+fn manifest(name: &str, mode: &str) -> String {
+    format!(
+        r#"{{"module": [{{"name": "{name}", "exec_type": "executable", "mode": "{mode}",
+        "module_type": "checker_bundle", "exec_command": "/opt/{name}"}}]}}"#
+    )
+}
+
+const CONFIG: &str = "<Config>\n  <CheckerBundle application=\"xodrBundle\"/>\n</Config>\n";
+
+#[test]
+fn a_start_reads_the_configuration_and_every_manifest() {
+    let dir = tempfile::tempdir().unwrap();
+    let mine = manifest("mine", "bus");
+    let theirs = manifest("theirs", "once").replace("checker_bundle", "report_module");
+    let hidden = (".hidden.json", "no manifest at all");
+    put(
+        dir.path(),
+        CONFIG,
+        &[("a.json", &mine), ("b.json", &theirs), hidden],
+    );
+    let loaded = sources(dir.path()).load().unwrap();
+    let names: Vec<&str> = loaded.children.iter().map(|it| it.name.as_str()).collect();
+    assert_eq!(names, ["xodrBundle", "mine"], "{:?}", loaded.notices);
+    assert!(loaded.notices.iter().any(|it| it.contains("theirs")));
+    assert_eq!(loaded.config.unwrap().bundles.len(), 1);
+}
+
+#[test]
+fn what_cannot_be_read_is_refused_as_a_whole() {
+    let dir = tempfile::tempdir().unwrap();
+    put(dir.path(), "<Config>", &[]);
+    assert!(matches!(
+        sources(dir.path()).load(),
+        Err(LoadError::Config(_))
+    ));
+    put(dir.path(), CONFIG, &[("a.json", "{")]);
+    assert!(matches!(
+        sources(dir.path()).load(),
+        Err(LoadError::Manifest(_))
+    ));
+}
+
+#[test]
+fn what_has_changed_is_told_line_by_line() {
+    let dir = tempfile::tempdir().unwrap();
+    let sources = sources(dir.path());
+    let (mine, yours) = (manifest("mine", "bus"), manifest("yours", "bus"));
+    put(dir.path(), CONFIG, &[("a.json", &mine)]);
+    let old = sources.load().unwrap();
+    assert_eq!(sources.fingerprint(&old), old.read);
+    assert_eq!(differences(&old, &old), Vec::<String>::new());
+    let config = CONFIG.replace("xodrBundle", "xoscBundle");
+    put(dir.path(), &config, &[("b.json", &yours)]);
+    assert_ne!(sources.fingerprint(&old), old.read);
+    let mut lines = differences(&old, &sources.load().unwrap());
+    lines.sort();
+    let expected = [
+        "added yours",
+        "removed mine",
+        "xodrBundle is no longer demanded",
+        "xoscBundle is demanded",
+    ];
+    assert_eq!(lines, expected);
+}
+
+#[test]
+fn a_manifest_that_another_lists_is_looked_at_too() {
+    let dir = tempfile::tempdir().unwrap();
+    let sources = sources(dir.path());
+    let listed = dir.path().join("mine.manifest");
+    std::fs::write(&listed, manifest("mine", "bus")).unwrap();
+    let list = format!(r#"{{"manifest_file_path": ["{}"]}}"#, listed.display());
+    put(dir.path(), CONFIG, &[("all.json", &list)]);
+    let old = sources.load().unwrap();
+    assert!(old.children.iter().any(|it| it.name == "mine"));
+    assert_eq!(sources.fingerprint(&old), old.read);
+    std::fs::write(&listed, manifest("another", "bus")).unwrap();
+    assert_ne!(sources.fingerprint(&old), old.read);
+}
+
+#[test]
+fn a_directory_of_manifests_that_is_away_takes_no_bundle_along() {
+    let dir = tempfile::tempdir().unwrap();
+    let sources = sources(dir.path());
+    let (bundles_d, aside) = (dir.path().join("bundles.d"), dir.path().join("aside"));
+    let mine = manifest("mine", "bus");
+    put(dir.path(), CONFIG, &[("a.json", &mine)]);
+    let old = sources.load().unwrap();
+    let still_has = || sources.still_has(&old, &sources.load().unwrap());
+    assert_eq!(still_has(), Ok(()));
+    std::fs::rename(&bundles_d, &aside).unwrap();
+    assert!(still_has().is_err(), "gone");
+    std::fs::create_dir(&bundles_d).unwrap();
+    assert!(still_has().is_err(), "an empty one in its place");
+    std::fs::write(bundles_d.join("b.json"), &mine).unwrap();
+    assert_eq!(still_has(), Ok(()), "somebody has put another there");
+    std::fs::remove_dir_all(&bundles_d).unwrap();
+    std::fs::rename(&aside, &bundles_d).unwrap();
+    std::fs::remove_file(bundles_d.join("a.json")).unwrap();
+    assert_eq!(still_has(), Ok(()), "somebody has taken it out");
+}
+
+#[test]
+fn a_name_is_not_taken_twice() {
+    let dir = tempfile::tempdir().unwrap();
+    let sources = sources(dir.path());
+    let (mine, standard) = (manifest("mine", "bus"), manifest("xodrBundle", "bus"));
+    let own = manifest("qcbus", "bus");
+    let cases = [
+        vec![("a.json", &*mine), ("b.json", &*mine)],
+        vec![("a.json", &*standard)],
+        vec![("a.json", &*own)],
+    ];
+    for manifests in cases {
+        put(dir.path(), CONFIG, &manifests);
+        let refused = sources.load().unwrap_err().to_string();
+        assert!(refused.contains("another name"), "{refused}");
+    }
+}
+
+#[test]
+fn what_looks_like_a_manifest_and_is_none_is_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let mine = manifest("mine", "bus");
+    put(dir.path(), CONFIG, &[("mine.JSON", &mine), (".hidden", "")]);
+    let notices = sources(dir.path()).load().unwrap().notices;
+    let said: Vec<&String> = notices
+        .iter()
+        .filter(|it| it.contains("no manifest"))
+        .collect();
+    assert!(
+        matches!(said[..], [one] if one.contains("mine.JSON")),
+        "{notices:?}"
+    );
+}
+
+#[test]
+fn a_bundle_that_cannot_be_asked_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let once = manifest("mine", "once");
+    put(dir.path(), CONFIG, &[("a.json", &once)]);
+    let refused = sources(dir.path()).load().unwrap_err().to_string();
+    assert!(refused.contains("mode"), "{refused}");
+}
