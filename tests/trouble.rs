@@ -143,8 +143,7 @@ fn a_bundle_that_cannot_be_started() {
 
 #[test]
 fn a_watched_directory_that_goes_and_comes_back() {
-    // That it is back is seen when everything is looked through.
-    let farm = Farm::with(&["--rescan", "1s"]);
+    let farm = Farm::new();
     let _broker = farm.serve_ready();
     farm.write("a.xodr", &Content::Good(1).bytes());
     farm.verdict("a.xodr");

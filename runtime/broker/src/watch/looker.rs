@@ -82,6 +82,8 @@ impl Looker {
                 Err(RecvTimeoutError::Timeout) => {}
             }
             let now = Instant::now();
+            // A directory may have gone since the next look was fixed.
+            next_scan = next_scan.min(now + self.scan_interval());
             for path in self
                 .settling
                 .settled(now, |path| stamp_of(path).ok().flatten())
