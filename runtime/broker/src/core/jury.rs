@@ -129,6 +129,12 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_jury_that_nobody_knows_is_not_one_without_members() {
+        // That one is demanded where nobody checks a kind of file.
+        assert_ne!(Jury::unknown(), Jury::default());
+    }
+
+    #[test]
     fn epochs_go_up_over_every_restart() {
         let (first, second) = (Epoch::first_of(1), Epoch::first_of(2));
         assert!(Epoch::default() < first && first < first.next());

@@ -444,3 +444,27 @@ fn a_run_does_not_wait_for_a_reporter_that_cannot_start() {
     world.pass(Duration::from_secs(4));
     assert_eq!(world.stopped, 1);
 }
+
+#[test]
+fn a_verdict_that_stands_after_all_is_not_told_of_what_is_not_there() {
+    let mut world = judged_world();
+    let waits = Event::Wait {
+        ticket: Ticket(7),
+        path: path_of(1),
+        stamp: None,
+        unwatched: None,
+        timeout: None,
+    };
+    let answered = |it: &Action| matches!(it, Action::Answer { .. });
+    assert!(!comes_of(&mut world, waits).iter().any(answered));
+    // Its file waits for another judgement, which nobody wants any more when its turn comes.
+    world.state.settings.max_active = 0;
+    world.join("Third");
+    world.remove("Third");
+    world.leave(world.peers.len() as u8 - 1);
+    world.state.settings.max_active = 4;
+    let actions = comes_of(&mut world, Event::Tick);
+    let confirmed = |it: &Action| matches!(it, Action::Judged { fresh: false, .. });
+    assert!(actions.iter().any(confirmed), "{actions:?}");
+    assert!(!actions.iter().any(answered), "{actions:?}");
+}
