@@ -254,10 +254,16 @@ fn an_output_disk_that_is_full() {
             !left.iter().any(|name| name.ends_with(".xqar")),
             "nothing half-written: {left:?}"
         );
+        let lost = Content::Scenario(1, "nowhere.xodr".to_owned());
+        farm.write("lost.xosc", &lost.bytes());
+        notice(&farm, "lost.xosc");
         std::fs::remove_file(&filler).unwrap();
         // With room again, the verdict comes by itself.
         let verdict = farm.verdict("a.xodr");
         assert_eq!(verdict.verdict, Content::Good(1).verdict());
+        // What was seen when the file was read is said also by the second attempt.
+        let verdict = farm.verdict("lost.xosc");
+        assert_eq!(verdict.verdict, Verdict::Rejected, "{verdict:?}");
     });
 }
 

@@ -107,7 +107,6 @@ impl Broker {
         let config = self.in_force.config.clone();
         let path = job.path.clone();
         reached("checked", &path);
-        self.intake.release(job.job);
         self.untrimmed = true;
         self.writers
             .order(&path, Order::Store { job, config, root });

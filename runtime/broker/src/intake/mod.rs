@@ -122,8 +122,14 @@ impl Intake {
             .and_then(|all| all.first().map(|(_, held)| held.clone()))
     }
 
-    /// The root document of a job that has ended lately; it may still be on the bus.
+    /// The root document of a job that is stored or has ended lately; it may still be on the bus.
     pub fn recent_root(&self, job: JobId) -> Option<DocId> {
+        let held = lock(&self.held)
+            .get(&job)
+            .and_then(|all| Some(all.first()?.0));
+        if held.is_some() {
+            return held;
+        }
         lock(&self.recent)
             .iter()
             .find(|(it, _)| *it == job)

@@ -21,8 +21,12 @@ impl Store {
     ) -> Pooled {
         let document = root.and_then(|bytes| Document::open(bytes).ok());
         let mut remarks: Vec<Remark> = unanswered(job).into_iter().collect();
-        if let (Some(document), Some(prepared)) = (&document, &job.prepared) {
-            remarks.extend(qcbus_ingest::remarks(document, &prepared.missing, &bundles));
+        match (&document, &job.prepared) {
+            (Some(document), Some(prepared)) => {
+                remarks.extend(qcbus_ingest::remarks(document, &prepared.missing, &bundles));
+            }
+            (None, Some(_)) => remarks.push(unseen_root()),
+            (_, None) => {}
         }
         let input = PoolInput {
             input_file: &to_text(&job.path),
@@ -68,6 +72,16 @@ fn unanswered(job: &FinishedJob) -> Option<Remark> {
         issue: None,
         open: Some(open),
     })
+}
+
+/// What was found when the file was read cannot be told without its image: then nothing is accepted.
+fn unseen_root() -> Remark {
+    Remark {
+        checker: "qcbus_file".to_owned(),
+        description: "The file is whole and can be read.".to_owned(),
+        issue: None,
+        open: Some("its image was let go of before its result was written".to_owned()),
+    }
 }
 
 /// Reasons shown to a person; more than these are counted.
