@@ -301,3 +301,98 @@ fn a_process_that_is_replaced_and_does_not_go_is_killed() {
     world.pass(Duration::from_millis(1));
     assert!(world.killed.contains(&old));
 }
+
+/// A child that is to be started again in this way, and has joined.
+fn world_with(restart: Restart) -> World {
+    let mut world = World::new();
+    let specs = vec![ChildSpec {
+        restart,
+        ..child(1)
+    }];
+    world.manifest = Some(1);
+    world.event(Event::Children { specs });
+    world.pass(Duration::ZERO);
+    world.child_joins();
+    world
+}
+
+#[test]
+fn a_child_is_started_again_as_its_manifest_says() {
+    let leaves: fn(&mut World) = |world| world.leave(0);
+    let dies: fn(&mut World) = |world| world.kill(0);
+    let cases = [
+        (Restart::Always, leaves, true),
+        (Restart::Always, dies, true),
+        (Restart::OnFailure, leaves, false),
+        (Restart::OnFailure, dies, true),
+        (Restart::Never, leaves, false),
+        (Restart::Never, dies, false),
+    ];
+    for (number, (restart, ends, again)) in cases.into_iter().enumerate() {
+        let mut world = world_with(restart);
+        ends(&mut world);
+        world.pass(Duration::from_secs(2));
+        assert_eq!(!world.launched.is_empty(), again, "case {number}");
+    }
+    let mut world = world_with(Restart::Always);
+    world.event(Event::Drain);
+    world.leave(0);
+    world.pass(Duration::from_secs(2));
+    assert!(world.launched.is_empty(), "the broker stops");
+}
+
+#[test]
+fn pauses_between_starts_double_up_to_a_limit() {
+    let mut world = World::new();
+    world.manifest(Some(1));
+    world.pass(Duration::ZERO);
+    let mut pauses = Vec::new();
+    for _ in 0..12 {
+        world.child_ends(ChildEnd::Failed("it crashed".to_owned()));
+        let ended = world.now;
+        while world.launched.is_empty() {
+            world.pass(Duration::from_millis(10));
+        }
+        pauses.push(world.now - ended);
+    }
+    let (first, most) = (
+        world.state.settings.backoff,
+        world.state.settings.backoff_max,
+    );
+    for (number, pause) in (0_u32..).zip(pauses) {
+        let least = (first * 2_u32.pow(number)).min(most);
+        // Up to a quarter more, so that children that fell together do not get up together.
+        let tick = Duration::from_millis(20);
+        assert!(
+            least <= pause && pause <= least.mul_f64(1.25) + tick,
+            "{number}: {pause:?}"
+        );
+    }
+}
+
+#[test]
+fn a_child_that_fails_now_and_then_is_not_given_up() {
+    let mut world = World::new();
+    world.state.settings.max_restarts = 2;
+    world.manifest(Some(1));
+    world.pass(Duration::ZERO);
+    let window = world.state.settings.restart_window;
+    for _ in 0..5 {
+        world.child_ends(ChildEnd::Failed("it crashed".to_owned()));
+        world.pass(window + Duration::from_secs(1));
+    }
+    assert!(
+        !notices(&world).contains(&"gave-up"),
+        "{:?}",
+        notices(&world)
+    );
+    for _ in 0..5 {
+        world.child_ends(ChildEnd::Failed("it crashed".to_owned()));
+        world.pass(Duration::from_secs(5));
+    }
+    assert!(
+        notices(&world).contains(&"gave-up"),
+        "{:?}",
+        notices(&world)
+    );
+}
