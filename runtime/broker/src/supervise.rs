@@ -112,6 +112,14 @@ impl Children {
     }
 }
 
+/// Whether a process of this machine runs. One that nobody has buried yet does not.
+pub fn is_there(pid: u32) -> bool {
+    let stat = std::fs::read_to_string(Path::new("/proc").join(pid.to_string()).join("stat"));
+    // The command stands in parentheses and may contain anything; behind it comes the state.
+    let state = stat.as_deref().ok().and_then(|it| it.rsplit_once(')'));
+    state.is_some_and(|(_, rest)| !rest.trim_start().starts_with(['Z', 'X']))
+}
+
 /// A process id may have been given to somebody else since: only a process that was started with
 /// `--launch` is killed by number.
 fn is_ours(pid: i32) -> bool {
@@ -285,6 +293,19 @@ mod tests {
         tokio::time::timeout(Duration::from_secs(60), gone)
             .await
             .unwrap();
+    }
+
+    #[test]
+    fn the_dead_are_not_there_before_they_are_buried() {
+        assert!(is_there(std::process::id()));
+        let mut child = std::process::Command::new("true").spawn().unwrap();
+        let stat = Path::new("/proc").join(child.id().to_string()).join("stat");
+        while !std::fs::read_to_string(&stat).unwrap().contains(") Z ") {
+            std::thread::yield_now();
+        }
+        assert!(!is_there(child.id()), "it has ended");
+        child.wait().unwrap();
+        assert!(!is_there(child.id()), "it is buried");
     }
 
     #[tokio::test]

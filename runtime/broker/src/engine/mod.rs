@@ -27,7 +27,7 @@ use crate::options::Options;
 use crate::reload::{LoadError, Loaded, Sources};
 use crate::stages::reached;
 use crate::store::Store;
-use crate::supervise::Children;
+use crate::supervise::{Children, is_there};
 use crate::watch::{Seen, Watcher};
 use crate::writers::Writers;
 
@@ -326,6 +326,12 @@ impl Broker {
     fn bus_event(&mut self, event: HostEvent) -> bool {
         let known = |peer, sessions: &Sessions| sessions.sessions.get(&peer).copied();
         match event {
+            // A child is a process of this machine. One that has died since it said hello would be
+            // taken for one of another container, and keep its name from the next.
+            HostEvent::Hello { peer, hello } if hello.launch.is_some() && !is_there(hello.pid) => {
+                self.host.disconnect(peer);
+                true
+            }
             HostEvent::Hello { peer, hello } => {
                 let session = self.sessions.add(peer);
                 self.handle(Event::Hello { session, hello })
