@@ -187,6 +187,9 @@ impl Judgement {
                 continue;
             }
             let name = path.to_string_lossy().into_owned();
+            if is_being_written(&path) {
+                continue;
+            }
             let results = [".xqar", ".verdict.json"];
             let file = results.iter().find_map(|suffix| name.strip_suffix(suffix));
             // Reports are withdrawn by their reporters, later than results.
@@ -196,6 +199,15 @@ impl Judgement {
             }
         }
     }
+}
+
+/// Whether this is what a reporter that lives is writing: its name says whose it is.
+fn is_being_written(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let writer = name
+        .strip_prefix(".qcbus-")
+        .and_then(|it| it.split_once('-'));
+    writer.is_some_and(|(pid, _)| Path::new("/proc").join(pid).exists())
 }
 
 /// Whether the rule that the oracle expects has an issue.
