@@ -18,7 +18,7 @@ use super::jury::{Epoch, Jury};
 pub struct SessionId(pub u64);
 
 /// One start of a child process. The number counts up over all brokers of an instance: the generation,
-/// the how manieth start, and in the last [`SPEC_BITS`] bits what was started, so that a broker knows
+/// which of its starts, and in the last [`SPEC_BITS`] bits what was started, so that a broker knows
 /// of a process that a former one has started whether it still is what is wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Launch(pub u64);
