@@ -180,3 +180,53 @@ fn a_bundle_that_nobody_starts_again_leaves_errors_behind_until_it_is_back() {
         assert_eq!(farm.verdict(name).verdict, Verdict::Accepted, "{name}");
     }
 }
+
+/// An animal that is frozen when its broker is killed: the next knows nothing of it.
+fn frozen(farm: &Farm) -> PeerStatus {
+    let mut broker = farm.serve_ready();
+    farm.let_in("hangs_after_hello", "");
+    let frozen = peer(farm, "hangs_after_hello", |it| it.pid != 0);
+    broker.kill();
+    frozen
+}
+
+fn has_gone(farm: &Farm, frozen: &PeerStatus) {
+    let pid = i32::try_from(frozen.pid).unwrap();
+    until_or(
+        "what hangs is killed",
+        || {
+            farm.processes()
+                .iter()
+                .all(|it| it.pid != pid)
+                .then_some(())
+        },
+        || format!("{:#?}\n{}", farm.processes(), tail(&farm.log())),
+    );
+}
+
+#[test]
+fn what_hung_when_its_broker_was_killed_is_killed_by_the_next() {
+    let farm = Farm::new();
+    let frozen = frozen(&farm);
+    farm.send_away("hangs_after_hello");
+    let _broker = farm.serve_ready();
+    has_gone(&farm, &frozen);
+    let words = format!(
+        "process {}, which an earlier broker had started",
+        frozen.pid
+    );
+    until_or(
+        "it is said",
+        || farm.log().contains(&words).then_some(()),
+        || farm.log(),
+    );
+}
+
+#[test]
+fn what_hung_when_its_broker_was_killed_does_not_outlive_the_next() {
+    let farm = Farm::new();
+    let frozen = frozen(&farm);
+    let _broker = farm.serve_ready();
+    assert!(farm.qcbus(&["down"]).status.success());
+    has_gone(&farm, &frozen);
+}

@@ -1,9 +1,10 @@
 //! Starting and killing child processes. When to do so is the state machine's business.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
+use rustix::process::Pid;
 use tokio::process::{Child, Command};
 use tokio::sync::mpsc::UnboundedSender;
 
@@ -26,15 +27,21 @@ pub struct Surroundings {
 #[derive(Debug)]
 pub struct Children {
     surroundings: Surroundings,
+    first: Launch,
     pids: BTreeMap<Launch, u32>,
     events: UnboundedSender<Event>,
 }
 
 impl Children {
-    /// No children yet. Their ends are told to `events`.
-    pub fn new(surroundings: Surroundings, events: UnboundedSender<Event>) -> Children {
+    /// No children yet of the broker of this generation. Their ends are told to `events`.
+    pub fn new(
+        surroundings: Surroundings,
+        generation: u64,
+        events: UnboundedSender<Event>,
+    ) -> Children {
         Children {
             surroundings,
+            first: Launch::first_of(generation),
             pids: BTreeMap::new(),
             events,
         }
@@ -91,16 +98,20 @@ impl Children {
             return;
         };
         let Ok(raw) = i32::try_from(pid) else { return };
-        let Some(pid) = rustix::process::Pid::from_raw(raw) else {
+        let Some(pid) = Pid::from_raw(raw) else {
             return;
         };
-        if own.is_none() && !is_ours(raw) {
+        if own.is_none() && CommandLine::of(pid).and_then(|it| it.launch()).is_none() {
             return;
         }
-        use rustix::process::{Signal, kill_process, kill_process_group};
-        if kill_process_group(pid, Signal::KILL).is_err() {
-            // Not the leader of a group, or gone already.
-            let _ = kill_process(pid, Signal::KILL);
+        kill_with_group(pid);
+    }
+
+    /// What former brokers of this instance have started.
+    pub fn former(&self) -> Former {
+        Former {
+            instance_dir: self.surroundings.instance_dir.clone(),
+            before: self.first,
         }
     }
 
@@ -120,14 +131,82 @@ pub fn is_there(pid: u32) -> bool {
     state.is_some_and(|(_, rest)| !rest.trim_start().starts_with(['Z', 'X']))
 }
 
-/// A process id may have been given to somebody else since: only a process that was started with
-/// `--launch` is killed by number.
-fn is_ours(pid: i32) -> bool {
-    let command = std::fs::read(Path::new("/proc").join(pid.to_string()).join("cmdline"));
-    command.is_ok_and(|line| {
-        line.split(|byte| *byte == 0)
-            .any(|word| word == b"--launch")
-    })
+/// Processes that former brokers of an instance have started. Their command lines tell: no list can
+/// miss one of a broker that was killed before it wrote the list.
+#[derive(Debug)]
+pub struct Former {
+    instance_dir: PathBuf,
+    before: Launch,
+}
+
+impl Former {
+    /// Kills those that are of none of these starts. Returns their process ids and programs.
+    pub fn kill_but(&self, joined: &BTreeSet<Launch>) -> Vec<(u32, String)> {
+        let mut killed = Vec::new();
+        for pid in processes() {
+            let Some(command) = CommandLine::of(pid) else {
+                continue;
+            };
+            let Some(launch) = command.launch() else {
+                continue;
+            };
+            let former = launch < self.before && !joined.contains(&launch);
+            if former && command.is_of_instance(&self.instance_dir) {
+                kill_with_group(pid);
+                killed.push((pid.as_raw_nonzero().get().unsigned_abs(), command.program()));
+            }
+        }
+        killed
+    }
+}
+
+fn processes() -> impl Iterator<Item = Pid> {
+    let entries = std::fs::read_dir("/proc").into_iter().flatten().flatten();
+    let numbers = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
+    numbers.filter_map(Pid::from_raw)
+}
+
+fn kill_with_group(pid: Pid) {
+    use rustix::process::{Signal, kill_process, kill_process_group};
+    if kill_process_group(pid, Signal::KILL).is_err() {
+        // Not the leader of a group, or gone already.
+        let _ = kill_process(pid, Signal::KILL);
+    }
+}
+
+/// The words with which a process was started.
+struct CommandLine(Vec<Vec<u8>>);
+
+impl CommandLine {
+    /// `None`: there is no such process, or it has ended and nobody has buried it yet.
+    fn of(pid: Pid) -> Option<CommandLine> {
+        let path = Path::new("/proc").join(pid.as_raw_nonzero().to_string());
+        let line = std::fs::read(path.join("cmdline")).ok()?;
+        let words = line.split(|byte| *byte == 0).map(<[u8]>::to_vec);
+        (!line.is_empty()).then(|| CommandLine(words.collect()))
+    }
+
+    fn behind(&self, flag: &str) -> Option<&[u8]> {
+        let at = self.0.iter().rposition(|word| word == flag.as_bytes())?;
+        self.0.get(at + 1).map(Vec::as_slice)
+    }
+
+    /// Which start of a broker it is. A process id may have been given to somebody else since: only
+    /// what was started with `--launch` is ours.
+    fn launch(&self) -> Option<Launch> {
+        let number = std::str::from_utf8(self.behind("--launch")?).ok()?;
+        number.parse().ok().map(Launch)
+    }
+
+    fn is_of_instance(&self, directory: &Path) -> bool {
+        use std::os::unix::ffi::OsStrExt as _;
+        self.behind("--instance-dir") == Some(directory.as_os_str().as_bytes())
+    }
+
+    fn program(&self) -> String {
+        let first = self.0.first().map(Vec::as_slice).unwrap_or_default();
+        String::from_utf8_lossy(first).into_owned()
+    }
 }
 
 async fn watch(launch: Launch, mut child: Child, events: UnboundedSender<Event>) {
@@ -210,7 +289,7 @@ mod tests {
             die_with_broker: true,
             memory_limit: None,
         };
-        (Children::new(surroundings, events), inbox)
+        (Children::new(surroundings, 2, events), inbox)
     }
 
     fn spec(command: &[&str]) -> ChildSpec {
@@ -322,5 +401,43 @@ mod tests {
         );
         stranger.kill().unwrap();
         stranger.wait().unwrap();
+    }
+
+    #[tokio::test]
+    async fn only_what_a_former_broker_of_this_instance_started_and_did_not_join_is_killed() {
+        use std::os::unix::process::CommandExt as _;
+        let (children, _inbox) = children();
+        let start = |instance: &str, launch: Launch| {
+            let mut command = std::process::Command::new("sh");
+            command.args(["-c", "sleep 1000; true", "sh", "--instance-dir", instance]);
+            command.args(["--launch", &launch.0.to_string()]);
+            command.process_group(0).spawn().unwrap()
+        };
+        let (former, joined) = (Launch::first_of(1), Launch(Launch::first_of(1).0 + 1));
+        let mut stuck = start("/nowhere", former);
+        let others = [
+            start("/nowhere", joined),
+            start("/nowhere", Launch::first_of(2)),
+            start("/elsewhere", former),
+        ];
+        let killed = async {
+            // Until the shell runs, its command line is that of this test.
+            loop {
+                let killed = children.former().kill_but(&BTreeSet::from([joined]));
+                if !killed.is_empty() {
+                    break killed;
+                }
+                tokio::task::yield_now().await;
+            }
+        };
+        let killed = tokio::time::timeout(Duration::from_secs(60), killed).await;
+        assert_eq!(killed.unwrap(), [(stuck.id(), "sh".to_owned())]);
+        assert!(!stuck.wait().unwrap().success());
+        for mut other in others {
+            let spared = other.try_wait().unwrap().is_none();
+            kill_with_group(Pid::from_child(&other));
+            other.wait().unwrap();
+            assert!(spared);
+        }
     }
 }

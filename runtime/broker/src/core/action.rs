@@ -1,5 +1,6 @@
 //! Everything that the state machine wants done.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -69,6 +70,11 @@ pub enum Action {
         launch: Option<Launch>,
         /// Its process id.
         pid: u32,
+    },
+    /// Kill what former brokers of this instance started and what has not come to this one.
+    KillFormer {
+        /// The starts of those that have joined.
+        joined: BTreeSet<Launch>,
     },
     /// Pool, write, record.
     Store(Box<FinishedJob>),

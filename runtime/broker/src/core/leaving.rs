@@ -1,6 +1,6 @@
 //! Leaving: what nobody wants any more is told to finish and go, and killed when it does not.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use qcbus_messages::ToPeer;
@@ -19,6 +19,10 @@ pub(super) struct Retired {
 
 /// How long a process may take to leave after it was told to drain.
 pub(super) const LEAVE_LIMIT: Duration = Duration::from_secs(10);
+
+/// How long what a former broker started may take to join this one. A process that is well notices
+/// at once that its broker has gone, and ends when it finds no other within ten seconds.
+const RETURN_LIMIT: Duration = Duration::from_secs(15);
 
 impl State {
     /// Tells a peer to finish and go, and forgets that it was wanted.
@@ -75,6 +79,20 @@ impl State {
                 since: self.now,
             },
         );
+    }
+
+    /// A process that hung or was stopped when its broker was killed is no session of this one, so
+    /// nobody would ever miss it: what has not come back in time is killed, once.
+    pub(super) fn kill_what_did_not_return(&mut self, actions: &mut Actions) {
+        if self.former_are_gone || self.now < RETURN_LIMIT {
+            return;
+        }
+        self.former_are_gone = true;
+        let bundles = self.bundles.values().map(|it| it.launch);
+        let reporters = self.reporters.iter().map(|it| it.launch);
+        let leaving = self.retired.values().map(|it| it.launch);
+        let joined: BTreeSet<Launch> = bundles.chain(reporters).chain(leaving).flatten().collect();
+        actions.push(Action::KillFormer { joined });
     }
 
     /// Kills what was told to go long ago.

@@ -76,6 +76,8 @@ pub struct State {
     sessions: BTreeMap<SessionId, (Role, String)>,
     children: BTreeMap<String, Child>,
     retired: BTreeMap<SessionId, Retired>,
+    /// What former brokers started has joined or been killed.
+    former_are_gone: bool,
     waiters: Vec<Waiter>,
     config: Digest,
     demand: Arc<dyn Demand>,
@@ -127,6 +129,7 @@ impl State {
             sessions: BTreeMap::new(),
             children: BTreeMap::new(),
             retired: BTreeMap::new(),
+            former_are_gone: false,
             waiters: Vec::new(),
             config,
             demand,
@@ -296,6 +299,7 @@ impl State {
 
     fn tick(&mut self, actions: &mut Actions) {
         self.watch_children(actions);
+        self.kill_what_did_not_return(actions);
         self.watch_bundles(actions);
         self.watch_reporters(actions);
         self.fail_absent();

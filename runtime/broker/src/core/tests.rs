@@ -397,6 +397,32 @@ fn a_bundle_that_does_not_go_is_made_to() {
 }
 
 #[test]
+fn what_a_former_broker_started_and_did_not_come_back_is_killed_once() {
+    let mut world = World::new();
+    world.generation = 2;
+    world.state = fresh_state(2, 0);
+    world.manifest(Some(1));
+    world.child_of_a_former_broker_joins(1, &child(1));
+    let launch = world.state.bundles[CHILD].launch.unwrap();
+    let session = world.nth_peer(0).unwrap();
+    let mut killed = Vec::new();
+    for seconds in [7, 14, 16, 23, 30] {
+        let alive = FromPeer::Heartbeat {
+            job: None,
+            checker: None,
+        };
+        world.say(session, alive);
+        world.now = Duration::from_secs(seconds);
+        let actions = world.state.handle(world.now, Event::Tick);
+        killed.extend(actions.into_iter().filter_map(|action| match action {
+            Action::KillFormer { joined } => Some((seconds, joined)),
+            _ => None,
+        }));
+    }
+    assert_eq!(killed, [(16, BTreeSet::from([launch]))]);
+}
+
+#[test]
 fn a_cancelled_job_makes_room_for_the_next() {
     let mut world = World::new();
     world.join("First");

@@ -24,6 +24,7 @@ impl Broker {
             }
             Action::Spawn { launch, spec } => self.children.spawn(launch, &spec),
             Action::Kill { launch, pid } => self.children.kill(launch, pid),
+            Action::KillFormer { joined } => self.kill_former(joined),
             Action::Store(job) => self.order_store(job),
             Action::Withdraw { ref path, .. } => {
                 if let Some(watcher) = &self.watcher {

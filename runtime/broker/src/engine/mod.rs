@@ -5,7 +5,7 @@ mod asked;
 mod start;
 mod systemd;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -17,7 +17,7 @@ use qcbus_messages::{JobId, ToPeer};
 use tokio::sync::{mpsc, oneshot};
 
 use crate::control::{Asked, ControlSocket};
-use crate::core::{Event, Judged, Notice, SessionId, State, Ticket};
+use crate::core::{Event, Judged, Launch, Notice, SessionId, State, Ticket};
 use crate::demand::InForce;
 use crate::directory_lock::{DirectoryLock, LockError};
 use crate::gate::GateError;
@@ -272,6 +272,7 @@ impl Broker {
     async fn end(mut self, quit: bool) {
         self.watcher = None;
         self.children.kill_all();
+        self.children.former().kill_but(&BTreeSet::new());
         if !quit {
             self.writers.finish();
         }
@@ -321,6 +322,21 @@ impl Broker {
     fn sweep_dead(&self) {
         let out = self.options.out.clone();
         tokio::task::spawn_blocking(move || qcbus_disk::sweep_dead(&out));
+    }
+
+    /// Looks through all processes of the machine, off the loop.
+    fn kill_former(&self, joined: BTreeSet<Launch>) {
+        let former = self.children.former();
+        let notices = self.inbox.notices_in.clone();
+        tokio::task::spawn_blocking(move || {
+            for (pid, name) in former.kill_but(&joined) {
+                let why = format!(
+                    "process {pid}, which an earlier broker had started, did not join this one"
+                );
+                // After the end of the loop nobody listens.
+                let _ = notices.send(Notice::Killed { name, why });
+            }
+        });
     }
 
     fn bus_event(&mut self, event: HostEvent) -> bool {

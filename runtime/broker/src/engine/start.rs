@@ -57,7 +57,11 @@ impl Broker {
         let voids = store.voids()?;
         let writers = writers(&options, &store, &inbox, &senders.notices)?;
         let intake = intake(&options, &host);
-        let children = Children::new(surroundings(&options), inbox.events_in.clone());
+        let children = Children::new(
+            surroundings(&options),
+            host.generation(),
+            inbox.events_in.clone(),
+        );
         let mut broker = Broker {
             started: Instant::now(),
             clock: AttendedTime::new(),
