@@ -153,9 +153,11 @@ fn end(farm: &Farm, mut broker: support::broker::Broker) {
     let down = farm.qcbus(&["down"]);
     assert!(down.status.success(), "{down:?}\n{}", tail(&farm.log()));
     assert!(broker.wait().success());
-    until("all processes have ended", || {
-        farm.processes().is_empty().then_some(())
-    });
+    until_or(
+        "all processes have ended",
+        || farm.processes().is_empty().then_some(()),
+        || format!("{:#?}\n{}", farm.processes(), tail(&farm.log())),
+    );
     until_so("no shared memory is left", || {
         shm_segments(&prefix).is_empty()
     });
