@@ -23,7 +23,7 @@ use support::farm::{Farm, shm_segments, tail, zoo};
 use support::inside::{is_inside, run_inside};
 use support::judge::{Files, judge, verdicts_in_journal};
 use support::processes::memory_kib;
-use support::watchdog::{until, until_or, until_so};
+use support::watchdog::{until_or, until_so};
 
 /// A shared memory of its own, small enough to be filled.
 const SMALL_SHM: &str = "mount -t tmpfs -o size=512m tmpfs /dev/shm";
