@@ -209,3 +209,7 @@ pub(super) fn clip_text(text: &mut String, max: usize) {
         text.push('…');
     }
 }
+
+#[cfg(test)]
+#[path = "outcome_tests.rs"]
+mod tests;

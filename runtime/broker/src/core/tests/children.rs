@@ -95,10 +95,31 @@ fn an_upgrade_that_dies_before_it_joins_is_said_and_tried_again() {
     world.child_ends(ChildEnd::Failed("it crashed".to_owned()));
     assert!(notices(&world).contains(&"not-upgraded"));
     assert_eq!(child_version(&world), "1", "the older goes on");
+    world.pass(Duration::from_millis(1));
+    assert!(world.launched.is_empty(), "not without a pause");
     world.pass(Duration::from_secs(1));
     assert_eq!(world.launched.len(), 1, "it is started again");
     world.child_joins();
     assert_eq!(child_version(&world), "2");
+}
+
+#[test]
+fn an_upgrade_that_dies_again_and_again_is_tried_after_longer_and_longer_pauses() {
+    let mut world = world_with_an_upgrade();
+    let mut pauses = Vec::new();
+    for _ in 0..3 {
+        world.child_ends(ChildEnd::Failed("it crashed".to_owned()));
+        let mut pause = Duration::ZERO;
+        while world.launched.is_empty() {
+            world.pass(Duration::from_millis(50));
+            pause += Duration::from_millis(50);
+        }
+        pauses.push(pause);
+    }
+    assert!(
+        pauses.is_sorted() && pauses[0] * 3 < pauses[2],
+        "{pauses:?}"
+    );
 }
 
 #[test]
