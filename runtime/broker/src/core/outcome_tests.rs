@@ -1,0 +1,131 @@
+use std::collections::BTreeMap;
+
+use qcbus_formats::location::OtherPlace;
+use qcbus_formats::xqar::{Level, Metadata, Param};
+
+use super::*;
+
+fn offers() -> Arc<Catalogue> {
+    let checker = |id: &str| CheckerInfo {
+        id: id.to_owned(),
+        description: format!("what {id} looks at"),
+        rule_uids: vec![format!("example.org:xodr:1.0.0:{id}")],
+        kinds: vec![FileKind::Xodr],
+        default_on: true,
+        level: Level::Error,
+        params: Vec::new(),
+    };
+    Arc::new(Catalogue {
+        checkers: vec![checker("first"), checker("second")],
+        ..Catalogue::default()
+    })
+}
+
+fn share(staged: BTreeMap<u32, Staged>) -> Share {
+    Share {
+        state: ShareState::Done,
+        version: "1".to_owned(),
+        catalogue: Some(offers()),
+        mark: None,
+        demanded: vec![0],
+        staged,
+        staged_bytes: 0,
+        micros: 7,
+        suspect: false,
+        strikes: 0,
+        absent: false,
+    }
+}
+
+#[test]
+fn a_result_has_what_a_checker_said_and_what_is_known_of_it() {
+    let param = Param {
+        name: "tolerance".to_owned(),
+        value: "0.1".to_owned(),
+    };
+    let fact = Metadata {
+        key: "roads".to_owned(),
+        value: "3".to_owned(),
+        description: "how many there are".to_owned(),
+    };
+    let staged = Staged {
+        issues: Vec::new(),
+        withheld: 0,
+        done: Some((Ending::Completed, vec![param.clone()], vec![fact.clone()])),
+    };
+    let outcome = outcome("Bundle", &share(BTreeMap::from([(0, staged)])));
+    let expected = CheckerOutcome {
+        id: "first".to_owned(),
+        description: "what first looks at".to_owned(),
+        rule_uids: vec!["example.org:xodr:1.0.0:first".to_owned()],
+        ending: Some(Ending::Completed),
+        params: vec![param],
+        metadata: vec![fact],
+        ..CheckerOutcome::default()
+    };
+    assert_eq!(outcome.said.checkers, [expected]);
+    let asked = Asked {
+        asked: 1,
+        offered: 2,
+    };
+    assert_eq!(outcome.said.asked, Some(asked));
+    assert_eq!(outcome.micros, 7);
+}
+
+#[test]
+fn a_bundle_that_takes_no_such_files_says_so_of_each_checker_asked() {
+    let outcome = not_applicable("Bundle", "1", &offers(), &[1], FileKind::Xosc);
+    let reason = "Bundle does not check .xosc files".to_owned();
+    let [only] = outcome.said.checkers.as_slice() else {
+        panic!("{:?}", outcome.said.checkers);
+    };
+    assert_eq!(only.id, "second");
+    assert_eq!(only.ending, Some(Ending::NotApplicable { reason }));
+}
+
+/// Every text that a bundle chooses counts, byte for byte: what is kept of it is bounded by weight.
+#[test]
+fn what_an_issue_weighs_grows_with_each_of_its_texts() {
+    let place = |text: &str, which: usize| {
+        let at = |number: usize| if which == number { text } else { "" }.to_owned();
+        let child = InfoElement {
+            name: at(5),
+            ..InfoElement::default()
+        };
+        let element = InfoElement {
+            name: at(6),
+            attributes: vec![(at(7), at(8))],
+            text: at(9),
+            children: vec![child],
+        };
+        Issue {
+            id: 0,
+            description: at(0),
+            level: Level::Error,
+            rule_uid: at(1),
+            locations: vec![Locations {
+                description: at(2),
+                elsewhere: Some(OtherPlace {
+                    path: at(3),
+                    row: 1,
+                    column: 1,
+                    xpath: Some(at(4)),
+                }),
+                places: vec![Location::Xml { xpath: at(10) }],
+            }],
+            domain_info: vec![DomainInfo {
+                name: at(11),
+                content: vec![element],
+            }],
+        }
+    };
+    let empty = weight(&place("", 0));
+    for which in 0..12 {
+        let grown = weight(&place(&"x".repeat(1000), which));
+        assert_eq!(grown, empty + 1000, "text {which}");
+    }
+    let mut more = place("", 0);
+    let known = more.locations[0].places[0].clone();
+    more.locations[0].places.push(known);
+    assert!(weight(&more) > empty, "a place costs something");
+}
