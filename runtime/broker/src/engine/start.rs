@@ -57,11 +57,7 @@ impl Broker {
         let voids = store.voids()?;
         let writers = writers(&options, &store, &inbox, &senders.notices)?;
         let intake = intake(&options, &host);
-        let children = Children::new(
-            surroundings(&options),
-            host.generation(),
-            inbox.events_in.clone(),
-        );
+        let children = children(&options, &inbox);
         let mut broker = Broker {
             started: Instant::now(),
             clock: AttendedTime::new(),
@@ -276,12 +272,14 @@ fn intake(options: &Options, host: &Host) -> Arc<Intake> {
     ))
 }
 
-fn surroundings(options: &Options) -> Surroundings {
-    Surroundings {
+fn children(options: &Options, inbox: &Inbox) -> Children {
+    let surroundings = Surroundings {
         instance_dir: options.instance.dir().to_path_buf(),
         die_with_broker: options.die_with_broker,
         memory_limit: options.memory_limit,
-    }
+    };
+    let generation = options.settings.generation;
+    Children::new(surroundings, generation, inbox.events_in.clone())
 }
 
 fn look_once(roots: &[PathBuf], files: &[PathBuf], seen: &mpsc::UnboundedSender<Seen>) {
