@@ -129,3 +129,60 @@ fn what_an_issue_weighs_grows_with_each_of_its_texts() {
     more.locations[0].places.push(known);
     assert!(weight(&more) > empty, "a place costs something");
 }
+
+#[test]
+fn a_text_is_cut_at_a_character_and_says_so() {
+    let cut = |text: &str, most: usize| {
+        let mut text = text.to_owned();
+        clip_text(&mut text, most);
+        text
+    };
+    assert_eq!(cut("abcd", 4), "abcd");
+    assert_eq!(cut("abcd", 3), "abc…");
+    assert_eq!(cut("aäö", 2), "a…", "`ä` has two bytes");
+    assert_eq!(cut("aäö", 3), "aä…");
+    assert_eq!(cut("aäö", 5), "aäö");
+    assert_eq!(cut("ä", 0), "…");
+}
+
+#[test]
+fn what_a_finding_has_too_much_of_is_cut() {
+    let long = "x".repeat(2000);
+    let place = Locations {
+        description: long.clone(),
+        elsewhere: Some(OtherPlace {
+            path: long.clone(),
+            row: 1,
+            column: 1,
+            xpath: Some(long.clone()),
+        }),
+        places: vec![Location::Xml { xpath: "/a".into() }; 100],
+    };
+    let fact = DomainInfo {
+        name: "qcbus.location".to_owned(),
+        content: Vec::new(),
+    };
+    let mut issue = Issue {
+        id: 0,
+        description: long.clone(),
+        level: Level::Error,
+        rule_uid: long,
+        locations: vec![place; 100],
+        domain_info: vec![fact; 100],
+    };
+    clip(&mut issue, 1000);
+    let cut = |text: &str, most: usize| text.len() == most + "…".len() && text.ends_with('…');
+    assert!(cut(&issue.description, 1000));
+    assert!(cut(&issue.rule_uid, 512));
+    assert_eq!((issue.locations.len(), issue.domain_info.len()), (64, 16));
+    for place in &issue.locations {
+        let elsewhere = place.elsewhere.as_ref().unwrap();
+        let texts = [
+            &place.description,
+            &elsewhere.path,
+            elsewhere.xpath.as_ref().unwrap(),
+        ];
+        assert!(texts.into_iter().all(|text| cut(text, 1000)));
+        assert_eq!(place.places.len(), 16);
+    }
+}

@@ -129,6 +129,18 @@ fn a_reporter_that_is_there_is_told_at_once() {
 }
 
 #[test]
+fn what_a_reporter_has_is_not_sent_to_it_again() {
+    for has in [true, false] {
+        let mut desk = Desk::new(has);
+        let path = desk.path.clone();
+        desk.event(Event::Present { path });
+        let (_, actions) = desk.join();
+        let sent = |it: &Action| matches!(it, Action::Deliver { .. });
+        assert_eq!(actions.iter().any(sent), !has, "{actions:?}");
+    }
+}
+
+#[test]
 fn a_reporter_that_is_away_is_told_when_it_comes() {
     let mut desk = Desk::new(true);
     assert!(!is_told(&desk.vanish()));
