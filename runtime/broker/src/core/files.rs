@@ -310,53 +310,5 @@ impl Files {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn files(count: u32) -> Files {
-        let mut files = Files::default();
-        for n in 0..count {
-            let path: Arc<Path> = Path::new(&format!("/x/{n}.xodr")).into();
-            files.insert(&path, FileKind::Xodr, Stamp::default());
-        }
-        files
-    }
-
-    #[test]
-    fn a_file_waits_once_however_often_it_is_queued() {
-        let mut files = files(1);
-        for _ in 0..3 {
-            files.enqueue(0, Priority::Background, Duration::ZERO);
-            files.enqueue(0, Priority::Fresh, Duration::ZERO);
-        }
-        assert_eq!(files.dequeue(Duration::ZERO), Some(0));
-        assert_eq!(files.dequeue(Duration::ZERO), None);
-        assert!(files.is_quiet());
-    }
-
-    #[test]
-    fn the_background_gets_its_share() {
-        let mut files = files(60);
-        files.enqueue(59, Priority::Background, Duration::ZERO);
-        for id in 0..59 {
-            files.enqueue(id, Priority::Fresh, Duration::ZERO);
-        }
-        let order: Vec<_> = std::iter::from_fn(|| files.dequeue(Duration::ZERO)).collect();
-        let place = order.iter().position(|id| *id == 59);
-        assert_eq!(place, Some(usize::from(BACKGROUND_SHARE)));
-        assert_eq!(order.len(), 60);
-    }
-
-    #[test]
-    fn a_file_that_must_rest_lets_others_pass() {
-        let mut files = files(2);
-        files.enqueue(0, Priority::Fresh, Duration::ZERO);
-        files.enqueue(1, Priority::Fresh, Duration::ZERO);
-        if let Some(entry) = files.get_mut(0) {
-            entry.not_before = Duration::from_secs(1);
-        }
-        assert_eq!(files.dequeue(Duration::ZERO), Some(1));
-        assert_eq!(files.dequeue(Duration::ZERO), None);
-        assert_eq!(files.dequeue(Duration::from_secs(1)), Some(0));
-    }
-}
+#[path = "files_tests.rs"]
+mod tests;
