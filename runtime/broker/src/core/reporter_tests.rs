@@ -267,3 +267,89 @@ fn an_upgraded_reporter_finishes(ends: fn(&mut Desk, SessionId, Launch) -> Vec<A
     let actions = ends(&mut desk, old, first);
     assert!(actions.iter().any(given), "{actions:?}");
 }
+
+/// Further judged files, each with as many findings as said, that the reporter does not have.
+fn more(desk: &mut Desk, findings: &[u64]) {
+    for (number, count) in (8..).zip(findings) {
+        let path: Arc<Path> = Path::new(&format!("/x/{number}.xodr")).into();
+        let known = desk.state.files.iter().next();
+        let known = known.and_then(|(_, entry)| entry.judged.clone());
+        let judged = Judged {
+            job: JobId(number),
+            counts: [0, 0, *count],
+            ..(*known.unwrap()).clone()
+        };
+        desk.state.remember(&path, judged, &[]);
+        desk.event(Event::Present { path });
+    }
+}
+
+/// The jobs whose results are sent.
+fn sent(actions: &[Action]) -> Vec<u64> {
+    let jobs = actions.iter().filter_map(|it| match it {
+        Action::Deliver { delivery, .. } => Some(delivery.job.0),
+        _ => None,
+    });
+    jobs.collect()
+}
+
+fn written(job: u64) -> FromPeer {
+    FromPeer::ResultDone {
+        job: JobId(job),
+        report: PeerReport::Written,
+    }
+}
+
+#[test]
+fn results_with_many_findings_travel_one_after_the_other() {
+    let mut desk = Desk::new(true);
+    more(&mut desk, &[1_500, 500, 1, 3_000, 1]);
+    let (session, actions) = desk.join();
+    assert_eq!(sent(&actions), [8, 9], "2,000 are the most under way");
+    assert_eq!(sent(&desk.say(session, written(8))), [10]);
+    assert!(sent(&desk.say(session, written(9))).is_empty());
+    assert_eq!(sent(&desk.say(session, written(10))), [11], "alone");
+    assert_eq!(sent(&desk.say(session, written(11))), [12]);
+}
+
+#[test]
+fn a_reporter_has_no_more_under_way_than_it_said() {
+    let mut desk = Desk::new(true);
+    more(&mut desk, &[1; 6]);
+    desk.vanish();
+    let (session, actions) = desk.join();
+    assert!(is_told(&actions));
+    assert_eq!(sent(&actions), [8, 9, 10], "and what it is to take back");
+    assert_eq!(sent(&desk.say(session, withdrawn())), [11]);
+}
+
+#[test]
+fn a_result_under_way_is_not_sent_twice() {
+    let mut desk = Desk::new(false);
+    let path = desk.path.clone();
+    desk.event(Event::Present { path });
+    let (_, actions) = desk.join();
+    assert_eq!(sent(&actions), [7]);
+    let mut again = Vec::new();
+    desk.state.reporters[0].queue.push_back(0);
+    desk.state.deliver(0, &mut again);
+    assert!(sent(&again).is_empty());
+}
+
+#[test]
+fn a_reporter_that_does_not_leave_at_the_end_is_killed() {
+    let mut desk = Desk::new(true);
+    let specs = vec![spec(1)];
+    let actions = desk.event(Event::Children { specs });
+    let launch = actions.iter().find_map(|it| match it {
+        Action::Spawn { launch, .. } => Some(*launch),
+        _ => None,
+    });
+    desk.join_as(launch.map(|it| it.0));
+    desk.event(Event::Drain);
+    desk.event(Event::Tick);
+    let late = desk.state.handle(Duration::from_secs(5), Event::Tick);
+    let killed = |it: &Action| matches!(it, Action::Kill { launch: of, .. } if *of == launch);
+    assert!(late.iter().any(killed), "{late:?}");
+    assert!(late.iter().any(|it| matches!(it, Action::Stop)));
+}

@@ -14,6 +14,7 @@ mod acts;
 mod behind_the_gate;
 mod children;
 mod dependencies;
+mod ending;
 mod hands;
 mod membership;
 mod processes;

@@ -1,0 +1,161 @@
+//! How a broker ends, and when it begins to judge.
+
+use super::*;
+
+#[test]
+fn a_broker_that_is_told_to_stop_finishes_what_it_has_and_begins_nothing() {
+    let mut world = World::new();
+    world.join("First");
+    world.write(0);
+    world.prepare(0, true);
+    world.event(Event::Drain);
+    world.write(4);
+    assert!(world.preparing.is_empty(), "nothing is begun");
+    assert_eq!(world.stopped, 0);
+    world.answer(0);
+    world.store(0, true);
+    assert_eq!(world.judged[&0].1, Verdict::Accepted);
+    world.pass(Duration::ZERO);
+    assert_eq!(world.stopped, 1);
+    assert!(!world.judged.contains_key(&4));
+}
+
+#[test]
+fn a_broker_that_cannot_finish_stops_nevertheless() {
+    let mut world = World::new();
+    world.join("First");
+    world.write(0);
+    world.prepare(0, true);
+    world.state.settings.job_deadline = Duration::from_secs(1000);
+    world.state.settings.silence_limit = Duration::from_secs(1000);
+    world.event(Event::Drain);
+    world.pass(world.state.settings.drain_limit);
+    world.pass(Duration::ZERO);
+    assert_eq!(world.stopped, 0);
+    world.pass(Duration::from_millis(1));
+    world.pass(Duration::ZERO);
+    assert_eq!(world.stopped, 1);
+}
+
+#[test]
+fn a_broker_that_runs_once_stops_when_everything_was_judged() {
+    let mut world = World::new();
+    world.join("First");
+    world.state.settings.once = true;
+    world.state.settings.max_active = 1;
+    world.state.scanned = false;
+    world.write(0);
+    world.write(4);
+    world.until_judged(2);
+    world.pass(Duration::ZERO);
+    assert_eq!(world.stopped, 0, "there may be more");
+    world.event(Event::Scanned);
+    world.pass(Duration::ZERO);
+    assert_eq!(world.stopped, 1);
+    let mut world = World::new();
+    world.join("First");
+    world.write(0);
+    world.write(4);
+    world.state.settings.once = true;
+    world.state.settings.max_active = 1;
+    world.until_judged(1);
+    world.pass(Duration::ZERO);
+    assert_eq!(world.stopped, 0);
+    world.until_judged(2);
+    world.pass(Duration::ZERO);
+    assert_eq!(world.stopped, 1);
+}
+
+#[test]
+fn a_broker_that_runs_once_does_not_leave_a_file_that_must_rest() {
+    let mut world = World::new();
+    world.join("First");
+    world.state.settings.once = true;
+    world.write(0);
+    world.prepare(0, false);
+    world.pass(Duration::ZERO);
+    assert_eq!(world.stopped, 0, "there was no room for it");
+    world.pass(world.state.settings.retry_after);
+    world.until_judged(1);
+    world.pass(Duration::ZERO);
+    assert_eq!(world.stopped, 1);
+}
+
+/// A world with a process that the broker has started, told to stop with nothing to do.
+fn world_that_says_goodbye() -> (World, Launch) {
+    let mut world = World::new();
+    world.manifest(Some(1));
+    world.pass(Duration::ZERO);
+    world.child_joins();
+    let launch = world.state.bundles[CHILD].launch.unwrap();
+    world.event(Event::Drain);
+    world.pass(Duration::ZERO);
+    assert!(world.peers.values().all(|it| it.drained), "it is told");
+    assert_eq!(world.stopped, 0, "it has its time to leave");
+    (world, launch)
+}
+
+#[test]
+fn a_broker_that_stops_waits_until_what_it_started_has_left() {
+    let (mut world, launch) = world_that_says_goodbye();
+    world.pass(Duration::from_secs(1));
+    assert_eq!(world.stopped, 0);
+    world.leave(0);
+    world.pass(Duration::ZERO);
+    assert_eq!(world.stopped, 1);
+    assert!(!world.killed.contains(&launch));
+}
+
+#[test]
+fn what_does_not_leave_at_the_end_is_killed() {
+    let (mut world, launch) = world_that_says_goodbye();
+    world.pass(Duration::from_secs(3));
+    assert!(!world.killed.contains(&launch));
+    assert_eq!(world.stopped, 0);
+    world.pass(Duration::from_millis(1));
+    assert!(world.killed.contains(&launch));
+    assert_eq!(world.stopped, 1);
+}
+
+#[test]
+fn a_bundle_that_a_person_started_stays_when_the_broker_ends() {
+    let mut world = World::new();
+    world.join("First");
+    world.event(Event::Drain);
+    world.pass(Duration::ZERO);
+    assert_eq!(world.stopped, 1);
+    assert!(world.peers.values().all(|it| !it.drained));
+    assert!(world.killed.is_empty());
+}
+
+#[test]
+fn nothing_is_read_before_those_who_may_come_have_had_their_time() {
+    let mut world = World::new();
+    world.state.judged_once = false;
+    world.state.settings.collect = Duration::from_secs(1);
+    world.join("First");
+    world.write(0);
+    world.pass(Duration::from_millis(999));
+    assert!(
+        world.preparing.is_empty(),
+        "somebody may still join by hand"
+    );
+    world.manifest(Some(1));
+    world.pass(Duration::from_millis(1));
+    assert!(world.preparing.is_empty(), "a child is being started");
+    world.child_joins();
+    world.pass(Duration::ZERO);
+    assert_eq!(world.preparing.len(), 1);
+}
+
+#[test]
+fn the_newest_notices_are_kept() {
+    let mut world = World::new();
+    for number in 0..NOTICES + 10 {
+        let notice = Notice::TurnedAway(number.to_string());
+        world.state.notice(notice, &mut Vec::new());
+    }
+    assert_eq!(world.state.notices.len(), NOTICES);
+    let newest = Notice::TurnedAway((NOTICES + 9).to_string());
+    assert_eq!(world.state.notices.back(), Some(&newest));
+}
