@@ -353,3 +353,60 @@ fn a_reporter_that_does_not_leave_at_the_end_is_killed() {
     assert!(late.iter().any(killed), "{late:?}");
     assert!(late.iter().any(|it| matches!(it, Action::Stop)));
 }
+
+fn not(mut report: FromPeer, why: &str) -> FromPeer {
+    let (FromPeer::ResultDone { report: how, .. } | FromPeer::WithdrawalDone { report: how, .. }) =
+        &mut report
+    else {
+        panic!("{report:?} is no report");
+    };
+    *how = PeerReport::Failed(why.to_owned());
+    report
+}
+
+#[test]
+fn what_a_reporter_did_and_could_not_do_is_in_its_status() {
+    let mut desk = Desk::new(true);
+    more(&mut desk, &[1, 1, 1]);
+    desk.vanish();
+    let (session, _) = desk.join();
+    desk.say(session, written(8));
+    let actions = desk.say(session, not(written(9), "no room"));
+    let said = |it: &Action| matches!(it, Action::Notice(Notice::NotReported { name, .. }) if name == TEXT);
+    assert!(actions.iter().any(said), "{actions:?}");
+    desk.say(session, not(withdrawn(), "no rights"));
+    desk.say(session, written(10));
+    let status = desk.state.status();
+    let peer = status.peers.iter().find(|it| it.name == TEXT).unwrap();
+    assert_eq!(peer.done, 3);
+    assert_eq!(peer.note, "2 not reported: no rights");
+}
+
+#[test]
+fn what_one_reporter_has_written_does_not_touch_what_another_has() {
+    let mut desk = Desk::new(false);
+    let path = desk.path.clone();
+    desk.event(Event::Present { path });
+    let (session, _) = desk.join();
+    let entry = desk.state.files.get_mut(0).unwrap();
+    entry.delivered.push((5, Reported::Of(JobId(7))));
+    desk.say(session, written(7));
+    let entry = desk.state.files.get(0).unwrap();
+    assert!(entry.has(5, JobId(7)) && entry.has(0, JobId(7)));
+}
+
+#[test]
+fn a_result_that_cannot_be_read_back_is_said_and_makes_room_for_the_next() {
+    let mut desk = Desk::new(true);
+    more(&mut desk, &[3_000, 1]);
+    let (session, actions) = desk.join();
+    assert_eq!(sent(&actions), [8]);
+    let actions = desk.event(Event::Undeliverable {
+        session,
+        job: JobId(8),
+        why: "the disk is in trouble".to_owned(),
+    });
+    let said = |it: &Action| matches!(it, Action::Notice(Notice::NotDelivered(why)) if why.contains("trouble"));
+    assert!(actions.iter().any(said), "{actions:?}");
+    assert_eq!(sent(&actions), [9]);
+}
