@@ -16,6 +16,7 @@ mod children;
 mod dependencies;
 mod ending;
 mod hands;
+mod limits;
 mod membership;
 mod processes;
 mod reporting;
