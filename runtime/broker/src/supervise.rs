@@ -107,12 +107,13 @@ impl Children {
         kill_with_group(pid);
     }
 
-    /// What former brokers of this instance have started.
-    pub fn former(&self) -> Former {
-        Former {
+    /// What former brokers of this instance have started; `None` where children die with their broker.
+    pub fn former(&self) -> Option<Former> {
+        let may_be = !self.surroundings.die_with_broker;
+        may_be.then(|| Former {
             instance_dir: self.surroundings.instance_dir.clone(),
             before: self.first,
-        }
+        })
     }
 
     /// Kills whatever is left.
@@ -406,24 +407,31 @@ mod tests {
     #[tokio::test]
     async fn only_what_a_former_broker_of_this_instance_started_and_did_not_join_is_killed() {
         use std::os::unix::process::CommandExt as _;
-        let (children, _inbox) = children();
-        let start = |instance: &str, launch: Launch| {
+        let (mut children, _inbox) = children();
+        assert!(children.former().is_none(), "there is nothing to look for");
+        let (here, elsewhere) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        children.surroundings.die_with_broker = false;
+        children.surroundings.instance_dir = here.path().to_path_buf();
+        let former = children.former().unwrap();
+        let start = |instance: &tempfile::TempDir, launch: Launch| {
             let mut command = std::process::Command::new("sh");
-            command.args(["-c", "sleep 1000; true", "sh", "--instance-dir", instance]);
+            command.args(["-c", "sleep 1000; true", "sh", "--instance-dir"]);
+            command.arg(instance.path());
             command.args(["--launch", &launch.0.to_string()]);
+            command.stdout(Stdio::null()).stderr(Stdio::null());
             command.process_group(0).spawn().unwrap()
         };
-        let (former, joined) = (Launch::first_of(1), Launch(Launch::first_of(1).0 + 1));
-        let mut stuck = start("/nowhere", former);
+        let (first, joined) = (Launch::first_of(1), Launch(Launch::first_of(1).0 + 1));
+        let mut stuck = start(&here, first);
         let others = [
-            start("/nowhere", joined),
-            start("/nowhere", Launch::first_of(2)),
-            start("/elsewhere", former),
+            start(&here, joined),
+            start(&here, Launch::first_of(2)),
+            start(&elsewhere, first),
         ];
         let killed = async {
             // Until the shell runs, its command line is that of this test.
             loop {
-                let killed = children.former().kill_but(&BTreeSet::from([joined]));
+                let killed = former.kill_but(&BTreeSet::from([joined]));
                 if !killed.is_empty() {
                     break killed;
                 }
@@ -431,13 +439,14 @@ mod tests {
             }
         };
         let killed = tokio::time::timeout(Duration::from_secs(60), killed).await;
-        assert_eq!(killed.unwrap(), [(stuck.id(), "sh".to_owned())]);
-        assert!(!stuck.wait().unwrap().success());
-        for mut other in others {
-            let spared = other.try_wait().unwrap().is_none();
+        let spared = others.map(|mut other| {
+            let runs = other.try_wait().unwrap().is_none();
             kill_with_group(Pid::from_child(&other));
             other.wait().unwrap();
-            assert!(spared);
-        }
+            runs
+        });
+        assert_eq!(killed.unwrap(), [(stuck.id(), "sh".to_owned())]);
+        assert_eq!(spared, [true; 3]);
+        assert!(!stuck.wait().unwrap().success());
     }
 }

@@ -272,7 +272,9 @@ impl Broker {
     async fn end(mut self, quit: bool) {
         self.watcher = None;
         self.children.kill_all();
-        self.children.former().kill_but(&BTreeSet::new());
+        if let Some(former) = self.children.former() {
+            former.kill_but(&BTreeSet::new());
+        }
         if !quit {
             self.writers.finish();
         }
@@ -326,7 +328,9 @@ impl Broker {
 
     /// Looks through all processes of the machine, off the loop.
     fn kill_former(&self, joined: BTreeSet<Launch>) {
-        let former = self.children.former();
+        let Some(former) = self.children.former() else {
+            return;
+        };
         let notices = self.inbox.notices_in.clone();
         tokio::task::spawn_blocking(move || {
             for (pid, name) in former.kill_but(&joined) {
