@@ -12,6 +12,7 @@ pub mod deliveries;
 mod demand;
 mod directory_lock;
 mod engine;
+mod former;
 mod gate;
 mod intake;
 pub mod journal;

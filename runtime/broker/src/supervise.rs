@@ -1,6 +1,6 @@
 //! Starting and killing child processes. When to do so is the state machine's business.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
@@ -9,6 +9,7 @@ use tokio::process::{Child, Command};
 use tokio::sync::mpsc::UnboundedSender;
 
 use crate::core::{ChildEnd, ChildSpec, Event, Launch};
+use crate::former::{self, Former, kill_with_group};
 
 /// What every child is given.
 #[derive(Debug, Clone)]
@@ -101,7 +102,7 @@ impl Children {
         let Some(pid) = Pid::from_raw(raw) else {
             return;
         };
-        if own.is_none() && CommandLine::of(pid).and_then(|it| it.launch()).is_none() {
+        if own.is_none() && former::launch_of(pid).is_none() {
             return;
         }
         kill_with_group(pid);
@@ -110,10 +111,9 @@ impl Children {
     /// What former brokers of this instance have started; `None` where children die with their broker.
     pub fn former(&self) -> Option<Former> {
         let may_be = !self.surroundings.die_with_broker;
-        may_be.then(|| Former {
-            instance_dir: self.surroundings.instance_dir.clone(),
-            before: self.first,
-        })
+        may_be
+            .then(|| Former::of(&self.surroundings.instance_dir, self.first))
+            .flatten()
     }
 
     /// Kills whatever is left.
@@ -130,84 +130,6 @@ pub fn is_there(pid: u32) -> bool {
     // The command stands in parentheses and may contain anything; behind it comes the state.
     let state = stat.as_deref().ok().and_then(|it| it.rsplit_once(')'));
     state.is_some_and(|(_, rest)| !rest.trim_start().starts_with(['Z', 'X']))
-}
-
-/// Processes that former brokers of an instance have started. Their command lines tell: no list can
-/// miss one of a broker that was killed before it wrote the list.
-#[derive(Debug)]
-pub struct Former {
-    instance_dir: PathBuf,
-    before: Launch,
-}
-
-impl Former {
-    /// Kills those that are of none of these starts. Returns their process ids and programs.
-    pub fn kill_but(&self, joined: &BTreeSet<Launch>) -> Vec<(u32, String)> {
-        let mut killed = Vec::new();
-        for pid in processes() {
-            let Some(command) = CommandLine::of(pid) else {
-                continue;
-            };
-            let Some(launch) = command.launch() else {
-                continue;
-            };
-            let former = launch < self.before && !joined.contains(&launch);
-            if former && command.is_of_instance(&self.instance_dir) {
-                kill_with_group(pid);
-                killed.push((pid.as_raw_nonzero().get().unsigned_abs(), command.program()));
-            }
-        }
-        killed
-    }
-}
-
-fn processes() -> impl Iterator<Item = Pid> {
-    let entries = std::fs::read_dir("/proc").into_iter().flatten().flatten();
-    let numbers = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
-    numbers.filter_map(Pid::from_raw)
-}
-
-fn kill_with_group(pid: Pid) {
-    use rustix::process::{Signal, kill_process, kill_process_group};
-    if kill_process_group(pid, Signal::KILL).is_err() {
-        // Not the leader of a group, or gone already.
-        let _ = kill_process(pid, Signal::KILL);
-    }
-}
-
-/// The words with which a process was started.
-struct CommandLine(Vec<Vec<u8>>);
-
-impl CommandLine {
-    /// `None`: there is no such process, or it has ended and nobody has buried it yet.
-    fn of(pid: Pid) -> Option<CommandLine> {
-        let path = Path::new("/proc").join(pid.as_raw_nonzero().to_string());
-        let line = std::fs::read(path.join("cmdline")).ok()?;
-        let words = line.split(|byte| *byte == 0).map(<[u8]>::to_vec);
-        (!line.is_empty()).then(|| CommandLine(words.collect()))
-    }
-
-    fn behind(&self, flag: &str) -> Option<&[u8]> {
-        let at = self.0.iter().rposition(|word| word == flag.as_bytes())?;
-        self.0.get(at + 1).map(Vec::as_slice)
-    }
-
-    /// Which start of a broker it is. A process id may have been given to somebody else since: only
-    /// what was started with `--launch` is ours.
-    fn launch(&self) -> Option<Launch> {
-        let number = std::str::from_utf8(self.behind("--launch")?).ok()?;
-        number.parse().ok().map(Launch)
-    }
-
-    fn is_of_instance(&self, directory: &Path) -> bool {
-        use std::os::unix::ffi::OsStrExt as _;
-        self.behind("--instance-dir") == Some(directory.as_os_str().as_bytes())
-    }
-
-    fn program(&self) -> String {
-        let first = self.0.first().map(Vec::as_slice).unwrap_or_default();
-        String::from_utf8_lossy(first).into_owned()
-    }
 }
 
 async fn watch(launch: Launch, mut child: Child, events: UnboundedSender<Event>) {
@@ -402,51 +324,5 @@ mod tests {
         );
         stranger.kill().unwrap();
         stranger.wait().unwrap();
-    }
-
-    #[tokio::test]
-    async fn only_what_a_former_broker_of_this_instance_started_and_did_not_join_is_killed() {
-        use std::os::unix::process::CommandExt as _;
-        let (mut children, _inbox) = children();
-        assert!(children.former().is_none(), "there is nothing to look for");
-        let (here, elsewhere) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-        children.surroundings.die_with_broker = false;
-        children.surroundings.instance_dir = here.path().to_path_buf();
-        let former = children.former().unwrap();
-        let start = |instance: &tempfile::TempDir, launch: Launch| {
-            let mut command = std::process::Command::new("sh");
-            command.args(["-c", "sleep 1000; true", "sh", "--instance-dir"]);
-            command.arg(instance.path());
-            command.args(["--launch", &launch.0.to_string()]);
-            command.stdout(Stdio::null()).stderr(Stdio::null());
-            command.process_group(0).spawn().unwrap()
-        };
-        let (first, joined) = (Launch::first_of(1), Launch(Launch::first_of(1).0 + 1));
-        let mut stuck = start(&here, first);
-        let others = [
-            start(&here, joined),
-            start(&here, Launch::first_of(2)),
-            start(&elsewhere, first),
-        ];
-        let killed = async {
-            // Until the shell runs, its command line is that of this test.
-            loop {
-                let killed = former.kill_but(&BTreeSet::from([joined]));
-                if !killed.is_empty() {
-                    break killed;
-                }
-                tokio::task::yield_now().await;
-            }
-        };
-        let killed = tokio::time::timeout(Duration::from_secs(60), killed).await;
-        let spared = others.map(|mut other| {
-            let runs = other.try_wait().unwrap().is_none();
-            kill_with_group(Pid::from_child(&other));
-            other.wait().unwrap();
-            runs
-        });
-        assert_eq!(killed.unwrap(), [(stuck.id(), "sh".to_owned())]);
-        assert_eq!(spared, [true; 3]);
-        assert!(!stuck.wait().unwrap().success());
     }
 }
