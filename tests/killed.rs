@@ -181,11 +181,17 @@ fn a_bundle_that_nobody_starts_again_leaves_errors_behind_until_it_is_back() {
     }
 }
 
-/// An animal that is frozen when its broker is killed: the next knows nothing of it.
+/// A bundle that hangs when its broker is killed: the next knows nothing of it. (One that is merely
+/// stopped would be sent SIGHUP by the system, because its process group has lost its parent.)
 fn frozen(farm: &Farm) -> PeerStatus {
     let mut broker = farm.serve_ready();
     farm.let_in("hangs_after_hello", "");
     let frozen = peer(farm, "hangs_after_hello", |it| it.pid != 0);
+    until_or(
+        "it hangs",
+        || farm.log().contains("does nothing any more").then_some(()),
+        || farm.log(),
+    );
     broker.kill();
     frozen
 }

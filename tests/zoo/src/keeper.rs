@@ -177,7 +177,10 @@ async fn live(animal: &'static Animal, args: &Args, instance: &Instance) -> Exit
         };
         match mood {
             Mood::GoOn => {}
-            Mood::Freeze => std::future::pending().await,
+            Mood::Freeze => {
+                complain("from now on it does nothing any more");
+                std::future::pending().await
+            }
             Mood::Die => std::process::abort(),
         }
         if cage.draining && cage.jobs.is_empty() {
