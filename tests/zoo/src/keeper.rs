@@ -179,7 +179,7 @@ async fn live(animal: &'static Animal, args: &Args, instance: &Instance) -> Exit
             Mood::GoOn => {}
             Mood::Freeze => {
                 complain("from now on it does nothing any more");
-                std::future::pending().await
+                std::future::pending::<()>().await;
             }
             Mood::Die => std::process::abort(),
         }

@@ -79,6 +79,7 @@ fn a_file_in_the_other_queue_does_not_go_by_its_former_place() {
     files.enqueue(1, Priority::Background, at(1));
     files.since_background = BACKGROUND_SHARE;
     assert_eq!(files.dequeue(at(2)), Some(1), "the background has its turn");
+    assert!(files.background.is_empty(), "its former place is void");
     assert_eq!(files.dequeue(at(2)), Some(0));
 }
 

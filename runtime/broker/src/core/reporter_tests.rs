@@ -64,6 +64,10 @@ impl Desk {
         (session, self.event(Event::Hello { session, hello }))
     }
 
+    fn judges_nothing(&mut self) {
+        self.state.settings.collect = Duration::MAX;
+    }
+
     fn vanish(&mut self) -> Vec<Action> {
         let path = self.path.clone();
         self.event(Event::Vanished { path })
@@ -409,4 +413,108 @@ fn a_result_that_cannot_be_read_back_is_said_and_makes_room_for_the_next() {
     let said = |it: &Action| matches!(it, Action::Notice(Notice::NotDelivered(why)) if why.contains("trouble"));
     assert!(actions.iter().any(said), "{actions:?}");
     assert_eq!(sent(&actions), [9]);
+}
+
+/// Who is to take back what it said, as the journal is told.
+fn named(actions: &[Action]) -> Vec<String> {
+    let names = actions.iter().find_map(|it| match it {
+        Action::Withdraw { reporters, .. } => Some(reporters.clone()),
+        _ => None,
+    });
+    names.expect("the result is withdrawn")
+}
+
+#[test]
+fn who_never_had_a_report_is_not_told_that_its_file_has_gone() {
+    let mut desk = Desk::new(false);
+    desk.state.reporter_index(TEXT);
+    assert!(named(&desk.vanish()).is_empty());
+    let (_, actions) = desk.join();
+    assert!(!is_told(&actions), "{actions:?}");
+}
+
+#[test]
+fn a_file_that_goes_twice_before_its_report_is_taken_back_stays_to_be_taken_back() {
+    for there in [false, true] {
+        let mut desk = Desk::new(true);
+        desk.judges_nothing();
+        if there {
+            desk.join();
+        }
+        assert_eq!(named(&desk.vanish()), [TEXT]);
+        let path = desk.path.clone();
+        let stamp = Stamp::default();
+        desk.event(Event::Settled { path, stamp });
+        assert_eq!(named(&desk.vanish()), [TEXT], "it has not yet done so");
+    }
+}
+
+#[test]
+fn a_reporter_that_leaves_goes_without_a_word_and_gets_the_rest_when_it_comes_back() {
+    let mut desk = Desk::new(false);
+    let path = desk.path.clone();
+    desk.event(Event::Present { path });
+    let (session, actions) = desk.join();
+    assert_eq!(sent(&actions), [7]);
+    let actions = desk.say(session, FromPeer::Leaving);
+    let closed = |it: &Action| matches!(it, Action::Disconnect { session: of } if *of == session);
+    assert!(actions.iter().any(closed), "{actions:?}");
+    assert!(desk.state.sessions.is_empty());
+    assert_eq!(sent(&desk.join().1), [7]);
+}
+
+/// A reporter, told to take something back or sent a result, and what happens to it after a while.
+fn waited(owes: bool, beats: bool, limit: fn(&Settings) -> Duration) -> Vec<bool> {
+    let mut desk = Desk::new(true);
+    let specs = vec![spec(1)];
+    let actions = desk.event(Event::Children { specs });
+    let launch = actions.iter().find_map(|it| match it {
+        Action::Spawn { launch, .. } => Some(*launch),
+        _ => None,
+    });
+    let (session, _) = desk.join_as(launch.map(|it| it.0));
+    if owes {
+        desk.vanish();
+    }
+    let start = Duration::from_secs(1);
+    let end = start + limit(&desk.state.settings);
+    let mut now = start;
+    while beats && now + Duration::from_secs(1) < end {
+        now += Duration::from_secs(1);
+        let message = FromPeer::Heartbeat {
+            job: None,
+            checker: None,
+        };
+        desk.state.handle(now, Event::Message { session, message });
+    }
+    let killed = |it: &Action| matches!(it, Action::Kill { launch: of, .. } if *of == launch);
+    let ended = |now| desk.state.handle(now, Event::Tick).iter().any(killed);
+    [end, end + Duration::from_millis(1)].map(ended).into()
+}
+
+#[test]
+fn a_reporter_that_owes_an_answer_is_waited_for_so_long_and_no_longer() {
+    assert_eq!(waited(true, false, |it| it.silence_limit), [false, true]);
+    assert_eq!(waited(true, true, |it| it.job_deadline), [false, true]);
+    assert_eq!(waited(false, false, |it| it.job_deadline), [false, false]);
+}
+
+#[test]
+fn a_run_does_not_end_before_every_report_is_written() {
+    let mut desk = Desk::new(false);
+    desk.judges_nothing();
+    let path = desk.path.clone();
+    desk.event(Event::Present { path });
+    let (session, _) = desk.join();
+    assert!(!desk.state.all_delivered(), "a result is under way");
+    desk.say(session, written(7));
+    assert!(desk.state.all_delivered());
+    desk.vanish();
+    assert!(!desk.state.all_delivered(), "a report is to be taken back");
+    desk.say(session, withdrawn());
+    assert!(desk.state.all_delivered());
+    desk.state.reporters[0].queue.push_back(0);
+    assert!(!desk.state.all_delivered(), "a result waits");
+    desk.say(session, FromPeer::Leaving);
+    assert!(desk.state.all_delivered(), "nobody is there");
 }
