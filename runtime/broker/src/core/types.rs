@@ -369,3 +369,7 @@ pub fn job_message(job: JobId, config: Digest, kind: FileKind, prepared: &Prepar
         missing: prepared.missing.clone(),
     }
 }
+
+#[cfg(test)]
+#[path = "types_tests.rs"]
+mod tests;
