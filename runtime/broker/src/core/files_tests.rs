@@ -62,10 +62,14 @@ fn it_is_quiet_when_nothing_waits_and_nothing_is_checked() {
 #[test]
 fn a_file_that_moved_up_is_taken_once_and_in_its_new_place() {
     let mut files = files(3);
-    files.enqueue(1, Priority::Background, at(1));
-    files.enqueue(2, Priority::Background, at(1));
-    files.enqueue(0, Priority::Fresh, at(1));
-    files.enqueue(1, Priority::Fresh, at(2));
+    for (id, priority) in [
+        (1, Priority::Background),
+        (2, Priority::Background),
+        (0, Priority::Fresh),
+        (1, Priority::Fresh),
+    ] {
+        files.enqueue(id, priority, at(1));
+    }
     assert_eq!(taken(&mut files, at(3)), [0, 1, 2]);
     assert!(files.is_quiet());
 }

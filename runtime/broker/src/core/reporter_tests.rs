@@ -64,6 +64,17 @@ impl Desk {
         (session, self.event(Event::Hello { session, hello }))
     }
 
+    /// The manifest of the reporter has come, or has changed. Returns which start follows.
+    fn wants(&mut self, version: u8) -> Launch {
+        let specs = vec![spec(version)];
+        let actions = self.event(Event::Children { specs });
+        let mut launches = actions.iter().filter_map(|it| match it {
+            Action::Spawn { launch, .. } => Some(*launch),
+            _ => None,
+        });
+        launches.next().unwrap()
+    }
+
     fn judges_nothing(&mut self) {
         self.state.settings.collect = Duration::MAX;
     }
@@ -242,20 +253,10 @@ fn a_reporter_that_is_upgraded_finishes_what_it_has_begun() {
 
 fn an_upgraded_reporter_finishes(ends: fn(&mut Desk, SessionId, Launch) -> Vec<Action>) {
     let mut desk = Desk::new(false);
-    let launched = |actions: &[Action]| {
-        let launch = actions.iter().find_map(|it| match it {
-            Action::Spawn { launch, .. } => Some(*launch),
-            _ => None,
-        });
-        launch.unwrap()
-    };
-    let first = launched(&desk.event(Event::Children {
-        specs: vec![spec(1)],
-    }));
+    let first = desk.wants(1);
     let (old, _) = desk.join_as(Some(first.0));
-    let specs = vec![spec(2)];
-    let actions = desk.event(Event::Children { specs });
-    let (new, actions) = desk.join_as(Some(launched(&actions).0));
+    let second = desk.wants(2);
+    let (new, actions) = desk.join_as(Some(second.0));
     let drained = |it: &Action| matches!(it, Action::Send { session, message: ToPeer::Drain } if *session == old);
     assert!(
         actions.iter().any(drained),
@@ -343,17 +344,12 @@ fn a_result_under_way_is_not_sent_twice() {
 #[test]
 fn a_reporter_that_does_not_leave_at_the_end_is_killed() {
     let mut desk = Desk::new(true);
-    let specs = vec![spec(1)];
-    let actions = desk.event(Event::Children { specs });
-    let launch = actions.iter().find_map(|it| match it {
-        Action::Spawn { launch, .. } => Some(*launch),
-        _ => None,
-    });
-    desk.join_as(launch.map(|it| it.0));
+    let launch = desk.wants(1);
+    desk.join_as(Some(launch.0));
     desk.event(Event::Drain);
     desk.event(Event::Tick);
     let late = desk.state.handle(Duration::from_secs(5), Event::Tick);
-    let killed = |it: &Action| matches!(it, Action::Kill { launch: of, .. } if *of == launch);
+    let killed = |it: &Action| matches!(it, Action::Kill { launch: of, .. } if *of == Some(launch));
     assert!(late.iter().any(killed), "{late:?}");
     assert!(late.iter().any(|it| matches!(it, Action::Stop)));
 }
@@ -466,13 +462,8 @@ fn a_reporter_that_leaves_goes_without_a_word_and_gets_the_rest_when_it_comes_ba
 /// A reporter, told to take something back or sent a result, and what happens to it after a while.
 fn waited(owes: bool, beats: bool, limit: fn(&Settings) -> Duration) -> Vec<bool> {
     let mut desk = Desk::new(true);
-    let specs = vec![spec(1)];
-    let actions = desk.event(Event::Children { specs });
-    let launch = actions.iter().find_map(|it| match it {
-        Action::Spawn { launch, .. } => Some(*launch),
-        _ => None,
-    });
-    let (session, _) = desk.join_as(launch.map(|it| it.0));
+    let launch = desk.wants(1);
+    let (session, _) = desk.join_as(Some(launch.0));
     if owes {
         desk.vanish();
     }
@@ -487,7 +478,7 @@ fn waited(owes: bool, beats: bool, limit: fn(&Settings) -> Duration) -> Vec<bool
         };
         desk.state.handle(now, Event::Message { session, message });
     }
-    let killed = |it: &Action| matches!(it, Action::Kill { launch: of, .. } if *of == launch);
+    let killed = |it: &Action| matches!(it, Action::Kill { launch: of, .. } if *of == Some(launch));
     let ended = |now| desk.state.handle(now, Event::Tick).iter().any(killed);
     [end, end + Duration::from_millis(1)].map(ended).into()
 }

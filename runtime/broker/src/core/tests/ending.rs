@@ -4,10 +4,7 @@ use super::*;
 
 #[test]
 fn a_broker_that_is_told_to_stop_finishes_what_it_has_and_begins_nothing() {
-    let mut world = World::new();
-    world.join("First");
-    world.write(0);
-    world.prepare(0, true);
+    let mut world = World::at_work();
     world.event(Event::Drain);
     world.write(4);
     assert!(world.preparing.is_empty(), "nothing is begun");
@@ -22,10 +19,7 @@ fn a_broker_that_is_told_to_stop_finishes_what_it_has_and_begins_nothing() {
 
 #[test]
 fn a_broker_that_cannot_finish_stops_nevertheless() {
-    let mut world = World::new();
-    world.join("First");
-    world.write(0);
-    world.prepare(0, true);
+    let mut world = World::at_work();
     world.state.settings.job_deadline = Duration::from_secs(1000);
     world.state.settings.silence_limit = Duration::from_secs(1000);
     world.event(Event::Drain);
@@ -37,33 +31,33 @@ fn a_broker_that_cannot_finish_stops_nevertheless() {
     assert_eq!(world.stopped, 1);
 }
 
-#[test]
-fn a_broker_that_runs_once_stops_when_everything_was_judged() {
+/// A world that ends when everything was judged, with two files that are judged one by one.
+fn world_that_runs_once(scanned: bool) -> World {
     let mut world = World::new();
     world.join("First");
     world.state.settings.once = true;
     world.state.settings.max_active = 1;
-    world.state.scanned = false;
+    world.state.scanned = scanned;
     world.write(0);
     world.write(4);
+    world
+}
+
+#[test]
+fn a_broker_that_runs_once_stops_when_everything_was_judged() {
+    let mut world = world_that_runs_once(false);
     world.until_judged(2);
     world.pass(Duration::ZERO);
     assert_eq!(world.stopped, 0, "there may be more");
     world.event(Event::Scanned);
     world.pass(Duration::ZERO);
     assert_eq!(world.stopped, 1);
-    let mut world = World::new();
-    world.join("First");
-    world.write(0);
-    world.write(4);
-    world.state.settings.once = true;
-    world.state.settings.max_active = 1;
-    world.until_judged(1);
-    world.pass(Duration::ZERO);
-    assert_eq!(world.stopped, 0);
-    world.until_judged(2);
-    world.pass(Duration::ZERO);
-    assert_eq!(world.stopped, 1);
+    let mut world = world_that_runs_once(true);
+    for (judged, stopped) in [(1, 0), (2, 1)] {
+        world.until_judged(judged);
+        world.pass(Duration::ZERO);
+        assert_eq!(world.stopped, stopped);
+    }
 }
 
 #[test]

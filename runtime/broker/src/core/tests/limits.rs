@@ -4,10 +4,7 @@ use super::*;
 
 /// A world in which a bundle has one job.
 fn busy() -> (World, SessionId, JobId) {
-    let mut world = World::new();
-    world.join("First");
-    world.write(0);
-    world.prepare(0, true);
+    let world = World::at_work();
     let session = world.nth_peer(0).unwrap();
     let job = *world.peers[&session].jobs.first().unwrap();
     (world, session, job)

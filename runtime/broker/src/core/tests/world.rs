@@ -83,6 +83,15 @@ pub struct Process {
 }
 
 impl World {
+    /// One in which a bundle has a job.
+    pub fn at_work() -> World {
+        let mut world = World::new();
+        world.join("First");
+        world.write(0);
+        world.prepare(0, true);
+        world
+    }
+
     pub fn new() -> World {
         let mut world = World {
             state: fresh_state(1, 0),
