@@ -102,6 +102,11 @@ fn hello(number: u64, launch: Option<u64>) -> Hello {
     }
 }
 
+fn exited(launch: Launch) -> Event {
+    let end = ChildEnd::Failed("it was killed by signal 9".to_owned());
+    Event::Exited { launch, end }
+}
+
 fn spec(version: u8) -> ChildSpec {
     ChildSpec {
         name: TEXT.to_owned(),
@@ -269,6 +274,8 @@ fn an_upgraded_reporter_finishes(ends: fn(&mut Desk, SessionId, Launch) -> Vec<A
         !actions.iter().any(given),
         "the older may still write the same report"
     );
+    let actions = desk.event(exited(Launch(first.0 + 1)));
+    assert!(!actions.iter().any(given), "that was another: {actions:?}");
     let actions = ends(&mut desk, old, first);
     assert!(actions.iter().any(given), "{actions:?}");
 }
@@ -508,4 +515,18 @@ fn a_run_does_not_end_before_every_report_is_written() {
     assert!(!desk.state.all_delivered(), "a result waits");
     desk.say(session, FromPeer::Leaving);
     assert!(desk.state.all_delivered(), "nobody is there");
+}
+
+#[test]
+fn a_reporter_whose_process_has_ended_is_away_at_once() {
+    let mut desk = Desk::new(true);
+    let launch = desk.wants(1);
+    desk.join_as(Some(launch.0));
+    desk.event(exited(Launch(launch.0 + 1)));
+    assert!(desk.state.reporters[0].session.is_some(), "another one");
+    let actions = desk.event(exited(launch));
+    assert!(desk.state.reporters[0].session.is_none());
+    let said =
+        |it: &Action| matches!(it, Action::Notice(Notice::Ended { name, .. }) if name == TEXT);
+    assert!(actions.iter().any(said), "{actions:?}");
 }

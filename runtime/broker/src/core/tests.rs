@@ -15,6 +15,7 @@ mod behind_the_gate;
 mod children;
 mod dependencies;
 mod ending;
+mod exits;
 mod hands;
 mod limits;
 mod membership;

@@ -1,0 +1,111 @@
+//! What follows when the process of a child ends.
+
+use super::*;
+
+fn with(restart: Restart) -> World {
+    let mut world = World::new();
+    let specs = vec![ChildSpec {
+        restart,
+        ..child(1)
+    }];
+    world.manifest = Some(1);
+    world.event(Event::Children { specs });
+    world.pass(Duration::ZERO);
+    assert_eq!(world.launched.len(), 1);
+    world
+}
+
+fn kinds(world: &World) -> Vec<&'static str> {
+    world.state.notices.iter().map(Notice::kind).collect()
+}
+
+fn crashed() -> ChildEnd {
+    ChildEnd::Failed("it crashed".to_owned())
+}
+
+fn done() -> ChildEnd {
+    ChildEnd::Done("it ended with exit code 0".to_owned())
+}
+
+/// How long it takes until the child is started again.
+fn pause(world: &mut World) -> Duration {
+    let start = world.now;
+    while world.launched.is_empty() {
+        assert!(world.now < start + Duration::from_secs(3600), "never");
+        world.pass(Duration::from_millis(50));
+    }
+    world.now - start
+}
+
+#[test]
+fn a_bundle_whose_process_has_ended_is_away_at_once() {
+    let mut world = with(Restart::Always);
+    world.child_joins();
+    let launch = world.state.bundles[CHILD].launch.unwrap();
+    let other = Launch(launch.0 + 1);
+    let end = crashed();
+    world.event(Event::Exited { launch: other, end });
+    assert!(world.state.bundles[CHILD].session.is_some(), "another one");
+    let end = crashed();
+    world.event(Event::Exited { launch, end });
+    assert!(world.state.bundles[CHILD].session.is_none());
+    assert!(world.peers.is_empty(), "its session is closed");
+    assert_eq!(kinds(&world), ["ended"]);
+    assert!(pause(&mut world) < Duration::from_secs(1));
+}
+
+#[test]
+fn a_child_that_has_nothing_to_do_is_left_alone_for_long_unless_it_is_always_wanted() {
+    let mut world = with(Restart::OnFailure);
+    world.child_ends(done());
+    assert!(kinds(&world).is_empty(), "that is no failure");
+    assert!(pause(&mut world) >= world.state.settings.backoff_max);
+    let mut world = with(Restart::Always);
+    world.child_ends(done());
+    assert_eq!(kinds(&world), ["ended"]);
+    assert!(pause(&mut world) < Duration::from_secs(1));
+}
+
+#[test]
+fn what_ends_while_the_broker_stops_is_no_news() {
+    let mut world = with(Restart::Always);
+    world.event(Event::Drain);
+    world.child_ends(crashed());
+    assert!(kinds(&world).is_empty());
+}
+
+#[test]
+fn a_child_that_fails_is_hoped_for_twice() {
+    let mut world = World::new();
+    world.join("First");
+    world.manifest(Some(1));
+    pause(&mut world);
+    world.write(0);
+    world.prepare(0, true);
+    for time in 1..=3 {
+        world.child_ends(crashed());
+        world.answer(0);
+        world.store(0, true);
+        assert_eq!(world.judged.contains_key(&0), time == 3, "failure {time}");
+        pause(&mut world);
+    }
+    assert_eq!(world.judged[&0].1, Verdict::Undetermined);
+}
+
+#[test]
+fn a_child_that_fails_over_and_over_rests_for_a_window() {
+    let mut world = with(Restart::Always);
+    world.state.settings.max_restarts = 3;
+    world.state.settings.backoff_max = Duration::from_secs(1);
+    let window = world.state.settings.restart_window;
+    for _ in 0..3 {
+        world.child_ends(crashed());
+        assert!(pause(&mut world) < Duration::from_secs(3));
+    }
+    assert_eq!(world.state.children[CHILD].restarts, 3);
+    world.child_ends(crashed());
+    assert!(kinds(&world).contains(&"gave-up"));
+    let rest = pause(&mut world);
+    let tick = Duration::from_millis(50);
+    assert!((window..=window + tick).contains(&rest), "{rest:?}");
+}
