@@ -81,7 +81,7 @@ impl State {
         );
     }
 
-    /// A process that hung or was stopped when its broker was killed is no session of this one, so
+    /// A process that hung when its broker was killed has no session with this one, so
     /// nobody would ever miss it: what has not come back in time is killed, once.
     pub(super) fn kill_what_did_not_return(&mut self, actions: &mut Actions) {
         if self.former_are_gone || self.now < RETURN_LIMIT {

@@ -2,7 +2,7 @@
 
 use super::*;
 
-fn notices(world: &World) -> Vec<&'static str> {
+pub fn notices(world: &World) -> Vec<&'static str> {
     world.state.notices.iter().map(Notice::kind).collect()
 }
 
@@ -323,8 +323,8 @@ fn a_process_that_is_replaced_and_does_not_go_is_killed() {
     assert!(world.killed.contains(&old));
 }
 
-/// A child that is to be started again in this way, and has joined.
-fn world_with(restart: Restart) -> World {
+/// A child that is to be started again in this way, and is being started.
+pub fn world_that_starts(restart: Restart) -> World {
     let mut world = World::new();
     let specs = vec![ChildSpec {
         restart,
@@ -333,6 +333,13 @@ fn world_with(restart: Restart) -> World {
     world.manifest = Some(1);
     world.event(Event::Children { specs });
     world.pass(Duration::ZERO);
+    assert_eq!(world.launched.len(), 1);
+    world
+}
+
+/// The same, and it has joined.
+fn world_with(restart: Restart) -> World {
+    let mut world = world_that_starts(restart);
     world.child_joins();
     world
 }

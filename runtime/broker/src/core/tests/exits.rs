@@ -1,23 +1,7 @@
 //! What follows when the process of a child ends.
 
+use super::children::{notices, world_that_starts};
 use super::*;
-
-fn with(restart: Restart) -> World {
-    let mut world = World::new();
-    let specs = vec![ChildSpec {
-        restart,
-        ..child(1)
-    }];
-    world.manifest = Some(1);
-    world.event(Event::Children { specs });
-    world.pass(Duration::ZERO);
-    assert_eq!(world.launched.len(), 1);
-    world
-}
-
-fn kinds(world: &World) -> Vec<&'static str> {
-    world.state.notices.iter().map(Notice::kind).collect()
-}
 
 fn crashed() -> ChildEnd {
     ChildEnd::Failed("it crashed".to_owned())
@@ -39,7 +23,7 @@ fn pause(world: &mut World) -> Duration {
 
 #[test]
 fn a_bundle_whose_process_has_ended_is_away_at_once() {
-    let mut world = with(Restart::Always);
+    let mut world = world_that_starts(Restart::Always);
     world.child_joins();
     let launch = world.state.bundles[CHILD].launch.unwrap();
     let other = Launch(launch.0 + 1);
@@ -50,28 +34,28 @@ fn a_bundle_whose_process_has_ended_is_away_at_once() {
     world.event(Event::Exited { launch, end });
     assert!(world.state.bundles[CHILD].session.is_none());
     assert!(world.peers.is_empty(), "its session is closed");
-    assert_eq!(kinds(&world), ["ended"]);
+    assert_eq!(notices(&world), ["ended"]);
     assert!(pause(&mut world) < Duration::from_secs(1));
 }
 
 #[test]
 fn a_child_that_has_nothing_to_do_is_left_alone_for_long_unless_it_is_always_wanted() {
-    let mut world = with(Restart::OnFailure);
+    let mut world = world_that_starts(Restart::OnFailure);
     world.child_ends(done());
-    assert!(kinds(&world).is_empty(), "that is no failure");
+    assert!(notices(&world).is_empty(), "that is no failure");
     assert!(pause(&mut world) >= world.state.settings.backoff_max);
-    let mut world = with(Restart::Always);
+    let mut world = world_that_starts(Restart::Always);
     world.child_ends(done());
-    assert_eq!(kinds(&world), ["ended"]);
+    assert_eq!(notices(&world), ["ended"]);
     assert!(pause(&mut world) < Duration::from_secs(1));
 }
 
 #[test]
 fn what_ends_while_the_broker_stops_is_no_news() {
-    let mut world = with(Restart::Always);
+    let mut world = world_that_starts(Restart::Always);
     world.event(Event::Drain);
     world.child_ends(crashed());
-    assert!(kinds(&world).is_empty());
+    assert!(notices(&world).is_empty());
 }
 
 #[test]
@@ -94,7 +78,7 @@ fn a_child_that_fails_is_hoped_for_twice() {
 
 #[test]
 fn a_child_that_fails_over_and_over_rests_for_a_window() {
-    let mut world = with(Restart::Always);
+    let mut world = world_that_starts(Restart::Always);
     world.state.settings.max_restarts = 3;
     world.state.settings.backoff_max = Duration::from_secs(1);
     let window = world.state.settings.restart_window;
@@ -104,7 +88,7 @@ fn a_child_that_fails_over_and_over_rests_for_a_window() {
     }
     assert_eq!(world.state.children[CHILD].restarts, 3);
     world.child_ends(crashed());
-    assert!(kinds(&world).contains(&"gave-up"));
+    assert!(notices(&world).contains(&"gave-up"));
     let rest = pause(&mut world);
     let tick = Duration::from_millis(50);
     assert!((window..=window + tick).contains(&rest), "{rest:?}");
