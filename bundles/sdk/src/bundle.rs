@@ -120,7 +120,8 @@ impl Bundle {
 impl Checker {
     /// Severity of its issues when it leaves nothing else to say.
     pub fn level(&self) -> Level {
-        match (self.is_backport, self.facts.level) {
+        let lowered = self.is_backport && !matches!(self.facts.backport, Backport::Alike { .. });
+        match (lowered, self.facts.level) {
             (true, Level::Error) => Level::Warning,
             (true, _) => Level::Information,
             (false, level) => level,
@@ -147,7 +148,7 @@ fn checkers_of(rule: &'static dyn AnyRule) -> Vec<Checker> {
             .map_err(|error: crate::VersionError| error.to_string()),
         description: summary,
     };
-    if !matches!(facts.backport, Backport::Separate { .. }) {
+    if !facts.backport.is_separate() {
         return vec![plain];
     }
     let backport = Checker {

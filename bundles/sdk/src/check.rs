@@ -371,9 +371,11 @@ impl<'r> Run<'r> {
             }));
         };
         let backported = range.is_before(version) && reaches_back(checker.facts.backport, version)?;
-        let separate = matches!(checker.facts.backport, Backport::Separate { .. });
+        let separate = checker.facts.backport.is_separate();
+        let alike = matches!(checker.facts.backport, Backport::Alike { .. });
         match (checker.is_backport, range.contains(version), backported) {
             (false, true, _) => Ok(None),
+            (true, _, true) if alike => Ok(None),
             (true, _, true) => Ok(Some(note(standard, version, range))),
             (false, _, true) if !separate => Ok(Some(note(standard, version, range))),
             (true, true, _) => Err(skips(format!(
@@ -393,8 +395,10 @@ fn note(standard: &str, version: Version, range: &crate::VersionRange) -> String
 fn reaches_back(backport: Backport, version: Version) -> Result<bool, Outcome> {
     match backport {
         Backport::None => Ok(false),
-        Backport::Lower { since: "" } | Backport::Separate { since: "" } => Ok(true),
-        Backport::Lower { since } | Backport::Separate { since } => {
+        Backport::Lower { since: "" }
+        | Backport::Separate { since: "" }
+        | Backport::Alike { since: "" } => Ok(true),
+        Backport::Lower { since } | Backport::Separate { since } | Backport::Alike { since } => {
             let wrong = |error: crate::VersionError| Outcome::failed(error.to_string());
             Ok(since.parse::<Version>().map_err(wrong)? <= version)
         }

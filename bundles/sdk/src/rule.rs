@@ -128,6 +128,19 @@ pub enum Backport {
         /// First version that has the elements in question; empty for every version.
         since: &'static str,
     },
+    /// A checker of its own, `…_backport`, and as severe: what it finds broke older documents just
+    /// as well, only that nobody had written the rule down.
+    Alike {
+        /// First version that has the elements in question; empty for every version.
+        since: &'static str,
+    },
+}
+
+impl Backport {
+    /// Whether older documents have a checker of their own.
+    pub(crate) fn is_separate(self) -> bool {
+        matches!(self, Backport::Separate { .. } | Backport::Alike { .. })
+    }
 }
 
 impl<M: Model> Rule<M> {
