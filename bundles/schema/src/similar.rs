@@ -5,10 +5,7 @@ const LONGEST: usize = 64;
 
 /// The candidate closest to `name`, if it is close enough to be a slip: equal but for case, or one
 /// change in every three characters, at most three (insertions, deletions, replacements, swaps).
-pub(crate) fn closest<'c>(
-    name: &str,
-    candidates: impl Iterator<Item = &'c str>,
-) -> Option<&'c str> {
+pub fn closest<'c>(name: &str, candidates: impl Iterator<Item = &'c str>) -> Option<&'c str> {
     let allowed = (name.chars().count() / 3).clamp(1, 3);
     let mut best: Option<(usize, &str)> = None;
     for candidate in candidates.filter(|candidate| !candidate.is_empty()) {

@@ -1,0 +1,121 @@
+//! Which types a schema gives the elements and attributes of a document: for rules about values,
+//! which go by type and not by the place of an element.
+
+use std::collections::HashMap;
+
+use qcbus_document::{Attribute, Document, FileKind, Node};
+
+use crate::model::{ComplexType, Content, Schema, TypeRef};
+use crate::simple::{SimpleType, Variety};
+use crate::versions::{Version, select};
+
+/// The complex type of every element of one document.
+#[derive(Debug, Clone)]
+pub struct Typing {
+    schema: &'static Schema,
+    /// By the node's index: the number of its complex type, or [`UNKNOWN`].
+    types: Vec<u32>,
+}
+
+/// The element is not declared where it stands, or its type is no complex one.
+const UNKNOWN: u32 = u32::MAX;
+
+impl Typing {
+    /// Walks the document once. Versions without a schema of their own are read by the newest before
+    /// them; `None` where no schema describes such files at all.
+    pub fn of(document: &Document<'_>, kind: FileKind, version: Version) -> Option<Typing> {
+        let schema = select(kind, version).ok()?.schema;
+        let mut types = vec![UNKNOWN; document.len() as usize];
+        let root = document.root()?;
+        let declared = schema.root(root.name())?;
+        set(&mut types, root, complex(declared.ty));
+        // Which type a name stands for depends on the type around it, and files repeat few pairs.
+        let mut known: HashMap<(u32, u16), u32> = HashMap::new();
+        for node in root.descendants() {
+            let around = node.parent().map_or(UNKNOWN, |parent| get(&types, parent));
+            if around == UNKNOWN {
+                continue;
+            }
+            let found = *known
+                .entry((around, node.name_number()))
+                .or_insert_with(|| child(schema, around, node.name()));
+            set(&mut types, node, found);
+        }
+        Some(Typing { schema, types })
+    }
+
+    /// The name of the element's type, `AbsoluteSpeed`; `None` where the schema declares no such
+    /// element.
+    pub fn class(&self, node: Node<'_>) -> Option<&'static str> {
+        self.complex(node)?.name.as_deref()
+    }
+
+    /// The type of an attribute's value; `None` where the schema declares no such attribute.
+    pub fn value(&self, attribute: Attribute<'_>) -> Option<ValueType> {
+        let schema = self.schema;
+        let name = schema.names.find(attribute.name())?;
+        let complex = self.complex(attribute.node())?;
+        let declared = complex.attributes.iter().find(|one| one.name == name)?;
+        let simple = schema.simple.get(declared.value as usize)?;
+        Some(ValueType { schema, simple })
+    }
+
+    fn complex(&self, node: Node<'_>) -> Option<&'static ComplexType> {
+        let number = get(&self.types, node);
+        self.schema.complex.get(number as usize)
+    }
+}
+
+fn get(types: &[u32], node: Node<'_>) -> u32 {
+    types.get(node.index() as usize).copied().unwrap_or(UNKNOWN)
+}
+
+fn set(types: &mut [u32], node: Node<'_>, found: u32) {
+    if let Some(slot) = types.get_mut(node.index() as usize) {
+        *slot = found;
+    }
+}
+
+fn complex(ty: TypeRef) -> u32 {
+    match ty {
+        TypeRef::Complex(number) => number,
+        TypeRef::Any | TypeRef::Simple(_) => UNKNOWN,
+    }
+}
+
+/// The type of a child of this name within a type.
+fn child(schema: &Schema, around: u32, name: &str) -> u32 {
+    let declared = || {
+        let name = schema.names.find(name)?;
+        let content: &Content = &schema.complex.get(around as usize)?.content;
+        content.children().iter().find(|child| child.name == name)
+    };
+    declared().map_or(UNKNOWN, |declared| complex(declared.ty))
+}
+
+/// The type of an attribute's value.
+#[derive(Debug, Clone, Copy)]
+pub struct ValueType {
+    schema: &'static Schema,
+    simple: &'static SimpleType,
+}
+
+impl ValueType {
+    /// The schema's name for it, `Double`.
+    pub fn name(&self) -> Option<&'static str> {
+        self.simple.name.as_deref()
+    }
+
+    /// The words that are allowed, when it is an enumeration: its own, or those of the first of its
+    /// alternatives that is one.
+    pub fn words(&self) -> Option<&'static [Box<str>]> {
+        let own = self.simple.facets.enumeration.as_deref();
+        own.or_else(|| match &self.simple.variety {
+            Variety::Union(members) => members.iter().find_map(|member| {
+                let member = self.schema.simple.get(*member as usize)?;
+                member.facets.enumeration.as_deref()
+            }),
+            Variety::Atomic(_) | Variety::List(_) => None,
+        })
+    }
+}
