@@ -30,6 +30,11 @@ const MAY_KNOW: &[(&str, Option<&[&str]>)] = &[
     ("qcbus-broker", Some(PROCESS)),
     ("qcbus-sdk", Some(PROCESS)),
     ("qcbus-opendrive", Some(&[])),
+    // A scenario lies on a map, and its values have the types that its schema gives them.
+    (
+        "qcbus-openscenario",
+        Some(&["qcbus-opendrive", "qcbus-schema"]),
+    ),
     ("qcbus-schema", Some(&[])),
     // What the schema rules of all bundles have in common: for bundles, from their parts.
     ("qcbus-schema-rule", Some(&["qcbus-sdk", "qcbus-schema"])),
@@ -50,6 +55,7 @@ const PROCESS: &[&str] = &["qcbus-bus", "qcbus-disk", "qcbus-ingest"];
 const BUNDLE: &[&str] = &[
     "qcbus-sdk",
     "qcbus-opendrive",
+    "qcbus-openscenario",
     "qcbus-schema",
     "qcbus-schema-rule",
 ];

@@ -1,0 +1,183 @@
+//! The text of an expression in lexemes.
+
+use super::words::FOREIGN;
+use super::{Fault, FaultKind, OPENING, is_blank, quoted};
+
+/// The signs of the language.
+const SIGNS: [char; 8] = ['+', '-', '*', '/', '%', '(', ')', ','];
+
+/// A number, name, word or sign, and where it stands.
+#[derive(Clone, Copy)]
+pub(super) struct Lexeme<'t> {
+    pub at: usize,
+    pub text: &'t str,
+    pub token: Token,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Token {
+    /// As the grammar writes it.
+    Number,
+    /// A name with its `$`.
+    Parameter,
+    /// A word, known or not.
+    Word,
+    /// One of `+ - * / % ( ) ,`.
+    Sign,
+    /// The `}` at the end.
+    Close,
+    /// The text ended without a `}`.
+    End,
+}
+
+/// Reads lexemes from the front of a text. What is no lexeme is a fault when it is reached.
+#[derive(Clone)]
+pub(super) struct Lexer<'t> {
+    at: usize,
+    rest: &'t str,
+}
+
+/// The name that `rest` begins with.
+pub(super) fn name(rest: &str) -> Option<&str> {
+    if !rest.starts_with(|c: char| c == '_' || c.is_ascii_alphabetic()) {
+        return None;
+    }
+    let end = rest.find(|c: char| c != '_' && !c.is_ascii_alphanumeric());
+    Some(end.map_or(rest, |end| rest.split_at(end).0))
+}
+
+impl<'t> Lexer<'t> {
+    /// A lexer behind the `${` that `text` begins with.
+    pub fn new(text: &'t str) -> Result<Lexer<'t>, Fault> {
+        let mut lexer = Lexer { at: 0, rest: text };
+        lexer.skip_blanks();
+        if lexer.rest.starts_with(OPENING) {
+            lexer.take(OPENING.len());
+            Ok(lexer)
+        } else {
+            let text = format!("an expression begins with `{OPENING}`");
+            Err(Fault::evaluation(lexer.at, text))
+        }
+    }
+
+    /// What is left, without the blanks around it, and where it begins.
+    pub fn left(&mut self) -> (usize, &'t str) {
+        self.skip_blanks();
+        (self.at, self.rest.trim_end_matches(is_blank))
+    }
+
+    /// The next lexeme.
+    pub fn read(&mut self) -> Result<Lexeme<'t>, Fault> {
+        self.skip_blanks();
+        let (at, rest) = (self.at, self.rest);
+        let (token, length) = match rest.as_bytes() {
+            [] => (Token::End, 0),
+            [b'0'..=b'9', ..] | [b'.', b'0'..=b'9', ..] => (Token::Number, self.number()?),
+            [b'$', ..] => (Token::Parameter, self.parameter()?),
+            [b'}', ..] => (Token::Close, 1),
+            _ => match name(rest) {
+                Some(word) => (Token::Word, word.len()),
+                None => (Token::Sign, self.sign()?),
+            },
+        };
+        let text = self.take(length);
+        Ok(Lexeme { at, text, token })
+    }
+
+    fn skip_blanks(&mut self) {
+        let trimmed = self.rest.trim_start_matches(is_blank);
+        self.take(self.rest.len() - trimmed.len());
+    }
+
+    fn take(&mut self, length: usize) -> &'t str {
+        let (taken, rest) = self.rest.split_at(length);
+        self.at += length;
+        self.rest = rest;
+        taken
+    }
+
+    /// The length of the number here. Everything is taken for a part of it that could be meant as
+    /// one, so that `5f` is one fault and not two lexemes.
+    fn number(&self) -> Result<usize, Fault> {
+        let (mut digits_only, mut after_e) = (true, false);
+        let end = self.rest.find(|c: char| {
+            let inside = c.is_ascii_alphanumeric() || matches!(c, '.' | '_');
+            let belongs = inside || after_e && matches!(c, '+' | '-');
+            after_e = digits_only && matches!(c, 'e' | 'E');
+            digits_only &= c.is_ascii_digit() || c == '.';
+            !belongs
+        });
+        let length = end.unwrap_or(self.rest.len());
+        let number = self.rest.split_at(length).0;
+        match misspelt(number) {
+            None => Ok(length),
+            Some(why) => {
+                let text = format!("{} is no number: {why}", quoted(number));
+                Err(Fault::evaluation(self.at, text))
+            }
+        }
+    }
+
+    fn parameter(&self) -> Result<usize, Fault> {
+        let dollar = "$";
+        let name = self.rest.strip_prefix(dollar).and_then(name);
+        let text = "`$` is not followed by a name; a parameter is written `$name`";
+        name.map(|name| dollar.len() + name.len())
+            .ok_or_else(|| Fault::evaluation(self.at, text))
+    }
+
+    fn sign(&self) -> Result<usize, Fault> {
+        let foreign = FOREIGN.iter().find(|entry| self.rest.starts_with(entry.0));
+        if foreign.is_none() && self.rest.starts_with(SIGNS) {
+            return Ok(1);
+        }
+        let (found, way_out) = match foreign {
+            Some((sign, way_out)) => (format!("`{sign}`"), *way_out),
+            None => {
+                let found = self.rest.chars().next().map(shown);
+                (found.unwrap_or_default(), "its signs are `+ - * / % ( ) ,`")
+            }
+        };
+        let text = format!("{found} does not belong to the expression language; {way_out}");
+        Err(Fault::new(FaultKind::Operator, self.at, text))
+    }
+}
+
+/// A character for a message: an invisible one by its number.
+fn shown(c: char) -> String {
+    if c.is_control() || c.is_whitespace() {
+        format!("the character U+{:04X}", u32::from(c))
+    } else {
+        format!("`{c}`")
+    }
+}
+
+/// What keeps `text` from being a number by the grammar.
+fn misspelt(text: &str) -> Option<&'static str> {
+    let parts = text.split_once(['e', 'E']);
+    let (mantissa, exponent) = parts.map_or((text, None), |(m, e)| (m, Some(e)));
+    let (whole, fraction) = match mantissa.split_once('.') {
+        Some((whole, fraction)) => (whole, Some(fraction)),
+        None => (mantissa, None),
+    };
+    let exponent = exponent.map(|e| e.strip_prefix(['+', '-']).unwrap_or(e));
+    let foreign = |digits: &str| digits.bytes().any(|c| !c.is_ascii_digit());
+    let padded = |digits: &str| digits.len() > 1 && digits.starts_with('0');
+    if [Some(whole), fraction, exponent]
+        .into_iter()
+        .flatten()
+        .any(foreign)
+    {
+        Some("numbers are written like `2`, `0.5` or `1.5e-3`, without units and separators")
+    } else if whole.is_empty() {
+        Some("a digit goes before the point, like `0.5`")
+    } else if fraction == Some("") {
+        Some("a digit goes behind the point, like `2.0`")
+    } else if exponent == Some("") {
+        Some("a digit goes behind the `e`, like `1.5e3`")
+    } else if padded(whole) || exponent.is_some_and(padded) {
+        Some("numbers and exponents have no leading zeros")
+    } else {
+        None
+    }
+}

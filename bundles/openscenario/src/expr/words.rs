@@ -1,0 +1,160 @@
+//! The words and signs of the language.
+
+use super::Version;
+use super::arithmetic::{self as numbers, OfOne, OfTwo};
+
+/// An operator between two operands.
+pub(super) struct Operator {
+    pub symbol: &'static str,
+    pub action: Action,
+}
+
+/// What an operator does with its operands.
+#[derive(Clone, Copy)]
+pub(super) enum Action {
+    Numbers(OfTwo),
+    Booleans(fn(bool, bool) -> bool),
+}
+
+/// A function.
+pub(super) struct Function {
+    pub name: &'static str,
+    /// The version that it came with.
+    pub since: Version,
+    pub form: Form,
+}
+
+/// How many arguments a function takes, and what it does with them.
+#[derive(Clone, Copy)]
+pub(super) enum Form {
+    One(OfOne),
+    Two(OfTwo),
+}
+
+/// The operators that bind least.
+pub(super) static OR: [Operator; 1] = [Operator::booleans("or", |a, b| a || b)];
+
+pub(super) static AND: [Operator; 1] = [Operator::booleans("and", |a, b| a && b)];
+
+pub(super) static SUM: [Operator; 2] = [
+    Operator::numbers("+", numbers::add),
+    Operator::numbers("-", numbers::subtract),
+];
+
+/// The operators that bind most.
+pub(super) static PRODUCT: [Operator; 3] = [
+    Operator::numbers("*", numbers::multiply),
+    Operator::numbers("/", numbers::divide),
+    Operator::numbers("%", numbers::remainder),
+];
+
+/// The functions. What the standard has since 1.3, simulators have taken from 1.1 on.
+pub(super) static FUNCTIONS: [Function; 15] = {
+    use Form::{One, Two};
+    [
+        Function::new("round", (1, 1), One(numbers::round)),
+        Function::new("floor", (1, 1), One(numbers::floor)),
+        Function::new("ceil", (1, 1), One(numbers::ceil)),
+        Function::new("sqrt", (1, 1), One(numbers::sqrt)),
+        Function::new("pow", (1, 1), Two(numbers::pow)),
+        Function::new("sin", (1, 3), One(numbers::sin)),
+        Function::new("cos", (1, 3), One(numbers::cos)),
+        Function::new("tan", (1, 3), One(numbers::tan)),
+        Function::new("asin", (1, 3), One(numbers::asin)),
+        Function::new("acos", (1, 3), One(numbers::acos)),
+        Function::new("atan", (1, 3), One(numbers::atan)),
+        Function::new("sign", (1, 3), One(numbers::sign)),
+        Function::new("abs", (1, 3), One(numbers::abs)),
+        Function::new("max", (1, 3), Two(numbers::max)),
+        Function::new("min", (1, 3), Two(numbers::min)),
+    ]
+};
+
+/// The version that `pi` came with.
+pub(super) const PI_SINCE: Version = (1, 4);
+
+/// Words that are neither functions nor behind a `$`.
+const RESERVED: [&str; 6] = ["not", "and", "or", "true", "false", "pi"];
+
+/// Whether the language has this word.
+pub(super) fn is_known(word: &str) -> bool {
+    RESERVED.contains(&word) || Function::named(word).is_some()
+}
+
+/// The word of the language that `word` is but for capitals.
+pub(super) fn ignoring_case(word: &str) -> Option<&'static str> {
+    let functions = FUNCTIONS.iter().map(|function| function.name);
+    let mut words = functions.chain(RESERVED);
+    words.find(|known| known.eq_ignore_ascii_case(word))
+}
+
+/// What other languages write and this one does not, the longer before the shorter, each with the
+/// way out.
+pub(super) static FOREIGN: [(&str, &str); 28] = [
+    ("**", POWER),
+    ("^", POWER),
+    ("//", "a whole quotient is written `floor(7 / 2)`"),
+    ("&&", "it is written `and`"),
+    ("&", "it is written `and`"),
+    ("||", "it is written `or`"),
+    ("|", "it is written `or`"),
+    ("==", COMPARISON),
+    ("!=", COMPARISON),
+    ("<=", COMPARISON),
+    (">=", COMPARISON),
+    ("<", COMPARISON),
+    (">", COMPARISON),
+    ("=", "values are neither compared nor assigned"),
+    ("!", "it is written `not`"),
+    ("?", "there is no choice between values"),
+    ("'", TEXT),
+    ("\"", TEXT),
+    ("{", BRACKETS),
+    ("[", BRACKETS),
+    ("]", BRACKETS),
+    ("\u{d7}", "a product is written `2 * 3`"),
+    ("\u{b7}", "a product is written `2 * 3`"),
+    ("\u{f7}", "a quotient is written `7 / 2`"),
+    ("\u{2212}", HYPHEN),
+    ("\u{2013}", HYPHEN),
+    ("\u{3c0}", "from version 1.4 on it is written `pi`"),
+    ("\u{221a}", "a square root is written `sqrt(2)`"),
+];
+
+const POWER: &str = "a power is written `pow(2, 3)`";
+const COMPARISON: &str = "values are not compared here but in conditions";
+const TEXT: &str = "expressions know numbers and booleans, but no text";
+const BRACKETS: &str = "all brackets are round";
+const HYPHEN: &str = "a minus is the hyphen of the keyboard, `-`";
+
+impl Operator {
+    const fn numbers(symbol: &'static str, action: OfTwo) -> Operator {
+        let action = Action::Numbers(action);
+        Operator { symbol, action }
+    }
+
+    const fn booleans(symbol: &'static str, action: fn(bool, bool) -> bool) -> Operator {
+        let action = Action::Booleans(action);
+        Operator { symbol, action }
+    }
+}
+
+impl Function {
+    const fn new(name: &'static str, since: Version, form: Form) -> Function {
+        Function { name, since, form }
+    }
+
+    /// The function of this name.
+    pub fn named(name: &str) -> Option<&'static Function> {
+        FUNCTIONS.iter().find(|function| function.name == name)
+    }
+
+    /// What it takes, for messages.
+    pub fn takes(&self) -> String {
+        let name = self.name;
+        match self.form {
+            Form::One(_) => format!("`{name}` takes one argument, `{name}(x)`"),
+            Form::Two(_) => format!("`{name}` takes two arguments, `{name}(x, y)`"),
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! The OpenSCENARIO model: what a scenario says, read once and shared by all rules.
+//!
+//! [`Scenario`] is made of the document that is checked, the catalogs and the map that it refers to.
+//! Rules walk it by [`Element`]s: a node of a document together with where it is read, so that
+//! `$parameter` and `${expression}` have their value and what a catalog's entry was assigned holds in
+//! it. Whatever rests on a faulty value is `None`: the fault is listed once ([`Scenario::faults`])
+//! and leads to nothing else. `docs/openscenario-model.md` is the guide.
+
+pub mod expr;
+
+mod actors;
+mod catalogs;
+mod data_type;
+mod date_time;
+mod element;
+mod entities;
+mod faults;
+mod form;
+mod inputs;
+mod network;
+mod reading;
+mod scenario;
+mod scope;
+mod storyboard;
+mod text;
+
+pub use actors::Actors;
+pub use catalogs::{CatalogKind, Entry, Resolution};
+pub use data_type::{DataType, Value, parse_double};
+pub use date_time::{DateTime, DateTimeError};
+pub use element::Element;
+pub use entities::{Entities, Entity, EntityKind, Selection};
+pub use faults::{Dialect, ValueFault, ValueFaultKind};
+pub use form::Form;
+pub use inputs::{Inputs, LinkedCatalog, LinkedMap};
+pub use network::{LaneAt, Network};
+pub use qcbus_schema::closest;
+pub use reading::Reading;
+pub use scenario::Scenario;
+pub use scope::{Declaration, Declared, Declares};
+pub use storyboard::{StoryElement, StoryKind, Storyboard};
+pub use text::{identifier, is_identifier};
+
+/// The version in a file header: major and minor.
+pub type Version = (u16, u16);

@@ -1,0 +1,392 @@
+//! The whole: the document that is checked with its catalogs and its map.
+
+use std::cell::OnceCell;
+
+use foldhash::{HashMap, HashMapExt as _};
+use qcbus_document::{Attribute, Document, FileKind, Node};
+use qcbus_opendrive::RoadMap;
+use qcbus_schema::Typing;
+
+use crate::Version;
+use crate::catalogs::{AssignmentProblem, Catalogs, Link};
+use crate::data_type::DataType;
+use crate::element::Element;
+use crate::entities::Entities;
+use crate::expr::{self, Evaluated};
+use crate::faults::{ValueFault, ValueFaultKind};
+use crate::form::Form;
+use crate::inputs::{Inputs, LinkedMap};
+use crate::reading::{self, Expected, Reading, resolve};
+use crate::scope::{Context, ContextId, DeclarationProblem, operand};
+use crate::storyboard::Storyboard;
+
+/// A document of OpenSCENARIO and all that it refers to.
+pub struct Scenario<'d> {
+    document: Document<'d>,
+    version: Version,
+    form: Form,
+    map: LinkedMap<'d>,
+    /// Never empty: the first is the document.
+    contexts: Vec<Context<'d>>,
+    /// What stands for a context that is not there.
+    pub(crate) catalogs: Catalogs<'d>,
+    pub(crate) links: HashMap<(ContextId, u32), Link<'d>>,
+    pub(crate) assignment_problems: Vec<AssignmentProblem<'d>>,
+    declaration_problems: Vec<DeclarationProblem<'d>>,
+    kind: FileKind,
+    typings: OnceCell<HashMap<*const u8, Option<Typing>>>,
+    faults: OnceCell<Vec<ValueFault<'d>>>,
+    entities: OnceCell<Entities<'d>>,
+    storyboard: OnceCell<Storyboard<'d>>,
+    roads: OnceCell<Box<RoadMap<'d>>>,
+}
+
+/// Files that name no version are read as the newest.
+const NEWEST: Version = (1, 4);
+
+impl<'d> Scenario<'d> {
+    /// Reads declarations and follows references to catalogs; the rest is read when first asked for.
+    /// `None` when the document has no root element.
+    pub fn new(inputs: &Inputs<'d>) -> Option<Scenario<'d>> {
+        let root = inputs.document.root()?;
+        let version = inputs.version.unwrap_or(NEWEST);
+        let (context, declaration_problems) = Context::new(root, version, &HashMap::new());
+        let mut scenario = Scenario {
+            document: inputs.document,
+            version,
+            form: Form::of(&inputs.document),
+            map: inputs.map,
+            contexts: vec![context],
+            catalogs: Catalogs::new(root, &inputs.catalogs, &inputs.incomplete),
+            links: HashMap::new(),
+            assignment_problems: Vec::new(),
+            declaration_problems,
+            kind: inputs.kind,
+            typings: OnceCell::new(),
+            faults: OnceCell::new(),
+            entities: OnceCell::new(),
+            storyboard: OnceCell::new(),
+            roads: OnceCell::new(),
+        };
+        scenario.follow_references();
+        Some(scenario)
+    }
+
+    /// The document that is checked.
+    pub fn document(&self) -> Document<'d> {
+        self.document
+    }
+
+    /// The version in the file header; the newest when there is none.
+    pub fn version(&self) -> Version {
+        self.version
+    }
+
+    /// What kind of document it is.
+    pub fn form(&self) -> Form {
+        self.form
+    }
+
+    /// The root element.
+    pub fn root(&self) -> Element<'_, 'd> {
+        Element {
+            scenario: self,
+            node: self.contexts[0].top,
+            context: 0,
+        }
+    }
+
+    /// The elements of a name in the document itself, in document order.
+    pub fn elements(&self, name: &str) -> impl Iterator<Item = Element<'_, 'd>> {
+        self.document.elements(name).map(|node| Element {
+            scenario: self,
+            node,
+            context: 0,
+        })
+    }
+
+    /// An element of the document itself.
+    pub fn element(&self, node: Node<'d>) -> Element<'_, 'd> {
+        Element {
+            scenario: self,
+            node,
+            context: 0,
+        }
+    }
+
+    /// The elements of a name in the document and in the entries of catalogs that it refers to, an
+    /// entry as often as it is referred to.
+    pub fn elements_everywhere(&self, name: &str) -> impl Iterator<Item = Element<'_, 'd>> {
+        self.tops().flat_map(move |top| {
+            let itself = top.is(name).then_some(top);
+            itself.into_iter().chain(top.descendants_named(name))
+        })
+    }
+
+    /// The root element, and each entry of a catalog as often as it is referred to.
+    pub fn tops(&self) -> impl Iterator<Item = Element<'_, 'd>> {
+        (0..).zip(&self.contexts).map(|(context, one)| Element {
+            scenario: self,
+            node: one.top,
+            context,
+        })
+    }
+
+    pub(crate) fn context(&self, id: ContextId) -> &Context<'d> {
+        self.contexts.get(id as usize).unwrap_or(&self.contexts[0])
+    }
+
+    pub(crate) fn contexts(&self) -> usize {
+        self.contexts.len()
+    }
+
+    pub(crate) fn push_context(&mut self, context: Context<'d>) -> ContextId {
+        self.contexts.push(context);
+        u32::try_from(self.contexts.len() - 1).unwrap_or(0)
+    }
+
+    pub(crate) fn map_input(&self) -> LinkedMap<'d> {
+        self.map
+    }
+
+    pub(crate) fn roads_of(&self, document: Document<'d>) -> &RoadMap<'d> {
+        self.roads.get_or_init(|| Box::new(RoadMap::new(document)))
+    }
+
+    /// The entities and selections.
+    pub fn entities(&self) -> &Entities<'d> {
+        self.entities.get_or_init(|| Entities::of(self))
+    }
+
+    /// The storyboard's tree, maneuvers from catalogs included.
+    pub fn storyboard(&self) -> &Storyboard<'d> {
+        self.storyboard.get_or_init(|| Storyboard::of(self))
+    }
+
+    /// Types of the elements of the document that a context reads.
+    pub(crate) fn typing(&self, context: ContextId) -> Option<&Typing> {
+        let typings = self.typings.get_or_init(|| self.read_typings());
+        typings
+            .get(&key(self.context(context).top.document()))?
+            .as_ref()
+    }
+
+    fn read_typings(&self) -> HashMap<*const u8, Option<Typing>> {
+        let mut typings = HashMap::new();
+        for context in &self.contexts {
+            let document = context.top.document();
+            typings.entry(key(document)).or_insert_with(|| {
+                let stated = qcbus_schema::version_of(&document, self.kind);
+                let version = stated.unwrap_or(qcbus_schema::Version {
+                    major: u32::from(self.version.0),
+                    minor: u32::from(self.version.1),
+                });
+                Typing::of(&document, FileKind::Xosc, version)
+            });
+        }
+        typings
+    }
+
+    pub(crate) fn read(&self, attribute: Attribute<'d>, context: ContextId) -> Reading<'d> {
+        let raw = attribute.value();
+        if reading::Form::of(raw) == reading::Form::Literal || is_plain(attribute) {
+            return Reading::Literal(raw);
+        }
+        match self.evaluate(attribute, raw, context) {
+            Ok(value) => Reading::Value(value),
+            Err(problem) => problem.value.map_or(Reading::Unknown, Reading::Value),
+        }
+    }
+
+    fn evaluate(
+        &self,
+        attribute: Attribute<'d>,
+        raw: &'d str,
+        context: ContextId,
+    ) -> Result<crate::Value<'d>, crate::faults::Problem<'d>> {
+        let node = attribute.node();
+        let read_in = self.context(context);
+        let expected = self.expected(attribute, context);
+        resolve(raw, expected, self.version, &|name| read_in.get(node, name))
+    }
+
+    /// What the value of an attribute is to be.
+    fn expected(&self, attribute: Attribute<'d>, context: ContextId) -> Expected {
+        let node = attribute.node();
+        if attribute.is("value") {
+            // The schema says text: the true type is that of a declaration.
+            let declared = match node.name() {
+                "ParameterDeclaration" => node.attr("parameterType"),
+                "VariableDeclaration" => node.attr("variableType"),
+                "ParameterAssignment"
+                | "ParameterSetAction"
+                | "SetAction"
+                | "VariableSetAction"
+                | "ParameterCondition"
+                | "VariableCondition"
+                | "ValueConstraint" => {
+                    return Expected::Unknown;
+                }
+                _ => None,
+            };
+            if let Some(data_type) = declared.and_then(DataType::of_declaration) {
+                return Expected::Type(data_type);
+            }
+        }
+        let value = self
+            .typing(context)
+            .and_then(|typing| typing.value(attribute));
+        let Some(value) = value else {
+            return Expected::Unknown;
+        };
+        match (value.words(), value.name().and_then(DataType::of_schema)) {
+            (Some(words), _) => Expected::Words(words),
+            (None, Some(data_type)) => Expected::Type(data_type),
+            (None, None) => Expected::Unknown,
+        }
+    }
+
+    /// Every value of the document that cannot be had as it is written, in document order. What only
+    /// follows from another fault is not among them.
+    pub fn faults(&self) -> &[ValueFault<'d>] {
+        self.faults.get_or_init(|| self.find_faults())
+    }
+
+    /// The faults of some kinds.
+    pub fn faults_of(&self, kinds: &[ValueFaultKind]) -> impl Iterator<Item = &ValueFault<'d>> {
+        self.faults()
+            .iter()
+            .filter(move |fault| kinds.contains(&fault.kind))
+    }
+
+    fn find_faults(&self) -> Vec<ValueFault<'d>> {
+        let mut faults: Vec<ValueFault<'d>> = Vec::new();
+        let mut note = |attribute: Attribute<'d>, problem: &crate::faults::Problem<'d>| {
+            if !problem.is_silent() {
+                faults.push(self.explained(attribute, problem));
+            }
+        };
+        for (node, problem) in &self.declaration_problems {
+            if let Some(attribute) = node.attribute("value") {
+                note(attribute, problem);
+            }
+        }
+        for attribute in self
+            .substituted()
+            .filter(|attribute| !is_declared_value(*attribute))
+        {
+            if let Err(problem) = self.evaluate(attribute, attribute.value(), 0) {
+                note(attribute, &problem);
+            }
+        }
+        faults.sort_by_key(|fault| fault.attribute.offset());
+        faults
+    }
+
+    /// Every expression of the document that has a value, in document order; what is text to the
+    /// schema is none.
+    pub fn expressions(&self) -> impl Iterator<Item = (Attribute<'d>, Evaluated)> {
+        self.substituted().filter_map(|attribute| {
+            let raw = attribute.value();
+            let is_text = matches!(
+                self.expected(attribute, 0),
+                Expected::Words(_) | Expected::Type(DataType::String | DataType::DateTime)
+            );
+            if is_text || reading::Form::of(raw) != reading::Form::Expression {
+                return None;
+            }
+            let context = &self.contexts[0];
+            let lookup = |name: &str| operand(context.get(attribute.node(), name));
+            let evaluated = expr::evaluate(raw, self.version, &lookup).ok()?;
+            Some((attribute, evaluated))
+        })
+    }
+
+    /// Every use of a parameter in the document: the attribute and the parameter's name.
+    pub fn parameter_uses(&self) -> impl Iterator<Item = (Attribute<'d>, &'d str)> {
+        self.substituted().flat_map(|attribute| {
+            let raw = attribute.value();
+            let names: Vec<&'d str> = match reading::Form::of(raw) {
+                reading::Form::Parameter(name) | reading::Form::Embedded(_, name) => vec![name],
+                reading::Form::Expression => {
+                    expr::names(raw).into_iter().map(|(name, _)| name).collect()
+                }
+                reading::Form::Literal | reading::Form::Ros(_) => Vec::new(),
+            };
+            names.into_iter().map(move |name| (attribute, name))
+        })
+    }
+
+    /// The attributes of the document that are not written out.
+    fn substituted(&self) -> impl Iterator<Item = Attribute<'d>> {
+        let root = self.contexts[0].top;
+        let all = std::iter::once(root)
+            .chain(root.descendants())
+            .flat_map(|node| node.attributes());
+        all.filter(|attribute| {
+            attribute.value().contains('$')
+                && reading::Form::of(attribute.value()) != reading::Form::Literal
+                && !is_plain(*attribute)
+        })
+    }
+
+    /// The fault with what the whole scenario knows about it.
+    fn explained(
+        &self,
+        attribute: Attribute<'d>,
+        problem: &crate::faults::Problem<'d>,
+    ) -> ValueFault<'d> {
+        let mut fault = ValueFault {
+            attribute,
+            kind: problem.kind,
+            at: problem.at,
+            name: problem.name.clone(),
+            text: problem.text.clone(),
+        };
+        if fault.kind == ValueFaultKind::Undeclared {
+            let element = self.element(attribute.node());
+            if self.declares_variable(&fault.name) {
+                fault.kind = ValueFaultKind::Variable;
+                fault.text = format!(
+                    "`{}` is a variable, whose value is known only when the scenario runs; `$` reads \
+                     parameters",
+                    fault.name
+                );
+            } else if let Some(near) = qcbus_schema::closest(&fault.name, element.parameter_names())
+            {
+                fault.text.push_str(&format!("; `${near}` is"));
+            }
+        }
+        fault
+    }
+
+    fn declares_variable(&self, name: &str) -> bool {
+        let block = self.root().child("VariableDeclarations");
+        let mut variables = block
+            .into_iter()
+            .flat_map(|block| block.children_named("VariableDeclaration"));
+        variables.any(|variable| variable.written("name") == Some(name))
+    }
+}
+
+/// Tells documents apart: where the text of their path lies in memory.
+fn key(document: Document<'_>) -> *const u8 {
+    document.path().as_ptr()
+}
+
+/// Names of what is declared or assigned are names, also where old files write a `$` before them.
+fn is_plain(attribute: Attribute<'_>) -> bool {
+    match attribute.name() {
+        "name" => matches!(
+            attribute.node().name(),
+            "ParameterDeclaration" | "VariableDeclaration" | "MonitorDeclaration"
+        ),
+        "parameterRef" => true,
+        name => name == "xmlns" || name.starts_with("xmlns:") || name.starts_with("xsi:"),
+    }
+}
+
+/// The value of a parameter is read with its declaration.
+fn is_declared_value(attribute: Attribute<'_>) -> bool {
+    attribute.is("value") && attribute.node().is("ParameterDeclaration")
+}

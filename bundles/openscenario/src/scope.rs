@@ -1,0 +1,229 @@
+//! Parameters and where they hold: a declaration holds in the element around its
+//! `ParameterDeclarations`, the innermost of a name wins, and a catalog's entry sees its own only.
+
+use foldhash::{HashMap, HashMapExt as _};
+use qcbus_document::Node;
+
+use crate::Version;
+use crate::data_type::{DataType, Value};
+use crate::expr::Operand;
+use crate::faults::{Problem, ValueFaultKind};
+use crate::reading::{Expected, resolve};
+
+/// A parameter as declared.
+#[derive(Debug, Clone)]
+pub struct Declaration<'d> {
+    /// The `ParameterDeclaration`.
+    pub node: Node<'d>,
+    /// Its name, without the `$` that old files write before it.
+    pub name: &'d str,
+    /// Its type; `None` when `parameterType` is missing or no type.
+    pub data_type: Option<DataType>,
+    /// Its value.
+    pub declared: Declared<'d>,
+}
+
+/// What a declaration gives.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Declared<'d> {
+    /// A value of its type.
+    Value(Value<'d>),
+    /// Nothing that could be used; why is said about the declaration.
+    Faulty,
+}
+
+/// What a declaration stands for, named by its element.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Declares {
+    /// `ParameterDeclaration`
+    Parameter,
+    /// `VariableDeclaration`
+    Variable,
+    /// `MonitorDeclaration`
+    Monitor,
+}
+
+/// The declarations of one element.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Frame<'d> {
+    pub(crate) declarations: Vec<Declaration<'d>>,
+    /// The first of each name.
+    by_name: HashMap<&'d str, u32>,
+}
+
+impl<'d> Frame<'d> {
+    fn push(&mut self, declaration: Declaration<'d>) {
+        let at = u32::try_from(self.declarations.len()).unwrap_or(u32::MAX);
+        self.by_name.entry(declaration.name).or_insert(at);
+        self.declarations.push(declaration);
+    }
+
+    pub(crate) fn get(&self, name: &str) -> Option<&Declaration<'d>> {
+        self.declarations.get(*self.by_name.get(name)? as usize)
+    }
+}
+
+/// The number of a context in its scenario; 0 is the document that is checked.
+pub(crate) type ContextId = u32;
+
+/// Where values are read: a document, or an entry of a catalog with what a reference assigned.
+#[derive(Debug, Clone)]
+pub(crate) struct Context<'d> {
+    /// The root of the document, or the entry.
+    pub(crate) top: Node<'d>,
+    /// The `CatalogReference` that leads here, and where that is read.
+    pub(crate) reference: Option<(Node<'d>, ContextId)>,
+    /// How many references lead from the document to here.
+    pub(crate) depth: u32,
+    /// By the index of the element that they hold in.
+    frames: HashMap<u32, Frame<'d>>,
+}
+
+/// What was found wrong with a declaration's value.
+pub(crate) type DeclarationProblem<'d> = (Node<'d>, Problem<'d>);
+
+impl<'d> Context<'d> {
+    /// Reads the declarations below `top` in document order; `assigned` replaces values of the
+    /// parameters that `top` itself declares.
+    pub(crate) fn new(
+        top: Node<'d>,
+        version: Version,
+        assigned: &HashMap<&'d str, Declared<'d>>,
+    ) -> (Context<'d>, Vec<DeclarationProblem<'d>>) {
+        let mut context = Context {
+            top,
+            reference: None,
+            depth: 0,
+            frames: HashMap::new(),
+        };
+        let mut problems = Vec::new();
+        for block in top.descendants_named("ParameterDeclarations") {
+            let Some(holder) = block.parent() else {
+                continue;
+            };
+            for node in block.children_named("ParameterDeclaration") {
+                let declared = context.declare(node, version, &mut problems);
+                let own = if holder == top {
+                    assigned.get(declared.name)
+                } else {
+                    None
+                };
+                let declared = match own {
+                    Some(value) => Declaration {
+                        declared: value.clone(),
+                        ..declared
+                    },
+                    None => declared,
+                };
+                context
+                    .frames
+                    .entry(holder.index())
+                    .or_default()
+                    .push(declared);
+            }
+        }
+        (context, problems)
+    }
+
+    fn declare(
+        &self,
+        node: Node<'d>,
+        version: Version,
+        problems: &mut Vec<DeclarationProblem<'d>>,
+    ) -> Declaration<'d> {
+        let name = node.attr("name").unwrap_or("");
+        let name = name.strip_prefix('$').unwrap_or(name);
+        let data_type = node
+            .attr("parameterType")
+            .and_then(DataType::of_declaration);
+        let expected = data_type.map_or(Expected::Unknown, Expected::Type);
+        let declared = match node.attr("value") {
+            None => Declared::Faulty,
+            Some(raw) => match resolve(raw, expected, version, &|name| self.get(node, name)) {
+                Ok(value) => Declared::Value(value),
+                Err(mut problem) => {
+                    if problem.kind == ValueFaultKind::Undeclared {
+                        self.explain_order(node, &mut problem);
+                    }
+                    let value = problem.value.take();
+                    problems.push((node, problem));
+                    value.map_or(Declared::Faulty, Declared::Value)
+                }
+            },
+        };
+        Declaration {
+            node,
+            name,
+            data_type,
+            declared,
+        }
+    }
+
+    /// A parameter that is declared, but not before its use.
+    fn explain_order(&self, node: Node<'d>, problem: &mut Problem<'d>) {
+        let block = node.parent();
+        let later = block
+            .into_iter()
+            .flat_map(|block| block.children_named("ParameterDeclaration"));
+        let mut later = later.skip_while(|other| *other != node);
+        if later.any(|other| other.attr("name") == Some(problem.name.as_str())) {
+            problem.kind = ValueFaultKind::Order;
+            problem.text = format!(
+                "`${}` is declared only here or further down; a declaration may use parameters that are \
+                 declared before it",
+                problem.name
+            );
+        }
+    }
+
+    /// The declaration that a name means at a node.
+    pub(crate) fn get(&self, node: Node<'d>, name: &str) -> Option<&Declaration<'d>> {
+        if self.frames.is_empty() {
+            return None;
+        }
+        let around = std::iter::once(node).chain(node.ancestors());
+        for holder in around {
+            if let Some(found) = self.frame(holder).and_then(|frame| frame.get(name)) {
+                return Some(found);
+            }
+            if holder == self.top {
+                return None;
+            }
+        }
+        None
+    }
+
+    /// What an element declares.
+    pub(crate) fn frame(&self, holder: Node<'d>) -> Option<&Frame<'d>> {
+        self.frames.get(&holder.index())
+    }
+
+    /// All names that hold at a node, the innermost first.
+    pub(crate) fn names(&self, node: Node<'d>) -> impl Iterator<Item = &'d str> {
+        let around = std::iter::once(node).chain(node.ancestors());
+        around
+            .filter_map(|holder| self.frame(holder))
+            .flat_map(|frame| frame.declarations.iter().map(|one| one.name))
+    }
+}
+
+/// What a declaration is in an expression.
+pub(crate) fn operand(declaration: Option<&Declaration<'_>>) -> Operand {
+    let Some(declaration) = declaration else {
+        return Operand::Undeclared;
+    };
+    match (&declaration.declared, declaration.data_type) {
+        (Declared::Faulty, _) => Operand::Unresolved,
+        (Declared::Value(Value::Integer(value)), _) => {
+            Operand::Value(crate::expr::Value::Integer(*value))
+        }
+        (Declared::Value(Value::Double(value)), _) => {
+            Operand::Value(crate::expr::Value::Double(*value))
+        }
+        (Declared::Value(Value::Boolean(value)), _) => {
+            Operand::Value(crate::expr::Value::Boolean(*value))
+        }
+        (Declared::Value(Value::Text(_)), Some(DataType::DateTime)) => Operand::Text("dateTime"),
+        (Declared::Value(Value::Text(_)), _) => Operand::Text("string"),
+    }
+}

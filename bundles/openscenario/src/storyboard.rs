@@ -1,0 +1,224 @@
+//! The storyboard as a tree of names: `story::act::group::maneuver::event::action`.
+
+use std::borrow::Cow;
+
+use foldhash::HashMap;
+use qcbus_document::Node;
+
+use crate::element::Element;
+use crate::scenario::Scenario;
+use crate::scope::ContextId;
+
+/// What an element of the storyboard is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[expect(missing_docs, reason = "the standard's words")]
+pub enum StoryKind {
+    Story,
+    Act,
+    ManeuverGroup,
+    Maneuver,
+    Event,
+    Action,
+}
+
+impl StoryKind {
+    /// The kind of an element of this name.
+    pub fn of_element(name: &str) -> Option<StoryKind> {
+        Some(match name {
+            "Story" => StoryKind::Story,
+            "Act" => StoryKind::Act,
+            "ManeuverGroup" => StoryKind::ManeuverGroup,
+            "Maneuver" => StoryKind::Maneuver,
+            "Event" => StoryKind::Event,
+            "Action" => StoryKind::Action,
+            _ => return None,
+        })
+    }
+
+    /// The kind that a `storyboardElementType` names.
+    pub fn of_word(word: &str) -> Option<StoryKind> {
+        StoryKind::ALL.into_iter().find(|kind| kind.word() == word)
+    }
+
+    /// All kinds from the outside in.
+    pub const ALL: [StoryKind; 6] = [
+        StoryKind::Story,
+        StoryKind::Act,
+        StoryKind::ManeuverGroup,
+        StoryKind::Maneuver,
+        StoryKind::Event,
+        StoryKind::Action,
+    ];
+
+    /// The word of `storyboardElementType`.
+    pub fn word(self) -> &'static str {
+        match self {
+            StoryKind::Story => "story",
+            StoryKind::Act => "act",
+            StoryKind::ManeuverGroup => "maneuverGroup",
+            StoryKind::Maneuver => "maneuver",
+            StoryKind::Event => "event",
+            StoryKind::Action => "action",
+        }
+    }
+}
+
+/// An element of the storyboard.
+#[derive(Debug, Clone)]
+pub struct StoryElement<'d> {
+    node: Node<'d>,
+    context: ContextId,
+    kind: StoryKind,
+    name: Option<Cow<'d, str>>,
+    parent: Option<u32>,
+}
+
+impl<'d> StoryElement<'d> {
+    /// What it is.
+    pub fn kind(&self) -> StoryKind {
+        self.kind
+    }
+
+    /// Its name, parameters replaced; `None` when it has none or it is unknown.
+    pub fn name(&self) -> Option<&str> {
+        self.name.as_deref()
+    }
+
+    /// The place of the element around it in [`Storyboard::elements`].
+    pub fn parent(&self) -> Option<usize> {
+        self.parent.map(|parent| parent as usize)
+    }
+
+    /// The element in the document or in a catalog.
+    pub fn element<'m>(&self, scenario: &'m Scenario<'d>) -> Element<'m, 'd> {
+        Element {
+            scenario,
+            node: self.node,
+            context: self.context,
+        }
+    }
+}
+
+/// All elements of the storyboard.
+#[derive(Debug, Default)]
+pub struct Storyboard<'d> {
+    elements: Vec<StoryElement<'d>>,
+    by_name: HashMap<String, Vec<u32>>,
+    /// Whether every name of an element is known.
+    complete: bool,
+}
+
+impl<'d> Storyboard<'d> {
+    pub(crate) fn of(scenario: &Scenario<'d>) -> Storyboard<'d> {
+        let mut storyboard = Storyboard {
+            complete: true,
+            ..Storyboard::default()
+        };
+        if let Some(root) = scenario.root().child("Storyboard") {
+            storyboard.add_within(root, None);
+        }
+        storyboard
+    }
+
+    fn add_within(&mut self, around: Element<'_, 'd>, parent: Option<u32>) {
+        for child in around.children() {
+            let child = if child.is("CatalogReference") && around.is("ManeuverGroup") {
+                match child.scenario().entry(child) {
+                    Some(entry) => entry,
+                    None => {
+                        self.complete = false;
+                        continue;
+                    }
+                }
+            } else {
+                child
+            };
+            if let Some(kind) = StoryKind::of_element(child.name()) {
+                let place = self.add(child, kind, parent);
+                if kind != StoryKind::Action {
+                    self.add_within(child, Some(place));
+                }
+            }
+        }
+    }
+
+    fn add(&mut self, element: Element<'_, 'd>, kind: StoryKind, parent: Option<u32>) -> u32 {
+        let place = u32::try_from(self.elements.len()).unwrap_or(u32::MAX);
+        let name = element.text("name");
+        match &name {
+            Some(name) => self
+                .by_name
+                .entry(name.to_string())
+                .or_default()
+                .push(place),
+            None => self.complete = false,
+        }
+        self.elements.push(StoryElement {
+            node: element.node,
+            context: element.context,
+            kind,
+            name,
+            parent,
+        });
+        place
+    }
+
+    /// All elements; an element comes before those within it.
+    pub fn elements(&self) -> &[StoryElement<'d>] {
+        &self.elements
+    }
+
+    /// Whether every name is known: a catalog's maneuver that was not found, or a name that cannot be
+    /// resolved, may be what a reference means.
+    pub fn is_complete(&self) -> bool {
+        self.complete
+    }
+
+    /// The elements that a reference may mean: `leaf` any of this name, `a::b::leaf` those directly
+    /// within a `b` that is directly within an `a`.
+    pub fn find(&self, reference: &str) -> Vec<&StoryElement<'d>> {
+        let mut path = reference.rsplit("::");
+        let leaf = path.next().unwrap_or("");
+        let outward: Vec<&str> = path.collect();
+        let places = self.by_name.get(leaf).map_or(&[][..], Vec::as_slice);
+        let elements = places
+            .iter()
+            .filter_map(|place| self.elements.get(*place as usize));
+        elements
+            .filter(|element| self.lies_in(element, &outward))
+            .collect()
+    }
+
+    fn lies_in(&self, element: &StoryElement<'d>, outward: &[&str]) -> bool {
+        let mut at = element;
+        outward.iter().all(|name| {
+            let parent = at.parent().and_then(|parent| self.elements.get(parent));
+            match parent {
+                Some(parent) if parent.name() == Some(*name) => {
+                    at = parent;
+                    true
+                }
+                _ => false,
+            }
+        })
+    }
+
+    /// The names of all elements, for suggestions.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.elements.iter().filter_map(StoryElement::name)
+    }
+
+    /// The entry for an element of the storyboard.
+    pub fn entry(&self, element: Element<'_, 'd>) -> Option<&StoryElement<'d>> {
+        let of =
+            |one: &&StoryElement<'d>| one.node == element.node && one.context == element.context;
+        let name = element.text("name");
+        match name.and_then(|name| self.by_name.get(&*name)) {
+            Some(places) => places
+                .iter()
+                .filter_map(|place| self.elements.get(*place as usize))
+                .find(of),
+            None => self.elements.iter().find(of),
+        }
+    }
+}

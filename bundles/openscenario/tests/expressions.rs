@@ -1,0 +1,384 @@
+//! Expressions: what they are worth, and what is said about those that are worth nothing.
+
+use qcbus_openscenario::expr::{
+    Evaluated, Fault, FaultKind, Newer, Operand, Value, evaluate, is_expression, names,
+};
+
+const DELAY: &str = "${$delay + ((($x1 - $x0)* 2 + ($y1 - $y0)*2 )*0.5 / $speed) + sqrt(9)}";
+
+/// The parameters of all tests.
+fn parameter(name: &str) -> Operand {
+    let value = match name {
+        "doubleVal" | "zero" => Value::Double(0.0),
+        "delay" => Value::Double(1.5),
+        "half" | "speed" => Value::Double(0.5),
+        "x0" | "y0" | "one" => Value::Integer(1),
+        "x1" | "y1" => Value::Integer(3),
+        "smallest" => Value::Integer(i64::MIN),
+        "infinite" => Value::Double(f64::INFINITY),
+        "nan" => Value::Double(f64::NAN),
+        "yes" => Value::Boolean(true),
+        "stringParam" => return Operand::Text("string"),
+        "timeParam" => return Operand::Text("dateTime"),
+        "faulty" => return Operand::Unresolved,
+        "counter" => return Operand::Variable,
+        _ => return Operand::Undeclared,
+    };
+    Operand::Value(value)
+}
+
+fn in_version(text: &str, minor: u16) -> Result<Evaluated, Fault> {
+    evaluate(text, (1, minor), &parameter)
+}
+
+fn value(inner: &str) -> Result<Value, Fault> {
+    in_version(&format!("${{{inner}}}"), 4).map(|evaluated| evaluated.value)
+}
+
+/// The kind of a fault in a word, and where it is.
+fn fault(text: &str) -> (&'static str, usize) {
+    let Err(fault) = in_version(text, 3) else {
+        return ("no fault", 0);
+    };
+    let kind = match fault.kind {
+        FaultKind::Operator => "operator",
+        FaultKind::Arguments => "arguments",
+        FaultKind::Types => "types",
+        FaultKind::Evaluation => "evaluation",
+        FaultKind::Undeclared(_) => "undeclared",
+        FaultKind::Variable(_) => "variable",
+        FaultKind::Unresolved => "unresolved",
+        FaultKind::Limit => "limit",
+    };
+    (kind, fault.at)
+}
+
+/// What the reference implementation's own tests expect.
+#[test]
+fn the_expressions_of_the_reference_tests() {
+    for (text, kind) in [
+        ("${2/0}", "evaluation"),
+        ("${34/$doubleVal}", "evaluation"),
+        ("${pow(0,-0.5)}", "evaluation"),
+        ("${sqrt(-9)}", "evaluation"),
+        ("${pow(-3,-0.5)}", "evaluation"),
+        ("${pow(-3,0.5)}", "evaluation"),
+        ("${1.80E308}", "evaluation"),
+        ("${1.797e308 + 1e308}", "evaluation"),
+        ("${5f}", "evaluation"),
+        ("${5}}", "evaluation"),
+        ("${}", "evaluation"),
+        ("${$timeParam + 1}", "evaluation"),
+        ("${$stringParam + 1}", "evaluation"),
+        ("${powerer(2, 3)}", "operator"),
+        ("${3^$foo}", "operator"),
+        ("${2*3+4^23}", "operator"),
+        ("${1 and 1}", "types"),
+        ("${2_3}", "evaluation"),
+    ] {
+        assert_eq!(fault(text).0, kind, "{text}");
+    }
+    let delay = in_version(DELAY, 1).unwrap();
+    assert_eq!(delay.value, Value::Double(12.5));
+    assert!(delay.uses_parameters && delay.newer.is_empty() && delay.imprecise.is_none());
+    // Whether it fits its attribute is not for the expression to say.
+    assert_eq!(value("65535 +1"), Ok(Value::Integer(65536)));
+}
+
+#[test]
+fn every_line_of_the_grammar() {
+    use Value::{Boolean, Double, Integer};
+    for (inner, expected) in [
+        (" 7\t\r\n", Integer(7)),
+        ("false or true or false", Boolean(true)),
+        ("true or true and false", Boolean(true)),
+        ("not true or true", Boolean(true)),
+        ("not true and false", Boolean(false)),
+        ("not not $yes", Boolean(true)),
+        ("not(true)", Boolean(false)),
+        ("10 - 4 - 3", Integer(3)),
+        ("2 + 3 * 4", Integer(14)),
+        ("2 - -3", Integer(5)),
+        ("1--2", Integer(3)),
+        ("- - 2", Integer(2)),
+        ("-2 * -3", Integer(6)),
+        ("12 / 4 * 3", Double(9.0)),
+        ("7 / 2", Double(3.5)),
+        ("-7 % 3", Integer(-1)),
+        ("7 % -3", Integer(1)),
+        ("-7.5 % 2", Double(-1.5)),
+        ("$smallest % -1", Integer(0)),
+        ("(2 + 3) * 4", Integer(20)),
+        ("0", Integer(0)),
+        ("0.50", Double(0.5)),
+        ("1e3", Double(1000.0)),
+        ("15E-1", Double(1.5)),
+        ("1.5e+3", Double(1500.0)),
+        ("1e3+3", Double(1003.0)),
+        ("pi", Double(std::f64::consts::PI)),
+        ("$one", Integer(1)),
+        ("$one*$half", Double(0.5)),
+        ("round(2.5)", Integer(3)),
+        ("round(-2.5)", Integer(-3)),
+        ("round(0.49999999999999994)", Integer(0)),
+        ("floor(-0.5)", Integer(-1)),
+        ("ceil(35.5+1)", Integer(37)),
+        ("round(1e30)", Double(1e30)),
+        ("floor(-9223372036854775808.0)", Integer(i64::MIN)),
+        (
+            "ceil(9223372036854775808.0)",
+            Double(9_223_372_036_854_775_808.0),
+        ),
+        ("sqrt(9)", Double(3.0)),
+        ("pow(2, 3)", Double(8.0)),
+        ("pow(-2, -1)", Double(-0.5)),
+        ("sin(0) + cos(0) + tan(0)", Double(1.0)),
+        ("asin(0) + acos(1) + atan(0)", Double(0.0)),
+        ("sign(-0.5)", Integer(-1)),
+        ("sign(0.0)", Integer(0)),
+        ("abs(-3)", Integer(3)),
+        ("abs(-0.5)", Double(0.5)),
+        ("max(2, 3)", Integer(3)),
+        ("max(2, 1.0)", Double(2.0)),
+        ("min(2.5, 3)", Double(2.5)),
+        ("min($infinite, 5)", Double(5.0)),
+        ("round ( (2.5) )", Integer(3)),
+    ] {
+        assert_eq!(value(inner), Ok(expected), "{inner}");
+    }
+    let blanks = in_version(" \n${ 1 }\t", 3).unwrap();
+    assert_eq!(blanks.value, Integer(1));
+    assert!(!blanks.uses_parameters);
+}
+
+#[test]
+fn what_is_not_of_the_language_is_named_where_it_stands() {
+    for (text, kind, at) in [
+        ("${2 ** 3}", "operator", 4),
+        ("${7 // 2}", "operator", 4),
+        ("${1 == 1}", "operator", 4),
+        ("${1 <= 1}", "operator", 4),
+        ("${$one = 1}", "operator", 7),
+        ("${!true}", "operator", 2),
+        ("${true && true}", "operator", 7),
+        ("${true || true}", "operator", 7),
+        ("${'a'}", "operator", 2),
+        ("${[1]}", "operator", 2),
+        ("${1 ? 2 : 3}", "operator", 4),
+        ("${3 \u{2212} 1}", "operator", 4),
+        ("${3\u{a0}- 1}", "operator", 3),
+        ("${.}", "operator", 2),
+        ("${pi}", "operator", 2),
+        ("${e}", "operator", 2),
+        ("${speed}", "operator", 2),
+        ("${True}", "operator", 2),
+        ("${1 AND 2}", "operator", 4),
+        ("${7 mod 2}", "operator", 4),
+        ("${sin}", "arguments", 2),
+        ("${2 * sin 3}", "arguments", 6),
+        ("${sin()}", "arguments", 2),
+        ("${sin(1, 2)}", "arguments", 2),
+        ("${pow(2)}", "arguments", 2),
+        ("${pow(1,2,3)}", "arguments", 2),
+        ("${pow(,3)}", "arguments", 6),
+        ("${pow(2,)}", "arguments", 8),
+    ] {
+        assert_eq!(fault(text), (kind, at), "{text}");
+    }
+}
+
+#[test]
+fn what_cannot_be_read_or_computed_is_named_where_it_stands() {
+    for (text, kind, at) in [
+        ("5", "evaluation", 0),
+        (" $half", "evaluation", 1),
+        ("${ }", "evaluation", 3),
+        ("${1", "evaluation", 3),
+        ("${1 +", "evaluation", 5),
+        ("${1}${2}", "evaluation", 4),
+        ("${1} m", "evaluation", 5),
+        ("${(1}", "evaluation", 2),
+        ("${pow(1, 2}", "evaluation", 5),
+        ("${1)}", "evaluation", 3),
+        ("${()}", "evaluation", 3),
+        ("${1 2}", "evaluation", 4),
+        ("${2 $half}", "evaluation", 4),
+        ("${2(3)}", "evaluation", 3),
+        ("${1,5}", "evaluation", 3),
+        ("${+5}", "evaluation", 2),
+        ("${2 * }", "evaluation", 6),
+        ("${true and}", "evaluation", 10),
+        ("${$}", "evaluation", 2),
+        ("${$1}", "evaluation", 2),
+        ("${$(var x)}", "evaluation", 2),
+        ("${007}", "evaluation", 2),
+        ("${.5}", "evaluation", 2),
+        ("${5.}", "evaluation", 2),
+        ("${1.2.3}", "evaluation", 2),
+        ("${1e}", "evaluation", 2),
+        ("${1e-05}", "evaluation", 2),
+        ("${0x1F}", "evaluation", 2),
+        ("${9223372036854775808}", "evaluation", 2),
+        ("${1 + 9223372036854775807}", "evaluation", 4),
+        ("${-$smallest}", "evaluation", 2),
+        ("${abs($smallest)}", "evaluation", 2),
+        ("${1 % 0}", "evaluation", 4),
+        ("${1 % $zero}", "evaluation", 4),
+        ("${2 * asin(1.5)}", "evaluation", 6),
+        ("${acos(-2)}", "evaluation", 2),
+        ("${$infinite}", "evaluation", 2),
+        ("${sin($infinite)}", "evaluation", 2),
+        ("${max(1, $nan)}", "evaluation", 9),
+        ("${1 + true}", "types", 6),
+        ("${1 + not true}", "types", 6),
+        ("${-true}", "types", 3),
+        ("${not 1}", "types", 6),
+        ("${true or (1 + 2)}", "types", 10),
+        ("${sin($yes)}", "types", 6),
+        ("${$none}", "undeclared", 2),
+        ("${1 + $counter}", "variable", 6),
+        ("${$faulty}", "unresolved", 2),
+    ] {
+        assert_eq!(fault(text), (kind, at), "{text}");
+    }
+}
+
+#[test]
+fn the_gravest_fault_is_told_and_no_other() {
+    for (text, kind, at) in [
+        // What cannot be read goes before everything.
+        ("${$none + 1 and 2/0 ^ 2}", "operator", 20),
+        ("${$none + }", "evaluation", 10),
+        // Names go before types, types before values.
+        ("${1 and $none}", "undeclared", 8),
+        ("${not (1 + $none)}", "undeclared", 11),
+        ("${2/0 + true}", "types", 8),
+        ("${$stringParam and 1}", "types", 19),
+        // A part without a value has a type all the same.
+        ("${$faulty + true}", "types", 12),
+        ("${($faulty + 1) and true}", "types", 2),
+        ("${$faulty + 2/0}", "evaluation", 13),
+        ("${$faulty + $none}", "undeclared", 12),
+        ("${$faulty and $faulty}", "unresolved", 2),
+        // Among equals the first.
+        ("${$none + $counter}", "undeclared", 2),
+        ("${1/0 + sqrt(-1)}", "evaluation", 3),
+        ("${1 and true and 2}", "types", 2),
+    ] {
+        assert_eq!(fault(text), (kind, at), "{text}");
+    }
+    let undeclared = in_version("${$a + $b}", 1).unwrap_err();
+    assert_eq!(undeclared.kind, FaultKind::Undeclared("a".to_owned()));
+    let variable = in_version("${$counter}", 1).unwrap_err();
+    assert_eq!(variable.kind, FaultKind::Variable("counter".to_owned()));
+}
+
+#[test]
+fn faults_teach() {
+    for (text, expected) in [
+        (
+            "${3^2}",
+            "`^` does not belong to the expression language; a power is written `pow(2, 3)`",
+        ),
+        (
+            "${Sin(3)}",
+            "`Sin` does not belong to the expression language; words are case-sensitive, it is \
+             written `sin`",
+        ),
+        (
+            "${3\u{a0}* 2}",
+            "the character U+00A0 does not belong to the expression language; its signs are \
+             `+ - * / % ( ) ,`",
+        ),
+        (
+            "${2 * pi}",
+            "`pi` is a constant from version 1.4 on and the file is of 1.3; until then the number \
+             is written, 3.141592653589793",
+        ),
+        (
+            "${pow(2)}",
+            "`pow` takes two arguments, `pow(x, y)`, found 1",
+        ),
+        (
+            "${sqrt 2}",
+            "`sqrt` takes one argument, `sqrt(x)`, found no brackets",
+        ),
+        ("${1 and true}", "`and` takes booleans, found a number"),
+        ("${2 - $yes}", "`-` takes numbers, found a boolean"),
+        (
+            "${5f}",
+            "`5f` is no number: numbers are written like `2`, `0.5` or `1.5e-3`, without units \
+             and separators",
+        ),
+        (
+            "${5}}",
+            "an expression is the whole value, but `}` follows its `}`",
+        ),
+        ("${2/0}", "division by zero: the right operand of `/` is 0"),
+        ("${sqrt(-9)}", "`sqrt` takes no negative number, found -9"),
+        (
+            "${$timeParam}",
+            "`$timeParam` is of type dateTime; expressions take numbers and booleans",
+        ),
+        (
+            "${$counter}",
+            "`$counter` is a variable; expressions take parameters only",
+        ),
+    ] {
+        let fault = in_version(text, 3).unwrap_err();
+        assert_eq!(fault.to_string(), expected, "{text}");
+    }
+}
+
+#[test]
+fn the_version_decides_what_is_known() {
+    let text = "${sin(cos(0)) * sin(1) + sqrt(4) + max(1, 2)}";
+    let newer = in_version(text, 2).unwrap().newer;
+    let since = (1, 3);
+    let expected = [("sin", 2), ("cos", 6), ("max", 35)];
+    assert_eq!(newer, expected.map(|(name, at)| Newer { name, since, at }));
+    assert_eq!(in_version(text, 3).unwrap().newer, []);
+    assert_eq!(in_version("${sqrt(4)}", 0).unwrap().newer, []);
+    assert!(in_version("${pi}", 4).is_ok() && evaluate("${pi}", (2, 0), &parameter).is_ok());
+    assert_eq!(
+        in_version("${pi}", 3).unwrap_err().kind,
+        FaultKind::Operator
+    );
+}
+
+#[test]
+fn lost_digits_are_noted() {
+    for (text, at) in [
+        ("${9007199254740993 + 0.5}", Some(19)),
+        ("${1 + sqrt(9007199254740993)}", Some(6)),
+        ("${1e-200 * 1e-200}", Some(9)),
+        ("${1e-200 / 1e200}", Some(9)),
+        ("${pow(10, -400)}", Some(2)),
+        ("${1e-400}", Some(2)),
+        ("${9007199254740992 + 0.5}", None),
+        ("${9007199254740993 + 1}", None),
+        ("${0.0 * 5}", None),
+        ("${1 / $infinite}", None),
+        ("${1.5 - 1.5}", None),
+        ("${0.0e-400}", None),
+    ] {
+        let imprecise = in_version(text, 3).unwrap().imprecise;
+        assert_eq!(imprecise.map(|imprecise| imprecise.at), at, "{text}");
+    }
+}
+
+#[test]
+fn names_are_found_in_faulty_expressions_too() {
+    assert_eq!(
+        names("${$a * ($b_2+$a)}"),
+        [("a", 2), ("b_2", 8), ("a", 13)]
+    );
+    assert_eq!(
+        names(" ${2 ^^ $a$b $ $1 }${$c"),
+        [("a", 8), ("b", 10), ("c", 21)]
+    );
+    assert_eq!(names("costs $five"), []);
+    assert_eq!(names("${é$é$x"), [("x", 7)]);
+    assert!(is_expression(" \t\r\n${") && is_expression("${1}"));
+    assert!(!is_expression("$a") && !is_expression("a ${1}") && !is_expression("\u{a0}${1}"));
+}
