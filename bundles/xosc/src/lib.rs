@@ -6,6 +6,7 @@
 
 mod examples;
 mod families;
+mod model;
 mod rules;
 
 use qcbus_document::FileKind;

@@ -5,6 +5,8 @@
 use qcbus_sdk::AnyRule;
 
 mod naming_unique_element_names_on_same_level;
+mod parameters_parameter_declaration_parameter_scope;
+mod reference_control_resolvable_entity_references;
 mod reference_control_unique_element_names_on_same_level;
 mod xml_fileheader_is_present;
 mod xml_root_tag_is_openscenario;
@@ -24,4 +26,6 @@ pub static RULES: &[&dyn AnyRule] = &[
     &xml_valid_schema::RULE,
     &reference_control_unique_element_names_on_same_level::RULE,
     &naming_unique_element_names_on_same_level::RULE,
+    &reference_control_resolvable_entity_references::RULE,
+    &parameters_parameter_declaration_parameter_scope::RULE,
 ];

@@ -1,0 +1,23 @@
+use qcbus_openscenario::{Form, Scenario, ValueFaultKind};
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::families::values;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_parameters_parameter_declaration_parameter_scope",
+    uids: &["asam.net:xosc:1.1.0:parameters.parameter_declaration_parameter_scope"],
+    versions: "1.1.0..",
+    backport: Backport::Alike { since: "" },
+    after: super::READABLE,
+    page: include_str!("parameters_parameter_declaration_parameter_scope.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    // What is undeclared in a catalog is said by the rule about catalogs.
+    if scenario.form() != Form::Catalog {
+        values::report(scenario, &[ValueFaultKind::Undeclared], found);
+    }
+}

@@ -1,0 +1,31 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::families::references::{self, ENTITY_REFERENCES};
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_reference_control_resolvable_entity_references",
+    uids: &["asam.net:xosc:1.2.0:reference_control.resolvable_entity_references"],
+    versions: "1.2.0..",
+    backport: Backport::Alike { since: "" },
+    after: super::READABLE,
+    page: include_str!("reference_control_resolvable_entity_references.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let entities = scenario.entities();
+    for (element, attribute) in ENTITY_REFERENCES {
+        for reference in scenario.elements_everywhere(element) {
+            let Some(name) = reference.text(attribute) else {
+                continue;
+            };
+            if !entities.contains(&name) {
+                let names = entities.names();
+                references::unresolved(reference, attribute, &name, "entity", names, found);
+            }
+        }
+    }
+}
