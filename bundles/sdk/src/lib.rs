@@ -15,6 +15,7 @@ mod param;
 mod place;
 mod plan;
 mod resource;
+pub mod robust;
 mod rule;
 pub mod run;
 mod seen;

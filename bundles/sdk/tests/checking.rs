@@ -72,6 +72,14 @@ static SEPARATE: Rule<Document> = Rule {
     run: every_road,
     ..Rule::DEFAULTS
 };
+static ALIKE: Rule<Document> = Rule {
+    id: "alike",
+    uids: &["x:xodr:1.8.0:a.k"],
+    versions: "1.8.0..",
+    backport: Backport::Alike { since: "" },
+    run: every_road,
+    ..Rule::DEFAULTS
+};
 static WITH_PARAM: Rule<Document> = Rule {
     id: "with_param",
     uids: &["x:xodr:1.0.0:a.i"],
@@ -111,6 +119,7 @@ static RULES: &[&dyn AnyRule] = &[
     &NEWER,
     &LOWERED,
     &SEPARATE,
+    &ALIKE,
     &WITH_PARAM,
     &ON_NO_MODEL,
 ];
@@ -190,7 +199,7 @@ fn a_panic_is_that_checkers_error_and_keeps_what_was_found() {
     );
     assert_eq!(
         checked(|_| true, |_, _| None).len(),
-        RULES.len() + 1,
+        RULES.len() + 2,
         "the others go on"
     );
 }
@@ -229,6 +238,12 @@ fn versions_gate_and_backports_lower() {
     assert_eq!(
         (backport.status(), backport.issues[0].level),
         (Status::Completed, Level::Warning)
+    );
+    assert_eq!(of("alike").status(), Status::Skipped);
+    let alike = of("alike_backport");
+    assert_eq!(
+        (alike.issues[0].level, alike.issues[0].description.as_str()),
+        (Level::Error, "a road")
     );
 }
 
