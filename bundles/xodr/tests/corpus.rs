@@ -1,22 +1,14 @@
 //! The recorded results of ASAM's own OpenDRIVE bundle, where they are at hand.
 
-#![expect(
-    clippy::panic,
-    clippy::print_stdout,
-    reason = "a test may fail and say why it did not run"
-)]
-
-mod common;
-
-use std::fmt::Write;
 use std::path::Path;
 
-use common::{CASES, Deviation, agrees_or_says};
-use qcbus_sdk::Bundle;
-use qcbus_sdk::corpus::{self, Comparison, compare_asam_cases, compare_real_files, settle};
+use qcbus_sdk::corpus::{Deviations, Parity};
+
+/// Where the recorded results lie, if they are at hand.
+const CASES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/cases");
 
 /// The page that shows where we agree and where we do not.
-const PARITY: &str = concat!(
+const PAGE: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
     "/../../docs/evidence/parity-opendrive.md"
 );
@@ -42,8 +34,8 @@ const NO_WIDTH: &str = "the lane has no width where it is linked, so it has no e
      its link is reported by `new_lane_appear` and `zero_width_at_…`";
 
 /// Where we differ, and why ours is right.
-const DEVIATIONS: &[Deviation] = &[
-    Deviation {
+const DEVIATIONS: &[Deviations] = &[
+    Deviations {
         checker: CONTACT,
         inputs: &[
             "road_geometry_param_poly3_length_match_invalid.xodr",
@@ -64,7 +56,7 @@ const DEVIATIONS: &[Deviation] = &[
         ],
         reason: NO_LINK,
     },
-    Deviation {
+    Deviations {
         checker: CONTACT,
         inputs: &[
             "junction_connection_linkage_invalid.xodr",
@@ -80,49 +72,49 @@ const DEVIATIONS: &[Deviation] = &[
         ],
         reason: CONNECTING,
     },
-    Deviation {
+    Deviations {
         checker: ACROSS,
         inputs: &["road_lane_link_new_lane_appear_both_start_contact_point_invalid.xodr"],
         reason: "one link is missing; ASAM's checker reports it twice, once from either road",
     },
-    Deviation {
+    Deviations {
         checker: ACROSS,
         inputs: &["valid_schema/positive18.xodr", "many_invalid.xodr"],
         reason: UNLINKED,
     },
-    Deviation {
+    Deviations {
         checker: GAPS,
         inputs: &["road_geometry_elem_asc_order/invalid.xodr"],
         reason: "the geometries are listed in the wrong order, which is reported; taken by their s, each \
              starts where the one before it ends",
     },
-    Deviation {
+    Deviations {
         checker: GAPS,
         inputs: &["aV_invalid.xodr", "bV_invalid.xodr"],
         reason: "the curve really starts or ends elsewhere than its neighbour; ASAM's checker compares with \
              x and y of the geometry instead, and only where a road has three geometries",
     },
-    Deviation {
+    Deviations {
         checker: GAPS,
         inputs: &["performance_avoid_redundant_info_lane_width_invalid.xodr"],
         reason: "the third is a biking lane that is not advisory; annex D.1 does not count it as drivable",
     },
-    Deviation {
+    Deviations {
         checker: GAPS,
         inputs: &["junction_connection_linkage_invalid.xodr"],
         reason: CROSSED,
     },
-    Deviation {
+    Deviations {
         checker: GAPS,
         inputs: &["junctions_connection_one_connection_element_invalid.xodr"],
         reason: "the linked lanes are 58 mm and 20 mm apart; ASAM's checker passes over them",
     },
-    Deviation {
+    Deviations {
         checker: GAPS,
         inputs: &["Ex_Entry_Exit.xodr"],
         reason: "the lanes are 20 mm apart at a direct junction, which ASAM's checker does not look at",
     },
-    Deviation {
+    Deviations {
         checker: GAPS,
         inputs: &[
             "road_lane_link_new_lane_appear_end_contact_point_invalid.xodr",
@@ -130,12 +122,12 @@ const DEVIATIONS: &[Deviation] = &[
         ],
         reason: NO_WIDTH,
     },
-    Deviation {
+    Deviations {
         checker: REDUNDANT,
         inputs: &["valid_schema/positive18.xodr"],
         reason: "one more: two lines in one direction whose headings are written a full turn apart",
     },
-    Deviation {
+    Deviations {
         checker: REDUNDANT,
         inputs: &["lane_gap_example_issue_119.xodr"],
         reason: "the records change the width by less than a micrometre over the metre for which they hold; \
@@ -143,36 +135,9 @@ const DEVIATIONS: &[Deviation] = &[
     },
 ];
 
-#[test]
-fn agrees_with_what_is_recorded() {
-    let cases = recorded(compare_asam_cases, DEVIATIONS);
-    let maps = recorded(compare_real_files, ON_REAL_MAPS);
-    if let Some((cases, maps)) = cases.zip(maps) {
-        agrees_or_says(Path::new(PARITY), &page(&cases, &maps));
-    }
-}
-
-type Compare = fn(&'static Bundle, &Path) -> Result<Option<Vec<Comparison>>, String>;
-
-/// The recorded results with ours, of which only declared ones differ; `None` when they are not at
-/// hand.
-fn recorded(compare: Compare, deviations: &[Deviation]) -> Option<Vec<Comparison>> {
-    let comparisons = match compare(&qcbus_xodr::BUNDLE, Path::new(CASES)) {
-        Ok(comparisons) => comparisons,
-        Err(error) => panic!("{error}"),
-    };
-    let Some(comparisons) = comparisons else {
-        println!("skipped: {CASES} is not there");
-        return None;
-    };
-    let each: Vec<corpus::Deviation> = deviations.iter().flat_map(Deviation::each).collect();
-    settle(&qcbus_xodr::BUNDLE, &comparisons, &each);
-    Some(comparisons)
-}
-
 /// Where we differ on the maps of other projects, and why ours is right.
-const ON_REAL_MAPS: &[Deviation] = &[
-    Deviation {
+const ON_REAL_MAPS: &[Deviations] = &[
+    Deviations {
         checker: ACROSS,
         inputs: &[
             "linux-files/UC_Motorway-Exit-Entry.xodr",
@@ -180,23 +145,23 @@ const ON_REAL_MAPS: &[Deviation] = &[
         ],
         reason: UNLINKED,
     },
-    Deviation {
+    Deviations {
         checker: SCHEMA,
         inputs: &["straight_500m_signs_lht.xodr"],
         reason: "the objects have a radius, a width and a length at once, which the schema of 1.8.1 \
              forbids; the recorded bundle validates against 1.8.0",
     },
-    Deviation {
+    Deviations {
         checker: "check_asam_xodr_road_linkage_is_junction_needed",
         inputs: &["fabriksgatan_mixed_id_types.xodr"],
         reason: NOT_NUMBERS,
     },
-    Deviation {
+    Deviations {
         checker: ACROSS,
         inputs: &["fabriksgatan_mixed_id_types.xodr"],
         reason: NOT_NUMBERS,
     },
-    Deviation {
+    Deviations {
         checker: ACROSS,
         inputs: &[
             "Unittest/xodr/multi_intersections.xodr",
@@ -206,19 +171,19 @@ const ON_REAL_MAPS: &[Deviation] = &[
         ],
         reason: "each missing link once; ASAM's checker reports it twice, once from either road",
     },
-    Deviation {
+    Deviations {
         checker: "check_asam_xodr_road_lane_link_new_lane_appear",
         inputs: &["highway_merge.xodr"],
         reason: "ASAM's checker crashes on a lane link to a lane that does not exist, which \
              `ids_only_ref_defined_ids` reports",
     },
-    Deviation {
+    Deviations {
         checker: "check_asam_xodr_road_lane_link_new_lane_appear",
         inputs: &["parking_demo.xodr"],
         reason: "one of the two lanes has no width all along, so it does not appear; that it is linked is \
              reported by `zero_width_at_…`",
     },
-    Deviation {
+    Deviations {
         checker: REDUNDANT,
         inputs: &[
             "linux-files/UC_Motorway-Exit-Entry.xodr",
@@ -228,66 +193,21 @@ const ON_REAL_MAPS: &[Deviation] = &[
     },
 ];
 
-/// The parity page: per collection a table of checkers, and every deviation with its reason.
-fn page(cases: &[Comparison], maps: &[Comparison]) -> String {
-    let mut page = String::from(
-        "# Parity with ASAM's OpenDRIVE bundle\n\n\
+const PARITY: Parity = Parity {
+    bundle: &qcbus_xodr::BUNDLE,
+    introduction: "# Parity with ASAM's OpenDRIVE bundle\n\n\
          Generated by `QCBUS_BLESS=1 cargo test -p qcbus-xodr --test corpus` from recorded results of\n\
          ASAM's bundle (qc-opendrive 1.0.0), checked by the same test wherever those are at hand. A\n\
          deviation is a result in which ours differs on purpose; in each of them ours is right, for the\n\
          reason given. Where ASAM's checkers were silenced by a finding about the schema, ours may run.\n",
-    );
-    page.push_str(
-        "\n## ASAM's own test files\n\n\
-         A result agrees when status, number and levels of the issues are the same and the XPaths select\n\
-         the same elements; ours may name further places.\n",
-    );
-    collection(&mut page, cases, DEVIATIONS);
-    page.push_str(
-        "\n## Maps of other projects\n\n\
+    on_cases: DEVIATIONS,
+    about_real_files: "\n## Maps of other projects\n\n\
          A result agrees when the status and the number of issues are the same. The recorded bundle is the\n\
          published one, which lacks three of the checkers.\n",
-    );
-    collection(&mut page, maps, ON_REAL_MAPS);
-    page
-}
+    on_real_files: ON_REAL_MAPS,
+};
 
-fn collection(page: &mut String, comparisons: &[Comparison], deviations: &[Deviation]) {
-    page.push_str("\n| checker | results | agree | deviations |\n|---|---:|---:|---:|\n");
-    let mut checkers: Vec<&str> = comparisons.iter().map(|one| one.checker.as_str()).collect();
-    checkers.sort_unstable();
-    checkers.dedup();
-    for checker in &checkers {
-        let of_checker = comparisons.iter().filter(|one| one.checker == *checker);
-        let (all, differ) = of_checker.fold((0, 0), |(all, differ), one| {
-            (all + 1, differ + u32::from(one.difference.is_some()))
-        });
-        _ = writeln!(
-            page,
-            "| `{checker}` | {all} | {} | {differ} |",
-            all - differ
-        );
-    }
-    let differ = comparisons.iter().filter(|one| one.difference.is_some());
-    let differ = differ.count();
-    _ = writeln!(
-        page,
-        "\n{} results, {differ} deviations:",
-        comparisons.len()
-    );
-    for deviation in deviations {
-        _ = writeln!(page, "\n`{}`: {}.\n", deviation.checker, deviation.reason);
-        for input in deviation.inputs {
-            let hit = comparisons.iter().find(|one| {
-                one.checker == deviation.checker
-                    && one.input.ends_with(input)
-                    && one.difference.is_some()
-            });
-            if let Some((path, difference)) =
-                hit.and_then(|one| Some((&one.input, one.difference.as_ref()?)))
-            {
-                _ = writeln!(page, "- `{path}`: {}", difference.trim_end_matches(" ()"));
-            }
-        }
-    }
+#[test]
+fn agrees_with_what_is_recorded() {
+    PARITY.assert(Path::new(CASES), Path::new(PAGE));
 }

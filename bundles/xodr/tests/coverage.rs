@@ -3,10 +3,11 @@
 
 #![expect(clippy::unwrap_used, reason = "in a test it is a finding")]
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
 
+use qcbus_sdk::corpus::agrees_or_says;
 use qcbus_sdk::pages::evidence;
 use qcbus_xodr::BUNDLE;
 
@@ -14,35 +15,11 @@ const ANNEX: &str = include_str!("../annex_f.tsv");
 
 /// Rules that the standard prints, with the reason for those that cannot be checked.
 fn annex() -> Vec<(&'static str, Option<&'static str>)> {
-    ANNEX
-        .lines()
-        .filter(|line| !line.starts_with('#') && !line.is_empty())
-        .map(|line| match line.split_once('\t') {
-            Some((uid, why)) => (uid, Some(why)),
-            None => (line, None),
-        })
-        .collect()
-}
-
-/// By UID: the checker that addresses it, and whether it fires under this very UID.
-fn evidence_by_uid() -> BTreeMap<&'static str, (&'static str, bool)> {
-    let fired = evidence::fired(&BUNDLE);
-    let mut all: BTreeMap<&'static str, (&'static str, bool)> = BTreeMap::new();
-    for rule in BUNDLE.rules {
-        let facts = rule.facts();
-        for uid in facts.uids {
-            let proven = fired.get(facts.id).is_some_and(|uids| uids.contains(*uid));
-            let entry = all.entry(uid).or_insert((facts.id, proven));
-            if proven && !entry.1 {
-                *entry = (facts.id, true);
-            }
-        }
-    }
-    all
+    evidence::listed(ANNEX)
 }
 
 fn table() -> String {
-    let evidence = evidence_by_uid();
+    let evidence = evidence::by_uid(&BUNDLE);
     let annex = annex();
     let known: BTreeSet<&str> = annex.iter().map(|(uid, _)| *uid).collect();
     let (mut own, mut twins, mut definitions, mut open) = (0, 0, 0, 0);
@@ -91,16 +68,7 @@ fn table() -> String {
 #[test]
 fn the_table_of_rules_is_true() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
-    let table = table();
-    if std::env::var_os("QCBUS_BLESS").is_some() {
-        std::fs::write(&path, &table).unwrap();
-    }
-    let written = std::fs::read_to_string(&path).unwrap_or_default();
-    assert!(
-        written == table,
-        "{} is not what the rules prove; QCBUS_BLESS=1 rewrites it",
-        path.display()
-    );
+    agrees_or_says(&path, &table());
 }
 
 #[test]

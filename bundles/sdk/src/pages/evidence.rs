@@ -85,6 +85,38 @@ fn stage(bundle: &'static Bundle, rule: &str, example: &Example) -> Option<Stage
     Staged::new(bundle, example, version).ok()
 }
 
+/// By UID: the checker that addresses it, and whether it finds something under this very UID in its own
+/// bad examples.
+pub fn by_uid(bundle: &'static Bundle) -> BTreeMap<&'static str, (&'static str, bool)> {
+    let fired = fired(bundle);
+    let mut all: BTreeMap<&'static str, (&'static str, bool)> = BTreeMap::new();
+    for rule in bundle.rules {
+        let facts = rule.facts();
+        for uid in facts.uids {
+            let proven = fired.get(facts.id).is_some_and(|uids| uids.contains(*uid));
+            let entry = all.entry(uid).or_insert((facts.id, proven));
+            if proven && !entry.1 {
+                *entry = (facts.id, true);
+            }
+        }
+    }
+    all
+}
+
+/// The lines of a list of rules: a UID and, after a tab, why it cannot be checked. Lines that begin
+/// with `#` are comments.
+pub fn listed(list: &'static str) -> Vec<(&'static str, Option<&'static str>)> {
+    let lines = list
+        .lines()
+        .filter(|line| !line.starts_with('#') && !line.is_empty());
+    lines
+        .map(|line| match line.split_once('\t') {
+            Some((uid, why)) => (uid, Some(why)),
+            None => (line, None),
+        })
+        .collect()
+}
+
 struct Heard<'p> {
     plan: &'p Plan,
     rule: &'p str,

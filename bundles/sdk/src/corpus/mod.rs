@@ -1,5 +1,7 @@
 //! Compares a bundle with recorded results of ASAM's own, for tests.
 
+mod parity;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -10,6 +12,8 @@ use serde_json::Value;
 
 use crate::run::examine;
 use crate::{Bundle, Loaded, Plan};
+
+pub use parity::{Deviations, Parity, agrees_or_says};
 
 /// A case in which we differ from the recorded result on purpose.
 #[derive(Debug, Clone, Copy)]
@@ -64,34 +68,6 @@ pub fn compare_asam_cases(
         }));
     }
     Ok(Some(comparisons))
-}
-
-/// Fails the running test when a checker of the bundle disagrees with the cases in
-/// `cases/asam-cases.json` about its status, the number and levels of its issues or the nodes they
-/// point at, and no deviation is declared; or when a declared deviation does not occur.
-///
-/// Where the recorded checker was skipped because the schema's checker had found something, ours may
-/// run: a schema finding does not silence the other rules. Without the cases it says so and passes.
-/// Returns what was compared.
-///
-/// # Panics
-/// With all disagreements.
-#[expect(clippy::panic, reason = "it is an assertion for tests")]
-pub fn assert_asam_cases(
-    bundle: &'static Bundle,
-    cases: &Path,
-    deviations: &[Deviation],
-) -> Vec<Comparison> {
-    let comparisons = match compare_asam_cases(bundle, cases) {
-        Ok(Some(comparisons)) => comparisons,
-        Ok(None) => {
-            crate::run::complain(&format!("skipped: {} is not there\n", cases.display()));
-            return Vec::new();
-        }
-        Err(error) => panic!("{error}"),
-    };
-    settle(bundle, &comparisons, deviations);
-    comparisons
 }
 
 /// Compares a bundle with what ASAM's found on the files of other projects, recorded in
