@@ -36,10 +36,15 @@ impl Driver {
     fn write_one_shared(&mut self, name: &str) {
         let number = self.dice.roll() >> 8;
         let content = match name {
+            CATALOG if self.dice.below(4) == 0 => Content::OtherCatalog(number),
             CATALOG => Content::Catalog(number, mark(&mut self.dice)),
             _ if SHARED_PARTS.contains(&name) => Content::Part(number, mark(&mut self.dice)),
-            _ if self.dice.below(3) == 0 => Content::Marked(number),
-            _ => Content::Good(number),
+            _ => match self.dice.below(6) {
+                0 => Content::Marked(number),
+                1 => Content::Elsewhere(number),
+                2 | 3 => Content::Including(number, SHARED_PARTS[0].to_owned()),
+                _ => Content::Good(number),
+            },
         };
         self.put(name, content, "share");
     }

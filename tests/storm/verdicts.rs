@@ -82,6 +82,12 @@ struct Judge<'a> {
 }
 
 impl Judge<'_> {
+    /// Whether nobody who had to judge would have found a fault in what refers to this.
+    fn leaves_whole(&self, part: &Content) -> bool {
+        let checker = part.spoils();
+        checker.is_none_or(|it| it == STRICT && !self.strict)
+    }
+
     /// Whether nobody who had to judge would have found a fault in this by itself.
     fn passes(&self, content: &Content) -> bool {
         let checker = content.checker();
@@ -138,13 +144,16 @@ impl Judge<'_> {
         match self.ledger.content(digest) {
             // Half-written.
             None => None,
-            Some(content) if self.strict && !content.is_clean() => {
-                Some("accepted, and a part of it is marked")
+            Some(content) if !self.leaves_whole(content) => {
+                Some("accepted, and a part of it spoils it")
             }
             Some(_) if !self.ledger.has_held(part, digest, self.seen.at) => {
                 Some("accepted, and these bytes of a part never lay there")
             }
-            Some(_) => None,
+            Some(content) => {
+                let further = content.parts();
+                further.iter().find_map(|part| self.wrong_part(told, part))
+            }
         }
     }
 
@@ -163,23 +172,21 @@ impl Judge<'_> {
         if let wrong @ Some(_) = self.wrong_acceptance(name, digest) {
             return wrong;
         }
-        let may_pass = |part: &String| {
-            let mut there = self
-                .ledger
-                .seen(part, self.seen.from, self.seen.at)
-                .into_iter();
-            there.any(|it| match it {
-                Held::Bytes(digest) => {
-                    let content = self.ledger.content(digest);
-                    !self.strict || content.is_none_or(Content::is_clean)
-                }
-                Held::Unfinished => true,
-                Held::Nothing => false,
-            })
-        };
         let parts = self.ledger.content(digest)?.parts();
-        let wrong = "accepted, and all the time a part of it was marked or not there";
-        (!parts.iter().all(may_pass)).then_some(wrong)
+        let wrong = "accepted, and all the time a part of it spoilt it or was not there";
+        (!parts.iter().all(|part| self.may_pass(part))).then_some(wrong)
+    }
+
+    /// Whether a part, with all that it depends on, was such for a moment that it spoils nothing.
+    fn may_pass(&self, part: &str) -> bool {
+        let there = self.ledger.seen(part, self.seen.from, self.seen.at);
+        there.into_iter().any(|it| match it {
+            Held::Bytes(digest) => self.ledger.content(digest).is_none_or(|content| {
+                self.leaves_whole(content) && content.parts().iter().all(|part| self.may_pass(part))
+            }),
+            Held::Unfinished => true,
+            Held::Nothing => false,
+        })
     }
 }
 
@@ -200,7 +207,7 @@ pub fn innocent_dead<'h>(
 mod tests {
     use super::super::ledger::digest;
     use super::*;
-    use crate::support::content::Mark;
+    use crate::support::content::{CATALOG, Mark};
 
     /// A map was written, then what it includes got the word, and all that is told to the judge.
     struct Case {
@@ -240,6 +247,7 @@ mod tests {
         let clean = accepted(&Content::Part(2, Mark::Clean));
         assert!(!is_wrong(&clean));
         assert!(is_wrong(&accepted(&Content::Part(2, Mark::Marked))));
+        assert!(is_wrong(&accepted(&Content::Elsewhere(2))));
         let changes: [fn(&mut Told); 6] = [
             |told| told.bundles.truncate(1),
             |told| told.failed.push(JUDGE.to_owned()),
@@ -253,6 +261,50 @@ mod tests {
             change(&mut case.told);
             assert!(is_wrong(&case), "change {number} is let pass");
         }
+    }
+
+    /// A scenario on a map that includes a part, and a catalog.
+    fn accepted_scenario(part: &Content, catalog: &Content) -> Case {
+        let mut case = accepted(part);
+        let scenario = Content::Scenario(3, "a.xodr".to_owned());
+        case.ledger.note("s.xosc", Duration::ZERO, Some(&scenario));
+        case.ledger.note(CATALOG, Duration::ZERO, Some(catalog));
+        case.told.name = "s.xosc".to_owned();
+        case.told.bundles = vec!["xoscBundle".to_owned(), JUDGE.to_owned()];
+        let map = Content::Including(1, "part.xml".to_owned());
+        let further = [
+            ("/farm/a.xodr", &map),
+            ("/farm/catalogs/vehicles.xosc", catalog),
+        ];
+        let further =
+            further.map(|(path, content)| (path.to_owned(), Some(digest(&content.bytes()))));
+        case.told.depends_on.extend(further);
+        case.told.digest = digest(&scenario.bytes());
+        case.at = case.ledger.now();
+        case
+    }
+
+    #[test]
+    fn what_a_part_includes_and_what_a_catalog_lacks_spoils_a_scenario() {
+        let (part, catalog) = (
+            Content::Part(2, Mark::Clean),
+            Content::Catalog(4, Mark::Clean),
+        );
+        assert!(!is_wrong(&accepted_scenario(&part, &catalog)));
+        assert!(is_wrong(&accepted_scenario(
+            &Content::Part(2, Mark::Marked),
+            &catalog
+        )));
+        assert!(is_wrong(&accepted_scenario(
+            &part,
+            &Content::OtherCatalog(4)
+        )));
+        let mut hidden = accepted_scenario(&part, &catalog);
+        hidden
+            .told
+            .depends_on
+            .retain(|(path, _)| !path.ends_with("part.xml"));
+        assert!(is_wrong(&hidden));
     }
 
     #[test]

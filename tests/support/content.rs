@@ -23,8 +23,12 @@ pub enum Content {
     Including(u64, String),
     /// A road for others to include, with the word or without. No file to check.
     Part(u64, Mark),
+    /// A good map, but not one that scenarios here can use: its road has another id.
+    Elsewhere(u64),
     /// A catalog, with the word or without.
     Catalog(u64, Mark),
+    /// A good catalog that lacks the vehicle of the scenarios.
+    OtherCatalog(u64),
     /// A scenario on a map; its vehicles come from the catalogs in [`CATALOGS`].
     Scenario(u64, String),
 }
@@ -105,7 +109,14 @@ impl Content {
                 let road = one_road(2, 200, &name(*number, *mark));
                 format!("{XML}<OpenDRIVE>\n{road}</OpenDRIVE>\n")
             }
+            Content::Elsewhere(number) => {
+                let road = one_road(9, 0, &name(*number, Mark::Clean));
+                format!("{XML}<OpenDRIVE>\n{HEADER}\n{road}</OpenDRIVE>\n")
+            }
             Content::Catalog(number, mark) => CATALOG_TEXT.replace("NUMBER", &name(*number, *mark)),
+            Content::OtherCatalog(number) => CATALOG_TEXT
+                .replace("NUMBER", &number.to_string())
+                .replace("delivery_van", "sold_van"),
             Content::Scenario(number, map) => SCENARIO_TEXT
                 .replace("NUMBER", &number.to_string())
                 .replace("MAP", map),
@@ -115,7 +126,7 @@ impl Content {
 
     /// What must be found, whatever its parts are.
     pub fn verdict(&self) -> Verdict {
-        if self.is_clean() && self.checker().is_none() {
+        if self.checker().is_none() {
             Verdict::Accepted
         } else {
             Verdict::Rejected
@@ -129,7 +140,11 @@ impl Content {
             Content::NoVersion(_) => Some("check_asam_xodr_xml_version_is_defined"),
             Content::WrongRoot(_) => Some("check_asam_xodr_xml_root_tag_is_opendrive"),
             Content::Torn(_) => Some("xml_valid_xml_document"),
-            Content::Good(_) | Content::Including(..) | Content::Scenario(..) => None,
+            Content::Good(_)
+            | Content::Including(..)
+            | Content::Scenario(..)
+            | Content::Elsewhere(_)
+            | Content::OtherCatalog(_) => None,
             Content::Marked(_) => Some(STRICT),
             Content::Part(_, mark) | Content::Catalog(_, mark) => match mark {
                 Mark::Clean => None,
@@ -138,15 +153,19 @@ impl Content {
         }
     }
 
-    /// Whether the word that `judges_strictly` rejects is not in it.
-    pub fn is_clean(&self) -> bool {
-        !matches!(
-            self,
-            Content::Marked(_) | Content::Part(_, Mark::Marked) | Content::Catalog(_, Mark::Marked)
-        )
+    /// The checker, or how its name ends, that finds a fault in whatever refers to this.
+    pub fn spoils(&self) -> Option<&'static str> {
+        match self {
+            Content::Marked(_)
+            | Content::Part(_, Mark::Marked)
+            | Content::Catalog(_, Mark::Marked) => Some(STRICT),
+            Content::Elsewhere(_) => Some("reference_control_road_lane_exists"),
+            Content::OtherCatalog(_) => Some("reference_control_catalog_reference_resolvability"),
+            _ => None,
+        }
     }
 
-    /// What else its verdict depends on, by name.
+    /// What else its verdict depends on, by name; those may depend on more.
     pub fn parts(&self) -> Vec<String> {
         match self {
             Content::Including(_, part) => vec![part.clone()],

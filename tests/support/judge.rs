@@ -40,15 +40,31 @@ pub fn judge(farm: &Farm, files: &Files, strangers: &[&str]) -> Judgement {
 pub fn judge_with(farm: &Farm, files: &Files, parts: &Files, strangers: &[&str]) -> Judgement {
     let mut judgement = Judgement::default();
     for (name, content) in files {
-        let clean = |name: &String| {
-            let part = files.get(name).or_else(|| parts.get(name));
-            part.is_some_and(Content::is_clean)
-        };
-        let parts_are_clean = content.parts().iter().all(clean);
-        judgement.file(farm, name, content, parts_are_clean, strangers);
+        let all = with_their_parts(content, |name| files.get(name).or_else(|| parts.get(name)));
+        let spoilt = all.iter().find_map(|(_, part)| match part {
+            Some(part) => part.spoils(),
+            None => Some(STRICT),
+        });
+        judgement.file(farm, name, content, spoilt, strangers);
     }
     judgement.nothing_else(farm, files);
     judgement
+}
+
+/// All that a file depends on, by name, the parts of its parts as well: a scenario on a map that
+/// includes something. `None` for what is not there.
+fn with_their_parts<'c>(
+    content: &Content,
+    get: impl Fn(&str) -> Option<&'c Content>,
+) -> BTreeMap<String, Option<&'c Content>> {
+    let mut found = BTreeMap::new();
+    let mut open = content.parts();
+    while let Some(name) = open.pop() {
+        let part = get(&name);
+        open.extend(part.map(Content::parts).unwrap_or_default());
+        found.insert(name, part);
+    }
+    found
 }
 
 impl Judgement {
@@ -68,7 +84,7 @@ impl Judgement {
         farm: &Farm,
         name: &str,
         content: &Content,
-        parts_are_clean: bool,
+        by_parts: Option<&'static str>,
         strangers: &[&str],
     ) {
         let bytes = content.bytes();
@@ -88,7 +104,6 @@ impl Judgement {
             );
         }
         let (complete, foreign) = self.is_complete(farm, name, strangers);
-        let by_parts = (!parts_are_clean).then_some(STRICT);
         let checker = content.checker().or(by_parts);
         if complete && !expected_rule_fired(farm, name, checker) {
             self.complain(name, format!("the fault was not found: {content:?}"));
@@ -164,7 +179,8 @@ impl Judgement {
             }
             if accepted {
                 needed.insert(name.clone());
-                needed.extend(content.parts());
+                let get = |name: &str| files.get(name).or_else(|| parts.get(name));
+                needed.extend(with_their_parts(content, get).into_keys());
             }
         }
         for (name, content) in parts.iter().filter(|(name, _)| needed.contains(*name)) {
