@@ -1,5 +1,6 @@
 //! Compares a bundle with recorded results of ASAM's own, for tests.
 
+mod findings;
 mod parity;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,6 +14,7 @@ use serde_json::Value;
 use crate::run::examine;
 use crate::{Bundle, Loaded, Plan};
 
+pub use findings::print_findings;
 pub use parity::{Deviations, Parity, agrees_or_says};
 
 /// A case in which we differ from the recorded result on purpose.
