@@ -17,6 +17,9 @@ pub struct ValueFault<'d> {
     pub name: String,
     /// What was found and what is allowed: a sentence fragment without the attribute's name.
     pub text: String,
+    /// Whether the schema's checker says it as well: what is written is no value of the attribute's
+    /// type, whatever the parameters are.
+    pub said_by_schema: bool,
 }
 
 /// What is wrong with a value. Each kind is one rule's.

@@ -342,6 +342,7 @@ impl<'d> Scenario<'d> {
             at: problem.at,
             name: problem.name.clone(),
             text: problem.text.clone(),
+            said_by_schema: self.is_foreign_to_schema(attribute),
         };
         if fault.kind == ValueFaultKind::Undeclared {
             let element = self.element(attribute.node());
@@ -358,6 +359,28 @@ impl<'d> Scenario<'d> {
             }
         }
         fault
+    }
+
+    /// Whether the attribute's type in the schema admits nothing of the form in which it is written.
+    fn is_foreign_to_schema(&self, attribute: Attribute<'d>) -> bool {
+        let value = self.typing(0).and_then(|typing| typing.value(attribute));
+        let Some(value) = value else {
+            return false;
+        };
+        let data_type = match (value.words(), value.name().and_then(DataType::of_schema)) {
+            (None, None | Some(DataType::String)) => return false,
+            (Some(_), _) => None,
+            (None, data_type) => data_type,
+        };
+        let raw = attribute.value();
+        match reading::Form::of(raw) {
+            reading::Form::Literal | reading::Form::Parameter(_) => false,
+            reading::Form::Embedded(..) | reading::Form::Ros(_) => true,
+            reading::Form::Expression => {
+                let takes_one = data_type.is_some_and(|one| one != DataType::DateTime);
+                !takes_one || self.version < (1, 1) || !expr::is_of_schema(raw)
+            }
+        }
     }
 
     fn declares_variable(&self, name: &str) -> bool {

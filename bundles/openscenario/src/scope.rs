@@ -166,7 +166,8 @@ impl<'d> Context<'d> {
             .into_iter()
             .flat_map(|block| block.children_named("ParameterDeclaration"));
         let mut later = later.skip_while(|other| *other != node);
-        if later.any(|other| other.attr("name") == Some(problem.name.as_str())) {
+        let is_it = |name: &str| name.strip_prefix('$').unwrap_or(name) == problem.name;
+        if later.any(|other| other.attr("name").is_some_and(is_it)) {
             problem.kind = ValueFaultKind::Order;
             problem.text = format!(
                 "`${}` is declared only here or further down; a declaration may use parameters that are \

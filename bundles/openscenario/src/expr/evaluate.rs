@@ -3,9 +3,11 @@
 //! One pass finds the types, the value and the gravest fault. Whatever goes wrong in a part, its
 //! type is known in most cases, so that the types around it are checked all the same.
 
+use std::f64::consts::PI;
+
 use super::arithmetic::{self, Number};
 use super::tree::{Link, Node, NodeKind};
-use super::words::{Action, Function};
+use super::words::{Action, PI_SINCE};
 use super::{Evaluated, Fault, FaultKind, Imprecision, Newer, Operand, Value, Version, quoted};
 
 /// The value of `tree`, an expression in a file of this `version`.
@@ -55,6 +57,10 @@ impl Evaluator<'_> {
         match &node.kind {
             NodeKind::Number(text) => Typed::Number(self.computed(at, arithmetic::literal(text))),
             NodeKind::Constant(value) => Typed::from(*value),
+            NodeKind::Pi => {
+                self.note_newer(at, "pi", PI_SINCE);
+                Typed::Number(Ok(Number::Double(PI)))
+            }
             NodeKind::Parameter(name) => self.parameter(at, name),
             NodeKind::Minus(operand) => {
                 let operand = self.number(operand, "-");
@@ -66,12 +72,12 @@ impl Evaluator<'_> {
             }
             NodeKind::Chain(first, links) => self.chain(first, links),
             NodeKind::Call1(function, action, x) => {
-                self.note_newer(at, function);
+                self.note_newer(at, function.name, function.since);
                 let x = self.number(x, function.name);
                 Typed::Number(x.and_then(|x| self.computed(at, action(x))))
             }
             NodeKind::Call2(function, action, arguments) => {
-                self.note_newer(at, function);
+                self.note_newer(at, function.name, function.since);
                 let [x, y] = &**arguments;
                 let x = self.number(x, function.name);
                 let y = self.number(y, function.name);
@@ -146,8 +152,7 @@ impl Evaluator<'_> {
         Ok(computed.number)
     }
 
-    fn note_newer(&mut self, at: usize, function: &Function) {
-        let Function { name, since, .. } = *function;
+    fn note_newer(&mut self, at: usize, name: &'static str, since: Version) {
         let known = self.newer.iter().any(|newer| newer.name == name);
         if since > self.version && !known {
             self.newer.push(Newer { name, since, at });

@@ -113,7 +113,14 @@ impl<'t> Lexer<'t> {
             None => Ok(length),
             Some(why) => {
                 let text = format!("{} is no number: {why}", quoted(number));
-                Err(Fault::evaluation(self.at, text))
+                // Letters in a number are taken for an operand that does not exist.
+                let letters = number.contains(|c: char| c == '_' || c.is_ascii_alphabetic());
+                let kind = if why == FOREIGN_TO_NUMBERS && letters {
+                    FaultKind::Operator
+                } else {
+                    FaultKind::Evaluation
+                };
+                Err(Fault::new(kind, self.at, text))
             }
         }
     }
@@ -152,6 +159,9 @@ fn shown(c: char) -> String {
     }
 }
 
+const FOREIGN_TO_NUMBERS: &str =
+    "numbers are written like `2`, `0.5` or `1.5e-3`, without units and separators";
+
 /// What keeps `text` from being a number by the grammar.
 fn misspelt(text: &str) -> Option<&'static str> {
     let parts = text.split_once(['e', 'E']);
@@ -168,7 +178,7 @@ fn misspelt(text: &str) -> Option<&'static str> {
         .flatten()
         .any(foreign)
     {
-        Some("numbers are written like `2`, `0.5` or `1.5e-3`, without units and separators")
+        Some(FOREIGN_TO_NUMBERS)
     } else if whole.is_empty() {
         Some("a digit goes before the point, like `0.5`")
     } else if fraction == Some("") {

@@ -87,16 +87,17 @@ pub struct Evaluated {
     pub value: Value,
     /// Whether it depends on a parameter, so that it may differ where others are given.
     pub uses_parameters: bool,
-    /// Functions that came with a later version than the file's, each where it is first used.
+    /// Functions and constants that came with a later version than the file's, each where it is
+    /// first used.
     pub newer: Vec<Newer>,
     /// The first place where a digit that was written or computed is lost.
     pub imprecise: Option<Imprecision>,
 }
 
-/// A function that is used in a file of an earlier version than the one it came with.
+/// A function, or `pi`, that is used in a file of an earlier version than the one it came with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Newer {
-    /// The function.
+    /// Its name.
     pub name: &'static str,
     /// The version it came with, major and minor.
     pub since: (u16, u16),
@@ -127,8 +128,8 @@ pub struct Fault {
 /// The kinds of [`Fault`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FaultKind {
-    /// An operator, function, constant or character that the language does not have, or that the
-    /// file's version does not have.
+    /// An operator, function, constant or character that the language does not have, or a number with
+    /// letters in it.
     Operator,
     /// A function without brackets or with another number of arguments than it takes.
     Arguments,
@@ -158,7 +159,7 @@ pub fn evaluate(
     lookup: &dyn Fn(&str) -> Operand,
 ) -> Result<Evaluated, Fault> {
     let version = version.max((1, 1));
-    let tree = parser::parse(text, version)?;
+    let tree = parser::parse(text)?;
     evaluate::evaluate(&tree, version, lookup)
 }
 
@@ -176,6 +177,15 @@ pub fn names(text: &str) -> Vec<(&str, usize)> {
 /// Whether `text` is meant as an expression: it begins with `${`, XML blanks aside.
 pub fn is_expression(text: &str) -> bool {
     text.trim_start_matches(is_blank).starts_with(OPENING)
+}
+
+/// Whether the schemas from 1.1 on admit `text` as an expression, by its characters only.
+pub(crate) fn is_of_schema(text: &str) -> bool {
+    let inner = text
+        .strip_prefix(OPENING)
+        .and_then(|text| text.strip_suffix('}'));
+    let admitted = |c: char| c.is_ascii_alphanumeric() || " _+-*/%$().,".contains(c);
+    inner.is_some_and(|inner| inner.chars().all(admitted))
 }
 
 /// XML's white space.

@@ -1,18 +1,18 @@
 //! Lexemes into a tree, one method for each line of the grammar.
 
-use std::f64::consts::{E, PI};
+use std::f64::consts::E;
 
 use super::lexer::{Lexeme, Lexer, Token};
 use super::tree::{Link, Node, NodeKind};
 use super::words::{self, Form, Function, Operator};
-use super::{Fault, FaultKind, MAX_DEPTH, MAX_LENGTH, Value, Version, quoted};
+use super::{Fault, FaultKind, MAX_DEPTH, MAX_LENGTH, Value, quoted};
 
 const MISSING_END: &str = "the expression ends without its `}`";
 
 type Parsed<'t> = Result<Node<'t>, Fault>;
 
 /// The tree of the expression that is the whole of `text`.
-pub(super) fn parse(text: &str, version: Version) -> Parsed<'_> {
+pub(super) fn parse(text: &str) -> Parsed<'_> {
     if text.len() > MAX_LENGTH {
         let length = text.len();
         let text = format!("{length} bytes are too long for an expression; {MAX_LENGTH} are read");
@@ -21,7 +21,6 @@ pub(super) fn parse(text: &str, version: Version) -> Parsed<'_> {
     let mut lexer = Lexer::new(text)?;
     let ahead = lexer.read()?;
     Parser {
-        version,
         lexer,
         ahead,
         depth: 0,
@@ -30,7 +29,6 @@ pub(super) fn parse(text: &str, version: Version) -> Parsed<'_> {
 }
 
 struct Parser<'t> {
-    version: Version,
     lexer: Lexer<'t>,
     /// The lexeme that decides what comes next.
     ahead: Lexeme<'t>,
@@ -107,7 +105,7 @@ impl<'t> Parser<'t> {
             (Token::Parameter, _) => NodeKind::Parameter(text.trim_start_matches('$')),
             (Token::Word, "true") => NodeKind::Constant(Value::Boolean(true)),
             (Token::Word, "false") => NodeKind::Constant(Value::Boolean(false)),
-            (Token::Word, "pi") => self.pi()?,
+            (Token::Word, "pi") => NodeKind::Pi,
             (Token::Word, _) if let Some(function) = Function::named(text) => {
                 return self.call(function);
             }
@@ -116,19 +114,6 @@ impl<'t> Parser<'t> {
         };
         self.advance()?;
         Ok(Node { at, kind })
-    }
-
-    fn pi(&self) -> Result<NodeKind<'t>, Fault> {
-        if self.version >= words::PI_SINCE {
-            return Ok(NodeKind::Constant(Value::Double(PI)));
-        }
-        let text = format!(
-            "`pi` is a constant from version {} on and the file is of {}; until then the number is \
-             written, {PI}",
-            shown(words::PI_SINCE),
-            shown(self.version)
-        );
-        Err(Fault::new(FaultKind::Operator, self.ahead.at, text))
     }
 
     fn brackets(&mut self) -> Parsed<'t> {
@@ -316,8 +301,4 @@ impl<'t> Parser<'t> {
 fn wrong_arguments(at: usize, function: &Function, found: &str) -> Fault {
     let text = format!("{}, found {found}", function.takes());
     Fault::new(FaultKind::Arguments, at, text)
-}
-
-fn shown((major, minor): Version) -> String {
-    format!("{major}.{minor}")
 }

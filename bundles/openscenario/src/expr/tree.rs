@@ -14,8 +14,10 @@ pub(super) struct Node<'t> {
 pub(super) enum NodeKind<'t> {
     /// A number as written, in agreement with the grammar.
     Number(&'t str),
-    /// `true`, `false`, `pi`.
+    /// `true`, `false`.
     Constant(Value),
+    /// `pi`
+    Pi,
     /// A parameter's name without its `$`.
     Parameter(&'t str),
     /// `-` before its operand.

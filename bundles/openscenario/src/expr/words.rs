@@ -70,7 +70,7 @@ pub(super) static FUNCTIONS: [Function; 15] = {
     ]
 };
 
-/// The version that `pi` came with.
+/// The version that `pi` came with. Simulators have taken it before.
 pub(super) const PI_SINCE: Version = (1, 4);
 
 /// Words that are neither functions nor behind a `$`.
