@@ -283,21 +283,27 @@ impl<'d> Scenario<'d> {
         faults
     }
 
+    /// The attributes of the document that are written as expressions, in document order, whatever is
+    /// wrong with them; what is text to the schema is none.
+    pub fn written_expressions(&self) -> impl Iterator<Item = Attribute<'d>> {
+        self.substituted().filter(|attribute| {
+            let is_text = || {
+                matches!(
+                    self.expected(*attribute, 0),
+                    Expected::Words(_) | Expected::Type(DataType::String | DataType::DateTime)
+                )
+            };
+            reading::Form::of(attribute.value()) == reading::Form::Expression && !is_text()
+        })
+    }
+
     /// Every expression of the document that has a value, in document order; what is text to the
     /// schema is none.
     pub fn expressions(&self) -> impl Iterator<Item = (Attribute<'d>, Evaluated)> {
-        self.substituted().filter_map(|attribute| {
-            let raw = attribute.value();
-            let is_text = matches!(
-                self.expected(attribute, 0),
-                Expected::Words(_) | Expected::Type(DataType::String | DataType::DateTime)
-            );
-            if is_text || reading::Form::of(raw) != reading::Form::Expression {
-                return None;
-            }
+        self.written_expressions().filter_map(|attribute| {
             let context = &self.contexts[0];
             let lookup = |name: &str| operand(context.get(attribute.node(), name));
-            let evaluated = expr::evaluate(raw, self.version, &lookup).ok()?;
+            let evaluated = expr::evaluate(attribute.value(), self.version, &lookup).ok()?;
             Some((attribute, evaluated))
         })
     }

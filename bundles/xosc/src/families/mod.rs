@@ -1,5 +1,7 @@
 //! Algorithms that several rules share.
 
+pub(crate) mod constraints;
+pub(crate) mod declared;
 pub(crate) mod names;
 pub(crate) mod references;
 pub(crate) mod values;

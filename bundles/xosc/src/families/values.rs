@@ -1,14 +1,31 @@
 //! Values that cannot be had as they are written: the model lists them once, each rule says its kinds.
 
 use qcbus_document::Attribute;
-use qcbus_openscenario::{Scenario, ValueFault, ValueFaultKind};
+use qcbus_openscenario::{
+    DataType, Declared, Element, Form, Reading, Scenario, Value, ValueFault, ValueFaultKind,
+};
 use qcbus_sdk::{Finding, Sink};
 
 /// Says every fault of these kinds.
 pub(crate) fn report(scenario: &Scenario<'_>, kinds: &[ValueFaultKind], found: &mut Sink<'_>) {
-    for fault in scenario.faults_of(kinds) {
+    for fault in faults(scenario, kinds) {
         say(fault, found);
     }
+}
+
+/// The faults of some kinds, without what the schema's checker says as well. A name that leads nowhere
+/// is a fact of its own, however it is written.
+pub(crate) fn faults<'m, 'd>(
+    scenario: &'m Scenario<'d>,
+    kinds: &[ValueFaultKind],
+) -> impl Iterator<Item = &'m ValueFault<'d>> {
+    let names = [
+        ValueFaultKind::Undeclared,
+        ValueFaultKind::Variable,
+        ValueFaultKind::Order,
+    ];
+    let faults = scenario.faults_of(kinds);
+    faults.filter(move |fault| !fault.said_by_schema || names.contains(&fault.kind))
 }
 
 /// Says one fault.
@@ -36,4 +53,113 @@ pub(crate) fn short(value: &str) -> String {
         Some((end, _)) => format!("{}…", &value[..end]),
         None => value.to_owned(),
     }
+}
+
+/// The parameter of type string that keeps an expression from having a value, although its text is a
+/// number.
+pub(crate) fn numeric_text<'d>(scenario: &Scenario<'d>, fault: &ValueFault<'d>) -> Option<&'d str> {
+    let behind = fault.attribute.value().get(fault.at..)?.strip_prefix('$')?;
+    let name = qcbus_openscenario::identifier(behind);
+    let element = scenario.element(fault.attribute.node());
+    let declaration = element.parameter(name)?;
+    let Declared::Value(value @ Value::Text(_)) = &declaration.declared else {
+        return None;
+    };
+    let is_number = declaration.data_type == Some(DataType::String) && value.number().is_some();
+    is_number.then_some(name)
+}
+
+/// An attribute that the schema takes for text as a value of its true type: the value, or why it is none
+/// (a sentence fragment); `None` when it is missing or unknown.
+pub(crate) fn typed<'d>(
+    element: Element<'_, 'd>,
+    name: &str,
+    data_type: DataType,
+) -> Option<Result<Value<'d>, String>> {
+    let value = match element.read(name) {
+        Reading::Absent | Reading::Unknown => return None,
+        Reading::Literal(text) => data_type.parse(text),
+        Reading::Value(value) => fitting(&value, data_type),
+    };
+    let wrong = || {
+        let written = element.text(name).unwrap_or_default();
+        format!(
+            "{} is no value of type `{}`, which is {}",
+            super::references::quoted(element, name, &short(&written)),
+            data_type.word(),
+            data_type.allowed()
+        )
+    };
+    Some(value.ok_or_else(wrong))
+}
+
+/// A value of a parameter or an expression as one of the type.
+fn fitting<'d>(value: &Value<'d>, data_type: DataType) -> Option<Value<'d>> {
+    match data_type {
+        DataType::Double => value.number().map(Value::Double),
+        DataType::Boolean => value.flag().map(Value::Boolean),
+        DataType::String => Some(Value::Text(value.text())),
+        DataType::DateTime => {
+            let text = value.text();
+            data_type.parse(&text)?;
+            Some(Value::Text(text))
+        }
+        DataType::Int | DataType::UnsignedInt | DataType::UnsignedShort => {
+            let range = data_type.range()?;
+            let integer = value.integer().filter(|integer| range.contains(integer))?;
+            Some(Value::Integer(integer))
+        }
+    }
+}
+
+/// Whether a fault of a declared or used value is said by another rule than that about types.
+pub(crate) fn is_of_other_rule(scenario: &Scenario<'_>, fault: &ValueFault<'_>) -> bool {
+    fault.attribute.node().is("VariableDeclaration")
+        || is_about_time(fault)
+        || is_empty_default(scenario, fault)
+}
+
+/// Whether a date-time is due.
+pub(crate) fn is_about_time(fault: &ValueFault<'_>) -> bool {
+    let node = fault.attribute.node();
+    match fault.attribute.name() {
+        "date" | "dateTime" => true,
+        "value" => {
+            node.is("ParameterDeclaration") && node.attr("parameterType") == Some("dateTime")
+        }
+        _ => false,
+    }
+}
+
+/// Whether the only fault of a date-time is that its zone has no colon: `+0100`, as the standard itself
+/// writes it in places.
+pub(crate) fn is_basic_zone<'d>(scenario: &Scenario<'d>, fault: &ValueFault<'d>) -> bool {
+    let attribute = fault.attribute;
+    let name = attribute.value().trim().strip_prefix('$');
+    let element = scenario.element(attribute.node());
+    let declared = name.and_then(|name| element.parameter(name));
+    let text = match declared.map(|declaration| &declaration.declared) {
+        Some(Declared::Value(value)) => value.text(),
+        _ => attribute.value().into(),
+    };
+    let text = text.trim();
+    let Some((clock, minutes)) = text
+        .len()
+        .checked_sub(2)
+        .and_then(|at| text.split_at_checked(at))
+    else {
+        return false;
+    };
+    DataType::DateTime
+        .parse(&format!("{clock}:{minutes}"))
+        .is_some()
+        && clock.contains(['+', '-'])
+        && !clock.ends_with(':')
+}
+
+/// Whether the default of a catalog's parameter is empty.
+pub(crate) fn is_empty_default(scenario: &Scenario<'_>, fault: &ValueFault<'_>) -> bool {
+    scenario.form() == Form::Catalog
+        && fault.attribute.node().is("ParameterDeclaration")
+        && fault.attribute.value().trim().is_empty()
 }

@@ -14,6 +14,44 @@ mod xml_valid_schema;
 mod xml_valid_xml_document;
 mod xml_version_is_defined;
 
+mod data_type_allowed_operators;
+mod data_type_time_format;
+mod data_type_variable_correctly_typed;
+mod data_type_variable_modification_or_comparison_possible;
+mod dialect_ros_substitution;
+mod expressions_arguments_of_operators;
+mod expressions_before_1_1;
+mod expressions_evaluation_of_expressions_possible;
+mod expressions_in_string_attribute;
+mod expressions_precision_loss;
+mod expressions_suspicious_units;
+mod expressions_type_casting;
+mod expressions_type_of_boolean;
+mod expressions_unused_constant;
+mod monitors_no_change;
+mod monitors_reference;
+mod monitors_unused;
+mod naming_parameter_declaration_name_prefix_reserved;
+mod naming_parameter_declaration_parameter_name;
+mod parameters_condition_constant;
+mod parameters_condition_reference;
+mod parameters_constraint_contradiction;
+mod parameters_constraint_satisfied;
+mod parameters_constraint_type;
+mod parameters_enum_after_resolution;
+mod parameters_forward_or_cyclic;
+mod parameters_parameter_declaration_parameter_type_inference;
+mod parameters_partial_substitution;
+mod parameters_shadowing;
+mod parameters_type_literal_version;
+mod parameters_unused;
+mod parameters_valid_parameter_declaration_in_catalogs;
+mod reference_control_resolvable_variable_reference;
+mod variables_dollar_reference;
+mod variables_name_syntax;
+mod variables_never_written_condition;
+mod variables_unused;
+
 /// The precondition of rules that need no more than a file that could be read: see `after`.
 pub(crate) const READABLE: &[&str] = &["check_asam_xosc_xml_root_tag_is_openscenario"];
 
@@ -28,4 +66,41 @@ pub static RULES: &[&dyn AnyRule] = &[
     &naming_unique_element_names_on_same_level::RULE,
     &reference_control_resolvable_entity_references::RULE,
     &parameters_parameter_declaration_parameter_scope::RULE,
+    &data_type_allowed_operators::RULE,
+    &expressions_before_1_1::RULE,
+    &expressions_arguments_of_operators::RULE,
+    &expressions_type_of_boolean::RULE,
+    &expressions_type_casting::RULE,
+    &expressions_evaluation_of_expressions_possible::RULE,
+    &expressions_in_string_attribute::RULE,
+    &expressions_precision_loss::RULE,
+    &expressions_suspicious_units::RULE,
+    &expressions_unused_constant::RULE,
+    &naming_parameter_declaration_parameter_name::RULE,
+    &naming_parameter_declaration_name_prefix_reserved::RULE,
+    &parameters_valid_parameter_declaration_in_catalogs::RULE,
+    &parameters_parameter_declaration_parameter_type_inference::RULE,
+    &parameters_forward_or_cyclic::RULE,
+    &parameters_enum_after_resolution::RULE,
+    &parameters_condition_reference::RULE,
+    &parameters_constraint_type::RULE,
+    &parameters_constraint_contradiction::RULE,
+    &parameters_constraint_satisfied::RULE,
+    &parameters_partial_substitution::RULE,
+    &dialect_ros_substitution::RULE,
+    &parameters_type_literal_version::RULE,
+    &parameters_shadowing::RULE,
+    &parameters_unused::RULE,
+    &parameters_condition_constant::RULE,
+    &reference_control_resolvable_variable_reference::RULE,
+    &data_type_variable_correctly_typed::RULE,
+    &data_type_variable_modification_or_comparison_possible::RULE,
+    &variables_dollar_reference::RULE,
+    &variables_name_syntax::RULE,
+    &variables_unused::RULE,
+    &variables_never_written_condition::RULE,
+    &monitors_reference::RULE,
+    &monitors_unused::RULE,
+    &monitors_no_change::RULE,
+    &data_type_time_format::RULE,
 ];

@@ -1,0 +1,136 @@
+//! What a scenario declares at its top: parameters, variables, monitors. And who refers to it.
+
+use std::borrow::Cow;
+
+use foldhash::{HashMap, HashMapExt as _, HashSet};
+use qcbus_openscenario::{DataType, Element, Scenario};
+use qcbus_sdk::Sink;
+
+use super::references;
+
+/// A kind of declaration and the elements that refer to it.
+pub(crate) struct Declarable {
+    /// The block at the top.
+    block: &'static str,
+    /// The declaration in it.
+    declaration: &'static str,
+    /// What messages call it.
+    pub(crate) what: &'static str,
+    /// The attribute that names one.
+    pub(crate) reference: &'static str,
+    /// The elements that change its value.
+    pub(crate) writers: &'static [&'static str],
+    /// The elements that look at its value.
+    pub(crate) readers: &'static [&'static str],
+}
+
+/// Parameters, which stand in `ParameterDeclarations` of many elements; only those at the top can be
+/// referred to by name.
+pub(crate) const PARAMETERS: Declarable = Declarable {
+    block: "ParameterDeclarations",
+    declaration: "ParameterDeclaration",
+    what: "parameter",
+    reference: "parameterRef",
+    writers: &["ParameterAction"],
+    readers: &["ParameterCondition"],
+};
+
+/// Variables.
+pub(crate) const VARIABLES: Declarable = Declarable {
+    block: "VariableDeclarations",
+    declaration: "VariableDeclaration",
+    what: "variable",
+    reference: "variableRef",
+    writers: &["VariableAction"],
+    readers: &["VariableCondition"],
+};
+
+/// Monitors, which only the outside looks at.
+pub(crate) const MONITORS: Declarable = Declarable {
+    block: "MonitorDeclarations",
+    declaration: "MonitorDeclaration",
+    what: "monitor",
+    reference: "monitorRef",
+    writers: &["SetMonitorAction"],
+    readers: &[],
+};
+
+impl Declarable {
+    /// The declarations at the top.
+    pub(crate) fn declarations<'m, 'd>(
+        &self,
+        scenario: &'m Scenario<'d>,
+    ) -> impl Iterator<Item = Element<'m, 'd>> + use<'m, 'd> {
+        let declaration = self.declaration;
+        let block = scenario.root().child(self.block);
+        block
+            .into_iter()
+            .flat_map(move |block| block.children_named(declaration))
+    }
+
+    /// The declarations at the top by name, the first of each.
+    pub(crate) fn by_name<'m, 'd>(
+        &self,
+        scenario: &'m Scenario<'d>,
+    ) -> HashMap<&'d str, Element<'m, 'd>> {
+        let mut by_name = HashMap::new();
+        for declaration in self.declarations(scenario) {
+            by_name
+                .entry(bare(declaration.written("name").unwrap_or("")))
+                .or_insert(declaration);
+        }
+        by_name
+    }
+
+    /// The elements that refer to one of the kind.
+    pub(crate) fn references<'m, 'd>(
+        &'static self,
+        scenario: &'m Scenario<'d>,
+        elements: &'static [&'static str],
+    ) -> impl Iterator<Item = (Element<'m, 'd>, Cow<'d, str>)> {
+        let all = elements
+            .iter()
+            .flat_map(|element| scenario.elements_everywhere(element));
+        all.filter_map(|element| {
+            let name = match element.text(self.reference)? {
+                Cow::Borrowed(name) => Cow::Borrowed(bare(name)),
+                Cow::Owned(name) => Cow::Owned(name),
+            };
+            Some((element, name))
+        })
+    }
+
+    /// The names that the elements refer to.
+    pub(crate) fn names<'d>(
+        &'static self,
+        scenario: &Scenario<'d>,
+        elements: &'static [&'static str],
+    ) -> HashSet<Cow<'d, str>> {
+        self.references(scenario, elements)
+            .map(|(_, name)| name)
+            .collect()
+    }
+
+    /// Says which references name nothing that is declared.
+    pub(crate) fn resolve(&'static self, scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+        let declared = self.by_name(scenario);
+        for elements in [self.writers, self.readers] {
+            for (element, name) in self.references(scenario, elements) {
+                if !declared.contains_key(&*name) {
+                    let names = declared.keys().copied();
+                    references::unresolved(element, self.reference, &name, self.what, names, found);
+                }
+            }
+        }
+    }
+}
+
+/// A name without the `$` that old files write before it.
+pub(crate) fn bare(name: &str) -> &str {
+    name.strip_prefix('$').unwrap_or(name)
+}
+
+/// The type that a declaration names.
+pub(crate) fn type_of(declaration: Element<'_, '_>, attribute: &str) -> Option<DataType> {
+    DataType::of_declaration(declaration.written(attribute)?)
+}

@@ -1,0 +1,55 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::constraints;
+use crate::families::declared;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_data_type_variable_modification_or_comparison_possible",
+    uids: &["asam.net:xosc:1.2.0:data_type.variable_modification_or_comparison_possible"],
+    versions: "1.2.0..",
+    after: super::READABLE,
+    page: include_str!("data_type_variable_modification_or_comparison_possible.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let declared = declared::VARIABLES.by_name(scenario);
+    let type_of = |name: &str| {
+        let declaration = declared.get(name)?;
+        declared::type_of(*declaration, "variableType")
+    };
+    for (action, name) in declared::VARIABLES.references(scenario, &["VariableAction"]) {
+        let modification = action.path(&["ModifyAction", "Rule"]);
+        let data_type = type_of(&name).filter(|data_type| !data_type.is_numeric());
+        let Some((rule, data_type)) = modification.zip(data_type) else {
+            continue;
+        };
+        let how = if rule.child("MultiplyByValue").is_some() {
+            "multiplied"
+        } else {
+            "added to"
+        };
+        let text = format!(
+            "the variable `{name}` is of type `{}` and cannot be {how}, only numbers can; `SetAction` sets it",
+            data_type.word()
+        );
+        found.about(action, "variableRef", text);
+    }
+    for (condition, name) in declared::VARIABLES.references(scenario, &["VariableCondition"]) {
+        let comparison = constraints::Comparison::of(condition).filter(|one| one.is_order());
+        let data_type = type_of(&name).filter(|data_type| !data_type.is_ordered());
+        let Some((comparison, data_type)) = comparison.zip(data_type) else {
+            continue;
+        };
+        let text = format!(
+            "the variable `{name}` is of type `{}`, whose values have no order for `{}`; `equalTo` and \
+             `notEqualTo` are possible",
+            data_type.word(),
+            comparison.word()
+        );
+        found.about(condition, "rule", text);
+    }
+}

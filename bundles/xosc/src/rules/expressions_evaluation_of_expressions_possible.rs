@@ -1,0 +1,28 @@
+use qcbus_openscenario::{Scenario, ValueFaultKind};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::values;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_expressions_evaluation_of_expressions_possible",
+    uids: &["asam.net:xosc:1.1.0:expressions.evaluation_of_expressions_possible"],
+    versions: "1.1.0..",
+    after: super::READABLE,
+    page: include_str!("expressions_evaluation_of_expressions_possible.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for fault in values::faults(scenario, &[ValueFaultKind::Evaluation]) {
+        // A number that is declared as text is said by the rule about conversions.
+        if values::numeric_text(scenario, fault).is_none() {
+            values::say(fault, found);
+        }
+    }
+    for fault in values::faults(scenario, &[ValueFaultKind::Limit]) {
+        // That we do not look does not make it wrong.
+        values::say(fault, found).level(Level::Information);
+    }
+}

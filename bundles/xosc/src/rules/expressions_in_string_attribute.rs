@@ -1,0 +1,48 @@
+use qcbus_openscenario::{Scenario, ValueFaultKind, expr};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::values;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_expressions_in_string_attribute",
+    uids: &["qcbus.dev:xosc:1.0.0:expressions.in_string_attribute"],
+    level: Level::Warning,
+    versions: "1.1.0..",
+    after: super::READABLE,
+    page: include_str!("expressions_in_string_attribute.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for fault in values::faults(scenario, &[ValueFaultKind::InText]) {
+        let attribute = fault.attribute;
+        if is_reference(attribute.name()) {
+            continue;
+        }
+        let declared = attribute.node().attr("parameterType");
+        let level = if declared == Some("dateTime") {
+            Level::Error
+        } else if reads_as_expression(attribute.value(), scenario.version()) {
+            Level::Warning
+        } else {
+            Level::Information
+        };
+        values::say(fault, found).level(level);
+    }
+}
+
+/// Whether the attribute names something: when nobody bears the name, the rules about references say so.
+fn is_reference(attribute: &str) -> bool {
+    attribute.ends_with("Ref") || matches!(attribute, "catalogName" | "entryName")
+}
+
+/// Whether somebody may have meant to compute something; what cannot be read is a text in braces.
+fn reads_as_expression(text: &str, version: (u16, u16)) -> bool {
+    use expr::{FaultKind, Operand};
+    match expr::evaluate(text, version, &|_| Operand::Unresolved) {
+        Ok(_) => true,
+        Err(fault) => matches!(fault.kind, FaultKind::Unresolved | FaultKind::Types),
+    }
+}

@@ -1,0 +1,74 @@
+use std::f64::consts::TAU;
+
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Param, Rule, Sink};
+
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_expressions_suspicious_units",
+    uids: &["qcbus.dev:xosc:1.0.0:expressions.suspicious_units"],
+    level: Level::Information,
+    after: super::READABLE,
+    params: &[FASTEST],
+    page: include_str!("expressions_suspicious_units.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// Elements whose `value` is a speed in m/s.
+const SPEEDS: &[&str] = &["AbsoluteTargetSpeed", "AbsoluteSpeed", "SpeedCondition"];
+
+/// Elements whose angles are in radians.
+const ORIENTED: &[&str] = &["WorldPosition", "GeoPosition", "Orientation"];
+
+const FASTEST: Param = Param::number(
+    "fastest",
+    70.0,
+    "m/s",
+    "a speed beyond this may be meant in another unit",
+);
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let fastest = found.number(&FASTEST);
+    for name in SPEEDS {
+        for element in scenario.elements_everywhere(name) {
+            let speed = element.number("value");
+            let Some(speed) = speed.filter(|speed| speed.abs() > fastest) else {
+                continue;
+            };
+            let text = format!(
+                "`{name}` asks for {} m/s, which are {:.0} km/h; speeds are in m/s, {} km/h would be {:.1} m/s",
+                short(speed),
+                speed * 3.6,
+                short(speed),
+                speed / 3.6
+            );
+            found.about(element, "value", text);
+        }
+    }
+    for name in ORIENTED {
+        for element in scenario.elements_everywhere(name) {
+            for attribute in ["h", "p", "r"] {
+                let angle = element.number(attribute);
+                let Some(angle) = angle.filter(|angle| angle.abs() > TAU + 0.01) else {
+                    continue;
+                };
+                let text = format!(
+                    "`{attribute}` of `{name}` is {}, more than a full turn; angles are in radians, {} degrees \
+                     would be {:.4}",
+                    short(angle),
+                    short(angle),
+                    angle.to_radians()
+                );
+                found.about(element, attribute, text);
+            }
+        }
+    }
+}
+
+/// With three digits behind the point at most.
+fn short(number: f64) -> String {
+    let rounded = (number * 1000.0).round() / 1000.0;
+    rounded.to_string()
+}

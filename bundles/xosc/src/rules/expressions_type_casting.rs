@@ -1,0 +1,33 @@
+use qcbus_openscenario::{Scenario, ValueFaultKind};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::values;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_expressions_type_casting",
+    uids: &["asam.net:xosc:1.1.0:expressions.type_casting"],
+    versions: "1.1.0..",
+    after: super::READABLE,
+    page: include_str!("expressions_type_casting.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    values::report(scenario, &[ValueFaultKind::Result], found);
+    for fault in values::faults(scenario, &[ValueFaultKind::Narrowed]) {
+        values::say(fault, found).level(Level::Warning);
+    }
+    for fault in values::faults(scenario, &[ValueFaultKind::Evaluation]) {
+        let Some(name) = values::numeric_text(scenario, fault) else {
+            continue;
+        };
+        let text = format!(
+            "{}: `${name}` is of type `string`, and its text is a number; expressions take numbers, and only \
+             some simulators convert it",
+            values::written(fault.attribute)
+        );
+        found.issue(fault.attribute, text).level(Level::Warning);
+    }
+}

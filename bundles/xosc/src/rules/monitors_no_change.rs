@@ -1,0 +1,49 @@
+use foldhash::{HashSet, HashSetExt as _};
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::declared;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_monitors_no_change",
+    uids: &["qcbus.dev:xosc:1.0.0:monitors.no_change"],
+    level: Level::Information,
+    versions: "1.3.0..",
+    after: super::READABLE,
+    page: include_str!("monitors_no_change.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    if !scenario.storyboard().is_complete() {
+        return;
+    }
+    let declared = declared::MONITORS.by_name(scenario);
+    let mut changed = HashSet::new();
+    let mut same = Vec::new();
+    for (action, name) in declared::MONITORS.references(scenario, &["SetMonitorAction"]) {
+        let Some(declaration) = declared.get(&*name) else {
+            continue;
+        };
+        let (first, set) = (declaration.flag("value"), action.flag("value"));
+        if first.is_some() && first == set {
+            same.push((action, *declaration, name));
+        } else {
+            changed.insert(name);
+        }
+    }
+    for (action, declaration, name) in same {
+        if !changed.contains(&name) {
+            let value = action.text("value").unwrap_or_default();
+            let text = format!(
+                "the monitor `{name}` is set to `{value}`, which it is from the beginning, and no action sets it \
+                 to anything else"
+            );
+            found
+                .about(action, "value", text)
+                .at(declaration.node(), "its declaration");
+        }
+    }
+}

@@ -1,0 +1,33 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::declared;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_monitors_unused",
+    uids: &["qcbus.dev:xosc:1.0.0:monitors.unused"],
+    level: Level::Information,
+    versions: "1.3.0..",
+    after: super::READABLE,
+    page: include_str!("monitors_unused.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    if !scenario.storyboard().is_complete() {
+        return;
+    }
+    let set = declared::MONITORS.names(scenario, &["SetMonitorAction"]);
+    for declaration in declared::MONITORS.declarations(scenario) {
+        let name = declaration.written("name").unwrap_or("");
+        if !set.contains(declared::bare(name)) {
+            let text = format!(
+                "no `SetMonitorAction` sets the monitor `{name}`, so that it reports its first value throughout \
+                 the run"
+            );
+            found.issue(declaration.node(), text);
+        }
+    }
+}

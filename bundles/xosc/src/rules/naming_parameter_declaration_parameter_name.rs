@@ -1,0 +1,36 @@
+use qcbus_openscenario::{Scenario, is_identifier};
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_naming_parameter_declaration_parameter_name",
+    uids: &["asam.net:xosc:1.1.0:naming.parameter_declaration_parameter_name"],
+    versions: "1.1.0..",
+    backport: Backport::Lower { since: "" },
+    after: super::READABLE,
+    page: include_str!("naming_parameter_declaration_parameter_name.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for declaration in scenario.elements("ParameterDeclaration") {
+        let Some(name) = declaration
+            .written("name")
+            .filter(|name| !is_identifier(name))
+        else {
+            continue;
+        };
+        let why = match name.strip_prefix('$') {
+            Some(rest) if is_identifier(rest) => format!(
+                "the `$` belongs where the parameter is used; it is declared as `{rest}`"
+            ),
+            _ => "a name begins with a letter or `_` and goes on with letters, digits and `_`, else no `$` \
+                  can refer to it"
+                .to_owned(),
+        };
+        let text = format!("`{name}` is no name of a parameter: {why}");
+        found.about(declaration, "name", text);
+    }
+}

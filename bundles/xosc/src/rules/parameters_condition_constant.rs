@@ -1,0 +1,53 @@
+use qcbus_openscenario::{Declaration, Declared, Element, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::constraints;
+use crate::families::declared;
+use crate::families::values;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_parameters_condition_constant",
+    uids: &["qcbus.dev:xosc:1.0.0:parameters.condition_constant"],
+    level: Level::Information,
+    versions: "1.2.0..",
+    after: super::READABLE,
+    page: include_str!("parameters_condition_constant.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    if !scenario.storyboard().is_complete() {
+        return;
+    }
+    let changed = declared::PARAMETERS.names(scenario, &["ParameterAction"]);
+    for (element, name) in declared::PARAMETERS.references(scenario, &["ParameterCondition"]) {
+        let declaration = scenario.root().parameter(&name);
+        let Some(declaration) = declaration.filter(|_| !changed.contains(&name)) else {
+            continue;
+        };
+        let outcome = outcome(element, declaration)
+            .map(|holds| format!(": with the declared value the condition is always {holds}"));
+        let text = format!(
+            "no `ParameterAction` changes the parameter `{name}`, so that it keeps its value throughout the \
+             run{}",
+            outcome.unwrap_or_default()
+        );
+        found.about(element, "parameterRef", text);
+    }
+}
+
+/// What the condition is with the value that is declared.
+fn outcome(condition: Element<'_, '_>, declaration: &Declaration<'_>) -> Option<bool> {
+    let Declared::Value(value) = &declaration.declared else {
+        return None;
+    };
+    let data_type = declaration.data_type?;
+    let other = values::typed(condition, "value", data_type)?.ok()?;
+    let (left, right) = (
+        constraints::Operand::new(value, data_type)?,
+        constraints::Operand::new(&other, data_type)?,
+    );
+    left.holds(constraints::Comparison::of(condition)?, &right)
+}

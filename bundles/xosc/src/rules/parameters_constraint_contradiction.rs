@@ -1,0 +1,39 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::constraints;
+use crate::families::declared;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_parameters_constraint_contradiction",
+    uids: &["qcbus.dev:xosc:1.0.0:parameters.constraint_contradiction"],
+    level: Level::Warning,
+    versions: "1.1.0..",
+    after: super::READABLE,
+    page: include_str!("parameters_constraint_contradiction.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for declaration in scenario.elements("ParameterDeclaration") {
+        let Some(data_type) = declared::type_of(declaration, "parameterType") else {
+            continue;
+        };
+        for group in constraints::groups(declaration, data_type) {
+            if let Some((first, second)) = group.contradiction(data_type) {
+                let text = format!(
+                    "{} and {} exclude each other: no value of type `{}` satisfies this group",
+                    first.shown(),
+                    second.shown(),
+                    data_type.word()
+                );
+                found
+                    .issue(group.element.node(), text)
+                    .at(first.element.node(), "the first of the two")
+                    .at(second.element.node(), "the second of the two");
+            }
+        }
+    }
+}

@@ -1,0 +1,71 @@
+use qcbus_openscenario::{Declaration, Declared, Element, Scenario};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::constraints;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_parameters_constraint_satisfied",
+    uids: &["qcbus.dev:xosc:1.0.0:parameters.constraint_satisfied"],
+    versions: "1.1.0..",
+    after: super::READABLE,
+    page: include_str!("parameters_constraint_satisfied.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for block in scenario.elements("ParameterDeclarations") {
+        let declarations = block.parent().map_or(&[][..], Element::declarations);
+        for declaration in declarations {
+            check(scenario.element(declaration.node), declaration, found);
+        }
+    }
+}
+
+fn check(node: Element<'_, '_>, declaration: &Declaration<'_>, found: &mut Sink<'_>) {
+    let (Some(data_type), Declared::Value(value)) = (declaration.data_type, &declaration.declared)
+    else {
+        return;
+    };
+    let Some(operand) = constraints::Operand::new(value, data_type) else {
+        return;
+    };
+    let groups = constraints::groups(node, data_type);
+    let mut violated = Vec::new();
+    for group in &groups {
+        match group.violated(&operand) {
+            Ok(Some(constraint)) => violated.push((group, constraint)),
+            // One satisfied group is enough, and of one that is not understood nobody knows.
+            Ok(None) | Err(()) => return,
+        }
+    }
+    let Some((first, rest)) = violated.split_first() else {
+        return;
+    };
+    if violated
+        .iter()
+        .all(|(group, _)| group.contradiction(data_type).is_some())
+    {
+        // That no value satisfies them is said by another rule.
+        return;
+    }
+    let others: Vec<String> = rest.iter().map(|(_, one)| one.shown()).collect();
+    let text = if others.is_empty() {
+        format!("violates its constraint {}", first.1.shown())
+    } else {
+        format!(
+            "satisfies none of its constraint groups, of which one must hold: it violates {} and {}",
+            first.1.shown(),
+            others.join(" and ")
+        )
+    };
+    let text = format!(
+        "the value `{}` of the parameter `{}` {text}",
+        value.text(),
+        declaration.name
+    );
+    found
+        .about(node, "value", text)
+        .at(first.1.element.node(), "the constraint");
+}

@@ -1,0 +1,43 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::constraints;
+use crate::families::declared;
+use crate::families::values;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_parameters_constraint_type",
+    uids: &["qcbus.dev:xosc:1.0.0:parameters.constraint_type"],
+    versions: "1.1.0..",
+    after: super::READABLE,
+    page: include_str!("parameters_constraint_type.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for declaration in scenario.elements("ParameterDeclaration") {
+        let Some(data_type) = declared::type_of(declaration, "parameterType") else {
+            continue;
+        };
+        for group in constraints::groups(declaration, data_type) {
+            for constraint in group.constraints {
+                let element = constraint.element;
+                if let Some(Err(text)) = values::typed(element, "value", data_type) {
+                    found.about(element, "value", text);
+                }
+                let ordering = constraint.comparison.filter(|one| one.is_order());
+                if let Some(comparison) = ordering.filter(|_| !data_type.is_ordered()) {
+                    let text = format!(
+                        "`{}` compares by order, but values of type `{}` have none; `equalTo` and \
+                         `notEqualTo` are possible",
+                        comparison.word(),
+                        data_type.word()
+                    );
+                    found.about(element, "rule", text);
+                }
+            }
+        }
+    }
+}

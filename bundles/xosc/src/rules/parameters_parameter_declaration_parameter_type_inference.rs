@@ -1,0 +1,59 @@
+use qcbus_openscenario::{DataType, Scenario, ValueFaultKind};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::declared;
+use crate::families::values;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_parameters_parameter_declaration_parameter_type_inference",
+    uids: &["asam.net:xosc:1.0.0:parameters.parameter_declaration_parameter_type_inference"],
+    after: super::READABLE,
+    page: include_str!("parameters_parameter_declaration_parameter_type_inference.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let kinds = [ValueFaultKind::Declared, ValueFaultKind::Parameter];
+    for fault in values::faults(scenario, &kinds) {
+        if !values::is_of_other_rule(scenario, fault) {
+            values::say(fault, found);
+        }
+    }
+    for declaration in scenario.elements("ParameterDeclaration") {
+        if declared::type_of(declaration, "parameterType") == Some(DataType::Double)
+            && declaration.double("value").is_some_and(f64::is_nan)
+        {
+            let text = "the value is `NaN`, which is not equal, less or greater than any number, so that \
+                        nothing can be computed with it or compared to it";
+            found
+                .about(declaration, "value", text)
+                .level(Level::Warning);
+        }
+    }
+    run_time(scenario, found);
+}
+
+/// Values that a parameter is set to or compared with while the scenario runs.
+fn run_time(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let declared = declared::PARAMETERS.by_name(scenario);
+    let references =
+        declared::PARAMETERS.references(scenario, &["ParameterAction", "ParameterCondition"]);
+    for (element, name) in references {
+        let data_type = declared
+            .get(&*name)
+            .and_then(|declaration| declared::type_of(*declaration, "parameterType"));
+        let holder = if element.is("ParameterAction") {
+            element.child("SetAction")
+        } else {
+            Some(element)
+        };
+        let Some((holder, data_type)) = holder.zip(data_type) else {
+            continue;
+        };
+        if let Some(Err(text)) = values::typed(holder, "value", data_type) {
+            found.about(holder, "value", format!("the parameter `{name}`: {text}"));
+        }
+    }
+}

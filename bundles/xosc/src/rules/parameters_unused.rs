@@ -1,0 +1,59 @@
+use foldhash::{HashSet, HashSetExt as _};
+use qcbus_openscenario::{Form, Scenario, identifier};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::declared;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_parameters_unused",
+    uids: &["qcbus.dev:xosc:1.0.0:parameters.unused"],
+    level: Level::Information,
+    after: super::READABLE,
+    page: include_str!("parameters_unused.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    if scenario.form() == Form::Scenario && !scenario.storyboard().is_complete() {
+        // What could not be read may use it.
+        return;
+    }
+    let used = used(scenario);
+    let referred = declared::PARAMETERS.names(scenario, &["ParameterAction", "ParameterCondition"]);
+    for block in scenario.elements("ParameterDeclarations") {
+        let Some(holder) = block.parent() else {
+            continue;
+        };
+        let at_top = holder == scenario.root();
+        for declaration in holder.declarations() {
+            let known = used.contains(&declaration.node.index())
+                || (at_top && referred.contains(declaration.name));
+            if !known {
+                let text = format!(
+                    "the parameter `{}` is declared and never used within `{}`",
+                    declaration.name,
+                    holder.name()
+                );
+                found.issue(declaration.node, text);
+            }
+        }
+    }
+}
+
+/// The declarations that a `$name` leads to, wherever in a value it stands.
+fn used(scenario: &Scenario<'_>) -> HashSet<u32> {
+    let mut used = HashSet::new();
+    let root = scenario.root();
+    for element in std::iter::once(root).chain(root.descendants()) {
+        for attribute in element.node().attributes() {
+            for behind in attribute.value().split('$').skip(1) {
+                if let Some(declaration) = element.parameter(identifier(behind)) {
+                    used.insert(declaration.node.index());
+                }
+            }
+        }
+    }
+    used
+}

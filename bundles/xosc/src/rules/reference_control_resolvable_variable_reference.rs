@@ -1,0 +1,22 @@
+use qcbus_openscenario::{Form, Scenario};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::declared;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_reference_control_resolvable_variable_reference",
+    uids: &["asam.net:xosc:1.2.0:reference_control.resolvable_variable_reference"],
+    versions: "1.2.0..",
+    after: super::READABLE,
+    page: include_str!("reference_control_resolvable_variable_reference.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    // A catalog's maneuver may be used by any scenario.
+    if scenario.form() == Form::Scenario {
+        declared::VARIABLES.resolve(scenario, found);
+    }
+}

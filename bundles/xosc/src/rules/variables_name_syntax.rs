@@ -1,0 +1,40 @@
+use qcbus_openscenario::{Scenario, is_identifier};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::declared;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_variables_name_syntax",
+    uids: &["qcbus.dev:xosc:1.0.0:variables.name_syntax"],
+    level: Level::Warning,
+    versions: "1.2.0..",
+    after: super::READABLE,
+    page: include_str!("variables_name_syntax.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let parameters = declared::PARAMETERS.by_name(scenario);
+    for declaration in declared::VARIABLES.declarations(scenario) {
+        let Some(name) = declaration.written("name") else {
+            continue;
+        };
+        if !is_identifier(name) {
+            let text = format!(
+                "`{name}` is no name as variables should have it: a letter or `_`, followed by letters, digits \
+                 and `_`"
+            );
+            found.about(declaration, "name", text);
+        } else if let Some(parameter) = parameters.get(name) {
+            let text = format!(
+                "a parameter is called `{name}`, too; `${name}` means the parameter, `variableRef` the variable, \
+                 and readers confuse the two"
+            );
+            found
+                .about(declaration, "name", text)
+                .at(parameter.node(), "the parameter");
+        }
+    }
+}

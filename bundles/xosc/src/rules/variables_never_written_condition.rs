@@ -1,0 +1,36 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::declared;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_variables_never_written_condition",
+    uids: &["qcbus.dev:xosc:1.0.0:variables.never_written_condition"],
+    level: Level::Information,
+    versions: "1.2.0..",
+    after: super::READABLE,
+    page: include_str!("variables_never_written_condition.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    if !scenario.storyboard().is_complete() {
+        return;
+    }
+    let declared = declared::VARIABLES.by_name(scenario);
+    let written = declared::VARIABLES.names(scenario, &["VariableAction"]);
+    for (condition, name) in declared::VARIABLES.references(scenario, &["VariableCondition"]) {
+        let Some(declaration) = declared.get(&*name).filter(|_| !written.contains(&name)) else {
+            continue;
+        };
+        let text = format!(
+            "no action sets the variable `{name}`: unless the outside does, it stays as it is declared and so \
+             does this condition"
+        );
+        found
+            .about(condition, "variableRef", text)
+            .at(declaration.node(), "its declaration");
+    }
+}

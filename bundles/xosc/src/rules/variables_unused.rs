@@ -1,0 +1,32 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::declared;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_variables_unused",
+    uids: &["qcbus.dev:xosc:1.0.0:variables.unused"],
+    level: Level::Information,
+    versions: "1.2.0..",
+    after: super::READABLE,
+    page: include_str!("variables_unused.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    if !scenario.storyboard().is_complete() {
+        return;
+    }
+    let used = declared::VARIABLES.names(scenario, &["VariableAction", "VariableCondition"]);
+    for declaration in declared::VARIABLES.declarations(scenario) {
+        let name = declared::bare(declaration.written("name").unwrap_or(""));
+        if !used.contains(name) {
+            let text = format!(
+                "no action sets the variable `{name}` and no condition looks at it; only the outside can use it"
+            );
+            found.issue(declaration.node(), text);
+        }
+    }
+}
