@@ -1,5 +1,5 @@
 use qcbus_openscenario::{Scenario, is_identifier};
-use qcbus_sdk::{Backport, Rule, Sink};
+use qcbus_sdk::{Backport, Level, Rule, Sink};
 
 use crate::model::{About, Scene};
 
@@ -22,15 +22,20 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         else {
             continue;
         };
-        let why = match name.strip_prefix('$') {
-            Some(rest) if is_identifier(rest) => format!(
+        let stripped = name.strip_prefix('$').filter(|rest| is_identifier(rest));
+        let why = match stripped {
+            Some(rest) => format!(
                 "the `$` belongs where the parameter is used; it is declared as `{rest}`"
             ),
-            _ => "a name begins with a letter or `_` and goes on with letters, digits and `_`, else no `$` \
-                  can refer to it"
+            None => "a name begins with a letter or `_` and goes on with letters, digits and `_`, else no `$` \
+                     can refer to it"
                 .to_owned(),
         };
         let text = format!("`{name}` is no name of a parameter: {why}");
-        found.about(declaration, "name", text);
+        let finding = found.about(declaration, "name", text);
+        if stripped.is_some() {
+            // Examples of the standard itself are written so, and simulators leave the sign out.
+            finding.level(Level::Warning);
+        }
     }
 }

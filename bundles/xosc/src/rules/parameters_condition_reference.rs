@@ -1,4 +1,4 @@
-use qcbus_openscenario::{Form, Scenario};
+use qcbus_openscenario::{Element, Form, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::declared;
@@ -35,9 +35,24 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 .about(element, "parameterRef", text)
                 .level(Level::Warning)
                 .at(inner.node, "its declaration");
+        } else if is_criterion(element) {
+            let text = format!(
+                "the parameter `{name}` of this criterion is none of the scenario's: conditions whose name begins \
+                 with `criteria_` are read by CARLA's ScenarioRunner and by nobody else"
+            );
+            found
+                .about(element, "parameterRef", text)
+                .level(Level::Information);
         } else {
             let names = declared.keys().copied();
             references::unresolved(element, "parameterRef", &name, "parameter", names, found);
         }
     }
+}
+
+/// Whether the condition is one of those by which CARLA's ScenarioRunner judges a run.
+fn is_criterion(element: Element<'_, '_>) -> bool {
+    let condition = element.ancestor("Condition");
+    let name = condition.and_then(|condition| condition.text("name"));
+    name.is_some_and(|name| name.starts_with("criteria_"))
 }

@@ -1,4 +1,4 @@
-use qcbus_openscenario::Scenario;
+use qcbus_openscenario::{Form, Scenario};
 use qcbus_sdk::{Backport, Rule, Sink};
 
 use crate::families::references::{self, ENTITY_REFERENCES};
@@ -16,13 +16,19 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    // A catalog knows no entities: those are the business of whoever refers to it.
+    if scenario.form() != Form::Scenario {
+        return;
+    }
     let entities = scenario.entities();
     for (element, attribute) in ENTITY_REFERENCES {
         for reference in scenario.elements_everywhere(element) {
             let Some(name) = reference.text(attribute) else {
                 continue;
             };
-            if !entities.contains(&name) {
+            // Catalogs have parameters for trailers that a vehicle may have: empty, it has none.
+            let left_out = name.is_empty() && reference.written(attribute) != Some("");
+            if !left_out && !entities.contains(&name) {
                 let names = entities.names();
                 references::unresolved(reference, attribute, &name, "entity", names, found);
             }
