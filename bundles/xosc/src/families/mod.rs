@@ -3,5 +3,6 @@
 pub(crate) mod constraints;
 pub(crate) mod declared;
 pub(crate) mod names;
+pub(crate) mod ranges;
 pub(crate) mod references;
 pub(crate) mod values;

@@ -51,6 +51,22 @@ mod variables_dollar_reference;
 mod variables_name_syntax;
 mod variables_never_written_condition;
 mod variables_unused;
+mod action_controller_override_range;
+mod data_type_condition_delay_not_negative;
+mod data_type_distances_are_not_negative;
+mod data_type_non_negative_transition_time_in_light_state_action;
+mod environment_ranges;
+mod position_geo_range;
+mod positive_duration_in_phase;
+mod range_actions;
+mod range_appearance;
+mod range_conditions;
+mod range_entities;
+mod range_positions;
+mod range_traffic;
+mod range_trajectories;
+mod storyboard_maximum_execution_count;
+mod trajectory_timing_scale;
 
 /// The precondition of rules that need no more than a file that could be read: see `after`.
 pub(crate) const READABLE: &[&str] = &["check_asam_xosc_xml_root_tag_is_openscenario"];
@@ -103,4 +119,20 @@ pub static RULES: &[&dyn AnyRule] = &[
     &monitors_unused::RULE,
     &monitors_no_change::RULE,
     &data_type_time_format::RULE,
+    &data_type_condition_delay_not_negative::RULE,
+    &data_type_distances_are_not_negative::RULE,
+    &positive_duration_in_phase::RULE,
+    &data_type_non_negative_transition_time_in_light_state_action::RULE,
+    &storyboard_maximum_execution_count::RULE,
+    &action_controller_override_range::RULE,
+    &environment_ranges::RULE,
+    &position_geo_range::RULE,
+    &trajectory_timing_scale::RULE,
+    &range_actions::RULE,
+    &range_appearance::RULE,
+    &range_conditions::RULE,
+    &range_entities::RULE,
+    &range_positions::RULE,
+    &range_traffic::RULE,
+    &range_trajectories::RULE,
 ];

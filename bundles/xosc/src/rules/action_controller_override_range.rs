@@ -1,0 +1,43 @@
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::ranges;
+use crate::families::ranges::tables::OVERRIDES;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_action_controller_override_range",
+    uids: &UIDS,
+    after: super::READABLE,
+    page: include_str!("action_controller_override_range.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const OWN: [&str; 1] = ["qcbus.dev:xosc:1.0.0:action.controller_override_range"];
+
+const UIDS: [&str; OWN.len() + OVERRIDES.len()] = ranges::uids(&OWN, OVERRIDES);
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    ranges::report_as_own(scenario, OVERRIDES, found);
+    for gear in scenario.elements_everywhere("Gear") {
+        if gear.class() == Some("OverrideGearAction") {
+            whole_number(gear, found);
+        }
+    }
+}
+
+/// The number of a gear is a double to the schema.
+fn whole_number(gear: Element<'_, '_>, found: &mut Sink<'_>) {
+    let Some(number) = gear.double("number") else {
+        return;
+    };
+    if number.fract() != 0.0 || !number.is_finite() {
+        let text = format!(
+            "`number` of `Gear` is {}, but must be a whole number: the number of a gear, 0 for neutral, \
+             negative for reverse",
+            ranges::shown(gear, "number", number)
+        );
+        found.about(gear, "number", text);
+    }
+}

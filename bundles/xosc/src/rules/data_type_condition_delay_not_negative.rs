@@ -1,0 +1,23 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::ranges;
+use crate::families::ranges::tables::CONDITION_DELAY;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_data_type_condition_delay_not_negative",
+    uids: &UIDS,
+    after: super::READABLE,
+    page: include_str!("data_type_condition_delay_not_negative.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const OWN: [&str; 1] = ["asam.net:xosc:1.0.0:data_type.condition_delay_not_negative"];
+
+const UIDS: [&str; OWN.len() + CONDITION_DELAY.len()] = ranges::uids(&OWN, CONDITION_DELAY);
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    ranges::report_as_own(scenario, CONDITION_DELAY, found);
+}

@@ -1,0 +1,26 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::families::ranges;
+use crate::families::ranges::tables::TRANSITIONS;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_data_type_non_negative_transition_time_in_light_state_action",
+    uids: &UIDS,
+    versions: "1.2.0..",
+    backport: Backport::Alike { since: "" },
+    after: super::READABLE,
+    page: include_str!("data_type_non_negative_transition_time_in_light_state_action.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const OWN: [&str; 1] =
+    ["asam.net:xosc:1.2.0:data_type.non_negative_transition_time_in_light_state_action"];
+
+const UIDS: [&str; OWN.len() + TRANSITIONS.len()] = ranges::uids(&OWN, TRANSITIONS);
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    ranges::report_as_own(scenario, TRANSITIONS, found);
+}

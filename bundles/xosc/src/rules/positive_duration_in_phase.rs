@@ -1,0 +1,28 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::families::ranges;
+use crate::families::ranges::tables::PHASES;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_positive_duration_in_phase",
+    uids: &UIDS,
+    versions: "1.2.0..",
+    backport: Backport::Alike { since: "" },
+    after: super::READABLE,
+    page: include_str!("positive_duration_in_phase.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const OWN: [&str; 2] = [
+    "asam.net:xosc:1.2.0:data_type.positive_duration_in_phase",
+    "asam.net:xosc:1.0.0:data_type.phase_duration_positive",
+];
+
+const UIDS: [&str; OWN.len() + PHASES.len()] = ranges::uids(&OWN, PHASES);
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    ranges::report_as_own(scenario, PHASES, found);
+}

@@ -1,0 +1,23 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::ranges;
+use crate::families::ranges::tables::EXECUTIONS;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_storyboard_maximum_execution_count",
+    uids: &UIDS,
+    after: super::READABLE,
+    page: include_str!("storyboard_maximum_execution_count.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const OWN: [&str; 1] = ["qcbus.dev:xosc:1.0.0:storyboard.maximum_execution_count"];
+
+const UIDS: [&str; OWN.len() + EXECUTIONS.len()] = ranges::uids(&OWN, EXECUTIONS);
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    ranges::report_as_own(scenario, EXECUTIONS, found);
+}

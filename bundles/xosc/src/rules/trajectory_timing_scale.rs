@@ -1,0 +1,23 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::ranges;
+use crate::families::ranges::tables::TIMING;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_trajectory_timing_scale",
+    uids: &UIDS,
+    after: super::READABLE,
+    page: include_str!("trajectory_timing_scale.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const OWN: [&str; 1] = ["qcbus.dev:xosc:1.0.0:trajectory.timing_scale"];
+
+const UIDS: [&str; OWN.len() + TIMING.len()] = ranges::uids(&OWN, TIMING);
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    ranges::report_as_own(scenario, TIMING, found);
+}
