@@ -2,6 +2,7 @@
 
 pub(crate) mod constraints;
 pub(crate) mod declared;
+pub(crate) mod deprecation;
 pub(crate) mod names;
 pub(crate) mod ranges;
 pub(crate) mod references;

@@ -55,7 +55,16 @@ mod action_controller_override_range;
 mod data_type_condition_delay_not_negative;
 mod data_type_distances_are_not_negative;
 mod data_type_non_negative_transition_time_in_light_state_action;
+mod deprecated_element_used;
+mod deprecated_old_and_new_together;
+mod environment_friction_zero;
 mod environment_ranges;
+mod general_file_ending;
+mod header_date_plausible;
+mod header_license_present;
+mod header_metadata_filled;
+mod header_unsupported_version;
+mod modular_not_plain_scenario;
 mod position_geo_range;
 mod positive_duration_in_phase;
 mod range_actions;
@@ -135,4 +144,13 @@ pub static RULES: &[&dyn AnyRule] = &[
     &range_positions::RULE,
     &range_traffic::RULE,
     &range_trajectories::RULE,
+    &general_file_ending::RULE,
+    &header_unsupported_version::RULE,
+    &header_metadata_filled::RULE,
+    &header_date_plausible::RULE,
+    &header_license_present::RULE,
+    &modular_not_plain_scenario::RULE,
+    &environment_friction_zero::RULE,
+    &deprecated_old_and_new_together::RULE,
+    &deprecated_element_used::RULE,
 ];

@@ -1,0 +1,27 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_general_file_ending",
+    uids: &["asam.net:xosc:1.0.0:general.file_ending"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("general_file_ending.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let document = scenario.document();
+    let path = document.path();
+    let name = path.rsplit(['/', '\\']).next().unwrap_or(path);
+    // Archives of modular scenarios are files of their own kind.
+    if name.ends_with(".xosc") || name.ends_with(".mosc") {
+        return;
+    }
+    let text =
+        format!("the file is called `{name}`, but the name of such a file should end in `.xosc`");
+    found.issue((document, 0), text).here("the file");
+}

@@ -1,0 +1,41 @@
+use qcbus_openscenario::{DateTime, Scenario};
+use qcbus_sdk::{Level, Param, Place, Rule, Sink};
+
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_header_date_plausible",
+    uids: &["qcbus.dev:xosc:1.0.0:header.date_plausible"],
+    level: Level::Information,
+    after: super::READABLE,
+    params: &[EARLIEST],
+    page: include_str!("header_date_plausible.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const EARLIEST: Param = Param::number(
+    "earliest",
+    2000.0,
+    "year",
+    "files that are older than this year are not believed",
+);
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let Some(header) = scenario.root().child("FileHeader") else {
+        return;
+    };
+    // What is no date at all is the schema's finding.
+    let date = header.text("date");
+    let year = date
+        .and_then(|date| DateTime::parse(&date).ok())
+        .map(|date| date.year);
+    let earliest = found.number(&EARLIEST);
+    if let Some(year) = year.filter(|year| (*year as f64) < earliest) {
+        let text = format!(
+            "the header's `date` is in the year {year}, before {earliest}: a tool has probably written what it \
+             had instead of the date"
+        );
+        found.issue(Place::attribute_or_node(header.node(), "date"), text);
+    }
+}

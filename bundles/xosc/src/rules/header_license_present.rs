@@ -1,0 +1,35 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_header_license_present",
+    uids: &["qcbus.dev:xosc:1.0.0:header.license_present"],
+    level: Level::Information,
+    versions: "1.1..",
+    after: super::READABLE,
+    default_on: false,
+    page: include_str!("header_license_present.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let Some(header) = scenario.root().child("FileHeader") else {
+        return;
+    };
+    let Some(license) = header.child("License") else {
+        let text =
+            "the header has no `License`; it should say under which terms the file may be used";
+        found.issue(header.node(), text);
+        return;
+    };
+    let named = license
+        .text("spdxId")
+        .is_none_or(|id| !id.trim().is_empty());
+    if !license.has("spdxId") || !named {
+        let text = "the `License` names no `spdxId`, such as `MIT` or `CC-BY-4.0`, by which programs know it";
+        found.issue(Place::attribute_or_node(license.node(), "spdxId"), text);
+    }
+}

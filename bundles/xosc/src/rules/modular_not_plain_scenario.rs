@@ -1,0 +1,46 @@
+use qcbus_document::FileKind;
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_modular_not_plain_scenario",
+    uids: &["qcbus.dev:xosc:1.0.0:modular.not_plain_scenario"],
+    after: super::READABLE,
+    page: include_str!("modular_not_plain_scenario.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    if found.subject().kind() == FileKind::Mosc {
+        return;
+    }
+    let references: Vec<_> = scenario.elements("ScenarioReference").collect();
+    if let Some(first) = references.first() {
+        let text = format!(
+            "`ScenarioReference` belongs to modular scenarios, which must be expanded before a simulator can run \
+             them: it knows no such element, and the {} without maneuvers",
+            match references.len() {
+                1 => "group is".to_owned(),
+                many => format!("{many} groups like this one are"),
+            }
+        );
+        found.issue(first.node(), text);
+        return;
+    }
+    let root = scenario.root();
+    let offers = || {
+        let all = root.descendants();
+        all.filter_map(|element| element.attribute("parameterAttributes"))
+    };
+    if let Some(first) = offers().next() {
+        let text = format!(
+            "`parameterAttributes` belongs to modular scenarios and is no attribute of the standard ({} in this \
+             file); simulators that do not check the schema run the file as it is",
+            offers().count()
+        );
+        found.issue(first, text).level(Level::Information);
+    }
+}
