@@ -3,6 +3,7 @@
 pub(crate) mod constraints;
 pub(crate) mod declared;
 pub(crate) mod deprecation;
+pub(crate) mod minsubset;
 pub(crate) mod names;
 pub(crate) mod ranges;
 pub(crate) mod references;

@@ -64,6 +64,27 @@ mod header_date_plausible;
 mod header_license_present;
 mod header_metadata_filled;
 mod header_unsupported_version;
+mod minsubset_additional_axles_not_allowed;
+mod minsubset_allowed_conditions;
+mod minsubset_allowed_init_actions;
+mod minsubset_allowed_position_types;
+mod minsubset_allowed_scenario_objects;
+mod minsubset_allowed_story_actions;
+mod minsubset_allowed_vehicle_attributes;
+mod minsubset_allowed_vehicle_elements;
+mod minsubset_allowed_vehicle_performance_attributes;
+mod minsubset_catalog_references_not_allowed;
+mod minsubset_entity_selection_not_allowed;
+mod minsubset_follow_trajectory_action_constraints;
+mod minsubset_max_one_action_per_act;
+mod minsubset_maximum_execution_count_is_one;
+mod minsubset_monitors_not_allowed;
+mod minsubset_not_more_than_one_story_allowed;
+mod minsubset_object_controller_not_allowed;
+mod minsubset_parameters_not_allowed;
+mod minsubset_stop_triggers_not_allowed_except_in_storyboard;
+mod minsubset_variables_not_allowed;
+mod minsubset_vehicle_must_contain_front_axle;
 mod modular_not_plain_scenario;
 mod position_geo_range;
 mod positive_duration_in_phase;
@@ -153,4 +174,25 @@ pub static RULES: &[&dyn AnyRule] = &[
     &environment_friction_zero::RULE,
     &deprecated_old_and_new_together::RULE,
     &deprecated_element_used::RULE,
+    &minsubset_additional_axles_not_allowed::RULE,
+    &minsubset_allowed_conditions::RULE,
+    &minsubset_allowed_init_actions::RULE,
+    &minsubset_allowed_position_types::RULE,
+    &minsubset_allowed_scenario_objects::RULE,
+    &minsubset_allowed_story_actions::RULE,
+    &minsubset_allowed_vehicle_attributes::RULE,
+    &minsubset_allowed_vehicle_elements::RULE,
+    &minsubset_allowed_vehicle_performance_attributes::RULE,
+    &minsubset_catalog_references_not_allowed::RULE,
+    &minsubset_entity_selection_not_allowed::RULE,
+    &minsubset_follow_trajectory_action_constraints::RULE,
+    &minsubset_max_one_action_per_act::RULE,
+    &minsubset_maximum_execution_count_is_one::RULE,
+    &minsubset_monitors_not_allowed::RULE,
+    &minsubset_not_more_than_one_story_allowed::RULE,
+    &minsubset_object_controller_not_allowed::RULE,
+    &minsubset_parameters_not_allowed::RULE,
+    &minsubset_stop_triggers_not_allowed_except_in_storyboard::RULE,
+    &minsubset_variables_not_allowed::RULE,
+    &minsubset_vehicle_must_contain_front_axle::RULE,
 ];

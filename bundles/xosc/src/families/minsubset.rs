@@ -1,0 +1,62 @@
+//! The minimum subset: what a scenario may use that is exchanged between any two tools. Each rule names
+//! what one part of it allows; none of them runs without being asked for.
+
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Place, Sink};
+
+/// Says every element of these names: the subset has none of them. `instead` is how to do without.
+pub(crate) fn none(scenario: &Scenario<'_>, names: &[&str], instead: &str, found: &mut Sink<'_>) {
+    for element in names.iter().flat_map(|name| scenario.elements(name)) {
+        outside(element, instead, found);
+    }
+}
+
+/// Says that an element is outside the subset.
+pub(crate) fn outside(element: Element<'_, '_>, instead: &str, found: &mut Sink<'_>) {
+    let text = format!(
+        "`{}` is outside the minimum subset: {instead}",
+        element.name()
+    );
+    found.issue(element.node(), text);
+}
+
+/// Says what stands directly within an element and is none of what the subset allows there.
+pub(crate) fn only(around: Element<'_, '_>, allowed: &[&str], found: &mut Sink<'_>) {
+    for child in around.children() {
+        if !allowed.contains(&child.name()) {
+            let text = format!(
+                "`{}` in `{}` is outside the minimum subset, which has only {} there",
+                child.name(),
+                around.name(),
+                list(allowed)
+            );
+            found.issue(child.node(), text);
+        }
+    }
+}
+
+/// Says the attributes of an element that the subset leaves out.
+pub(crate) fn without(
+    scenario: &Scenario<'_>,
+    element: &str,
+    attributes: &[&str],
+    found: &mut Sink<'_>,
+) {
+    for element in scenario.elements(element) {
+        for attribute in attributes {
+            if element.has(attribute) {
+                let text = format!(
+                    "`{attribute}` of `{}` is outside the minimum subset, which has only the attributes that the \
+                     standard demands",
+                    element.name()
+                );
+                found.issue(Place::attribute_or_node(element.node(), attribute), text);
+            }
+        }
+    }
+}
+
+fn list(names: &[&str]) -> String {
+    let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+    quoted.join(", ")
+}

@@ -1,0 +1,28 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::minsubset;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_minsubset_allowed_vehicle_elements",
+    uids: &["asam.net:xosc:1.3.0:minsubset.allowed_vehicle_elements"],
+    level: Level::Information,
+    versions: "1.3.0..",
+    after: super::READABLE,
+    default_on: false,
+    page: include_str!("minsubset_allowed_vehicle_elements.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let optional = ["Properties", "Trailer", "TrailerCoupler", "TrailerHitch"];
+    for vehicle in scenario.elements("Vehicle") {
+        for part in vehicle.children() {
+            if optional.contains(&part.name()) {
+                minsubset::outside(part, "a vehicle has only what the standard demands", found);
+            }
+        }
+    }
+}
