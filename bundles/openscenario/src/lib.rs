@@ -34,7 +34,7 @@ pub use faults::{Dialect, ValueFault, ValueFaultKind};
 pub use form::Form;
 pub use inputs::{Inputs, LinkedCatalog, LinkedMap};
 pub use network::{LaneAt, Network};
-pub use qcbus_schema::closest;
+pub use qcbus_schema::{Member, closest};
 pub use reading::Reading;
 pub use scenario::Scenario;
 pub use scope::{Declaration, Declared, Declares};

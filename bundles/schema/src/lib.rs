@@ -35,7 +35,7 @@ pub use notation::NotationError;
 pub use regex::{Pattern, PatternError};
 pub use similar::closest;
 pub use simple::Expectation;
-pub use typing::{Typing, ValueType};
+pub use typing::{Member, Typing, ValueType, came_with};
 pub use user_schemas::{UserSchemaContent, UserSchemaError, UserSchemaFile, user_schemas};
 pub use validate::Overlay;
 pub use versions::{SHIPPED, Shipped, SkipReason, Version, version_of};

@@ -7,7 +7,7 @@ use qcbus_document::{Attribute, Document, FileKind, Node};
 
 use crate::model::{ComplexType, Content, Schema, TypeRef};
 use crate::simple::{SimpleType, Variety};
-use crate::versions::{Version, select};
+use crate::versions::{SHIPPED, Version, select};
 
 /// The complex type of every element of one document.
 #[derive(Debug, Clone)]
@@ -91,6 +91,57 @@ fn child(schema: &Schema, around: u32, name: &str) -> u32 {
         content.children().iter().find(|child| child.name == name)
     };
     declared().map_or(UNKNOWN, |declared| complex(declared.ty))
+}
+
+/// Something that a type may have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Member<'a> {
+    /// A child of this name.
+    Child(&'a str),
+    /// An attribute of this name.
+    Attribute(&'a str),
+    /// An attribute that may say this word.
+    Word(&'a str, &'a str),
+}
+
+/// The first version after `version` in which the type of this name has something; `None` when it
+/// never has, as far as is known.
+pub fn came_with(
+    kind: FileKind,
+    version: Version,
+    class: &str,
+    member: Member<'_>,
+) -> Option<Version> {
+    let later = SHIPPED
+        .iter()
+        .filter(|one| one.kind == kind && one.version > version);
+    let mut having = later.filter(|one| {
+        one.schema()
+            .is_ok_and(|schema| has(schema, class, member).unwrap_or(false))
+    });
+    having.next().map(|one| one.version)
+}
+
+fn has(schema: &'static Schema, class: &str, member: Member<'_>) -> Option<bool> {
+    let mut types = schema.complex.iter();
+    let complex = types.find(|complex| complex.name.as_deref() == Some(class))?;
+    let attribute = |name: &str| {
+        let name = schema.names.find(name)?;
+        complex.attributes.iter().find(|one| one.name == name)
+    };
+    Some(match member {
+        Member::Child(name) => {
+            let name = schema.names.find(name)?;
+            let mut children = complex.content.children().iter();
+            children.any(|child| child.name == name)
+        }
+        Member::Attribute(name) => attribute(name).is_some(),
+        Member::Word(name, word) => {
+            let simple = schema.simple.get(attribute(name)?.value as usize)?;
+            let words = ValueType { schema, simple }.words()?;
+            words.iter().any(|one| **one == *word)
+        }
+    })
 }
 
 /// The type of an attribute's value.

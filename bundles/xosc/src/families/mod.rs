@@ -5,6 +5,7 @@ pub(crate) mod declared;
 pub(crate) mod deprecation;
 pub(crate) mod minsubset;
 pub(crate) mod names;
+pub(crate) mod profiles;
 pub(crate) mod ranges;
 pub(crate) mod references;
 pub(crate) mod values;

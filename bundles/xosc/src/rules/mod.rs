@@ -64,6 +64,7 @@ mod header_date_plausible;
 mod header_license_present;
 mod header_metadata_filled;
 mod header_unsupported_version;
+mod header_version_feature_mismatch;
 mod minsubset_additional_axles_not_allowed;
 mod minsubset_allowed_conditions;
 mod minsubset_allowed_init_actions;
@@ -88,6 +89,8 @@ mod minsubset_vehicle_must_contain_front_axle;
 mod modular_not_plain_scenario;
 mod position_geo_range;
 mod positive_duration_in_phase;
+mod profile_carla_supported;
+mod profile_esmini_supported;
 mod range_actions;
 mod range_appearance;
 mod range_conditions;
@@ -167,6 +170,7 @@ pub static RULES: &[&dyn AnyRule] = &[
     &range_trajectories::RULE,
     &general_file_ending::RULE,
     &header_unsupported_version::RULE,
+    &header_version_feature_mismatch::RULE,
     &header_metadata_filled::RULE,
     &header_date_plausible::RULE,
     &header_license_present::RULE,
@@ -195,4 +199,6 @@ pub static RULES: &[&dyn AnyRule] = &[
     &minsubset_stop_triggers_not_allowed_except_in_storyboard::RULE,
     &minsubset_variables_not_allowed::RULE,
     &minsubset_vehicle_must_contain_front_axle::RULE,
+    &profile_carla_supported::RULE,
+    &profile_esmini_supported::RULE,
 ];

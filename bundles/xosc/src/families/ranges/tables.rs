@@ -43,7 +43,8 @@ table! {
         from_zero DynamicConstraints maxDecelerationRate "m/s³" "dynamicconstraints_maxdecelerationrate";
         from_zero DynamicConstraints maxSpeed "m/s" "dynamicconstraints_maxspeed";
         from_zero LaneOffsetActionDynamics maxLateralAcc "m/s²" "laneoffsetactiondynamics_maxlateralacc";
-        from_zero LongitudinalDistanceAction timeGap "s" "longitudinaldistanceaction_timegap";
+        from_zero LongitudinalDistanceAction timeGap "s" "longitudinaldistanceaction_timegap"
+            .judged(a_side_may_have_a_sign, NO_SIDE);
         from_zero SpeedProfileEntry time "s" "speedprofileentry_time";
         from_zero SynchronizeAction targetTolerance "m" "synchronizeaction_targettolerance";
         from_zero SynchronizeAction targetToleranceMaster "m" "synchronizeaction_targettolerancemaster";
@@ -114,7 +115,8 @@ table! {
         from_zero DistanceCondition value "m" "distancecondition_value";
         from_zero LateralDistanceAction distance "m" "lateraldistanceaction_distance"
             .judged(a_side_may_have_a_sign, NO_SIDE);
-        from_zero LongitudinalDistanceAction distance "m" "longitudinaldistanceaction_distance";
+        from_zero LongitudinalDistanceAction distance "m" "longitudinaldistanceaction_distance"
+            .judged(a_side_may_have_a_sign, NO_SIDE);
         from_zero ReachPositionCondition tolerance "m" "reachpositioncondition_tolerance";
         from_zero RelativeClearanceCondition distanceBackward "m" "relativeclearancecondition_distancebackward";
         from_zero RelativeClearanceCondition distanceForward "m" "relativeclearancecondition_distanceforward";

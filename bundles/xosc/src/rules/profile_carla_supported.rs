@@ -1,0 +1,56 @@
+use qcbus_openscenario::{Form, Scenario};
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::families::profiles::Fate::{Ignores, Stops};
+use crate::families::profiles::{self, Gap, gap};
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_profile_carla_supported",
+    uids: &["qcbus.dev:xosc:1.0.0:profile.carla_supported"],
+    level: Level::Information,
+    after: super::READABLE,
+    default_on: false,
+    page: include_str!("profile_carla_supported.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const GAPS: &[Gap] = &[
+    gap("AbsoluteTargetLane", Stops),
+    gap("Brake", Stops).saying("active", "true"),
+    gap("Clothoid", Stops),
+    gap("Clutch", Stops).saying("active", "true"),
+    gap("EntitySelection", Ignores),
+    gap("Gear", Stops).saying("active", "true"),
+    gap("LongitudinalDistanceAction", Stops).with("timeGap"),
+    gap("Nurbs", Stops),
+    gap("ObjectController", Ignores),
+    gap("ParkingBrake", Stops).saying("active", "true"),
+    gap("RoutePosition", Stops),
+    gap("SceneGraphFile", Ignores),
+    gap("SteeringWheel", Stops).saying("active", "true"),
+    gap("Throttle", Stops).saying("active", "true"),
+    gap("TrafficAction", Stops),
+    gap("UserDefinedValueCondition", Stops),
+    gap("VisibilityAction", Stops),
+];
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let (major, minor) = scenario.version();
+    if (major, minor) == (1, 0) {
+        profiles::report(scenario, NAME, GAPS, found);
+        return;
+    }
+    // Catalogs are read whatever their version.
+    let header = scenario.root().child("FileHeader");
+    if let Some(header) = header.filter(|_| scenario.form() == Form::Scenario) {
+        let text = format!(
+            "{NAME} reads scenarios of version 1.0 only, and this one says {major}.{minor}"
+        );
+        let attribute = if major == 1 { "revMinor" } else { "revMajor" };
+        found.issue(Place::attribute_or_node(header.node(), attribute), text);
+    }
+}
+
+const NAME: &str = "CARLA's scenario runner";
