@@ -7,7 +7,20 @@ use qcbus_sdk::AnyRule;
 mod naming_unique_element_names_on_same_level;
 mod parameters_parameter_declaration_parameter_scope;
 mod reference_control_resolvable_entity_references;
+mod reference_control_resolvable_storyboard_element_reference;
 mod reference_control_unique_element_names_on_same_level;
+mod reference_control_valid_actor_reference_in_private_actions;
+mod storyboard_act_never_starts;
+mod storyboard_action_conflict;
+mod storyboard_empty;
+mod storyboard_event_never_starts;
+mod storyboard_init_private_unknown;
+mod storyboard_priority_conflict;
+mod storyboard_private_action_global_actor;
+mod storyboard_reference_to_self_or_parent_end;
+mod storyboard_select_triggering_entities;
+mod storyboard_stop_trigger;
+mod storyboard_unreachable_by_reference;
 mod xml_fileheader_is_present;
 mod xml_root_tag_is_openscenario;
 mod xml_valid_schema;
@@ -201,4 +214,17 @@ pub static RULES: &[&dyn AnyRule] = &[
     &minsubset_vehicle_must_contain_front_axle::RULE,
     &profile_carla_supported::RULE,
     &profile_esmini_supported::RULE,
+    &reference_control_valid_actor_reference_in_private_actions::RULE,
+    &reference_control_resolvable_storyboard_element_reference::RULE,
+    &storyboard_stop_trigger::RULE,
+    &storyboard_act_never_starts::RULE,
+    &storyboard_event_never_starts::RULE,
+    &storyboard_empty::RULE,
+    &storyboard_unreachable_by_reference::RULE,
+    &storyboard_reference_to_self_or_parent_end::RULE,
+    &storyboard_select_triggering_entities::RULE,
+    &storyboard_priority_conflict::RULE,
+    &storyboard_action_conflict::RULE,
+    &storyboard_private_action_global_actor::RULE,
+    &storyboard_init_private_unknown::RULE,
 ];

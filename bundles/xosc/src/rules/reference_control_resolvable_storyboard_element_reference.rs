@@ -1,0 +1,136 @@
+use qcbus_openscenario::{Element, Form, Scenario, StoryElement, StoryKind};
+use qcbus_sdk::{Backport, Level, Rule, Sink};
+
+use crate::families::references::{hint, quoted};
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_reference_control_resolvable_storyboard_element_reference",
+    uids: &[
+        "asam.net:xosc:1.2.0:reference_control.resolvable_storyboard_element_reference",
+        "asam.net:xosc:1.0.0:reference_control.resolvable_storyboard_element_ref",
+    ],
+    versions: "1.2.0..",
+    backport: Backport::Alike { since: "" },
+    after: super::READABLE,
+    page: include_str!("reference_control_resolvable_storyboard_element_reference.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    if scenario.form() != Form::Scenario {
+        return;
+    }
+    for condition in scenario.elements_everywhere("StoryboardElementStateCondition") {
+        let Some(name) = condition.text("storyboardElementRef") else {
+            continue;
+        };
+        look_up(scenario, condition, &name, found);
+    }
+}
+
+fn look_up<'d>(
+    scenario: &Scenario<'d>,
+    condition: Element<'_, 'd>,
+    name: &str,
+    found: &mut Sink<'_>,
+) {
+    let storyboard = scenario.storyboard();
+    let matches = storyboard.find(name);
+    if matches.is_empty() {
+        // A name with `::` in it is the fault of the name.
+        let named_so = name.contains("::") && storyboard.names().any(|other| other == name);
+        if storyboard.is_complete() && !named_so {
+            nowhere(scenario, condition, name, found);
+        }
+        return;
+    }
+    let word = condition.word("storyboardElementType");
+    let Some(kind) = word.and_then(|word| StoryKind::of_word(&word)) else {
+        return;
+    };
+    let of_kind: Vec<&StoryElement<'_>> = matches
+        .iter()
+        .copied()
+        .filter(|one| one.kind() == kind)
+        .collect();
+    match (of_kind.first(), of_kind.get(1)) {
+        (None, _) if storyboard.is_complete() => {
+            let is = matches.first().map_or("", |one| one.kind().word());
+            let text = format!(
+                "{} is of type `{is}`, but `storyboardElementType` says `{}`",
+                quoted(condition, "storyboardElementRef", name),
+                kind.word()
+            );
+            let finding = found.about(condition, "storyboardElementType", text);
+            if let Some(one) = matches.first() {
+                finding.at(one.element(scenario).node(), "the element of this name");
+            }
+        }
+        (Some(first), Some(second)) => {
+            let text = format!(
+                "{} may be any of {} elements of type `{}`; the name must lead to one, in front of it may \
+                 stand those of the elements around it: `outer::{name}`",
+                quoted(condition, "storyboardElementRef", name),
+                of_kind.len(),
+                kind.word()
+            );
+            let by_scope = nearest(scenario, condition, &of_kind) == 1;
+            found
+                .about(condition, "storyboardElementRef", text)
+                .level(if by_scope {
+                    Level::Warning
+                } else {
+                    Level::Error
+                })
+                .at(first.element(scenario).node(), "the first of them")
+                .at(second.element(scenario).node(), "the second of them");
+        }
+        _ => {}
+    }
+}
+
+fn nowhere<'d>(
+    scenario: &Scenario<'d>,
+    condition: Element<'_, 'd>,
+    name: &str,
+    found: &mut Sink<'_>,
+) {
+    let storyboard = scenario.storyboard();
+    let reference = quoted(condition, "storyboardElementRef", name);
+    let leaf = name.rsplit("::").next().unwrap_or(name);
+    if leaf != name && !storyboard.find(leaf).is_empty() {
+        let text = format!(
+            "{reference} leads to no element: there is `{leaf}`, but the names in front of it must be those of \
+             the elements directly around it, none left out"
+        );
+        found.about(condition, "storyboardElementRef", text);
+        return;
+    }
+    let text = format!(
+        "{reference} leads to no story, act, maneuver group, maneuver, event or action{}",
+        hint(leaf, storyboard.names())
+    );
+    found.about(condition, "storyboardElementRef", text);
+}
+
+/// How many of the elements lie nearest to the condition: within the innermost element around it that
+/// has any of them. Simulators that look there first find one when it is the only one.
+fn nearest<'d>(
+    scenario: &Scenario<'d>,
+    condition: Element<'_, 'd>,
+    elements: &[&StoryElement<'d>],
+) -> usize {
+    condition
+        .ancestors()
+        .map(|around| {
+            let within = |one: &&&StoryElement<'d>| {
+                let element = one.element(scenario);
+                element == around || element.ancestors().any(|other| other == around)
+            };
+            elements.iter().filter(within).count()
+        })
+        .find(|count| *count > 0)
+        .unwrap_or(0)
+}

@@ -1,0 +1,52 @@
+use qcbus_openscenario::{Actors, Element, Scenario};
+use qcbus_sdk::{Backport, Rule, Sink};
+
+use crate::families::triggers::called;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_reference_control_valid_actor_reference_in_private_actions",
+    uids: &["asam.net:xosc:1.2.0:reference_control.valid_actor_reference_in_private_actions"],
+    versions: "1.2.0..",
+    backport: Backport::Alike { since: "" },
+    after: super::READABLE,
+    page: include_str!("reference_control_valid_actor_reference_in_private_actions.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for group in scenario.elements("ManeuverGroup") {
+        // A missing `Actors` is the schema's finding.
+        let Some(block) = group.child("Actors") else {
+            continue;
+        };
+        let actors = Actors::of(block);
+        if actors.is_none_or(|actors| actors.triggering || !actors.named.is_empty()) {
+            continue;
+        }
+        let Some(private) = private_actions(group).next() else {
+            continue;
+        };
+        let text = format!(
+            "{} has no actors, but private actions: they move nobody; `Actors` must have an `EntityRef` or \
+             `selectTriggeringEntities=\"true\"`",
+            called(group)
+        );
+        found
+            .about(block, "", text)
+            .at(private.node(), "its first private action");
+    }
+}
+
+/// The private actions of a group, those in maneuvers of catalogs included.
+fn private_actions<'m, 'd>(group: Element<'m, 'd>) -> impl Iterator<Item = Element<'m, 'd>> {
+    let scenario = group.scenario();
+    let entries = group
+        .children_named("CatalogReference")
+        .filter_map(|reference| scenario.entry(reference));
+    group
+        .children_named("Maneuver")
+        .chain(entries)
+        .flat_map(|maneuver| maneuver.descendants_named("PrivateAction"))
+}

@@ -1,0 +1,24 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::triggers;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_storyboard_act_never_starts",
+    uids: &["qcbus.dev:xosc:1.0.0:storyboard.act_never_starts"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("storyboard_act_never_starts.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let remedy = if scenario.version() >= (1, 3) {
+        "an act without `StartTrigger` starts at once"
+    } else {
+        "an act that is to start at once has a condition such as a simulation time greater than 0"
+    };
+    triggers::empty_starts(scenario, "Act", remedy, found);
+}

@@ -1,0 +1,92 @@
+use foldhash::{HashMap, HashMapExt as _};
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::actions::{Domain, acting, domains};
+use crate::families::triggers::{called, canonical};
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_storyboard_action_conflict",
+    uids: &["qcbus.dev:xosc:1.0.0:storyboard.action_conflict"],
+    level: Level::Information,
+    after: super::READABLE,
+    page: include_str!("storyboard_action_conflict.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// An action with the event around it.
+type Taken<'m, 'd> = (Element<'m, 'd>, Element<'m, 'd>);
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for act in scenario.elements("Act") {
+        let mut taken: HashMap<(String, &str, Domain), Taken<'_, '_>> = HashMap::new();
+        for event in events(act) {
+            let trigger = event.child("StartTrigger").map(canonical);
+            let trigger = trigger.unwrap_or_default();
+            for action in event.children_named("Action") {
+                take(&trigger, event, action, &mut taken, found);
+            }
+        }
+    }
+}
+
+/// The events of an act, those of maneuvers in catalogs among them.
+fn events<'m, 'd>(act: Element<'m, 'd>) -> impl Iterator<Item = Element<'m, 'd>> {
+    act.children_named("ManeuverGroup")
+        .flat_map(Element::children)
+        .filter_map(|child| match child.name() {
+            "Maneuver" => Some(child),
+            "CatalogReference" => child.scenario().entry(child),
+            _ => None,
+        })
+        .flat_map(|maneuver| maneuver.children_named("Event"))
+}
+
+fn take<'m, 'd>(
+    trigger: &str,
+    event: Element<'m, 'd>,
+    action: Element<'m, 'd>,
+    taken: &mut HashMap<(String, &'m str, Domain), Taken<'m, 'd>>,
+    found: &mut Sink<'_>,
+) {
+    let Some(private) = action.child("PrivateAction") else {
+        return;
+    };
+    let domains = domains(private);
+    if domains.is_empty() {
+        return;
+    }
+    for entity in acting(action).unwrap_or_default() {
+        for domain in &domains {
+            let key = (trigger.to_owned(), entity.name(), *domain);
+            let Some((other, its_event)) = taken.get(&key).copied() else {
+                taken.insert(key, (action, event));
+                continue;
+            };
+            if other == action || by_priority(event, its_event) {
+                continue;
+            }
+            let text = format!(
+                "{} and {} start by the same trigger and both take over the {} motion of `{}`: which of them \
+                 holds depends on the simulator",
+                called(action),
+                called(other),
+                domain.word(),
+                entity.name()
+            );
+            found
+                .about(action, "", text)
+                .at(other.node(), "the action that starts together with it");
+            return;
+        }
+    }
+}
+
+/// Whether the two events are of one maneuver and their priorities are the question, which another rule
+/// asks.
+fn by_priority<'d>(event: Element<'_, 'd>, other: Element<'_, 'd>) -> bool {
+    let parallel = |one: Element<'_, 'd>| one.word("priority").as_deref() == Some("parallel");
+    event != other && event.parent() == other.parent() && !(parallel(event) && parallel(other))
+}

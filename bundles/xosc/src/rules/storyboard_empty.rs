@@ -1,0 +1,29 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_storyboard_empty",
+    uids: &["qcbus.dev:xosc:1.0.0:storyboard.empty"],
+    level: Level::Warning,
+    // Before that the schema demands a story.
+    versions: "1.2.0..",
+    after: super::READABLE,
+    page: include_str!("storyboard_empty.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let Some(storyboard) = scenario.root().child("Storyboard") else {
+        return;
+    };
+    let Some(actions) = storyboard.path(&["Init", "Actions"]) else {
+        return;
+    };
+    if actions.children().next().is_none() && storyboard.child("Story").is_none() {
+        let text = "the storyboard has neither a story nor an action in `Init`: nothing happens in this scenario";
+        found.about(storyboard, "", text);
+    }
+}

@@ -1,0 +1,24 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::triggers;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_storyboard_event_never_starts",
+    uids: &["qcbus.dev:xosc:1.0.0:storyboard.event_never_starts"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("storyboard_event_never_starts.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let remedy = if scenario.version() >= (1, 1) {
+        "an event without `StartTrigger` starts with its act"
+    } else {
+        "an event that is to start with its act has a condition such as a simulation time greater than 0"
+    };
+    triggers::empty_starts(scenario, "Event", remedy, found);
+}

@@ -1,0 +1,41 @@
+use foldhash::{HashMap, HashMapExt as _};
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::references::quoted;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_storyboard_init_private_unknown",
+    uids: &["qcbus.dev:xosc:1.0.0:storyboard.init_private_unknown"],
+    level: Level::Information,
+    after: super::READABLE,
+    page: include_str!("storyboard_init_private_unknown.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let actions = scenario.root().path(&["Storyboard", "Init", "Actions"]);
+    let mut first = HashMap::new();
+    for private in actions
+        .into_iter()
+        .flat_map(|actions| actions.children_named("Private"))
+    {
+        let Some(name) = private.text("entityRef") else {
+            continue;
+        };
+        let Some(known) = first.get(&name).copied() else {
+            first.insert(name, private.node());
+            continue;
+        };
+        let text = format!(
+            "`Init` has a further `Private` of {}: all of its actions happen at the start, and in which order \
+             the standard does not say; one `Private` with all of them is easier to read",
+            quoted(private, "entityRef", &name)
+        );
+        found
+            .about(private, "entityRef", text)
+            .at(known, "its first `Private`");
+    }
+}

@@ -1,0 +1,53 @@
+use foldhash::{HashMap, HashMapExt as _};
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::triggers::{called, canonical};
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_storyboard_priority_conflict",
+    uids: &["qcbus.dev:xosc:1.0.0:storyboard.priority_conflict"],
+    level: Level::Information,
+    after: super::READABLE,
+    page: include_str!("storyboard_priority_conflict.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for maneuver in scenario.elements_everywhere("Maneuver") {
+        let mut first: HashMap<String, Element<'_, '_>> = HashMap::new();
+        for event in maneuver.children_named("Event") {
+            let trigger = event.child("StartTrigger").map(canonical);
+            let trigger = trigger.unwrap_or_default();
+            match first.get(&trigger) {
+                Some(other) => {
+                    compare(*other, event, found);
+                }
+                None => {
+                    first.insert(trigger, event);
+                }
+            }
+        }
+    }
+}
+
+fn compare(first: Element<'_, '_>, event: Element<'_, '_>, found: &mut Sink<'_>) {
+    let (Some(one), Some(other)) = (first.word("priority"), event.word("priority")) else {
+        return;
+    };
+    let ranked = |word: &str| matches!(word, "overwrite" | "override" | "skip");
+    if !ranked(&one) && !ranked(&other) {
+        return;
+    }
+    let text = format!(
+        "{} starts by the same trigger as {}, with priority `{other}` against `{one}`: which of them goes on \
+         depends on the order in which the simulator starts them",
+        called(event),
+        called(first)
+    );
+    found
+        .about(event, "priority", text)
+        .at(first.node(), "the event that starts by the same trigger");
+}

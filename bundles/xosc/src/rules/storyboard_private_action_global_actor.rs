@@ -1,0 +1,41 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::triggers::called;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_storyboard_private_action_global_actor",
+    uids: &["qcbus.dev:xosc:1.0.0:storyboard.private_action_global_actor"],
+    level: Level::Information,
+    after: super::READABLE,
+    page: include_str!("storyboard_private_action_global_actor.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for group in scenario.elements("ManeuverGroup") {
+        let actor = group.path(&["Actors", "EntityRef"]);
+        // What a maneuver of a catalog does may be private.
+        let (Some(actor), None) = (actor, group.child("CatalogReference")) else {
+            continue;
+        };
+        let mut actions = group
+            .children_named("Maneuver")
+            .flat_map(|maneuver| maneuver.descendants_named("Action"))
+            .peekable();
+        let only_global = actions.peek().is_some()
+            && actions.all(|action| {
+                action.child("GlobalAction").is_some() && action.child("PrivateAction").is_none()
+            });
+        if only_global {
+            let text = format!(
+                "{} has actors, but global actions only, which no entity carries out: `Actors` may be empty, or \
+                 a private action was meant",
+                called(group)
+            );
+            found.about(actor, "", text);
+        }
+    }
+}

@@ -1,0 +1,72 @@
+use qcbus_openscenario::{Element, Form, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::states::{StateCondition, own_triggers};
+use crate::families::triggers::called;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_storyboard_reference_to_self_or_parent_end",
+    uids: &["qcbus.dev:xosc:1.0.0:storyboard.reference_to_self_or_parent_end"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("storyboard_reference_to_self_or_parent_end.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run<'d>(scenario: &Scenario<'d>, found: &mut Sink<'_>) {
+    if scenario.form() != Form::Scenario {
+        return;
+    }
+    for (owner, groups) in own_triggers(scenario) {
+        let element = owner.element(scenario);
+        let waits = |condition: &StateCondition<'_, 'd>| waits_for_itself(element, condition);
+        let all = groups.iter().all(|group| group.iter().any(waits));
+        for condition in groups.iter().flatten() {
+            let itself = condition.target == element;
+            if ends_around(element, condition) || (all && itself && waits(condition)) {
+                say(element, condition, itself, found);
+            }
+        }
+    }
+}
+
+/// Whether the condition cannot be true before the element starts.
+fn waits_for_itself<'d>(element: Element<'_, 'd>, condition: &StateCondition<'_, 'd>) -> bool {
+    let before = ["standbyState", "skipTransition"];
+    (condition.target == element && !before.contains(&&*condition.state))
+        || ends_around(element, condition)
+}
+
+/// Whether the condition waits for the end of an element around this one, after which nothing in it
+/// starts.
+fn ends_around<'d>(element: Element<'_, 'd>, condition: &StateCondition<'_, 'd>) -> bool {
+    condition.state == "completeState"
+        && element.ancestors().any(|around| around == condition.target)
+}
+
+fn say<'d>(
+    element: Element<'_, 'd>,
+    condition: &StateCondition<'_, 'd>,
+    itself: bool,
+    found: &mut Sink<'_>,
+) {
+    let state = &condition.state;
+    let text = if itself {
+        format!(
+            "{} waits for its own `{state}` before it starts, which cannot come first: it never starts",
+            called(element)
+        )
+    } else {
+        format!(
+            "{} waits for the `{state}` of {}, which it lies in: when that is complete, nothing in it starts any \
+             more",
+            called(element),
+            called(condition.target)
+        )
+    };
+    found
+        .about(condition.element, "storyboardElementRef", text)
+        .at(condition.target.node(), "what it waits for");
+}

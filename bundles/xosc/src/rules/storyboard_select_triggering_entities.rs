@@ -1,0 +1,58 @@
+use qcbus_openscenario::{Actors, Element, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::triggers::called;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_storyboard_select_triggering_entities",
+    uids: &["qcbus.dev:xosc:1.0.0:storyboard.select_triggering_entities"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("storyboard_select_triggering_entities.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for group in scenario.elements("ManeuverGroup") {
+        let Some(block) = group.child("Actors") else {
+            continue;
+        };
+        let selects = block.flag("selectTriggeringEntities") == Some(true);
+        let named = Actors::of(block).is_none_or(|actors| !actors.named.is_empty());
+        if !selects || named || triggered_by_entities(group) != Some(false) {
+            continue;
+        }
+        let text = format!(
+            "the actors of {} are the entities that trigger it, but no start trigger of its act or of its events \
+             has a `ByEntityCondition`: nobody acts",
+            called(group)
+        );
+        found.about(block, "selectTriggeringEntities", text);
+    }
+}
+
+/// Whether the start trigger of the act or that of an event has a condition about entities; `None` when
+/// a maneuver is not known, or there is none.
+fn triggered_by_entities(group: Element<'_, '_>) -> Option<bool> {
+    let by_entity = |owner: Element<'_, '_>| {
+        owner.child("StartTrigger").is_some_and(|trigger| {
+            trigger
+                .descendants_named("ByEntityCondition")
+                .next()
+                .is_some()
+        })
+    };
+    let mut maneuvers: Vec<Element<'_, '_>> = group.children_named("Maneuver").collect();
+    for reference in group.children_named("CatalogReference") {
+        maneuvers.push(group.scenario().entry(reference)?);
+    }
+    if maneuvers.is_empty() {
+        return None;
+    }
+    let events = maneuvers
+        .into_iter()
+        .flat_map(|maneuver| maneuver.descendants_named("Event"));
+    Some(group.parent().is_some_and(by_entity) || events.into_iter().any(by_entity))
+}

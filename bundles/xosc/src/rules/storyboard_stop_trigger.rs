@@ -1,0 +1,34 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_storyboard_stop_trigger",
+    uids: &["qcbus.dev:xosc:1.0.0:storyboard.stop_trigger"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("storyboard_stop_trigger.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let Some(storyboard) = scenario.root().child("Storyboard") else {
+        return;
+    };
+    match storyboard.child("StopTrigger") {
+        Some(trigger) if trigger.children().next().is_none() => {
+            let text = "the `StopTrigger` of the storyboard is empty and never true: nothing ends the run; \
+                        a `SimulationTimeCondition` would";
+            found.about(trigger, "", text);
+        }
+        // Before 1.3 the schema demands one.
+        None if scenario.version() >= (1, 3) => {
+            let text = "the storyboard has no `StopTrigger`: nothing ends the run; a `SimulationTimeCondition` \
+                        would";
+            found.about(storyboard, "", text);
+        }
+        _ => {}
+    }
+}

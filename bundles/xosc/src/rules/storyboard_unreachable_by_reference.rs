@@ -1,0 +1,53 @@
+use qcbus_openscenario::{Form, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::states::Waiting;
+use crate::families::triggers::called;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_storyboard_unreachable_by_reference",
+    uids: &["qcbus.dev:xosc:1.0.0:storyboard.unreachable_by_reference"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("storyboard_unreachable_by_reference.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    if scenario.form() != Form::Scenario {
+        return;
+    }
+    let elements = scenario.storyboard().elements();
+    let named = |place: usize| {
+        elements
+            .get(place)
+            .map_or_else(String::new, |one| called(one.element(scenario)))
+    };
+    for cycle in Waiting::of(scenario).cycles() {
+        let Some(((first, condition), others)) = cycle.split_first() else {
+            continue;
+        };
+        let rest: Vec<String> = others.iter().map(|(place, _)| named(*place)).collect();
+        let text = match rest.as_slice() {
+            [] => format!(
+                "{} starts only after something within it has started, which cannot come first: it never starts",
+                named(*first)
+            ),
+            [other] => format!(
+                "{} and {other} wait for each other: neither ever starts",
+                named(*first)
+            ),
+            rest => format!(
+                "{} waits for {}, and that for the first of them: none of them ever starts",
+                named(*first),
+                rest.join(", which waits for ")
+            ),
+        };
+        let mut finding = found.about(*condition, "storyboardElementRef", text);
+        for (_, further) in others.iter().take(4) {
+            finding = finding.at(further.node(), "the next that waits");
+        }
+    }
+}
