@@ -76,3 +76,6 @@ pub(crate) fn short(value: f64) -> String {
     let rounded = (value * 1000.0).round() / 1000.0;
     format!("{}", if rounded == 0.0 { 0.0 } else { rounded })
 }
+
+/// Elements of type `TransitionDynamics`.
+pub(crate) const TRANSITIONS: &[&str] = &["SpeedActionDynamics", "LaneChangeActionDynamics"];

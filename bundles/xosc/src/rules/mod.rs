@@ -4,12 +4,24 @@
 
 use qcbus_sdk::AnyRule;
 
+mod action_add_delete_order;
+mod action_custom_command_portable;
+mod action_distance_exclusive;
+mod action_negative_lane_change;
+mod action_relative_speed_continuous;
+mod action_speed_not_negative;
+mod action_step_dynamics_zero;
+mod action_synchronize;
+mod action_transition_not_zero;
+mod general_animation_constraint_pedestrian;
 mod naming_unique_element_names_on_same_level;
 mod parameters_parameter_declaration_parameter_scope;
 mod reference_control_resolvable_entity_references;
 mod reference_control_resolvable_storyboard_element_reference;
 mod reference_control_unique_element_names_on_same_level;
 mod reference_control_valid_actor_reference_in_private_actions;
+mod scenario_logic_targetspeed_maxspeed_general;
+mod scenario_logic_targetspeed_maxspeed_speedprofileaction;
 mod storyboard_act_never_starts;
 mod storyboard_action_conflict;
 mod storyboard_empty;
@@ -227,4 +239,16 @@ pub static RULES: &[&dyn AnyRule] = &[
     &storyboard_action_conflict::RULE,
     &storyboard_private_action_global_actor::RULE,
     &storyboard_init_private_unknown::RULE,
+    &general_animation_constraint_pedestrian::RULE,
+    &scenario_logic_targetspeed_maxspeed_general::RULE,
+    &scenario_logic_targetspeed_maxspeed_speedprofileaction::RULE,
+    &action_distance_exclusive::RULE,
+    &action_relative_speed_continuous::RULE,
+    &action_step_dynamics_zero::RULE,
+    &action_transition_not_zero::RULE,
+    &action_synchronize::RULE,
+    &action_add_delete_order::RULE,
+    &action_speed_not_negative::RULE,
+    &action_negative_lane_change::RULE,
+    &action_custom_command_portable::RULE,
 ];

@@ -1,0 +1,78 @@
+use foldhash::{HashMap, HashMapExt as _, HashSet, HashSetExt as _};
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::references::quoted;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_action_add_delete_order",
+    uids: &["qcbus.dev:xosc:1.0.0:action.add_delete_order"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("action_add_delete_order.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let placed = placed(scenario);
+    let mut deleted: HashSet<String> = HashSet::new();
+    for action in scenario.elements_everywhere("EntityAction") {
+        if action.child("DeleteEntityAction").is_some() {
+            // It may be any of them.
+            let Some(name) = action.text("entityRef") else {
+                return;
+            };
+            deleted.extend(members(scenario, &name));
+        }
+    }
+    for action in scenario.elements_everywhere("EntityAction") {
+        let added = action.child("AddEntityAction").is_some() && action.ancestor("Init").is_none();
+        let Some(name) = action.text("entityRef").filter(|_| added) else {
+            continue;
+        };
+        let Some(teleport) = placed.get(&*name).filter(|_| !deleted.contains(&*name)) else {
+            continue;
+        };
+        let text = format!(
+            "{} is added, but it is there from the start: `Init` places it, and nothing deletes it; leave one of \
+                 the two away, or delete it first",
+            quoted(action, "entityRef", &name)
+        );
+        found
+            .about(action, "entityRef", text)
+            .at(teleport.node(), "where it is placed");
+    }
+}
+
+/// The entities that `Init` places, with what places them.
+fn placed<'m, 'd>(scenario: &'m Scenario<'d>) -> HashMap<String, Element<'m, 'd>> {
+    let mut placed = HashMap::new();
+    let actions = scenario.root().path(&["Storyboard", "Init", "Actions"]);
+    let privates = actions
+        .into_iter()
+        .flat_map(|actions| actions.children_named("Private"));
+    for private in privates {
+        let Some(name) = private.text("entityRef") else {
+            continue;
+        };
+        let teleport = private
+            .children_named("PrivateAction")
+            .find_map(|action| action.child("TeleportAction"));
+        if let Some(teleport) = teleport {
+            for member in members(scenario, &name) {
+                placed.entry(member).or_insert(teleport);
+            }
+        }
+    }
+    placed
+}
+
+/// The names of the scenario objects that a name stands for.
+fn members(scenario: &Scenario<'_>, name: &str) -> Vec<String> {
+    match scenario.entities().expand(name) {
+        Some(entities) => entities.iter().map(|one| one.name().to_owned()).collect(),
+        None => vec![name.to_owned()],
+    }
+}

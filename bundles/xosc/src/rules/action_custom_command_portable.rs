@@ -1,0 +1,43 @@
+use foldhash::{HashMap, HashMapExt as _};
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_action_custom_command_portable",
+    uids: &["qcbus.dev:xosc:1.0.0:action.custom_command_portable"],
+    level: Level::Information,
+    after: super::READABLE,
+    page: include_str!("action_custom_command_portable.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let mut kinds: Vec<(Element<'_, '_>, String, usize)> = Vec::new();
+    let mut known: HashMap<String, usize> = HashMap::new();
+    for command in scenario.elements_everywhere("CustomCommandAction") {
+        let Some(kind) = command.text("type") else {
+            continue;
+        };
+        let next = kinds.len();
+        let at = *known.entry(kind.to_string()).or_insert(next);
+        match kinds.get_mut(at) {
+            Some((_, _, count)) => *count += 1,
+            None => kinds.push((command, kind.into_owned(), 1)),
+        }
+    }
+    for (command, kind, count) in kinds {
+        let often = if count == 1 {
+            String::new()
+        } else {
+            format!(" (used {count} times)")
+        };
+        let text = format!(
+            "what the custom command `{kind}`{often} does is known to the simulator that it was written for only; \
+                 others skip it or stop"
+        );
+        found.about(command, "type", text);
+    }
+}

@@ -1,0 +1,30 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_action_distance_exclusive",
+    uids: &["qcbus.dev:xosc:1.0.0:action.distance_exclusive"],
+    after: super::READABLE,
+    page: include_str!("action_distance_exclusive.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for action in scenario.elements_everywhere("LongitudinalDistanceAction") {
+        match (action.has("distance"), action.has("timeGap")) {
+            (true, true) => {
+                let text = "both `distance` and `timeGap` say how far to stay away, but only one of them may";
+                found.about(action, "timeGap", text);
+            }
+            (false, false) => {
+                let text =
+                    "neither `distance` nor `timeGap` says how far to stay away, one of them must";
+                found.about(action, "", text);
+            }
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,45 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Param, Rule, Sink};
+
+use crate::families::actions::short;
+use crate::families::references::quoted;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_action_negative_lane_change",
+    uids: &["qcbus.dev:xosc:1.0.0:action.negative_lane_change"],
+    level: Level::Information,
+    params: &[MOST],
+    after: super::READABLE,
+    page: include_str!("action_negative_lane_change.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const MOST: Param = Param::number("most", 5.0, "m", "an offset up to this is that of a lane");
+
+/// Elements with an offset from the middle of a lane.
+const OFFSETS: &[(&str, &str)] = &[
+    ("AbsoluteTargetLaneOffset", "value"),
+    ("RelativeTargetLaneOffset", "value"),
+    ("LaneChangeAction", "targetLaneOffset"),
+];
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let most = found.number(&MOST);
+    for (name, attribute) in OFFSETS {
+        for element in scenario.elements_everywhere(name) {
+            let offset = element.number(attribute);
+            let Some(offset) = offset.filter(|offset| offset.abs() > most) else {
+                continue;
+            };
+            let text = format!(
+                "the lane offset is {} m: that is more than {} m and leads out of most lanes; it is measured from \
+                 the middle of the lane, not of the road",
+                quoted(element, attribute, &short(offset)),
+                short(most)
+            );
+            found.about(element, attribute, text);
+        }
+    }
+}

@@ -1,0 +1,44 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::actions::short;
+use crate::families::references::quoted;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_action_relative_speed_continuous",
+    uids: &["qcbus.dev:xosc:1.0.0:action.relative_speed_continuous"],
+    after: super::READABLE,
+    page: include_str!("action_relative_speed_continuous.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for action in scenario.elements_everywhere("SpeedAction") {
+        let target = action.path(&["SpeedActionTarget", "RelativeTargetSpeed"]);
+        let (Some(target), Some(dynamics)) = (target, action.child("SpeedActionDynamics")) else {
+            continue;
+        };
+        let (Some(dimension), Some(shape)) = (
+            dynamics.word("dynamicsDimension"),
+            dynamics.word("dynamicsShape"),
+        ) else {
+            continue;
+        };
+        let timed = matches!(&*dimension, "time" | "distance") && shape != "step";
+        // A value of 0 and a step take neither time nor distance.
+        let value = dynamics.number("value").filter(|value| *value > 0.0);
+        let (Some(value), true, Some(true)) = (value, timed, target.flag("continuous")) else {
+            continue;
+        };
+        let text = format!(
+            "the relative speed is kept continuously, which must not be used together with a {dimension} to reach \
+                 it (here {}): such an action has no end; a `rate` is allowed, or `continuous=\"false\"`",
+            quoted(dynamics, "value", &short(value))
+        );
+        found
+            .about(target, "continuous", text)
+            .at(dynamics.node(), "its dynamics");
+    }
+}

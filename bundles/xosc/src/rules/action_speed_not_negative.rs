@@ -1,0 +1,28 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::actions::short;
+use crate::families::references::quoted;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_action_speed_not_negative",
+    uids: &["qcbus.dev:xosc:1.0.0:action.speed_not_negative"],
+    level: Level::Information,
+    after: super::READABLE,
+    page: include_str!("action_speed_not_negative.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for target in scenario.elements_everywhere("AbsoluteTargetSpeed") {
+        if let Some(speed) = target.number("value").filter(|speed| *speed < 0.0) {
+            let text = format!(
+                "the target speed is {} m/s: below 0 an entity drives backwards, which not every simulator does",
+                quoted(target, "value", &short(speed))
+            );
+            found.about(target, "value", text);
+        }
+    }
+}

@@ -1,0 +1,41 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::actions::{TRANSITIONS, short};
+use crate::families::references::quoted;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_action_step_dynamics_zero",
+    uids: &["qcbus.dev:xosc:1.0.0:action.step_dynamics_zero"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("action_step_dynamics_zero.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for dynamics in TRANSITIONS
+        .iter()
+        .flat_map(|name| scenario.elements_everywhere(name))
+    {
+        let (Some(shape), Some(dimension)) = (
+            dynamics.word("dynamicsShape"),
+            dynamics.word("dynamicsDimension"),
+        ) else {
+            continue;
+        };
+        let Some(value) = dynamics.number("value").filter(|value| *value != 0.0) else {
+            continue;
+        };
+        if shape == "step" && matches!(&*dimension, "time" | "distance") {
+            let text = format!(
+                "a step happens at once, so its {dimension} must be 0, but is {}; a simulator takes no notice of \
+                 it, and a transition that takes that long is `linear`, `cubic` or `sinusoidal`",
+                quoted(dynamics, "value", &short(value))
+            );
+            found.about(dynamics, "value", text);
+        }
+    }
+}

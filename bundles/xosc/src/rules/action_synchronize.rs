@@ -1,0 +1,33 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::actions::acting;
+use crate::families::references::quoted;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_action_synchronize",
+    uids: &["qcbus.dev:xosc:1.0.0:action.synchronize"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("action_synchronize.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for action in scenario.elements_everywhere("SynchronizeAction") {
+        let Some(master) = action.text("masterEntityRef") else {
+            continue;
+        };
+        let acting = acting(action).unwrap_or_default();
+        if acting.iter().any(|entity| entity.name() == master) {
+            let text = format!(
+                "{} is the master and an actor of this action: an entity cannot arrive together with itself, the \
+                 master must be another one",
+                quoted(action, "masterEntityRef", &master)
+            );
+            found.about(action, "masterEntityRef", text);
+        }
+    }
+}

@@ -1,0 +1,46 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::actions::TRANSITIONS;
+use crate::families::references::quoted;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_action_transition_not_zero",
+    uids: &["qcbus.dev:xosc:1.0.0:action.transition_not_zero"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("action_transition_not_zero.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for dynamics in TRANSITIONS
+        .iter()
+        .flat_map(|name| scenario.elements_everywhere(name))
+    {
+        let (Some(shape), Some(dimension)) = (
+            dynamics.word("dynamicsShape"),
+            dynamics.word("dynamicsDimension"),
+        ) else {
+            continue;
+        };
+        if dynamics.number("value") != Some(0.0) || shape == "step" {
+            continue;
+        }
+        let value = quoted(dynamics, "value", "0");
+        let text = match &*dimension {
+            "rate" => format!(
+                "the rate of a `{shape}` transition is {value}: nothing changes, and the action never ends; the \
+                 rate must be above 0"
+            ),
+            "time" | "distance" => format!(
+                "the {dimension} of a `{shape}` transition is {value}: that is a jump, for which the shape is \
+                 `step`; other shapes divide by the {dimension}"
+            ),
+            _ => continue,
+        };
+        found.about(dynamics, "value", text);
+    }
+}

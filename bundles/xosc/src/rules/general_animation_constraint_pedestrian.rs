@@ -1,0 +1,35 @@
+use qcbus_openscenario::{EntityKind, Scenario};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::actions::acting;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_general_animation_constraint_pedestrian",
+    uids: &["asam.net:xosc:1.2.0:general.animation_constraint_pedestrian"],
+    versions: "1.2.0..",
+    after: super::READABLE,
+    page: include_str!("general_animation_constraint_pedestrian.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for animation in scenario.elements_everywhere("PedestrianAnimation") {
+        // What an external object is only the simulator knows.
+        let other = acting(animation)
+            .unwrap_or_default()
+            .into_iter()
+            .find(|entity| matches!(entity.kind(), EntityKind::Vehicle | EntityKind::MiscObject));
+        let Some(entity) = other else { continue };
+        let text = format!(
+            "`{}` is a `{}`, but only a pedestrian can carry out a `PedestrianAnimation`",
+            entity.name(),
+            entity.kind().element()
+        );
+        found.about(animation, "", text).at(
+            entity.element(scenario).node(),
+            "the entity that is to carry it out",
+        );
+    }
+}

@@ -1,0 +1,65 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
+
+use crate::families::actions::{short, slowest};
+use crate::families::references::quoted;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_scenario_logic_targetspeed_maxspeed_general",
+    uids: &["asam.net:xosc:1.2.0:scenario_logic.targetspeed_maxspeed_general"],
+    level: Level::Warning,
+    versions: "1.2.0..",
+    backport: Backport::Alike { since: "" },
+    params: &[TOLERANCE],
+    after: super::READABLE,
+    page: include_str!("scenario_logic_targetspeed_maxspeed_general.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    0.1,
+    "m/s",
+    "by how much a target speed may exceed the greatest speed",
+);
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let tolerance = found.number(&TOLERANCE);
+    for action in scenario.elements_everywhere("SpeedAction") {
+        let Some(target) = action.path(&["SpeedActionTarget", "AbsoluteTargetSpeed"]) else {
+            continue;
+        };
+        let Some(speed) = target.number("value") else {
+            continue;
+        };
+        let Some((name, most)) = slowest(action) else {
+            continue;
+        };
+        if speed.abs() <= most + tolerance {
+            continue;
+        }
+        let follows = action
+            .child("SpeedActionDynamics")
+            .and_then(|dynamics| dynamics.word("followingMode"))
+            .is_some_and(|mode| mode == "follow");
+        let (level, effect) = if follows {
+            (
+                Level::Warning,
+                "it is to follow within its limits, so it never gets there and the action does not end",
+            )
+        } else {
+            (
+                Level::Information,
+                "a simulator drives it faster than it can, or stops at its greatest speed",
+            )
+        };
+        let text = format!(
+            "the target speed of {} m/s is beyond the `maxSpeed` of `{name}`, which is {} m/s: {effect}",
+            quoted(target, "value", &short(speed)),
+            short(most)
+        );
+        found.about(target, "value", text).level(level);
+    }
+}

@@ -1,0 +1,60 @@
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Level, Param, Rule, Sink};
+
+use crate::families::actions::{short, slowest};
+use crate::families::references::quoted;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_scenario_logic_targetspeed_maxspeed_speedprofileaction",
+    uids: &["asam.net:xosc:1.2.0:scenario_logic.targetspeed_maxspeed_speedprofileaction"],
+    level: Level::Warning,
+    versions: "1.2.0..",
+    params: &[TOLERANCE],
+    after: super::READABLE,
+    page: include_str!("scenario_logic_targetspeed_maxspeed_speedprofileaction.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    0.1,
+    "m/s",
+    "by how much a speed may exceed the greatest speed",
+);
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let tolerance = found.number(&TOLERANCE);
+    for action in scenario.elements_everywhere("SpeedProfileAction") {
+        // With a reference entity the speeds are relative to its own.
+        let follows = action
+            .word("followingMode")
+            .is_some_and(|mode| mode == "follow");
+        if !follows || action.has("entityRef") {
+            continue;
+        }
+        let Some((name, most)) = slowest(action) else {
+            continue;
+        };
+        let beyond: Vec<(Element<'_, '_>, f64)> = action
+            .children_named("SpeedProfileEntry")
+            .filter_map(|entry| Some((entry, entry.number("speed")?)))
+            .filter(|(_, speed)| speed.abs() > most + tolerance)
+            .collect();
+        let Some((entry, speed)) = beyond.first().copied() else {
+            continue;
+        };
+        let further = match beyond.len() - 1 {
+            0 => String::new(),
+            further => format!(" (one of {} such entries)", further + 1),
+        };
+        let text = format!(
+            "the speed of {} m/s{further} is beyond the `maxSpeed` of `{name}`, which is {} m/s: in mode \
+                 `follow` it never gets there",
+            quoted(entry, "speed", &short(speed)),
+            short(most)
+        );
+        found.about(entry, "speed", text);
+    }
+}
