@@ -79,3 +79,12 @@ pub(crate) fn short(value: f64) -> String {
 
 /// Elements of type `TransitionDynamics`.
 pub(crate) const TRANSITIONS: &[&str] = &["SpeedActionDynamics", "LaneChangeActionDynamics"];
+
+/// A number as it is written; what a parameter or an expression led to, and those.
+pub(crate) fn stated(element: Element<'_, '_>, attribute: &str, value: f64) -> String {
+    match element.written(attribute) {
+        Some(written) if written.contains('$') => format!("`{}` (`{written}`)", short(value)),
+        Some(written) => format!("`{}`", written.trim()),
+        None => format!("`{}`", short(value)),
+    }
+}

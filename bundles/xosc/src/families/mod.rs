@@ -5,6 +5,7 @@ pub(crate) mod declared;
 pub(crate) mod deprecation;
 pub(crate) mod minsubset;
 pub(crate) mod actions;
+pub(crate) mod claims;
 pub(crate) mod names;
 pub(crate) mod profiles;
 pub(crate) mod ranges;

@@ -31,6 +31,7 @@ pub(crate) fn empty_starts(
 
 /// An element with its name, for texts: "the act `Drive`".
 pub(crate) fn called(element: Element<'_, '_>) -> String {
+    let own = format!("`{}`", element.name());
     let kind = match element.name() {
         "Story" => "story",
         "Act" => "act",
@@ -38,7 +39,7 @@ pub(crate) fn called(element: Element<'_, '_>) -> String {
         "Maneuver" => "maneuver",
         "Event" => "event",
         "Action" => "action",
-        other => other,
+        _ => &own,
     };
     match element.text("name") {
         Some(name) => format!("the {kind} `{name}`"),
@@ -75,37 +76,27 @@ pub(crate) fn earliest(condition: Element<'_, '_>) -> Option<f64> {
 /// An element with all that matters of it as one text: what has the same text means the same. Names
 /// of conditions say nothing.
 pub(crate) fn canonical(element: Element<'_, '_>) -> String {
+    canonical_but(element, &[])
+}
+
+/// Like [`canonical`], without some of the element's own attributes.
+pub(crate) fn canonical_but(element: Element<'_, '_>, without: &[&str]) -> String {
     let mut text = String::new();
-    write_canonical(element, &|_, _| true, DEEPEST, &mut text);
+    write_canonical(element, without, DEEPEST, &mut text);
     text
 }
 
 /// Conditions are a few levels deep; what lies deeper than this is no condition of the standard.
 const DEEPEST: usize = 64;
 
-/// Like [`canonical`], with only those attributes that `matters` keeps.
-pub(crate) fn canonical_of(
-    element: Element<'_, '_>,
-    matters: &dyn Fn(Element<'_, '_>, &str) -> bool,
-) -> String {
-    let mut text = String::new();
-    write_canonical(element, matters, DEEPEST, &mut text);
-    text
-}
-
-fn write_canonical(
-    element: Element<'_, '_>,
-    matters: &dyn Fn(Element<'_, '_>, &str) -> bool,
-    deep: usize,
-    out: &mut String,
-) {
+fn write_canonical(element: Element<'_, '_>, without: &[&str], deep: usize, out: &mut String) {
     let Some(deeper) = deep.checked_sub(1) else {
         return;
     };
     let mut attributes: Vec<(&str, String)> = Vec::new();
     for attribute in element.node().attributes() {
         let name = attribute.name();
-        if (element.is("Condition") && name == "name") || !matters(element, name) {
+        if (element.is("Condition") && name == "name") || without.contains(&name) {
             continue;
         }
         let value = match element.number(name) {
@@ -124,7 +115,19 @@ fn write_canonical(
     }
     out.push('>');
     for child in element.children() {
-        write_canonical(child, matters, deeper, out);
+        write_canonical(child, &[], deeper, out);
     }
     out.push_str("</>");
+}
+
+/// The events of an act, those of maneuvers in catalogs among them.
+pub(crate) fn events<'m, 'd>(act: Element<'m, 'd>) -> impl Iterator<Item = Element<'m, 'd>> {
+    act.children_named("ManeuverGroup")
+        .flat_map(Element::children)
+        .filter_map(|child| match child.name() {
+            "Maneuver" => Some(child),
+            "CatalogReference" => child.scenario().entry(child),
+            _ => None,
+        })
+        .flat_map(|maneuver| maneuver.children_named("Event"))
 }

@@ -37,7 +37,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         };
         let text = format!(
             "{} is added, but it is there from the start: `Init` places it, and nothing deletes it; leave one of \
-                 the two away, or delete it first",
+             the two away, or delete it first",
             quoted(action, "entityRef", &name)
         );
         found

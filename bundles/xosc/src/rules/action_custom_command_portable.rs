@@ -36,7 +36,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         };
         let text = format!(
             "what the custom command `{kind}`{often} does is known to the simulator that it was written for only; \
-                 others skip it or stop"
+             others skip it or stop"
         );
         found.about(command, "type", text);
     }

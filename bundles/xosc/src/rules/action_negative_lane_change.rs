@@ -1,8 +1,7 @@
 use qcbus_openscenario::Scenario;
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
-use crate::families::actions::short;
-use crate::families::references::quoted;
+use crate::families::actions::{short, stated};
 use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -36,7 +35,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             let text = format!(
                 "the lane offset is {} m: that is more than {} m and leads out of most lanes; it is measured from \
                  the middle of the lane, not of the road",
-                quoted(element, attribute, &short(offset)),
+                stated(element, attribute, offset),
                 short(most)
             );
             found.about(element, attribute, text);

@@ -1,8 +1,7 @@
 use qcbus_openscenario::Scenario;
 use qcbus_sdk::{Rule, Sink};
 
-use crate::families::actions::short;
-use crate::families::references::quoted;
+use crate::families::actions::stated;
 use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -34,8 +33,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         };
         let text = format!(
             "the relative speed is kept continuously, which must not be used together with a {dimension} to reach \
-                 it (here {}): such an action has no end; a `rate` is allowed, or `continuous=\"false\"`",
-            quoted(dynamics, "value", &short(value))
+             it (here {}): such an action has no end; a `rate` is allowed, or `continuous=\"false\"`",
+            stated(dynamics, "value", value)
         );
         found
             .about(target, "continuous", text)

@@ -1,8 +1,7 @@
 use qcbus_openscenario::Scenario;
 use qcbus_sdk::{Level, Rule, Sink};
 
-use crate::families::actions::short;
-use crate::families::references::quoted;
+use crate::families::actions::stated;
 use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -20,7 +19,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         if let Some(speed) = target.number("value").filter(|speed| *speed < 0.0) {
             let text = format!(
                 "the target speed is {} m/s: below 0 an entity drives backwards, which not every simulator does",
-                quoted(target, "value", &short(speed))
+                stated(target, "value", speed)
             );
             found.about(target, "value", text);
         }

@@ -1,8 +1,7 @@
 use qcbus_openscenario::Scenario;
 use qcbus_sdk::{Level, Rule, Sink};
 
-use crate::families::actions::{TRANSITIONS, short};
-use crate::families::references::quoted;
+use crate::families::actions::{TRANSITIONS, stated};
 use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -33,7 +32,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             let text = format!(
                 "a step happens at once, so its {dimension} must be 0, but is {}; a simulator takes no notice of \
                  it, and a transition that takes that long is `linear`, `cubic` or `sinusoidal`",
-                quoted(dynamics, "value", &short(value))
+                stated(dynamics, "value", value)
             );
             found.about(dynamics, "value", text);
         }

@@ -22,6 +22,8 @@ mod reference_control_unique_element_names_on_same_level;
 mod reference_control_valid_actor_reference_in_private_actions;
 mod scenario_logic_targetspeed_maxspeed_general;
 mod scenario_logic_targetspeed_maxspeed_speedprofileaction;
+mod schema_cardinality;
+mod schema_choice_single_alternative;
 mod storyboard_act_never_starts;
 mod storyboard_action_conflict;
 mod storyboard_empty;
@@ -33,6 +35,12 @@ mod storyboard_reference_to_self_or_parent_end;
 mod storyboard_select_triggering_entities;
 mod storyboard_stop_trigger;
 mod storyboard_unreachable_by_reference;
+mod trigger_contradiction;
+mod trigger_edge_on_state;
+mod trigger_float_equal;
+mod trigger_simulation_time_equal;
+mod trigger_time_unordered;
+mod trigger_traveled_distance_stopped;
 mod xml_fileheader_is_present;
 mod xml_root_tag_is_openscenario;
 mod xml_valid_schema;
@@ -251,4 +259,12 @@ pub static RULES: &[&dyn AnyRule] = &[
     &action_speed_not_negative::RULE,
     &action_negative_lane_change::RULE,
     &action_custom_command_portable::RULE,
+    &trigger_contradiction::RULE,
+    &trigger_time_unordered::RULE,
+    &trigger_simulation_time_equal::RULE,
+    &trigger_float_equal::RULE,
+    &trigger_edge_on_state::RULE,
+    &trigger_traveled_distance_stopped::RULE,
+    &schema_choice_single_alternative::RULE,
+    &schema_cardinality::RULE,
 ];

@@ -34,7 +34,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             called(group)
         );
         found
-            .about(block, "", text)
+            .about(group, "", text)
+            .at(block.node(), "its actors")
             .at(private.node(), "its first private action");
     }
 }

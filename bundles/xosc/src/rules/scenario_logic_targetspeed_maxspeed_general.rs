@@ -1,8 +1,7 @@
 use qcbus_openscenario::Scenario;
 use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
 
-use crate::families::actions::{short, slowest};
-use crate::families::references::quoted;
+use crate::families::actions::{short, slowest, stated};
 use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -57,7 +56,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         };
         let text = format!(
             "the target speed of {} m/s is beyond the `maxSpeed` of `{name}`, which is {} m/s: {effect}",
-            quoted(target, "value", &short(speed)),
+            stated(target, "value", speed),
             short(most)
         );
         found.about(target, "value", text).level(level);

@@ -1,8 +1,7 @@
 use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
-use crate::families::actions::{short, slowest};
-use crate::families::references::quoted;
+use crate::families::actions::{short, slowest, stated};
 use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -51,8 +50,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         };
         let text = format!(
             "the speed of {} m/s{further} is beyond the `maxSpeed` of `{name}`, which is {} m/s: in mode \
-                 `follow` it never gets there",
-            quoted(entry, "speed", &short(speed)),
+             `follow` it never gets there",
+            stated(entry, "speed", speed),
             short(most)
         );
         found.about(entry, "speed", text);

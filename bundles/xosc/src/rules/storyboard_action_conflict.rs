@@ -3,7 +3,7 @@ use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::actions::{Domain, acting, domains};
-use crate::families::triggers::{called, canonical};
+use crate::families::triggers::{called, canonical, events};
 use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -30,18 +30,6 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             }
         }
     }
-}
-
-/// The events of an act, those of maneuvers in catalogs among them.
-fn events<'m, 'd>(act: Element<'m, 'd>) -> impl Iterator<Item = Element<'m, 'd>> {
-    act.children_named("ManeuverGroup")
-        .flat_map(Element::children)
-        .filter_map(|child| match child.name() {
-            "Maneuver" => Some(child),
-            "CatalogReference" => child.scenario().entry(child),
-            _ => None,
-        })
-        .flat_map(|maneuver| maneuver.children_named("Event"))
 }
 
 fn take<'m, 'd>(

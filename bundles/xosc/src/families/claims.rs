@@ -1,0 +1,212 @@
+//! What conditions demand of one and the same quantity.
+
+use qcbus_openscenario::Element;
+
+use crate::families::actions::stated;
+use crate::families::references::quoted;
+use crate::families::triggers::canonical_but;
+
+/// One end of a range.
+#[derive(Clone)]
+pub(crate) struct Bound<'m, 'd> {
+    value: f64,
+    /// Whether the value itself is allowed.
+    closed: bool,
+    /// The element that demands it.
+    pub(crate) element: Element<'m, 'd>,
+    /// What it demands, in words.
+    pub(crate) wanted: String,
+}
+
+/// What is demanded of a quantity.
+#[derive(Clone)]
+pub(crate) struct Claim<'m, 'd> {
+    low: Option<Bound<'m, 'd>>,
+    high: Option<Bound<'m, 'd>>,
+    word: Option<(String, Bound<'m, 'd>)>,
+    attribute: &'static str,
+}
+
+/// Conditions about one of several words: the element and the attribute with the word.
+const WORDS: &[(&str, &str)] = &[
+    ("TrafficSignalCondition", "state"),
+    ("TrafficSignalControllerCondition", "phase"),
+    ("StoryboardElementStateCondition", "state"),
+];
+
+/// Conditions that compare with a value that may be a text.
+const TEXTS: &[&str] = &[
+    "ParameterCondition",
+    "VariableCondition",
+    "UserDefinedValueCondition",
+];
+
+/// The quantity that a condition is about and what it demands of it; `None` when it is not about one,
+/// or not about its value in this very step.
+pub(crate) fn of<'m, 'd>(condition: Element<'m, 'd>) -> Option<(String, Claim<'m, 'd>)> {
+    let edge = condition.word("conditionEdge")?;
+    if !matches!(&*edge, "none" | "rising") {
+        return None;
+    }
+    let delay = condition.number("delay").unwrap_or(0.0);
+    let (leaf, about) = leaf(condition)?;
+    let (claim, without) = match WORDS.iter().find(|(name, _)| leaf.is(name)) {
+        Some((_, attribute)) => (word(leaf, attribute)?, *attribute),
+        None => (value(leaf)?, "value"),
+    };
+    let same = canonical_but(leaf, &["rule", without]);
+    Some((format!("{delay} {about} {same}"), claim))
+}
+
+/// The element that says what is compared, and the entities that it is about.
+fn leaf<'m, 'd>(condition: Element<'m, 'd>) -> Option<(Element<'m, 'd>, String)> {
+    if let Some(by_value) = condition.child("ByValueCondition") {
+        return Some((by_value.children().next()?, String::new()));
+    }
+    let by_entity = condition.child("ByEntityCondition")?;
+    let triggering = by_entity.child("TriggeringEntities")?;
+    let entities = triggering.scenario().entities();
+    let mut names = Vec::new();
+    for reference in triggering.children_named("EntityRef") {
+        names.push(reference.text("entityRef")?.into_owned());
+    }
+    names.sort();
+    let one = matches!(names.as_slice(), [name] if entities.object(name).is_some());
+    // Of several, one may meet this condition and another one that.
+    if !one && triggering.word("triggeringEntitiesRule")? != "all" {
+        return None;
+    }
+    let leaf = by_entity.child("EntityCondition")?.children().next()?;
+    Some((leaf, names.join(" ")))
+}
+
+fn word<'m, 'd>(leaf: Element<'m, 'd>, attribute: &'static str) -> Option<Claim<'m, 'd>> {
+    let word = leaf.word(attribute)?;
+    // Transitions last for a step, in which the state before or after them holds, too.
+    if word.ends_with("Transition") {
+        return None;
+    }
+    let bound = Bound {
+        value: 0.0,
+        closed: true,
+        element: leaf,
+        wanted: quoted(leaf, attribute, &word),
+    };
+    Some(Claim {
+        low: None,
+        high: None,
+        word: Some((word.to_lowercase(), bound)),
+        attribute,
+    })
+}
+
+fn value<'m, 'd>(leaf: Element<'m, 'd>) -> Option<Claim<'m, 'd>> {
+    let rule = leaf.word("rule")?;
+    let Some(value) = leaf.number("value") else {
+        let text = leaf
+            .text("value")
+            .filter(|_| TEXTS.contains(&leaf.name()))?;
+        let bound = Bound {
+            value: 0.0,
+            closed: true,
+            element: leaf,
+            wanted: quoted(leaf, "value", &text),
+        };
+        let word = (rule == "equalTo").then(|| (text.into_owned(), bound));
+        return word.map(|word| Claim {
+            low: None,
+            high: None,
+            word: Some(word),
+            attribute: "value",
+        });
+    };
+    let bound = |closed: bool, words: &str| Bound {
+        value,
+        closed,
+        element: leaf,
+        wanted: format!("{words} {}", stated(leaf, "value", value)),
+    };
+    let (low, high) = match &*rule {
+        "greaterThan" => (Some(bound(false, "more than")), None),
+        "greaterOrEqual" => (Some(bound(true, "at least")), None),
+        "lessThan" => (None, Some(bound(false, "less than"))),
+        "lessOrEqual" => (None, Some(bound(true, "at most"))),
+        "equalTo" => (Some(bound(true, "exactly")), Some(bound(true, "exactly"))),
+        _ => return None,
+    };
+    Some(Claim {
+        low,
+        high,
+        word: None,
+        attribute: "value",
+    })
+}
+
+impl<'m, 'd> Claim<'m, 'd> {
+    fn any(&self) -> Option<&Bound<'m, 'd>> {
+        let ends = self.low.as_ref().or(self.high.as_ref());
+        ends.or(self.word.as_ref().map(|(_, bound)| bound))
+    }
+
+    /// The element that demands it.
+    pub(crate) fn element(&self) -> Option<Element<'m, 'd>> {
+        self.any().map(|bound| bound.element)
+    }
+
+    /// What it demands, in words.
+    pub(crate) fn wanted(&self) -> &str {
+        self.any().map_or("", |bound| &bound.wanted)
+    }
+
+    /// The attribute that says so.
+    pub(crate) fn attribute(&self) -> &'static str {
+        self.attribute
+    }
+
+    /// What of this rules out the other.
+    pub(crate) fn against(&self, other: &Claim<'m, 'd>) -> Option<&Bound<'m, 'd>> {
+        if let (Some((word, bound)), Some((wanted, _))) = (&self.word, &other.word) {
+            return (word != wanted).then_some(bound);
+        }
+        let empty = |low: &Bound<'m, 'd>, high: &Bound<'m, 'd>| {
+            low.value > high.value || (low.value == high.value && !(low.closed && high.closed))
+        };
+        match (&self.low, &other.high) {
+            (Some(low), Some(high)) if empty(low, high) => return Some(low),
+            _ => {}
+        }
+        match (&other.low, &self.high) {
+            (Some(low), Some(high)) if empty(low, high) => Some(high),
+            _ => None,
+        }
+    }
+
+    /// Takes over what the other demands beyond this.
+    pub(crate) fn narrow(&mut self, other: Claim<'m, 'd>) {
+        let tighter_low = |one: &Bound<'m, 'd>, than: &Bound<'m, 'd>| {
+            one.value > than.value || (one.value == than.value && than.closed)
+        };
+        let tighter_high = |one: &Bound<'m, 'd>, than: &Bound<'m, 'd>| {
+            one.value < than.value || (one.value == than.value && than.closed)
+        };
+        if let Some(low) = other.low {
+            if self
+                .low
+                .as_ref()
+                .is_none_or(|known| tighter_low(&low, known))
+            {
+                self.low = Some(low);
+            }
+        }
+        if let Some(high) = other.high {
+            if self
+                .high
+                .as_ref()
+                .is_none_or(|known| tighter_high(&high, known))
+            {
+                self.high = Some(high);
+            }
+        }
+        self.word = self.word.take().or(other.word);
+    }
+}

@@ -1,0 +1,60 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::triggers::called;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_schema_cardinality",
+    uids: &["qcbus.dev:xosc:1.0.0:schema.cardinality"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("schema_cardinality.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// Elements that the schema lets be empty: what they must have any of to do something, and what happens
+/// if they do not.
+const CONTAINERS: &[(&str, &[&str], &str)] = &[
+    (
+        "ManeuverGroup",
+        &["Maneuver", "CatalogReference"],
+        "has neither a `Maneuver` nor a `CatalogReference`: nothing happens in it, and it is over at once",
+    ),
+    (
+        "OverrideControllerValueAction",
+        &[
+            "Throttle",
+            "Brake",
+            "Clutch",
+            "ParkingBrake",
+            "SteeringWheel",
+            "Gear",
+        ],
+        "overrides nothing: it may have a `Throttle`, a `Brake`, a `Clutch`, a `ParkingBrake`, a `SteeringWheel` \
+         and a `Gear`",
+    ),
+    (
+        "Environment",
+        &["TimeOfDay", "Weather", "RoadCondition"],
+        "has no `TimeOfDay`, `Weather` or `RoadCondition`: it leaves everything as it is",
+    ),
+];
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for (name, contents, effect) in CONTAINERS {
+        // Before that the schema demands all parts of these.
+        if *name != "ManeuverGroup" && scenario.version() < (1, 1) {
+            continue;
+        }
+        for element in scenario.elements(name) {
+            if !element
+                .children()
+                .any(|child| contents.contains(&child.name()))
+            {
+                found.about(element, "", format!("{} {effect}", called(element)));
+            }
+        }
+    }
+}

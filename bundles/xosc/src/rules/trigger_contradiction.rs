@@ -1,0 +1,48 @@
+use foldhash::{HashMap, HashMapExt as _};
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::claims::{self, Claim};
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_trigger_contradiction",
+    uids: &["qcbus.dev:xosc:1.0.0:trigger.contradiction"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("trigger_contradiction.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for group in scenario.elements_everywhere("ConditionGroup") {
+        let mut known: HashMap<String, Claim<'_, '_>> = HashMap::new();
+        for condition in group.children_named("Condition") {
+            let Some((quantity, claim)) = claims::of(condition) else {
+                continue;
+            };
+            match known.get_mut(&quantity) {
+                None => {
+                    known.insert(quantity, claim);
+                }
+                Some(other) => {
+                    if let (Some(against), Some(element)) = (other.against(&claim), claim.element())
+                    {
+                        let text = format!(
+                            "this `{}` demands {}, another condition of the same group {}: all conditions of a group \
+                             must be true at once, so this group never is",
+                            element.name(),
+                            claim.wanted(),
+                            against.wanted
+                        );
+                        found
+                            .about(element, claim.attribute(), text)
+                            .at(against.element.node(), "the condition that it contradicts");
+                    }
+                    other.narrow(claim);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,81 @@
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::actions::stated;
+use crate::families::triggers;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_trigger_edge_on_state",
+    uids: &["qcbus.dev:xosc:1.0.0:trigger.edge_on_state"],
+    level: Level::Information,
+    after: super::READABLE,
+    page: include_str!("trigger_edge_on_state.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for condition in scenario.elements_everywhere("Condition") {
+        let Some(edge) = condition
+            .word("conditionEdge")
+            .filter(|edge| edge != "none")
+        else {
+            continue;
+        };
+        let time = triggers::time(condition).and_then(|time| of_time(time, &edge));
+        let states = condition.path(&["ByValueCondition", "StoryboardElementStateCondition"]);
+        let Some((level, text)) = time.or_else(|| of_state(states?, &edge)) else {
+            continue;
+        };
+        found.about(condition, "conditionEdge", text).level(level);
+    }
+}
+
+/// What is odd about an edge of a condition about time, which only ever grows, from 0 on.
+fn of_time(time: Element<'_, '_>, edge: &str) -> Option<(Level, String)> {
+    let value = time.number("value")?;
+    let rule = time.word("rule")?;
+    let wanted = stated(time, "value", value);
+    match (edge, &*rule) {
+        ("falling", "greaterThan" | "greaterOrEqual") => Some((
+            Level::Warning,
+            format!(
+                "the time becomes greater than {wanted} s and stays so: a `falling` edge never comes, only a \
+                 `rising` one does"
+            ),
+        )),
+        ("rising", "lessThan" | "lessOrEqual") => Some((
+            Level::Warning,
+            format!(
+                "the time is less than {wanted} s from the beginning or never: a `rising` edge never comes, only a \
+                 `falling` one does"
+            ),
+        )),
+        ("rising", "equalTo" | "greaterOrEqual") if value == 0.0 => Some((
+            Level::Information,
+            format!(
+                "at {wanted} s the condition is true in the very first step, before which there is none to rise \
+                 from: strictly the edge never comes; `conditionEdge=\"none\"` is what such a condition needs"
+            ),
+        )),
+        _ => None,
+    }
+}
+
+/// What is odd about an edge of a condition about a transition, which lasts for one step.
+fn of_state(state: Element<'_, '_>, edge: &str) -> Option<(Level, String)> {
+    let name = state.word("state")?;
+    let transition = name.ends_with("Transition");
+    let text = match edge {
+        "falling" if transition => format!(
+            "`{name}` lasts for one step: its `falling` edge only comes one step later; `none` or `rising` is meant"
+        ),
+        "risingOrFalling" if transition => format!(
+            "`{name}` lasts for one step: it rises and falls, so the condition is true in two steps in a row; \
+             `none` or `rising` is meant"
+        ),
+        _ => return None,
+    };
+    Some((Level::Information, text))
+}

@@ -1,0 +1,36 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::actions::stated;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_trigger_float_equal",
+    uids: &["qcbus.dev:xosc:1.0.0:trigger.float_equal"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("trigger_float_equal.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for entity_condition in scenario.elements_everywhere("EntityCondition") {
+        for condition in entity_condition.children() {
+            if condition.word("rule").as_deref() != Some("equalTo") {
+                continue;
+            }
+            // Standing still, and no distance between bounding boxes, come out as 0 exactly.
+            let Some(value) = condition.number("value").filter(|value| *value != 0.0) else {
+                continue;
+            };
+            let text = format!(
+                "`{}` demands exactly {}: a measured quantity goes past a value without ever being equal to it, \
+                 and then the condition is never true; `greaterThan` or `lessThan` is sure",
+                condition.name(),
+                stated(condition, "value", value)
+            );
+            found.about(condition, "rule", text);
+        }
+    }
+}

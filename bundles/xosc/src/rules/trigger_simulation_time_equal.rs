@@ -1,0 +1,38 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::actions::stated;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_trigger_simulation_time_equal",
+    uids: &["qcbus.dev:xosc:1.0.0:trigger.simulation_time_equal"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("trigger_simulation_time_equal.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let instead = if scenario.version() >= (1, 2) {
+        "`greaterOrEqual`"
+    } else {
+        "`greaterThan`"
+    };
+    for time in scenario.elements_everywhere("SimulationTimeCondition") {
+        if time.word("rule").as_deref() != Some("equalTo") {
+            continue;
+        }
+        // The run begins at 0: that moment is there in any case.
+        let Some(value) = time.number("value").filter(|value| *value > 0.0) else {
+            continue;
+        };
+        let text = format!(
+            "the simulation time is to be equal to {} s, but it goes on in steps that may miss that moment, and \
+             then the condition is never true; {instead} holds from then on",
+            stated(time, "value", value)
+        );
+        found.about(time, "rule", text);
+    }
+}

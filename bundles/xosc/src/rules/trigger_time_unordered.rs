@@ -1,0 +1,108 @@
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::actions::short;
+use crate::families::triggers::{self, called, earliest, groups, time};
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_trigger_time_unordered",
+    uids: &["qcbus.dev:xosc:1.0.0:trigger.time_unordered"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("trigger_time_unordered.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// A moment that a condition about time names.
+type Moment<'m, 'd> = (f64, Element<'m, 'd>);
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let Some(storyboard) = scenario.root().child("Storyboard") else {
+        return;
+    };
+    let run_ends = end(storyboard).map(|moment| (moment, "the run"));
+    for story in storyboard.children_named("Story") {
+        for act in story.children_named("Act") {
+            let act_ends = end(act).map(|moment| (moment, "its act"));
+            let ends = [run_ends, act_ends].into_iter().flatten();
+            let Some(((at, by), what)) = ends.min_by(|one, other| one.0.0.total_cmp(&other.0.0))
+            else {
+                continue;
+            };
+            // What lies in an act that never starts need not be said, too.
+            if too_late(act, at, what, by, found) {
+                continue;
+            }
+            for event in triggers::events(act) {
+                too_late(event, at, what, by, found);
+            }
+        }
+    }
+}
+
+/// Says that an element cannot start before the end.
+fn too_late(
+    element: Element<'_, '_>,
+    end: f64,
+    what: &str,
+    by: Element<'_, '_>,
+    found: &mut Sink<'_>,
+) -> bool {
+    let Some((start, condition)) = start(element).filter(|(start, _)| *start > end) else {
+        return false;
+    };
+    let what = if element.is("Act") && what == "its act" {
+        "its own `StopTrigger`"
+    } else {
+        what
+    };
+    let ends = if what.ends_with('`') {
+        "stops it"
+    } else {
+        "ends"
+    };
+    let text = format!(
+        "{} starts at {} s at the earliest, but {what} {ends} at {} s: it never starts",
+        called(element),
+        short(start),
+        short(end)
+    );
+    found
+        .about(condition, "value", text)
+        .at(by.node(), "what ends it");
+    true
+}
+
+/// When the stop trigger of an element is true for certain: it has a group that asks for nothing but the
+/// time.
+fn end<'m, 'd>(element: Element<'m, 'd>) -> Option<Moment<'m, 'd>> {
+    let alone = |group: Vec<Element<'m, 'd>>| match group.as_slice() {
+        [condition] => {
+            let time = time(*condition)?;
+            let lasting = matches!(&*time.word("rule")?, "greaterThan" | "greaterOrEqual")
+                && matches!(&*condition.word("conditionEdge")?, "none" | "rising");
+            Some((earliest(*condition).filter(|_| lasting)?, time))
+        }
+        _ => None,
+    };
+    groups(element.child("StopTrigger")?)
+        .filter_map(alone)
+        .min_by(|(one, _), (other, _)| one.total_cmp(other))
+}
+
+/// Before when the start trigger of an element cannot be true; `None` when it can be at any time.
+fn start<'m, 'd>(element: Element<'m, 'd>) -> Option<Moment<'m, 'd>> {
+    let mut first: Option<Moment<'m, 'd>> = None;
+    for group in groups(element.child("StartTrigger")?) {
+        let moments = group
+            .iter()
+            .filter_map(|condition| Some((earliest(*condition)?, time(*condition)?)));
+        let last = moments.max_by(|(one, _), (other, _)| one.total_cmp(other))?;
+        if first.is_none_or(|(moment, _)| last.0 < moment) {
+            first = Some(last);
+        }
+    }
+    first
+}

@@ -1,0 +1,106 @@
+use foldhash::{HashSet, HashSetExt as _};
+use qcbus_openscenario::{Element, Entity, EntityKind, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::actions::acting;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_trigger_traveled_distance_stopped",
+    uids: &["qcbus.dev:xosc:1.0.0:trigger.traveled_distance_stopped"],
+    level: Level::Information,
+    after: super::READABLE,
+    page: include_str!("trigger_traveled_distance_stopped.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run<'d>(scenario: &Scenario<'d>, found: &mut Sink<'_>) {
+    let mut conditions = scenario
+        .elements_everywhere("TraveledDistanceCondition")
+        .peekable();
+    if conditions.peek().is_none() {
+        return;
+    }
+    let Some(moved) = moved(scenario) else { return };
+    for condition in conditions {
+        let Some(by_entity) = condition.ancestor("ByEntityCondition") else {
+            continue;
+        };
+        let Some(triggering) = by_entity.child("TriggeringEntities") else {
+            continue;
+        };
+        let all = triggering.word("triggeringEntitiesRule").as_deref() == Some("all");
+        let Some(entities) = entities(triggering) else {
+            continue;
+        };
+        let still = |entity: &&&Entity<'d>| stays(scenario, entity, &moved);
+        let stays: Vec<&&Entity<'d>> = entities.iter().filter(still).collect();
+        let Some(entity) = stays.first() else {
+            continue;
+        };
+        if !all && stays.len() < entities.len() {
+            continue;
+        }
+        let text = format!(
+            "`{}` is to travel a distance, but nothing in this scenario moves it: it has no controller, and no \
+             action gives it a speed or a way; unless the simulator drives it, the condition is never true",
+            entity.name()
+        );
+        found.about(condition, "", text);
+    }
+}
+
+/// The entities that a condition is about; `None` when one is not known.
+fn entities<'m, 'd>(triggering: Element<'m, 'd>) -> Option<Vec<&'m Entity<'d>>> {
+    let known = triggering.scenario().entities();
+    let mut entities = Vec::new();
+    for reference in triggering.children_named("EntityRef") {
+        entities.extend(known.expand(&reference.text("entityRef")?)?);
+    }
+    Some(entities)
+}
+
+/// Whether nothing moves an entity.
+fn stays<'d>(scenario: &Scenario<'d>, entity: &Entity<'d>, moved: &HashSet<String>) -> bool {
+    let controlled = entity.element(scenario).child("ObjectController");
+    let known = matches!(
+        entity.kind(),
+        EntityKind::Vehicle | EntityKind::Pedestrian | EntityKind::MiscObject
+    );
+    known
+        && !moved.contains(entity.name())
+        && controlled.is_none_or(|controller| controller.children().next().is_none())
+}
+
+/// The names of the entities that any action moves; `None` when it is not known of one of them.
+fn moved(scenario: &Scenario<'_>) -> Option<HashSet<String>> {
+    // Trailers go where their vehicle goes; a group without a known maneuver may do anything.
+    let trailers = ["Trailer", "TrailerAction"];
+    let towed = trailers
+        .iter()
+        .any(|name| scenario.elements_everywhere(name).next().is_some());
+    if towed || !scenario.storyboard().is_complete() {
+        return None;
+    }
+    let mut moved = HashSet::new();
+    for action in scenario.elements_everywhere("PrivateAction") {
+        // In catalogs that are looked at for themselves nobody acts.
+        if moves(action) {
+            let acting = acting(action)?;
+            moved.extend(acting.into_iter().map(|entity| entity.name().to_owned()));
+        }
+    }
+    Some(moved)
+}
+
+/// Whether an action may move somebody. Setting the speed to 0 does not.
+fn moves(action: Element<'_, '_>) -> bool {
+    action.children().any(|kind| match kind.name() {
+        "VisibilityAction" | "AppearanceAction" | "TeleportAction" => false,
+        _ => {
+            let target = kind.path(&["SpeedAction", "SpeedActionTarget", "AbsoluteTargetSpeed"]);
+            target.and_then(|target| target.number("value")) != Some(0.0)
+        }
+    })
+}
