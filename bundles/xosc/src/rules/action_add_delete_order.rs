@@ -9,6 +9,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_action_add_delete_order",
     uids: &["qcbus.dev:xosc:1.0.0:action.add_delete_order"],
     level: Level::Warning,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("action_add_delete_order.md"),
     run,

@@ -8,6 +8,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_action_custom_command_portable",
     uids: &["qcbus.dev:xosc:1.0.0:action.custom_command_portable"],
     level: Level::Information,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("action_custom_command_portable.md"),
     run,

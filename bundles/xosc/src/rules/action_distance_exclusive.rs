@@ -6,6 +6,7 @@ use crate::model::{About, Scene};
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_action_distance_exclusive",
     uids: &["qcbus.dev:xosc:1.0.0:action.distance_exclusive"],
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("action_distance_exclusive.md"),
     run,

@@ -9,6 +9,7 @@ pub static RULE: Rule<Scene> = Rule {
     uids: &["qcbus.dev:xosc:1.0.0:action.negative_lane_change"],
     level: Level::Information,
     params: &[MOST],
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("action_negative_lane_change.md"),
     run,

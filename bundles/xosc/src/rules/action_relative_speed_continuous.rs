@@ -7,6 +7,7 @@ use crate::model::{About, Scene};
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_action_relative_speed_continuous",
     uids: &["qcbus.dev:xosc:1.0.0:action.relative_speed_continuous"],
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("action_relative_speed_continuous.md"),
     run,

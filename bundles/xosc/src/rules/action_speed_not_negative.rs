@@ -8,6 +8,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_action_speed_not_negative",
     uids: &["qcbus.dev:xosc:1.0.0:action.speed_not_negative"],
     level: Level::Information,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("action_speed_not_negative.md"),
     run,

@@ -8,6 +8,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_action_step_dynamics_zero",
     uids: &["qcbus.dev:xosc:1.0.0:action.step_dynamics_zero"],
     level: Level::Warning,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("action_step_dynamics_zero.md"),
     run,

@@ -9,6 +9,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_action_synchronize",
     uids: &["qcbus.dev:xosc:1.0.0:action.synchronize"],
     level: Level::Warning,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("action_synchronize.md"),
     run,

@@ -9,6 +9,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_action_transition_not_zero",
     uids: &["qcbus.dev:xosc:1.0.0:action.transition_not_zero"],
     level: Level::Warning,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("action_transition_not_zero.md"),
     run,

@@ -8,6 +8,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_schema_cardinality",
     uids: &["qcbus.dev:xosc:1.0.0:schema.cardinality"],
     level: Level::Warning,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("schema_cardinality.md"),
     run,

@@ -8,6 +8,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_storyboard_act_never_starts",
     uids: &["qcbus.dev:xosc:1.0.0:storyboard.act_never_starts"],
     level: Level::Warning,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("storyboard_act_never_starts.md"),
     run,

@@ -9,6 +9,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_storyboard_init_private_unknown",
     uids: &["qcbus.dev:xosc:1.0.0:storyboard.init_private_unknown"],
     level: Level::Information,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("storyboard_init_private_unknown.md"),
     run,

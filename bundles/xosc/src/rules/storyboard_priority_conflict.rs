@@ -9,6 +9,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_storyboard_priority_conflict",
     uids: &["qcbus.dev:xosc:1.0.0:storyboard.priority_conflict"],
     level: Level::Information,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("storyboard_priority_conflict.md"),
     run,

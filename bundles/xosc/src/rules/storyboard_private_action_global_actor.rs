@@ -8,6 +8,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_storyboard_private_action_global_actor",
     uids: &["qcbus.dev:xosc:1.0.0:storyboard.private_action_global_actor"],
     level: Level::Information,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("storyboard_private_action_global_actor.md"),
     run,

@@ -9,6 +9,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_storyboard_reference_to_self_or_parent_end",
     uids: &["qcbus.dev:xosc:1.0.0:storyboard.reference_to_self_or_parent_end"],
     level: Level::Warning,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("storyboard_reference_to_self_or_parent_end.md"),
     run,

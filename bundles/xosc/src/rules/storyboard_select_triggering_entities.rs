@@ -8,6 +8,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_storyboard_select_triggering_entities",
     uids: &["qcbus.dev:xosc:1.0.0:storyboard.select_triggering_entities"],
     level: Level::Warning,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("storyboard_select_triggering_entities.md"),
     run,

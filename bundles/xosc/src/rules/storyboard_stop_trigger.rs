@@ -7,6 +7,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_storyboard_stop_trigger",
     uids: &["qcbus.dev:xosc:1.0.0:storyboard.stop_trigger"],
     level: Level::Warning,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("storyboard_stop_trigger.md"),
     run,

@@ -9,6 +9,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_storyboard_unreachable_by_reference",
     uids: &["qcbus.dev:xosc:1.0.0:storyboard.unreachable_by_reference"],
     level: Level::Warning,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("storyboard_unreachable_by_reference.md"),
     run,

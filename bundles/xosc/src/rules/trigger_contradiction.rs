@@ -9,6 +9,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_trigger_contradiction",
     uids: &["qcbus.dev:xosc:1.0.0:trigger.contradiction"],
     level: Level::Warning,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("trigger_contradiction.md"),
     run,

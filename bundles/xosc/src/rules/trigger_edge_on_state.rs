@@ -9,6 +9,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_trigger_edge_on_state",
     uids: &["qcbus.dev:xosc:1.0.0:trigger.edge_on_state"],
     level: Level::Information,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("trigger_edge_on_state.md"),
     run,

@@ -8,6 +8,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_trigger_float_equal",
     uids: &["qcbus.dev:xosc:1.0.0:trigger.float_equal"],
     level: Level::Warning,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("trigger_float_equal.md"),
     run,

@@ -8,6 +8,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_trigger_simulation_time_equal",
     uids: &["qcbus.dev:xosc:1.0.0:trigger.simulation_time_equal"],
     level: Level::Warning,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("trigger_simulation_time_equal.md"),
     run,

@@ -9,6 +9,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_trigger_time_unordered",
     uids: &["qcbus.dev:xosc:1.0.0:trigger.time_unordered"],
     level: Level::Warning,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("trigger_time_unordered.md"),
     run,

@@ -9,6 +9,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_trigger_traveled_distance_stopped",
     uids: &["qcbus.dev:xosc:1.0.0:trigger.traveled_distance_stopped"],
     level: Level::Information,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("trigger_traveled_distance_stopped.md"),
     run,
