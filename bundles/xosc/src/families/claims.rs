@@ -189,23 +189,21 @@ impl<'m, 'd> Claim<'m, 'd> {
         let tighter_high = |one: &Bound<'m, 'd>, than: &Bound<'m, 'd>| {
             one.value < than.value || (one.value == than.value && than.closed)
         };
-        if let Some(low) = other.low {
-            if self
+        if let Some(low) = other.low
+            && self
                 .low
                 .as_ref()
                 .is_none_or(|known| tighter_low(&low, known))
-            {
-                self.low = Some(low);
-            }
+        {
+            self.low = Some(low);
         }
-        if let Some(high) = other.high {
-            if self
+        if let Some(high) = other.high
+            && self
                 .high
                 .as_ref()
                 .is_none_or(|known| tighter_high(&high, known))
-            {
-                self.high = Some(high);
-            }
+        {
+            self.high = Some(high);
         }
         self.word = self.word.take().or(other.word);
     }

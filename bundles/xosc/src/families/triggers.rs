@@ -7,10 +7,11 @@ use qcbus_sdk::Sink;
 
 use crate::model::About;
 
-/// Says which elements of a name have a `StartTrigger` without any condition.
-pub(crate) fn empty_starts(
-    scenario: &Scenario<'_>,
+/// Says which elements of a name that matter have a `StartTrigger` without any condition.
+pub(crate) fn empty_starts<'d>(
+    scenario: &Scenario<'d>,
     owner: &str,
+    matters: fn(Element<'_, 'd>) -> bool,
     remedy: &str,
     found: &mut Sink<'_>,
 ) {
@@ -18,10 +19,10 @@ pub(crate) fn empty_starts(
         let Some(trigger) = element.child("StartTrigger") else {
             continue;
         };
-        if trigger.children().next().is_none() {
+        if trigger.children().next().is_none() && matters(element) {
             let text = format!(
-                "the `StartTrigger` of {} is empty: without a condition it is never true, so it does \
-                 not start, while some simulators start it at once; {remedy}",
+                "the `StartTrigger` of {} is empty: without a condition it is never true, so it does not start, \
+                 while some simulators start it at once; {remedy}",
                 called(element)
             );
             found.about(trigger, "", text);
@@ -122,12 +123,17 @@ fn write_canonical(element: Element<'_, '_>, without: &[&str], deep: usize, out:
 
 /// The events of an act, those of maneuvers in catalogs among them.
 pub(crate) fn events<'m, 'd>(act: Element<'m, 'd>) -> impl Iterator<Item = Element<'m, 'd>> {
-    act.children_named("ManeuverGroup")
-        .flat_map(Element::children)
+    maneuvers(act)
         .filter_map(|child| match child.name() {
-            "Maneuver" => Some(child),
             "CatalogReference" => child.scenario().entry(child),
-            _ => None,
+            _ => Some(child),
         })
         .flat_map(|maneuver| maneuver.children_named("Event"))
+}
+
+/// The maneuvers of an act, and its references to maneuvers in catalogs.
+pub(crate) fn maneuvers<'m, 'd>(act: Element<'m, 'd>) -> impl Iterator<Item = Element<'m, 'd>> {
+    act.children_named("ManeuverGroup")
+        .flat_map(Element::children)
+        .filter(|child| child.is("Maneuver") || child.is("CatalogReference"))
 }

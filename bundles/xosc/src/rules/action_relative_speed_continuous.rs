@@ -1,5 +1,5 @@
 use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Rule, Sink};
+use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::actions::stated;
 use crate::model::{About, Scene};
@@ -7,6 +7,8 @@ use crate::model::{About, Scene};
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_action_relative_speed_continuous",
     uids: &["qcbus.dev:xosc:1.0.0:action.relative_speed_continuous"],
+    // Some simulators drop one of the two and go on.
+    level: Level::Warning,
     versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("action_relative_speed_continuous.md"),
@@ -33,7 +35,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "the relative speed is kept continuously, which must not be used together with a {dimension} to reach \
+            "the relative speed is kept continuously, which may not be used together with a {dimension} to reach \
              it (here {}): such an action has no end; a `rate` is allowed, or `continuous=\"false\"`",
             stated(dynamics, "value", value)
         );

@@ -1,8 +1,7 @@
 use qcbus_openscenario::Scenario;
 use qcbus_sdk::{Level, Rule, Sink};
 
-use crate::families::actions::TRANSITIONS;
-use crate::families::references::quoted;
+use crate::families::actions::{TRANSITIONS, stated};
 use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -30,7 +29,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         if dynamics.number("value") != Some(0.0) || shape == "step" {
             continue;
         }
-        let value = quoted(dynamics, "value", "0");
+        let value = stated(dynamics, "value", 0.0);
         let text = match &*dimension {
             "rate" => format!(
                 "the rate of a `{shape}` transition is {value}: nothing changes, and the action never ends; the \

@@ -76,14 +76,15 @@ fn look_up<'d>(
                 of_kind.len(),
                 kind.word()
             );
-            let by_scope = nearest(scenario, condition, &of_kind) == 1;
+            let level = match nearest(scenario, condition, &of_kind) {
+                // A maneuver of a catalog that is used twice cannot name its own elements otherwise.
+                1 if condition.reference().is_some() => Level::Information,
+                1 => Level::Warning,
+                _ => Level::Error,
+            };
             found
                 .about(condition, "storyboardElementRef", text)
-                .level(if by_scope {
-                    Level::Warning
-                } else {
-                    Level::Error
-                })
+                .level(level)
                 .at(first.element(scenario).node(), "the first of them")
                 .at(second.element(scenario).node(), "the second of them");
         }
@@ -115,8 +116,12 @@ fn nowhere<'d>(
     found.about(condition, "storyboardElementRef", text);
 }
 
+const MANY: usize = 256;
+
 /// How many of the elements lie nearest to the condition: within the innermost element around it that
 /// has any of them. Simulators that look there first find one when it is the only one.
+///
+/// Where there are very many, the first of them stand for all.
 fn nearest<'d>(
     scenario: &Scenario<'d>,
     condition: Element<'_, 'd>,
@@ -129,7 +134,7 @@ fn nearest<'d>(
                 let element = one.element(scenario);
                 element == around || element.ancestors().any(|other| other == around)
             };
-            elements.iter().filter(within).count()
+            elements.iter().take(MANY).filter(within).count()
         })
         .find(|count| *count > 0)
         .unwrap_or(0)

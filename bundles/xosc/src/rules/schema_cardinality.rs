@@ -1,4 +1,4 @@
-use qcbus_openscenario::Scenario;
+use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::triggers::called;
@@ -44,9 +44,19 @@ const CONTAINERS: &[(&str, &[&str], &str)] = &[
 ];
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    // Scenarios that only place entities have an empty group because older schemas demand one.
+    let groups = scenario.elements("ManeuverGroup");
+    let only_places = !groups
+        .into_iter()
+        .flat_map(Element::children)
+        .any(|child| child.is("Maneuver") || child.is("CatalogReference"));
     for (name, contents, effect) in CONTAINERS {
-        // Before that the schema demands all parts of these.
-        if *name != "ManeuverGroup" && scenario.version() < (1, 1) {
+        let silent = match *name {
+            "ManeuverGroup" => only_places,
+            // Before that the schema demands all parts of these.
+            _ => scenario.version() < (1, 1),
+        };
+        if silent {
             continue;
         }
         for element in scenario.elements(name) {

@@ -105,6 +105,8 @@ struct OneOf {
     level: Level,
     /// The versions whose schemas leave it open: from this one to before that one.
     versions: ((u16, u16), (u16, u16)),
+    /// Whether the schema leaves several open, too.
+    several: bool,
 }
 
 const ONE_OF: &[OneOf] = &[
@@ -119,24 +121,28 @@ const ONE_OF: &[OneOf] = &[
         ],
         level: Level::Error,
         versions: ((1, 0), (1, 3)),
+        several: false,
     },
     OneOf {
         element: "FollowTrajectoryAction",
         alternatives: &["TrajectoryRef", "Trajectory", "CatalogReference"],
         level: Level::Error,
         versions: ((1, 0), (2, 0)),
+        several: true,
     },
     OneOf {
         element: "TrafficSourceAction",
         alternatives: &["TrafficDistribution", "TrafficDefinition"],
         level: Level::Warning,
         versions: ((1, 3), (2, 0)),
+        several: true,
     },
     OneOf {
         element: "TrafficSwarmAction",
         alternatives: &["TrafficDistribution", "TrafficDefinition"],
         level: Level::Warning,
         versions: ((1, 3), (2, 0)),
+        several: true,
     },
 ];
 
@@ -188,7 +194,7 @@ fn choose(element: Element<'_, '_>, one_of: &OneOf, found: &mut Sink<'_>) {
             );
             found.about(element, "", text).level(one_of.level);
         }
-        (Some(first), Some(second)) => {
+        (Some(first), Some(second)) if one_of.several => {
             let text = format!(
                 "this `{}` has `{}` beside `{}`, but must have only one of {allowed}",
                 element.name(),

@@ -21,5 +21,5 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     } else {
         "an event that is to start with its act has a condition such as a simulation time greater than 0"
     };
-    triggers::empty_starts(scenario, "Event", remedy, found);
+    triggers::empty_starts(scenario, "Event", |_| true, remedy, found);
 }
