@@ -1,3 +1,4 @@
+use foldhash::{HashMap, HashMapExt as _};
 use qcbus_openscenario::{Element, Form, Scenario, StoryElement, StoryKind};
 use qcbus_sdk::{Backport, Level, Rule, Sink};
 
@@ -22,18 +23,23 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     if scenario.form() != Form::Scenario {
         return;
     }
+    let mut known = Known::new();
     for condition in scenario.elements_everywhere("StoryboardElementStateCondition") {
         let Some(name) = condition.text("storyboardElementRef") else {
             continue;
         };
-        look_up(scenario, condition, &name, found);
+        look_up(scenario, condition, &name, &mut known, found);
     }
 }
+
+/// What is around the elements that a name and a kind may mean.
+type Known = HashMap<(String, StoryKind), Around>;
 
 fn look_up<'d>(
     scenario: &Scenario<'d>,
     condition: Element<'_, 'd>,
     name: &str,
+    known: &mut Known,
     found: &mut Sink<'_>,
 ) {
     let storyboard = scenario.storyboard();
@@ -76,7 +82,10 @@ fn look_up<'d>(
                 of_kind.len(),
                 kind.word()
             );
-            let level = match nearest(scenario, condition, &of_kind) {
+            let around = known
+                .entry((name.to_owned(), kind))
+                .or_insert_with(|| around(scenario, &of_kind));
+            let level = match nearest(condition, around) {
                 // A maneuver of a catalog that is used twice cannot name its own elements otherwise.
                 1 if condition.reference().is_some() => Level::Information,
                 1 => Level::Warning,
@@ -116,26 +125,33 @@ fn nowhere<'d>(
     found.about(condition, "storyboardElementRef", text);
 }
 
-const MANY: usize = 256;
+/// Where an element stands: its offset, and that of the reference to the catalog that it is in.
+type Spot = (u64, Option<u64>);
+
+/// Of elements of one name and kind: how many lie in each element around them.
+type Around = HashMap<Spot, usize>;
+
+fn spot(element: Element<'_, '_>) -> Spot {
+    let reference = element.reference().map(|node| node.offset().into());
+    (element.node().offset().into(), reference)
+}
+
+fn around<'d>(scenario: &Scenario<'d>, elements: &[&StoryElement<'d>]) -> Around {
+    let mut around = Around::new();
+    for one in elements {
+        let element = one.element(scenario);
+        for outer in std::iter::once(element).chain(element.ancestors()) {
+            *around.entry(spot(outer)).or_insert(0) += 1;
+        }
+    }
+    around
+}
 
 /// How many of the elements lie nearest to the condition: within the innermost element around it that
 /// has any of them. Simulators that look there first find one when it is the only one.
-///
-/// Where there are very many, the first of them stand for all.
-fn nearest<'d>(
-    scenario: &Scenario<'d>,
-    condition: Element<'_, 'd>,
-    elements: &[&StoryElement<'d>],
-) -> usize {
+fn nearest(condition: Element<'_, '_>, around: &Around) -> usize {
     condition
         .ancestors()
-        .map(|around| {
-            let within = |one: &&&StoryElement<'d>| {
-                let element = one.element(scenario);
-                element == around || element.ancestors().any(|other| other == around)
-            };
-            elements.iter().take(MANY).filter(within).count()
-        })
-        .find(|count| *count > 0)
+        .find_map(|outer| around.get(&spot(outer)).copied())
         .unwrap_or(0)
 }

@@ -43,12 +43,26 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             rest => format!(
                 "{} waits for {}, and that for the first of them: none of them ever starts",
                 named(*first),
-                rest.join(", which waits for ")
+                chain(rest)
             ),
         };
         let mut finding = found.about(*condition, "storyboardElementRef", text);
         for (_, further) in others.iter().take(4) {
             finding = finding.at(further.node(), "the next that waits");
         }
+    }
+}
+
+/// The names one after the other, the middle of a long list left out.
+fn chain(names: &[String]) -> String {
+    const MOST: usize = 6;
+    let join = |names: &[String]| names.join(", which waits for ");
+    match (names.get(..MOST), names.last()) {
+        (Some(shown), Some(last)) if names.len() > MOST + 1 => format!(
+            "{}, and so on over {} more to {last}",
+            join(shown),
+            names.len() - MOST - 1
+        ),
+        _ => join(names),
     }
 }
