@@ -19,6 +19,9 @@ pub static RULE: Rule<Scene> = Rule {
 /// A moment that a condition about time names.
 type Moment<'m, 'd> = (f64, Element<'m, 'd>);
 
+/// From how many times the end on a start is so late that it is late on purpose.
+const FAR: f64 = 10.0;
+
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let Some(storyboard) = scenario.root().child("Storyboard") else {
         return;
@@ -70,8 +73,16 @@ fn too_late(
         short(start),
         short(end)
     );
+    // Who writes a time so far away means never.
+    let on_purpose = start >= FAR * end;
+    let level = if on_purpose {
+        Level::Information
+    } else {
+        Level::Warning
+    };
     found
         .about(condition, "value", text)
+        .level(level)
         .at(by.node(), "what ends it");
     true
 }
