@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use qcbus_document::FileKind;
 use qcbus_formats::pool::{Asked, BundleOutcome, CheckerOutcome, Ending, in_the_answer};
-use qcbus_formats::xqar::{DomainInfo, InfoElement, Issue, Location, Locations, Status};
+use qcbus_formats::xqar::{DomainInfo, InfoElement, Issue, Location, Locations};
 use qcbus_messages::{Catalogue, CheckerInfo};
 
 use super::jobs::{Share, ShareState};
@@ -134,11 +134,9 @@ fn said(offered: &CheckerInfo, staged: Option<&Staged>, failure: Option<&str>) -
             ),
         };
     }
-    let issues = staged.map(|staged| staged.issues.clone());
     CheckerOutcome {
-        issues: issues
-            .filter(|_| ending.status() != Status::Skipped)
-            .unwrap_or_default(),
+        // Whatever it says of its end: pooling makes a failure of findings by one that did not look.
+        issues: staged.map_or_else(Vec::new, |staged| staged.issues.clone()),
         ending: Some(ending),
         params,
         metadata,

@@ -1,7 +1,8 @@
 use std::collections::BTreeMap;
 
 use qcbus_formats::location::OtherPlace;
-use qcbus_formats::xqar::{Level, Metadata, Param};
+use qcbus_formats::pool::{NoPlaces, PoolInput, Scope, pool};
+use qcbus_formats::xqar::{Level, Metadata, Param, Status};
 
 use super::*;
 
@@ -70,6 +71,72 @@ fn a_result_has_what_a_checker_said_and_what_is_known_of_it() {
     };
     assert_eq!(outcome.said.asked, Some(asked));
     assert_eq!(outcome.micros, 7);
+}
+
+fn an_issue(text: &str) -> Issue {
+    Issue {
+        id: 0,
+        description: text.to_owned(),
+        level: Level::Error,
+        rule_uid: String::new(),
+        locations: Vec::new(),
+        domain_info: Vec::new(),
+    }
+}
+
+/// What stands in the result of a checker that ends so with these findings: its status, why, and
+/// what it found.
+fn in_the_result(ending: Ending, issues: Vec<Issue>) -> (Status, String, Vec<String>) {
+    let staged = Staged {
+        issues,
+        withheld: 0,
+        done: Some((ending, Vec::new(), Vec::new())),
+    };
+    let outcome = outcome("Bundle", &share(BTreeMap::from([(0, staged)])));
+    let input = PoolInput {
+        input_file: "/farm/a.xodr",
+        config: None,
+        bundles: vec![outcome.said],
+        remarks: Vec::new(),
+        scope: Scope::Alone,
+        version: "1",
+        build_date: "",
+    };
+    let pooled = pool(input, &mut NoPlaces);
+    let checker = &pooled.results.bundles[0].checkers[0];
+    let found = checker.issues.iter().map(|it| it.description.clone());
+    let status = checker.status.unwrap();
+    (status, checker.summary.clone(), found.collect())
+}
+
+#[test]
+fn a_checker_that_says_it_did_not_look_and_reports_findings_has_failed_and_keeps_them() {
+    let reason = || "it is for versions from 1.7".to_owned();
+    let not_applicable = Ending::NotApplicable { reason: reason() };
+    let blocked = Ending::Blocked {
+        by: vec!["second".to_owned()],
+        reason: reason(),
+    };
+    for ending in [not_applicable, blocked] {
+        let (status, ..) = in_the_result(ending.clone(), Vec::new());
+        assert_eq!(status, Status::Skipped);
+        let issues = vec![an_issue("too steep"), an_issue("too narrow")];
+        let (status, why, found) = in_the_result(ending, issues);
+        assert_eq!(status, Status::Error);
+        assert!(why.contains("skipped, and yet reported issues"), "{why}");
+        assert!(why.contains(&reason()), "{why}");
+        assert_eq!(found, ["too steep", "too narrow"]);
+    }
+}
+
+#[test]
+fn what_a_failed_checker_had_found_is_kept() {
+    let failed = Ending::Failed {
+        reason: "it crashed".to_owned(),
+    };
+    let (status, why, found) = in_the_result(failed, vec![an_issue("too steep")]);
+    assert_eq!((status, found), (Status::Error, vec!["too steep".into()]));
+    assert!(why.contains("it crashed"), "{why}");
 }
 
 #[test]
