@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 
 use qcbus_messages::control::Response;
 use qcbus_messages::{JobId, ToPeer};
@@ -20,6 +21,8 @@ pub enum Action {
         job: JobId,
         /// The file.
         path: Arc<Path>,
+        /// How long ago it came or was last asked for: nothing that is read may be older.
+        waited: Duration,
     },
     /// Let go of a job's documents.
     Release {

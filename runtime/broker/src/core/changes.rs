@@ -70,6 +70,7 @@ impl State {
         let same = entry.present && entry.stamp == stamp && (as_judged || at_work);
         entry.present = true;
         entry.stamp = stamp;
+        entry.asked = self.now;
         if !as_judged {
             self.shut(id, actions);
         }

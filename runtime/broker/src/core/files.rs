@@ -57,6 +57,9 @@ pub struct FileEntry {
     pub shut: bool,
     /// Not before then, after something failed for want of room or disk.
     pub not_before: Duration,
+    /// When something last made it wait, or somebody asked for it while it did: what is read for its
+    /// verdict must not be older.
+    pub asked: Duration,
     /// The verdict on some bytes, not always the present ones.
     pub judged: Option<Arc<Judged>>,
     /// What else was read with it, or looked for, the last time; also where no verdict came of it.
@@ -161,6 +164,7 @@ impl Files {
                 touched: false,
                 shut: false,
                 not_before: Duration::ZERO,
+                asked: Duration::ZERO,
                 judged: None,
                 depends_on: Vec::new(),
                 delivered: Vec::new(),
@@ -184,6 +188,9 @@ impl Files {
     /// Puts an idle file into a queue; one that waits in the background moves up when fresh.
     /// An active one is marked as changed by the caller, not here.
     pub fn enqueue(&mut self, id: FileId, priority: Priority, now: Duration) {
+        if let Some(entry) = self.entries.get_mut(&id) {
+            entry.asked = now;
+        }
         match self.entries.get(&id).map(|entry| &entry.stage) {
             Some(Stage::Idle | Stage::Waiting(Priority::Background, _))
                 if priority == Priority::Fresh =>

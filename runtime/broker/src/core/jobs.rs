@@ -162,6 +162,7 @@ impl State {
             }
         }
         let (path, kind) = (entry.path.clone(), entry.kind);
+        let waited = self.now.saturating_sub(entry.asked);
         let job = self.next_job();
         self.files.set_stage(id, Stage::Active(job));
         if let Some(entry) = self.files.get_mut(id) {
@@ -183,7 +184,7 @@ impl State {
                 shares: BTreeMap::new(),
             },
         );
-        actions.push(Action::Prepare { job, path });
+        actions.push(Action::Prepare { job, path, waited });
     }
 
     /// Reading is over.

@@ -16,7 +16,7 @@ impl Broker {
     pub(super) fn act(&mut self, action: Action) -> bool {
         match action {
             Action::Stop => return false,
-            Action::Prepare { job, path } => self.prepare(job, path),
+            Action::Prepare { job, path, .. } => self.prepare(job, path),
             Action::Release { job } => self.intake.release(job),
             Action::PublishAgain { job, doc } => {
                 let intake = self.intake.clone();

@@ -13,7 +13,7 @@ use qcbus_messages::{Role, ToPeer, Verdict};
 impl World {
     pub fn act(&mut self, action: Action) {
         match action {
-            Action::Prepare { job, path } => self.preparing.push((job, file_of(&path))),
+            Action::Prepare { job, path, waited } => self.is_to_be_read(job, &path, waited),
             Action::Release { job } => {
                 self.released.insert(job);
             }

@@ -237,3 +237,32 @@ fn unread() -> Judged {
         xqar: None,
     }
 }
+
+/// An event says once more what was known.
+fn is_told_again(world: &mut World, file: u8) {
+    let path = path_of(file);
+    let stamp = stamp(world.there[&path]);
+    world.event(Event::Settled { path, stamp });
+}
+
+/// What is read of a map for one file may serve another that had come by then, and no other.
+#[test]
+fn who_reads_a_file_is_told_how_long_ago_it_came_changed_or_was_asked_for() {
+    let second = Duration::from_secs(1);
+    let deeds: [fn(&mut World, u8); 4] = [|_, _| {}, World::write, World::wait, is_told_again];
+    for (deed, seconds) in deeds.into_iter().zip([3, 1, 1, 1]) {
+        let mut world = World::new();
+        world.join("First");
+        world.state.settings.max_preparing = 1;
+        world.write(0);
+        world.write(3);
+        world.pass(2 * second);
+        deed(&mut world, 3);
+        world.pass(second);
+        assert_eq!(world.preparing.len(), 1, "one at a time");
+        world.prepare(0, true);
+        let (job, file) = world.preparing[0];
+        assert_eq!(file, 3);
+        assert_eq!(world.waited[&job], second * seconds);
+    }
+}

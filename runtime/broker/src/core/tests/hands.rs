@@ -10,6 +10,11 @@ use qcbus_messages::{DocId, DocumentRole, JobDocument, Verdict};
 use super::world::World;
 
 impl World {
+    pub fn is_to_be_read(&mut self, job: JobId, path: &Path, waited: Duration) {
+        self.waited.insert(job, waited);
+        self.preparing.push((job, file_of(path)));
+    }
+
     pub fn prepare(&mut self, n: u8, room: bool) {
         if self.preparing.is_empty() {
             return;

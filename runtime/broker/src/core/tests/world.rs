@@ -21,6 +21,8 @@ pub struct World {
     pub contents: HashMap<u64, u64>,
     pub stamps: u64,
     pub preparing: Vec<(JobId, u8)>,
+    /// How long each job's file had waited when it was to be read.
+    pub waited: BTreeMap<JobId, Duration>,
     pub storing: Vec<FinishedJob>,
     pub stored: Vec<u8>,
     pub peers: BTreeMap<SessionId, Process>,
@@ -100,6 +102,7 @@ impl World {
             contents: HashMap::new(),
             stamps: 0,
             preparing: Vec::new(),
+            waited: BTreeMap::new(),
             storing: Vec::new(),
             stored: Vec::new(),
             peers: BTreeMap::new(),
