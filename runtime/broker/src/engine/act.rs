@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use qcbus_messages::{JobId, ToPeer};
 
@@ -16,7 +17,7 @@ impl Broker {
     pub(super) fn act(&mut self, action: Action) -> bool {
         match action {
             Action::Stop => return false,
-            Action::Prepare { job, path, .. } => self.prepare(job, path),
+            Action::Prepare { job, path, waited } => self.prepare(job, path, waited),
             Action::Release { job } => self.intake.release(job),
             Action::PublishAgain { job, doc } => {
                 let intake = self.intake.clone();
@@ -183,11 +184,14 @@ impl Broker {
         }
     }
 
-    pub(super) fn prepare(&self, job: JobId, path: Arc<Path>) {
+    pub(super) fn prepare(&self, job: JobId, path: Arc<Path>, waited: Duration) {
+        // The clock of the state machine may stand still, ours does not: this is never too early.
+        let now = Instant::now();
+        let asked = now.checked_sub(waited).unwrap_or(now);
         let (intake, events) = (self.intake.clone(), self.inbox.events_in.clone());
         tokio::task::spawn_blocking(move || {
             reached("taken", &path);
-            let result = intake.prepare(job, &path);
+            let result = intake.prepare(job, &path, asked);
             // After the end of the loop nobody waits for this.
             let _ = events.send(Event::Prepared { job, result });
         });

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use qcbus_bus::Held;
 use qcbus_ingest::{Limits, Look, Prepared, Source};
@@ -138,6 +139,8 @@ fn basis(inputs: &[Input]) -> Digest {
 /// root's verdict that is at stake: none of them can make the root vanish or unreadable.
 pub(super) struct Links<'i> {
     pub intake: &'i Intake,
+    /// Nothing may be older.
+    pub asked: Instant,
     pub gathered: &'i mut Gathered,
 }
 
@@ -148,7 +151,7 @@ impl Source for Links<'_> {
     fn fetch(&mut self, path: &Path) -> Result<Result<Published, Absence>, PrepareFailure> {
         // Looked at before: when it changes while it is tried, this stamp fits no more.
         let before = stamp_through_links(path);
-        let absence = match self.intake.publish_shared(path) {
+        let absence = match self.intake.publish_shared(path, self.asked) {
             Ok(published) => return Ok(Ok(published)),
             Err(failure) => failure.of_linked(path)?,
         };
@@ -210,6 +213,19 @@ pub(super) fn was_racy(input: &Input) -> bool {
 
 /// Whether a file certainly is what it was when it was read.
 pub(super) fn is_unchanged(input: &Input) -> bool {
-    let now = stamp_through_links(&input.path);
-    !was_racy(input) && now == input.content.stamp()
+    !was_racy(input) && has_its_stamps(input)
+}
+
+/// Whether nothing tells that a file has changed since it was read; of a young one that is no proof.
+pub(super) fn has_its_stamps(input: &Input) -> bool {
+    stamp_through_links(&input.path) == input.content.stamp()
+}
+
+/// Whether an image of the one reading is an image of the other: the same bytes of the same files,
+/// all of which could be read.
+pub(super) fn same_bytes(one: &[Input], other: &[Input]) -> bool {
+    let same = |(one, other): (&Input, &Input)| {
+        one.path == other.path && one.digest().is_some() && one.digest() == other.digest()
+    };
+    one.len() == other.len() && one.iter().zip(other).all(same)
 }

@@ -1,11 +1,12 @@
 //! From a path to published document images: the only place where the broker reads what it checks.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::{HashMap, HashSet, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
-use qcbus_bus::{Documents, Held, Loan};
+use qcbus_bus::{Documents, Held, Loan, LoanError};
 use qcbus_document::{Document, FileKind};
 use qcbus_ingest::{BuildError, Limits, Prepared};
 use qcbus_messages::{Digest, DocId, JobId};
@@ -15,9 +16,11 @@ use crate::stages::reached;
 
 mod failure;
 mod gathered;
+mod shared;
 
 use failure::{Failure, explained};
-use gathered::{Gathered, Links, inputs_of, is_unchanged, was_racy};
+use gathered::{Gathered, Links, inputs_of, same_bytes, was_racy};
+use shared::Shared;
 
 /// Reads files and publishes their images. Shared by the threads that do so.
 pub struct Intake {
@@ -26,7 +29,7 @@ pub struct Intake {
     roots: Vec<PathBuf>,
     max_documents: usize,
     next_doc: AtomicU64,
-    cache: Mutex<Cache>,
+    shared: Shared,
     held: Mutex<HashMap<JobId, Vec<(DocId, Held)>>>,
     recent: Mutex<VecDeque<(JobId, DocId)>>,
 }
@@ -51,16 +54,6 @@ struct Published {
     bytes: u64,
 }
 
-/// Documents that are on the bus, so that a thousand scenarios on one map publish the map once.
-#[derive(Debug, Default)]
-struct Cache {
-    by_path: HashMap<PathBuf, Published>,
-    order: VecDeque<PathBuf>,
-}
-
-/// Shared documents (maps, catalogs) that are kept on the bus beyond the job that needed them.
-const CACHED: usize = 8;
-
 /// Ended jobs whose root document reporters may still find on the bus.
 const RECENT: usize = 256;
 
@@ -79,23 +72,30 @@ impl Intake {
             roots,
             max_documents,
             next_doc: AtomicU64::new(1),
-            cache: Mutex::default(),
+            shared: Shared::default(),
             held: Mutex::default(),
             recent: Mutex::default(),
         }
     }
 
-    /// Reads a file with everything it refers to and publishes the images.
+    /// Reads a file with everything it refers to and publishes the images. Nothing in them is older
+    /// than `asked`, which is when the file came or somebody last asked for it.
     ///
     /// # Errors
     /// See [`PrepareFailure`].
-    pub fn prepare(&self, job: JobId, path: &Path) -> Result<Box<PreparedJob>, PrepareFailure> {
+    pub fn prepare(
+        &self,
+        job: JobId,
+        path: &Path,
+        asked: Instant,
+    ) -> Result<Box<PreparedJob>, PrepareFailure> {
         let root = self
             .publish_fresh(path)
             .map_err(|failure| explained(failure, path))?;
         let mut gathered = Gathered::new(path, &root);
-        self.gather(&root.held, &mut gathered)?;
+        self.gather(&root.held, asked, &mut gathered)?;
         let prepared = gathered.finish();
+        reached("gathered", path);
         self.hold(job, gathered.held);
         Ok(Box::new(prepared))
     }
@@ -153,12 +153,18 @@ impl Intake {
     }
 
     /// Follows the root's references.
-    fn gather(&self, root: &Held, gathered: &mut Gathered) -> Result<(), PrepareFailure> {
+    fn gather(
+        &self,
+        root: &Held,
+        asked: Instant,
+        gathered: &mut Gathered,
+    ) -> Result<(), PrepareFailure> {
         let Ok(document) = Document::open(root) else {
             return Ok(());
         };
         let mut links = Links {
             intake: self,
+            asked,
             gathered,
         };
         let missing = qcbus_ingest::gather(&document, self.max_documents, &mut links)?;
@@ -166,40 +172,44 @@ impl Intake {
         Ok(())
     }
 
-    /// A map or catalog: from the cache as long as nothing has changed.
-    fn publish_shared(&self, path: &Path) -> Result<Published, Failure> {
-        let cached = lock(&self.cache).by_path.get(path).cloned();
-        if let Some(published) = cached
-            && !published.racy
-            && published.inputs.iter().all(is_unchanged)
-        {
-            return Ok(published);
-        }
-        let published = self.publish_fresh(path)?;
-        let mut cache = lock(&self.cache);
-        if cache
-            .by_path
-            .insert(path.to_path_buf(), published.clone())
-            .is_none()
-        {
-            cache.order.push_back(path.to_path_buf());
-        }
-        while cache.order.len() > CACHED {
-            if let Some(oldest) = cache.order.pop_front() {
-                cache.by_path.remove(&oldest);
+    /// A map or catalog: as it is on the bus, as long as its bytes are what they were.
+    fn publish_shared(&self, path: &Path, asked: Instant) -> Result<Published, Failure> {
+        self.shared.get(path, asked, |before| {
+            let prepared = self.read(path)?;
+            let inputs = inputs_of(&prepared, &self.limits);
+            match before.filter(|before| same_bytes(&before.inputs, &inputs)) {
+                Some(before) => Ok(Published {
+                    racy: inputs.iter().any(was_racy),
+                    inputs,
+                    ..before.clone()
+                }),
+                None => self.publish(path, &prepared, inputs),
             }
-        }
-        Ok(published)
+        })
     }
 
     fn publish_fresh(&self, path: &Path) -> Result<Published, Failure> {
+        let prepared = self.read(path)?;
+        let inputs = inputs_of(&prepared, &self.limits);
+        self.publish(path, &prepared, inputs)
+    }
+
+    fn read(&self, path: &Path) -> Result<Prepared, Failure> {
         let prepared = qcbus_ingest::prepare(path, self.boundary(path), &self.limits)?;
         reached("read", path);
+        Ok(prepared)
+    }
+
+    fn publish(
+        &self,
+        path: &Path,
+        prepared: &Prepared,
+        inputs: Vec<Input>,
+    ) -> Result<Published, Failure> {
         let digest = Digest(prepared.digest());
-        let inputs = inputs_of(&prepared, &self.limits);
         let racy = inputs.iter().any(was_racy);
         let kind = FileKind::of_path(path).unwrap_or(FileKind::Xosc);
-        let (loan, used) = self.build(&prepared)?;
+        let (loan, used) = self.build(prepared)?;
         reached("built", path);
         let doc = DocId(self.next_doc.fetch_add(1, Ordering::Relaxed));
         let held = loan
@@ -226,13 +236,30 @@ impl Intake {
     fn build(&self, prepared: &Prepared) -> Result<(Loan, usize), Failure> {
         let mut room = prepared.upper_bound();
         loop {
-            let mut loan = self.documents.loan(room)?;
+            let mut loan = self.loan(room)?;
             match prepared.build_into(&mut loan) {
                 Ok(used) => return Ok((loan, used)),
                 Err(BuildError::SmallBuffer { needed, .. }) if needed > room => room = needed,
                 Err(error) => return Err(Failure::Build(error.to_string())),
             }
         }
+    }
+
+    /// Room for an image. What is only kept because somebody may need it again goes for it.
+    fn loan(&self, room: usize) -> Result<Loan, LoanError> {
+        loop {
+            match self.documents.loan(room) {
+                Err(LoanError::Busy | LoanError::NoSpace { .. }) if self.let_one_go() => {}
+                loan => return loan,
+            }
+        }
+    }
+
+    fn let_one_go(&self) -> bool {
+        let held = lock(&self.held);
+        let used: HashSet<DocId> = held.values().flatten().map(|(doc, _)| *doc).collect();
+        drop(held);
+        self.shared.make_room(|doc| used.contains(&doc))
     }
 
     /// The directory that includes may not leave.
@@ -246,3 +273,6 @@ impl Intake {
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
+
+#[cfg(test)]
+mod tests;

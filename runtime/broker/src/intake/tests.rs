@@ -1,0 +1,227 @@
+use std::fs;
+use std::time::{Duration, SystemTime};
+
+use qcbus_bus::{Host, HostOptions, Instance};
+use qcbus_messages::JobDocument;
+use tempfile::TempDir;
+
+use super::*;
+
+const MAP: &[u8] = b"<OpenDRIVE><header revMajor=\"1\" revMinor=\"7\"/></OpenDRIVE>";
+/// As many bytes.
+const OTHER: &[u8] = b"<OpenDRIVE><header revMajor=\"1\" revMinor=\"8\"/></OpenDRIVE>";
+
+/// A directory with scenarios and maps, and who reads them.
+struct Farm {
+    dir: TempDir,
+    intake: Intake,
+    jobs: AtomicU64,
+    /// Serves the bus as long as it is there.
+    _host: Mutex<Host>,
+}
+
+impl Farm {
+    fn new() -> Farm {
+        Farm::with(HostOptions::default())
+    }
+
+    fn with(options: HostOptions) -> Farm {
+        let dir = tempfile::tempdir().unwrap();
+        let host = Host::start(&Instance::at(dir.path().join("instance")), options).unwrap();
+        let roots = vec![dir.path().to_path_buf()];
+        Farm {
+            intake: Intake::new(host.documents(), Limits::default(), roots, 64),
+            jobs: AtomicU64::new(0),
+            _host: Mutex::new(host),
+            dir,
+        }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.dir.path().join(name)
+    }
+
+    fn put(&self, name: &str, bytes: &[u8]) {
+        fs::write(self.path(name), bytes).unwrap();
+    }
+
+    fn scenario(&self, name: &str, map: &str) {
+        let text = format!(
+            "<OpenSCENARIO><RoadNetwork><LogicFile filepath=\"{map}\"/></RoadNetwork></OpenSCENARIO>"
+        );
+        self.put(name, text.as_bytes());
+    }
+
+    fn prepare(&self, name: &str, asked: Instant) -> PreparedJob {
+        let job = JobId(self.jobs.fetch_add(1, Ordering::Relaxed));
+        let prepared = self.intake.prepare(job, &self.path(name), asked).unwrap();
+        self.intake.release(job);
+        *prepared
+    }
+
+    /// The map of a scenario that somebody asks for now.
+    fn map_of(&self, scenario: &str) -> JobDocument {
+        let prepared = self.prepare(scenario, Instant::now());
+        assert_eq!(prepared.missing, []);
+        prepared.documents[1].clone()
+    }
+
+    fn begun(&self, name: &str) -> Instant {
+        self.intake.shared.begun(&self.path(name)).unwrap()
+    }
+}
+
+#[tokio::test]
+async fn scenarios_on_one_map_share_its_image_as_long_as_its_bytes_are_the_same() {
+    let farm = Farm::new();
+    farm.put("town.xodr", MAP);
+    farm.scenario("a.xosc", "town.xodr");
+    farm.scenario("b.xosc", "./town.xodr");
+    let (a, b) = (farm.map_of("a.xosc"), farm.map_of("b.xosc"));
+    assert_eq!((a.doc, a.digest), (b.doc, b.digest));
+    farm.put("town.xodr", MAP);
+    assert_eq!(farm.map_of("a.xosc").doc, a.doc, "written again as it was");
+}
+
+#[tokio::test]
+async fn a_map_changed_in_place_a_moment_later_is_read_anew() {
+    let farm = Farm::new();
+    farm.put("town.xodr", MAP);
+    farm.scenario("a.xosc", "town.xodr");
+    let before = farm.map_of("a.xosc");
+    for (bytes, modified) in [
+        (OTHER, None),
+        (MAP, Some(SystemTime::now() - Duration::from_secs(3600))),
+    ] {
+        let file = fs::OpenOptions::new()
+            .write(true)
+            .open(farm.path("town.xodr"));
+        let mut file = file.unwrap();
+        std::io::Write::write_all(&mut file, bytes).unwrap();
+        if let Some(modified) = modified {
+            file.set_modified(modified).unwrap();
+        }
+        drop(file);
+        let after = farm.map_of("a.xosc");
+        assert_ne!(after.doc, before.doc);
+        assert_eq!(after.digest == before.digest, bytes == MAP);
+    }
+}
+
+#[tokio::test]
+async fn a_map_replaced_by_another_of_its_size_and_time_is_read_anew() {
+    let farm = Farm::new();
+    let long_ago = SystemTime::now() - Duration::from_secs(3600);
+    let put_old = |name: &str, bytes: &[u8]| {
+        farm.put(name, bytes);
+        let file = fs::File::options().write(true).open(farm.path(name));
+        file.unwrap().set_modified(long_ago).unwrap();
+    };
+    put_old("town.xodr", MAP);
+    put_old("next", OTHER);
+    farm.scenario("a.xosc", "town.xodr");
+    let before = farm.map_of("a.xosc");
+    fs::rename(farm.path("next"), farm.path("town.xodr")).unwrap();
+    let after = farm.map_of("a.xosc");
+    assert_ne!((after.doc, after.digest), (before.doc, before.digest));
+}
+
+#[tokio::test]
+async fn equal_maps_at_two_paths_are_two_documents() {
+    let farm = Farm::new();
+    farm.put("one.xodr", MAP);
+    farm.put("two.xodr", MAP);
+    farm.scenario("a.xosc", "one.xodr");
+    farm.scenario("b.xosc", "two.xodr");
+    let (a, b) = (farm.map_of("a.xosc"), farm.map_of("b.xosc"));
+    assert_eq!(a.digest, b.digest);
+    assert_ne!(
+        a.doc, b.doc,
+        "what is found in one is not found in the other"
+    );
+    assert!(a.path.ends_with("one.xodr") && b.path.ends_with("two.xodr"));
+}
+
+#[tokio::test]
+async fn a_map_whose_include_changes_is_another_document() {
+    let farm = Farm::new();
+    farm.put(
+        "town.xodr",
+        b"<OpenDRIVE><include file=\"part.xml\"/></OpenDRIVE>",
+    );
+    farm.put("part.xml", b"<OpenDRIVE><road id=\"1\"/></OpenDRIVE>");
+    farm.scenario("a.xosc", "town.xodr");
+    let before = farm.map_of("a.xosc");
+    assert_eq!(farm.map_of("a.xosc").doc, before.doc);
+    farm.put("part.xml", b"<OpenDRIVE><road id=\"2\"/></OpenDRIVE>");
+    let after = farm.map_of("a.xosc");
+    assert_eq!(after.digest, before.digest, "of the map's own bytes");
+    assert_ne!(after.doc, before.doc);
+}
+
+/// Its stamp proves nothing yet: a second write may leave it as it is.
+#[tokio::test]
+async fn a_young_map_is_read_again_for_whoever_asks_after_it_was_read() {
+    let farm = Farm::new();
+    farm.put("town.xodr", MAP);
+    farm.scenario("a.xosc", "town.xodr");
+    let asked = Instant::now();
+    assert!(farm.prepare("a.xosc", asked).racy);
+    let first = farm.begun("town.xodr");
+    assert!(first >= asked);
+    let prepared = farm.prepare("a.xosc", asked);
+    assert_eq!(farm.begun("town.xodr"), first, "asked for before");
+    assert!(prepared.racy, "and as young as it was");
+    farm.prepare("a.xosc", Instant::now());
+    assert!(farm.begun("town.xodr") > first);
+}
+
+#[tokio::test]
+async fn a_map_that_many_need_at_once_is_published_once() {
+    let farm = Farm::new();
+    farm.put("town.xodr", MAP);
+    let asked = Instant::now();
+    let names: Vec<String> = (0..8).map(|number| format!("{number}.xosc")).collect();
+    names
+        .iter()
+        .for_each(|name| farm.scenario(name, "town.xodr"));
+    let maps: Vec<DocId> = std::thread::scope(|scope| {
+        let farm = &farm;
+        let all: Vec<_> = names
+            .iter()
+            .map(|name| scope.spawn(move || farm.prepare(name, asked).documents[1].doc))
+            .collect();
+        all.into_iter().map(|one| one.join().unwrap()).collect()
+    });
+    assert!(maps.iter().all(|map| *map == maps[0]), "{maps:?}");
+}
+
+#[tokio::test]
+async fn a_map_that_was_not_there_is_found_when_it_comes() {
+    let farm = Farm::new();
+    farm.scenario("a.xosc", "town.xodr");
+    let missing = farm.prepare("a.xosc", Instant::now()).missing;
+    assert_eq!(missing.len(), 1);
+    farm.put("town.xodr", MAP);
+    farm.map_of("a.xosc");
+    fs::remove_file(farm.path("town.xodr")).unwrap();
+    let missing = farm.prepare("a.xosc", Instant::now()).missing;
+    assert_eq!(missing.len(), 1);
+}
+
+#[tokio::test]
+async fn what_is_only_kept_makes_room_for_what_is_needed() {
+    let farm = Farm::with(HostOptions {
+        active_documents: 4,
+        ..HostOptions::default()
+    });
+    // More than the bus carries at once.
+    for number in 0..40 {
+        let (map, scenario) = (format!("{number}.xodr"), format!("{number}.xosc"));
+        farm.put(&map, MAP);
+        farm.scenario(&scenario, &map);
+        farm.map_of(&scenario);
+    }
+    let last = farm.map_of("39.xosc").doc;
+    assert_eq!(farm.map_of("39.xosc").doc, last, "the newest is kept");
+}
