@@ -3,17 +3,15 @@
 //!
 //! `cargo build --release -p qcbus && cargo bench -p qcbus-benches --bench farm`
 
-use std::io::{BufRead, BufReader, Write};
-use std::os::unix::net::UnixStream;
+use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use qcbus_benches::Result;
+use qcbus_benches::farm::{Delivered, Farm, program};
 use qcbus_benches::figures::{digits, head, millis, quantile, row, size};
 use qcbus_benches::maps::map;
-use qcbus_messages::control::{Request, Response};
 
 fn main() -> Result<()> {
     let program = program()?;
@@ -27,16 +25,6 @@ fn main() -> Result<()> {
     burst(&program, &mut out)?;
     writeln!(out, "\n`check` of one file, a whole process:\n")?;
     whole_processes(&program, &mut out)
-}
-
-/// The `qcbus` that was built beside this bench.
-fn program() -> Result<PathBuf> {
-    let own = std::env::current_exe()?;
-    let found = own.ancestors().map(|dir| dir.join("qcbus"));
-    let mut found = found.filter(|path| path.is_file());
-    Ok(found
-        .next()
-        .ok_or("build it first: cargo build --release -p qcbus")?)
 }
 
 /// Files as people have them, when they are at hand, named from the workspace's root.
@@ -69,6 +57,13 @@ struct Case {
     ending: &'static str,
     make: Box<dyn Fn(u64) -> Vec<u8>>,
     rounds: u64,
+}
+
+impl Case {
+    fn deliver(&self, farm: &mut Farm, number: u64) -> Result<Delivered> {
+        let name = format!("f{number}.{}", self.ending);
+        farm.deliver(&name, &(self.make)(number))
+    }
 }
 
 fn cases() -> Vec<Case> {
@@ -124,7 +119,7 @@ fn warm(program: &Path, out: &mut impl Write) -> Result<()> {
         let mut times = Vec::new();
         let mut verdict = String::new();
         for number in 0..case.rounds {
-            let delivered = farm.deliver(&case, number)?;
+            let delivered = case.deliver(&mut farm, number)?;
             times.push(millis(delivered.answered - delivered.closed));
             verdict = delivered.verdict;
         }
@@ -138,12 +133,13 @@ fn warm(program: &Path, out: &mut impl Write) -> Result<()> {
 }
 
 /// As the broker logs them, in order, and what ends with each.
-const STAGES: [(&str, &str); 9] = [
+const STAGES: [(&str, &str); 10] = [
     ("settled", "seen and settled"),
     ("taken", "waiting for a reader"),
     ("read", "read, hash, decode"),
     ("built", "image"),
     ("published", "publish"),
+    ("gathered", "what it refers to"),
     ("checked", "job out, rules, answers in"),
     ("pooled", "pool"),
     ("written", "result and verdict file, with fsync"),
@@ -160,7 +156,7 @@ fn stages(program: &Path, out: &mut impl Write) -> Result<()> {
         let mut spans: Vec<Vec<f64>> = vec![Vec::new(); STAGES.len() + 2];
         for number in 0..case.rounds.min(40) {
             farm.said().clear();
-            let delivered = farm.deliver(&case, number)?;
+            let delivered = case.deliver(&mut farm, number)?;
             let mut before = of_day(delivered.closed_at);
             let begin = before;
             for (index, (stage, _)) in STAGES.iter().enumerate() {
@@ -213,162 +209,6 @@ fn burst(program: &Path, out: &mut impl Write) -> Result<()> {
         writeln!(out, "{}", row(&cells))?;
     }
     Ok(())
-}
-
-/// A broker that watches a directory, warmed up.
-struct Farm {
-    broker: Child,
-    watched: PathBuf,
-    control: BufReader<UnixStream>,
-    said: Arc<Mutex<Vec<String>>>,
-    _dir: tempfile::TempDir,
-}
-
-struct Delivered {
-    path: PathBuf,
-    closed: Instant,
-    closed_at: SystemTime,
-    answered: Instant,
-    verdict: String,
-}
-
-impl Farm {
-    fn start(program: &Path, log: bool) -> Result<Farm> {
-        let dir = tempfile::TempDir::new()?;
-        let (watched, instance) = (dir.path().join("in"), dir.path().join("i"));
-        std::fs::create_dir(&watched)?;
-        let watched = std::fs::canonicalize(watched)?;
-        let level = if log {
-            "qcbus_broker::stages=debug"
-        } else {
-            "error"
-        };
-        let mut broker = Command::new(program)
-            .arg("serve")
-            .arg(&watched)
-            .arg("--instance-dir")
-            .arg(&instance)
-            .arg("--out")
-            .arg(dir.path().join("out"))
-            .env("QCBUS_LOG", level)
-            .stderr(Stdio::piped())
-            .spawn()?;
-        let said = Arc::new(Mutex::new(Vec::new()));
-        listen(&mut broker, &said);
-        let mut farm = Farm {
-            control: connect(&instance.join("control.sock"))?,
-            broker,
-            watched,
-            said,
-            _dir: dir,
-        };
-        let map = |number| map(10_000, number).into_bytes();
-        let warm_up = Case {
-            name: String::new(),
-            ending: "xodr",
-            make: Box::new(map),
-            rounds: 10,
-        };
-        for number in 0..warm_up.rounds {
-            farm.deliver(&warm_up, number + 1_000_000)?;
-        }
-        Ok(farm)
-    }
-
-    fn said(&self) -> std::sync::MutexGuard<'_, Vec<String>> {
-        self.said.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// When the broker logged a stage of a file, in seconds of the day. The log may be a little
-    /// behind the verdict.
-    fn when(&self, stage: &str, path: &Path) -> Result<f64> {
-        let (stage, path) = (format!("stage=\"{stage}\""), path.display().to_string());
-        for _ in 0..1000 {
-            let said = self.said();
-            let line = said
-                .iter()
-                .find(|line| line.contains(&stage) && line.ends_with(&path));
-            if let Some(time) = line.and_then(|line| line.get(11..26)) {
-                let parts: Vec<f64> = time.split(':').flat_map(str::parse).collect();
-                if let [hours, minutes, seconds] = parts[..] {
-                    return Ok(hours * 3600.0 + minutes * 60.0 + seconds);
-                }
-            }
-            drop(said);
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        Err(format!("no {stage} of {path} in the log").into())
-    }
-
-    /// Writes one file and waits for its verdict. A moment of rest before it: a farm is idle when
-    /// a file comes.
-    fn deliver(&mut self, case: &Case, number: u64) -> Result<Delivered> {
-        let path = self.watched.join(format!("f{number}.{}", case.ending));
-        let bytes = (case.make)(number);
-        std::thread::sleep(Duration::from_millis(30));
-        let mut file = std::fs::File::create(&path)?;
-        file.write_all(&bytes)?;
-        drop(file);
-        let (closed, closed_at) = (Instant::now(), SystemTime::now());
-        let verdict = self.wait(&path)?;
-        Ok(Delivered {
-            path,
-            closed,
-            closed_at,
-            answered: Instant::now(),
-            verdict,
-        })
-    }
-
-    fn wait(&mut self, file: &Path) -> Result<String> {
-        let request = Request::Wait {
-            file: file.to_path_buf(),
-            timeout_ms: Some(60_000),
-        };
-        match ask(&mut self.control, &request)? {
-            Response::Verdict(verdict) => Ok(verdict.verdict.to_string()),
-            other => Err(format!("no verdict: {other:?}").into()),
-        }
-    }
-
-    fn stop(mut self) -> Result<()> {
-        ask(&mut self.control, &Request::Down)?;
-        self.broker.wait()?;
-        Ok(())
-    }
-}
-
-fn listen(broker: &mut Child, said: &Arc<Mutex<Vec<String>>>) {
-    let Some(errors) = broker.stderr.take() else {
-        return;
-    };
-    let said = said.clone();
-    std::thread::spawn(move || {
-        for line in BufReader::new(errors).lines().map_while(|line| line.ok()) {
-            said.lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .push(line);
-        }
-    });
-}
-
-fn connect(socket: &Path) -> Result<BufReader<UnixStream>> {
-    for _ in 0..5_000 {
-        match UnixStream::connect(socket) {
-            Ok(stream) => return Ok(BufReader::new(stream)),
-            Err(_) => std::thread::sleep(Duration::from_millis(1)),
-        }
-    }
-    Err("the broker does not listen".into())
-}
-
-fn ask(control: &mut BufReader<UnixStream>, request: &Request) -> Result<Response> {
-    let mut text = serde_json::to_vec(request)?;
-    text.push(b'\n');
-    control.get_mut().write_all(&text)?;
-    let mut line = String::new();
-    control.read_line(&mut line)?;
-    Ok(serde_json::from_str(&line)?)
 }
 
 fn of_day(time: SystemTime) -> f64 {

@@ -3,6 +3,7 @@
 //! Every bench is a program of its own (`cargo bench -p qcbus-benches --bench NAME`) and prints
 //! Markdown, so that the tables of `docs/evidence/performance.md` can be made again.
 
+pub mod farm;
 pub mod figures;
 pub mod machine;
 pub mod maps;
