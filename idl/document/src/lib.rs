@@ -16,6 +16,7 @@ mod document;
 mod fault;
 #[doc(hidden)]
 pub mod fuzzing;
+mod image;
 mod kind;
 mod layout;
 mod lines;
@@ -29,6 +30,7 @@ pub use attribute::{Attribute, Attributes};
 pub use builder::{BuildError, Capacities, ImageBuilder};
 pub use document::{Document, Elements, ImageError};
 pub use fault::{Fault, FaultCode, FaultGroup};
+pub use image::Image;
 pub use kind::{FileKind, SUFFIXES, Suffix};
 pub use node::{Ancestors, Children, ChildrenNamed, Descendants, DescendantsNamed, Node};
 pub use source::{Position, Source};

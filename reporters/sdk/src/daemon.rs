@@ -66,7 +66,7 @@ pub async fn run(
                 return Err(RunError::Closed(reason));
             }
             // Documents are looked up when a result needs one; reporters read no configuration.
-            PeerEvent::Document(_) | PeerEvent::Config(_) => {}
+            PeerEvent::Document(_) | PeerEvent::LetGo | PeerEvent::Config(_) => {}
         }
     }
     peer.leave().await;

@@ -82,6 +82,7 @@ impl Drop for Ticket {
 struct Mapped {
     start: *const u8,
     len: usize,
+    generation: u64,
     doc: DocId,
     digest: Digest,
     kind: FileKind,
@@ -119,6 +120,7 @@ impl Held {
         Some(Held(Arc::new(Mapped {
             start: bytes.as_ptr(),
             len,
+            generation,
             doc: DocId(header.doc),
             digest: Digest(header.digest),
             kind: kind_of_code(header.kind)?,
@@ -132,7 +134,14 @@ impl Held {
         self.0.doc
     }
 
-    /// Digest that it was published under.
+    /// What tells it from every other image that a broker of this instance has ever published:
+    /// the generation and the number. The bytes behind it never change; the same document has
+    /// another one as soon as a byte of it, or of a file that it includes, has changed.
+    pub fn identity(&self) -> (u64, DocId) {
+        (self.0.generation, self.0.doc)
+    }
+
+    /// Digest that it was published under: that of its file, whatever that includes.
     pub fn digest(&self) -> Digest {
         self.0.digest
     }
@@ -159,6 +168,12 @@ impl Deref for Held {
         // SAFETY: `start` and `len` were taken from the sample's payload, within its bounds; the
         // mapping lives as long as `self.0`, and nobody writes to it (see `Mapped`).
         unsafe { std::slice::from_raw_parts(self.0.start, self.0.len) }
+    }
+}
+
+impl AsRef<[u8]> for Held {
+    fn as_ref(&self) -> &[u8] {
+        self
     }
 }
 

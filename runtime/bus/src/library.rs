@@ -31,6 +31,14 @@ pub(crate) struct Library {
     shelves: [Shelf; 2],
 }
 
+/// What is to be read next.
+enum Next {
+    Document(Held),
+    /// The broker needs shared memory.
+    LetGo,
+    Nothing,
+}
+
 impl Library {
     pub(crate) fn new(
         hub: &Hub,
@@ -47,10 +55,20 @@ impl Library {
         })
     }
 
-    /// Takes in what was published; `arrived` gets the number of each document.
-    pub(crate) fn drain(&mut self, mut arrived: impl FnMut(DocId)) {
+    /// Takes in what was published; `arrived` gets the number of each document. `true`: the broker
+    /// needs shared memory, so that what is only kept is to be let go.
+    pub(crate) fn drain(&mut self, mut arrived: impl FnMut(DocId)) -> bool {
+        let mut asked = false;
         for shelf in &mut self.shelves {
-            while let Some(held) = shelf.receive(self.generation) {
+            loop {
+                let held = match shelf.receive(self.generation) {
+                    Next::Document(held) => held,
+                    Next::LetGo => {
+                        asked = true;
+                        continue;
+                    }
+                    Next::Nothing => break,
+                };
                 self.clock += 1;
                 let book = Book {
                     released: false,
@@ -62,6 +80,7 @@ impl Library {
                 arrived(doc);
             }
         }
+        asked
     }
 
     pub(crate) fn get(&self, doc: DocId) -> Option<Held> {
@@ -95,23 +114,26 @@ impl Shelf {
     }
 
     /// The next document, unless there is none or every hand is full with documents in use.
-    fn receive(&mut self, generation: u64) -> Option<Held> {
+    fn receive(&mut self, generation: u64) -> Next {
         loop {
-            let ticket = self.hand()?;
+            let Some(ticket) = self.hand() else {
+                return Next::Nothing;
+            };
             match self.subscriber.receive() {
                 Ok(Some(sample)) if sample.user_header().doc == LET_GO => {
-                    self.books
-                        .retain(|_, book| !book.released || !book.held.is_unused());
+                    // Also those that somebody still has in hand: they go when he drops them.
+                    self.books.retain(|_, book| !book.released);
+                    return Next::LetGo;
                 }
                 Ok(Some(sample)) => {
                     if let Some(held) = Held::new(sample, generation, ticket) {
-                        return Some(held);
+                        return Next::Document(held);
                     }
                 }
-                Ok(None) => return None,
+                Ok(None) => return Next::Nothing,
                 Err(why) => {
                     tracing::debug!(?why, topic = self.row.name, "cannot read documents");
-                    return None;
+                    return Next::Nothing;
                 }
             }
         }

@@ -229,8 +229,12 @@ impl Membership {
             }
         }
         self.read_config(events, config);
-        self.library
+        let asked = self
+            .library
             .drain(|doc| events.push_back(PeerEvent::Document(doc)));
+        if asked {
+            events.push_back(PeerEvent::LetGo);
+        }
         // Documents and configurations before the messages that speak of them; but nothing
         // before the welcome.
         let behind = events.len();

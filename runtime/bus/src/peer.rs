@@ -94,6 +94,8 @@ pub enum PeerEvent {
     Message(ToPeer),
     /// A document has arrived: [`Peer::document`] has it.
     Document(DocId),
+    /// The broker needs shared memory: whoever keeps documents that no job is about drops them.
+    LetGo,
     /// A configuration has arrived: [`Peer::config`] has it.
     Config(Digest),
     /// This is a new session, the old one ended without a word: everything older is void, jobs,

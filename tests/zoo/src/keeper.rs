@@ -223,7 +223,9 @@ impl Cage {
                 return Ok(Mood::GoOn);
             }
             PeerEvent::Closed { reason } => return Err(fail(&reason, 4)),
-            PeerEvent::Document(_) | PeerEvent::Config(_) => return Ok(Mood::GoOn),
+            PeerEvent::Document(_) | PeerEvent::LetGo | PeerEvent::Config(_) => {
+                return Ok(Mood::GoOn);
+            }
         };
         Ok(match message {
             ToPeer::Welcome { .. } if self.animal.role == Role::Bundle => {

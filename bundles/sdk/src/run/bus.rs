@@ -224,7 +224,7 @@ impl Daemon {
         match event {
             PeerEvent::Message(message) => self.obey(message),
             PeerEvent::Rejoined => self.forget_everything(),
-            PeerEvent::Document(_) | PeerEvent::Config(_) => {}
+            PeerEvent::Document(_) | PeerEvent::LetGo | PeerEvent::Config(_) => {}
             PeerEvent::Closed { reason } => {
                 tracing::info!(reason, "the session has ended");
                 // Told to go, or no broker came back: a supervisor reads the difference.
