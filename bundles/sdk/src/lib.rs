@@ -9,6 +9,7 @@ pub mod basic;
 mod bundle;
 mod check;
 pub mod corpus;
+mod kept;
 mod load;
 pub mod pages;
 mod param;
@@ -25,6 +26,7 @@ mod version;
 
 pub use bundle::{BACKPORT_SUFFIX, Bundle, Checker};
 pub use check::{Listener, Outcome, check};
+pub use kept::LinkedModel;
 pub use load::{LoadError, Loaded};
 pub use param::{Default, MAX_ISSUES, Param, ParamError, Values};
 pub use place::Place;

@@ -3,12 +3,13 @@
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
 
-use qcbus_document::{Document, FileKind, ImageError, Suffix};
+use qcbus_document::{Document, FileKind, Image, ImageError, Suffix};
 use qcbus_formats::pool::{BundleOutcome, Remark};
 use qcbus_ingest::{IngestError, Limits, Prepared, Source};
 use qcbus_messages::{Absence, Digest, DocumentRole, MissingDocument};
 
-use crate::subject::Linked;
+use crate::kept::KeptModels;
+use crate::subject::LinkedImage;
 use crate::{Bundle, Subject};
 
 /// A root document and what it refers to, as images in memory.
@@ -19,13 +20,6 @@ pub struct Loaded {
     root: Vec<u8>,
     linked: Vec<LinkedImage>,
     missing: Vec<MissingDocument>,
-}
-
-struct LinkedImage {
-    role: DocumentRole,
-    path: String,
-    referred_at: u32,
-    image: Vec<u8>,
 }
 
 /// Why a file could not be loaded; reads well after "failed to ".
@@ -77,14 +71,9 @@ impl Loaded {
     /// [`LoadError::Image`].
     pub fn subject(&self, bundle: &Bundle) -> Result<Subject<'_>, LoadError> {
         let root = Document::open(&self.root)?;
-        let linked = self.linked.iter().map(|linked| {
-            Ok(Linked {
-                document: Document::open(&linked.image)?,
-                role: linked.role,
-                path: linked.path.clone(),
-                referred_at: linked.referred_at,
-            })
-        });
+        // There is no next job: what is kept is for the rules of this one.
+        let models = KeptModels::default();
+        let linked = self.linked.iter().map(|linked| linked.open(&models));
         let linked = linked.collect::<Result<_, ImageError>>()?;
         let subject = Subject::new(root, self.kind, (bundle.version_of)(&root));
         Ok(subject.with(linked, self.missing.clone()))
@@ -173,7 +162,8 @@ impl Source for Shelf<'_> {
             role,
             path: qcbus_messages::path_text::to_text(path),
             referred_at,
-            image,
+            id: (0, self.linked.len() as u64),
+            image: Image::new(image),
         });
     }
 }

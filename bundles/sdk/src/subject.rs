@@ -1,11 +1,13 @@
 //! What is checked: a root document and the documents that it refers to.
 
 use std::cell::RefCell;
+use std::sync::Arc;
 
-use qcbus_document::{Document, FileKind, Node, XPaths};
+use qcbus_document::{Document, FileKind, Image, ImageError, Node, XPaths};
 use qcbus_messages::{DocumentRole, MissingDocument};
 
-use crate::{ResourceValue, Version};
+use crate::kept::{ImageId, KeptModels};
+use crate::{LinkedModel, ResourceValue, Version};
 
 /// The documents of one check.
 #[derive(Debug, Clone)]
@@ -30,6 +32,44 @@ pub struct Linked<'d> {
     pub path: String,
     /// Byte offset of the referring element in the root's image.
     pub referred_at: u32,
+    image: &'d LinkedImage,
+    models: KeptModels,
+}
+
+/// A document that a root refers to, as whoever checks has it in hand.
+#[derive(Debug, Clone)]
+pub(crate) struct LinkedImage {
+    pub role: DocumentRole,
+    pub path: String,
+    pub referred_at: u32,
+    pub id: ImageId,
+    pub image: Image,
+}
+
+impl LinkedImage {
+    /// The document, with models of it from among those that are kept.
+    pub(crate) fn open(&self, models: &KeptModels) -> Result<Linked<'_>, ImageError> {
+        Ok(Linked {
+            document: self.image.document()?,
+            role: self.role,
+            path: self.path.clone(),
+            referred_at: self.referred_at,
+            image: self,
+            models: models.clone(),
+        })
+    }
+}
+
+impl Linked<'_> {
+    /// A model of the document that is built when it is first asked for, shared by all rules, and
+    /// kept for the next root that refers to the same document with the same bytes, in it and in
+    /// all that it includes. `None` when nothing can be made of the document.
+    ///
+    /// What costs time on a large document belongs into such a model, so that a root costs its own
+    /// checks and not those of its map.
+    pub fn kept<M: LinkedModel>(&self) -> Option<Arc<M>> {
+        self.models.get(self.image.id, &self.image.image)
+    }
 }
 
 impl<'d> Subject<'d> {

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use qcbus_bus::{Instance, JoinError, Peer, PeerEvent, PeerOptions};
+use qcbus_document::Image;
 use qcbus_formats::config::Config;
 use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::Issue;
@@ -18,7 +19,9 @@ use tokio::sync::mpsc;
 use super::Exit;
 use super::file::complain;
 use super::module::configured;
-use super::worker::{self, CheckerAtWork, LinkedHeld, Progress, Work};
+use super::worker::{self, CheckerAtWork, Order, Progress, Work};
+use crate::kept::KeptModels;
+use crate::subject::LinkedImage;
 use crate::{Bundle, Outcome, Plan, UserFiles};
 
 /// How a bundle joins the bus.
@@ -156,7 +159,7 @@ async fn serve(
         Err(error) => return fail(&error.to_string(), Exit::Internal),
     };
     let (sender, mut progress) = mpsc::unbounded_channel();
-    let works = match worker::start(sender) {
+    let works = match worker::start(KeptModels::default(), sender) {
         Ok(works) => works,
         Err(error) => {
             return fail(
@@ -201,7 +204,7 @@ struct Daemon {
     bundle: &'static Bundle,
     given: Option<UserFiles>,
     peer: Peer,
-    works: std::sync::mpsc::Sender<Work>,
+    works: std::sync::mpsc::Sender<Order>,
     /// Each configuration and what it demands; made once, unless files that it names change.
     plans: BTreeMap<Digest, (Option<Config>, Arc<Plan>)>,
     waiting: VecDeque<Job>,
@@ -224,7 +227,8 @@ impl Daemon {
         match event {
             PeerEvent::Message(message) => self.obey(message),
             PeerEvent::Rejoined => self.forget_everything(),
-            PeerEvent::Document(_) | PeerEvent::LetGo | PeerEvent::Config(_) => {}
+            PeerEvent::LetGo => self.keep_nothing(),
+            PeerEvent::Document(_) | PeerEvent::Config(_) => {}
             PeerEvent::Closed { reason } => {
                 tracing::info!(reason, "the session has ended");
                 // Told to go, or no broker came back: a supervisor reads the difference.
@@ -283,9 +287,16 @@ impl Daemon {
         None
     }
 
+    /// Documents that no job is about any more are not kept for the next.
+    fn keep_nothing(&self) {
+        // When the thread has ended, nothing is kept.
+        let _ = self.works.send(Order::LetGo);
+    }
+
     /// A new session: nothing that was asked before counts any more.
     fn forget_everything(&mut self) {
         self.waiting.clear();
+        self.keep_nothing();
         if let Some(running) = &self.running {
             running.cancelled.store(true, Ordering::Relaxed);
         }
@@ -343,7 +354,7 @@ impl Daemon {
                 cancelled: work.cancelled.clone(),
                 checker: work.checker.clone(),
             });
-            if self.works.send(work).is_err() {
+            if self.works.send(Order::Check(Box::new(work))).is_err() {
                 tracing::error!("the checking thread has ended");
                 self.draining = true;
                 self.running = None;
@@ -358,11 +369,14 @@ impl Daemon {
         let (root, linked) = job.documents.split_first()?;
         let root = held(root.doc)?;
         let linked = linked.iter().map(|document| {
-            Some(LinkedHeld {
+            let held = held(document.doc)?;
+            let (generation, doc) = held.identity();
+            Some(LinkedImage {
                 role: document.role,
                 path: document.path.clone(),
                 referred_at: document.referred_at,
-                image: held(document.doc)?,
+                id: (generation, doc.0),
+                image: Image::new(held),
             })
         });
         let linked = linked.collect::<Option<_>>()?;

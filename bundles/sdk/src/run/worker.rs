@@ -6,11 +6,22 @@ use std::time::Instant;
 
 use qcbus_bus::Held;
 use qcbus_document::{Document, FileKind};
+use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::Issue;
-use qcbus_messages::{DocumentRole, JobId, MissingDocument};
+use qcbus_messages::{JobId, MissingDocument};
 use tokio::sync::mpsc;
 
-use crate::{Linked, Listener, Outcome, Plan, Subject, check};
+use crate::kept::KeptModels;
+use crate::subject::LinkedImage;
+use crate::{Listener, Outcome, Plan, Subject, check};
+
+/// What the thread is told.
+pub(super) enum Order {
+    /// A job.
+    Check(Box<Work>),
+    /// The broker needs shared memory: documents that are only kept go.
+    LetGo,
+}
 
 /// One job, with everything that checking it takes.
 pub(super) struct Work {
@@ -18,18 +29,10 @@ pub(super) struct Work {
     pub kind: FileKind,
     pub plan: Arc<Plan>,
     pub root: Held,
-    pub linked: Vec<LinkedHeld>,
+    pub linked: Vec<LinkedImage>,
     pub missing: Vec<MissingDocument>,
     pub cancelled: Arc<AtomicBool>,
     pub checker: Arc<CheckerAtWork>,
-}
-
-/// A document that the root refers to, as it is held.
-pub(super) struct LinkedHeld {
-    pub role: DocumentRole,
-    pub path: String,
-    pub referred_at: u32,
-    pub image: Held,
 }
 
 /// Which checker the thread is at.
@@ -64,29 +67,26 @@ pub(super) enum Progress {
     },
 }
 
-/// Starts the thread. It ends when the sender of its work is dropped.
+/// Starts the thread. It ends when the sender of its orders is dropped.
 pub(super) fn start(
+    models: KeptModels,
     progress: mpsc::UnboundedSender<Progress>,
-) -> std::io::Result<std::sync::mpsc::Sender<Work>> {
-    let (sender, works) = std::sync::mpsc::channel::<Work>();
+) -> std::io::Result<std::sync::mpsc::Sender<Order>> {
+    let (sender, orders) = std::sync::mpsc::channel::<Order>();
     std::thread::Builder::new()
         .name("checker".to_owned())
         .spawn(move || {
-            for work in works {
-                let start = Instant::now();
-                let failed = one(&work, &progress).err();
-                let micros = u64::try_from(start.elapsed().as_micros()).unwrap_or(u64::MAX);
-                let job = work.job;
-                // The documents are let go before the broker hears that the job is done.
-                drop(work);
-                if progress
-                    .send(Progress::Finished {
-                        job,
-                        micros,
-                        failed,
-                    })
-                    .is_err()
-                {
+            for order in orders {
+                // The documents are let go before the broker hears that the job is done, but for
+                // those of a few models.
+                let finished = match order {
+                    Order::Check(work) => finish(&work, &models, &progress),
+                    Order::LetGo => {
+                        models.clear();
+                        continue;
+                    }
+                };
+                if progress.send(finished).is_err() {
                     return;
                 }
             }
@@ -94,32 +94,62 @@ pub(super) fn start(
     Ok(sender)
 }
 
-fn one(work: &Work, progress: &mpsc::UnboundedSender<Progress>) -> Result<(), String> {
-    let root = open(&work.root, "the root")?;
+/// Does one job.
+fn finish(
+    work: &Work,
+    models: &KeptModels,
+    progress: &mpsc::UnboundedSender<Progress>,
+) -> Progress {
+    let start = Instant::now();
+    let outcome = one(work, models, progress);
+    // What was at hand when a rule or a model panicked is not given to the next job.
+    if outcome == Ok(Trust::All) {
+        models.tidy();
+    } else {
+        models.clear();
+    }
+    Progress::Finished {
+        job: work.job,
+        micros: u64::try_from(start.elapsed().as_micros()).unwrap_or(u64::MAX),
+        failed: outcome.err(),
+    }
+}
+
+/// What may be used again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Trust {
+    All,
+    /// A checker has failed.
+    Nothing,
+}
+
+fn one(
+    work: &Work,
+    models: &KeptModels,
+    progress: &mpsc::UnboundedSender<Progress>,
+) -> Result<Trust, String> {
+    let unopened = |what: &str, error| format!("failed to {error} ({what})");
+    let root = Document::open(&work.root).map_err(|error| unopened("the root", error))?;
     let linked = work.linked.iter().map(|linked| {
-        let document = open(&linked.image, &linked.path)?;
-        Ok(Linked {
-            document,
-            role: linked.role,
-            path: linked.path.clone(),
-            referred_at: linked.referred_at,
-        })
+        let opened = linked.open(models);
+        opened.map_err(|error| unopened(&linked.path, error))
     });
     let linked = linked.collect::<Result<Vec<_>, String>>()?;
     let subject = Subject::new(root, work.kind, (work.plan.bundle().version_of)(&root))
         .with(linked, work.missing.clone());
-    let mut reporter = Reporter { work, progress };
+    let mut reporter = Reporter {
+        work,
+        progress,
+        trust: Trust::All,
+    };
     check(&work.plan, &subject, &mut reporter);
-    Ok(())
-}
-
-fn open<'h>(held: &'h Held, what: &str) -> Result<Document<'h>, String> {
-    Document::open(held).map_err(|error| format!("failed to {error} ({what})"))
+    Ok(reporter.trust)
 }
 
 struct Reporter<'w> {
     work: &'w Work,
     progress: &'w mpsc::UnboundedSender<Progress>,
+    trust: Trust,
 }
 
 impl Listener for Reporter<'_> {
@@ -133,6 +163,9 @@ impl Listener for Reporter<'_> {
 
     fn ended(&mut self, checker: usize, issues: Vec<Issue>, outcome: Outcome) {
         let job = self.work.job;
+        if matches!(outcome.ending, Ending::Failed { .. }) {
+            self.trust = Trust::Nothing;
+        }
         let _ = self.progress.send(Progress::Ended {
             job,
             checker: index(checker),
@@ -144,4 +177,23 @@ impl Listener for Reporter<'_> {
 
 fn index(checker: usize) -> u32 {
     u32::try_from(checker).unwrap_or(u32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kept::tests::{First, image};
+
+    #[test]
+    fn what_is_only_kept_goes_when_the_broker_needs_memory() {
+        let models = KeptModels::default();
+        let (told, mut progress) = mpsc::unbounded_channel();
+        let orders = start(models.clone(), told).unwrap();
+        models.get::<First>((1, 1), &image(1, 1)).unwrap();
+        assert_eq!(models.len(), 1);
+        orders.send(Order::LetGo).unwrap();
+        drop(orders);
+        assert!(progress.blocking_recv().is_none(), "the thread has ended");
+        assert_eq!(models.len(), 0);
+    }
 }

@@ -1,0 +1,205 @@
+//! Models of linked documents that are kept from job to job: a hundred scenarios on one map read
+//! its roads once.
+
+use std::any::Any;
+use std::fmt;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use qcbus_document::Image;
+
+/// A model of a document that others refer to, such as the road network of a scenario's map.
+/// Rules get it by [`crate::Linked::kept`].
+///
+/// It outlives the check for which it was built, so it owns the image that it was made of. A model
+/// that borrows from a document is put beside its image in one value, as `self_cell` does.
+///
+/// Whatever a rule finds must not depend on whether a model was built for it or was there: it is
+/// the same for the same image, and may only remember what it has found out about that image.
+pub trait LinkedModel: Send + Sync + Sized + 'static {
+    /// Builds the model. Does no I/O; `None` when nothing can be made of the image.
+    fn build(image: Image) -> Option<Self>;
+}
+
+/// Models that are kept between two jobs at most. Each holds its image, and with it a slot of the
+/// bus's large class, of which the jobs under way need their share.
+const MOST: usize = 2;
+/// Bytes of their images at most.
+const MOST_BYTES: usize = 256 << 20;
+/// The model of an image of fewer bytes is made anew in less time than it takes to send a result.
+const WORTH_KEEPING: usize = 512 << 10;
+
+/// Tells images apart: no two that are given to the same [`KeptModels`] have the same one, whatever
+/// lies between them.
+pub(crate) type ImageId = (u64, u64);
+
+/// The models of one process, or of one check where there is no next.
+#[derive(Clone, Default)]
+pub(crate) struct KeptModels(Arc<Mutex<Vec<Kept>>>);
+
+struct Kept {
+    of: ImageId,
+    bytes: usize,
+    model: Arc<dyn Any + Send + Sync>,
+}
+
+impl KeptModels {
+    /// The model of an image, built if it is not there.
+    pub(crate) fn get<M: LinkedModel>(&self, of: ImageId, image: &Image) -> Option<Arc<M>> {
+        if let Some(model) = self.find(of) {
+            return Some(model);
+        }
+        // Unlocked: a model may ask for another one, and may panic.
+        let model = Arc::new(M::build(image.clone())?);
+        self.lock().push(Kept {
+            of,
+            bytes: image.len(),
+            model: model.clone(),
+        });
+        Some(model)
+    }
+
+    /// Finds a model and puts it last: the first were not used for longest.
+    fn find<M: LinkedModel>(&self, of: ImageId) -> Option<Arc<M>> {
+        let mut models = self.lock();
+        let is_it = |kept: &Kept| kept.of == of && kept.model.is::<M>();
+        let at = models.iter().position(is_it)?;
+        let kept = models.remove(at);
+        let model = kept.model.clone();
+        models.push(kept);
+        model.downcast().ok()
+    }
+
+    /// A job is over: what is not worth its memory until the next one goes.
+    pub(crate) fn tidy(&self) {
+        let mut models = self.lock();
+        models.retain(|kept| kept.bytes >= WORTH_KEEPING);
+        let surplus = models.len().saturating_sub(MOST);
+        models.drain(..surplus);
+        while models.iter().map(|kept| kept.bytes).sum::<usize>() > MOST_BYTES {
+            models.remove(0);
+        }
+    }
+
+    /// Drops all models, and with them their hold on images.
+    pub(crate) fn clear(&self) {
+        self.lock().clear();
+    }
+
+    /// How many there are.
+    #[cfg(test)]
+    pub(crate) fn len(&self) -> usize {
+        self.lock().len()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Vec<Kept>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl fmt::Debug for KeptModels {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("KeptModels").finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// The first byte of an image, and which of several models of it this is.
+    #[derive(Debug, PartialEq)]
+    pub(crate) struct First(u8);
+
+    impl LinkedModel for First {
+        fn build(image: Image) -> Option<First> {
+            image.first().copied().map(First)
+        }
+    }
+
+    struct Len(usize);
+
+    impl LinkedModel for Len {
+        fn build(image: Image) -> Option<Len> {
+            Some(Len(image.len()))
+        }
+    }
+
+    struct Panics;
+
+    impl LinkedModel for Panics {
+        fn build(_: Image) -> Option<Panics> {
+            panic!("on purpose")
+        }
+    }
+
+    /// Memory that nobody writes to costs nothing.
+    pub(crate) fn image(first: u8, bytes: usize) -> Image {
+        let mut all = vec![0; bytes];
+        all.iter_mut().take(1).for_each(|byte| *byte = first);
+        Image::new(all)
+    }
+
+    fn large(first: u8) -> Image {
+        image(first, WORTH_KEEPING)
+    }
+
+    #[test]
+    fn a_model_is_built_once_for_each_image() {
+        let models = KeptModels::default();
+        let one = models.get::<First>((1, 1), &large(1)).unwrap();
+        models.tidy();
+        // Another generation has another document of that number.
+        let two = models.get::<First>((2, 1), &large(2)).unwrap();
+        models.tidy();
+        assert_eq!((&*one, &*two), (&First(1), &First(2)));
+        let again = models.get::<First>((1, 1), &large(1)).unwrap();
+        assert!(Arc::ptr_eq(&one, &again));
+        assert_eq!(
+            models.get::<Len>((1, 1), &large(1)).unwrap().0,
+            large(1).len()
+        );
+    }
+
+    #[test]
+    fn the_images_used_last_are_kept() {
+        let models = KeptModels::default();
+        let id = |number: u8| (1, u64::from(number));
+        let get = |number: u8| models.get::<First>(id(number), &large(number)).unwrap();
+        let one = get(1);
+        get(2);
+        get(1);
+        get(3);
+        assert_eq!(models.len(), 3, "while the job lasts");
+        models.tidy();
+        assert_eq!(models.len(), MOST);
+        assert!(Arc::ptr_eq(&get(1), &one), "used after the second");
+        assert_eq!(models.len(), MOST);
+        get(2);
+        assert_eq!(models.len(), MOST + 1, "built anew");
+        models.clear();
+        assert!(!Arc::ptr_eq(&get(1), &one));
+    }
+
+    #[test]
+    fn what_is_small_or_enormous_is_kept_for_its_job_only() {
+        for bytes in [1, WORTH_KEEPING - 1, MOST_BYTES + 1] {
+            let models = KeptModels::default();
+            let image = image(1, bytes);
+            let one = models.get::<First>((1, 1), &image).unwrap();
+            let again = models.get::<First>((1, 1), &image).unwrap();
+            assert!(Arc::ptr_eq(&one, &again));
+            models.tidy();
+            assert_eq!(models.len(), 0, "{bytes}");
+        }
+    }
+
+    #[test]
+    fn without_a_model_there_is_nothing_to_keep() {
+        let models = KeptModels::default();
+        assert!(models.get::<First>((1, 1), &image(1, 0)).is_none());
+        let asked = std::panic::AssertUnwindSafe(|| models.get::<Panics>((1, 1), &large(1)));
+        assert!(std::panic::catch_unwind(asked).is_err());
+        assert_eq!(models.len(), 0);
+        assert!(models.get::<First>((1, 1), &large(1)).is_some());
+    }
+}
