@@ -21,6 +21,7 @@ mod map;
 mod names;
 mod objects;
 mod outlines;
+mod owned;
 mod part;
 mod plan_view;
 mod profile;
@@ -52,6 +53,7 @@ pub use objects::{
     Structure, Validity,
 };
 pub use outlines::{Corner, CornerKind, CurveLocal, ObjectPoint, Outline, Polyline};
+pub use owned::OwnedMap;
 pub use part::MapPart;
 pub use plan_view::{Geometry, Located, PlanView, ShapeKind};
 pub use profile::{Profile, Record, Stretch, Valid};

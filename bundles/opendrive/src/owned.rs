@@ -1,0 +1,82 @@
+//! A map that owns its image.
+
+use std::fmt;
+
+use qcbus_document::{Image, ImageError};
+use self_cell::self_cell;
+
+use crate::RoadMap;
+
+self_cell!(
+    struct Cell {
+        owner: Image,
+
+        // What it has found out about itself is behind locks, so that its lifetime cannot be shortened.
+        #[not_covariant]
+        dependent: RoadMap,
+    }
+);
+
+/// A [`RoadMap`] together with the image that it reads: it can be kept for as long as anybody likes,
+/// and what it has once found out about its roads it need not find out again.
+pub struct OwnedMap(Cell);
+
+impl OwnedMap {
+    /// The map of an image.
+    ///
+    /// # Errors
+    /// When the bytes are no image.
+    pub fn of(image: Image) -> Result<OwnedMap, ImageError> {
+        Cell::try_new(image, |image| image.document().map(RoadMap::new)).map(OwnedMap)
+    }
+
+    /// Looks at the map. What borrows from it stays inside.
+    pub fn with<T>(&self, look: impl for<'a> FnOnce(&RoadMap<'a>) -> T) -> T {
+        self.0.with_dependent(|_, map| look(map))
+    }
+}
+
+impl fmt::Debug for OwnedMap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let roads = self.with(|map| map.roads().len());
+        f.debug_struct("OwnedMap").field("roads", &roads).finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use qcbus_ingest::{Limits, prepare_bytes};
+
+    use super::*;
+
+    fn image(text: &str) -> Image {
+        let prepared = prepare_bytes(
+            Path::new("/a.xodr"),
+            text.as_bytes().to_vec(),
+            &Limits::default(),
+        );
+        Image::new(prepared.build())
+    }
+
+    #[test]
+    fn a_map_outlives_those_who_made_it_and_may_be_shared_between_threads() {
+        let map = OwnedMap::of(image(
+            "<OpenDRIVE><road id='1'/><road id='2'><signals><signal id='s'/></signals></road></OpenDRIVE>",
+        ))
+        .unwrap();
+        let ask = || map.with(|map| (map.roads().len(), map.signals_with_id("s").count()));
+        std::thread::scope(|scope| {
+            let other = scope.spawn(ask);
+            assert_eq!((ask(), other.join().unwrap()), ((2, 1), (2, 1)));
+        });
+        assert_eq!(format!("{map:?}"), "OwnedMap { roads: 2 }");
+    }
+
+    #[test]
+    fn what_is_no_image_is_no_map() {
+        let map = OwnedMap::of(Image::new(*b"<OpenDRIVE/>"));
+        assert!(map.is_err(), "{map:?}");
+    }
+}
