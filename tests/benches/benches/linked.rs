@@ -9,9 +9,11 @@ use std::time::{Duration, Instant};
 
 use qcbus_benches::Result;
 use qcbus_benches::farm::{Farm, program};
-use qcbus_benches::figures::{digits, head, millis, quantile, row, size};
+use qcbus_benches::figures::{best_of, digits, head, millis, quantile, row, size, time};
 use qcbus_benches::maps::map;
 use qcbus_benches::scenarios::scenario;
+use qcbus_document::Image;
+use qcbus_opendrive::OwnedMap;
 
 /// Scenarios on each map.
 const SCENARIOS: usize = 100;
@@ -24,6 +26,14 @@ fn main() -> Result<()> {
     let program = program()?;
     let mut out = std::io::stdout().lock();
     writeln!(out, "{}", qcbus_benches::machine::describe())?;
+    writeln!(out, "\nThe model of the map, ms:\n")?;
+    let columns = ["map", "built", "every lane asked for", "asked again"];
+    writeln!(out, "{}", head(&columns))?;
+    for bytes in MAPS {
+        let mut cells = vec![size(bytes)];
+        cells.extend(model(bytes)?.map(digits));
+        writeln!(out, "{}", row(&cells))?;
+    }
     writeln!(out, "\nOne after the other, warm broker, ms (p50):\n")?;
     let columns = ["map", "each", "of it reading", "of it checking"];
     writeln!(out, "{}", head(&columns))?;
@@ -49,6 +59,18 @@ fn main() -> Result<()> {
 fn name(bytes: usize, settled: bool) -> String {
     let when = if settled { "" } else { ", just written" };
     format!("{}{when}", size(bytes))
+}
+
+/// What a bundle saves on every job but the first when it keeps the model of a map.
+fn model(bytes: usize) -> Result<[f64; 3]> {
+    let limits = qcbus_ingest::Limits::default();
+    let text = map(bytes, 0).into_bytes();
+    let image =
+        Image::new(qcbus_ingest::prepare_bytes(Path::new("/town.xodr"), text, &limits).build());
+    let build = best_of(5, || OwnedMap::of(image.clone()));
+    let map = OwnedMap::of(image)?;
+    let lanes = || map.with(|map| map.lanes().count());
+    Ok([build, time(lanes), time(lanes)].map(millis))
 }
 
 /// A map beside a directory of scenarios.
