@@ -1,0 +1,229 @@
+//! Edits of a file's text. None of them changes the number of its lines, save `cut`.
+
+use std::collections::BTreeSet;
+use std::ops::Range;
+
+use super::scan::{Element, Scan, lines};
+use super::select::Selector;
+
+/// What is done to an element.
+#[derive(Debug, Clone)]
+pub enum Action {
+    Drop,
+    DropAttribute(String),
+    Set(String, String),
+    Duplicate,
+    Swap,
+    Prepend(String),
+    Append(String),
+    Before(String),
+    After(String),
+    Replace(String),
+    Rename(String),
+    Unclose,
+    Quote,
+    Reverse,
+}
+
+/// An edited text, and the rows at which it was edited.
+pub type Edited = (String, BTreeSet<u64>);
+
+/// What replaces which bytes.
+type Splices = Vec<(Range<usize>, String)>;
+
+impl Action {
+    pub fn parse(text: &str) -> Result<Action, String> {
+        let bad = || format!("no edit: {text}");
+        let (verb, rest) = text.split_once(' ').unwrap_or((text, ""));
+        let owned = || rest.to_owned();
+        let named = || rest.strip_prefix('@').ok_or_else(bad);
+        let action = match verb {
+            "set" => {
+                let (name, value) = named()?.split_once('=').ok_or_else(bad)?;
+                if value.contains(['"', '<']) {
+                    return Err(format!("no attribute may have such a value: {text}"));
+                }
+                Action::Set(name.to_owned(), value.to_owned())
+            }
+            "drop" if !rest.is_empty() => Action::DropAttribute(named()?.to_owned()),
+            "prepend" => Action::Prepend(owned()),
+            "append" => Action::Append(owned()),
+            "before" if !rest.is_empty() => Action::Before(owned()),
+            "after" if !rest.is_empty() => Action::After(owned()),
+            "replace" if !rest.is_empty() => Action::Replace(owned()),
+            "rename" if !rest.is_empty() => Action::Rename(owned()),
+            _ if !rest.is_empty() => return Err(bad()),
+            "drop" => Action::Drop,
+            "duplicate" => Action::Duplicate,
+            "swap" => Action::Swap,
+            "unclose" => Action::Unclose,
+            "quote" => Action::Quote,
+            "reverse" => Action::Reverse,
+            _ => return Err(bad()),
+        };
+        Ok(action)
+    }
+
+    /// Changes the one element that the selector means.
+    pub fn apply(&self, selector: &Selector, text: &str) -> Result<Edited, String> {
+        let scan = Scan::of(text)?;
+        let id = selector.one(&scan)?;
+        let splices = self.splices(&scan, id)?;
+        let rows = self.rows(&scan, id);
+        let edited = spliced(text, splices);
+        if edited == text {
+            return Err(format!("changes nothing: {} | {self:?}", selector.text));
+        }
+        if lines(&edited) != lines(text) {
+            return Err(format!("changes the number of lines: {self:?}"));
+        }
+        Ok((edited, rows))
+    }
+
+    fn splices(&self, scan: &Scan<'_>, id: usize) -> Result<Splices, String> {
+        let (text, element) = (scan.text, &scan.elements[id]);
+        let whole = element.start_tag.start..element.end;
+        let at = |place: usize, text: &str| vec![(place..place, text.to_owned())];
+        let splices = match self {
+            Action::Drop => vec![(whole.clone(), gap(&text[whole]))],
+            Action::DropAttribute(name) => {
+                let attribute = scan.attribute(id, name);
+                let attribute = attribute.ok_or_else(|| format!("no attribute {name}"))?;
+                let whole = attribute.whole.clone();
+                vec![(whole.clone(), gap(&text[whole]))]
+            }
+            Action::Set(name, value) => match scan.attribute(id, name) {
+                Some(attribute) => vec![(attribute.value.clone(), value.clone())],
+                None => at(element.name.end, &format!(" {name}=\"{value}\"")),
+            },
+            Action::Duplicate => at(
+                whole.end,
+                &text[whole].replace("\r\n", " ").replace('\n', " "),
+            ),
+            Action::Swap => {
+                let next = &scan.elements[next(scan, id)?];
+                let other = next.start_tag.start..next.end;
+                let texts = (
+                    text[whole.clone()].to_owned(),
+                    text[other.clone()].to_owned(),
+                );
+                vec![(whole, texts.1), (other, texts.0)]
+            }
+            Action::Prepend(xml) | Action::Append(xml) if element.closes_itself => {
+                vec![opened(text, element, xml)]
+            }
+            Action::Prepend(xml) => at(element.start_tag.end, xml),
+            Action::Append(xml) => at(end_tag(element)?.start, xml),
+            Action::Before(xml) => at(whole.start, xml),
+            Action::After(xml) => at(whole.end, xml),
+            Action::Replace(xml) => vec![(whole.clone(), format!("{xml}{}", gap(&text[whole])))],
+            Action::Rename(name) => {
+                let mut splices = vec![(element.name.clone(), name.clone())];
+                if let Some(tag) = &element.end_tag {
+                    splices.push((tag.clone(), format!("</{name}>")));
+                }
+                splices
+            }
+            Action::Unclose => {
+                let tag = end_tag(element)?;
+                vec![(tag.clone(), gap(&text[tag]))]
+            }
+            Action::Quote => quoted(text, element)?,
+            Action::Reverse => vec![reversed(text, element)?],
+        };
+        Ok(splices)
+    }
+
+    /// Where the edit is to be seen, in the edited text.
+    fn rows(&self, scan: &Scan<'_>, id: usize) -> BTreeSet<u64> {
+        let element = &scan.elements[id];
+        let (start, end) = (element.start_tag.start, element.end);
+        let tag = || scan.rows(id);
+        let one = |at: usize| BTreeSet::from([scan.row(at)]);
+        match self {
+            Action::Drop => element.parent.map_or(one(0), |up| scan.rows(up).collect()),
+            Action::Duplicate => tag().chain(one(end)).collect(),
+            Action::Swap => {
+                let Ok(next) = next(scan, id) else {
+                    return one(start);
+                };
+                let next = &scan.elements[next];
+                let height = |it: &Element| lines(&scan.text[it.start_tag.start..it.end]) as u64;
+                let second = scan.row(next.start_tag.start) + height(next) - height(element);
+                BTreeSet::from([scan.row(start), second])
+            }
+            Action::Append(_) if !element.closes_itself => {
+                let tag = element.end_tag.as_ref();
+                one(tag.map_or(end, |tag| tag.start))
+            }
+            Action::Prepend(_) | Action::Append(_) => one(element.start_tag.end),
+            Action::Before(_) | Action::Replace(_) => one(start),
+            Action::After(_) => one(end),
+            Action::Unclose => {
+                let tag_before = element.end_tag.as_ref().map_or(end, |tag| tag.start);
+                tag().chain(one(tag_before)).collect()
+            }
+            _ => tag().collect(),
+        }
+    }
+}
+
+/// The lines of what is removed stay.
+fn gap(text: &str) -> String {
+    "\n".repeat(lines(text))
+}
+
+fn spliced(text: &str, mut splices: Splices) -> String {
+    splices.sort_by_key(|(range, _)| range.start);
+    let mut edited = text.to_owned();
+    for (range, new) in splices.into_iter().rev() {
+        edited.replace_range(range, &new);
+    }
+    edited
+}
+
+fn next(scan: &Scan<'_>, id: usize) -> Result<usize, String> {
+    let mut later = scan.siblings(id).filter(|other| *other > id);
+    later
+        .next()
+        .ok_or_else(|| "nothing comes after it".to_owned())
+}
+
+fn end_tag(element: &Element) -> Result<Range<usize>, String> {
+    let tag = element.end_tag.clone();
+    tag.ok_or_else(|| "the element has no end tag".to_owned())
+}
+
+/// An empty element with content.
+fn opened(text: &str, element: &Element, xml: &str) -> (Range<usize>, String) {
+    let tag = &text[element.start_tag.clone()];
+    let slash = tag.rfind('/').unwrap_or(tag.len());
+    let kept = tag[..slash].trim_end().len();
+    let (gap, name) = (gap(&tag[kept..slash]), &text[element.name.clone()]);
+    let range = element.start_tag.start + kept..element.start_tag.end;
+    (range, format!("{gap}>{xml}</{name}>"))
+}
+
+fn quoted(text: &str, element: &Element) -> Result<Splices, String> {
+    let quoted = element.attributes.iter().map(|attribute| {
+        let value = &text[attribute.value.clone()];
+        if value.contains('\'') {
+            return Err(format!("has a quote: {value}"));
+        }
+        let range = attribute.value.start - 1..attribute.value.end + 1;
+        Ok((range, format!("'{value}'")))
+    });
+    quoted.collect()
+}
+
+fn reversed(text: &str, element: &Element) -> Result<(Range<usize>, String), String> {
+    let [first, .., last] = &element.attributes[..] else {
+        return Err("less than two attributes".to_owned());
+    };
+    let range = first.whole.start..last.whole.end;
+    let attributes = element.attributes.iter().rev();
+    Ok((
+        range,
+        attributes.map(|it| &text[it.whole.clone()]).collect(),
+    ))
+}

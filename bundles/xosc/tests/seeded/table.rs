@@ -1,0 +1,181 @@
+//! The lists of faults and of harmless variants; `README.md` describes how they are written.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Component, Path, PathBuf};
+
+use qcbus_sdk::Level;
+
+use super::edit::Action;
+use super::encode::Storage;
+use super::select::Selector;
+
+/// A scenario and how it is changed.
+#[derive(Debug)]
+pub struct Entry {
+    pub id: String,
+    pub category: String,
+    pub scenario: Scenario,
+    /// The least level of what must be found; none for a harmless variant.
+    pub level: Option<Level>,
+    pub edits: Vec<Edit>,
+    /// Where it must be found; where the edits are, when there is none.
+    pub at: Vec<Target>,
+    pub why: String,
+}
+
+/// A real file.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Scenario {
+    pub producer: String,
+    /// Below the producer's directory.
+    pub path: PathBuf,
+}
+
+/// An element of a file, or the file.
+#[derive(Debug)]
+pub struct Target {
+    pub selector: Option<Selector>,
+    /// Below the producer's directory.
+    pub file: PathBuf,
+}
+
+#[derive(Debug)]
+pub struct Edit {
+    pub change: Change,
+    /// Below the producer's directory.
+    pub file: PathBuf,
+}
+
+#[derive(Debug)]
+pub enum Change {
+    Element(Selector, Action),
+    Storage(Storage),
+    Write(String),
+    Remove,
+}
+
+/// Reads a list; the text of an error begins with the line's number.
+pub fn read(text: &str) -> Result<Vec<Entry>, String> {
+    let (mut aliases, mut all) = (BTreeMap::new(), Vec::<Entry>::new());
+    for (number, line) in text.lines().enumerate() {
+        let trimmed = line.trim();
+        if trimmed.is_empty() || trimmed.starts_with('#') {
+            continue;
+        }
+        let read = if line.starts_with(' ') {
+            let entry = all.last_mut().ok_or_else(|| "there is no entry".to_owned());
+            entry.and_then(|entry| entry.line(trimmed))
+        } else if let Some((name, file)) = alias(trimmed) {
+            let before = aliases.insert(name, file);
+            before.map_or(Ok(()), |_| Err(format!("@{name} is given twice")))
+        } else {
+            Entry::head(trimmed, &aliases).map(|entry| all.push(entry))
+        };
+        read.map_err(|error| format!("{}: {error}", number + 1))?;
+    }
+    let mut ids = BTreeSet::new();
+    for entry in &all {
+        let id = &entry.id;
+        if entry.edits.is_empty() || entry.why.is_empty() || !ids.insert(id) {
+            return Err(format!("{id}: no edit, no reason, or twice"));
+        }
+    }
+    Ok(all)
+}
+
+fn alias(line: &str) -> Option<(&str, &str)> {
+    line.strip_prefix('@')?.split_once(" = ")
+}
+
+impl Entry {
+    fn head(line: &str, aliases: &BTreeMap<&str, &str>) -> Result<Entry, String> {
+        let fields: Vec<&str> = line.split(" | ").map(str::trim).collect();
+        let (id, category, file, level) = match fields[..] {
+            [id, category, file] => (id, category, file, None),
+            [id, category, file, level] => {
+                let level = Level::from_word(level).ok_or_else(|| format!("no level: {level}"))?;
+                (id, category, file, Some(level))
+            }
+            _ => return Err(format!("no entry: {line}")),
+        };
+        let file = match file.strip_prefix('@') {
+            Some(alias) => aliases
+                .get(alias)
+                .ok_or_else(|| format!("no alias: {file}"))?,
+            None => file,
+        };
+        let (producer, path) = file
+            .split_once(':')
+            .ok_or_else(|| format!("no file: {file}"))?;
+        Ok(Entry {
+            id: id.to_owned(),
+            category: category.to_owned(),
+            scenario: Scenario {
+                producer: producer.to_owned(),
+                path: path.into(),
+            },
+            level,
+            edits: Vec::new(),
+            at: Vec::new(),
+            why: String::new(),
+        })
+    }
+
+    fn line(&mut self, line: &str) -> Result<(), String> {
+        if let Some(why) = line.strip_prefix("why: ") {
+            why.clone_into(&mut self.why);
+            return Ok(());
+        }
+        let (line, file) = match line.rsplit_once(" | in: ") {
+            Some((line, file)) => (line, self.beside(file.trim())?),
+            None => (line, self.scenario.path.clone()),
+        };
+        if let Some(selector) = line.strip_prefix("at: ") {
+            let selector = (selector != ".").then(|| Selector::parse(selector));
+            let selector = selector.transpose()?;
+            self.at.push(Target { selector, file });
+            return Ok(());
+        }
+        let (selector, action) = line
+            .split_once(" | ")
+            .ok_or_else(|| format!("neither an edit nor a place: {line}"))?;
+        let change = match (selector.trim(), action.trim()) {
+            (".", "remove") => Change::Remove,
+            (".", action) => match action.strip_prefix("write ") {
+                Some(text) => Change::Write(text.to_owned()),
+                None => Change::Storage(Storage::parse(action)?),
+            },
+            (selector, action) => {
+                Change::Element(Selector::parse(selector)?, Action::parse(action)?)
+            }
+        };
+        self.edits.push(Edit { change, file });
+        Ok(())
+    }
+
+    /// A path that starts at the scenario's directory, below the producer's.
+    fn beside(&self, path: &str) -> Result<PathBuf, String> {
+        let folder = self.scenario.path.parent().unwrap_or(Path::new(""));
+        let path = normal(&folder.join(path));
+        if path.starts_with("..") {
+            return Err(format!(
+                "not in the producer's directory: {}",
+                path.display()
+            ));
+        }
+        Ok(path)
+    }
+}
+
+/// A path without `.` and, as far as can be, without `..`.
+pub fn normal(path: &Path) -> PathBuf {
+    let mut normal = PathBuf::new();
+    for component in path.components() {
+        match component {
+            Component::CurDir => {}
+            Component::ParentDir if normal.file_name().is_some() => _ = normal.pop(),
+            _ => normal.push(component),
+        }
+    }
+    normal
+}
