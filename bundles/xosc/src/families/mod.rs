@@ -6,6 +6,8 @@ pub(crate) mod deprecation;
 pub(crate) mod minsubset;
 pub(crate) mod actions;
 pub(crate) mod claims;
+pub(crate) mod allowed_values;
+pub(crate) mod catalogs;
 pub(crate) mod names;
 pub(crate) mod profiles;
 pub(crate) mod ranges;

@@ -1,8 +1,10 @@
 //! Names within one element.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 use qcbus_document::{Document, Node};
+use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Place, Sink};
 
 /// Demands that no two children of one element have the same `name`, whatever they are.
@@ -39,4 +41,36 @@ pub(crate) fn unique_among_siblings(document: &Document<'_>, found: &mut Sink<'_
             }
         }
     }
+}
+
+/// Elements that maneuvers of catalogs have, too.
+const IN_STORIES: &[&str] = &["Maneuver", "Event", "Action"];
+/// Elements by whose names others refer to them.
+const NAMED: &[&str] = &[
+    "ScenarioObject",
+    "EntitySelection",
+    "Story",
+    "Act",
+    "ManeuverGroup",
+    "Catalog",
+    "TrafficSignalController",
+    "Phase",
+];
+
+/// The elements by whose names others refer to them, with their names: entities, elements of the
+/// storyboard, catalogs and their entries, traffic signal controllers and their phases.
+pub(crate) fn keys<'m, 'd>(
+    scenario: &'m Scenario<'d>,
+) -> impl Iterator<Item = (Element<'m, 'd>, Cow<'d, str>)> {
+    let own = NAMED.iter().flat_map(|name| scenario.elements(name));
+    let in_stories = IN_STORIES
+        .iter()
+        .flat_map(|name| scenario.elements_everywhere(name));
+    let entries = scenario
+        .elements("Catalog")
+        .flat_map(Element::children)
+        .filter(|entry| !entry.is("Maneuver"));
+    own.chain(in_stories)
+        .chain(entries)
+        .filter_map(|element| Some((element, element.text("name")?)))
 }

@@ -14,8 +14,27 @@ mod action_step_dynamics_zero;
 mod action_synchronize;
 mod action_transition_not_zero;
 mod general_animation_constraint_pedestrian;
+mod catalogs_duplicate_across_files;
+mod catalogs_file_valid;
+mod catalogs_kind_mismatch;
+mod catalogs_location_missing;
+mod catalogs_mixed_document;
+mod catalogs_path_escape;
+mod catalogs_unused_location;
+mod catalogs_version_mismatch;
+mod naming_duplicate_property;
+mod naming_empty_name;
+mod naming_entity_selection_clash;
+mod naming_no_double_colon_prefix_in_names;
+mod naming_non_ascii_or_control;
+mod naming_storyboard_ambiguous;
 mod naming_unique_element_names_on_same_level;
+mod parameters_assignment_duplicate;
+mod parameters_assignment_type;
+mod parameters_assignment_unknown;
 mod parameters_parameter_declaration_parameter_scope;
+mod reference_control_catalog_reference_resolvability;
+mod reference_control_catalogs_referenced_by_directory;
 mod reference_control_resolvable_entity_references;
 mod reference_control_resolvable_storyboard_element_reference;
 mod reference_control_unique_element_names_on_same_level;
@@ -41,6 +60,7 @@ mod trigger_float_equal;
 mod trigger_simulation_time_equal;
 mod trigger_time_unordered;
 mod trigger_traveled_distance_stopped;
+mod reference_control_uniquely_resolvable_entity_references;
 mod xml_fileheader_is_present;
 mod xml_root_tag_is_openscenario;
 mod xml_valid_schema;
@@ -267,4 +287,24 @@ pub static RULES: &[&dyn AnyRule] = &[
     &trigger_traveled_distance_stopped::RULE,
     &schema_choice_single_alternative::RULE,
     &schema_cardinality::RULE,
+    &reference_control_uniquely_resolvable_entity_references::RULE,
+    &reference_control_catalog_reference_resolvability::RULE,
+    &reference_control_catalogs_referenced_by_directory::RULE,
+    &parameters_assignment_unknown::RULE,
+    &parameters_assignment_type::RULE,
+    &parameters_assignment_duplicate::RULE,
+    &catalogs_location_missing::RULE,
+    &catalogs_kind_mismatch::RULE,
+    &catalogs_file_valid::RULE,
+    &catalogs_duplicate_across_files::RULE,
+    &catalogs_mixed_document::RULE,
+    &catalogs_unused_location::RULE,
+    &catalogs_version_mismatch::RULE,
+    &catalogs_path_escape::RULE,
+    &naming_no_double_colon_prefix_in_names::RULE,
+    &naming_empty_name::RULE,
+    &naming_entity_selection_clash::RULE,
+    &naming_duplicate_property::RULE,
+    &naming_storyboard_ambiguous::RULE,
+    &naming_non_ascii_or_control::RULE,
 ];

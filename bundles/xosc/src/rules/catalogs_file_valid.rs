@@ -1,0 +1,58 @@
+use qcbus_document::Document;
+use qcbus_messages::DocumentRole;
+use qcbus_openscenario::{Form, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_catalogs_file_valid",
+    uids: &["qcbus.dev:xosc:1.0.0:catalogs.file_valid"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("catalogs_file_valid.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(_: &Scenario<'_>, found: &mut Sink<'_>) {
+    // What cannot be read at all is said by the bus.
+    let subject = found.subject();
+    for linked in subject.with_role(DocumentRole::Catalog) {
+        let document = &linked.document;
+        let Some((level, what)) = fault(document) else {
+            continue;
+        };
+        let name = linked.path.rsplit('/').next().unwrap_or("");
+        let text = format!("the file `{name}` lies in a directory of catalogs, but {what}");
+        found.issue((*document, 0), text).level(level);
+    }
+}
+
+fn fault(document: &Document<'_>) -> Option<(Level, String)> {
+    let root = document.root()?;
+    if !root.name().eq_ignore_ascii_case("OpenSCENARIO") {
+        let what = format!("its root element is `{}`, not `OpenSCENARIO`", root.name());
+        return Some((Level::Warning, what));
+    }
+    match Form::of(document) {
+        Form::Catalog => {
+            let nameless = root.children_named("Catalog").any(|catalog| {
+                catalog
+                    .attr("name")
+                    .is_none_or(|name| name.trim().is_empty())
+            });
+            nameless.then(|| {
+                let what = "its `Catalog` has no name, by which a scenario could refer to it";
+                (Level::Warning, what.to_owned())
+            })
+        }
+        // Scenarios beside their catalogs do no harm.
+        Form::Scenario => Some((Level::Information, "it is a scenario".to_owned())),
+        Form::Distribution => {
+            let what = "it is a distribution of parameter values";
+            Some((Level::Information, what.to_owned()))
+        }
+        Form::Unclear => Some((Level::Warning, "it has no `Catalog`".to_owned())),
+    }
+}

@@ -1,0 +1,57 @@
+use qcbus_openscenario::{CatalogKind, Resolution, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::catalogs::{self, Once};
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_catalogs_location_missing",
+    uids: &["qcbus.dev:xosc:1.0.0:catalogs.location_missing"],
+    after: super::READABLE,
+    page: include_str!("catalogs_location_missing.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let mut without = Once::new();
+    let mut elsewhere = Once::new();
+    for (reference, to) in catalogs::references(scenario) {
+        match to {
+            Resolution::NoLocation => without.add(catalogs::kinds(reference), reference),
+            Resolution::OtherLocation(entry) => {
+                elsewhere.add(entry.catalog.attr("name").unwrap_or(""), reference);
+            }
+            _ => {}
+        }
+    }
+    for (reference, count) in without.each() {
+        let kinds = catalogs::kinds(reference).iter();
+        let text = format!(
+            "`CatalogLocations` do not say where such a catalog is, they have no {}{}",
+            catalogs::listed(kinds.map(|kind| kind.location())).replace(", ", " or "),
+            catalogs::further(count)
+        );
+        found.about(reference, "", text);
+    }
+    for (reference, count) in elsewhere.each() {
+        let Resolution::OtherLocation(entry) = scenario.resolution(reference) else {
+            continue;
+        };
+        let mut kinds = CatalogKind::ALL.into_iter();
+        let location = kinds
+            .find(|kind| entry.node.is(kind.element()))
+            .map_or("", CatalogKind::location);
+        let text = format!(
+            "the catalog `{}` lies only in a directory of other catalogs, not in that of `{location}`, where \
+             a `{}` is looked for; some simulators do not find it{}",
+            entry.catalog.attr("name").unwrap_or(""),
+            entry.node.name(),
+            catalogs::further(count)
+        );
+        found
+            .about(reference, "catalogName", text)
+            .level(Level::Warning)
+            .at(entry.node, "the entry");
+    }
+}

@@ -1,0 +1,48 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_catalogs_mixed_document",
+    uids: &["qcbus.dev:xosc:1.0.0:catalogs.mixed_document"],
+    after: super::READABLE,
+    page: include_str!("catalogs_mixed_document.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// The elements that make a document what it is.
+const FORMS: &[(&[&str], &str)] = &[
+    (&["Entities", "Storyboard"], "a scenario"),
+    (&["Catalog"], "a catalog"),
+    (&["ParameterValueDistribution"], "a distribution"),
+];
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let root = scenario.root();
+    let mut forms: Vec<_> = FORMS
+        .iter()
+        .filter_map(|(names, what)| {
+            let first = root
+                .children()
+                .find(|child| names.contains(&child.name()))?;
+            Some((first.node(), *what))
+        })
+        .collect();
+    forms.sort_by_key(|(node, _)| node.offset());
+    let mut forms = forms.into_iter();
+    let Some((first, what)) = forms.next() else {
+        return;
+    };
+    for (node, other) in forms {
+        let text = format!(
+            "`{}` makes the document {other}, but `{}` has made it {what} already; a document is one of them",
+            node.name(),
+            first.name()
+        );
+        found
+            .issue(node, text)
+            .at(first, format!("what makes it {what}"));
+    }
+}

@@ -1,0 +1,53 @@
+use qcbus_openscenario::{CatalogKind, Scenario};
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::families::catalogs;
+use crate::families::references::quoted;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_catalogs_path_escape",
+    uids: &["qcbus.dev:xosc:1.0.0:catalogs.path_escape"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("catalogs_path_escape.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for kind in CatalogKind::ALL {
+        let Some(directory) = scenario.catalog_directory(kind) else {
+            continue;
+        };
+        let Some(path) = directory.text("path") else {
+            continue;
+        };
+        // Where nothing was found that is what the bus says, and this would be why.
+        if catalogs::missing(found.subject(), directory.node()).is_some() {
+            continue;
+        }
+        let Some(why) = why(path.trim()) else {
+            continue;
+        };
+        let text = format!("the path {} {why}", quoted(directory, "path", &path));
+        found.issue(Place::attribute_or_node(directory.node(), "path"), text);
+    }
+}
+
+/// What keeps a path from being found on another machine.
+fn why(path: &str) -> Option<&'static str> {
+    let mut start = path.chars();
+    let is_drive = start
+        .next()
+        .is_some_and(|first| first.is_ascii_alphabetic())
+        && start.next() == Some(':');
+    if is_drive || path.starts_with(['/', '\\']) || path.starts_with("file://") {
+        return Some(
+            "is absolute and leads to the directory on this machine only; one that is relative to the \
+             scenario works everywhere",
+        );
+    }
+    path.contains('\\')
+        .then_some("has backslashes, which divide directories on Windows only; `/` does everywhere")
+}

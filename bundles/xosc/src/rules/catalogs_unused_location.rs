@@ -1,0 +1,56 @@
+use qcbus_openscenario::{CatalogKind, Form, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::catalogs;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_catalogs_unused_location",
+    uids: &["qcbus.dev:xosc:1.0.0:catalogs.unused_location"],
+    level: Level::Information,
+    after: super::READABLE,
+    page: include_str!("catalogs_unused_location.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    if scenario.form() != Form::Scenario {
+        return;
+    }
+    let mut used: Vec<CatalogKind> = Vec::new();
+    for (reference, to) in catalogs::references(scenario) {
+        used.extend(
+            CatalogKind::ALL
+                .into_iter()
+                .filter(|kind| catalogs::is_use(reference, to, *kind)),
+        );
+        used.sort_unstable();
+        used.dedup();
+    }
+    let subject = found.subject();
+    let unused: Vec<_> = CatalogKind::ALL
+        .into_iter()
+        .filter(|kind| !used.contains(kind))
+        .filter_map(|kind| scenario.catalog_directory(kind))
+        // A directory that is not there is what the bus says of it; an empty path means none.
+        .filter(|directory| catalogs::missing(subject, directory.node()).is_none())
+        .filter(|directory| {
+            directory
+                .text("path")
+                .is_none_or(|path| !path.trim().is_empty())
+        })
+        .filter_map(|directory| directory.node().parent())
+        .collect();
+    let Some((first, others)) = unused.split_first() else {
+        return;
+    };
+    let text = format!(
+        "no reference leads to the catalogs of {}",
+        catalogs::listed(unused.iter().map(|location| location.name()))
+    );
+    let mut finding = found.issue(*first, text);
+    for other in others {
+        finding = finding.at(*other, "another that is not used");
+    }
+}

@@ -1,0 +1,73 @@
+use qcbus_document::Node;
+use qcbus_openscenario::{Resolution, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::catalogs::{self, Once};
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_catalogs_version_mismatch",
+    uids: &["qcbus.dev:xosc:1.0.0:catalogs.version_mismatch"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("catalogs_version_mismatch.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let Some(own) = scenario
+        .root()
+        .child("FileHeader")
+        .and_then(|header| version(header.node()))
+    else {
+        return;
+    };
+    let mut newer = Once::new();
+    for (reference, to) in catalogs::references(scenario) {
+        let (Resolution::Entry(entry) | Resolution::OtherLocation(entry)) = to else {
+            continue;
+        };
+        let Some((header, version)) = header(entry.node) else {
+            continue;
+        };
+        if version > own || version.0 != own.0 {
+            newer.add((header.document().path(), version), reference);
+        }
+    }
+    for (reference, count) in newer.each() {
+        let (Resolution::Entry(entry) | Resolution::OtherLocation(entry)) =
+            scenario.resolution(reference)
+        else {
+            continue;
+        };
+        let Some((header, version)) = header(entry.node) else {
+            continue;
+        };
+        let which = if version > own { "newer" } else { "far older" };
+        let text = format!(
+            "the catalog `{}` is written in OpenSCENARIO {}.{}, {which} than {}.{} of the scenario: a \
+             simulator that reads it by the scenario's version may not understand it{}",
+            entry.catalog.attr("name").unwrap_or(""),
+            version.0,
+            version.1,
+            own.0,
+            own.1,
+            catalogs::further(count)
+        );
+        found
+            .about(reference, "catalogName", text)
+            .at(header, "the header of the catalog");
+    }
+}
+
+fn header(entry: Node<'_>) -> Option<(Node<'_>, (u16, u16))> {
+    let root = entry.ancestors().last()?;
+    let header = root.child("FileHeader")?;
+    Some((header, version(header)?))
+}
+
+fn version(header: Node<'_>) -> Option<(u16, u16)> {
+    let part = |name| header.attr(name)?.trim().parse().ok();
+    Some((part("revMajor")?, part("revMinor")?))
+}

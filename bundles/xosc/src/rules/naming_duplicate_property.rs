@@ -1,0 +1,52 @@
+use foldhash::HashMap;
+use qcbus_document::Node;
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_naming_duplicate_property",
+    uids: &["qcbus.dev:xosc:1.0.0:naming.duplicate_property"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("naming_duplicate_property.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for block in scenario.elements("Properties") {
+        let mut first: HashMap<&str, Node<'_>> = HashMap::default();
+        for property in block.node().children_named("Property") {
+            let Some(name) = property.attr("name") else {
+                continue;
+            };
+            let known = *first.entry(name).or_insert(property);
+            if known == property {
+                continue;
+            }
+            let value = |property: Node<'_>| property.attr("value").unwrap_or("").to_owned();
+            let (level, what) = if value(known) == value(property) {
+                (
+                    Level::Information,
+                    "is there twice with one value".to_owned(),
+                )
+            } else {
+                let what = format!(
+                    "is `{}` here and `{}` before; which holds is up to the simulator",
+                    value(property),
+                    value(known)
+                );
+                (Level::Warning, what)
+            };
+            found
+                .issue(
+                    Place::attribute_or_node(property, "name"),
+                    format!("the property `{name}` {what}"),
+                )
+                .level(level)
+                .at(known, "the first property of this name");
+        }
+    }
+}

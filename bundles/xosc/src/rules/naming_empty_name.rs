@@ -1,0 +1,47 @@
+use qcbus_openscenario::{Element, Scenario, StoryKind};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::names;
+use crate::families::references::quoted;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_naming_empty_name",
+    uids: &["qcbus.dev:xosc:1.0.0:naming.empty_name"],
+    after: super::READABLE,
+    page: include_str!("naming_empty_name.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for (element, name) in names::keys(scenario) {
+        if name.trim().is_empty() {
+            let text = format!(
+                "the name of this `{}` is empty, so nothing can refer to it",
+                element.name()
+            );
+            let level = if may_be_nameless(element) {
+                Level::Warning
+            } else {
+                Level::Error
+            };
+            found.about(element, "name", text).level(level);
+        } else if name.trim() != name {
+            let text = format!(
+                "the name {} has white space around it, which is part of the name: references must have it, too",
+                quoted(element, "name", &name)
+            );
+            found.about(element, "name", text).level(Level::Warning);
+        }
+    }
+}
+
+/// Whether a run goes well without the name: who is never referred to needs none.
+fn may_be_nameless(element: Element<'_, '_>) -> bool {
+    let in_catalog = element
+        .node()
+        .parent()
+        .is_some_and(|parent| parent.is("Catalog"));
+    !in_catalog && (StoryKind::of_element(element.name()).is_some() || element.is("Phase"))
+}

@@ -1,0 +1,43 @@
+use foldhash::HashMap;
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::references::quoted;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_naming_entity_selection_clash",
+    uids: &["qcbus.dev:xosc:1.0.0:naming.entity_selection_clash"],
+    after: super::READABLE,
+    page: include_str!("naming_entity_selection_clash.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let entities = scenario.entities();
+    let objects = entities.objects().iter();
+    let objects = objects.map(|object| (object.name(), object.element(scenario)));
+    let selections = entities.selections().iter();
+    let selections = selections.map(|selection| (selection.name(), selection.element(scenario)));
+    let mut first: HashMap<&str, Element<'_, '_>> = HashMap::default();
+    for (name, element) in objects.chain(selections) {
+        let known = *first.entry(name).or_insert(element);
+        if known == element || is_said_elsewhere(known, element) {
+            continue;
+        }
+        let text = format!(
+            "the name {} already belongs to a `{}`; all entities and selections share one set of names",
+            quoted(element, "name", name),
+            known.name()
+        );
+        found
+            .about(element, "name", text)
+            .at(known.node(), "who has the name already");
+    }
+}
+
+/// Equal names of siblings are found by comparing what is written.
+fn is_said_elsewhere(one: Element<'_, '_>, other: Element<'_, '_>) -> bool {
+    one.node().parent() == other.node().parent() && one.written("name") == other.written("name")
+}

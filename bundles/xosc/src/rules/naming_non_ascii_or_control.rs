@@ -1,0 +1,36 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::names;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_naming_non_ascii_or_control",
+    uids: &["qcbus.dev:xosc:1.0.0:naming.non_ascii_or_control"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("naming_non_ascii_or_control.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for (element, name) in names::keys(scenario) {
+        let Some(sign) = name.chars().find(|sign| is_invisible(*sign)) else {
+            continue;
+        };
+        let shown: String = name.chars().filter(|sign| !is_invisible(*sign)).collect();
+        let text = format!(
+            "the name `{shown}` has the invisible character U+{:04X} in it; whoever types the name does not \
+             meet it",
+            u32::from(sign)
+        );
+        found.about(element, "name", text);
+    }
+}
+
+/// Control characters, blanks that look like a space or like nothing, marks of direction.
+fn is_invisible(sign: char) -> bool {
+    sign.is_control()
+        || matches!(sign, '\u{a0}' | '\u{ad}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202f}' | '\u{2060}' | '\u{feff}')
+}

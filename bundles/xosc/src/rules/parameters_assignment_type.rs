@@ -1,0 +1,60 @@
+use qcbus_openscenario::{Declared, Scenario};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::{allowed_values, catalogs};
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_parameters_assignment_type",
+    uids: &["qcbus.dev:xosc:1.0.0:parameters.assignment_type"],
+    after: super::READABLE,
+    page: include_str!("parameters_assignment_type.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for (assignment, _, text) in scenario.assignment_faults() {
+        let name = assignment.written("parameterRef").unwrap_or("");
+        let text = format!("the value for `{name}` does not fit: {text}");
+        found.about(assignment, "value", text);
+    }
+    constraints(scenario, found);
+}
+
+/// Values that have the type, and are none that the entry allows.
+fn constraints(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for (reference, _) in catalogs::references(scenario) {
+        let Some(entry) = scenario.entry(reference) else {
+            continue;
+        };
+        let block = reference.child("ParameterAssignments");
+        let assignments = block
+            .into_iter()
+            .flat_map(|block| block.children_named("ParameterAssignment"));
+        for assignment in assignments {
+            let name = assignment.written("parameterRef").unwrap_or("");
+            let name = name.strip_prefix('$').unwrap_or(name);
+            let mut own = entry.declarations().iter();
+            let Some(declaration) = own.find(|one| one.name == name) else {
+                continue;
+            };
+            let Declared::Value(value) = &declaration.declared else {
+                continue;
+            };
+            let node = entry
+                .descendants_named("ParameterDeclaration")
+                .find(|one| one.node() == declaration.node);
+            let Some(allowed) = node.and_then(|node| allowed_values::violated(node, value)) else {
+                continue;
+            };
+            let text = format!(
+                "the value for `{name}` is `{}`, but the entry allows only {allowed}",
+                value.text()
+            );
+            found
+                .about(assignment, "value", text)
+                .at(declaration.node, "the declaration");
+        }
+    }
+}

@@ -1,0 +1,58 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::catalogs;
+use crate::families::references::hint;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_parameters_assignment_unknown",
+    uids: &["qcbus.dev:xosc:1.0.0:parameters.assignment_unknown"],
+    after: super::READABLE,
+    page: include_str!("parameters_assignment_unknown.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for (reference, _) in catalogs::references(scenario) {
+        let Some(entry) = scenario.entry(reference) else {
+            continue;
+        };
+        let block = reference.child("ParameterAssignments");
+        let assignments = block
+            .into_iter()
+            .flat_map(|block| block.children_named("ParameterAssignment"));
+        for assignment in assignments {
+            let Some(written) = assignment.written("parameterRef") else {
+                continue;
+            };
+            let name = written.strip_prefix('$').unwrap_or(written);
+            let mut names = entry.declarations().iter().map(|one| one.name);
+            if !names.any(|declared| declared == name) {
+                let names = entry.declarations().iter().map(|one| one.name);
+                let near = hint(name, names.clone());
+                let what = match entry.declarations().len() {
+                    0 => "; it declares none".to_owned(),
+                    _ if near.is_empty() => format!("; it declares {}", catalogs::listed(names)),
+                    _ => near,
+                };
+                let text = format!(
+                    "the entry `{}` has no parameter `{name}`{what}",
+                    reference.text("entryName").unwrap_or_default()
+                );
+                found
+                    .about(assignment, "parameterRef", text)
+                    .at(entry.node(), "the entry");
+            } else if written != name {
+                let text = format!(
+                    "`parameterRef` names the parameter `{name}`, it does not use its value: the name stands \
+                     there without `$`"
+                );
+                found
+                    .about(assignment, "parameterRef", text)
+                    .level(Level::Warning);
+            }
+        }
+    }
+}

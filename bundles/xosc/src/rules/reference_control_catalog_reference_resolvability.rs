@@ -1,0 +1,107 @@
+use qcbus_openscenario::{CatalogKind, Element, Resolution, Scenario};
+use qcbus_sdk::{Backport, Level, Rule, Sink};
+
+use crate::families::catalogs::{self, Fault, Once};
+use crate::families::references::{hint, quoted};
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_reference_control_catalog_reference_resolvability",
+    uids: &["asam.net:xosc:1.0.0:reference_control.catalog_reference_resolvability"],
+    backport: Backport::None,
+    after: super::READABLE,
+    page: include_str!("reference_control_catalog_reference_resolvability.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let faults = catalogs::faults(scenario, found.subject());
+    let has = |kinds: &[CatalogKind], wanted: &[Fault]| {
+        let mut all = kinds.iter().filter_map(|kind| faults.get(kind));
+        all.any(|fault| wanted.contains(fault))
+    };
+    let mut no_catalog = Once::new();
+    let mut no_entry = Once::new();
+    for (reference, to) in catalogs::references(scenario) {
+        let kinds = catalogs::kinds(reference);
+        let names = (reference.text("catalogName"), reference.text("entryName"));
+        match to {
+            // That nothing is in the directory is one fault, and said there.
+            Resolution::NoCatalog if !has(kinds, &[Fault::Said, Fault::Empty]) => {
+                no_catalog.add((names.0, kinds), reference);
+            }
+            Resolution::NoEntry { .. } => no_entry.add((names, kinds), reference),
+            _ => {}
+        }
+    }
+    for (reference, count) in no_catalog.each() {
+        let open = has(catalogs::kinds(reference), &[Fault::NoPath]);
+        catalog(reference, count, open, found);
+    }
+    for (reference, count) in no_entry.each() {
+        entry(reference, count, found);
+    }
+}
+
+fn catalog(reference: Element<'_, '_>, count: u32, open: bool, found: &mut Sink<'_>) {
+    let Some(name) = reference.text("catalogName") else {
+        return;
+    };
+    let scenario = reference.scenario();
+    let mut names: Vec<&str> = scenario
+        .catalogs()
+        .filter_map(|(_, catalog)| catalog.attr("name"))
+        .collect();
+    names.sort_unstable();
+    names.dedup();
+    let by_file = scenario.catalogs().find(|(_, catalog)| {
+        let document = catalog.document();
+        catalogs::stem(document.path()) == name
+    });
+    let mut text = format!(
+        "there is no catalog {} in the catalog locations",
+        quoted(reference, "catalogName", &name)
+    );
+    if let Some((_, catalog)) = by_file {
+        text.push_str(&format!(
+            "; the file of this name has the catalog `{}`, and the name in the file counts",
+            catalog.attr("name").unwrap_or("")
+        ));
+    } else if open {
+        text.push_str("; the path of the location is empty, and which files are meant by that is up to the simulator");
+    } else if names.is_empty() {
+        text.push_str(", of which no file is a catalog");
+    } else {
+        text.push_str(&hint(&name, names.iter().copied()));
+    }
+    text.push_str(&catalogs::further(count));
+    let finding = found.about(reference, "catalogName", text);
+    if by_file.is_some() || open {
+        finding.level(Level::Warning);
+    }
+}
+
+fn entry(reference: Element<'_, '_>, count: u32, found: &mut Sink<'_>) {
+    let (Some(name), Resolution::NoEntry { catalog }) = (
+        reference.text("entryName"),
+        reference.scenario().resolution(reference),
+    ) else {
+        return;
+    };
+    let kinds = catalogs::kinds(reference);
+    let fitting = catalog
+        .children()
+        .filter(|child| kinds.iter().any(|kind| child.is(kind.element())));
+    let names: Vec<&str> = fitting.filter_map(|child| child.attr("name")).collect();
+    let mut text = format!(
+        "the catalog `{}` has no entry {}{}",
+        catalog.attr("name").unwrap_or(""),
+        quoted(reference, "entryName", &name),
+        hint(&name, names.iter().copied())
+    );
+    text.push_str(&catalogs::further(count));
+    found
+        .about(reference, "entryName", text)
+        .at(*catalog, "the catalog");
+}

@@ -1,0 +1,52 @@
+use qcbus_openscenario::{CatalogKind, Resolution, Scenario};
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::families::catalogs::{self, Fault};
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_reference_control_catalogs_referenced_by_directory",
+    uids: &["asam.net:xosc:1.0.0:reference_control.catalogs_referenced_by_directory"],
+    after: super::READABLE,
+    page: include_str!("reference_control_catalogs_referenced_by_directory.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for kind in CatalogKind::ALL {
+        let fault = catalogs::fault_of(scenario, found.subject(), kind);
+        let Some((fault, directory)) = fault.zip(scenario.catalog_directory(kind)) else {
+            continue;
+        };
+        let path = directory.text("path").unwrap_or_default();
+        let place = Place::attribute_or_node(directory.node(), "path");
+        let mut uses = catalogs::references(scenario);
+        match fault {
+            Fault::File => {
+                let used = uses.any(|(reference, to)| catalogs::is_use(reference, to, kind));
+                let text = format!(
+                    "`{path}` is a file, but a location of catalogs is the directory that they are in"
+                );
+                let level = if used { Level::Error } else { Level::Warning };
+                found.issue(place, text).level(level);
+            }
+            Fault::Empty => {
+                let user = uses.find(|(reference, to)| {
+                    matches!(to, Resolution::NoCatalog)
+                        && catalogs::kinds(*reference).contains(&kind)
+                });
+                if let Some((user, _)) = user {
+                    let name = user.text("catalogName").unwrap_or_default();
+                    let text = format!(
+                        "there is no `.xosc` file in `{path}`, but the scenario refers to the catalog `{name}`"
+                    );
+                    found
+                        .issue(place, text)
+                        .at(user.node(), "a reference to it");
+                }
+            }
+            Fault::Said | Fault::NoPath => {}
+        }
+    }
+}

@@ -1,0 +1,40 @@
+use foldhash::HashMap;
+use qcbus_document::Node;
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Backport, Level, Rule, Sink};
+
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_reference_control_uniquely_resolvable_entity_references",
+    uids: &["asam.net:xosc:1.2.0:reference_control.uniquely_resolvable_entity_references"],
+    level: Level::Warning,
+    versions: "1.2.0..",
+    backport: Backport::Alike { since: "" },
+    after: super::READABLE,
+    page: include_str!("reference_control_uniquely_resolvable_entity_references.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for catalog in scenario.elements("Catalog") {
+        let mut first: HashMap<&str, Node<'_>> = HashMap::default();
+        for entry in catalog.node().children() {
+            let Some(name) = entry.attr("name") else {
+                continue;
+            };
+            let known = *first.entry(name).or_insert(entry);
+            if known != entry {
+                let text = format!(
+                    "the catalog already has an entry `{name}`, a `{}`; a reference by this name leads to \
+                     one of them, and which is up to the simulator",
+                    known.name()
+                );
+                found
+                    .issue(entry, text)
+                    .at(known, "the first entry of this name");
+            }
+        }
+    }
+}
