@@ -8,6 +8,7 @@ pub(crate) mod actions;
 pub(crate) mod claims;
 pub(crate) mod allowed_values;
 pub(crate) mod catalogs;
+pub(crate) mod distributions;
 pub(crate) mod names;
 pub(crate) mod profiles;
 pub(crate) mod ranges;

@@ -22,6 +22,11 @@ mod catalogs_mixed_document;
 mod catalogs_path_escape;
 mod catalogs_unused_location;
 mod catalogs_version_mismatch;
+mod distribution_parameter_known;
+mod distribution_range_valid;
+mod distribution_scenario_file;
+mod distribution_values_satisfy_constraints;
+mod distribution_weights;
 mod naming_duplicate_property;
 mod naming_empty_name;
 mod naming_entity_selection_clash;
@@ -307,4 +312,9 @@ pub static RULES: &[&dyn AnyRule] = &[
     &naming_duplicate_property::RULE,
     &naming_storyboard_ambiguous::RULE,
     &naming_non_ascii_or_control::RULE,
+    &distribution_scenario_file::RULE,
+    &distribution_parameter_known::RULE,
+    &distribution_range_valid::RULE,
+    &distribution_weights::RULE,
+    &distribution_values_satisfy_constraints::RULE,
 ];

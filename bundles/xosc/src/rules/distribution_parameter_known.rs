@@ -1,0 +1,54 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::families::distributions::{self, SOURCES};
+use crate::families::references::hint;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_distribution_parameter_known",
+    uids: &["qcbus.dev:xosc:1.0.0:distribution.parameter_known"],
+    versions: "1.1.0..",
+    after: super::READABLE,
+    page: include_str!("distribution_parameter_known.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let Some(target) = distributions::target(scenario, found.subject()) else {
+        return;
+    };
+    for (element, attribute) in SOURCES {
+        for source in scenario.elements(element) {
+            let Some(name) = distributions::parameter_name(source, attribute) else {
+                continue;
+            };
+            let place = Place::attribute_or_node(source.node(), attribute);
+            if distributions::declaration(&target, name).is_some() {
+                if source.written(attribute) != Some(name) {
+                    let text = format!(
+                        "the parameter `{name}` is named here, so there is no `$` before it"
+                    );
+                    found.issue(place, text).level(Level::Warning);
+                }
+                continue;
+            }
+            let names = target.root().declarations().iter().map(|one| one.name);
+            let further_in = target.elements("ParameterDeclaration").find(|one| {
+                one.written("name")
+                    .is_some_and(|own| own.strip_prefix('$').unwrap_or(own) == name)
+            });
+            let why = match further_in {
+                Some(_) => "; one further in is not set from outside".to_owned(),
+                None => hint(name, names),
+            };
+            let text = format!("the scenario itself declares no parameter `{name}`{why}");
+            let finding = found.issue(place, text);
+            match further_in {
+                Some(one) => finding.at(one.node(), "the declaration further in"),
+                None => finding.at(target.root().node(), "the scenario"),
+            };
+        }
+    }
+}

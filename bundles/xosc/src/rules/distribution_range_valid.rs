@@ -1,0 +1,112 @@
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Level, Param, Rule, Sink};
+
+use crate::families::distributions;
+use crate::families::references::quoted;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_distribution_range_valid",
+    uids: &["qcbus.dev:xosc:1.0.0:distribution.range_valid"],
+    versions: "1.1.0..",
+    after: super::READABLE,
+    params: &[MOST],
+    page: include_str!("distribution_range_valid.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const MOST: Param = Param::number(
+    "most",
+    1e6,
+    "",
+    "more scenarios than this from one distribution are taken for a mistake",
+);
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for range in scenario.elements("Range") {
+        let inside = range
+            .ancestors()
+            .any(|around| around.is("ParameterValueDistribution"));
+        let limits = (range.double("lowerLimit"), range.double("upperLimit"));
+        if let (true, (Some(lower), Some(upper))) = (inside, limits)
+            && lower > upper
+        {
+            let text = format!(
+                "the range begins at {lower} and ends at {upper}; the lower limit must not be above the upper"
+            );
+            found.about(range, "lowerLimit", text);
+        }
+    }
+    for distribution in scenario.elements("DistributionRange") {
+        let step = distribution.number("stepWidth");
+        if let Some(step) = step.filter(|step| *step <= 0.0) {
+            let text = format!(
+                "the width of a step is {}, but must be above 0: with it the range never ends",
+                quoted(distribution, "stepWidth", &step.to_string())
+            );
+            found.about(distribution, "stepWidth", text);
+        }
+    }
+    for bins in scenario.elements("Histogram") {
+        overlap(bins, found);
+    }
+    for all in scenario.elements("Deterministic") {
+        count(all, found);
+    }
+}
+
+/// Bins of a histogram that share values.
+fn overlap(histogram: Element<'_, '_>, found: &mut Sink<'_>) {
+    let mut bins: Vec<_> = histogram
+        .children_named("Bin")
+        .filter_map(|bin| {
+            let limits = distributions::limits(bin.child("Range")?)?;
+            Some((limits, bin))
+        })
+        .collect();
+    bins.sort_by(|((one, _), _), ((other, _), _)| one.total_cmp(other));
+    for pair in bins.windows(2) {
+        let [((_, end), before), ((start, _), bin)] = pair else {
+            continue;
+        };
+        if start < end {
+            let text = format!(
+                "the bin begins at {start}, where another goes on to {end}; bins should not share values"
+            );
+            found
+                .issue(bin.node(), text)
+                .level(Level::Warning)
+                .at(before.node(), "the other bin");
+        }
+    }
+}
+
+/// Every value of one parameter is combined with every value of the others.
+fn count(all: Element<'_, '_>, found: &mut Sink<'_>) {
+    let single = all.children_named("DeterministicSingleParameterDistribution");
+    let singles = single.map(|one| match one.child("DistributionRange") {
+        Some(range) => distributions::steps(range).unwrap_or(1.0),
+        None => one
+            .path(&["DistributionSet"])
+            .map_or(1.0, |set| number_of(set, "Element")),
+    });
+    let multi = all.children_named("DeterministicMultiParameterDistribution");
+    let multis = multi.map(|one| {
+        one.child("ValueSetDistribution")
+            .map_or(1.0, |sets| number_of(sets, "ParameterValueSet"))
+    });
+    let total: f64 = singles.chain(multis).product();
+    let most = found.number(&MOST);
+    if total > most {
+        let text = format!(
+            "the values combine to {total:.0} scenarios, more than the {most:.0} that somebody would want to run"
+        );
+        found.issue(all.node(), text).level(Level::Warning);
+    }
+}
+
+fn number_of(element: Element<'_, '_>, name: &str) -> f64 {
+    let count = u32::try_from(element.children_named(name).count()).unwrap_or(u32::MAX);
+    f64::from(count.max(1))
+}

@@ -1,0 +1,73 @@
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::references::quoted;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_distribution_weights",
+    uids: &["qcbus.dev:xosc:1.0.0:distribution.weights"],
+    versions: "1.1.0..",
+    after: super::READABLE,
+    page: include_str!("distribution_weights.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// An attribute that says how a distribution is shaped: element, attribute, the values that it may have
+/// in words, and whether it may be 0.
+const SHAPES: &[(&str, &str, &str, bool)] = &[
+    ("NormalDistribution", "variance", "0 or more", true),
+    ("LogNormalDistribution", "variance", "0 or more", true),
+    ("PoissonDistribution", "expectedValue", "above 0", false),
+    ("Stochastic", "numberOfTestRuns", "1 or more", false),
+];
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for (element, attribute, allowed, zero) in SHAPES {
+        for one in scenario.elements(element) {
+            let value = one.number(attribute);
+            if let Some(value) = value.filter(|value| *value < 0.0 || (*value == 0.0 && !zero)) {
+                let text = format!(
+                    "`{attribute}` of `{element}` is {}, but must be {allowed}",
+                    quoted(one, attribute, &value.to_string())
+                );
+                found.about(one, attribute, text);
+            } else if value == Some(0.0) {
+                let text = format!(
+                    "`{attribute}` of `{element}` is 0, so all values are the same; is a distribution meant?"
+                );
+                found.about(one, attribute, text).level(Level::Warning);
+            }
+        }
+    }
+    for (set, part) in [
+        ("ProbabilityDistributionSet", "Element"),
+        ("Histogram", "Bin"),
+    ] {
+        for set in scenario.elements(set) {
+            weights(set, part, found);
+        }
+    }
+}
+
+fn weights(set: Element<'_, '_>, part: &str, found: &mut Sink<'_>) {
+    let mut sum = Some(0.0);
+    let mut negative = false;
+    for one in set.children_named(part) {
+        let weight = one.number("weight");
+        sum = sum.zip(weight).map(|(sum, weight)| sum + weight);
+        if let Some(weight) = weight.filter(|weight| *weight < 0.0) {
+            negative = true;
+            let text = format!(
+                "the weight is {}, but must not be negative: it is how often the value is drawn",
+                quoted(one, "weight", &weight.to_string())
+            );
+            found.about(one, "weight", text);
+        }
+    }
+    if sum == Some(0.0) && !negative && set.child(part).is_some() {
+        let text = "all weights are 0, so nothing can be drawn; at least one must be above 0";
+        found.issue(set.node(), text);
+    }
+}
