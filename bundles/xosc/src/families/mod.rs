@@ -15,4 +15,7 @@ pub(crate) mod ranges;
 pub(crate) mod references;
 pub(crate) mod states;
 pub(crate) mod triggers;
+pub(crate) mod placement;
+pub(crate) mod references;
+pub(crate) mod spawn;
 pub(crate) mod values;

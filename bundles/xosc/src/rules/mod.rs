@@ -27,6 +27,17 @@ mod distribution_range_valid;
 mod distribution_scenario_file;
 mod distribution_values_satisfy_constraints;
 mod distribution_weights;
+mod entities_axle_geometry;
+mod entities_bounding_box_positive;
+mod entities_none;
+mod entities_not_positioned;
+mod entities_overlapping_spawn;
+mod entities_performance_plausible;
+mod entities_selection_members;
+mod entities_selection_not_allowed;
+mod entities_trailer_reference;
+mod entities_unused;
+mod general_references_to_scenario_object;
 mod naming_duplicate_property;
 mod naming_empty_name;
 mod naming_entity_selection_clash;
@@ -66,6 +77,9 @@ mod trigger_simulation_time_equal;
 mod trigger_time_unordered;
 mod trigger_traveled_distance_stopped;
 mod reference_control_uniquely_resolvable_entity_references;
+mod references_init_order;
+mod references_self_reference;
+mod scenario_logic_controller_activation;
 mod xml_fileheader_is_present;
 mod xml_root_tag_is_openscenario;
 mod xml_valid_schema;
@@ -317,4 +331,18 @@ pub static RULES: &[&dyn AnyRule] = &[
     &distribution_range_valid::RULE,
     &distribution_weights::RULE,
     &distribution_values_satisfy_constraints::RULE,
+    &entities_none::RULE,
+    &entities_not_positioned::RULE,
+    &entities_unused::RULE,
+    &entities_selection_members::RULE,
+    &entities_selection_not_allowed::RULE,
+    &entities_bounding_box_positive::RULE,
+    &entities_axle_geometry::RULE,
+    &entities_performance_plausible::RULE,
+    &entities_trailer_reference::RULE,
+    &entities_overlapping_spawn::RULE,
+    &general_references_to_scenario_object::RULE,
+    &references_self_reference::RULE,
+    &references_init_order::RULE,
+    &scenario_logic_controller_activation::RULE,
 ];

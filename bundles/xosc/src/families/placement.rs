@@ -1,0 +1,104 @@
+//! Where entities begin: what places them, and in which order.
+
+use foldhash::{HashMap, HashSet};
+use qcbus_document::Node;
+use qcbus_openscenario::{Actors, Element, Scenario};
+
+/// A `TeleportAction` of `Init` for one entity.
+pub(crate) struct Start<'m, 'd> {
+    /// The entity.
+    pub(crate) name: String,
+    /// `WorldPosition` or the like.
+    pub(crate) position: Element<'m, 'd>,
+}
+
+/// The teleports of `Init` in document order, those of a selection for each of its members.
+pub(crate) fn starts<'m, 'd>(scenario: &'m Scenario<'d>) -> Vec<Start<'m, 'd>> {
+    let mut starts = Vec::new();
+    let actions = scenario.root().path(&["Storyboard", "Init", "Actions"]);
+    let privates = actions
+        .into_iter()
+        .flat_map(|actions| actions.children_named("Private"));
+    for private in privates {
+        let name = private.text("entityRef");
+        let Some(entities) = name.and_then(|name| scenario.entities().expand(&name)) else {
+            continue;
+        };
+        for action in private.children_named("PrivateAction") {
+            let position = action.path(&["TeleportAction", "Position"]);
+            let Some(position) = position.and_then(|position| position.children().next()) else {
+                continue;
+            };
+            starts.extend(entities.iter().map(|entity| Start {
+                name: entity.name().to_owned(),
+                position,
+            }));
+        }
+    }
+    starts
+}
+
+/// The names of all entities that something places at some time; `None` when that is not known.
+pub(crate) fn placed(scenario: &Scenario<'_>) -> Option<HashSet<String>> {
+    let mut placed = trailers(scenario)?;
+    let init = scenario.root().path(&["Storyboard", "Init", "Actions"]);
+    // What a simulator makes of an action of its own nobody else knows.
+    let is_open = init.is_some_and(|init| init.child("UserDefinedAction").is_some());
+    if is_open || !scenario.storyboard().is_complete() {
+        return None;
+    }
+    for action in ["TeleportAction", "FollowTrajectoryAction"] {
+        for action in scenario.elements_everywhere(action) {
+            for name in Actors::of(action)?.names()? {
+                placed.extend(expanded(scenario, &name)?);
+            }
+        }
+    }
+    for action in scenario.elements_everywhere("AddEntityAction") {
+        let name = action.parent()?.text("entityRef")?;
+        placed.extend(expanded(scenario, &name)?);
+    }
+    Some(placed)
+}
+
+/// What is drawn by another vehicle and stands behind it; `None` when that is not known.
+pub(crate) fn trailers(scenario: &Scenario<'_>) -> Option<HashSet<String>> {
+    let mut trailers: HashSet<String> = HashSet::default();
+    for reference in scenario.elements_everywhere("TrailerRef") {
+        trailers.insert(reference.text("entityRef")?.into_owned());
+    }
+    for action in scenario.elements_everywhere("ConnectTrailerAction") {
+        trailers.insert(action.text("trailerRef")?.into_owned());
+    }
+    let entities = scenario.entities().objects().iter();
+    let within = entities.filter(|entity| entity.element(scenario).is("Trailer"));
+    trailers.extend(within.map(|entity| entity.name().to_owned()));
+    Some(trailers)
+}
+
+/// The names of the scenario objects behind a name. One that leads nowhere is said elsewhere.
+fn expanded(scenario: &Scenario<'_>, name: &str) -> Option<Vec<String>> {
+    if !scenario.entities().contains(name) {
+        return Some(Vec::new());
+    }
+    let objects = scenario.entities().expand(name)?;
+    Some(
+        objects
+            .iter()
+            .map(|object| object.name().to_owned())
+            .collect(),
+    )
+}
+
+/// Elements of which each place in a file counts once, however many references lead to it: for what
+/// is the same with all of them.
+pub(crate) fn once<'m, 'd: 'm>(
+    elements: impl Iterator<Item = Element<'m, 'd>>,
+) -> impl Iterator<Item = Element<'m, 'd>> {
+    let mut seen: HashMap<(*const u8, u32), Node<'d>> = HashMap::default();
+    elements.filter(move |element| {
+        let node = element.node();
+        let key = (node.document().path().as_ptr(), node.offset());
+        seen.insert(key, node).is_none()
+    })
+}

@@ -1,0 +1,77 @@
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Level, Param, Rule, Sink};
+
+use crate::families::placement;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_entities_axle_geometry",
+    uids: &["qcbus.dev:xosc:1.0.0:entities.axle_geometry"],
+    level: Level::Warning,
+    after: super::READABLE,
+    params: &[WHEELBASE, WHEEL],
+    page: include_str!("entities_axle_geometry.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const WHEELBASE: Param = Param::number(
+    "wheelbase",
+    0.3,
+    "m",
+    "the front axle of a car, van, truck or bus is at least this far before the rear axle",
+);
+const WHEEL: Param = Param::number(
+    "wheel",
+    3.0,
+    "m",
+    "a wheel of more than this diameter is taken for a mistake",
+);
+
+/// Vehicles that have a front axle and a rear axle that are two.
+const TWO_AXLED: [&str; 4] = ["car", "van", "truck", "bus"];
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let (least, most) = (found.number(&WHEELBASE), found.number(&WHEEL));
+    for vehicle in placement::once(scenario.elements_everywhere("Vehicle")) {
+        let Some(axles) = vehicle.child("Axles") else {
+            continue;
+        };
+        let category = vehicle.word("vehicleCategory");
+        if category.is_some_and(|category| TWO_AXLED.contains(&&*category)) {
+            wheelbase(axles, least, found);
+        }
+        for axle in axles.children() {
+            let Some(diameter) = axle.number("wheelDiameter").filter(|one| *one > most) else {
+                continue;
+            };
+            let text = format!(
+                "the wheels are {diameter} m high; no wheel of a vehicle on the road is more than {most} m"
+            );
+            found.about(axle, "wheelDiameter", text);
+        }
+    }
+}
+
+fn wheelbase(axles: Element<'_, '_>, least: f64, found: &mut Sink<'_>) {
+    let (Some(front), Some(rear)) = (axles.child("FrontAxle"), axles.child("RearAxle")) else {
+        return;
+    };
+    let (Some(x), Some(rear_x)) = (front.number("positionX"), rear.number("positionX")) else {
+        return;
+    };
+    if x - rear_x >= least {
+        return;
+    }
+    let text = if x <= rear_x {
+        format!("the front axle at x = {x} m is not before the rear axle at x = {rear_x} m")
+    } else {
+        format!(
+            "the front axle is only {:.2} m before the rear axle; a model of steering divides by that",
+            x - rear_x
+        )
+    };
+    found
+        .about(front, "positionX", text)
+        .at(rear.node(), "the rear axle");
+}

@@ -1,0 +1,37 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::{catalogs, placement};
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_entities_bounding_box_positive",
+    uids: &["qcbus.dev:xosc:1.0.0:entities.bounding_box_positive"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("entities_bounding_box_positive.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for kind in ["Vehicle", "Pedestrian"] {
+        for object in placement::once(scenario.elements_everywhere(kind)) {
+            let Some(dimensions) = object.path(&["BoundingBox", "Dimensions"]) else {
+                continue;
+            };
+            let names = ["length", "width", "height"].into_iter();
+            let flat: Vec<&str> = names
+                .filter(|name| dimensions.number(name) == Some(0.0))
+                .collect();
+            let Some(first) = flat.first() else {
+                continue;
+            };
+            let text = format!(
+                "the bounding box of this `{kind}` is 0 in {}; distances and collisions are measured by it",
+                catalogs::listed(flat.iter().copied())
+            );
+            found.about(dimensions, first, text);
+        }
+    }
+}

@@ -1,0 +1,31 @@
+use qcbus_openscenario::{Form, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_entities_none",
+    uids: &["qcbus.dev:xosc:1.0.0:entities.none"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("entities_none.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let Some(block) = scenario.root().child("Entities") else {
+        return;
+    };
+    // Traffic may come from elsewhere.
+    let has_traffic = scenario
+        .elements_everywhere("TrafficAction")
+        .next()
+        .is_some();
+    if scenario.form() == Form::Scenario && block.child("ScenarioObject").is_none() && !has_traffic
+    {
+        let text =
+            "the scenario has no `ScenarioObject` and no traffic, so nobody takes part in it";
+        found.issue(block.node(), text);
+    }
+}

@@ -1,0 +1,35 @@
+use qcbus_openscenario::{EntityKind, Form, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::placement;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_entities_not_positioned",
+    uids: &["qcbus.dev:xosc:1.0.0:entities.not_positioned"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("entities_not_positioned.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    if scenario.form() != Form::Scenario || scenario.root().child("Storyboard").is_none() {
+        return;
+    }
+    let Some(placed) = placement::placed(scenario) else {
+        return;
+    };
+    for entity in scenario.entities().objects() {
+        let must_be = matches!(entity.kind(), EntityKind::Vehicle | EntityKind::Pedestrian);
+        if must_be && !placed.contains(entity.name()) {
+            let text = format!(
+                "nothing places the entity `{}`: no `TeleportAction`, no trajectory and no \
+                 `AddEntityAction` is for it, and where it begins is up to the simulator",
+                entity.name()
+            );
+            found.about(entity.element(scenario), "name", text);
+        }
+    }
+}

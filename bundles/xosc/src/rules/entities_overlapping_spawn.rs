@@ -1,0 +1,38 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Param, Rule, Sink};
+
+use crate::families::spawn;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_entities_overlapping_spawn",
+    uids: &["qcbus.dev:xosc:1.0.0:entities.overlapping_spawn"],
+    level: Level::Warning,
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("entities_overlapping_spawn.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    0.1,
+    "m",
+    "bounding boxes that reach less far into each other only touch",
+);
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let tolerance = found.number(&TOLERANCE);
+    let bodies = spawn::bodies(scenario);
+    for (one, other) in spawn::overlapping(&bodies, tolerance) {
+        let text = format!(
+            "`{}` begins within `{}`: their bounding boxes overlap, so the run begins with a collision",
+            one.name, other.name
+        );
+        found.about(one.position, "", text).at(
+            other.position.node(),
+            format!("where `{}` begins", other.name),
+        );
+    }
+}

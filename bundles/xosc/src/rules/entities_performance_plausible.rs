@@ -1,0 +1,57 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Param, Rule, Sink};
+
+use crate::families::placement;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_entities_performance_plausible",
+    uids: &["qcbus.dev:xosc:1.0.0:entities.performance_plausible"],
+    level: Level::Information,
+    after: super::READABLE,
+    params: &[SPEED, ACCELERATION],
+    page: include_str!("entities_performance_plausible.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const SPEED: Param = Param::number(
+    "speed",
+    150.0,
+    "m/s",
+    "a greater `maxSpeed` is taken for km/h or for a placeholder",
+);
+const ACCELERATION: Param = Param::number(
+    "acceleration",
+    20.0,
+    "m/s²",
+    "a greater `maxAcceleration` or `maxDeceleration` is taken for a placeholder",
+);
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let (speed, acceleration) = (found.number(&SPEED), found.number(&ACCELERATION));
+    let limits = [
+        ("maxSpeed", speed, "m/s"),
+        ("maxAcceleration", acceleration, "m/s²"),
+        ("maxDeceleration", acceleration, "m/s²"),
+    ];
+    for performance in placement::once(scenario.elements_everywhere("Performance")) {
+        let above = limits.iter().filter_map(|(name, most, unit)| {
+            let value = performance.number(name).filter(|value| value > most)?;
+            Some((
+                *name,
+                format!("`{name}` is {value} {unit}, more than {most} {unit}"),
+            ))
+        });
+        let above: Vec<(&str, String)> = above.collect();
+        let Some((first, _)) = above.first() else {
+            continue;
+        };
+        let texts: Vec<&str> = above.iter().map(|(_, text)| text.as_str()).collect();
+        let text = format!(
+            "{}; no road vehicle does that, so it limits nothing",
+            texts.join(", and ")
+        );
+        found.about(performance, first, text);
+    }
+}

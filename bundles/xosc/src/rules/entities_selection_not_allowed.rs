@@ -1,0 +1,88 @@
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::references::quoted;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_entities_selection_not_allowed",
+    uids: &["qcbus.dev:xosc:1.0.0:entities.selection_not_allowed"],
+    versions: "1.1.0..",
+    after: super::READABLE,
+    page: include_str!("entities_selection_not_allowed.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// References to one entity, after the standard's table of entity type constraints.
+const SINGLE: &[(&str, &str)] = &[
+    ("CentralObject", "entityRef"),
+    ("LateralDistanceAction", "entityRef"),
+    ("LongitudinalDistanceAction", "entityRef"),
+    ("FromCurrentEntity", "entityRef"),
+    ("RelativeAngleCondition", "entityRef"),
+    ("RelativeDistanceCondition", "entityRef"),
+    ("RelativeLanePosition", "entityRef"),
+    ("RelativeObjectPosition", "entityRef"),
+    ("RelativeRoadPosition", "entityRef"),
+    ("RelativeSpeedCondition", "entityRef"),
+    ("RelativeTargetLane", "entityRef"),
+    ("RelativeTargetLaneOffset", "entityRef"),
+    ("RelativeTargetSpeed", "entityRef"),
+    ("RelativeWorldPosition", "entityRef"),
+    ("SynchronizeAction", "masterEntityRef"),
+    ("TimeHeadwayCondition", "entityRef"),
+    ("TrailerRef", "entityRef"),
+    ("ConnectTrailerAction", "trailerRef"),
+];
+
+/// Where an `EntityRef` is a reference to one entity.
+const AROUND: [&str; 2] = ["CollisionCondition", "TimeToCollisionConditionTarget"];
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    if scenario.entities().selections().is_empty() {
+        return;
+    }
+    for (element, attribute) in SINGLE {
+        for reference in scenario.elements_everywhere(element) {
+            look(reference, attribute, found);
+        }
+    }
+    for reference in scenario.elements_everywhere("EntityRef") {
+        let parent = reference.node().parent().map_or("", |parent| parent.name());
+        if AROUND.contains(&parent) {
+            look(reference, "entityRef", found);
+        }
+    }
+}
+
+fn look(reference: Element<'_, '_>, attribute: &str, found: &mut Sink<'_>) {
+    let scenario = reference.scenario();
+    let Some(name) = reference.text(attribute) else {
+        return;
+    };
+    let Some(selection) = scenario.entities().selection(&name) else {
+        return;
+    };
+    if scenario.entities().object(&name).is_some() {
+        return;
+    }
+    // Of one member it is clear at least who is meant.
+    let clear = scenario
+        .entities()
+        .expand(&name)
+        .is_some_and(|members| members.len() == 1);
+    let level = if clear { Level::Warning } else { Level::Error };
+    let what = match reference.name() {
+        "EntityRef" => reference.node().parent().map_or("", |parent| parent.name()),
+        name => name,
+    };
+    let text = format!(
+        "`{what}` refers to the selection {}, but needs one entity",
+        quoted(reference, attribute, &name)
+    );
+    found
+        .about(reference, attribute, text)
+        .level(level)
+        .at(selection.element(scenario).node(), "the selection");
+}

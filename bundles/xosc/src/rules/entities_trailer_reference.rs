@@ -1,0 +1,169 @@
+use foldhash::HashMap;
+use qcbus_openscenario::{Actors, Element, Entity, EntityKind, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::references::quoted;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_entities_trailer_reference",
+    uids: &["qcbus.dev:xosc:1.0.0:entities.trailer_reference"],
+    versions: "1.3.0..",
+    after: super::READABLE,
+    page: include_str!("entities_trailer_reference.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    // Who draws whom from the beginning, and the element that says so.
+    let mut drawn: HashMap<&str, (&str, Element<'_, '_>)> = HashMap::default();
+    for towing in scenario.entities().objects() {
+        let Some(vehicle) = towing.object(scenario) else {
+            continue;
+        };
+        let Some((trailer, at, attribute)) = vehicle.child("Trailer").and_then(trailer_of) else {
+            continue;
+        };
+        kind(trailer, at, attribute, found);
+        coupling(towing, trailer, at, attribute, found);
+        if let Some((other, first)) = drawn.get(trailer.name()) {
+            let text = format!(
+                "`{}` draws the trailer `{}`, but `{other}` does already",
+                towing.name(),
+                trailer.name()
+            );
+            found
+                .about(at, attribute, text)
+                .at(first.node(), "the other vehicle's trailer");
+        } else {
+            drawn.insert(trailer.name(), (towing.name(), at));
+        }
+    }
+    for towing in scenario.entities().objects() {
+        circle(towing, &mut drawn, found);
+    }
+    for action in scenario.elements_everywhere("ConnectTrailerAction") {
+        connect(action, found);
+    }
+}
+
+/// The trailer that a vehicle's `Trailer` names or is, and where that is said.
+fn trailer_of<'m, 'd>(
+    block: Element<'m, 'd>,
+) -> Option<(&'m Entity<'d>, Element<'m, 'd>, &'static str)> {
+    let (at, attribute) = match block.child("TrailerRef") {
+        Some(reference) => (reference, "entityRef"),
+        None => (block.child("Trailer")?, "name"),
+    };
+    let name = at.text(attribute)?;
+    let entity = block.scenario().entities().object(&name)?;
+    Some((entity, at, attribute))
+}
+
+fn kind<'d>(trailer: &Entity<'d>, at: Element<'_, 'd>, attribute: &str, found: &mut Sink<'_>) {
+    if matches!(
+        trailer.kind(),
+        EntityKind::Pedestrian | EntityKind::MiscObject
+    ) {
+        let text = format!(
+            "the trailer {} is a `{}`, but must be a `Vehicle`",
+            quoted(at, attribute, trailer.name()),
+            trailer.kind().element()
+        );
+        let node = trailer.element(at.scenario()).node();
+        found.about(at, attribute, text).at(node, "the entity");
+    }
+}
+
+/// A hitch on the one and a coupler on the other tell where the two are joined.
+fn coupling<'d>(
+    towing: &Entity<'d>,
+    trailer: &Entity<'d>,
+    at: Element<'_, 'd>,
+    attribute: &str,
+    found: &mut Sink<'_>,
+) {
+    let scenario = at.scenario();
+    let lacks = |entity: &Entity<'d>, part: &str| {
+        let vehicle = entity
+            .object(scenario)
+            .filter(|object| object.is("Vehicle"));
+        vehicle.is_some_and(|vehicle| vehicle.child(part).is_none())
+    };
+    let mut missing = Vec::new();
+    if lacks(towing, "TrailerHitch") {
+        missing.push(format!("`{}` has no `TrailerHitch`", towing.name()));
+    }
+    if lacks(trailer, "TrailerCoupler") {
+        missing.push(format!(
+            "the trailer `{}` has no `TrailerCoupler`",
+            trailer.name()
+        ));
+    }
+    if !missing.is_empty() {
+        let text = format!(
+            "{}; where the two are joined is up to the simulator",
+            missing.join(" and ")
+        );
+        found.about(at, attribute, text).level(Level::Warning);
+    }
+}
+
+/// A vehicle that draws itself, with or without others between.
+fn circle(
+    towing: &Entity<'_>,
+    drawn: &mut HashMap<&str, (&str, Element<'_, '_>)>,
+    found: &mut Sink<'_>,
+) {
+    let mut name = towing.name();
+    let mut steps = 0;
+    while let Some((by, _)) = drawn.get(name) {
+        name = by;
+        steps += 1;
+        if name == towing.name() {
+            break;
+        }
+        if steps > drawn.len() {
+            return;
+        }
+    }
+    if steps == 0 || name != towing.name() {
+        return;
+    }
+    if let Some((_, at)) = drawn.remove(towing.name()) {
+        let text = format!(
+            "`{}` is a trailer of itself, directly or by way of others",
+            towing.name()
+        );
+        found.about(
+            at,
+            if at.is("TrailerRef") {
+                "entityRef"
+            } else {
+                "name"
+            },
+            text,
+        );
+    }
+}
+
+fn connect(action: Element<'_, '_>, found: &mut Sink<'_>) {
+    let scenario = action.scenario();
+    let Some(name) = action.text("trailerRef") else {
+        return;
+    };
+    let Some(trailer) = scenario.entities().object(&name) else {
+        return;
+    };
+    kind(trailer, action, "trailerRef", found);
+    let actors = Actors::of(action).and_then(|actors| actors.names());
+    for actor in actors.into_iter().flatten() {
+        if actor == name {
+            let text = format!("`{name}` is to be connected to itself as its trailer");
+            found.about(action, "trailerRef", text);
+        } else if let Some(towing) = scenario.entities().object(&actor) {
+            coupling(towing, trailer, action, "trailerRef", found);
+        }
+    }
+}

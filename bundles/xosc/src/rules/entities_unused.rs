@@ -1,0 +1,55 @@
+use foldhash::HashSet;
+use qcbus_openscenario::{EntityKind, Form, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::references::ENTITY_REFERENCES;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_entities_unused",
+    uids: &["qcbus.dev:xosc:1.0.0:entities.unused"],
+    level: Level::Information,
+    after: super::READABLE,
+    page: include_str!("entities_unused.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let is_whole = scenario.form() == Form::Scenario && scenario.storyboard().is_complete();
+    if !is_whole || scenario.root().child("Storyboard").is_none() {
+        return;
+    }
+    let mut used: HashSet<String> = HashSet::default();
+    for (element, attribute) in ENTITY_REFERENCES {
+        for reference in scenario.elements_everywhere(element) {
+            if !reference.has(attribute) {
+                continue;
+            }
+            let Some(name) = reference.text(attribute) else {
+                return;
+            };
+            used.insert(name.into_owned());
+        }
+    }
+    let entities = scenario.entities();
+    let by_type = entities
+        .selections()
+        .iter()
+        .any(|selection| selection.types().next().is_some());
+    for object in entities.objects() {
+        let element = object.element(scenario);
+        // Vehicles and pedestrians must at least be placed, which is a rule of its own.
+        let is_other = !matches!(object.kind(), EntityKind::Vehicle | EntityKind::Pedestrian);
+        if is_other && !by_type && !element.is("Trailer") && !used.contains(object.name()) {
+            let text = format!("nothing refers to the entity `{}`", object.name());
+            found.about(element, "name", text);
+        }
+    }
+    for selection in entities.selections() {
+        if !used.contains(selection.name()) {
+            let text = format!("nothing refers to the selection `{}`", selection.name());
+            found.about(selection.element(scenario), "name", text);
+        }
+    }
+}

@@ -1,0 +1,149 @@
+use qcbus_openscenario::{Actors, Element, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::placement;
+use crate::families::references::quoted;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_references_self_reference",
+    uids: &["qcbus.dev:xosc:1.0.0:references.self_reference"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("references_self_reference.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// Actions that need another one than their actor. That a lane or a single change of speed is counted
+/// from the actor itself is common, and well defined.
+const ACTIONS: &[(&str, &str, &str)] = &[
+    (
+        "LongitudinalDistanceAction",
+        "entityRef",
+        "keep a distance to itself",
+    ),
+    (
+        "LateralDistanceAction",
+        "entityRef",
+        "keep a distance to itself",
+    ),
+    (
+        "SynchronizeAction",
+        "masterEntityRef",
+        "arrive together with itself",
+    ),
+];
+
+/// Conditions about two, and what is always so with one.
+const CONDITIONS: &[(&str, &str)] = &[
+    (
+        "RelativeDistanceCondition",
+        "its distance to itself is always 0",
+    ),
+    (
+        "RelativeSpeedCondition",
+        "its speed relative to itself is always 0",
+    ),
+    ("RelativeAngleCondition", "its angle to itself is always 0"),
+    ("TimeHeadwayCondition", "it has no headway to itself"),
+];
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for (action, attribute, what) in ACTIONS {
+        for action in scenario.elements_everywhere(action) {
+            actor(action, attribute, what, found);
+        }
+    }
+    for target in scenario.elements_everywhere("RelativeTargetSpeed") {
+        if target.flag("continuous") == Some(true) {
+            actor(
+                target,
+                "entityRef",
+                "keep its speed relative to itself for ever",
+                found,
+            );
+        }
+    }
+    for (condition, always) in CONDITIONS {
+        for condition in scenario.elements_everywhere(condition) {
+            triggering(condition, always, found);
+        }
+    }
+    for reference in scenario.elements_everywhere("EntityRef") {
+        match reference.node().parent().map(|parent| parent.name()) {
+            Some("CollisionCondition") => {
+                triggering(reference, "it cannot collide with itself", found);
+            }
+            Some("TimeToCollisionConditionTarget") => {
+                triggering(reference, "it cannot collide with itself", found);
+            }
+            _ => {}
+        }
+    }
+    first_positions(scenario, found);
+}
+
+fn actor(action: Element<'_, '_>, attribute: &str, what: &str, found: &mut Sink<'_>) {
+    let (Some(name), Some(actors)) = (action.text(attribute), Actors::of(action)) else {
+        return;
+    };
+    let actors = actors
+        .named
+        .iter()
+        .filter_map(|one| Some((*one, one.text("entityRef")?)));
+    let mut actors = actors.filter(|(_, actor)| *actor == name);
+    if let Some((actor, _)) = actors.next() {
+        let text = format!(
+            "the actor {} is to {what}",
+            quoted(action, attribute, &name)
+        );
+        found
+            .about(action, attribute, text)
+            .at(actor.node(), "the actor");
+    }
+}
+
+fn triggering(condition: Element<'_, '_>, always: &str, found: &mut Sink<'_>) {
+    let Some(name) = condition.text("entityRef") else {
+        return;
+    };
+    let around = condition.ancestor("ByEntityCondition");
+    let Some(entities) = around.and_then(|around| around.child("TriggeringEntities")) else {
+        return;
+    };
+    // One of several may be the other one's partner: there it is merely superfluous.
+    let mut names = entities
+        .children_named("EntityRef")
+        .map(|one| one.text("entityRef"));
+    if let (Some(Some(only)), None) = (names.next(), names.next())
+        && only == name
+    {
+        let text = format!(
+            "the condition compares {} with itself: {always}",
+            quoted(condition, "entityRef", &name)
+        );
+        found
+            .about(condition, "entityRef", text)
+            .at(entities.node(), "whom the condition is about");
+    }
+}
+
+/// Who has no place yet cannot be placed relative to it.
+fn first_positions(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let mut seen: foldhash::HashSet<String> = foldhash::HashSet::default();
+    for start in placement::starts(scenario) {
+        let is_first = seen.insert(start.name.clone());
+        let own = start
+            .position
+            .text("entityRef")
+            .is_some_and(|name| name == *start.name);
+        if is_first && own && start.position.name().starts_with("Relative") {
+            let text = format!(
+                "`{}` is placed relative to itself, before it has any place",
+                start.name
+            );
+            found.about(start.position, "entityRef", text);
+        }
+    }
+}
