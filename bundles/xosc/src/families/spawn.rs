@@ -1,5 +1,7 @@
 //! Who stands in whom at the beginning.
 
+use std::collections::BTreeMap;
+
 use foldhash::{HashMap, HashSet};
 use qcbus_openscenario::{Element, EntityKind, Scenario};
 
@@ -125,7 +127,8 @@ pub(crate) fn overlapping<'b, 'm, 'd>(
     bodies: &'b [Body<'m, 'd>],
     tolerance: f64,
 ) -> Vec<(&'b Body<'m, 'd>, &'b Body<'m, 'd>)> {
-    let mut lanes: HashMap<Option<&(String, String)>, Vec<(f64, f64, usize)>> = HashMap::default();
+    // By lane; in the world there is one.
+    let mut lanes: BTreeMap<Option<&(String, String)>, Vec<Reach>> = BTreeMap::new();
     for (at, body) in bodies.iter().enumerate() {
         let reach = body.half.0.hypot(body.half.1) + body.center.0.hypot(body.center.1);
         let (key, middle) = match &body.place {
@@ -138,9 +141,9 @@ pub(crate) fn overlapping<'b, 'm, 'd>(
             .push((middle - reach, middle + reach, at));
     }
     let mut found: HashMap<usize, usize> = HashMap::default();
-    for group in lanes.values_mut() {
+    for mut group in lanes.into_values() {
         group.sort_by(|one, other| one.0.total_cmp(&other.0));
-        sweep(bodies, group, tolerance, &mut found);
+        sweep(bodies, &group, tolerance, &mut found);
     }
     let mut found: Vec<_> = found.into_iter().collect();
     found.sort_unstable();
@@ -150,13 +153,16 @@ pub(crate) fn overlapping<'b, 'm, 'd>(
         .collect()
 }
 
+/// The stretch that a body may touch, and the body's place in the list.
+type Reach = (f64, f64, usize);
+
 /// So many neighbours of one body are looked at: more only stand in one heap, and that is said.
 const MOST: usize = 500;
 
 /// Compares those whose reaches share a stretch, from left to right.
 fn sweep(
     bodies: &[Body<'_, '_>],
-    group: &[(f64, f64, usize)],
+    group: &[Reach],
     tolerance: f64,
     found: &mut HashMap<usize, usize>,
 ) {
