@@ -39,14 +39,21 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let mut kinds = CatalogKind::ALL.into_iter();
-        let location = kinds
-            .find(|kind| entry.node.is(kind.element()))
-            .map_or("", CatalogKind::location);
+        let Some(kind) = kinds.find(|kind| entry.node.is(kind.element())) else {
+            continue;
+        };
+        let (name, location) = (entry.catalog.attr("name").unwrap_or(""), kind.location());
+        let why = if scenario.catalog_directory(kind).is_some() {
+            format!(
+                "the directory of `{location}`, where a `{}` is looked for",
+                kind.element()
+            )
+        } else {
+            format!("that of a `{location}`, which `CatalogLocations` do not have")
+        };
         let text = format!(
-            "the catalog `{}` lies only in a directory of other catalogs, not in that of `{location}`, where \
-             a `{}` is looked for; some simulators do not find it{}",
-            entry.catalog.attr("name").unwrap_or(""),
-            entry.node.name(),
+            "the catalog `{name}` lies in a directory of other catalogs, and not in {why}; some simulators do \
+             not find it{}",
             catalogs::further(count)
         );
         found

@@ -8,7 +8,7 @@ use crate::model::{About, Scene};
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_catalogs_version_mismatch",
     uids: &["qcbus.dev:xosc:1.0.0:catalogs.version_mismatch"],
-    level: Level::Warning,
+    level: Level::Information,
     after: super::READABLE,
     page: include_str!("catalogs_version_mismatch.md"),
     run,
@@ -55,8 +55,14 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             own.1,
             catalogs::further(count)
         );
+        let level = if version.0 == own.0 {
+            Level::Information
+        } else {
+            Level::Warning
+        };
         found
             .about(reference, "catalogName", text)
+            .level(level)
             .at(header, "the header of the catalog");
     }
 }

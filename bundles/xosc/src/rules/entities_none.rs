@@ -7,6 +7,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_entities_none",
     uids: &["qcbus.dev:xosc:1.0.0:entities.none"],
     level: Level::Warning,
+    versions: "1.0.0..",
     after: super::READABLE,
     page: include_str!("entities_none.md"),
     run,

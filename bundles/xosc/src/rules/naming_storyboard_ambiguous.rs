@@ -1,4 +1,4 @@
-use qcbus_openscenario::{Scenario, StoryKind};
+use qcbus_openscenario::{Scenario, StoryElement, StoryKind};
 use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::references::quoted;
@@ -14,7 +14,7 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+fn run<'d>(scenario: &Scenario<'d>, found: &mut Sink<'_>) {
     let storyboard = scenario.storyboard();
     for condition in scenario.elements_everywhere("StoryboardElementStateCondition") {
         let (Some(name), Some(word)) = (
@@ -31,6 +31,17 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let [first, _, ..] = meant.as_slice() else {
             continue;
         };
+        // A maneuver of a catalog that is used twice means itself each time.
+        let own = condition
+            .ancestor("Maneuver")
+            .filter(|own| own.reference().is_some());
+        let is_own = |one: &&&StoryElement<'d>| {
+            let element = one.element(scenario);
+            own.is_some() && (Some(element) == own || element.ancestor("Maneuver") == own)
+        };
+        if meant.iter().filter(is_own).count() == 1 {
+            continue;
+        }
         let parent = first
             .parent()
             .and_then(|parent| storyboard.elements().get(parent));

@@ -1,5 +1,6 @@
-use qcbus_openscenario::{Declared, Scenario};
-use qcbus_sdk::{Rule, Sink};
+use qcbus_document::Node;
+use qcbus_openscenario::{Declared, Element, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::{allowed_values, catalogs};
 use crate::model::{About, Scene};
@@ -16,10 +17,31 @@ pub static RULE: Rule<Scene> = Rule {
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for (assignment, _, text) in scenario.assignment_faults() {
         let name = assignment.written("parameterRef").unwrap_or("");
+        let name = name.strip_prefix('$').unwrap_or(name);
         let text = format!("the value for `{name}` does not fit: {text}");
-        found.about(assignment, "value", text);
+        // Where the default does not fit, either, the type is what is wrong, and the catalog's fault.
+        match misdeclared(assignment, name) {
+            Some(declaration) => found
+                .about(assignment, "value", text)
+                .level(Level::Warning)
+                .at(
+                    declaration,
+                    "the declaration, whose own value is not of its type, either",
+                ),
+            None => found.about(assignment, "value", text),
+        };
     }
     constraints(scenario, found);
+}
+
+/// The declaration of a parameter, when the value that it declares is not of its type.
+fn misdeclared<'d>(assignment: Element<'_, 'd>, name: &str) -> Option<Node<'d>> {
+    let reference = assignment.parent()?.parent()?;
+    let entry = assignment.scenario().entry(reference)?;
+    let declaration = entry.declarations().iter().find(|one| one.name == name)?;
+    let default = declaration.node.attr("value")?;
+    let fits = default.contains('$') || declaration.data_type?.parse(default).is_some();
+    (!fits).then_some(declaration.node)
 }
 
 /// Values that have the type, and are none that the entry allows.
@@ -42,8 +64,9 @@ fn constraints(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             let Declared::Value(value) = &declaration.declared else {
                 continue;
             };
-            let node = entry
-                .descendants_named("ParameterDeclaration")
+            let block = entry.child("ParameterDeclarations").into_iter();
+            let node = block
+                .flat_map(|block| block.children_named("ParameterDeclaration"))
                 .find(|one| one.node() == declaration.node);
             let Some(allowed) = node.and_then(|node| allowed_values::violated(node, value)) else {
                 continue;

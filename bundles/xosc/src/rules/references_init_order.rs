@@ -8,7 +8,7 @@ use crate::model::{About, Scene};
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_references_init_order",
     uids: &["qcbus.dev:xosc:1.0.0:references.init_order"],
-    level: Level::Warning,
+    level: Level::Information,
     after: super::READABLE,
     page: include_str!("references_init_order.md"),
     run,
