@@ -7,6 +7,7 @@ pub(crate) mod minsubset;
 pub(crate) mod actions;
 pub(crate) mod claims;
 pub(crate) mod allowed_values;
+pub(crate) mod casts;
 pub(crate) mod catalogs;
 pub(crate) mod distributions;
 pub(crate) mod names;

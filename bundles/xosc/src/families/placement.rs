@@ -47,9 +47,16 @@ pub(crate) fn placed(scenario: &Scenario<'_>) -> Option<HashSet<String>> {
     if is_open || !scenario.storyboard().is_complete() {
         return None;
     }
+    // All actions of a group place the same.
+    let mut groups: HashSet<u32> = HashSet::default();
     for action in ["TeleportAction", "FollowTrajectoryAction"] {
         for action in scenario.elements_everywhere(action) {
-            for name in Actors::of(action)?.names()? {
+            let mut around = action.ancestors();
+            let holder = around.find(|one| one.is("Private") || one.is("ManeuverGroup"))?;
+            if !groups.insert(holder.node().offset()) {
+                continue;
+            }
+            for name in Actors::of(holder)?.names()? {
                 placed.extend(expanded(scenario, &name)?);
             }
         }

@@ -40,7 +40,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for object in entities.objects() {
         let element = object.element(scenario);
         // Vehicles and pedestrians must at least be placed, which is a rule of its own.
-        let is_other = !matches!(object.kind(), EntityKind::Vehicle | EntityKind::Pedestrian);
+        let is_other = matches!(object.kind(), EntityKind::MiscObject | EntityKind::External);
         if is_other && !by_type && !element.is("Trailer") && !used.contains(object.name()) {
             let text = format!("nothing refers to the entity `{}`", object.name());
             found.about(element, "name", text);

@@ -1,6 +1,8 @@
-use qcbus_openscenario::{Actors, Element, Entity, EntityKind, Scenario};
+use foldhash::HashMap;
+use qcbus_openscenario::{Element, Entity, EntityKind, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
+use crate::families::casts::{Cast, Casts};
 use crate::families::references::quoted;
 use crate::model::{About, Scene};
 
@@ -35,15 +37,23 @@ const OF_THE_LIVING: &[&str] = &[
 const OF_VEHICLES: &[&str] = &["OverrideControllerValueAction"];
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let mut casts = Casts::default();
+    let mut verdicts = Verdicts::default();
+    let kinds = [EntityKind::Vehicle, EntityKind::Pedestrian];
     for action in OF_THE_LIVING {
         for action in scenario.elements_everywhere(action) {
-            let allowed = [EntityKind::Vehicle, EntityKind::Pedestrian];
-            actors(action, &allowed, "vehicles and pedestrians", found);
+            if let Some(cast) = casts.of(action) {
+                let verdict = verdicts.of(scenario, &cast, &kinds);
+                say(action, verdict, "vehicles and pedestrians", found);
+            }
         }
     }
     for action in OF_VEHICLES {
         for action in scenario.elements_everywhere(action) {
-            actors(action, &[EntityKind::Vehicle], "vehicles", found);
+            if let Some(cast) = casts.of(action) {
+                let verdict = verdicts.of(scenario, &cast, &[EntityKind::Vehicle]);
+                say(action, verdict, "vehicles", found);
+            }
         }
     }
     for action in scenario.elements_everywhere("SynchronizeAction") {
@@ -51,36 +61,107 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-fn actors(action: Element<'_, '_>, allowed: &[EntityKind], who: &str, found: &mut Sink<'_>) {
-    let Some(actors) = Actors::of(action) else {
-        return;
-    };
-    let entities = action.scenario().entities();
-    for actor in &actors.named {
-        let Some(name) = actor.text("entityRef") else {
+/// What is wrong with the actors of a group, for the actions of some kinds of entities.
+#[derive(Clone)]
+enum Verdict<'m, 'd> {
+    Fine,
+    /// One who is none for them, by name or as a member of the selection that is named.
+    Wrong {
+        actor: Element<'m, 'd>,
+        named: String,
+        wrong: &'m Entity<'d>,
+    },
+    /// A selection acts as one: of vehicles or of pedestrians.
+    Mixed {
+        actor: Element<'m, 'd>,
+        named: String,
+    },
+}
+
+/// The verdicts by group and number of allowed kinds: a group has the same for all its actions.
+#[derive(Default)]
+struct Verdicts<'m, 'd> {
+    known: HashMap<(u32, usize), Verdict<'m, 'd>>,
+}
+
+impl<'m, 'd> Verdicts<'m, 'd> {
+    fn of(
+        &mut self,
+        scenario: &'m Scenario<'d>,
+        cast: &Cast<'m, 'd>,
+        allowed: &[EntityKind],
+    ) -> &Verdict<'m, 'd> {
+        let known = self.known.entry((cast.at, allowed.len()));
+        known.or_insert_with(|| judge(scenario, cast, allowed))
+    }
+}
+
+fn judge<'m, 'd>(
+    scenario: &'m Scenario<'d>,
+    cast: &Cast<'m, 'd>,
+    allowed: &[EntityKind],
+) -> Verdict<'m, 'd> {
+    let mut named: Vec<_> = cast
+        .by_name
+        .iter()
+        .map(|(name, actor)| (name, *actor))
+        .collect();
+    named.sort_by_key(|(_, actor)| actor.node().offset());
+    let mut verdict = Verdict::Fine;
+    for (name, actor) in named {
+        let Some(objects) = scenario.entities().expand(name) else {
             continue;
         };
-        let Some(objects) = entities.expand(&name) else {
-            continue;
-        };
-        let what = action.name();
-        let Some(wrong) = objects.iter().find(|one| is_wrong(one, allowed)) else {
-            mixed(action, &objects, &name, found);
-            continue;
-        };
-        let (actor_name, kind) = (wrong.name(), wrong.kind().element());
-        let text = if name == actor_name {
-            format!("the actor `{actor_name}` is a `{kind}`, but `{what}` is for {who}")
-        } else {
-            format!(
-                "`{actor_name}` of the selection `{name}` is a `{kind}`, but `{what}` is for {who}"
-            )
-        };
-        let node = wrong.element(action.scenario()).node();
-        found
-            .about(action, "", text)
-            .at(actor.node(), "the actor")
-            .at(node, "the entity");
+        if let Some(wrong) = objects.iter().find(|one| is_wrong(one, allowed)) {
+            return Verdict::Wrong {
+                actor,
+                named: name.clone(),
+                wrong,
+            };
+        }
+        let has = |kind| objects.iter().any(|one| one.kind() == kind);
+        if has(EntityKind::Vehicle) && has(EntityKind::Pedestrian) {
+            verdict = Verdict::Mixed {
+                actor,
+                named: name.clone(),
+            };
+        }
+    }
+    verdict
+}
+
+fn say(action: Element<'_, '_>, verdict: &Verdict<'_, '_>, who: &str, found: &mut Sink<'_>) {
+    let what = action.name();
+    match verdict {
+        Verdict::Fine => {}
+        Verdict::Wrong {
+            actor,
+            named,
+            wrong,
+        } => {
+            let (name, kind) = (wrong.name(), wrong.kind().element());
+            let of = if named == name { "the actor " } else { "" };
+            let selection = match named == name {
+                true => String::new(),
+                false => format!(" of the selection `{named}`"),
+            };
+            let text = format!("{of}`{name}`{selection} is a `{kind}`, but `{what}` is for {who}");
+            let node = wrong.element(actor.scenario()).node();
+            found
+                .about(action, "", text)
+                .at(actor.node(), "the actor")
+                .at(node, "the entity");
+        }
+        Verdict::Mixed { actor, named } => {
+            let text = format!(
+                "the selection `{named}` has vehicles and pedestrians, but for a `{what}` it may have one of \
+                 the two only"
+            );
+            found
+                .about(action, "", text)
+                .level(Level::Information)
+                .at(actor.node(), "the actor");
+        }
     }
 }
 
@@ -88,19 +169,6 @@ fn actors(action: Element<'_, '_>, allowed: &[EntityKind], who: &str, found: &mu
 fn is_wrong(entity: &Entity<'_>, allowed: &[EntityKind]) -> bool {
     let known = !matches!(entity.kind(), EntityKind::External | EntityKind::Unknown);
     known && !allowed.contains(&entity.kind())
-}
-
-/// A selection acts as one: of vehicles or of pedestrians.
-fn mixed(action: Element<'_, '_>, objects: &[&Entity<'_>], name: &str, found: &mut Sink<'_>) {
-    let has = |kind| objects.iter().any(|one| one.kind() == kind);
-    if has(EntityKind::Vehicle) && has(EntityKind::Pedestrian) {
-        let text = format!(
-            "the selection `{name}` has vehicles and pedestrians, but for a `{}` it may have one of the two \
-             only",
-            action.name()
-        );
-        found.about(action, "", text).level(Level::Information);
-    }
 }
 
 fn master(action: Element<'_, '_>, found: &mut Sink<'_>) {

@@ -1,6 +1,7 @@
-use qcbus_openscenario::{Actors, Element, Scenario};
+use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
+use crate::families::casts::Casts;
 use crate::families::placement;
 use crate::families::references::quoted;
 use crate::model::{About, Scene};
@@ -50,9 +51,10 @@ const CONDITIONS: &[(&str, &str)] = &[
 ];
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let mut casts = Casts::default();
     for (action, attribute, what) in ACTIONS {
         for action in scenario.elements_everywhere(action) {
-            actor(action, attribute, what, found);
+            actor(action, attribute, what, &mut casts, found);
         }
     }
     for target in scenario.elements_everywhere("RelativeTargetSpeed") {
@@ -61,6 +63,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 target,
                 "entityRef",
                 "keep its speed relative to itself for ever",
+                &mut casts,
                 found,
             );
         }
@@ -84,16 +87,17 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     first_positions(scenario, found);
 }
 
-fn actor(action: Element<'_, '_>, attribute: &str, what: &str, found: &mut Sink<'_>) {
-    let (Some(name), Some(actors)) = (action.text(attribute), Actors::of(action)) else {
+fn actor<'m, 'd>(
+    action: Element<'m, 'd>,
+    attribute: &str,
+    what: &str,
+    casts: &mut Casts<'m, 'd>,
+    found: &mut Sink<'_>,
+) {
+    let (Some(name), Some(cast)) = (action.text(attribute), casts.of(action)) else {
         return;
     };
-    let actors = actors
-        .named
-        .iter()
-        .filter_map(|one| Some((*one, one.text("entityRef")?)));
-    let mut actors = actors.filter(|(_, actor)| *actor == name);
-    if let Some((actor, _)) = actors.next() {
+    if let Some(actor) = cast.by_name.get(&*name) {
         let text = format!(
             "the actor {} is to {what}",
             quoted(action, attribute, &name)

@@ -1,0 +1,40 @@
+//! The actors of many actions: a group's are looked up once, however many actions it has.
+
+use std::rc::Rc;
+
+use foldhash::HashMap;
+use qcbus_openscenario::{Actors, Element};
+
+/// The actors of a `ManeuverGroup` or `Private` by name, with the elements that name them.
+pub(crate) struct Cast<'m, 'd> {
+    /// Where the group or `Private` stands in the document.
+    pub(crate) at: u32,
+    pub(crate) by_name: HashMap<String, Element<'m, 'd>>,
+}
+
+/// The casts that were looked up.
+#[derive(Default)]
+pub(crate) struct Casts<'m, 'd> {
+    known: HashMap<u32, Rc<Cast<'m, 'd>>>,
+}
+
+impl<'m, 'd> Casts<'m, 'd> {
+    /// The actors of an action; `None` when nobody acts there.
+    pub(crate) fn of(&mut self, action: Element<'m, 'd>) -> Option<Rc<Cast<'m, 'd>>> {
+        let mut around = action.ancestors();
+        let holder = around.find(|one| one.is("Private") || one.is("ManeuverGroup"))?;
+        let at = holder.node().offset();
+        if let Some(cast) = self.known.get(&at) {
+            return Some(Rc::clone(cast));
+        }
+        let mut by_name = HashMap::default();
+        for actor in Actors::of(holder)?.named {
+            if let Some(name) = actor.text("entityRef") {
+                by_name.entry(name.into_owned()).or_insert(actor);
+            }
+        }
+        let cast = Rc::new(Cast { at, by_name });
+        self.known.insert(at, Rc::clone(&cast));
+        Some(cast)
+    }
+}
