@@ -63,14 +63,14 @@ fn an_entry_sees_none_of_the_scenarios_parameters() {
     let car = CAR.replace("$fast", "$outer");
     let body = format!("{parameters}{}", object(&reference("c0", "car", "")));
     with_catalogs(&body, &[&car], |scenario| {
-        assert_eq!(fastest(scenario), None)
+        assert_eq!(fastest(scenario), None);
     });
     let body = format!(
         "{parameters}{}",
         object(&reference("c0", "car", &assign("fast", "$outer")))
     );
     with_catalogs(&body, &[CAR], |scenario| {
-        assert_eq!(fastest(scenario), Some(5.0))
+        assert_eq!(fastest(scenario), Some(5.0));
     });
 }
 
@@ -168,6 +168,6 @@ fn references_in_a_circle_come_to_an_end() {
         "{locations}<Entities><ScenarioObject name=\"Ego\"><ObjectController>{inner}</ObjectController></ScenarioObject></Entities>"
     );
     with_catalogs(&body, &[&driver], |scenario| {
-        assert!(scenario.tops().count() < 20)
+        assert!(scenario.tops().count() < 20);
     });
 }
