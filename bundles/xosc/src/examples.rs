@@ -25,6 +25,10 @@
 //! | `entityCondition` | the content of an `<EntityCondition>` about `Ego` |
 //! | `shape` | the content of a `<Shape>`: of a trajectory that `Ego` follows without timing |
 //! | `route` | the content of a `<Route>` that is assigned to `Ego` |
+//! | `mapPosition` | like `position`, in a scenario on the map `map.xodr` |
+//! | `mapRoute` | like `route`, on the map `map.xodr` |
+//! | `mapSignals` | the content of `<TrafficSignals>`, on the map `map.xodr` |
+//! | `mapEvent` | like `event`, on the map `map.xodr`, with the traffic signal controller `crossing` and its phases `go` and `stop` |
 //! | `catalog` | the entries of a catalog |
 //! | `distribution` | the content of a `<ParameterValueDistribution>` |
 
@@ -134,6 +138,12 @@ macro_rules! stop {
 macro_rules! start {
     () => {
         concat!("<StartTrigger>", after!("begin", "1"), "</StartTrigger>\n")
+    };
+}
+
+macro_rules! on_map {
+    ($($text:expr),* $(,)?) => {
+        concat!("<RoadNetwork>\n<LogicFile filepath=\"map.xodr\"/>\n", $($text,)* "</RoadNetwork>\n")
     };
 }
 
@@ -265,6 +275,34 @@ pub(crate) const TEMPLATES: &[Template] = by_name![
     "route": action!(
         "<RoutingAction><AssignRouteAction><Route name=\"Way\" closed=\"false\">\n{example}\n",
         "</Route></AssignRouteAction></RoutingAction>\n"
+    ),
+    "mapPosition": document!(
+        "<CatalogLocations/>\n", on_map!(), cars!(), "<Storyboard>\n<Init><Actions>\n", place!("Other", "50"),
+        "<Private entityRef=\"Ego\"><PrivateAction><TeleportAction><Position>\n{example}\n",
+        "</Position></TeleportAction></PrivateAction></Private>\n</Actions></Init>\n", stop!(), "</Storyboard>\n"
+    ),
+    "mapRoute": document!(
+        "<CatalogLocations/>\n", on_map!(), cars!(), "<Storyboard>\n<Init><Actions>\n", place!("Other", "50"),
+        "<Private entityRef=\"Ego\"><PrivateAction><RoutingAction><AssignRouteAction>",
+        "<Route name=\"Way\" closed=\"false\">\n{example}\n</Route></AssignRouteAction></RoutingAction>",
+        "</PrivateAction></Private>\n</Actions></Init>\n", stop!(), "</Storyboard>\n"
+    ),
+    "mapSignals": document!(
+        "<CatalogLocations/>\n", on_map!("<TrafficSignals>\n{example}\n</TrafficSignals>\n"), cars!(),
+        "<Storyboard>\n", init!(), stop!(), "</Storyboard>\n"
+    ),
+    "mapEvent": document!(
+        "<CatalogLocations/>\n",
+        on_map!(
+            "<TrafficSignals><TrafficSignalController name=\"crossing\">",
+            "<Phase name=\"go\" duration=\"20\"/><Phase name=\"stop\" duration=\"10\"/>",
+            "</TrafficSignalController></TrafficSignals>\n"
+        ),
+        cars!(), "<Storyboard>\n", init!(), "<Story name=\"Main\">\n<Act name=\"Drive\">\n",
+        "<ManeuverGroup name=\"Cars\" maximumExecutionCount=\"1\">\n",
+        "<Actors selectTriggeringEntities=\"false\"><EntityRef entityRef=\"Ego\"/></Actors>\n",
+        "<Maneuver name=\"Move\">\n<Event name=\"Now\" priority=\"parallel\">\n{example}\n</Event>\n",
+        "</Maneuver>\n</ManeuverGroup>\n", start!(), "</Act>\n</Story>\n", stop!(), "</Storyboard>\n"
     ),
     "catalog": document!("<Catalog name=\"examples\">\n{example}\n</Catalog>\n"),
     "distribution": document!("<ParameterValueDistribution>\n{example}\n</ParameterValueDistribution>\n"),

@@ -172,6 +172,43 @@ mod range_traffic;
 mod range_trajectories;
 mod storyboard_maximum_execution_count;
 mod trajectory_timing_scale;
+mod position_finite;
+mod position_orientation_range;
+mod position_relative_lane_exclusive;
+mod position_route_reference;
+mod positioning_geodetic_datum_defined;
+mod positioning_road_lane_offset_in_bounds;
+mod reference_control_resolvable_signal_id_in_traffic_signal_state_action;
+mod reference_control_resolvable_traffic_signal_controller_by_traffic_signal_controller_ref;
+mod reference_control_road_lane_exists;
+mod reference_control_road_network_availability;
+mod reference_control_road_network_reference;
+mod reference_control_traffic_signal_controller_action_references;
+mod reference_control_traffic_signal_controller_condition_references;
+mod reference_control_traffic_signal_controller_references;
+mod reference_control_traffic_signal_state_references;
+mod road_lane_id_zero;
+mod road_lane_type_drivable;
+mod road_signal_condition;
+mod road_world_position_on_road;
+mod road_xodr_parses;
+mod route_connected;
+mod route_duplicate_waypoints;
+mod routing_ambiguous_route_waypoints;
+mod routing_cardinality_of_control_points_in_nurbs;
+mod routing_offset_should_be_less_than_trajectory_length;
+mod routing_route_waypoints_locations;
+mod routing_trajectory_timing_exists_if_requested;
+mod scenario_logic_invalid_elements_if_no_road_network;
+mod signal_delay_without_reference;
+mod signal_reference_cycle;
+mod signal_state_unknown;
+mod signal_zero_cycle;
+mod trajectory_clothoid_time_order;
+mod trajectory_duplicate_vertices;
+mod trajectory_knots_non_decreasing;
+mod trajectory_speed_plausible;
+mod trajectory_times_increasing;
 
 /// The precondition of rules that need no more than a file that could be read: see `after`.
 pub(crate) const READABLE: &[&str] = &["check_asam_xosc_xml_root_tag_is_openscenario"];
@@ -345,4 +382,41 @@ pub static RULES: &[&dyn AnyRule] = &[
     &references_self_reference::RULE,
     &references_init_order::RULE,
     &scenario_logic_controller_activation::RULE,
+    &reference_control_road_network_reference::RULE,
+    &reference_control_road_network_availability::RULE,
+    &scenario_logic_invalid_elements_if_no_road_network::RULE,
+    &road_xodr_parses::RULE,
+    &reference_control_resolvable_signal_id_in_traffic_signal_state_action::RULE,
+    &reference_control_traffic_signal_state_references::RULE,
+    &road_signal_condition::RULE,
+    &reference_control_resolvable_traffic_signal_controller_by_traffic_signal_controller_ref::RULE,
+    &reference_control_traffic_signal_controller_references::RULE,
+    &reference_control_traffic_signal_controller_action_references::RULE,
+    &reference_control_traffic_signal_controller_condition_references::RULE,
+    &signal_delay_without_reference::RULE,
+    &signal_reference_cycle::RULE,
+    &signal_zero_cycle::RULE,
+    &signal_state_unknown::RULE,
+    &reference_control_road_lane_exists::RULE,
+    &positioning_road_lane_offset_in_bounds::RULE,
+    &positioning_geodetic_datum_defined::RULE,
+    &road_lane_type_drivable::RULE,
+    &road_lane_id_zero::RULE,
+    &road_world_position_on_road::RULE,
+    &position_orientation_range::RULE,
+    &position_finite::RULE,
+    &position_relative_lane_exclusive::RULE,
+    &position_route_reference::RULE,
+    &routing_route_waypoints_locations::RULE,
+    &routing_ambiguous_route_waypoints::RULE,
+    &route_connected::RULE,
+    &route_duplicate_waypoints::RULE,
+    &routing_trajectory_timing_exists_if_requested::RULE,
+    &routing_cardinality_of_control_points_in_nurbs::RULE,
+    &routing_offset_should_be_less_than_trajectory_length::RULE,
+    &trajectory_times_increasing::RULE,
+    &trajectory_duplicate_vertices::RULE,
+    &trajectory_speed_plausible::RULE,
+    &trajectory_clothoid_time_order::RULE,
+    &trajectory_knots_non_decreasing::RULE,
 ];

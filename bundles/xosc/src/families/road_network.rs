@@ -1,0 +1,33 @@
+//! What only makes sense with a road network.
+
+use qcbus_openscenario::{Element, Scenario};
+
+/// Elements that rest on roads, lanes or the map's datum, and those that rest on its signals.
+pub(crate) const ON_ROADS: &[&str] = &[
+    "RoadPosition",
+    "LanePosition",
+    "GeoPosition",
+    "LaneChangeAction",
+    "EndOfRoadCondition",
+    "OffroadCondition",
+];
+/// Elements that rest on traffic signals.
+pub(crate) const ON_SIGNALS: &[&str] = &[
+    "TrafficSignalController",
+    "TrafficSignalAction",
+    "TrafficSignalCondition",
+    "TrafficSignalControllerCondition",
+];
+
+/// The first element of each kind, and how many there are.
+pub(crate) fn used<'m, 'd>(
+    scenario: &'m Scenario<'d>,
+    names: &[&'static str],
+) -> Vec<(&'static str, Element<'m, 'd>, usize)> {
+    let of_kind = |name: &&'static str| {
+        let mut all = scenario.elements_everywhere(name);
+        let first = all.next()?;
+        Some((*name, first, 1 + all.count()))
+    };
+    names.iter().filter_map(of_kind).collect()
+}

@@ -1,0 +1,171 @@
+//! Which roads are near a place.
+
+use foldhash::{HashMap, HashMapExt as _};
+use qcbus_opendrive::geometry::Pose;
+use qcbus_opendrive::{Road, RoadMap, Side};
+
+/// The edge of a cell, in metres: larger than most roads are wide.
+const CELL: f64 = 50.0;
+/// Roads are looked at every so many metres.
+const STEP: f64 = 5.0;
+/// No map is looked at in more places.
+const MOST: f64 = 1_000_000.0;
+
+/// A cross section of a road.
+struct Sample {
+    road: usize,
+    s: f64,
+    pose: Pose,
+    right: f64,
+    left: f64,
+}
+
+/// The roads of a map by where they are.
+pub(crate) struct RoadsNearby<'m, 'd> {
+    map: &'m RoadMap<'d>,
+    step: f64,
+    samples: Vec<Sample>,
+    cells: HashMap<(i64, i64), Vec<u32>>,
+    /// How far from the reference line lanes reach.
+    widest: f64,
+}
+
+impl<'m, 'd> RoadsNearby<'m, 'd> {
+    pub(crate) fn of(map: &'m RoadMap<'d>) -> RoadsNearby<'m, 'd> {
+        let length: f64 = map.roads().iter().filter_map(|road| road.length()).sum();
+        let mut nearby = RoadsNearby {
+            map,
+            step: STEP.max(length / MOST),
+            samples: Vec::new(),
+            cells: HashMap::new(),
+            widest: 0.0,
+        };
+        for road in map.roads() {
+            nearby.add(road);
+        }
+        nearby
+    }
+
+    fn add(&mut self, road: &Road<'d>) {
+        let Some(length) = road.length().filter(|length| *length >= 0.0) else {
+            return;
+        };
+        let mut s = 0.0;
+        loop {
+            if let Some(sample) = sample(road, s) {
+                self.widest = self.widest.max(sample.left).max(-sample.right);
+                let at = u32::try_from(self.samples.len()).unwrap_or(u32::MAX);
+                let cell = cell(sample.pose.x, sample.pose.y);
+                self.cells.entry(cell).or_default().push(at);
+                self.samples.push(sample);
+            }
+            if s >= length {
+                return;
+            }
+            s = (s + self.step).min(length);
+        }
+    }
+
+    /// Whether nothing is known of where roads are.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.samples.is_empty()
+    }
+
+    /// The cross sections within a square around a place, and perhaps some more.
+    fn around(&self, x: f64, y: f64, reach: f64) -> impl Iterator<Item = &Sample> {
+        const MOST_CELLS: i64 = 100;
+        let (low, high) = (cell(x - reach, y - reach), cell(x + reach, y + reach));
+        let is_wide = |low: i64, high: i64| high.saturating_sub(low) > MOST_CELLS;
+        let all = is_wide(low.0, high.0) || is_wide(low.1, high.1);
+        let everything = if all { &self.samples[..] } else { &[] };
+        let rows = (!all).then_some(low.0..=high.0).into_iter().flatten();
+        let cells = rows.flat_map(move |i| (low.1..=high.1).map(move |j| (i, j)));
+        let places = cells.filter_map(|cell| self.cells.get(&cell)).flatten();
+        let near = places.filter_map(|at| self.samples.get(*at as usize));
+        near.chain(everything)
+    }
+
+    /// Whether a lane is within this distance.
+    pub(crate) fn is_near(&self, x: f64, y: f64, distance: f64) -> bool {
+        let reach = distance + self.widest.min(10.0 * CELL) + self.step;
+        self.around(x, y, reach).any(|sample| {
+            let (along, t) = seen_from(sample.pose, x, y);
+            let aside = (t - sample.left).max(sample.right - t).max(0.0);
+            let beyond = (along.abs() - self.step / 2.0).max(0.0);
+            aside.hypot(beyond) <= distance
+        })
+    }
+
+    /// The roads on whose lanes a place lies, by their ids, in the order of the map.
+    pub(crate) fn roads_at(&self, x: f64, y: f64) -> Vec<&'d str> {
+        let reach = self.widest.min(10.0 * CELL) + self.step;
+        let mut roads: Vec<usize> = Vec::new();
+        for near in self.around(x, y, reach) {
+            if roads.contains(&near.road) {
+                continue;
+            }
+            let (along, _) = seen_from(near.pose, x, y);
+            if along.abs() <= self.step && self.is_on(near.road, near.s + along, x, y) {
+                roads.push(near.road);
+            }
+        }
+        roads.sort_unstable();
+        let ids = roads.iter().filter_map(|at| self.map.roads().get(*at));
+        ids.map(Road::id).collect()
+    }
+
+    /// Whether a place lies well within the lanes of a road near a station.
+    fn is_on(&self, road: usize, near: f64, x: f64, y: f64) -> bool {
+        const WITHIN: f64 = 0.25;
+        let Some(road) = self.map.roads().get(road) else {
+            return false;
+        };
+        let Some(length) = road.length() else {
+            return false;
+        };
+        let mut s = near;
+        for _ in 0..4 {
+            let Some(found) = sample(road, s.clamp(0.0, length)) else {
+                return false;
+            };
+            let (along, t) = seen_from(found.pose, x, y);
+            if along.abs() < 0.01 {
+                return t > found.right + WITHIN && t < found.left - WITHIN;
+            }
+            s = found.s + along;
+            if s < 0.0 || s > length {
+                return false;
+            }
+        }
+        false
+    }
+}
+
+fn sample(road: &Road<'_>, s: f64) -> Option<Sample> {
+    let edge = |side| {
+        let section = road.permanent()?.section_at(road, side, s)?;
+        section.edge_t(side, s - section.s()?)
+    };
+    Some(Sample {
+        road: road.index(),
+        s,
+        pose: road.pose(s)?,
+        right: edge(Side::Right).unwrap_or(0.0),
+        left: edge(Side::Left).unwrap_or(0.0),
+    })
+}
+
+/// A place along and beside a pose.
+fn seen_from(pose: Pose, x: f64, y: f64) -> (f64, f64) {
+    let (sin, cos) = pose.hdg.sin_cos();
+    let (dx, dy) = (x - pose.x, y - pose.y);
+    (dx * cos + dy * sin, dy * cos - dx * sin)
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "what is farther away than i64 is in the last cell"
+)]
+fn cell(x: f64, y: f64) -> (i64, i64) {
+    ((x / CELL).floor() as i64, (y / CELL).floor() as i64)
+}

@@ -1,0 +1,134 @@
+//! Trajectories: who follows them, and which times and places they are made of.
+
+use qcbus_openscenario::Element;
+
+use crate::families::positions::Spot;
+
+/// Whether whoever follows a trajectory keeps to its times.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Timing<'m, 'd> {
+    /// Yes, says this element.
+    Asked(Element<'m, 'd>),
+    /// No: its times mean nothing.
+    Ignored,
+    /// Nobody follows it here: it is an entry of a catalog that is checked itself.
+    Unknown,
+}
+
+/// Whether the times of a trajectory are used.
+pub(crate) fn timing_of<'m, 'd>(trajectory: Element<'m, 'd>) -> Timing<'m, 'd> {
+    match follower(trajectory) {
+        Some(action) => {
+            let reference = action.child("TimeReference");
+            match reference.map(|reference| (reference.child("Timing"), reference.child("None"))) {
+                Some((Some(timing), _)) => Timing::Asked(timing),
+                Some((None, Some(_))) => Timing::Ignored,
+                _ => Timing::Unknown,
+            }
+        }
+        None if trajectory.ancestor("TrajectoryPosition").is_some() => Timing::Ignored,
+        None => Timing::Unknown,
+    }
+}
+
+/// The action by which a trajectory is followed.
+pub(crate) fn follower<'m, 'd>(trajectory: Element<'m, 'd>) -> Option<Element<'m, 'd>> {
+    let around = trajectory.parent()?;
+    let around = if around.is("TrajectoryRef") {
+        around.parent()?
+    } else {
+        around
+    };
+    around.is("FollowTrajectoryAction").then_some(around)
+}
+
+/// The trajectory that an action follows, wherever it is written.
+pub(crate) fn followed<'m, 'd>(action: Element<'m, 'd>) -> Option<Element<'m, 'd>> {
+    let within = action.child("TrajectoryRef");
+    let found = within.and_then(|reference| reference.child_or_entry(&["Trajectory"]));
+    found.or_else(|| action.child_or_entry(&["Trajectory"]))
+}
+
+/// The shape of a trajectory.
+pub(crate) fn shape<'m, 'd>(trajectory: Element<'m, 'd>) -> Option<Element<'m, 'd>> {
+    let mut shapes = trajectory.child("Shape")?.children();
+    shapes.find(|shape| ["Polyline", "Clothoid", "ClothoidSpline", "Nurbs"].contains(&shape.name()))
+}
+
+/// A place of a shape where a time belongs.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Stamp<'m, 'd> {
+    pub(crate) element: Element<'m, 'd>,
+    pub(crate) attribute: &'static str,
+}
+
+impl<'m, 'd> Stamp<'m, 'd> {
+    pub(crate) fn time(self) -> Option<f64> {
+        self.element.number(self.attribute)
+    }
+
+    /// Where the moving object is then, if a position says so.
+    pub(crate) fn spot(self) -> Option<Spot<'d>> {
+        Spot::of(self.element.child("Position")?)
+    }
+}
+
+/// The places of a shape where times belong, in the order in which they are passed.
+pub(crate) fn stamps<'m, 'd>(shape: Element<'m, 'd>) -> Vec<Stamp<'m, 'd>> {
+    let of = |element, attribute| Stamp { element, attribute };
+    match shape.name() {
+        "Polyline" => shape
+            .children_named("Vertex")
+            .map(|vertex| of(vertex, "time"))
+            .collect(),
+        "Nurbs" => shape
+            .children_named("ControlPoint")
+            .map(|point| of(point, "time"))
+            .collect(),
+        "Clothoid" => vec![of(shape, "startTime"), of(shape, "stopTime")],
+        "ClothoidSpline" => shape
+            .children_named("ClothoidSplineSegment")
+            .map(|segment| of(segment, "timeStart"))
+            .chain([of(shape, "timeEnd")])
+            .collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// The name of a trajectory for a text.
+pub(crate) fn named(trajectory: Element<'_, '_>) -> String {
+    match trajectory.text("name") {
+        Some(name) => format!("trajectory `{name}`"),
+        None => "trajectory".to_owned(),
+    }
+}
+
+/// How long a shape is, at most.
+pub(crate) fn longest(trajectory: Element<'_, '_>) -> Option<f64> {
+    let shape = shape(trajectory)?;
+    match shape.name() {
+        "Clothoid" => shape.number("length"),
+        "ClothoidSpline" => {
+            let segments = shape.children_named("ClothoidSplineSegment");
+            segments.map(|segment| segment.number("length")).sum()
+        }
+        // Chords are the length of a polyline unless something rounds its corners (1.4), and no
+        // curve of control points is longer than the line through them.
+        "Polyline" | "Nurbs" if shape.child("Interpolation").is_none() => {
+            chords(shape, trajectory.flag("closed")?)
+        }
+        _ => None,
+    }
+}
+
+fn chords(shape: Element<'_, '_>, closed: bool) -> Option<f64> {
+    let spots: Option<Vec<Spot<'_>>> = stamps(shape).into_iter().map(Stamp::spot).collect();
+    let spots = spots?;
+    let (first, last) = (spots.first()?, spots.last()?);
+    let along: Option<f64> = spots
+        .windows(2)
+        .map(|pair| pair.first()?.distance(pair.last()?))
+        .sum();
+    let back = if closed { last.distance(first)? } else { 0.0 };
+    Some(along? + back)
+}

@@ -1,0 +1,50 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::model::{About as _, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_positioning_geodetic_datum_defined",
+    uids: &["asam.net:xosc:1.1.0:positioning.geodetic_datum_defined"],
+    versions: "1.1.0..",
+    after: super::READABLE,
+    page: include_str!("positioning_geodetic_datum_defined.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let Some(map) = scenario.network().map() else {
+        return;
+    };
+    let reference = map.header().and_then(|header| header.child("geoReference"));
+    let is_defined = reference.is_some_and(|reference| {
+        !reference.text().trim().is_empty() || reference.children().next().is_some()
+    });
+    if is_defined {
+        return;
+    }
+    let mut positions = scenario.elements_everywhere("GeoPosition");
+    // One map lacks one thing, however many positions rest on it.
+    let Some(first) = positions.next() else {
+        return;
+    };
+    let others = match positions.count() {
+        0 => String::new(),
+        1 => " and so is one more".to_owned(),
+        count => format!(" and so are {count} more"),
+    };
+    let text = format!(
+        "a position is given by latitude and longitude{others}, but the road network has {}; without the \
+         map projection nobody can tell where that is in the map",
+        match reference {
+            Some(_) => "an empty `geoReference`",
+            None => "no `geoReference`",
+        }
+    );
+    let finding = found.about(first, "", text);
+    match reference.or_else(|| map.header()).or_else(|| map.root()) {
+        Some(place) => finding.at(place, "the header of the map"),
+        None => finding,
+    };
+}

@@ -1,0 +1,132 @@
+use qcbus_opendrive::{Road, Side};
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Level, Param, Rule, Sink};
+
+use crate::families::positions::{ON_ROAD, lane_of, metres, road_of, section_of, shown, station};
+use crate::model::{About as _, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_positioning_road_lane_offset_in_bounds",
+    uids: &["asam.net:xosc:1.0.0:positioning.road_lane_offset_in_bounds"],
+    after: super::READABLE,
+    params: &[SLACK],
+    page: include_str!("positioning_road_lane_offset_in_bounds.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const SLACK: Param = Param::number(
+    "slack",
+    1e-3,
+    "m",
+    "how far beyond a road's end or a lane's border a position may lie; along the road, a millionth of \
+     its length is added",
+);
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let map = scenario.network().map();
+    let slack = found.number(&SLACK);
+    for name in ON_ROAD {
+        for position in scenario.elements_everywhere(name) {
+            let Some(s) = position.number("s") else {
+                continue;
+            };
+            let road = map.and_then(|map| road_of(position, map));
+            if s < -slack {
+                before(position, s, road, found);
+                continue;
+            }
+            let Some(road) = road else { continue };
+            match road.length() {
+                Some(length) if s > length + slack + length * 1e-6 => {
+                    beyond(position, s, length, road, found);
+                }
+                Some(_) if position.is("LanePosition") => beside_lane(position, road, slack, found),
+                Some(_) => beside_lanes(position, road, slack, found),
+                None => {}
+            }
+        }
+    }
+}
+
+fn before(position: Element<'_, '_>, s: f64, road: Option<&Road<'_>>, found: &mut Sink<'_>) {
+    let text = format!(
+        "`{}` is at s = {}, but a road begins at s = 0",
+        position.name(),
+        shown(position, "s", &metres(s))
+    );
+    let finding = found.about(position, "s", text);
+    if let Some(road) = road {
+        finding.at(road.node(), "the road");
+    }
+}
+
+fn beyond(position: Element<'_, '_>, s: f64, length: f64, road: &Road<'_>, found: &mut Sink<'_>) {
+    let text = format!(
+        "`{}` is at s = {}, but the road `{}` ends at {}",
+        position.name(),
+        shown(position, "s", &metres(s)),
+        road.id(),
+        metres(length)
+    );
+    found.about(position, "s", text).at(road.node(), "the road");
+}
+
+fn beside_lane<'d>(position: Element<'_, 'd>, road: &Road<'d>, slack: f64, found: &mut Sink<'_>) {
+    let Some(offset) = position.number("offset") else {
+        return;
+    };
+    let Some((lane, s)) = lane_of(position, road) else {
+        return;
+    };
+    // The center lane has no width: that it is named at all is what matters.
+    if lane.id() == Some(0) {
+        return;
+    }
+    let width = lane.at.s().and_then(|start| lane.width(s - start));
+    let Some(width) = width.filter(|width| offset.abs() > width / 2.0 + slack) else {
+        return;
+    };
+    let text = format!(
+        "the `offset` of `LanePosition` is {}, but the lane `{}` of road `{}` is {} wide at s = {}: the \
+         position is {} outside of it",
+        shown(position, "offset", &metres(offset)),
+        lane.id_text().unwrap_or(""),
+        road.id(),
+        metres(width),
+        metres(s),
+        metres(offset.abs() - width / 2.0)
+    );
+    found
+        .about(position, "offset", text)
+        .level(Level::Warning)
+        .at(lane.node(), "the lane");
+}
+
+fn beside_lanes<'d>(position: Element<'_, 'd>, road: &Road<'d>, slack: f64, found: &mut Sink<'_>) {
+    let Some((t, s)) = position.number("t").zip(station(position, road)) else {
+        return;
+    };
+    let edge = |side| {
+        let section = section_of(road, side, s)?;
+        section.edge_t(side, s - section.s()?)
+    };
+    let (Some(left), Some(right)) = (edge(Side::Left), edge(Side::Right)) else {
+        return;
+    };
+    if t <= left + slack && t >= right - slack {
+        return;
+    }
+    let text = format!(
+        "`RoadPosition` is at t = {}, but the lanes of road `{}` reach from t = {} to t = {} at s = {}",
+        shown(position, "t", &metres(t)),
+        road.id(),
+        metres(right),
+        metres(left),
+        metres(s)
+    );
+    found
+        .about(position, "t", text)
+        .level(Level::Warning)
+        .at(road.node(), "the road");
+}

@@ -1,0 +1,110 @@
+use qcbus_opendrive::{Road, RoadMap, SectionRef};
+use qcbus_openscenario::{Element, LaneAt, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::positions::{self, ON_ROAD, find_lane, lane_id, listed, metres};
+use crate::families::references::quoted;
+use crate::model::{About as _, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_reference_control_road_lane_exists",
+    uids: &["asam.net:xosc:1.0.0:reference_control.road_lane_exists"],
+    after: super::READABLE,
+    page: include_str!("reference_control_road_lane_exists.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let Some(map) = scenario.network().map() else {
+        return;
+    };
+    let roads = listed(map.roads().iter().map(Road::id));
+    for name in ON_ROAD {
+        for position in scenario.elements_everywhere(name) {
+            let Some(id) = position.text("roadId") else {
+                continue;
+            };
+            if map.road(&id).is_none() {
+                no_road(position, &id, map, &roads, found);
+            } else if position.is("LanePosition")
+                && let Some(road) = positions::road_of(position, map)
+            {
+                lane(scenario, position, road, found);
+            }
+        }
+    }
+}
+
+fn no_road(
+    position: Element<'_, '_>,
+    id: &str,
+    map: &RoadMap<'_>,
+    roads: &str,
+    found: &mut Sink<'_>,
+) {
+    let there = if roads.is_empty() {
+        "has no roads at all".to_owned()
+    } else {
+        format!("has {roads}")
+    };
+    let text = format!(
+        "`{}` is on the road {}, but the road network {there}",
+        position.name(),
+        quoted(position, "roadId", id)
+    );
+    let finding = found.about(position, "roadId", text);
+    if let Some(root) = map.root() {
+        finding.at(root, "the road network");
+    }
+}
+
+fn lane<'d>(
+    scenario: &Scenario<'d>,
+    position: Element<'_, 'd>,
+    road: &Road<'d>,
+    found: &mut Sink<'_>,
+) {
+    let Some(text) = position.text("laneId") else {
+        return;
+    };
+    let Some(id) = lane_id(&text) else {
+        let text = format!(
+            "`LanePosition` names the lane {}, which is no integer; lanes of roads have integer ids, so \
+             this one was not looked for",
+            quoted(position, "laneId", &text)
+        );
+        found
+            .about(position, "laneId", text)
+            .level(Level::Information);
+        return;
+    };
+    let Some(s) = positions::station(position, road) else {
+        return;
+    };
+    if let LaneAt::None(section) = find_lane(scenario, road, s, id) {
+        let text = format!(
+            "`LanePosition` names the lane {} of road `{}` at s = {}, but the lane section there {}",
+            quoted(position, "laneId", &text),
+            road.id(),
+            metres(s),
+            lanes(section)
+        );
+        found
+            .about(position, "laneId", text)
+            .at(road.node(), "the road");
+    }
+}
+
+/// What lanes there are instead.
+fn lanes(section: SectionRef<'_, '_>) -> String {
+    let mut ids: Vec<i64> = section.lanes().filter_map(|lane| lane.id()).collect();
+    ids.retain(|id| *id != 0);
+    ids.sort_unstable_by_key(|id| (-id.signum(), id.unsigned_abs()));
+    let ids: Vec<String> = ids.iter().map(ToString::to_string).collect();
+    if ids.is_empty() {
+        "has no lanes".to_owned()
+    } else {
+        format!("has {}", listed(ids.iter().map(String::as_str)))
+    }
+}

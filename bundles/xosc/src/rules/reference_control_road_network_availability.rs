@@ -1,0 +1,70 @@
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::references::quoted;
+use crate::model::{About as _, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_reference_control_road_network_availability",
+    uids: &["asam.net:xosc:1.0.0:reference_control.road_network_availability"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("reference_control_road_network_availability.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let Some(network) = scenario.root().child("RoadNetwork") else {
+        return;
+    };
+    for file in network.children() {
+        if !file.is("SceneGraphFile") && !file.is("LogicFile") {
+            continue;
+        }
+        let Some(path) = file.text("filepath") else {
+            continue;
+        };
+        if let Some(why) = only_here(&path) {
+            let text = format!(
+                "the path {} {why}; a path that starts at the directory of the scenario is found everywhere",
+                quoted(file, "filepath", &path)
+            );
+            found
+                .about(file, "filepath", text)
+                .level(Level::Information);
+        } else if file.is("SceneGraphFile") {
+            scene(file, &path, found);
+        }
+    }
+}
+
+/// Why a path leads somewhere on one machine only.
+fn only_here(path: &str) -> Option<&'static str> {
+    let path = path.trim();
+    let path = path.strip_prefix("file://").unwrap_or(path);
+    let mut letters = path.chars();
+    let drive = (letters.next(), letters.next());
+    if matches!(drive, (Some(letter), Some(':')) if letter.is_ascii_alphabetic()) {
+        return Some("names a drive of one Windows machine");
+    }
+    if path.starts_with("\\\\") {
+        return Some("names a share of one network");
+    }
+    let is_private = ["/home/", "/Users/", "/root/", "~"]
+        .iter()
+        .any(|home| path.starts_with(home));
+    is_private.then_some("leads into one person's directory")
+}
+
+/// What the text alone tells of a scene graph: files of this kind are not opened.
+fn scene(file: Element<'_, '_>, path: &str, found: &mut Sink<'_>) {
+    let path = path.trim();
+    if path.ends_with(['/', '\\']) || path == "." || path == ".." {
+        let text = format!(
+            "the path {} is a directory; `SceneGraphFile` names a file, and is left out where there is none",
+            quoted(file, "filepath", path)
+        );
+        found.about(file, "filepath", text);
+    }
+}

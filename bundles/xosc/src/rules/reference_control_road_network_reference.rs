@@ -1,0 +1,39 @@
+use qcbus_openscenario::{Form, Network, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::road_network::{ON_ROADS, ON_SIGNALS, used};
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_reference_control_road_network_reference",
+    uids: &["asam.net:xosc:1.0.0:reference_control.road_network_reference"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("reference_control_road_network_reference.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    if scenario.form() != Form::Scenario || !matches!(scenario.network(), Network::Unnamed) {
+        return;
+    }
+    // An empty path is said where files are looked for, and that there is no `RoadNetwork` at all by
+    // the schema.
+    let Some(network) = scenario.root().child("RoadNetwork") else {
+        return;
+    };
+    let is_named = ["LogicFile", "Logics"]
+        .iter()
+        .any(|name| network.child(name).is_some());
+    // What cannot work without is an error, and said as one.
+    let is_missed = [ON_ROADS, ON_SIGNALS]
+        .iter()
+        .any(|names| !used(scenario, names).is_empty());
+    if is_named || is_missed {
+        return;
+    }
+    let text = "the road network has no `LogicFile`; a scenario without roads is valid, but in most cases the \
+                map was forgotten";
+    found.issue(network.node(), text);
+}

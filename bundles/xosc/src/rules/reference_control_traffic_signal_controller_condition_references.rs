@@ -1,0 +1,18 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::signals;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_reference_control_traffic_signal_controller_condition_references",
+    uids: &["asam.net:xosc:1.0.0:reference_control.traffic_signal_controller_condition_references"],
+    after: super::READABLE,
+    page: include_str!("reference_control_traffic_signal_controller_condition_references.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    signals::missing_phases(scenario, "TrafficSignalControllerCondition", found);
+}

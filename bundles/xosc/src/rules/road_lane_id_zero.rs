@@ -1,0 +1,32 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::positions::lane_id;
+use crate::families::references::quoted;
+use crate::model::{About as _, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_road_lane_id_zero",
+    uids: &["qcbus.dev:xosc:1.0.0:road.lane_id_zero"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("road_lane_id_zero.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for name in ["LanePosition", "FromLaneCoordinates"] {
+        for position in scenario.elements_everywhere(name) {
+            let Some(id) = position.text("laneId").filter(|id| lane_id(id) == Some(0)) else {
+                continue;
+            };
+            let text = format!(
+                "`{name}` names the lane {}, the center lane, which has no width: it is the line between \
+                 the two sides of a road; lanes to the right have ids below zero, to the left above",
+                quoted(position, "laneId", &id)
+            );
+            found.about(position, "laneId", text);
+        }
+    }
+}

@@ -1,0 +1,121 @@
+use qcbus_opendrive::LaneRef;
+use qcbus_openscenario::{Element, Entity, EntityKind, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::positions::{lane_of, metres, moved, owner, road_of};
+use crate::model::{About as _, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_road_lane_type_drivable",
+    uids: &["qcbus.dev:xosc:1.0.0:road.lane_type_drivable"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("road_lane_type_drivable.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// Lanes that no motor vehicle drives or stands on.
+const NOT_FOR_VEHICLES: &[&str] = &[
+    "none", "median", "curb", "sidewalk", "walking", "biking", "rail", "tram",
+];
+
+/// Where a pedestrian is in the way of vehicles from the beginning.
+const FOR_VEHICLES: &[&str] = &[
+    "driving",
+    "entry",
+    "exit",
+    "onRamp",
+    "offRamp",
+    "connectingRamp",
+    "slipLane",
+    "bidirectional",
+    "HOV",
+    "bus",
+    "taxi",
+    "mwyEntry",
+    "mwyExit",
+];
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let Some(map) = scenario.network().map() else {
+        return;
+    };
+    for position in scenario.elements_everywhere("LanePosition") {
+        let Some(owner) = owner(position) else {
+            continue;
+        };
+        let goes = match owner.name() {
+            "TeleportAction" => "is placed",
+            "AcquirePositionAction" => "is sent to a place",
+            _ => continue,
+        };
+        let lane = road_of(position, map).and_then(|road| lane_of(position, road));
+        let Some((lane, s)) = lane.filter(|(lane, _)| lane.id() != Some(0)) else {
+            continue;
+        };
+        let Some(kind) = lane.kind() else { continue };
+        let is_init = owner.ancestor("Init").is_some();
+        let entities = moved(position).unwrap_or_default();
+        for entity in entities {
+            let Some(level) = unfit(scenario, entity, lane, kind, is_init) else {
+                continue;
+            };
+            say(position, entity, goes, (lane, kind, s), level, found);
+            break;
+        }
+    }
+}
+
+fn say(
+    position: Element<'_, '_>,
+    entity: &Entity<'_>,
+    goes: &str,
+    (lane, kind, s): (LaneRef<'_, '_>, &str, f64),
+    level: Level,
+    found: &mut Sink<'_>,
+) {
+    let what = if entity.kind() == EntityKind::Pedestrian {
+        "pedestrian"
+    } else {
+        "vehicle"
+    };
+    let text = format!(
+        "the {what} `{}` {goes} on the lane `{}` of road `{}` at s = {}, which is of type `{kind}`",
+        entity.name(),
+        lane.id_text().unwrap_or(""),
+        lane.at.road.id(),
+        metres(s)
+    );
+    found
+        .about(position, "laneId", text)
+        .level(level)
+        .at(lane.node(), "the lane");
+}
+
+/// How bad it is that an entity is on a lane of this type; `None` where it belongs.
+fn unfit<'d>(
+    scenario: &Scenario<'d>,
+    entity: &Entity<'d>,
+    lane: LaneRef<'_, '_>,
+    kind: &str,
+    is_init: bool,
+) -> Option<Level> {
+    match entity.kind() {
+        EntityKind::Vehicle if NOT_FOR_VEHICLES.contains(&kind) => {
+            let category = entity.object(scenario)?.word("vehicleCategory")?;
+            let fits = match &*category {
+                "bicycle" => kind != "rail",
+                "tram" | "train" => kind == "rail" || kind == "tram",
+                // Lanes that bicycles share with others.
+                _ => kind == "biking" && lane.advisory().is_some_and(|word| word != "none"),
+            };
+            (!fits).then_some(Level::Warning)
+        }
+        // Who is sent to a driving lane later crosses the road.
+        EntityKind::Pedestrian if is_init && FOR_VEHICLES.contains(&kind) => {
+            Some(Level::Information)
+        }
+        _ => None,
+    }
+}

@@ -1,0 +1,83 @@
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::positions::metres;
+use crate::families::routes::{Way, Ways, is_for_vehicles, routes, stop, waypoints};
+use crate::model::{About as _, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_route_connected",
+    uids: &["qcbus.dev:xosc:1.0.0:route.connected"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("route_connected.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let Some(map) = scenario.network().map() else {
+        return;
+    };
+    let mut routes = routes(scenario)
+        .filter(|route| is_for_vehicles(*route))
+        .peekable();
+    if routes.peek().is_none() {
+        return;
+    }
+    let Some(mut ways) = Ways::of(map) else {
+        return;
+    };
+    for route in routes {
+        let mut before = None;
+        for (waypoint, position) in waypoints(route) {
+            let here = position.and_then(|position| Some((position, stop(position, map)?)));
+            if let (Some((from, left)), Some((to, reached))) = (&before, &here) {
+                match ways.between(left, reached) {
+                    Way::Driven | Way::Unknown => {}
+                    Way::Against => say(waypoint, *from, *to, true, found),
+                    Way::None => say(waypoint, *from, *to, false, found),
+                }
+            }
+            before = here;
+        }
+    }
+}
+
+fn say(
+    waypoint: Element<'_, '_>,
+    from: Element<'_, '_>,
+    to: Element<'_, '_>,
+    is_linked: bool,
+    found: &mut Sink<'_>,
+) {
+    let (here, before) = (place(to), place(from));
+    let text = if is_linked {
+        format!(
+            "this waypoint ({here}) is reached from the one before it ({before}) only against the direction \
+             of traffic"
+        )
+    } else {
+        format!(
+            "this waypoint ({here}) cannot be reached from the one before it ({before}): no linked lanes lead \
+             there"
+        )
+    };
+    found
+        .about(waypoint, "", text)
+        .at(from.node(), "the waypoint before it");
+}
+
+fn place(position: Element<'_, '_>) -> String {
+    let text = |name| position.text(name).unwrap_or_default();
+    let s = position.number("s").map_or(String::new(), metres);
+    if position.is("LanePosition") {
+        format!(
+            "road `{}`, lane `{}`, s = {s}",
+            text("roadId"),
+            text("laneId")
+        )
+    } else {
+        format!("road `{}`, s = {s}", text("roadId"))
+    }
+}

@@ -1,0 +1,43 @@
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::model::{About as _, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_routing_cardinality_of_control_points_in_nurbs",
+    uids: &["asam.net:xosc:1.0.0:routing.cardinality_of_control_points_in_nurbs"],
+    after: super::READABLE,
+    page: include_str!("routing_cardinality_of_control_points_in_nurbs.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for nurbs in scenario.elements_everywhere("Nurbs") {
+        let order = nurbs
+            .integer("order")
+            .and_then(|order| u64::try_from(order).ok());
+        // Orders below two are out of their range.
+        if let Some(order) = order.filter(|order| *order >= 2) {
+            count(nurbs, order, found);
+        }
+    }
+}
+
+fn count(nurbs: Element<'_, '_>, order: u64, found: &mut Sink<'_>) {
+    let points = nurbs.children_named("ControlPoint").count() as u64;
+    let knots = nurbs.children_named("Knot").count() as u64;
+    if points < order {
+        let text = format!(
+            "a NURBS of order {order} has {points} control points; it needs at least as many as its order"
+        );
+        found.about(nurbs, "order", text);
+    } else if points.checked_add(order) != Some(knots) {
+        let text = format!(
+            "a NURBS of order {order} with {points} control points has {knots} knots; it needs {}, the sum \
+             of the two",
+            points.saturating_add(order)
+        );
+        found.about(nurbs, "", text);
+    }
+}

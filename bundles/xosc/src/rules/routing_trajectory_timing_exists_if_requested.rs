@@ -1,0 +1,56 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::trajectories::{Timing, followed, named, shape, stamps, timing_of};
+use crate::model::{About as _, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_routing_trajectory_timing_exists_if_requested",
+    uids: &["asam.net:xosc:1.0.0:routing.trajectory_timing_exists_if_requested"],
+    after: super::READABLE,
+    page: include_str!("routing_trajectory_timing_exists_if_requested.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for action in scenario.elements_everywhere("FollowTrajectoryAction") {
+        let Some(trajectory) = followed(action) else {
+            continue;
+        };
+        let Timing::Asked(timing) = timing_of(trajectory) else {
+            continue;
+        };
+        let Some(shape) = shape(trajectory) else {
+            continue;
+        };
+        // In 1.0 the schema demands it of vertices.
+        if shape.is("Polyline") && scenario.version() < (1, 1) {
+            continue;
+        }
+        let stamps = stamps(shape);
+        let missing = || {
+            stamps
+                .iter()
+                .filter(|stamp| !stamp.element.has(stamp.attribute))
+        };
+        let Some(first) = missing().next() else {
+            continue;
+        };
+        let (count, all) = (missing().count(), stamps.len());
+        let text = format!(
+            "`Timing` asks for the times of the {}, but `{}` has no `{}`{}",
+            named(trajectory),
+            first.element.name(),
+            first.attribute,
+            if count > 1 {
+                format!("; {count} of {all} times are missing")
+            } else {
+                String::new()
+            }
+        );
+        found
+            .about(first.element, "", text)
+            .at(timing.node(), "asks for times");
+    }
+}

@@ -1,0 +1,48 @@
+use qcbus_openscenario::{Form, Network, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::road_network::{ON_ROADS, ON_SIGNALS, used};
+use crate::model::{About as _, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_asam_xosc_scenario_logic_invalid_elements_if_no_road_network",
+    uids: &["asam.net:xosc:1.0.0:scenario_logic.invalid_elements_if_no_road_network"],
+    after: super::READABLE,
+    page: include_str!("scenario_logic_invalid_elements_if_no_road_network.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    if scenario.form() != Form::Scenario || !matches!(scenario.network(), Network::Unnamed) {
+        return;
+    }
+    let network = scenario.root().child("RoadNetwork");
+    let is_named = ["LogicFile", "Logics"].iter().any(|name| {
+        let file = network.and_then(|network| network.child(name));
+        file.and_then(|file| file.written("filepath"))
+            .is_some_and(|path| !path.trim().is_empty())
+    });
+    if is_named {
+        return;
+    }
+    let kinds = [(ON_ROADS, Level::Error), (ON_SIGNALS, Level::Warning)];
+    for (names, level) in kinds {
+        for (name, first, count) in used(scenario, names) {
+            let many = match count {
+                1 => format!("a `{name}` is used"),
+                count => format!("`{name}` is used {count} times, here first"),
+            };
+            let lost = match level {
+                Level::Error => "there are no roads that it could refer to",
+                _ => "only the simulator can know the signals that it is about",
+            };
+            let text =
+                format!("{many}, but the scenario has no road network (`LogicFile`): {lost}");
+            let finding = found.about(first, "", text).level(level);
+            if let Some(network) = network {
+                finding.at(network.node(), "the road network without `LogicFile`");
+            }
+        }
+    }
+}

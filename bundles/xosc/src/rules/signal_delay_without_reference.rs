@@ -1,0 +1,42 @@
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::signals::Controllers;
+use crate::model::{About as _, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_signal_delay_without_reference",
+    uids: &["qcbus.dev:xosc:1.0.0:signal.delay_without_reference"],
+    after: super::READABLE,
+    page: include_str!("signal_delay_without_reference.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for controller in Controllers::of(scenario).all {
+        match (controller.has("delay"), controller.has("reference")) {
+            (true, false) => delay_alone(controller, found),
+            (false, true) => {
+                let text = "the controller has a `reference` to another one and no `delay`; the two belong \
+                            together: without a delay nobody knows how far it is behind";
+                found
+                    .about(controller, "reference", text)
+                    .level(Level::Warning);
+            }
+            _ => {}
+        }
+    }
+}
+
+fn delay_alone(controller: Element<'_, '_>, found: &mut Sink<'_>) {
+    // No delay at all is what a controller without reference has.
+    let Some(delay) = controller.number("delay").filter(|delay| *delay != 0.0) else {
+        return;
+    };
+    let text = format!(
+        "the controller has a `delay` of {delay} s and no `reference`; the delay counts from the first \
+         phase of the controller that `reference` names, so it has no effect"
+    );
+    found.about(controller, "delay", text);
+}

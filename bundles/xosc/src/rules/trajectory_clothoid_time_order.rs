@@ -1,0 +1,38 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::positions::shown;
+use crate::families::trajectories::{Timing, timing_of};
+use crate::model::{About as _, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_trajectory_clothoid_time_order",
+    uids: &["qcbus.dev:xosc:1.0.0:trajectory.clothoid_time_order"],
+    after: super::READABLE,
+    page: include_str!("trajectory_clothoid_time_order.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for clothoid in scenario.elements_everywhere("Clothoid") {
+        let times = clothoid
+            .number("startTime")
+            .zip(clothoid.number("stopTime"));
+        let Some((start, stop)) = times.filter(|(start, stop)| start >= stop) else {
+            continue;
+        };
+        let timing = clothoid.ancestor("Trajectory").map(timing_of);
+        let level = match timing {
+            Some(Timing::Asked(_)) => Level::Error,
+            // Two zeros are what exporters write when there are no times.
+            _ if start <= stop => continue,
+            _ => Level::Warning,
+        };
+        let text = format!(
+            "`stopTime` of `Clothoid` is {} s, but `startTime` is {start} s; it stops after it has started",
+            shown(clothoid, "stopTime", &stop.to_string()),
+        );
+        found.about(clothoid, "stopTime", text).level(level);
+    }
+}

@@ -1,0 +1,40 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Place, Rule, Sink};
+
+use crate::families::positions::shown;
+use crate::model::{About as _, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_trajectory_knots_non_decreasing",
+    uids: &["qcbus.dev:xosc:1.0.0:trajectory.knots_non_decreasing"],
+    after: super::READABLE,
+    page: include_str!("trajectory_knots_non_decreasing.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for nurbs in scenario.elements_everywhere("Nurbs") {
+        let knots: Vec<_> = nurbs.children_named("Knot").collect();
+        let falls = knots.windows(2).filter_map(|pair| match pair {
+            [one, two] => {
+                let (before, after) = one.number("value").zip(two.number("value"))?;
+                (after < before).then_some((*one, *two, before, after))
+            }
+            _ => None,
+        });
+        let falls: Vec<_> = falls.collect();
+        // A fall back to the beginning makes every later knot wrong; the first one is to be mended.
+        let Some((one, two, before, after)) = falls.first() else {
+            continue;
+        };
+        let text = format!(
+            "the knot {} follows the knot {before}; the knots of a NURBS do not decrease",
+            shown(*two, "value", &after.to_string())
+        );
+        let place = Place::attribute_or_node(one.node(), "value");
+        found
+            .about(*two, "value", text)
+            .at(place, "the knot before it");
+    }
+}

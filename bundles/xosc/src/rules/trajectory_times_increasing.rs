@@ -1,0 +1,130 @@
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::families::positions::shown;
+use crate::families::trajectories::{Stamp, Timing, named, shape, stamps, timing_of};
+use crate::model::{About as _, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_trajectory_times_increasing",
+    uids: &["qcbus.dev:xosc:1.0.0:trajectory.times_increasing"],
+    after: super::READABLE,
+    page: include_str!("trajectory_times_increasing.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for trajectory in scenario.elements_everywhere("Trajectory") {
+        let is_asked = match timing_of(trajectory) {
+            Timing::Asked(_) => true,
+            Timing::Unknown => false,
+            // Older exporters write `0` for every vertex, and nobody looks at it.
+            Timing::Ignored => continue,
+        };
+        let Some(shape) = shape(trajectory).filter(|shape| !shape.is("Clothoid")) else {
+            continue;
+        };
+        look_at(trajectory, shape, is_asked, found);
+    }
+}
+
+/// A time that does not come after the one before it.
+#[derive(Clone, Copy)]
+struct Step<'m, 'd> {
+    from: (Stamp<'m, 'd>, f64),
+    to: (Stamp<'m, 'd>, f64),
+}
+
+impl Step<'_, '_> {
+    /// How bad it is; `None` where time does go on.
+    fn level(&self, is_asked: bool) -> Option<Level> {
+        let ((from, before), (to, after)) = (self.from, self.to);
+        if after > before {
+            return None;
+        }
+        if after < before {
+            return Some(if is_asked {
+                Level::Error
+            } else {
+                Level::Warning
+            });
+        }
+        if !is_asked {
+            return None;
+        }
+        // To be at two places at one time is impossible; to be named twice is not.
+        let distance = from.spot().zip(to.spot());
+        let distance = distance.and_then(|(from, to)| from.distance(&to));
+        let is_jump = distance.is_some_and(|distance| distance > 1e-3) && from.element.is("Vertex");
+        Some(if is_jump {
+            Level::Error
+        } else {
+            Level::Warning
+        })
+    }
+}
+
+fn look_at(
+    trajectory: Element<'_, '_>,
+    shape: Element<'_, '_>,
+    is_asked: bool,
+    found: &mut Sink<'_>,
+) {
+    let stamps = stamps(shape);
+    let known: Vec<_> = stamps
+        .into_iter()
+        .filter_map(|stamp| Some((stamp, stamp.time()?)))
+        .collect();
+    if let Some((stamp, time)) = known.first().filter(|(_, time)| is_asked && *time < 0.0)
+        && stamp.element.is("Vertex")
+    {
+        let text = format!(
+            "the {} begins at {time} s; times begin at 0",
+            named(trajectory)
+        );
+        found
+            .about(stamp.element, stamp.attribute, text)
+            .level(Level::Warning);
+    }
+    let steps = known.windows(2).filter_map(|pair| match pair {
+        [from, to] => {
+            let step = Step {
+                from: *from,
+                to: *to,
+            };
+            Some((step.level(is_asked)?, step))
+        }
+        _ => None,
+    });
+    let steps: Vec<_> = steps.collect();
+    let worst = steps.iter().find(|(level, _)| *level == Level::Error);
+    if let Some((level, step)) = worst.or_else(|| steps.first()) {
+        say(trajectory, *step, steps.len(), *level, found);
+    }
+}
+
+fn say(
+    trajectory: Element<'_, '_>,
+    step: Step<'_, '_>,
+    count: usize,
+    level: Level,
+    found: &mut Sink<'_>,
+) {
+    let ((from, before), (to, after)) = (step.from, step.to);
+    let more = match count {
+        1 => String::new(),
+        count => format!("; so it is at {count} places of the {}", named(trajectory)),
+    };
+    let text = format!(
+        "`{}` of `{}` is {} s, but the time before it is {before} s; the times of a trajectory increase{more}",
+        to.attribute,
+        to.element.name(),
+        shown(to.element, to.attribute, &after.to_string()),
+    );
+    let place = Place::attribute_or_node(from.element.node(), from.attribute);
+    found
+        .about(to.element, to.attribute, text)
+        .level(level)
+        .at(place, "the time before it");
+}
