@@ -86,7 +86,7 @@ impl Ways {
         let mut ways = Ways {
             driven: HashMap::new(),
             linked: HashMap::new(),
-            budget: 20_000_000,
+            budget: 4_000_000,
         };
         for joint in map.lane_joints() {
             let lanes = (map.lane(joint.from.lane), map.lane(joint.to.lane));

@@ -20,7 +20,8 @@ const TURNS: Param = Param::number(
     "turns",
     1.0,
     "",
-    "so many full turns an angle may be; within a trajectory, where headings may go on counting, five times as many",
+    "so many full turns an angle may be; twice as many are information, and within a trajectory, where headings \
+     may go on counting, five times as many are nothing",
 );
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
@@ -44,19 +45,34 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                     continue;
                 }
             }
-            say(element, angle, value, found);
+            // Angles that were added up may be a little more than a full turn.
+            let level = if value.abs() > 2.0 * most {
+                Level::Warning
+            } else {
+                Level::Information
+            };
+            say(element, angle, value, level, found);
         }
     }
 }
 
-fn say(element: Element<'_, '_>, angle: &str, value: f64, found: &mut Sink<'_>) {
-    let rounded = (value * 1e4).round() / 1e4;
-    let radians = (value.to_radians() * 1e4).round() / 1e4;
+fn say(element: Element<'_, '_>, angle: &str, value: f64, level: Level, found: &mut Sink<'_>) {
+    let four_digits = |value: f64| (value * 1e4).round() / 1e4;
+    let rounded = four_digits(value);
+    let meant = match level {
+        Level::Warning => format!(
+            "if {rounded} degrees are meant, write {}",
+            four_digits(value.to_radians())
+        ),
+        _ => format!(
+            "{} rad is the same direction",
+            four_digits(value % std::f64::consts::TAU)
+        ),
+    };
     let text = format!(
-        "`{angle}` of `{}` is {} rad, which is more than a full turn (6.2832 rad); if {rounded} degrees are \
-         meant, write {radians}",
+        "`{angle}` of `{}` is {} rad, which is more than a full turn (6.2832 rad); {meant}",
         element.name(),
         shown(element, angle, &rounded.to_string())
     );
-    found.about(element, angle, text);
+    found.about(element, angle, text).level(level);
 }
