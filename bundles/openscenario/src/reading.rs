@@ -127,8 +127,13 @@ fn literal<'d>(raw: &'d str, expected: Expected) -> Result<Value<'d>, Problem<'d
                 .map(|error| format!("; it {error}")),
             _ => None,
         };
+        let shown = if raw.is_empty() {
+            "an empty text".to_owned()
+        } else {
+            format!("`{raw}`")
+        };
         let text = format!(
-            "`{raw}` is no value of type `{}`, which is {}{}",
+            "{shown} is no value of type `{}`, which is {}{}",
             data_type.word(),
             data_type.allowed(),
             why.unwrap_or_default()

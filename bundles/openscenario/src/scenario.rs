@@ -36,6 +36,8 @@ pub struct Scenario<'d> {
     kind: FileKind,
     typings: OnceCell<HashMap<*const u8, Option<Typing>>>,
     faults: OnceCell<Vec<ValueFault<'d>>>,
+    /// Each with the context of its entry.
+    entry_faults: OnceCell<Vec<(ContextId, ValueFault<'d>)>>,
     entities: OnceCell<Entities<'d>>,
     storyboard: OnceCell<Storyboard<'d>>,
     roads: OnceCell<Box<RoadMap<'d>>>,
@@ -64,6 +66,7 @@ impl<'d> Scenario<'d> {
             kind: inputs.kind,
             typings: OnceCell::new(),
             faults: OnceCell::new(),
+            entry_faults: OnceCell::new(),
             entities: OnceCell::new(),
             storyboard: OnceCell::new(),
             roads: OnceCell::new(),
@@ -204,8 +207,18 @@ impl<'d> Scenario<'d> {
         raw: &'d str,
         context: ContextId,
     ) -> Result<crate::Value<'d>, crate::faults::Problem<'d>> {
+        self.evaluate_in(attribute, raw, context, self.context(context))
+    }
+
+    /// Like `evaluate`, with the parameters of another context.
+    fn evaluate_in(
+        &self,
+        attribute: Attribute<'d>,
+        raw: &'d str,
+        context: ContextId,
+        read_in: &Context<'d>,
+    ) -> Result<crate::Value<'d>, crate::faults::Problem<'d>> {
         let node = attribute.node();
-        let read_in = self.context(context);
         let expected = self.expected(attribute, context);
         resolve(raw, expected, self.version, &|name| read_in.get(node, name))
     }
@@ -263,7 +276,7 @@ impl<'d> Scenario<'d> {
         let mut faults: Vec<ValueFault<'d>> = Vec::new();
         let mut note = |attribute: Attribute<'d>, problem: &crate::faults::Problem<'d>| {
             if !problem.is_silent() {
-                faults.push(self.explained(attribute, problem));
+                faults.push(self.explained(attribute, 0, problem));
             }
         };
         for (node, problem) in &self.declaration_problems {
@@ -272,7 +285,7 @@ impl<'d> Scenario<'d> {
             }
         }
         for attribute in self
-            .substituted()
+            .substituted(0)
             .filter(|attribute| !is_declared_value(*attribute))
         {
             if let Err(problem) = self.evaluate(attribute, attribute.value(), 0) {
@@ -283,10 +296,57 @@ impl<'d> Scenario<'d> {
         faults
     }
 
+    /// The faults of some kinds that values in the entries of catalogs have only because of what is
+    /// assigned where the document refers to them. What is wrong with the defaults is listed when the
+    /// catalog is checked.
+    pub fn entry_faults_of(
+        &self,
+        kinds: &[ValueFaultKind],
+    ) -> impl Iterator<Item = (Element<'_, 'd>, &ValueFault<'d>)> {
+        let all = self.entry_faults.get_or_init(|| self.find_entry_faults());
+        let wanted = all
+            .iter()
+            .filter(move |(_, fault)| kinds.contains(&fault.kind));
+        wanted.map(|(context, fault)| {
+            let element = Element {
+                scenario: self,
+                node: fault.attribute.node(),
+                context: *context,
+            };
+            (element, fault)
+        })
+    }
+
+    fn find_entry_faults(&self) -> Vec<(ContextId, ValueFault<'d>)> {
+        let mut faults = Vec::new();
+        let mut defaults: HashMap<Node<'d>, Context<'d>> = HashMap::new();
+        for (id, context) in (0..).zip(&self.contexts) {
+            let assigns = |(node, _): (Node<'d>, _)| node.child("ParameterAssignments").is_some();
+            if !context.reference.is_some_and(assigns) {
+                continue;
+            }
+            let top = context.top;
+            let default = defaults
+                .entry(top)
+                .or_insert_with(|| Context::new(top, self.version, &HashMap::new()).0);
+            for attribute in self.substituted(id) {
+                let Err(problem) = self.evaluate(attribute, attribute.value(), id) else {
+                    continue;
+                };
+                let by_default = self.evaluate_in(attribute, attribute.value(), id, default);
+                let as_ever = by_default.is_err_and(|other| other.kind == problem.kind);
+                if !problem.is_silent() && !as_ever {
+                    faults.push((id, self.explained(attribute, id, &problem)));
+                }
+            }
+        }
+        faults
+    }
+
     /// The attributes of the document that are written as expressions, in document order, whatever is
     /// wrong with them; what is text to the schema is none.
     pub fn written_expressions(&self) -> impl Iterator<Item = Attribute<'d>> {
-        self.substituted().filter(|attribute| {
+        self.substituted(0).filter(|attribute| {
             let is_text = || {
                 matches!(
                     self.expected(*attribute, 0),
@@ -310,7 +370,7 @@ impl<'d> Scenario<'d> {
 
     /// Every use of a parameter in the document: the attribute and the parameter's name.
     pub fn parameter_uses(&self) -> impl Iterator<Item = (Attribute<'d>, &'d str)> {
-        self.substituted().flat_map(|attribute| {
+        self.substituted(0).flat_map(|attribute| {
             let raw = attribute.value();
             let names: Vec<&'d str> = match reading::Form::of(raw) {
                 reading::Form::Parameter(name) | reading::Form::Embedded(_, name) => vec![name],
@@ -323,11 +383,11 @@ impl<'d> Scenario<'d> {
         })
     }
 
-    /// The attributes of the document that are not written out.
-    fn substituted(&self) -> impl Iterator<Item = Attribute<'d>> {
-        let root = self.contexts[0].top;
-        let all = std::iter::once(root)
-            .chain(root.descendants())
+    /// The attributes of the document, or of an entry, that are not written out.
+    fn substituted(&self, context: ContextId) -> impl Iterator<Item = Attribute<'d>> + use<'d> {
+        let top = self.context(context).top;
+        let all = std::iter::once(top)
+            .chain(top.descendants())
             .flat_map(|node| node.attributes());
         all.filter(|attribute| {
             attribute.value().contains('$')
@@ -340,6 +400,7 @@ impl<'d> Scenario<'d> {
     fn explained(
         &self,
         attribute: Attribute<'d>,
+        context: ContextId,
         problem: &crate::faults::Problem<'d>,
     ) -> ValueFault<'d> {
         let mut fault = ValueFault {
@@ -348,10 +409,14 @@ impl<'d> Scenario<'d> {
             at: problem.at,
             name: problem.name.clone(),
             text: problem.text.clone(),
-            said_by_schema: self.is_foreign_to_schema(attribute),
+            said_by_schema: self.is_foreign_to_schema(attribute, context),
         };
         if fault.kind == ValueFaultKind::Undeclared {
-            let element = self.element(attribute.node());
+            let element = Element {
+                scenario: self,
+                node: attribute.node(),
+                context,
+            };
             if self.declares_variable(&fault.name) {
                 fault.kind = ValueFaultKind::Variable;
                 fault.text = format!(
@@ -368,8 +433,10 @@ impl<'d> Scenario<'d> {
     }
 
     /// Whether the attribute's type in the schema admits nothing of the form in which it is written.
-    fn is_foreign_to_schema(&self, attribute: Attribute<'d>) -> bool {
-        let value = self.typing(0).and_then(|typing| typing.value(attribute));
+    fn is_foreign_to_schema(&self, attribute: Attribute<'d>, context: ContextId) -> bool {
+        let value = self
+            .typing(context)
+            .and_then(|typing| typing.value(attribute));
         let Some(value) = value else {
             return false;
         };

@@ -4,9 +4,10 @@ use std::borrow::Cow;
 
 use foldhash::{HashMap, HashMapExt as _, HashSet};
 use qcbus_openscenario::{DataType, Element, Scenario};
-use qcbus_sdk::Sink;
+use qcbus_sdk::{Level, Sink};
 
 use super::references;
+use crate::model::About as _;
 
 /// A kind of declaration and the elements that refer to it.
 pub(crate) struct Declarable {
@@ -116,10 +117,25 @@ impl Declarable {
         let declared = self.by_name(scenario);
         for elements in [self.writers, self.readers] {
             for (element, name) in self.references(scenario, elements) {
-                if !declared.contains_key(&*name) {
-                    let names = declared.keys().copied();
-                    references::unresolved(element, self.reference, &name, self.what, names, found);
+                if declared.contains_key(&*name) {
+                    continue;
                 }
+                let parameter = scenario.root().parameter(&name);
+                if let Some(parameter) = parameter {
+                    let text = format!(
+                        "`{}` refers to the {} `{name}`, but only a parameter has this name, which is \
+                         something else; some tools take it",
+                        element.name(),
+                        self.what
+                    );
+                    found
+                        .about(element, self.reference, text)
+                        .level(Level::Warning)
+                        .at(parameter.node, "the parameter");
+                    continue;
+                }
+                let names = declared.keys().copied();
+                references::unresolved(element, self.reference, &name, self.what, names, found);
             }
         }
     }

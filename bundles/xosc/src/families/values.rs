@@ -6,10 +6,25 @@ use qcbus_openscenario::{
 };
 use qcbus_sdk::{Finding, Sink};
 
+use crate::model::About as _;
+
 /// Says every fault of these kinds.
 pub(crate) fn report(scenario: &Scenario<'_>, kinds: &[ValueFaultKind], found: &mut Sink<'_>) {
     for fault in faults(scenario, kinds) {
         say(fault, found);
+    }
+    report_in_entries(scenario, kinds, found);
+}
+
+/// Says every fault of these kinds that entries of catalogs have by what is assigned to them.
+pub(crate) fn report_in_entries(
+    scenario: &Scenario<'_>,
+    kinds: &[ValueFaultKind],
+    found: &mut Sink<'_>,
+) {
+    for (element, fault) in scenario.entry_faults_of(kinds) {
+        let text = format!("{}: {}", written(fault.attribute), fault.text);
+        found.about(element, fault.attribute.name(), text);
     }
 }
 
@@ -78,19 +93,32 @@ pub(crate) fn typed<'d>(
 ) -> Option<Result<Value<'d>, String>> {
     let value = match element.read(name) {
         Reading::Absent | Reading::Unknown => return None,
-        Reading::Literal(text) => data_type.parse(text),
+        Reading::Literal(text) => data_type.parse(text).or_else(|| whole(text, data_type)),
         Reading::Value(value) => fitting(&value, data_type),
     };
     let wrong = || {
         let written = element.text(name).unwrap_or_default();
+        let shown = if written.is_empty() {
+            "an empty text".to_owned()
+        } else {
+            super::references::quoted(element, name, &short(&written))
+        };
         format!(
-            "{} is no value of type `{}`, which is {}",
-            super::references::quoted(element, name, &short(&written)),
+            "{shown} is no value of type `{}`, which is {}",
             data_type.word(),
             data_type.allowed()
         )
     };
     Some(value.ok_or_else(wrong))
+}
+
+/// The integer that is written as a double without a fraction, `5.0`: what reads it as a number takes it.
+pub(crate) fn whole<'d>(text: &str, data_type: DataType) -> Option<Value<'d>> {
+    data_type.range()?;
+    fitting(
+        &Value::Double(qcbus_openscenario::parse_double(text)?),
+        data_type,
+    )
 }
 
 /// A value of a parameter or an expression as one of the type.

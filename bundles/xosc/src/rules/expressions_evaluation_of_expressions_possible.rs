@@ -21,6 +21,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             values::say(fault, found);
         }
     }
+    values::report_in_entries(scenario, &[ValueFaultKind::Evaluation], found);
     for fault in values::faults(scenario, &[ValueFaultKind::Limit]) {
         // That we do not look does not make it wrong.
         values::say(fault, found).level(Level::Information);

@@ -22,6 +22,9 @@ const SPEEDS: &[&str] = &["AbsoluteTargetSpeed", "AbsoluteSpeed", "SpeedConditio
 /// Elements whose angles are in radians.
 const ORIENTED: &[&str] = &["WorldPosition", "GeoPosition", "Orientation"];
 
+/// A speed beyond this stands for "as fast as you can", in whatever unit.
+const UNLIMITED: f64 = 1e4;
+
 const FASTEST: Param = Param::number(
     "fastest",
     70.0,
@@ -34,7 +37,9 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for name in SPEEDS {
         for element in scenario.elements_everywhere(name) {
             let speed = element.number("value");
-            let Some(speed) = speed.filter(|speed| speed.abs() > fastest) else {
+            let Some(speed) =
+                speed.filter(|speed| speed.abs() > fastest && speed.abs() < UNLIMITED)
+            else {
                 continue;
             };
             let text = format!(
@@ -51,11 +56,11 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         for element in scenario.elements_everywhere(name) {
             for attribute in ["h", "p", "r"] {
                 let angle = element.number(attribute);
-                let Some(angle) = angle.filter(|angle| angle.abs() > TAU + 0.01) else {
+                let Some(angle) = angle.filter(|angle| angle.abs() > 2.0 * TAU) else {
                     continue;
                 };
                 let text = format!(
-                    "`{attribute}` of `{name}` is {}, more than a full turn; angles are in radians, {} degrees \
+                    "`{attribute}` of `{name}` is {}, more than two full turns; angles are in radians, {} degrees \
                      would be {:.4}",
                     short(angle),
                     short(angle),

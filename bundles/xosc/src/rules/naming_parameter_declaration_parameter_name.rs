@@ -22,20 +22,20 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         else {
             continue;
         };
-        let stripped = name.strip_prefix('$').filter(|rest| is_identifier(rest));
-        let why = match stripped {
-            Some(rest) => format!(
-                "the `$` belongs where the parameter is used; it is declared as `{rest}`"
+        let (level, why) = match name.strip_prefix('$') {
+            // Many files have it, and most simulators take it off.
+            Some(rest) if is_identifier(rest) => (
+                Level::Warning,
+                format!("the `$` belongs where the parameter is used; it is declared as `{rest}`"),
             ),
-            None => "a name begins with a letter or `_` and goes on with letters, digits and `_`, else no `$` \
-                     can refer to it"
-                .to_owned(),
+            _ => (
+                Level::Error,
+                "a name begins with a letter or `_` and goes on with letters, digits and `_`, else no `$` \
+                 can refer to it"
+                    .to_owned(),
+            ),
         };
         let text = format!("`{name}` is no name of a parameter: {why}");
-        let finding = found.about(declaration, "name", text);
-        if stripped.is_some() {
-            // Examples of the standard itself are written so, and simulators leave the sign out.
-            finding.level(Level::Warning);
-        }
+        found.about(declaration, "name", text).level(level);
     }
 }

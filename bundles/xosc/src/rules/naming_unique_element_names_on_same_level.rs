@@ -5,7 +5,10 @@ use crate::families::names;
 
 pub static RULE: Rule<Document> = Rule {
     id: "check_asam_xosc_naming_unique_element_names_on_same_level",
-    uids: &["asam.net:xosc:1.0.0:naming.unique_element_names_on_same_level"],
+    uids: &[
+        "asam.net:xosc:1.0.0:naming.unique_element_names_on_same_level",
+        "qcbus.dev:xosc:1.0.0:parameters.duplicate_declaration",
+    ],
     versions: "1.0.0..1.2.0",
     after: super::READABLE,
     page: include_str!("naming_unique_element_names_on_same_level.md"),

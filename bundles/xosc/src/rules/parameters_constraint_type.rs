@@ -1,5 +1,5 @@
 use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Rule, Sink};
+use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::constraints;
 use crate::families::declared;
@@ -35,7 +35,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                         comparison.word(),
                         data_type.word()
                     );
-                    found.about(element, "rule", text);
+                    found.about(element, "rule", text).level(Level::Warning);
                 }
             }
         }

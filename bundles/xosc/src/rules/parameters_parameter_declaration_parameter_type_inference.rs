@@ -17,10 +17,22 @@ pub static RULE: Rule<Scene> = Rule {
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let kinds = [ValueFaultKind::Declared, ValueFaultKind::Parameter];
     for fault in values::faults(scenario, &kinds) {
-        if !values::is_of_other_rule(scenario, fault) {
-            values::say(fault, found);
+        if values::is_of_other_rule(scenario, fault) {
+            continue;
         }
+        let attribute = fault.attribute;
+        let declared = attribute.node().attr("parameterType");
+        let data_type = declared.and_then(DataType::of_declaration);
+        let whole = data_type.and_then(|data_type| values::whole(attribute.value(), data_type));
+        let level = if attribute.is("value") && whole.is_some() {
+            // Most simulators read `5.0` as 5.
+            Level::Warning
+        } else {
+            Level::Error
+        };
+        values::say(fault, found).level(level);
     }
+    values::report_in_entries(scenario, &[ValueFaultKind::Parameter], found);
     for declaration in scenario.elements("ParameterDeclaration") {
         if declared::type_of(declaration, "parameterType") == Some(DataType::Double)
             && declaration.double("value").is_some_and(f64::is_nan)
