@@ -14,11 +14,33 @@ const PAGE: &str = concat!(
 );
 
 /// Where we differ, and why ours is right.
-const DEVIATIONS: &[Deviations] = &[Deviations {
-    checker: "check_asam_xosc_reference_control_valid_actor_reference_in_private_actions",
-    inputs: &["reference_control.valid_actor_reference_in_private_actions.negative.xosc"],
-    reason: "with selectTriggeringEntities=\"true\" those who trigger are the actors",
-}];
+const DEVIATIONS: &[Deviations] = &[
+    Deviations {
+        checker: "check_asam_xosc_reference_control_valid_actor_reference_in_private_actions",
+        inputs: &["reference_control.valid_actor_reference_in_private_actions.negative.xosc"],
+        reason: "with selectTriggeringEntities=\"true\" those who trigger are the actors",
+    },
+    Deviations {
+        checker: "check_asam_xosc_data_type_allowed_operators",
+        inputs: &["allowed_operators/negative_example_multiple.xosc"],
+        reason: "its expressions stand in `entityRef`, a text, where nothing is evaluated: the entities of \
+                 those names are said to be missing",
+    },
+    Deviations {
+        checker: "check_asam_xosc_parameters_valid_parameter_declaration_in_catalogs",
+        inputs: &["parameters.valid_parameter_declaration_in_catalogs.negative_no_default.xosc"],
+        reason: "the empty default is said once at the declaration, where it is mended, with its first use as \
+                 second place",
+    },
+    Deviations {
+        checker: "check_asam_xosc_reference_control_resolvable_variable_reference",
+        inputs: &[
+            "reference_control.resolvable_variable_reference.positive.xosc",
+            "reference_control.resolvable_variable_reference.negative.multiple.xosc",
+        ],
+        reason: "a parameter is no variable: a warning",
+    },
+];
 
 /// Where we differ on the scenarios of other projects, and why ours is right.
 const ON_REAL_SCENARIOS: &[Deviations] = &[];
