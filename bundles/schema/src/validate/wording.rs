@@ -341,17 +341,38 @@ pub(super) fn invalid_value(
     let suggestion =
         closest(value.trim(), expectation.values.iter().map(String::as_str)).map(str::to_owned);
     let text = format!(
-        "{} is no value of {} in <{}>, expected: {}",
+        "{} is no value of {} in <{}>, expected: {}{}",
         quote(value),
         attribute.name(),
         node.name(),
-        expectation.sentence()
+        expectation.sentence(),
+        foreign_to_expressions(value, &expectation.words)
     );
     let mut expected = expectation.values;
     expected.extend(expectation.words);
     Wording::new(value, text)
         .expecting(expected)
         .suggesting(suggestion.as_deref())
+}
+
+/// What keeps a value from being the expression of OpenSCENARIO as which it is meant.
+fn foreign_to_expressions(value: &str, expected: &[String]) -> String {
+    let takes_one = expected
+        .iter()
+        .any(|words| words.starts_with("an expression"));
+    let inner = value.strip_prefix("${").filter(|_| takes_one);
+    let Some(inner) = inner.map(|inner| inner.strip_suffix('}').unwrap_or(inner)) else {
+        return String::new();
+    };
+    let admitted = |c: char| c.is_ascii_alphanumeric() || " _+-*/%$().,".contains(c);
+    match inner.chars().find(|c| !admitted(*c)) {
+        Some(sign) => format!(
+            "; {} has no meaning in expressions, which are made of numbers, words, parameters and \
+             the signs + - * / % ( ) ,",
+            quote(&sign.to_string())
+        ),
+        None => String::new(),
+    }
 }
 
 pub(super) fn invalid_text(
