@@ -433,11 +433,16 @@ impl<'d> Scenario<'d> {
     }
 
     /// Whether the attribute's type in the schema admits nothing of the form in which it is written.
+    /// Versions without a schema of their own are judged by no other, except as an information.
     fn is_foreign_to_schema(&self, attribute: Attribute<'d>, context: ContextId) -> bool {
+        let (major, minor) = (u32::from(self.version.0), u32::from(self.version.1));
+        let version = qcbus_schema::Version { major, minor };
+        let mut shipped = qcbus_schema::SHIPPED.iter();
+        let own = shipped.any(|one| one.kind == FileKind::Xosc && one.version == version);
         let value = self
             .typing(context)
             .and_then(|typing| typing.value(attribute));
-        let Some(value) = value else {
+        let Some(value) = value.filter(|_| own) else {
             return false;
         };
         let data_type = match (value.words(), value.name().and_then(DataType::of_schema)) {
