@@ -2,7 +2,7 @@
 
 use std::cell::OnceCell;
 
-use foldhash::{HashMap, HashMapExt as _};
+use foldhash::{HashMap, HashMapExt as _, HashSet};
 use qcbus_document::{Attribute, Document, FileKind, Node};
 use qcbus_opendrive::RoadMap;
 use qcbus_schema::Typing;
@@ -35,6 +35,7 @@ pub struct Scenario<'d> {
     declaration_problems: Vec<DeclarationProblem<'d>>,
     kind: FileKind,
     typings: OnceCell<HashMap<*const u8, Option<Typing>>>,
+    variables: OnceCell<HashSet<&'d str>>,
     faults: OnceCell<Vec<ValueFault<'d>>>,
     /// Each with the context of its entry.
     entry_faults: OnceCell<Vec<(ContextId, ValueFault<'d>)>>,
@@ -65,6 +66,7 @@ impl<'d> Scenario<'d> {
             declaration_problems,
             kind: inputs.kind,
             typings: OnceCell::new(),
+            variables: OnceCell::new(),
             faults: OnceCell::new(),
             entry_faults: OnceCell::new(),
             entities: OnceCell::new(),
@@ -424,9 +426,12 @@ impl<'d> Scenario<'d> {
                      parameters",
                     fault.name
                 );
-            } else if let Some(near) = qcbus_schema::closest(&fault.name, element.parameter_names())
-            {
-                fault.text.push_str(&format!("; `${near}` is"));
+            } else {
+                // Enough to find a slip, and bounded where thousands of names meet thousands of faults.
+                let names = element.parameter_names().take(500);
+                if let Some(near) = qcbus_schema::closest(&fault.name, names) {
+                    fault.text.push_str(&format!("; `${near}` is"));
+                }
             }
         }
         fault
@@ -462,11 +467,16 @@ impl<'d> Scenario<'d> {
     }
 
     fn declares_variable(&self, name: &str) -> bool {
-        let block = self.root().child("VariableDeclarations");
-        let mut variables = block
-            .into_iter()
-            .flat_map(|block| block.children_named("VariableDeclaration"));
-        variables.any(|variable| variable.written("name") == Some(name))
+        let variables = self.variables.get_or_init(|| {
+            let block = self.root().child("VariableDeclarations");
+            let declarations = block
+                .into_iter()
+                .flat_map(|block| block.children_named("VariableDeclaration"));
+            declarations
+                .filter_map(|variable| variable.written("name"))
+                .collect()
+        });
+        variables.contains(name)
     }
 }
 

@@ -31,6 +31,9 @@ pub(crate) const ENTITY_REFERENCES: &[(&str, &str)] = &[
     ("SynchronizeAction", "masterEntityRef"),
 ];
 
+/// Findings of one rule that come with a hint.
+const MOST_HINTS: u64 = 100;
+
 /// Says that a reference leads nowhere: `what` is the kind of thing that it names, `names` are those
 /// that there are.
 pub(crate) fn unresolved<'n>(
@@ -41,11 +44,16 @@ pub(crate) fn unresolved<'n>(
     names: impl Iterator<Item = &'n str>,
     found: &mut Sink<'_>,
 ) {
-    let text = format!(
-        "`{}` refers to the {what} {}, but there is none{}",
-        reference.name(),
-        quoted(reference, attribute, name),
+    // A hint looks at all names; whoever has so many faults has another problem than a slip.
+    let hint = if found.count() < MOST_HINTS {
         hint(name, names)
+    } else {
+        String::new()
+    };
+    let text = format!(
+        "`{}` refers to the {what} {}, but there is none{hint}",
+        reference.name(),
+        quoted(reference, attribute, name)
     );
     found.about(reference, attribute, text);
 }
