@@ -68,13 +68,11 @@ deprecated! {
         GeoPosition Attribute("latitude") "`latitudeDeg`, which is in degrees,";
         GeoPosition Attribute("longitude") "`longitudeDeg`, which is in degrees,";
         ParameterAction Within("GlobalAction") "a `VariableAction` and a `VariableDeclaration`";
-        ParameterDeclaration Word("parameterType", "integer") "`int`";
         ParkingBrake (OverrideParkingBrakeAction) Attribute("value") "a child `BrakePercent` or `BrakeForce`";
         ReachPositionCondition Within("EntityCondition") "a `DistanceCondition`";
         Sun Attribute("intensity") "`illuminance`";
         TrafficSourceAction Attribute("velocity") "`speed`";
         TrafficSwarmAction Attribute("velocity") "a child `InitialSpeedRange`";
-        VariableDeclaration Word("variableType", "integer") "`int`";
         Weather Attribute("cloudState") "`fractionalCloudCover`";
     }
     3: {

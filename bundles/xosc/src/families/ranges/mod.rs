@@ -42,6 +42,8 @@ pub(crate) struct Row {
     low: Bound,
     high: Bound,
     unit: &'static str,
+    /// Another rule says what is not finite.
+    finite: bool,
     /// The attribute is a count.
     counts: bool,
     judge: Judge,
@@ -61,6 +63,14 @@ impl Row {
         Row {
             judge,
             excuse,
+            ..self
+        }
+    }
+
+    /// What is not finite is said by another rule.
+    pub(crate) const fn if_finite(self) -> Row {
+        Row {
+            finite: true,
             ..self
         }
     }
@@ -110,6 +120,8 @@ impl Row {
         if self.counts {
             let count = element.integer(self.attribute)?;
             u32::try_from(count).ok().map(f64::from)
+        } else if self.finite {
+            element.number(self.attribute)
         } else {
             element.double(self.attribute)
         }
@@ -138,6 +150,7 @@ const fn row(
         low: Open,
         high: Open,
         unit,
+        finite: false,
         counts: false,
         judge: error,
         excuse: "",

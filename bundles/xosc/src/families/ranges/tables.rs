@@ -185,11 +185,11 @@ table! {
 // The standard confuses the ranges of latitude and longitude in radians, and has no places below the sea.
 table! {
     GEO:
-        between(-FRAC_PI_2, FRAC_PI_2) GeoPosition latitude "rad" "geoposition_latitude";
-        between(-90.0, 90.0) GeoPosition latitudeDeg "°" "geoposition_latitudedeg";
-        between(-PI, PI) GeoPosition longitude "rad" "geoposition_longitude" .judged(a_turn_is_harmless, A_TURN);
+        between(-FRAC_PI_2, FRAC_PI_2) GeoPosition latitude "rad" "geoposition_latitude" .if_finite();
+        between(-90.0, 90.0) GeoPosition latitudeDeg "°" "geoposition_latitudedeg" .if_finite();
+        between(-PI, PI) GeoPosition longitude "rad" "geoposition_longitude" .judged(a_turn_is_harmless, A_TURN).if_finite();
         between(-180.0, 180.0) GeoPosition longitudeDeg "°" "geoposition_longitudedeg"
-            .judged(a_turn_in_degrees_is_harmless, A_TURN);
+            .judged(a_turn_in_degrees_is_harmless, A_TURN).if_finite();
 }
 
 /// 190° east is 170° west.
@@ -237,12 +237,10 @@ table! {
 table! {
     POSITIONS:
         at_most(0.0) GeoPosition verticalRoadSelection "" "geoposition_verticalroadselection" .judged(warning, "");
-        from_zero LanePosition s "m" "laneposition_s";
         from_zero PositionInLaneCoordinates pathS "m" "positioninlanecoordinates_paths"
-            .called(&["FromLaneCoordinates"]);
+            .called(&["FromLaneCoordinates"]).if_finite();
         from_zero PositionInRoadCoordinates pathS "m" "positioninroadcoordinates_paths"
-            .called(&["FromRoadCoordinates"]);
-        from_zero RoadPosition s "m" "roadposition_s";
+            .called(&["FromRoadCoordinates"]).if_finite();
 }
 
 table! {
