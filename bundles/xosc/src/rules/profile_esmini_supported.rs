@@ -17,11 +17,11 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 const GAPS: &[Gap] = &[
-    gap("Actors", Stops).saying("selectTriggeringEntities", "true"),
+    gap("Actors", Ignores).saying("selectTriggeringEntities", "true"),
     gap("AnimationAction", Ignores),
     gap("EntitySelection", Ignores),
     gap("ExternalObjectReference", Ignores),
-    gap("FromCurrentEntity", Stops),
+    gap("FromCurrentEntity", Ignores),
     gap("GeoPosition", Stops),
     gap("ModifyAction", Ignores),
     gap("MonitorDeclaration", Ignores),
