@@ -1,5 +1,5 @@
 use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Level, Rule, Sink};
+use qcbus_sdk::{Rule, Sink};
 
 use crate::model::{About as _, Scene};
 
@@ -24,8 +24,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             (false, false) => {
                 let text = "`RelativeLanePosition` has neither `ds` nor `dsLane`, so it does not say how far \
                             along the road it is; one of them is needed";
-                // Most simulators take it as zero.
-                found.about(position, "", text).level(Level::Warning);
+                found.about(position, "", text);
             }
             _ => {}
         }

@@ -17,7 +17,7 @@ pub static RULE: Rule<Scene> = Rule {
 
 /// Lanes that no motor vehicle drives or stands on.
 const NOT_FOR_VEHICLES: &[&str] = &[
-    "none", "median", "curb", "sidewalk", "walking", "biking", "rail", "tram",
+    "none", "border", "median", "curb", "sidewalk", "walking", "biking", "rail", "tram",
 ];
 
 /// Where a pedestrian is in the way of vehicles from the beginning.

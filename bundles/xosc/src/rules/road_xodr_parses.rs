@@ -32,14 +32,14 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let Some(file) = file else { return };
     // Maps of other formats, such as Lanelet2, are XML too; their names say so.
     let path = linked.document.path().to_ascii_lowercase();
-    if ![".xodr", ".xodrz"]
+    let is_called_map = [".xodr", ".xodrz"]
         .iter()
-        .any(|ending| path.ends_with(ending))
-    {
+        .any(|ending| path.ends_with(ending));
+    if !is_called_map && !root.is("OpenSCENARIO") {
         return;
     }
     let text = format!(
-        "the road network is called an OpenDRIVE map, but its root element is `{}` instead of `OpenDRIVE`; \
+        "the file of the road network is no OpenDRIVE map: its root element is `{}` instead of `OpenDRIVE`; \
          nothing that needs roads was checked",
         root.name()
     );

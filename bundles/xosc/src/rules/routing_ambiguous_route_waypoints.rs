@@ -5,7 +5,7 @@ use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::positions::listed;
 use crate::families::roads_nearby::RoadsNearby;
-use crate::families::routes::{routes, waypoints};
+use crate::families::routes::{is_for_vehicles, routes, waypoints};
 use crate::model::{About as _, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -31,15 +31,19 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 continue;
             };
             let roads = nearby.get_or_init(|| RoadsNearby::of(map)).roads_at(x, y);
-            if roads.len() < 2 {
-                continue;
-            }
-            let text = format!(
-                "the waypoint is a `WorldPosition` on the lanes of {} roads, {}; a `LanePosition` says which one \
-                 the route takes",
-                roads.len(),
-                listed(roads.iter().copied())
-            );
+            let text = match roads.len() {
+                0 if is_for_vehicles(route) => {
+                    "the waypoint is a `WorldPosition` on no lane of the road network; a `LanePosition` says \
+                     which road the route takes"
+                        .to_owned()
+                }
+                0 | 1 => continue,
+                count => format!(
+                    "the waypoint is a `WorldPosition` on the lanes of {count} roads, {}; a `LanePosition` \
+                     says which one the route takes",
+                    listed(roads.iter().copied())
+                ),
+            };
             found
                 .about(position, "", text)
                 .point(x, y, position.number("z").unwrap_or(0.0));

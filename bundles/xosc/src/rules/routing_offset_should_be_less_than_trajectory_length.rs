@@ -1,8 +1,7 @@
-use qcbus_openscenario::Scenario;
+use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
-use crate::families::positions::metres;
-use crate::families::positions::shown;
+use crate::families::positions::{metres, shown};
 use crate::families::trajectories::{followed, longest, named};
 use crate::model::{About as _, Scene};
 
@@ -19,30 +18,47 @@ pub static RULE: Rule<Scene> = Rule {
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for action in scenario.elements_everywhere("FollowTrajectoryAction") {
-        let Some(offset) = action.number("initialDistanceOffset") else {
-            continue;
-        };
-        let offset_text = shown(action, "initialDistanceOffset", &metres(offset));
-        if offset < 0.0 {
-            let text = format!(
-                "`initialDistanceOffset` is {offset_text}; a trajectory begins at 0, there is nothing before it"
-            );
-            found.about(action, "initialDistanceOffset", text);
-            continue;
-        }
-        let Some(trajectory) = followed(action).filter(|_| offset > 0.0) else {
-            continue;
-        };
-        let Some(length) = longest(trajectory).filter(|length| offset >= *length) else {
-            continue;
-        };
+        look_at(action, "initialDistanceOffset", found);
+    }
+    for position in scenario.elements_everywhere("TrajectoryPosition") {
+        look_at(position, "s", found);
+    }
+}
+
+fn look_at(element: Element<'_, '_>, attribute: &str, found: &mut Sink<'_>) {
+    let Some(offset) = element.number(attribute) else {
+        return;
+    };
+    let value = shown(element, attribute, &metres(offset));
+    if offset < 0.0 {
         let text = format!(
-            "`initialDistanceOffset` is {offset_text}, but the {} is no longer than {}: nothing of it is left to follow",
+            "`{attribute}` of `{}` is {value}; a trajectory begins at 0, there is nothing before it",
+            element.name()
+        );
+        found.about(element, attribute, text);
+        return;
+    }
+    let Some(trajectory) = followed(element).filter(|_| offset > 0.0) else {
+        return;
+    };
+    let Some(length) = longest(trajectory) else {
+        return;
+    };
+    // One may stand at the end, but not go on from there.
+    let (is_beyond, lost) = if element.is("TrajectoryPosition") {
+        (offset > length + 1e-3, "it ends before that")
+    } else {
+        (offset >= length, "nothing of it is left to follow")
+    };
+    if is_beyond {
+        let text = format!(
+            "`{attribute}` of `{}` is {value}, but the {} is no longer than {}: {lost}",
+            element.name(),
             named(trajectory),
             metres(length)
         );
         found
-            .about(action, "initialDistanceOffset", text)
+            .about(element, attribute, text)
             .at(trajectory.node(), "the trajectory");
     }
 }

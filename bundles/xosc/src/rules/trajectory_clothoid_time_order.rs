@@ -19,7 +19,9 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let times = clothoid
             .number("startTime")
             .zip(clothoid.number("stopTime"));
-        let Some((start, stop)) = times.filter(|(start, stop)| start >= stop) else {
+        // To stop at zero or before is out of range already.
+        let wrong = times.filter(|(start, stop)| start >= stop && *stop > 0.0);
+        let Some((start, stop)) = wrong else {
             continue;
         };
         let timing = clothoid.ancestor("Trajectory").map(timing_of);

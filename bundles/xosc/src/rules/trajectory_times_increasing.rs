@@ -83,9 +83,7 @@ fn look_at(
             "the {} begins at {time} s; times begin at 0",
             named(trajectory)
         );
-        found
-            .about(stamp.element, stamp.attribute, text)
-            .level(Level::Warning);
+        found.about(stamp.element, stamp.attribute, text);
     }
     let steps = known.windows(2).filter_map(|pair| match pair {
         [from, to] => {
