@@ -200,6 +200,7 @@ const PARITY: Parity = Parity {
          ASAM's bundle (qc-opendrive 1.0.0), checked by the same test wherever those are at hand. A\n\
          deviation is a result in which ours differs on purpose; in each of them ours is right, for the\n\
          reason given. Where ASAM's checkers were silenced by a finding about the schema, ours may run.\n",
+    theirs_skip_nothing_to_see: false,
     on_cases: DEVIATIONS,
     about_real_files: "\n## Maps of other projects\n\n\
          A result agrees when the status and the number of issues are the same. The recorded bundle is the\n\

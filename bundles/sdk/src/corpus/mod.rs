@@ -119,6 +119,13 @@ pub fn compare_real_files(
     Ok(Some(comparisons))
 }
 
+/// The difference between a checker that was skipped and one that looked and found nothing.
+pub(super) const NOTHING_THERE: &str = "recorded skipped, ours completed and found nothing";
+
+fn looked_in_vain(theirs: &str, ours: &CheckerOutcome) -> bool {
+    theirs == "skipped" && status_of(ours) == "completed" && ours.issues.is_empty()
+}
+
 /// The checkers that a record of a file mentions; those that ran and found nothing are not.
 fn mentioned(peer: &Value) -> Vec<String> {
     let skipped = peer["skipped"].as_array().into_iter().flatten();
@@ -151,6 +158,9 @@ fn counted(peer: &Value, ours: &CheckerOutcome) -> Option<String> {
     let mut schema = schema.filter(|(checker, _)| checker.ends_with("valid_schema"));
     if theirs == "skipped" && status == "completed" && schema.next().is_some() {
         return None;
+    }
+    if looked_in_vain(theirs, ours) {
+        return Some(NOTHING_THERE.to_owned());
     }
     let recorded = peer["issuesByChecker"][&ours.id].as_u64().unwrap_or(0);
     let found = ours.issues.len() as u64;
@@ -239,6 +249,9 @@ impl Compared<'_> {
         let status = status_of(ours);
         if theirs == "skipped" && status == "completed" && self.schema_silenced() {
             return None;
+        }
+        if looked_in_vain(theirs, ours) {
+            return Some(NOTHING_THERE.to_owned());
         }
         if theirs != status {
             return Some(format!(

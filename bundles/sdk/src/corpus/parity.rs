@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::{Comparison, Deviation, compare_asam_cases, compare_real_files, settle};
+use super::{Comparison, Deviation, NOTHING_THERE, compare_asam_cases, compare_real_files, settle};
 use crate::Bundle;
 
 /// Inputs on which a checker differs from what is recorded, all for one reason.
@@ -36,6 +36,9 @@ pub struct Parity {
     pub bundle: &'static Bundle,
     /// What the page says before its tables.
     pub introduction: &'static str,
+    /// Whether a checker of theirs that was skipped agrees with one of ours that looked and found
+    /// nothing: theirs are skipped where there is no map or no storyboard to look at.
+    pub theirs_skip_nothing_to_see: bool,
     /// Where we differ on ASAM's own test files.
     pub on_cases: &'static [Deviations],
     /// What the page says before the table of other projects' files, with its heading.
@@ -72,10 +75,17 @@ impl Parity {
             Ok(comparisons) => comparisons,
             Err(error) => panic!("{error}"),
         };
-        let Some(comparisons) = comparisons else {
+        let Some(mut comparisons) = comparisons else {
             crate::run::complain(&format!("skipped: {} is not there\n", cases.display()));
             return None;
         };
+        for one in comparisons
+            .iter_mut()
+            .filter(|_| self.theirs_skip_nothing_to_see)
+        {
+            one.difference
+                .take_if(|difference| difference == NOTHING_THERE);
+        }
         let each: Vec<Deviation> = deviations.iter().flat_map(Deviations::each).collect();
         settle(self.bundle, &comparisons, &each);
         Some(comparisons)
