@@ -160,6 +160,7 @@ mod road_world_position_on_road;
 mod road_xodr_parses;
 mod route_connected;
 mod route_duplicate_waypoints;
+mod route_min_waypoints;
 mod routing_ambiguous_route_waypoints;
 mod routing_cardinality_of_control_points_in_nurbs;
 mod routing_offset_should_be_less_than_trajectory_length;
@@ -409,6 +410,7 @@ pub static RULES: &[&dyn AnyRule] = &[
     &routing_route_waypoints_locations::RULE,
     &routing_ambiguous_route_waypoints::RULE,
     &route_connected::RULE,
+    &route_min_waypoints::RULE,
     &route_duplicate_waypoints::RULE,
     &routing_trajectory_timing_exists_if_requested::RULE,
     &routing_cardinality_of_control_points_in_nurbs::RULE,

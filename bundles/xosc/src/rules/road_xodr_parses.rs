@@ -1,5 +1,5 @@
 use qcbus_messages::DocumentRole;
-use qcbus_openscenario::{Network, Scenario};
+use qcbus_openscenario::{Element, Network, Scenario};
 use qcbus_sdk::{Rule, Sink};
 
 use crate::model::{About as _, Scene};
@@ -14,24 +14,34 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    if !matches!(scenario.network(), Network::Foreign) {
-        return;
-    }
     let subject = found.subject();
-    let Some(linked) = subject.with_role(DocumentRole::Map).next() else {
-        return;
-    };
-    let Some(root) = linked.document.root() else {
-        return;
-    };
     let network = scenario.root().child("RoadNetwork");
-    let file = network.and_then(|network| {
-        let mut files = network.children();
-        files.find(|file| file.node().offset() == linked.referred_at)
-    });
-    let Some(file) = file else { return };
+    let files = || network.into_iter().flat_map(Element::children);
+    let (file, root) = match scenario.network() {
+        Network::Foreign => {
+            let Some(linked) = subject.with_role(DocumentRole::Map).next() else {
+                return;
+            };
+            let file = files().find(|file| file.node().offset() == linked.referred_at);
+            (file, linked.document.root())
+        }
+        // What is a catalog of the scenario already is not read a second time.
+        Network::Unnamed => {
+            let file = files().find(|file| file.is("LogicFile"));
+            let path = file.and_then(|file| file.text("filepath"));
+            let read = path.and_then(|path| {
+                let mut linked = subject.linked().iter();
+                linked.find(|linked| is_path_of(&linked.path, &path))
+            });
+            (file, read.and_then(|linked| linked.document.root()))
+        }
+        Network::Simulator | Network::NotHad | Network::Map(_) => return,
+    };
+    let (Some(file), Some(root)) = (file, root) else {
+        return;
+    };
     // Maps of other formats, such as Lanelet2, are XML too; their names say so.
-    let path = linked.document.path().to_ascii_lowercase();
+    let path = root.document().path().to_ascii_lowercase();
     let is_called_map = [".xodr", ".xodrz"]
         .iter()
         .any(|ending| path.ends_with(ending));
@@ -45,5 +55,17 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     );
     found
         .about(file, "filepath", text)
-        .at(root, "the root element of the map");
+        .at(root, "the root element of that file");
+}
+
+/// Whether a reference from the scenario's directory leads to a file, as far as its text tells.
+fn is_path_of(absolute: &str, reference: &str) -> bool {
+    let reference = reference.trim().replace('\\', "/");
+    let mut rest = &*reference;
+    while let Some(inner) = rest.strip_prefix("./").or_else(|| rest.strip_prefix("../")) {
+        rest = inner;
+    }
+    let before = absolute.replace('\\', "/");
+    let before = before.strip_suffix(rest);
+    !rest.is_empty() && before.is_some_and(|before| before.is_empty() || before.ends_with('/'))
 }

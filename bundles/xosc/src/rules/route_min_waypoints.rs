@@ -1,0 +1,38 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::routes::{routes, waypoints};
+use crate::model::{About as _, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_route_min_waypoints",
+    uids: &["qcbus.dev:xosc:1.0.0:route.min_waypoints"],
+    after: super::READABLE,
+    page: include_str!("route_min_waypoints.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// The last version whose schema counts the waypoints of the document itself.
+const LAST_SCHEMA: (u16, u16) = (1, 3);
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let by_schema = scenario.version() <= LAST_SCHEMA;
+    for route in routes(scenario) {
+        if by_schema && route.reference().is_none() {
+            continue;
+        }
+        let count = waypoints(route).take(2).count();
+        if count < 2 {
+            let there = if count == 0 {
+                "no waypoint"
+            } else {
+                "one waypoint"
+            };
+            let text = format!(
+                "the route has {there}; it leads from one waypoint to the next, so it needs two at least"
+            );
+            found.about(route, "", text);
+        }
+    }
+}
