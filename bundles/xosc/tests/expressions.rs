@@ -80,8 +80,8 @@ fn scenario(minor: u8, declaration: &str, delay: &str) -> String {
 <FileHeader revMajor="1" revMinor="{minor}" date="2026-01-01T00:00:00" description="test" author="qcbus"/>
 <ParameterDeclarations>{PARAMETERS}{declaration}</ParameterDeclarations>
 <CatalogLocations/>
-<RoadNetwork/>
-<Entities/>
+<RoadNetwork><LogicFile filepath="Town05"/></RoadNetwork>
+<Entities><ScenarioObject name="Ego"><ExternalObjectReference name="host"/></ScenarioObject></Entities>
 <Storyboard>
 <Init><Actions/></Init>
 <StopTrigger>

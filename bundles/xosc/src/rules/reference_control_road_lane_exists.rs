@@ -1,5 +1,5 @@
 use qcbus_opendrive::{Road, RoadMap, SectionRef};
-use qcbus_openscenario::{Element, LaneAt, Scenario};
+use qcbus_openscenario::{Element, LaneAt, Network, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::positions::{self, ON_ROAD, find_lane, lane_id, listed, metres};
@@ -16,8 +16,10 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    let Some(map) = scenario.network().map() else {
-        return;
+    let map = match scenario.network() {
+        Network::Map(map) => map,
+        Network::NotHad => return not_looked_for(scenario, found),
+        Network::Unnamed | Network::Simulator | Network::Foreign => return,
     };
     let roads = listed(map.roads().iter().map(Road::id));
     for name in ON_ROAD {
@@ -34,6 +36,29 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             }
         }
     }
+}
+
+/// Without the map nobody knows whether its roads would be there: said once, so that whoever mends the
+/// map's path knows what hangs on it.
+fn not_looked_for(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let positions = ON_ROAD
+        .iter()
+        .flat_map(|name| scenario.elements_everywhere(name));
+    let mut positions = positions.filter(|position| position.has("roadId"));
+    let Some(first) = positions.next() else {
+        return;
+    };
+    let more = match positions.count() {
+        0 => String::new(),
+        1 => ", nor that of one further position".to_owned(),
+        count => format!(", nor those of {count} further positions"),
+    };
+    let road = first.text("roadId").unwrap_or_default();
+    let text = format!(
+        "the road {} cannot be looked for{more}: the map could not be read",
+        quoted(first, "roadId", &road)
+    );
+    found.about(first, "roadId", text).level(Level::Warning);
 }
 
 fn no_road(
