@@ -8,6 +8,7 @@
 
 mod support;
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use qcbus_formats::xqar::{Level, Status};
@@ -81,7 +82,7 @@ fn every_promised_issue_is_found_at_its_place() {
     let said = desk.check_in(&sample_farm(), &["."], "out");
     assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
     let promises = promises();
-    assert_eq!(promises.len(), 10, "the table is read");
+    assert_eq!(promises.len(), 16, "the table is read");
     for Promise {
         file,
         rule,
@@ -118,8 +119,9 @@ fn good_files_are_accepted_without_a_word_of_blame() {
     let desk = Desk::new();
     let said = desk.check_in(&sample_farm(), &["."], "out");
     let good = table("Accepted");
+    let faulty: BTreeSet<String> = promises().into_iter().map(|it| it.file).collect();
     assert_eq!(
-        good.len() + promises().len(),
+        good.len() + faulty.len(),
         checkable().len(),
         "every file is in the README"
     );

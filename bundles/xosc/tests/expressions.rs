@@ -83,7 +83,9 @@ fn scenario(minor: u8, declaration: &str, delay: &str) -> String {
 <RoadNetwork><LogicFile filepath="Town05"/></RoadNetwork>
 <Entities><ScenarioObject name="Ego"><ExternalObjectReference name="host"/></ScenarioObject></Entities>
 <Storyboard>
-<Init><Actions/></Init>
+<Init><Actions><Private entityRef="Ego"><PrivateAction>
+<VisibilityAction graphics="true" sensors="true" traffic="true"/>
+</PrivateAction></Private></Actions></Init>
 <StopTrigger>
 <ConditionGroup>
 <Condition name="end" delay="{delay}" conditionEdge="none">
