@@ -179,7 +179,7 @@ fn cases() -> Vec<Case> {
             "undetermined",
             "is an expression",
         ),
-        map("empty", "", "undetermined", "is an empty path"),
+        map("empty", "", "rejected", "is an empty path"),
         catalogs("no_catalogs", "../nowhere", "rejected", NOT_THERE),
         catalogs(
             "catalogs_file",

@@ -5,7 +5,7 @@ use qcbus_sdk::{Place, Sink};
 
 /// What of an element is deprecated.
 #[derive(Clone, Copy)]
-enum Part {
+enum Subject {
     /// An attribute.
     Attribute(&'static str),
     /// A word that an attribute says.
@@ -14,13 +14,13 @@ enum Part {
     Within(&'static str),
 }
 
-use Part::{Attribute, Within, Word};
+use Subject::{Attribute, Within, Word};
 
 /// Something deprecated: the element, its type, what of it, since when, and what to write instead.
 struct Deprecated {
     element: &'static str,
     class: &'static str,
-    part: Part,
+    part: Subject,
     since: Version,
     instead: &'static str,
 }

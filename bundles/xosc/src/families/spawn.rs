@@ -11,7 +11,7 @@ use crate::families::placement;
 pub(crate) struct Body<'m, 'd> {
     pub(crate) name: String,
     pub(crate) position: Element<'m, 'd>,
-    place: Place,
+    place: Standing,
     /// Half the length and half the width.
     half: (f64, f64),
     /// From the reference point to the middle of the box.
@@ -19,7 +19,7 @@ pub(crate) struct Body<'m, 'd> {
     height: f64,
 }
 
-enum Place {
+enum Standing {
     World {
         x: f64,
         y: f64,
@@ -100,9 +100,9 @@ fn or(element: Element<'_, '_>, name: &str, otherwise: f64) -> Option<f64> {
     }
 }
 
-fn place(position: Element<'_, '_>) -> Option<Place> {
+fn place(position: Element<'_, '_>) -> Option<Standing> {
     match position.name() {
-        "WorldPosition" => Some(Place::World {
+        "WorldPosition" => Some(Standing::World {
             x: position.number("x")?,
             y: position.number("y")?,
             z: position.number("z"),
@@ -111,7 +111,7 @@ fn place(position: Element<'_, '_>) -> Option<Place> {
         "LanePosition" => {
             let lane = position.integer("laneId")?;
             let turned = position.child("Orientation").is_some();
-            Some(Place::Lane {
+            Some(Standing::Lane {
                 key: (position.text("roadId")?.into_owned(), lane.to_string()),
                 s: position.number("s")?,
                 offset: or(position, "offset", 0.0)?,
@@ -132,8 +132,8 @@ pub(crate) fn overlapping<'b, 'm, 'd>(
     for (at, body) in bodies.iter().enumerate() {
         let reach = body.half.0.hypot(body.half.1) + body.center.0.hypot(body.center.1);
         let (key, middle) = match &body.place {
-            Place::World { x, .. } => (None, *x),
-            Place::Lane { key, s, .. } => (Some(key), *s),
+            Standing::World { x, .. } => (None, *x),
+            Standing::Lane { key, s, .. } => (Some(key), *s),
         };
         lanes
             .entry(key)
@@ -186,17 +186,17 @@ fn sweep(
 
 fn overlap(one: &Body<'_, '_>, other: &Body<'_, '_>, tolerance: f64) -> bool {
     match (&one.place, &other.place) {
-        (Place::World { z, .. }, Place::World { z: other_z, .. }) => {
+        (Standing::World { z, .. }, Standing::World { z: other_z, .. }) => {
             let apart = z
                 .zip(*other_z)
                 .map_or(0.0, |(one, other)| (one - other).abs());
             apart < one.height.max(other.height).max(1.0) && boxes_overlap(one, other, tolerance)
         }
         (
-            Place::Lane {
+            Standing::Lane {
                 s, offset, along, ..
             },
-            Place::Lane {
+            Standing::Lane {
                 s: other_s,
                 offset: other_offset,
                 along: other_along,
@@ -249,7 +249,7 @@ fn boxes_overlap(one: &Body<'_, '_>, other: &Body<'_, '_>, tolerance: f64) -> bo
 }
 
 fn corners(body: &Body<'_, '_>) -> Option<[(f64, f64); 4]> {
-    let Place::World { x, y, h, .. } = &body.place else {
+    let Standing::World { x, y, h, .. } = &body.place else {
         return None;
     };
     let (sin, cos) = h.sin_cos();

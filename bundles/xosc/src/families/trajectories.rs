@@ -57,12 +57,12 @@ pub(crate) fn shape<'m, 'd>(trajectory: Element<'m, 'd>) -> Option<Element<'m, '
 
 /// A place of a shape where a time belongs.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Stamp<'m, 'd> {
+pub(crate) struct TimedPoint<'m, 'd> {
     pub(crate) element: Element<'m, 'd>,
     pub(crate) attribute: &'static str,
 }
 
-impl<'m, 'd> Stamp<'m, 'd> {
+impl<'m, 'd> TimedPoint<'m, 'd> {
     pub(crate) fn time(self) -> Option<f64> {
         self.element.number(self.attribute)
     }
@@ -74,8 +74,8 @@ impl<'m, 'd> Stamp<'m, 'd> {
 }
 
 /// The places of a shape where times belong, in the order in which they are passed.
-pub(crate) fn stamps<'m, 'd>(shape: Element<'m, 'd>) -> Vec<Stamp<'m, 'd>> {
-    let of = |element, attribute| Stamp { element, attribute };
+pub(crate) fn timed_points<'m, 'd>(shape: Element<'m, 'd>) -> Vec<TimedPoint<'m, 'd>> {
+    let of = |element, attribute| TimedPoint { element, attribute };
     match shape.name() {
         "Polyline" => shape
             .children_named("Vertex")
@@ -122,7 +122,10 @@ pub(crate) fn longest(trajectory: Element<'_, '_>) -> Option<f64> {
 }
 
 fn chords(shape: Element<'_, '_>, closed: bool) -> Option<f64> {
-    let spots: Option<Vec<Spot<'_>>> = stamps(shape).into_iter().map(Stamp::spot).collect();
+    let spots: Option<Vec<Spot<'_>>> = timed_points(shape)
+        .into_iter()
+        .map(TimedPoint::spot)
+        .collect();
     let spots = spots?;
     let (first, last) = (spots.first()?, spots.last()?);
     let along: Option<f64> = spots

@@ -51,9 +51,10 @@ fn only_here(path: &str) -> Option<&'static str> {
     if path.starts_with("\\\\") {
         return Some("names a share of one network");
     }
-    let is_private = ["/home/", "/Users/", "/root/", "~"]
-        .iter()
-        .any(|home| path.starts_with(home));
+    let top = path
+        .strip_prefix('/')
+        .and_then(|path| path.split('/').next());
+    let is_private = path.starts_with('~') || matches!(top, Some("home" | "Users" | "root"));
     is_private.then_some("leads into one person's directory")
 }
 

@@ -1,7 +1,7 @@
 use qcbus_openscenario::Scenario;
 use qcbus_sdk::{Rule, Sink};
 
-use crate::families::trajectories::{Timing, followed, named, shape, stamps, timing_of};
+use crate::families::trajectories::{Timing, followed, named, shape, timed_points, timing_of};
 use crate::model::{About as _, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -28,7 +28,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         if shape.is("Polyline") && scenario.version() < (1, 1) {
             continue;
         }
-        let stamps = stamps(shape);
+        let stamps = timed_points(shape);
         let missing = || {
             stamps
                 .iter()

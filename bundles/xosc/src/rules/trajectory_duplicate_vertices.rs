@@ -2,7 +2,7 @@ use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::positions::Spot;
-use crate::families::trajectories::{Stamp, Timing, named, shape, stamps, timing_of};
+use crate::families::trajectories::{TimedPoint, Timing, named, shape, timed_points, timing_of};
 use crate::model::{About as _, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -51,10 +51,10 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-type Vertex<'m, 'd> = (Stamp<'m, 'd>, Option<Spot<'d>>);
+type Vertex<'m, 'd> = (TimedPoint<'m, 'd>, Option<Spot<'d>>);
 
 fn places<'m, 'd>(shape: Element<'m, 'd>) -> Vec<Vertex<'m, 'd>> {
-    stamps(shape)
+    timed_points(shape)
         .into_iter()
         .map(|stamp| (stamp, stamp.spot()))
         .collect()

@@ -2,7 +2,7 @@ use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
 use crate::families::positions::moved;
-use crate::families::trajectories::{Timing, followed, shape, stamps, timing_of};
+use crate::families::trajectories::{Timing, followed, shape, timed_points, timing_of};
 use crate::model::{About as _, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -98,7 +98,7 @@ fn points<'m, 'd>(polyline: Element<'m, 'd>, scale: f64) -> Vec<Point<'m, 'd>> {
     let mut points: Vec<Point<'m, 'd>> = Vec::new();
     let mut before = None;
     let mut way = 0.0;
-    for stamp in stamps(polyline) {
+    for stamp in timed_points(polyline) {
         let Some((time, spot)) = stamp.time().zip(stamp.spot()) else {
             return Vec::new();
         };

@@ -2,7 +2,7 @@ use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Level, Place, Rule, Sink};
 
 use crate::families::positions::shown;
-use crate::families::trajectories::{Stamp, Timing, named, shape, stamps, timing_of};
+use crate::families::trajectories::{TimedPoint, Timing, named, shape, timed_points, timing_of};
 use crate::model::{About as _, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -32,8 +32,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
 /// A time that does not come after the one before it.
 #[derive(Clone, Copy)]
 struct Step<'m, 'd> {
-    from: (Stamp<'m, 'd>, f64),
-    to: (Stamp<'m, 'd>, f64),
+    from: (TimedPoint<'m, 'd>, f64),
+    to: (TimedPoint<'m, 'd>, f64),
 }
 
 impl Step<'_, '_> {
@@ -71,7 +71,7 @@ fn look_at(
     is_asked: bool,
     found: &mut Sink<'_>,
 ) {
-    let stamps = stamps(shape);
+    let stamps = timed_points(shape);
     let known: Vec<_> = stamps
         .into_iter()
         .filter_map(|stamp| Some((stamp, stamp.time()?)))

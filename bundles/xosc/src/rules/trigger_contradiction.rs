@@ -2,7 +2,7 @@ use foldhash::{HashMap, HashMapExt as _};
 use qcbus_openscenario::Scenario;
 use qcbus_sdk::{Level, Rule, Sink};
 
-use crate::families::claims::{self, Claim};
+use crate::families::demands::{self, Demand};
 use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -18,9 +18,9 @@ pub static RULE: Rule<Scene> = Rule {
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for group in scenario.elements_everywhere("ConditionGroup") {
-        let mut known: HashMap<String, Claim<'_, '_>> = HashMap::new();
+        let mut known: HashMap<String, Demand<'_, '_>> = HashMap::new();
         for condition in group.children_named("Condition") {
-            let Some((quantity, claim)) = claims::of(condition) else {
+            let Some((quantity, claim)) = demands::of(condition) else {
                 continue;
             };
             match known.get_mut(&quantity) {

@@ -20,7 +20,7 @@ pub(crate) struct Bound<'m, 'd> {
 
 /// What is demanded of a quantity.
 #[derive(Clone)]
-pub(crate) struct Claim<'m, 'd> {
+pub(crate) struct Demand<'m, 'd> {
     low: Option<Bound<'m, 'd>>,
     high: Option<Bound<'m, 'd>>,
     word: Option<(String, Bound<'m, 'd>)>,
@@ -43,7 +43,7 @@ const TEXTS: &[&str] = &[
 
 /// The quantity that a condition is about and what it demands of it; `None` when it is not about one,
 /// or not about its value in this very step.
-pub(crate) fn of<'m, 'd>(condition: Element<'m, 'd>) -> Option<(String, Claim<'m, 'd>)> {
+pub(crate) fn of<'m, 'd>(condition: Element<'m, 'd>) -> Option<(String, Demand<'m, 'd>)> {
     let edge = condition.word("conditionEdge")?;
     if !matches!(&*edge, "none" | "rising") {
         return None;
@@ -80,7 +80,7 @@ fn leaf<'m, 'd>(condition: Element<'m, 'd>) -> Option<(Element<'m, 'd>, String)>
     Some((leaf, names.join(" ")))
 }
 
-fn word<'m, 'd>(leaf: Element<'m, 'd>, attribute: &'static str) -> Option<Claim<'m, 'd>> {
+fn word<'m, 'd>(leaf: Element<'m, 'd>, attribute: &'static str) -> Option<Demand<'m, 'd>> {
     let word = leaf.word(attribute)?;
     // Transitions last for a step, in which the state before or after them holds, too.
     if word.ends_with("Transition") {
@@ -92,7 +92,7 @@ fn word<'m, 'd>(leaf: Element<'m, 'd>, attribute: &'static str) -> Option<Claim<
         element: leaf,
         wanted: quoted(leaf, attribute, &word),
     };
-    Some(Claim {
+    Some(Demand {
         low: None,
         high: None,
         word: Some((word.to_lowercase(), bound)),
@@ -100,7 +100,7 @@ fn word<'m, 'd>(leaf: Element<'m, 'd>, attribute: &'static str) -> Option<Claim<
     })
 }
 
-fn value<'m, 'd>(leaf: Element<'m, 'd>) -> Option<Claim<'m, 'd>> {
+fn value<'m, 'd>(leaf: Element<'m, 'd>) -> Option<Demand<'m, 'd>> {
     let rule = leaf.word("rule")?;
     let Some(value) = leaf.number("value") else {
         let text = leaf
@@ -113,7 +113,7 @@ fn value<'m, 'd>(leaf: Element<'m, 'd>) -> Option<Claim<'m, 'd>> {
             wanted: quoted(leaf, "value", &text),
         };
         let word = (rule == "equalTo").then(|| (text.into_owned(), bound));
-        return word.map(|word| Claim {
+        return word.map(|word| Demand {
             low: None,
             high: None,
             word: Some(word),
@@ -134,7 +134,7 @@ fn value<'m, 'd>(leaf: Element<'m, 'd>) -> Option<Claim<'m, 'd>> {
         "equalTo" => (Some(bound(true, "exactly")), Some(bound(true, "exactly"))),
         _ => return None,
     };
-    Some(Claim {
+    Some(Demand {
         low,
         high,
         word: None,
@@ -142,7 +142,7 @@ fn value<'m, 'd>(leaf: Element<'m, 'd>) -> Option<Claim<'m, 'd>> {
     })
 }
 
-impl<'m, 'd> Claim<'m, 'd> {
+impl<'m, 'd> Demand<'m, 'd> {
     fn any(&self) -> Option<&Bound<'m, 'd>> {
         let ends = self.low.as_ref().or(self.high.as_ref());
         ends.or(self.word.as_ref().map(|(_, bound)| bound))
@@ -164,7 +164,7 @@ impl<'m, 'd> Claim<'m, 'd> {
     }
 
     /// What of this rules out the other.
-    pub(crate) fn against(&self, other: &Claim<'m, 'd>) -> Option<&Bound<'m, 'd>> {
+    pub(crate) fn against(&self, other: &Demand<'m, 'd>) -> Option<&Bound<'m, 'd>> {
         if let (Some((word, bound)), Some((wanted, _))) = (&self.word, &other.word) {
             return (word != wanted).then_some(bound);
         }
@@ -182,7 +182,7 @@ impl<'m, 'd> Claim<'m, 'd> {
     }
 
     /// Takes over what the other demands beyond this.
-    pub(crate) fn narrow(&mut self, other: Claim<'m, 'd>) {
+    pub(crate) fn narrow(&mut self, other: Demand<'m, 'd>) {
         let tighter_low = |one: &Bound<'m, 'd>, than: &Bound<'m, 'd>| {
             one.value > than.value || (one.value == than.value && than.closed)
         };
