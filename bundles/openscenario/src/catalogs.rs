@@ -447,7 +447,7 @@ impl<'m, 'd> Element<'m, 'd> {
 }
 
 /// The assignments of a reference.
-fn assignments(reference: Node<'_>) -> impl Iterator<Item = Node<'_>> {
+pub(crate) fn assignments(reference: Node<'_>) -> impl Iterator<Item = Node<'_>> {
     let block = reference.child("ParameterAssignments");
     block
         .into_iter()

@@ -8,7 +8,7 @@ use qcbus_opendrive::RoadMap;
 use qcbus_schema::Typing;
 
 use crate::Version;
-use crate::catalogs::{AssignmentProblem, Catalogs, Link};
+use crate::catalogs::{AssignmentProblem, Catalogs, Link, assignments};
 use crate::data_type::DataType;
 use crate::element::Element;
 use crate::entities::Entities;
@@ -298,9 +298,9 @@ impl<'d> Scenario<'d> {
         faults
     }
 
-    /// The faults of some kinds that values in the entries of catalogs have only because of what is
-    /// assigned where the document refers to them. What is wrong with the defaults is listed when the
-    /// catalog is checked.
+    /// The faults of some kinds that values have in the entries of catalogs that the document refers to.
+    /// What is assigned may cause them anew at every reference; what is wrong with an entry by itself is
+    /// listed once, at the first.
     pub fn entry_faults_of(
         &self,
         kinds: &[ValueFaultKind],
@@ -323,26 +323,58 @@ impl<'d> Scenario<'d> {
         let mut faults = Vec::new();
         let mut defaults: HashMap<Node<'d>, Context<'d>> = HashMap::new();
         for (id, context) in (0..).zip(&self.contexts) {
-            let assigns = |(node, _): (Node<'d>, _)| node.child("ParameterAssignments").is_some();
-            if !context.reference.is_some_and(assigns) {
+            let Some((reference, _)) = context.reference else {
+                continue;
+            };
+            let is_first = !defaults.contains_key(&context.top);
+            if !is_first && reference.child("ParameterAssignments").is_none() {
                 continue;
             }
-            let top = context.top;
-            let default = defaults
-                .entry(top)
-                .or_insert_with(|| Context::new(top, self.version, &HashMap::new()).0);
-            for attribute in self.substituted(id) {
+            if is_first {
+                let (default, problems) = Context::new(context.top, self.version, &HashMap::new());
+                self.declared_faults(id, reference, &problems, &mut faults);
+                defaults.insert(context.top, default);
+            }
+            let Some(default) = defaults.get(&context.top) else {
+                continue;
+            };
+            for attribute in self.substituted(id).filter(|it| !is_declared_value(*it)) {
                 let Err(problem) = self.evaluate(attribute, attribute.value(), id) else {
                     continue;
                 };
                 let by_default = self.evaluate_in(attribute, attribute.value(), id, default);
                 let as_ever = by_default.is_err_and(|other| other.kind == problem.kind);
-                if !problem.is_silent() && !as_ever {
+                if !problem.is_silent() && (is_first || !as_ever) {
                     faults.push((id, self.explained(attribute, id, &problem)));
                 }
             }
         }
         faults
+    }
+
+    /// What is wrong with the defaults of an entry's parameters, but for those that the reference
+    /// assigns.
+    fn declared_faults(
+        &self,
+        id: ContextId,
+        reference: Node<'d>,
+        problems: &[DeclarationProblem<'d>],
+        faults: &mut Vec<(ContextId, ValueFault<'d>)>,
+    ) {
+        let assigned: Vec<&str> = assignments(reference)
+            .filter_map(|assignment| assignment.attr("parameterRef"))
+            .collect();
+        for (node, problem) in problems {
+            let is_assigned = node
+                .attr("name")
+                .is_some_and(|name| assigned.contains(&name));
+            if let Some(attribute) = node.attribute("value")
+                && !is_assigned
+                && !problem.is_silent()
+            {
+                faults.push((id, self.explained(attribute, id, problem)));
+            }
+        }
     }
 
     /// The attributes of the document that are written as expressions, in document order, whatever is
