@@ -98,7 +98,6 @@ mod naming_no_double_colon_prefix_in_names;
 mod naming_non_ascii_or_control;
 mod naming_parameter_declaration_name_prefix_reserved;
 mod naming_parameter_declaration_parameter_name;
-mod naming_storyboard_ambiguous;
 mod naming_unique_element_names_on_same_level;
 mod parameters_assignment_duplicate;
 mod parameters_assignment_type;
@@ -361,7 +360,6 @@ pub static RULES: &[&dyn AnyRule] = &[
     &naming_empty_name::RULE,
     &naming_entity_selection_clash::RULE,
     &naming_duplicate_property::RULE,
-    &naming_storyboard_ambiguous::RULE,
     &naming_non_ascii_or_control::RULE,
     &distribution_scenario_file::RULE,
     &distribution_parameter_known::RULE,

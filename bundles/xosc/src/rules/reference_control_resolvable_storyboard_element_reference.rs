@@ -10,6 +10,7 @@ pub static RULE: Rule<Scene> = Rule {
     uids: &[
         "asam.net:xosc:1.2.0:reference_control.resolvable_storyboard_element_reference",
         "asam.net:xosc:1.0.0:reference_control.resolvable_storyboard_element_ref",
+        "qcbus.dev:xosc:1.0.0:naming.storyboard_ambiguous",
     ],
     versions: "1.2.0..",
     backport: Backport::Alike { since: "" },
