@@ -89,21 +89,19 @@ impl Shared {
     /// `false`: there is none.
     pub(super) fn make_room(&self, is_used: impl Fn(DocId) -> bool) -> bool {
         let mut slots = lock(&self.0);
-        let by_age = slots.order.iter().flatten();
-        let unused = by_age.filter(|path| {
+        let unused = slots.order.iter().flatten().find(|path| {
+            // One that is locked is being read, perhaps by who asks for room. Nobody may be waited for
+            // here: whoever has the lock may be waiting for the slots. Who asks for it after this reads
+            // it anew.
             let slot = slots.by_path.get(*path);
-            // One that is locked is being read, perhaps by who asks for room.
-            let kept = slot.and_then(|slot| slot.try_lock().ok());
-            let kept = kept.as_ref().and_then(|kept| kept.as_ref());
-            kept.is_some_and(|kept| !is_used(kept.published.doc))
+            let Some(mut kept) = slot.and_then(|slot| slot.try_lock().ok()) else {
+                return false;
+            };
+            kept.take_if(|kept| !is_used(kept.published.doc)).is_some()
         });
-        let Some(path) = { unused }.next().cloned() else {
+        let Some(path) = unused.cloned() else {
             return false;
         };
-        if let Some(slot) = slots.by_path.get(&path) {
-            // Who waits for it at this moment reads it anew.
-            lock(slot).take();
-        }
         slots.remove(&path);
         true
     }
