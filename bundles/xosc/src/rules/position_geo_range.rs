@@ -3,7 +3,7 @@ use qcbus_sdk::{Rule, Sink};
 
 use crate::families::ranges;
 use crate::families::ranges::tables::GEO;
-use crate::model::Scene;
+use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_position_geo_range",
@@ -21,4 +21,22 @@ const UIDS: [&str; OWN.len() + GEO.len()] = ranges::uids(&OWN, GEO);
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     ranges::report_as_own(scenario, GEO, found);
+    // Before, the schema demands both.
+    if scenario.version() >= (1, 2) {
+        both_given(scenario, found);
+    }
+}
+
+/// Since each may be given in radians or in degrees, no schema can demand that one of them is there.
+fn both_given(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for position in scenario.elements_everywhere("GeoPosition") {
+        for (degrees, radians) in [("latitudeDeg", "latitude"), ("longitudeDeg", "longitude")] {
+            if !position.has(degrees) && !position.has(radians) {
+                let text = format!(
+                    "`GeoPosition` has no {radians}; `{degrees}` gives it in degrees, `{radians}` in radians"
+                );
+                found.about(position, degrees, text);
+            }
+        }
+    }
 }

@@ -43,7 +43,8 @@ fn waits_for_itself<'d>(element: Element<'_, 'd>, condition: &StateCondition<'_,
 /// Whether the condition waits for the end of an element around this one, after which nothing in it
 /// starts.
 fn ends_around<'d>(element: Element<'_, 'd>, condition: &StateCondition<'_, 'd>) -> bool {
-    condition.state == "completeState"
+    let over = ["completeState", "endTransition", "stopTransition"];
+    over.contains(&&*condition.state)
         && element.ancestors().any(|around| around == condition.target)
 }
 
