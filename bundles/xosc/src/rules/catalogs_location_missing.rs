@@ -28,7 +28,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for (reference, count) in without.each() {
         let kinds = catalogs::kinds(reference).iter();
         let text = format!(
-            "`CatalogLocations` do not say where such a catalog is, they have no {}{}",
+            "no catalog can be found here: `CatalogLocations` has no {}{}",
             catalogs::listed(kinds.map(|kind| kind.location())).replace(", ", " or "),
             catalogs::further(count)
         );

@@ -33,6 +33,12 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             found
                 .about(file, "filepath", text)
                 .level(Level::Information);
+        } else if path.contains('\\') {
+            let text = format!(
+                "the path {} has backslashes, which divide directories on Windows only; `/` does everywhere",
+                quoted(file, "filepath", &path)
+            );
+            found.about(file, "filepath", text);
         } else if file.is("SceneGraphFile") {
             scene(file, &path, found);
         }

@@ -32,7 +32,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             _ => Level::Warning,
         };
         let text = format!(
-            "`stopTime` of `Clothoid` is {} s, but `startTime` is {start} s; it stops after it has started",
+            "`stopTime` of `Clothoid` is {} s, but `startTime` is {start} s; it must stop after it starts",
             shown(clothoid, "stopTime", &stop.to_string()),
         );
         found.about(clothoid, "stopTime", text).level(level);

@@ -29,7 +29,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "the knot {} follows the knot {before}; the knots of a NURBS do not decrease",
+            "the knot {} follows the knot {before}; the knots of a NURBS must not decrease",
             shown(*two, "value", &after.to_string())
         );
         let place = Place::attribute_or_node(one.node(), "value");

@@ -115,7 +115,7 @@ fn say(
         count => format!("; so it is at {count} places of the {}", named(trajectory)),
     };
     let text = format!(
-        "`{}` of `{}` is {} s, but the time before it is {before} s; the times of a trajectory increase{more}",
+        "`{}` of `{}` is {} s, but the time before it is {before} s; the times of a trajectory must increase{more}",
         to.attribute,
         to.element.name(),
         shown(to.element, to.attribute, &after.to_string()),
