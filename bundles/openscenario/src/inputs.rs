@@ -1,9 +1,11 @@
 //! What a scenario is read from.
 
+use std::sync::Arc;
+
 use qcbus_document::{Document, FileKind};
-use qcbus_opendrive::RoadMap;
 
 use crate::Version;
+use crate::network::RoadNetwork;
 
 /// The documents of one check.
 #[derive(Debug, Clone)]
@@ -15,7 +17,7 @@ pub struct Inputs<'d> {
     /// The version in its header.
     pub version: Option<Version>,
     /// The map.
-    pub map: LinkedMap<'d>,
+    pub map: LinkedMap,
     /// The catalogs that could be read, in the order of the references.
     pub catalogs: Vec<LinkedCatalog<'d>>,
     /// Offsets of the `Directory` elements of whose catalogs not every one could be read.
@@ -32,16 +34,16 @@ pub struct LinkedCatalog<'d> {
 }
 
 /// The map that the document's `LogicFile` leads to.
-#[derive(Debug, Clone, Copy)]
-pub enum LinkedMap<'d> {
+#[derive(Debug, Clone)]
+pub enum LinkedMap {
     /// The document names none.
     Unnamed,
     /// A name that the simulator knows, and no file.
     Simulator,
     /// It leads nowhere, or to a file that could not be read.
     NotHad,
-    /// The document.
-    Document(Document<'d>),
-    /// The document with its roads.
-    Roads(&'d RoadMap<'d>),
+    /// It leads to a file that is no OpenDRIVE map.
+    Foreign,
+    /// Its roads; whoever checks may keep them for the next scenario.
+    Roads(Arc<RoadNetwork>),
 }

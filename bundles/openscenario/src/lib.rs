@@ -19,10 +19,12 @@ mod form;
 mod inputs;
 mod network;
 mod reading;
+mod roads_nearby;
 mod scenario;
 mod scope;
 mod storyboard;
 mod text;
+mod ways;
 
 pub use actors::Actors;
 pub use catalogs::{CatalogKind, Entry, Resolution};
@@ -33,13 +35,15 @@ pub use entities::{Entities, Entity, EntityKind, Selection};
 pub use faults::{Dialect, ValueFault, ValueFaultKind};
 pub use form::Form;
 pub use inputs::{Inputs, LinkedCatalog, LinkedMap};
-pub use network::{LaneAt, Network};
+pub use network::{LaneAt, Network, RoadNetwork};
 pub use qcbus_schema::{Member, closest};
 pub use reading::Reading;
+pub use roads_nearby::RoadsNearby;
 pub use scenario::Scenario;
 pub use scope::{Declaration, Declared, Declares};
 pub use storyboard::{StoryElement, StoryKind, Storyboard};
 pub use text::{identifier, is_identifier};
+pub use ways::{Stop, Way, Ways};
 
 /// The version in a file header: major and minor.
 pub type Version = (u16, u16);

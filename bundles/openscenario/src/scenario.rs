@@ -4,7 +4,6 @@ use std::cell::OnceCell;
 
 use foldhash::{HashMap, HashMapExt as _, HashSet};
 use qcbus_document::{Attribute, Document, FileKind, Node};
-use qcbus_opendrive::RoadMap;
 use qcbus_schema::Typing;
 
 use crate::Version;
@@ -25,7 +24,7 @@ pub struct Scenario<'d> {
     document: Document<'d>,
     version: Version,
     form: Form,
-    map: LinkedMap<'d>,
+    map: LinkedMap,
     /// Never empty: the first is the document.
     contexts: Vec<Context<'d>>,
     /// What stands for a context that is not there.
@@ -41,7 +40,6 @@ pub struct Scenario<'d> {
     entry_faults: OnceCell<Vec<(ContextId, ValueFault<'d>)>>,
     entities: OnceCell<Entities<'d>>,
     storyboard: OnceCell<Storyboard<'d>>,
-    roads: OnceCell<Box<RoadMap<'d>>>,
 }
 
 /// Files that name no version are read as the newest.
@@ -58,7 +56,7 @@ impl<'d> Scenario<'d> {
             document: inputs.document,
             version,
             form: Form::of(&inputs.document),
-            map: inputs.map,
+            map: inputs.map.clone(),
             contexts: vec![context],
             catalogs: Catalogs::new(root, &inputs.catalogs, &inputs.incomplete),
             links: HashMap::new(),
@@ -71,7 +69,6 @@ impl<'d> Scenario<'d> {
             entry_faults: OnceCell::new(),
             entities: OnceCell::new(),
             storyboard: OnceCell::new(),
-            roads: OnceCell::new(),
         };
         scenario.follow_references();
         Some(scenario)
@@ -150,12 +147,8 @@ impl<'d> Scenario<'d> {
         u32::try_from(self.contexts.len() - 1).unwrap_or(0)
     }
 
-    pub(crate) fn map_input(&self) -> LinkedMap<'d> {
-        self.map
-    }
-
-    pub(crate) fn roads_of(&self, document: Document<'d>) -> &RoadMap<'d> {
-        self.roads.get_or_init(|| Box::new(RoadMap::new(document)))
+    pub(crate) fn map_input(&self) -> &LinkedMap {
+        &self.map
     }
 
     /// The entities and selections.

@@ -1,8 +1,11 @@
 //! What rules about scenarios look at: `Rule<Scene>` gets a `&Scenario<'_>`.
 
+use std::sync::Arc;
+
+use qcbus_document::Image;
 use qcbus_messages::{Absence, DocumentRole};
-use qcbus_openscenario::{Element, Inputs, LinkedCatalog, LinkedMap, Scenario};
-use qcbus_sdk::{Finding, Model, Place, Sink, Subject, Unbuilt};
+use qcbus_openscenario::{Element, Inputs, LinkedCatalog, LinkedMap, RoadNetwork, Scenario};
+use qcbus_sdk::{Finding, LinkedModel, Model, Place, Sink, Subject, Unbuilt};
 
 /// A scenario, catalog or distribution with all that it refers to, read once per document and shared
 /// by all rules about it.
@@ -31,16 +34,33 @@ impl Model for Scene {
     }
 }
 
-fn map<'d>(subject: &'d Subject<'d>) -> LinkedMap<'d> {
+/// The roads of a scenario's map, kept for the next scenario on the same one.
+struct KeptRoads(Arc<RoadNetwork>);
+
+impl LinkedModel for KeptRoads {
+    fn build(image: Image) -> Option<KeptRoads> {
+        RoadNetwork::of(image)
+            .ok()
+            .map(|roads| KeptRoads(Arc::new(roads)))
+    }
+}
+
+fn map(subject: &Subject<'_>) -> LinkedMap {
     if let Some(linked) = subject.with_role(DocumentRole::Map).next() {
         let broken = subject.missing().iter().any(|missing| {
             missing.role == DocumentRole::Map && matches!(missing.why, Absence::Broken { .. })
         });
         // Of a map that breaks off, nobody knows what would have followed.
-        return if broken {
-            LinkedMap::NotHad
-        } else {
-            LinkedMap::Document(linked.document)
+        let is_map = linked
+            .document
+            .root()
+            .is_some_and(|root| root.is("OpenDRIVE"));
+        return match is_map {
+            _ if broken => LinkedMap::NotHad,
+            false => LinkedMap::Foreign,
+            true => linked
+                .kept::<KeptRoads>()
+                .map_or(LinkedMap::NotHad, |kept| LinkedMap::Roads(kept.0.clone())),
         };
     }
     let mut missing = subject

@@ -17,7 +17,6 @@ pub(crate) mod profiles;
 pub(crate) mod ranges;
 pub(crate) mod references;
 pub(crate) mod road_network;
-pub(crate) mod roads_nearby;
 pub(crate) mod routes;
 pub(crate) mod signals;
 pub(crate) mod spawn;

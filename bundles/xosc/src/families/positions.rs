@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use qcbus_opendrive::{LaneRef, Road, RoadMap, SectionRef, Side, Station};
-use qcbus_openscenario::{Actors, Element, Entity, LaneAt, Scenario};
+use qcbus_openscenario::{Actors, Element, Entity, LaneAt};
 
 /// Positions that name a road.
 pub(crate) const ON_ROAD: &[&str] = &["LanePosition", "RoadPosition"];
@@ -13,10 +13,10 @@ pub(crate) const ON_ROAD: &[&str] = &["LanePosition", "RoadPosition"];
 pub(crate) const AT_END: f64 = 1e-3;
 
 /// The road that a position names, where the map has exactly one of this id.
-pub(crate) fn road_of<'m, 'd>(
-    position: Element<'_, 'd>,
-    map: &'m RoadMap<'d>,
-) -> Option<&'m Road<'d>> {
+pub(crate) fn road_of<'m, 'r>(
+    position: Element<'_, '_>,
+    map: &'m RoadMap<'r>,
+) -> Option<&'m Road<'r>> {
     let id = position.text("roadId")?;
     let mut roads = map.roads_with_id(&id);
     let road = roads.next()?;
@@ -39,13 +39,8 @@ pub(crate) fn lane_id(text: &str) -> Option<i64> {
 
 /// The lane at a station. Where two lane sections meet, those of both count, and so do those of
 /// temporary layers: a simulator may look at either.
-pub(crate) fn find_lane<'m, 'd>(
-    scenario: &Scenario<'d>,
-    road: &'m Road<'d>,
-    s: f64,
-    id: i64,
-) -> LaneAt<'m, 'd> {
-    let found = scenario.lane_at(road, s, id);
+pub(crate) fn find_lane<'m, 'r>(road: &'m Road<'r>, s: f64, id: i64) -> LaneAt<'m, 'r> {
+    let found = LaneAt::of(road, s, id);
     let LaneAt::None(section) = found else {
         return found;
     };
@@ -65,24 +60,24 @@ pub(crate) fn find_lane<'m, 'd>(
 }
 
 /// The lane that a `LanePosition` names.
-pub(crate) fn lane_of<'m, 'd>(
-    position: Element<'_, 'd>,
-    road: &'m Road<'d>,
-) -> Option<(LaneRef<'m, 'd>, f64)> {
+pub(crate) fn lane_of<'m, 'r>(
+    position: Element<'_, '_>,
+    road: &'m Road<'r>,
+) -> Option<(LaneRef<'m, 'r>, f64)> {
     let s = station(position, road)?;
     let id = lane_id(&position.text("laneId")?)?;
-    match find_lane(position.scenario(), road, s, id) {
+    match find_lane(road, s, id) {
         LaneAt::Lane(lane) => Some((lane, s)),
         LaneAt::None(_) | LaneAt::Unknown => None,
     }
 }
 
 /// The lane section of a road at a station, for a side of it.
-pub(crate) fn section_of<'m, 'd>(
-    road: &'m Road<'d>,
+pub(crate) fn section_of<'m, 'r>(
+    road: &'m Road<'r>,
     side: Side,
     s: f64,
-) -> Option<SectionRef<'m, 'd>> {
+) -> Option<SectionRef<'m, 'r>> {
     road.permanent()?.section_at(road, side, s)
 }
 
@@ -119,7 +114,10 @@ impl<'d> Spot<'d> {
                 let frame = Frame::Within(kind.text("entityRef")?);
                 Spot::numbers(kind, frame, ["dx", "dy", "dz"], Some(0.0))
             }
-            "RoadPosition" | "LanePosition" => Spot::on_map(kind),
+            "RoadPosition" | "LanePosition" => {
+                let scenario = kind.scenario();
+                scenario.on_map(|map| Spot::on_map(kind, map)).flatten()
+            }
             _ => None,
         }
     }
@@ -143,8 +141,7 @@ impl<'d> Spot<'d> {
         })
     }
 
-    fn on_map(element: Element<'_, 'd>) -> Option<Spot<'d>> {
-        let map = element.scenario().network().map()?;
+    fn on_map(element: Element<'_, 'd>, map: &RoadMap<'_>) -> Option<Spot<'d>> {
         let road = road_of(element, map)?;
         let s = station(element, road)?;
         let t = if element.is("RoadPosition") {

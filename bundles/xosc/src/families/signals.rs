@@ -18,7 +18,17 @@ pub(crate) fn missing_signals(
     attribute: &str,
     found: &mut Sink<'_>,
 ) {
-    let map = scenario.network().map();
+    let looked = scenario.on_map(|map| missing_on(scenario, Some(map), element, attribute, found));
+    looked.unwrap_or_else(|| missing_on(scenario, None, element, attribute, found));
+}
+
+fn missing_on(
+    scenario: &Scenario<'_>,
+    map: Option<&RoadMap<'_>>,
+    element: &str,
+    attribute: &str,
+    found: &mut Sink<'_>,
+) {
     let mut known = None;
     for reference in scenario.elements_everywhere(element) {
         let Some(id) = reference.text(attribute) else {
@@ -49,14 +59,14 @@ pub(crate) fn missing_signals(
 }
 
 /// What may have been meant by an id that no signal bears.
-struct Known<'d> {
+struct Known<'r> {
     /// Ids by names.
-    by_name: HashMap<&'d str, &'d str>,
+    by_name: HashMap<&'r str, &'r str>,
     ids: String,
 }
 
-impl<'d> Known<'d> {
-    fn of(map: &RoadMap<'d>) -> Known<'d> {
+impl<'r> Known<'r> {
+    fn of(map: &RoadMap<'r>) -> Known<'r> {
         let named = map
             .signals()
             .filter_map(|(_, signal)| Some((signal.node().attr("name")?, signal.id()?)));

@@ -1,5 +1,6 @@
 use std::cell::OnceCell;
 
+use qcbus_opendrive::RoadMap;
 use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
@@ -66,7 +67,15 @@ impl Length {
         if route.flag("closed")? {
             return None;
         }
-        let map = route.scenario().network().map()?;
+        let scenario = route.scenario();
+        scenario.on_map(|map| Length::on(map, route, all_roads))?
+    }
+
+    fn on(
+        map: &RoadMap<'_>,
+        route: Element<'_, '_>,
+        all_roads: &OnceCell<Option<f64>>,
+    ) -> Option<Length> {
         let mut stations = Vec::new();
         let mut roads = Vec::new();
         for (_, position) in waypoints(route) {

@@ -1,3 +1,4 @@
+use qcbus_opendrive::RoadMap;
 use qcbus_openscenario::Scenario;
 use qcbus_sdk::{Rule, Sink};
 
@@ -14,9 +15,10 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    let Some(map) = scenario.network().map() else {
-        return;
-    };
+    scenario.on_map(|map| look(scenario, map, found));
+}
+
+fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let reference = map.header().and_then(|header| header.child("geoReference"));
     let is_defined = reference.is_some_and(|reference| {
         !reference.text().trim().is_empty() || reference.children().next().is_some()

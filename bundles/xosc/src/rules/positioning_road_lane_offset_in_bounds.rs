@@ -1,4 +1,4 @@
-use qcbus_opendrive::{Road, Side};
+use qcbus_opendrive::{Road, RoadMap, Side};
 use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
@@ -28,7 +28,11 @@ const SLACK: Param = Param::number(
 );
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    let map = scenario.network().map();
+    let looked = scenario.on_map(|map| look(scenario, Some(map), found));
+    looked.unwrap_or_else(|| look(scenario, None, found));
+}
+
+fn look(scenario: &Scenario<'_>, map: Option<&RoadMap<'_>>, found: &mut Sink<'_>) {
     let slack = found.number(&SLACK);
     for name in ON_ROAD {
         for position in scenario.elements_everywhere(name) {
@@ -76,7 +80,7 @@ fn beyond(position: Element<'_, '_>, s: f64, length: f64, road: &Road<'_>, found
     found.about(position, "s", text).at(road.node(), "the road");
 }
 
-fn beside_lane<'d>(position: Element<'_, 'd>, road: &Road<'d>, slack: f64, found: &mut Sink<'_>) {
+fn beside_lane(position: Element<'_, '_>, road: &Road<'_>, slack: f64, found: &mut Sink<'_>) {
     let Some(offset) = position.number("offset") else {
         return;
     };
@@ -107,7 +111,7 @@ fn beside_lane<'d>(position: Element<'_, 'd>, road: &Road<'d>, slack: f64, found
         .at(lane.node(), "the lane");
 }
 
-fn beside_lanes<'d>(position: Element<'_, 'd>, road: &Road<'d>, slack: f64, found: &mut Sink<'_>) {
+fn beside_lanes(position: Element<'_, '_>, road: &Road<'_>, slack: f64, found: &mut Sink<'_>) {
     let Some((t, s)) = position.number("t").zip(station(position, road)) else {
         return;
     };

@@ -16,11 +16,15 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    let map = match scenario.network() {
-        Network::Map(map) => map,
+    let network = match scenario.network() {
+        Network::Map(network) => network,
         Network::NotHad => return not_looked_for(scenario, found),
         Network::Unnamed | Network::Simulator | Network::Foreign => return,
     };
+    network.with(|map| look(scenario, map, found));
+}
+
+fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let roads = listed(map.roads().iter().map(Road::id));
     for name in ON_ROAD {
         for position in scenario.elements_everywhere(name) {
@@ -32,7 +36,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             } else if position.is("LanePosition")
                 && let Some(road) = positions::road_of(position, map)
             {
-                lane(scenario, position, road, found);
+                lane(position, road, found);
             }
         }
     }
@@ -84,12 +88,7 @@ fn no_road(
     }
 }
 
-fn lane<'d>(
-    scenario: &Scenario<'d>,
-    position: Element<'_, 'd>,
-    road: &Road<'d>,
-    found: &mut Sink<'_>,
-) {
+fn lane(position: Element<'_, '_>, road: &Road<'_>, found: &mut Sink<'_>) {
     let Some(text) = position.text("laneId") else {
         return;
     };
@@ -107,7 +106,7 @@ fn lane<'d>(
     let Some(s) = positions::station(position, road) else {
         return;
     };
-    if let LaneAt::None(section) = find_lane(scenario, road, s, id) {
+    if let LaneAt::None(section) = find_lane(road, s, id) {
         let text = format!(
             "`LanePosition` names the lane {} of road `{}` at s = {}, but the lane section there {}",
             quoted(position, "laneId", &text),

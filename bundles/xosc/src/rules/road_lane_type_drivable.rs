@@ -1,4 +1,4 @@
-use qcbus_opendrive::LaneRef;
+use qcbus_opendrive::{LaneRef, RoadMap};
 use qcbus_openscenario::{Element, Entity, EntityKind, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
@@ -38,9 +38,10 @@ const FOR_VEHICLES: &[&str] = &[
 ];
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    let Some(map) = scenario.network().map() else {
-        return;
-    };
+    scenario.on_map(|map| look(scenario, map, found));
+}
+
+fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
     for position in scenario.elements_everywhere("LanePosition") {
         let Some(owner) = owner(position) else {
             continue;

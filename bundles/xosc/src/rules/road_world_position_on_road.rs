@@ -1,10 +1,7 @@
-use std::cell::OnceCell;
-
 use qcbus_openscenario::{EntityKind, Scenario};
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
 use crate::families::positions::{metres, moved, owner};
-use crate::families::roads_nearby::RoadsNearby;
 use crate::model::{About as _, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -26,11 +23,10 @@ const DISTANCE: Param = Param::number(
 );
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    let Some(map) = scenario.network().map() else {
+    let Some(network) = scenario.network().map() else {
         return;
     };
     let distance = found.number(&DISTANCE);
-    let nearby = OnceCell::new();
     for position in scenario.elements_everywhere("WorldPosition") {
         let places = ["TeleportAction", "AcquirePositionAction"];
         if !owner(position).is_some_and(|owner| places.contains(&owner.name())) {
@@ -44,7 +40,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let Some(vehicle) = vehicle else { continue };
-        let nearby = nearby.get_or_init(|| RoadsNearby::of(map));
+        let nearby = network.nearby();
         if nearby.is_empty() || nearby.is_near(x, y, distance) {
             continue;
         }

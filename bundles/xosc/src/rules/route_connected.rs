@@ -1,8 +1,8 @@
-use qcbus_openscenario::{Element, Scenario};
+use qcbus_openscenario::{Element, Scenario, Way};
 use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::positions::metres;
-use crate::families::routes::{Way, Ways, is_for_vehicles, routes, stop, waypoints};
+use crate::families::routes::{is_for_vehicles, routes, stop, waypoints};
 use crate::model::{About as _, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -15,8 +15,11 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
+/// Stretches of road that are looked at for all routes of a scenario.
+const MOST: usize = 4_000_000;
+
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    let Some(map) = scenario.network().map() else {
+    let Some(network) = scenario.network().map() else {
         return;
     };
     let mut routes = routes(scenario)
@@ -25,15 +28,17 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     if routes.peek().is_none() {
         return;
     }
-    let Some(mut ways) = Ways::of(map) else {
+    let Some(ways) = network.ways() else {
         return;
     };
+    let mut budget = MOST;
     for route in routes {
         let mut before = None;
         for (waypoint, position) in waypoints(route) {
-            let here = position.and_then(|position| Some((position, stop(position, map)?)));
+            let here = position
+                .and_then(|position| Some((position, network.with(|map| stop(position, map))?)));
             if let (Some((from, left)), Some((to, reached))) = (&before, &here) {
-                match ways.between(left, reached) {
+                match ways.between(left, reached, &mut budget) {
                     Way::Driven | Way::Unknown => {}
                     Way::Against => say(waypoint, *from, *to, true, found),
                     Way::None => say(waypoint, *from, *to, false, found),

@@ -1,10 +1,7 @@
-use std::cell::OnceCell;
-
 use qcbus_openscenario::Scenario;
 use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::positions::listed;
-use crate::families::roads_nearby::RoadsNearby;
 use crate::families::routes::{is_for_vehicles, routes, waypoints};
 use crate::model::{About as _, Scene};
 
@@ -19,10 +16,9 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    let Some(map) = scenario.network().map() else {
+    let Some(network) = scenario.network().map() else {
         return;
     };
-    let nearby = OnceCell::new();
     for route in routes(scenario) {
         for (_, position) in waypoints(route) {
             let world = position.filter(|position| position.is("WorldPosition"));
@@ -30,8 +26,11 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             let Some((x, y)) = position.number("x").zip(position.number("y")) else {
                 continue;
             };
-            let roads = nearby.get_or_init(|| RoadsNearby::of(map)).roads_at(x, y);
-            let text = match roads.len() {
+            let (count, roads) = network.with(|map| {
+                let roads = network.nearby().roads_at(map, x, y);
+                (roads.len(), listed(roads.iter().map(|road| road.id())))
+            });
+            let text = match count {
                 0 if is_for_vehicles(route) => {
                     "the waypoint is a `WorldPosition` on no lane of the road network; a `LanePosition` says \
                      which road the route takes"
@@ -39,9 +38,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 }
                 0 | 1 => continue,
                 count => format!(
-                    "the waypoint is a `WorldPosition` on the lanes of {count} roads, {}; a `LanePosition` \
-                     says which one the route takes",
-                    listed(roads.iter().copied())
+                    "the waypoint is a `WorldPosition` on the lanes of {count} roads, {roads}; a `LanePosition` \
+                     says which one the route takes"
                 ),
             };
             found

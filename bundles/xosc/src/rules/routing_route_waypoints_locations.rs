@@ -1,3 +1,4 @@
+use qcbus_opendrive::RoadMap;
 use qcbus_openscenario::Scenario;
 use qcbus_sdk::{Level, Rule, Sink};
 
@@ -16,9 +17,10 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    let Some(map) = scenario.network().map() else {
-        return;
-    };
+    scenario.on_map(|map| look(scenario, map, found));
+}
+
+fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
     for route in routes(scenario) {
         for (_, position) in waypoints(route) {
             let Some(position) = position else { continue };

@@ -12,6 +12,7 @@ const STEP: f64 = 5.0;
 const MOST: f64 = 1_000_000.0;
 
 /// A cross section of a road.
+#[derive(Debug)]
 struct Sample {
     road: usize,
     s: f64,
@@ -21,8 +22,8 @@ struct Sample {
 }
 
 /// The roads of a map by where they are.
-pub(crate) struct RoadsNearby<'m, 'd> {
-    map: &'m RoadMap<'d>,
+#[derive(Debug)]
+pub struct RoadsNearby {
     step: f64,
     samples: Vec<Sample>,
     cells: HashMap<(i64, i64), Vec<u32>>,
@@ -30,11 +31,11 @@ pub(crate) struct RoadsNearby<'m, 'd> {
     widest: f64,
 }
 
-impl<'m, 'd> RoadsNearby<'m, 'd> {
-    pub(crate) fn of(map: &'m RoadMap<'d>) -> RoadsNearby<'m, 'd> {
+impl RoadsNearby {
+    /// Looks along all roads of a map.
+    pub fn of(map: &RoadMap<'_>) -> RoadsNearby {
         let length: f64 = map.roads().iter().filter_map(|road| road.length()).sum();
         let mut nearby = RoadsNearby {
-            map,
             step: STEP.max(length / MOST),
             samples: Vec::new(),
             cells: HashMap::new(),
@@ -46,7 +47,7 @@ impl<'m, 'd> RoadsNearby<'m, 'd> {
         nearby
     }
 
-    fn add(&mut self, road: &Road<'d>) {
+    fn add(&mut self, road: &Road<'_>) {
         let Some(length) = road.length().filter(|length| *length >= 0.0) else {
             return;
         };
@@ -67,7 +68,7 @@ impl<'m, 'd> RoadsNearby<'m, 'd> {
     }
 
     /// Whether nothing is known of where roads are.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.samples.is_empty()
     }
 
@@ -86,7 +87,7 @@ impl<'m, 'd> RoadsNearby<'m, 'd> {
     }
 
     /// Whether a lane is within this distance.
-    pub(crate) fn is_near(&self, x: f64, y: f64, distance: f64) -> bool {
+    pub fn is_near(&self, x: f64, y: f64, distance: f64) -> bool {
         let reach = distance + self.widest.min(10.0 * CELL) + self.step;
         self.around(x, y, reach).any(|sample| {
             let (along, t) = seen_from(sample.pose, x, y);
@@ -96,8 +97,9 @@ impl<'m, 'd> RoadsNearby<'m, 'd> {
         })
     }
 
-    /// The roads on whose lanes a place lies, by their ids, in the order of the map.
-    pub(crate) fn roads_at(&self, x: f64, y: f64) -> Vec<&'d str> {
+    /// The roads on whose lanes a place lies, in the order of the map, which is the one that this was
+    /// made of.
+    pub fn roads_at<'m, 'r>(&self, map: &'m RoadMap<'r>, x: f64, y: f64) -> Vec<&'m Road<'r>> {
         let reach = self.widest.min(10.0 * CELL) + self.step;
         let mut roads: Vec<usize> = Vec::new();
         for near in self.around(x, y, reach) {
@@ -105,40 +107,40 @@ impl<'m, 'd> RoadsNearby<'m, 'd> {
                 continue;
             }
             let (along, _) = seen_from(near.pose, x, y);
-            if along.abs() <= self.step && self.is_on(near.road, near.s + along, x, y) {
+            if along.abs() <= self.step && is_on(map, near.road, near.s + along, x, y) {
                 roads.push(near.road);
             }
         }
         roads.sort_unstable();
-        let ids = roads.iter().filter_map(|at| self.map.roads().get(*at));
-        ids.map(Road::id).collect()
+        let roads = roads.into_iter();
+        roads.filter_map(|at| map.roads().get(at)).collect()
     }
+}
 
-    /// Whether a place lies well within the lanes of a road near a station.
-    fn is_on(&self, road: usize, near: f64, x: f64, y: f64) -> bool {
-        const WITHIN: f64 = 0.25;
-        let Some(road) = self.map.roads().get(road) else {
+/// Whether a place lies well within the lanes of a road near a station.
+fn is_on(map: &RoadMap<'_>, road: usize, near: f64, x: f64, y: f64) -> bool {
+    const WITHIN: f64 = 0.25;
+    let Some(road) = map.roads().get(road) else {
+        return false;
+    };
+    let Some(length) = road.length() else {
+        return false;
+    };
+    let mut s = near;
+    for _ in 0..4 {
+        let Some(found) = sample(road, s.clamp(0.0, length)) else {
             return false;
         };
-        let Some(length) = road.length() else {
-            return false;
-        };
-        let mut s = near;
-        for _ in 0..4 {
-            let Some(found) = sample(road, s.clamp(0.0, length)) else {
-                return false;
-            };
-            let (along, t) = seen_from(found.pose, x, y);
-            if along.abs() < 0.01 {
-                return t > found.right + WITHIN && t < found.left - WITHIN;
-            }
-            s = found.s + along;
-            if s < 0.0 || s > length {
-                return false;
-            }
+        let (along, t) = seen_from(found.pose, x, y);
+        if along.abs() < 0.01 {
+            return t > found.right + WITHIN && t < found.left - WITHIN;
         }
-        false
+        s = found.s + along;
+        if s < 0.0 || s > length {
+            return false;
+        }
     }
+    false
 }
 
 fn sample(road: &Road<'_>, s: f64) -> Option<Sample> {

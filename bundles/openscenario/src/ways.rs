@@ -1,0 +1,218 @@
+//! Whether traffic gets from one place of a map to another.
+
+use foldhash::{HashMap, HashMapExt as _, HashSet, HashSetExt as _};
+use qcbus_opendrive::{ContactPoint, LaneRef, Road, RoadMap, Side, TrafficRule};
+
+/// A lane section of a road, and whether one goes along it or against it.
+type Stretch = (usize, usize, bool);
+
+/// Where one gets from each stretch of road.
+#[derive(Debug)]
+pub struct Ways {
+    /// As traffic runs.
+    driven: HashMap<Stretch, Vec<Stretch>>,
+    /// Whichever way traffic runs.
+    linked: HashMap<Stretch, Vec<Stretch>>,
+}
+
+/// Where a waypoint is: the stretches that it may be on, and the station.
+#[derive(Debug, Clone)]
+pub struct Stop {
+    stretches: Vec<Stretch>,
+    s: f64,
+}
+
+impl Stop {
+    /// In a lane, whichever ways traffic may run there.
+    pub fn in_lane(lane: LaneRef<'_, '_>, s: f64) -> Stop {
+        let along = [true, false];
+        let along = along.into_iter().filter(|along| may_run(lane, *along));
+        Stop {
+            stretches: along.map(|along| stretch(lane, along)).collect(),
+            s,
+        }
+    }
+
+    /// On a road, on either side of it and in either direction; `None` where it has no lanes.
+    pub fn on_road(road: &Road<'_>, s: f64) -> Option<Stop> {
+        let layer = road.permanent()?;
+        let sections = Side::BOTH
+            .iter()
+            .filter_map(|side| Some(layer.section_at(road, *side, s)?.index()));
+        let mut stretches: Vec<_> = sections
+            .flat_map(|section| [true, false].map(|along| (road.index(), section, along)))
+            .collect();
+        stretches.dedup();
+        (!stretches.is_empty()).then_some(Stop { stretches, s })
+    }
+}
+
+/// How to get from one waypoint to the next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Way {
+    /// As traffic runs.
+    Driven,
+    /// Against the direction of traffic only.
+    Against,
+    /// Not at all.
+    None,
+    /// Too much to look at.
+    Unknown,
+}
+
+impl Ways {
+    /// The ways of a map; `None` where links are of a kind that does not join lanes.
+    pub fn of(map: &RoadMap<'_>) -> Option<Ways> {
+        let is_simple = map
+            .junctions()
+            .iter()
+            .all(|junction| junction.node().attr("type") != Some("virtual"));
+        let is_linked = map.roads().iter().all(|road| {
+            let link = road.link_node();
+            link.into_iter()
+                .flat_map(|link| link.children())
+                .all(|link| link.attr("elementS").is_none())
+        });
+        if !is_simple || !is_linked {
+            return None;
+        }
+        let mut ways = Ways {
+            driven: HashMap::new(),
+            linked: HashMap::new(),
+        };
+        for joint in map.lane_joints() {
+            let lanes = (map.lane(joint.from.lane), map.lane(joint.to.lane));
+            let (Some(from), Some(to)) = lanes else {
+                continue;
+            };
+            ways.add((from, joint.from.end), (to, joint.to.end));
+            ways.add((to, joint.to.end), (from, joint.from.end));
+        }
+        Some(ways)
+    }
+
+    /// One may leave a lane at an end and enter another at one of its ends.
+    fn add(
+        &mut self,
+        (from, leaves): (LaneRef<'_, '_>, ContactPoint),
+        (to, enters): (LaneRef<'_, '_>, ContactPoint),
+    ) {
+        let along = leaves == ContactPoint::End;
+        let onward = enters == ContactPoint::Start;
+        let (here, there) = (stretch(from, along), stretch(to, onward));
+        self.linked.entry(here).or_default().push(there);
+        let is_driven =
+            |lane: LaneRef<'_, '_>| lane.kind().is_none_or(|kind| !ASIDE.contains(&kind));
+        if is_driven(from) && is_driven(to) && may_run(from, along) && may_run(to, onward) {
+            self.driven.entry(here).or_default().push(there);
+        }
+    }
+
+    /// How to get from one stop to another. `budget` is how many stretches may still be looked at: a
+    /// scenario may have as many routes as it likes.
+    pub fn between(&self, from: &Stop, to: &Stop, budget: &mut usize) -> Way {
+        if is_ahead(from, to) || reaches(&self.driven, from, to, budget) {
+            return Way::Driven;
+        }
+        let turned = |stop: &Stop| Stop {
+            stretches: stop
+                .stretches
+                .iter()
+                .flat_map(|(road, section, _)| [true, false].map(|along| (*road, *section, along)))
+                .collect(),
+            s: stop.s,
+        };
+        let (from, to) = (turned(from), turned(to));
+        let is_linked = is_ahead(&from, &to) || reaches(&self.linked, &from, &to, budget);
+        match (*budget, is_linked) {
+            (0, _) => Way::Unknown,
+            (_, true) => Way::Against,
+            (_, false) => Way::None,
+        }
+    }
+}
+
+fn stretch(lane: LaneRef<'_, '_>, along: bool) -> Stretch {
+    (lane.at.road.index(), lane.at.index(), along)
+}
+
+/// Whether the second stop is farther on in the same stretch or a later one of the same road.
+fn is_ahead(from: &Stop, to: &Stop) -> bool {
+    from.stretches.iter().any(|(road, section, along)| {
+        to.stretches.iter().any(|(other, later, onward)| {
+            road == other
+                && section == later
+                && along == onward
+                && if *along {
+                    from.s <= to.s
+                } else {
+                    from.s >= to.s
+                }
+        })
+    })
+}
+
+fn reaches(
+    ways: &HashMap<Stretch, Vec<Stretch>>,
+    from: &Stop,
+    to: &Stop,
+    budget: &mut usize,
+) -> bool {
+    let goals: HashSet<Stretch> = to.stretches.iter().copied().collect();
+    let mut seen: HashSet<Stretch> = HashSet::new();
+    let mut open: Vec<Stretch> = from.stretches.clone();
+    while let Some(here) = open.pop() {
+        for next in ways.get(&here).into_iter().flatten() {
+            if *budget == 0 {
+                return false;
+            }
+            *budget -= 1;
+            if goals.contains(next) {
+                return true;
+            }
+            if seen.insert(*next) {
+                open.push(*next);
+            }
+        }
+    }
+    false
+}
+
+/// Lanes that no route takes.
+const ASIDE: &[&str] = &[
+    "biking", "border", "curb", "median", "none", "parking", "rail", "shoulder", "sidewalk",
+    "tram", "walking",
+];
+
+/// Lanes without traffic that runs in one direction.
+const UNDIRECTED: &[&str] = &[
+    "bidirectional",
+    "border",
+    "curb",
+    "median",
+    "none",
+    "parking",
+    "shoulder",
+    "sidewalk",
+    "special1",
+    "special2",
+    "special3",
+    "walking",
+];
+
+/// Whether traffic may run on a lane along the road or against it; where that is not known, it may.
+fn may_run(lane: LaneRef<'_, '_>, along: bool) -> bool {
+    let (Some(side), Some(rule)) = (lane.side(), lane.at.road.traffic_rule()) else {
+        return true;
+    };
+    let is_undirected = lane.kind().is_none_or(|kind| UNDIRECTED.contains(&kind));
+    if is_undirected || lane.dynamic_direction() == Some(true) {
+        return true;
+    }
+    let standard = (side == Side::Right) == (rule == TrafficRule::RightHand);
+    match lane.direction() {
+        None | Some("standard") => along == standard,
+        Some("reversed") => along != standard,
+        Some(_) => true,
+    }
+}
