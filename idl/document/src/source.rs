@@ -49,9 +49,18 @@ impl<'a> Document<'a> {
         records.iter().map(move |record| document.source(record))
     }
 
-    /// The text of all sources, one after the other with a line feed between them.
+    /// The text of a source. Looks at every byte of it: whoever needs a line of many asks for
+    /// [`Document::source_bytes`].
     pub fn source_text(&self, source: &Source<'a>) -> &'a str {
         self.text_at(source.start, source.len).unwrap_or("")
+    }
+
+    /// The bytes of a source; UTF-8, unless the image is damaged.
+    pub fn source_bytes(&self, source: &Source<'a>) -> &'a [u8] {
+        let text: &'a [u8] = self.section(Section::Text);
+        let from = source.start as usize;
+        text.get(from..from.saturating_add(source.len as usize))
+            .unwrap_or_default()
     }
 
     /// Leads an offset of the text to its file, row and column. An offset just past the end of a

@@ -93,7 +93,7 @@ impl<B: Deref<Target = [u8]>> ImageSources<B> {
         let Some(source) = source else {
             return Answer::OtherFile;
         };
-        let text = document.source_text(&source);
+        let text = document.source_bytes(&source);
         let mut files = self.files.borrow_mut();
         let index = files
             .entry(path.to_owned())
@@ -196,8 +196,8 @@ struct Index {
 }
 
 impl Index {
-    fn of(text: &str) -> Index {
-        let feeds = text.bytes().enumerate().filter(|&(_, byte)| byte == b'\n');
+    fn of(text: &[u8]) -> Index {
+        let feeds = text.iter().enumerate().filter(|&(_, byte)| *byte == b'\n');
         let after = feeds.filter_map(|(at, _)| u32::try_from(at + 1).ok());
         Index {
             starts: std::iter::once(0).chain(after).collect(),
@@ -205,11 +205,12 @@ impl Index {
         }
     }
 
-    fn line<'t>(&self, text: &'t str, row: u64) -> Option<&'t str> {
+    fn line<'t>(&self, text: &'t [u8], row: u64) -> Option<&'t str> {
         let row = usize::try_from(row).ok()?.checked_sub(1)?;
         let start = *self.starts.get(row)? as usize;
         let end = self.starts.get(row + 1).map_or(text.len(), |&n| n as usize);
-        let line = text.get(start..end)?.trim_end_matches(['\n', '\r']);
+        let line = std::str::from_utf8(text.get(start..end)?).ok()?;
+        let line = line.trim_end_matches(['\n', '\r']);
         let marked = line.strip_prefix('\u{FEFF}').filter(|_| row == 0);
         Some(marked.unwrap_or(line))
     }
@@ -247,8 +248,8 @@ mod tests {
     #[test]
     fn lines_are_counted_by_line_feeds() {
         let text = "\u{FEFF}one\r\ntwo\n\nfour";
-        let index = Index::of(text);
-        let row = |row| index.line(text, row);
+        let index = Index::of(text.as_bytes());
+        let row = |row| index.line(text.as_bytes(), row);
         assert_eq!(row(0), None);
         assert_eq!(row(1), Some("one"));
         assert_eq!(row(2), Some("two"));
@@ -262,12 +263,13 @@ mod tests {
     fn of_a_very_long_line_only_a_part_is_given() {
         for letter in ["a", "ü"] {
             let text = format!("{}<{}", letter.repeat(5000), letter.repeat(5000));
-            let part = Index::of(&text).part(&text, 5001);
+            let index = Index::of(text.as_bytes());
+            let part = index.part(&text, 5001);
             assert_eq!(part.skipped, 4001);
             assert_eq!(part.text.chars().count(), 2 * REACH);
             assert_eq!(part.text.chars().nth(999), Some('<'));
             assert!(part.goes_on);
-            let end = Index::of(&text).part(&text, u64::MAX);
+            let end = index.part(&text, u64::MAX);
             assert_eq!((end.text.as_str(), end.goes_on), ("", false));
         }
     }
