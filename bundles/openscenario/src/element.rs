@@ -185,6 +185,11 @@ impl<'m, 'd> Element<'m, 'd> {
         }
     }
 
+    /// One of its attributes as it is to be understood.
+    pub fn reading(self, attribute: Attribute<'d>) -> Reading<'d> {
+        self.scenario.read(attribute, self.context)
+    }
+
     /// An attribute's text, parameters replaced; `None` when it is missing or unknown.
     pub fn text(self, name: &str) -> Option<Cow<'d, str>> {
         match self.read(name) {

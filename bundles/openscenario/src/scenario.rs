@@ -3,7 +3,7 @@
 use std::cell::OnceCell;
 
 use foldhash::{HashMap, HashMapExt as _, HashSet};
-use qcbus_document::{Attribute, Document, FileKind, Node};
+use qcbus_document::{Attribute, Document, FileKind, Named, Node};
 use qcbus_schema::Typing;
 
 use crate::Version;
@@ -35,6 +35,7 @@ pub struct Scenario<'d> {
     kind: FileKind,
     typings: OnceCell<HashMap<*const u8, Option<Typing>>>,
     variables: OnceCell<HashSet<&'d str>>,
+    with_dollar: OnceCell<Vec<Attribute<'d>>>,
     faults: OnceCell<Vec<ValueFault<'d>>>,
     /// Each with the context of its entry.
     entry_faults: OnceCell<Vec<(ContextId, ValueFault<'d>)>>,
@@ -65,6 +66,7 @@ impl<'d> Scenario<'d> {
             kind: inputs.kind,
             typings: OnceCell::new(),
             variables: OnceCell::new(),
+            with_dollar: OnceCell::new(),
             faults: OnceCell::new(),
             entry_faults: OnceCell::new(),
             entities: OnceCell::new(),
@@ -119,9 +121,23 @@ impl<'d> Scenario<'d> {
     /// The elements of a name in the document and in the entries of catalogs that it refers to, an
     /// entry as often as it is referred to.
     pub fn elements_everywhere(&self, name: &str) -> impl Iterator<Item = Element<'_, 'd>> {
+        // Thousands of references may lead to entries of the same few catalogs.
+        let mut known: Vec<(*const u8, Named<'d>)> = Vec::new();
         self.tops().flat_map(move |top| {
+            let document = top.node.document();
+            let key = key(document);
+            let named = match known.iter().find(|(other, _)| *other == key) {
+                Some((_, named)) => *named,
+                None => {
+                    let named = document.named(name);
+                    known.push((key, named));
+                    named
+                }
+            };
             let itself = top.is(name).then_some(top);
-            itself.into_iter().chain(top.descendants_named(name))
+            let within = named.within(top.node);
+            let within = within.map(move |node| Element { node, ..top });
+            itself.into_iter().chain(within)
         })
     }
 
@@ -410,16 +426,21 @@ impl<'d> Scenario<'d> {
         })
     }
 
+    /// The attributes of the document with a `$` in them, in document order.
+    pub fn with_dollar(&self) -> &[Attribute<'d>] {
+        self.with_dollar
+            .get_or_init(|| with_dollar(self.contexts[0].top).collect())
+    }
+
     /// The attributes of the document, or of an entry, that are not written out.
-    fn substituted(&self, context: ContextId) -> impl Iterator<Item = Attribute<'d>> + use<'d> {
-        let top = self.context(context).top;
-        let all = std::iter::once(top)
-            .chain(top.descendants())
-            .flat_map(|node| node.attributes());
+    fn substituted(&self, context: ContextId) -> impl Iterator<Item = Attribute<'d>> {
+        let (document, entry) = match context {
+            0 => (self.with_dollar(), None),
+            _ => (&[][..], Some(with_dollar(self.context(context).top))),
+        };
+        let all = document.iter().copied().chain(entry.into_iter().flatten());
         all.filter(|attribute| {
-            attribute.value().contains('$')
-                && reading::Form::of(attribute.value()) != reading::Form::Literal
-                && !is_plain(*attribute)
+            reading::Form::of(attribute.value()) != reading::Form::Literal && !is_plain(*attribute)
         })
     }
 
@@ -503,6 +524,12 @@ impl<'d> Scenario<'d> {
         });
         variables.contains(name)
     }
+}
+
+fn with_dollar<'d>(top: Node<'d>) -> impl Iterator<Item = Attribute<'d>> {
+    let all = std::iter::once(top).chain(top.descendants());
+    all.flat_map(|node| node.attributes())
+        .filter(|attribute| attribute.value().contains('$'))
 }
 
 /// Tells documents apart: where the text of their path lies in memory.

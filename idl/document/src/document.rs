@@ -8,7 +8,7 @@ use crate::layout::{
     ALIGNMENT, FaultRecord, Header, HeapRecord, MAGIC, NAME_IN_HEAP, NameRecord, NodeRecord,
     Section, U16, U32, VERSION,
 };
-use crate::node::Node;
+use crate::node::{Named, Node};
 
 /// A parsed file, read in place.
 ///
@@ -154,6 +154,11 @@ impl<'a> Document<'a> {
             document: *self,
             postings: postings.iter(),
         }
+    }
+
+    /// The elements with this local name, to be asked for within one subtree after the other.
+    pub fn named(&self, name: &str) -> Named<'a> {
+        Named::new(*self, name)
     }
 
     /// SHA-256 of the source bytes on disk, as ingest computed it.

@@ -32,7 +32,7 @@ pub use document::{Document, Elements, ImageError};
 pub use fault::{Fault, FaultCode, FaultGroup};
 pub use image::Image;
 pub use kind::{FileKind, SUFFIXES, Suffix};
-pub use node::{Ancestors, Children, ChildrenNamed, Descendants, DescendantsNamed, Node};
+pub use node::{Ancestors, Children, ChildrenNamed, Descendants, DescendantsNamed, Named, Node};
 pub use source::{Position, Source};
 pub use value::{NumberKind, ValueError};
 pub use xpath::{XPathError, XPaths};

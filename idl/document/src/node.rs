@@ -204,21 +204,7 @@ impl<'a> Node<'a> {
 
     /// All elements of this name within it; costs nothing per other element.
     pub fn descendants_named(&self, name: &str) -> DescendantsNamed<'a> {
-        let Descendants {
-            document,
-            next,
-            end,
-        } = self.descendants();
-        let postings = document
-            .name_id(name)
-            .map_or(&[][..], |id| document.postings(id));
-        let from = postings.partition_point(|index| index.get() < next);
-        let rest = postings.get(from..).unwrap_or(&[]);
-        let upto = rest.partition_point(|index| index.get() < end);
-        DescendantsNamed {
-            document,
-            postings: rest.get(..upto).unwrap_or(&[]).iter(),
-        }
+        self.document.named(name).within(*self)
     }
 
     /// The next element with the same parent.
@@ -460,6 +446,39 @@ impl<'a> Iterator for Descendants<'a> {
             }
         }
         None
+    }
+}
+
+/// The elements of one name, which is looked up once for many subtrees; made by
+/// [`Document::named`].
+#[derive(Clone, Copy, Debug)]
+pub struct Named<'a> {
+    document: Document<'a>,
+    postings: &'a [crate::layout::U32],
+}
+
+impl<'a> Named<'a> {
+    pub(crate) fn new(document: Document<'a>, name: &str) -> Named<'a> {
+        let postings = document
+            .name_id(name)
+            .map_or(&[][..], |id| document.postings(id));
+        Named { document, postings }
+    }
+
+    /// Those within an element of the same document, itself excluded, in document order.
+    pub fn within(&self, node: Node<'a>) -> DescendantsNamed<'a> {
+        let mut postings = self.postings;
+        if !postings.is_empty() {
+            let Descendants { next, end, .. } = node.descendants();
+            let from = postings.partition_point(|index| index.get() < next);
+            postings = postings.get(from..).unwrap_or(&[]);
+            let upto = postings.partition_point(|index| index.get() < end);
+            postings = postings.get(..upto).unwrap_or(&[]);
+        }
+        DescendantsNamed {
+            document: self.document,
+            postings: postings.iter(),
+        }
     }
 }
 

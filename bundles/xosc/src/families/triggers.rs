@@ -1,8 +1,12 @@
 //! Triggers: what starts and what stops, and when at the earliest.
 
+use std::borrow::Cow;
 use std::fmt::Write as _;
+use std::hash::BuildHasher as _;
 
-use qcbus_openscenario::{Element, Scenario};
+use foldhash::HashMap;
+use qcbus_document::Attribute;
+use qcbus_openscenario::{Element, Reading, Scenario, parse_double};
 use qcbus_sdk::Sink;
 
 use crate::model::About;
@@ -94,31 +98,107 @@ fn write_canonical(element: Element<'_, '_>, without: &[&str], deep: usize, out:
     let Some(deeper) = deep.checked_sub(1) else {
         return;
     };
-    let mut attributes: Vec<(&str, String)> = Vec::new();
-    for attribute in element.node().attributes() {
-        let name = attribute.name();
-        if (element.is("Condition") && name == "name") || without.contains(&name) {
-            continue;
-        }
-        let value = match element.number(name) {
-            Some(number) => number.to_string(),
-            None => match element.word(name) {
-                Some(word) => word.into_owned(),
-                None => attribute.value().to_owned(),
-            },
-        };
-        attributes.push((name, value));
-    }
-    attributes.sort();
+    let mut attributes: Vec<(&str, Attribute<'_>)> = element
+        .node()
+        .attributes()
+        .map(|attribute| (attribute.name(), attribute))
+        .filter(|(name, _)| {
+            !(without.contains(name) || (*name == "name" && element.is("Condition")))
+        })
+        .collect();
+    attributes.sort_unstable_by_key(|(name, _)| *name);
     let _ = write!(out, "<{}", element.name());
-    for (name, value) in attributes {
-        let _ = write!(out, " {name}={value:?}");
+    for (name, attribute) in attributes {
+        let _ = write!(out, " {name}=");
+        write_value(element, attribute, out);
     }
     out.push('>');
     for child in element.children() {
         write_canonical(child, &[], deeper, out);
     }
     out.push_str("</>");
+}
+
+/// Numbers for triggers, the same one for those that mean the same.
+#[derive(Default)]
+pub(crate) struct Kinds<'m, 'd> {
+    /// By fingerprint: nearly all triggers differ, and need not be compared as a whole.
+    by_print: HashMap<u64, Vec<usize>>,
+    firsts: Vec<Option<Element<'m, 'd>>>,
+}
+
+impl<'m, 'd> Kinds<'m, 'd> {
+    /// The number of a trigger; what has none is a kind of its own.
+    pub(crate) fn of(&mut self, trigger: Option<Element<'m, 'd>>) -> usize {
+        let print = trigger.map_or(0, |trigger| fingerprint(trigger, DEEPEST));
+        let same = self.by_print.entry(print).or_default();
+        let known = same.iter().find(|number| {
+            let first = self.firsts.get(**number).copied().flatten();
+            first.map(canonical) == trigger.map(canonical)
+        });
+        if let Some(number) = known {
+            return *number;
+        }
+        let number = self.firsts.len();
+        same.push(number);
+        self.firsts.push(trigger);
+        number
+    }
+}
+
+/// Equal for whatever is equal by [`canonical`].
+fn fingerprint(element: Element<'_, '_>, deep: usize) -> u64 {
+    let hash = foldhash::fast::FixedState::default();
+    let Some(deeper) = deep.checked_sub(1) else {
+        return 0;
+    };
+    let is_condition = element.is("Condition");
+    let attributes = element.node().attributes();
+    let attributes = attributes
+        .filter(|attribute| !(is_condition && attribute.is("name")))
+        .map(|attribute| hash.hash_one((attribute.name(), plain(element, attribute))));
+    let own = attributes.fold(0, u64::wrapping_add);
+    element
+        .children()
+        .fold(hash.hash_one((element.name(), own)), |print, child| {
+            hash.hash_one((print, fingerprint(child, deeper)))
+        })
+}
+
+/// What a value is compared by.
+#[derive(Hash)]
+enum Plain<'d> {
+    Number(u64),
+    Text(Cow<'d, str>),
+}
+
+fn plain<'d>(element: Element<'_, 'd>, attribute: Attribute<'d>) -> Plain<'d> {
+    // Minus zero is zero.
+    let number = |number: f64| Plain::Number((number + 0.0).to_bits());
+    let text = match element.reading(attribute) {
+        Reading::Literal(text) => Cow::Borrowed(text),
+        Reading::Value(value) => match value.number() {
+            Some(value) => return number(value),
+            None => value.text(),
+        },
+        Reading::Absent | Reading::Unknown => Cow::Borrowed(attribute.value()),
+    };
+    match parse_double(&text) {
+        Some(value) => number(value),
+        None => match text {
+            Cow::Borrowed(text) => Plain::Text(Cow::Borrowed(text.trim())),
+            Cow::Owned(text) => Plain::Text(Cow::Owned(text.trim().to_owned())),
+        },
+    }
+}
+
+/// A value so that equal ones look alike and no other does: numbers by their bits, texts with their
+/// length.
+fn write_value<'d>(element: Element<'_, 'd>, attribute: Attribute<'d>, out: &mut String) {
+    let _ = match plain(element, attribute) {
+        Plain::Number(bits) => write!(out, "#{bits:x}"),
+        Plain::Text(text) => write!(out, "{}:{text}", text.len()),
+    };
 }
 
 /// The events of an act, those of maneuvers in catalogs among them.

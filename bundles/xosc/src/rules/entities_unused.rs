@@ -1,3 +1,5 @@
+use std::borrow::Cow;
+
 use foldhash::HashSet;
 use qcbus_openscenario::{EntityKind, Form, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
@@ -20,7 +22,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     if !is_whole || scenario.root().child("Storyboard").is_none() {
         return;
     }
-    let mut used: HashSet<String> = HashSet::default();
+    let mut used: HashSet<Cow<'_, str>> = HashSet::default();
     for (element, attribute) in ENTITY_REFERENCES {
         for reference in scenario.elements_everywhere(element) {
             if !reference.has(attribute) {
@@ -29,7 +31,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             let Some(name) = reference.text(attribute) else {
                 return;
             };
-            used.insert(name.into_owned());
+            used.insert(name);
         }
     }
     let entities = scenario.entities();

@@ -45,13 +45,11 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
 /// The declarations that a `$name` leads to, wherever in a value it stands.
 fn used(scenario: &Scenario<'_>) -> HashSet<u32> {
     let mut used = HashSet::new();
-    let root = scenario.root();
-    for element in std::iter::once(root).chain(root.descendants()) {
-        for attribute in element.node().attributes() {
-            for behind in attribute.value().split('$').skip(1) {
-                if let Some(declaration) = element.parameter(identifier(behind)) {
-                    used.insert(declaration.node.index());
-                }
+    for attribute in scenario.with_dollar() {
+        let element = scenario.element(attribute.node());
+        for behind in attribute.value().split('$').skip(1) {
+            if let Some(declaration) = element.parameter(identifier(behind)) {
+                used.insert(declaration.node.index());
             }
         }
     }

@@ -3,7 +3,7 @@ use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::actions::{Domain, acting, domains};
-use crate::families::triggers::{called, canonical, events};
+use crate::families::triggers::{Kinds, called, events};
 use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -22,22 +22,29 @@ type Taken<'m, 'd> = (Element<'m, 'd>, Element<'m, 'd>);
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for act in scenario.elements("Act") {
-        let mut taken: HashMap<(String, &str, Domain), Taken<'_, '_>> = HashMap::new();
-        for event in events(act) {
-            let trigger = event.child("StartTrigger").map(canonical);
-            let trigger = trigger.unwrap_or_default();
+        let events: Vec<_> = events(act).collect();
+        let mut actions = events
+            .iter()
+            .flat_map(|event| event.children_named("Action"));
+        if actions.nth(1).is_none() {
+            continue;
+        }
+        let mut kinds = Kinds::default();
+        let mut taken: HashMap<(usize, &str, Domain), Taken<'_, '_>> = HashMap::new();
+        for event in events {
+            let trigger = kinds.of(event.child("StartTrigger"));
             for action in event.children_named("Action") {
-                take(&trigger, event, action, &mut taken, found);
+                take(trigger, event, action, &mut taken, found);
             }
         }
     }
 }
 
 fn take<'m, 'd>(
-    trigger: &str,
+    trigger: usize,
     event: Element<'m, 'd>,
     action: Element<'m, 'd>,
-    taken: &mut HashMap<(String, &'m str, Domain), Taken<'m, 'd>>,
+    taken: &mut HashMap<(usize, &'m str, Domain), Taken<'m, 'd>>,
     found: &mut Sink<'_>,
 ) {
     let Some(private) = action.child("PrivateAction") else {
@@ -49,7 +56,7 @@ fn take<'m, 'd>(
     }
     for entity in acting(action).unwrap_or_default() {
         for domain in &domains {
-            let key = (trigger.to_owned(), entity.name(), *domain);
+            let key = (trigger, entity.name(), *domain);
             let Some((other, its_event)) = taken.get(&key).copied() else {
                 taken.insert(key, (action, event));
                 continue;

@@ -2,7 +2,7 @@ use foldhash::{HashMap, HashMapExt as _};
 use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
-use crate::families::triggers::{called, canonical};
+use crate::families::triggers::{Kinds, called};
 use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -18,10 +18,14 @@ pub static RULE: Rule<Scene> = Rule {
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for maneuver in scenario.elements_everywhere("Maneuver") {
-        let mut first: HashMap<String, Element<'_, '_>> = HashMap::new();
-        for event in maneuver.children_named("Event") {
-            let trigger = event.child("StartTrigger").map(canonical);
-            let trigger = trigger.unwrap_or_default();
+        let events: Vec<_> = maneuver.children_named("Event").collect();
+        if events.len() < 2 {
+            continue;
+        }
+        let mut kinds = Kinds::default();
+        let mut first: HashMap<usize, Element<'_, '_>> = HashMap::new();
+        for event in events {
+            let trigger = kinds.of(event.child("StartTrigger"));
             match first.get(&trigger) {
                 Some(other) => {
                     compare(*other, event, found);

@@ -18,8 +18,12 @@ pub static RULE: Rule<Scene> = Rule {
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for group in scenario.elements_everywhere("ConditionGroup") {
+        let conditions: Vec<_> = group.children_named("Condition").collect();
+        if conditions.len() < 2 {
+            continue;
+        }
         let mut known: HashMap<String, Demand<'_, '_>> = HashMap::new();
-        for condition in group.children_named("Condition") {
+        for condition in conditions {
             let Some((quantity, claim)) = demands::of(condition) else {
                 continue;
             };
