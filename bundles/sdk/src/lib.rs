@@ -11,6 +11,7 @@ mod check;
 pub mod corpus;
 mod kept;
 mod load;
+pub mod mutate;
 pub mod pages;
 mod param;
 mod place;

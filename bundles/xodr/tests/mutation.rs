@@ -13,19 +13,16 @@
 
 #[path = "mutation/edit.rs"]
 mod edit;
-#[path = "mutation/tree.rs"]
-mod tree;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::Path;
 use std::sync::LazyLock;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use edit::{Edit, Entry};
+use qcbus_sdk::mutate::in_parallel;
 use qcbus_sdk::{Issue, Level, Listener, Loaded, Outcome, Plan, Status, check};
 use qcbus_xodr::BUNDLE;
-use tree::Tree;
 
 const EDITS: &str = include_str!("mutation/edits.txt");
 const PAGE: &str = concat!(
@@ -113,15 +110,15 @@ struct Row {
 /// A base map.
 struct Map {
     name: &'static str,
-    tree: Tree,
+    text: &'static str,
     /// Rules that apply to it.
     rules: BTreeSet<&'static str>,
 }
 
 fn maps() -> Vec<Map> {
-    let map = |(name, text): (&'static str, &str)| Map {
+    let map = |(name, text): (&'static str, &'static str)| Map {
         name,
-        tree: Tree::parse(text),
+        text,
         rules: Verdict::of(text).completed,
     };
     MAPS.into_iter().map(map).collect()
@@ -136,7 +133,7 @@ fn row(entry: &Entry, maps: &[Map], faults: &mut Vec<String>) -> Row {
             if !edit.is_for(map.name) || !map.rules.contains(entry.rule.as_str()) {
                 continue;
             }
-            let Some(text) = edit.apply(&map.tree) else {
+            let Some(text) = edit.apply(map.text) else {
                 continue;
             };
             tried += 1;
@@ -165,30 +162,15 @@ fn row(entry: &Entry, maps: &[Map], faults: &mut Vec<String>) -> Row {
 /// The rows of all rules whose name contains `wanted`, in order, and what is wrong. Rules do not know
 /// of each other, so every processor takes the next.
 fn rows(entries: &[Entry], maps: &[Map], wanted: &str) -> (Vec<Row>, Vec<String>) {
-    let next = AtomicUsize::new(0);
-    let work = || {
-        let mut done = BTreeMap::new();
-        loop {
-            let at = next.fetch_add(1, Ordering::Relaxed);
-            let Some(entry) = entries.get(at) else {
-                return done;
-            };
-            let mut faults = Vec::new();
-            if entry.rule.contains(wanted) {
-                let row = row(entry, maps, &mut faults);
-                done.insert(at, (row, faults));
-            } else {
-                done.insert(at, (Row::default(), faults));
-            }
-        }
-    };
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let done: BTreeMap<usize, (Row, Vec<String>)> = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
-        let all = workers.into_iter().flat_map(|it| it.join().unwrap());
-        all.collect()
+    let done = in_parallel(entries, |(): &mut (), entry| {
+        let mut faults = Vec::new();
+        let row = match entry.rule.contains(wanted) {
+            true => row(entry, maps, &mut faults),
+            false => Row::default(),
+        };
+        (row, faults)
     });
-    let (rows, faults): (Vec<Row>, Vec<Vec<String>>) = done.into_values().unzip();
+    let (rows, faults): (Vec<Row>, Vec<Vec<String>>) = done.into_iter().unzip();
     (rows, faults.concat())
 }
 
@@ -267,10 +249,6 @@ fn nothing_is_wrong_with_the_maps() {
         if found.any(|it| it.level != Level::Information && !it.description.contains(DEFECT)) {
             writeln!(faults, "in {name}:\n{}", verdict.told()).unwrap();
         }
-        // What the tree writes must be the same map.
-        let again = Verdict::of(&Tree::parse(text).text());
-        assert_eq!(verdict.told(), again.told(), "{name}");
-        assert_eq!(verdict.completed, again.completed, "{name}");
     }
     assert!(faults.is_empty(), "{faults}");
 }

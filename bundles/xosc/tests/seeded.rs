@@ -11,22 +11,12 @@
     reason = "a test may fail and tell what it tried"
 )]
 
-#[path = "seeded/edit.rs"]
-mod edit;
-#[path = "seeded/encode.rs"]
-mod encode;
 #[path = "seeded/engine.rs"]
 mod engine;
 #[path = "seeded/judge.rs"]
 mod judge;
-#[path = "seeded/overlay.rs"]
-mod overlay;
 #[path = "seeded/page.rs"]
 mod page;
-#[path = "seeded/scan.rs"]
-mod scan;
-#[path = "seeded/select.rs"]
-mod select;
 #[path = "seeded/table.rs"]
 mod table;
 #[path = "seeded/trials.rs"]
@@ -122,7 +112,10 @@ fn told(faults: &Trials<'_>, harmless: &Trials<'_>) {
         }
         tell(&format!("\n    why: {}\n", entry.why));
         for (file, rows) in &trial.spots {
-            tell(&format!("    at: {} {rows:?}\n", judge::name(file)));
+            tell(&format!(
+                "    at: {} {rows:?}\n",
+                qcbus_sdk::mutate::name(file)
+            ));
         }
         for said in &trial.new {
             tell(&format!("    new: {said}\n"));

@@ -1,23 +1,11 @@
-//! What is said of a scenario, and whether that is what should be said of an edited one.
+//! Whether what is said of an edited scenario is what should be said.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use qcbus_formats::pool::{CheckerOutcome, Remark};
-use qcbus_formats::xqar::{Issue, Location, Locations};
-use qcbus_sdk::{Level, Loaded, Plan, Status, examine};
+use qcbus_sdk::Level;
+use qcbus_sdk::mutate::{Said, Spots};
 
-use super::overlay::Spots;
-use super::table::{Entry, normal};
-
-/// An issue, without what depends on the directory of the scenario.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Said {
-    pub checker: String,
-    pub level: Level,
-    pub text: String,
-    /// The rows of its locations, the main one first.
-    pub rows: Vec<(PathBuf, u64)>,
-}
+use super::table::Entry;
 
 /// What became of an entry.
 #[derive(Debug)]
@@ -64,36 +52,6 @@ impl Trial<'_> {
     }
 }
 
-/// Everything that is said of a scenario below a directory.
-pub fn said(plan: &Plan, root: &Path, scenario: &Path) -> Result<Vec<Said>, String> {
-    let path = root.join(scenario);
-    let folder = path.parent().unwrap_or(root);
-    let loaded = Loaded::from_path(&path, folder).map_err(|error| error.to_string())?;
-    let outcome = examine(plan, &loaded).map_err(|error| error.to_string())?;
-    let bundles = [outcome];
-    let remarks = loaded
-        .remarks(&bundles)
-        .map_err(|error| error.to_string())?;
-    let reader = Reader { root, scenario };
-    let checkers = bundles[0].checkers.iter();
-    let mut all: Vec<Said> = checkers.flat_map(|it| reader.checker(it)).collect();
-    all.extend(remarks.iter().filter_map(|it| reader.remark(it)));
-    Ok(all)
-}
-
-/// What is said now and was not before. An issue that comes twice is told from one that comes once.
-pub fn new_ones(before: &[Said], after: Vec<Said>) -> Vec<Said> {
-    let mut left: Vec<_> = before.iter().map(Said::key).collect();
-    let is_new = |said: &Said| match left.iter().position(|old| *old == said.key()) {
-        Some(known) => {
-            left.swap_remove(known);
-            false
-        }
-        None => true,
-    };
-    after.into_iter().filter(is_new).collect()
-}
-
 /// Judges what an edit led to.
 pub fn judge(entry: &Entry, spots: Spots, new: Vec<Said>) -> Trial<'_> {
     let least = entry.level.unwrap_or(Level::Error);
@@ -121,79 +79,5 @@ pub fn judge(entry: &Entry, spots: Spots, new: Vec<Said>) -> Trial<'_> {
         spots,
         new,
         further,
-    }
-}
-
-impl Said {
-    fn key(&self) -> (&str, Level, Option<&(PathBuf, u64)>, &str) {
-        (&self.checker, self.level, self.rows.first(), &self.text)
-    }
-}
-
-impl std::fmt::Display for Said {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Said { checker, text, .. } = self;
-        write!(f, "{} at", self.level.as_str())?;
-        for (file, row) in &self.rows {
-            write!(f, " {}:{row}", name(file))?;
-        }
-        write!(f, ": {text} [{checker}]")
-    }
-}
-
-/// The last piece of a path.
-pub fn name(file: &Path) -> std::borrow::Cow<'_, str> {
-    file.file_name().unwrap_or_default().to_string_lossy()
-}
-
-/// Makes issues comparable.
-struct Reader<'r> {
-    root: &'r Path,
-    scenario: &'r Path,
-}
-
-impl Reader<'_> {
-    fn checker(&self, checker: &CheckerOutcome) -> Vec<Said> {
-        let issues = checker.issues.iter();
-        let mut all: Vec<Said> = issues.map(|it| self.issue(&checker.id, it)).collect();
-        if checker.status() == Status::Error {
-            all.push(Said {
-                checker: checker.id.clone(),
-                level: Level::Error,
-                text: format!("it failed: {}", checker.reason()),
-                rows: Vec::new(),
-            });
-        }
-        all
-    }
-
-    fn remark(&self, remark: &Remark) -> Option<Said> {
-        let issue = remark.issue.as_ref()?;
-        Some(self.issue(&remark.checker, issue))
-    }
-
-    fn issue(&self, checker: &str, issue: &Issue) -> Said {
-        let root = format!("{}/", self.root.display());
-        let locations = issue.locations.iter();
-        Said {
-            checker: checker.to_owned(),
-            level: issue.level,
-            text: issue.description.replace(&root, ""),
-            rows: locations.flat_map(|it| self.rows(it)).collect(),
-        }
-    }
-
-    /// A place in another file is also at the reference to that file.
-    fn rows(&self, locations: &Locations) -> Vec<(PathBuf, u64)> {
-        let elsewhere = locations.elsewhere.iter().map(|other| {
-            let path = normal(Path::new(&other.path));
-            let path = path.strip_prefix(self.root).unwrap_or(&path);
-            (path.to_owned(), other.row)
-        });
-        let here = locations.places.iter().filter_map(|place| match place {
-            Location::File { row, .. } => Some((self.scenario.to_owned(), *row)),
-            _ => None,
-        });
-        elsewhere.chain(here).collect()
     }
 }

@@ -4,8 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 use qcbus_sdk::Level;
+use qcbus_sdk::mutate::{Said, name};
 
-use super::judge::{Found, Said, Trial, name};
+use super::judge::{Found, Trial};
 use super::table::Entry;
 use super::trials::Trials;
 

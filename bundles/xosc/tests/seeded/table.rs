@@ -1,13 +1,10 @@
 //! The lists of faults and of harmless variants; `README.md` describes how they are written.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Component, Path, PathBuf};
+use std::path::PathBuf;
 
 use qcbus_sdk::Level;
-
-use super::edit::Action;
-use super::encode::Storage;
-use super::select::Selector;
+use qcbus_sdk::mutate::{Edit, Target, beside};
 
 /// A scenario and how it is changed.
 #[derive(Debug)]
@@ -29,29 +26,6 @@ pub struct Scenario {
     pub producer: String,
     /// Below the producer's directory.
     pub path: PathBuf,
-}
-
-/// An element of a file, or the file.
-#[derive(Debug)]
-pub struct Target {
-    pub selector: Option<Selector>,
-    /// Below the producer's directory.
-    pub file: PathBuf,
-}
-
-#[derive(Debug)]
-pub struct Edit {
-    pub change: Change,
-    /// Below the producer's directory.
-    pub file: PathBuf,
-}
-
-#[derive(Debug)]
-pub enum Change {
-    Element(Selector, Action),
-    Storage(Storage),
-    Write(String),
-    Remove,
 }
 
 /// Reads a list; the text of an error begins with the line's number.
@@ -127,55 +101,13 @@ impl Entry {
             return Ok(());
         }
         let (line, file) = match line.rsplit_once(" | in: ") {
-            Some((line, file)) => (line, self.beside(file.trim())?),
+            Some((line, file)) => (line, beside(&self.scenario.path, file.trim())?),
             None => (line, self.scenario.path.clone()),
         };
-        if let Some(selector) = line.strip_prefix("at: ") {
-            let selector = (selector != ".").then(|| Selector::parse(selector));
-            let selector = selector.transpose()?;
-            self.at.push(Target { selector, file });
-            return Ok(());
+        match line.strip_prefix("at: ") {
+            Some(selector) => self.at.push(Target::parse(selector, file)?),
+            None => self.edits.push(Edit::parse(line, file)?),
         }
-        let (selector, action) = line
-            .split_once(" | ")
-            .ok_or_else(|| format!("neither an edit nor a place: {line}"))?;
-        let change = match (selector.trim(), action.trim()) {
-            (".", "remove") => Change::Remove,
-            (".", action) => match action.strip_prefix("write ") {
-                Some(text) => Change::Write(text.to_owned()),
-                None => Change::Storage(Storage::parse(action)?),
-            },
-            (selector, action) => {
-                Change::Element(Selector::parse(selector)?, Action::parse(action)?)
-            }
-        };
-        self.edits.push(Edit { change, file });
         Ok(())
     }
-
-    /// A path that starts at the scenario's directory, below the producer's.
-    fn beside(&self, path: &str) -> Result<PathBuf, String> {
-        let folder = self.scenario.path.parent().unwrap_or(Path::new(""));
-        let path = normal(&folder.join(path));
-        if path.starts_with("..") {
-            return Err(format!(
-                "not in the producer's directory: {}",
-                path.display()
-            ));
-        }
-        Ok(path)
-    }
-}
-
-/// A path without `.` and, as far as can be, without `..`.
-pub fn normal(path: &Path) -> PathBuf {
-    let mut normal = PathBuf::new();
-    for component in path.components() {
-        match component {
-            Component::CurDir => {}
-            Component::ParentDir if normal.file_name().is_some() => _ = normal.pop(),
-            _ => normal.push(component),
-        }
-    }
-    normal
 }

@@ -2,13 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use qcbus_sdk::Plan;
+use qcbus_sdk::mutate::{Changed, Overlay, Said, apply, in_parallel, new_ones, said};
 use qcbus_xosc::BUNDLE;
 
-use super::judge::{Said, Trial, judge, new_ones, said};
-use super::overlay::{Changed, Overlay, apply};
+use super::judge::{Trial, judge};
 use super::table::{Entry, Scenario};
 
 const SHARED: [&str; 3] = ["esmini", "scenario_runner", "qc-framework"];
@@ -32,11 +31,11 @@ pub fn try_all<'e>(entries: &[&'e Entry]) -> Trials<'e> {
         .partition::<Vec<&Entry>, _>(|entry| entry.scenario.at_hand().is_some());
     let originals: BTreeSet<&Scenario> = there.iter().map(|entry| &entry.scenario).collect();
     let originals: Vec<&Scenario> = originals.into_iter().collect();
-    let before = in_parallel(&originals, |desk, scenario| {
+    let before = in_parallel(&originals, |desk: &mut Desk, scenario| {
         desk.said(&plan, scenario, &Changed::new())
     });
     let before: BTreeMap<&Scenario, _> = originals.iter().copied().zip(before).collect();
-    let tried = in_parallel(&there, |desk, entry| {
+    let tried = in_parallel(&there, |desk: &mut Desk, entry| {
         let before = before[&entry.scenario].as_ref();
         before
             .map_err(String::clone)
@@ -90,7 +89,7 @@ impl Desk {
         before: &[Said],
     ) -> Result<Trial<'e>, String> {
         let source = entry.scenario.at_hand().ok_or("not at hand")?;
-        let (changed, spots) = apply(entry, &source)?;
+        let (changed, spots) = apply(&entry.edits, &entry.at, &source)?;
         let after = self.said(plan, &entry.scenario, &changed)?;
         Ok(judge(entry, spots, new_ones(before, after)))
     }
@@ -110,26 +109,4 @@ impl Desk {
         let all = self.0[producer].with(changed, |root| said(plan, root, &scenario.path));
         all.map_err(|error| error.to_string())?
     }
-}
-
-/// Does the work for every item; the results are in the items' order.
-fn in_parallel<T: Sync, R: Send>(items: &[T], work: impl Fn(&mut Desk, &T) -> R + Sync) -> Vec<R> {
-    let next = AtomicUsize::new(0);
-    let worker = || {
-        let (mut desk, mut done) = (Desk::default(), Vec::new());
-        loop {
-            let at = next.fetch_add(1, Ordering::Relaxed);
-            let Some(item) = items.get(at) else {
-                return done;
-            };
-            done.push((at, work(&mut desk, item)));
-        }
-    };
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let done: BTreeMap<usize, R> = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(worker)).collect();
-        let all = workers.into_iter().flat_map(|it| it.join().unwrap());
-        all.collect()
-    });
-    done.into_values().collect()
 }

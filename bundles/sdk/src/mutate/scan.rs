@@ -6,7 +6,9 @@ use std::ops::Range;
 /// An element, by its bytes.
 #[derive(Debug)]
 pub struct Element {
+    /// Its name.
     pub name: Range<usize>,
+    /// Its attributes.
     pub attributes: Vec<Attribute>,
     /// From its `<` to behind the `>`.
     pub start_tag: Range<usize>,
@@ -14,6 +16,7 @@ pub struct Element {
     pub end_tag: Option<Range<usize>>,
     /// Behind all of it.
     pub end: usize,
+    /// Without content and end tag.
     pub closes_itself: bool,
     /// Number among the elements of the file.
     pub parent: Option<usize>,
@@ -22,6 +25,7 @@ pub struct Element {
 /// An attribute, by its bytes.
 #[derive(Debug)]
 pub struct Attribute {
+    /// Its name.
     pub name: Range<usize>,
     /// With the blanks before it and its quotes.
     pub whole: Range<usize>,
@@ -31,11 +35,17 @@ pub struct Attribute {
 
 /// A text and its elements, in document order.
 pub struct Scan<'t> {
+    /// The text.
     pub text: &'t str,
+    /// The elements.
     pub elements: Vec<Element>,
 }
 
 impl<'t> Scan<'t> {
+    /// Where the elements of a text are.
+    ///
+    /// # Errors
+    /// When a tag is no tag.
     pub fn of(text: &'t str) -> Result<Scan<'t>, String> {
         let mut scan = Scan {
             text,
@@ -92,15 +102,18 @@ impl<'t> Scan<'t> {
         self.elements[named].end_tag = Some(tag);
     }
 
+    /// The name of an element.
     pub fn name(&self, id: usize) -> &'t str {
         &self.text[self.elements[id].name.clone()]
     }
 
+    /// An attribute of an element.
     pub fn attribute(&self, id: usize, name: &str) -> Option<&Attribute> {
         let mut attributes = self.elements[id].attributes.iter();
         attributes.find(|it| &self.text[it.name.clone()] == name)
     }
 
+    /// The value of one, as it is written.
     pub fn value(&self, id: usize, name: &str) -> Option<&'t str> {
         let attribute = self.attribute(id, name)?;
         Some(&self.text[attribute.value.clone()])

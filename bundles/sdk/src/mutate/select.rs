@@ -21,14 +21,26 @@ struct Compound {
 }
 
 impl Selector {
+    /// Reads a selector; `#value` means the attribute `name`.
+    ///
+    /// # Errors
+    /// What cannot be read.
     pub fn parse(text: &str) -> Result<Selector, String> {
+        Selector::by(text, "name")
+    }
+
+    /// Likewise; `#value` means the attribute `key`.
+    ///
+    /// # Errors
+    /// What cannot be read.
+    pub fn by(text: &str, key: &str) -> Result<Selector, String> {
         let (mut words, mut child) = (Vec::new(), false);
         for word in split(text) {
             if word == ">" {
                 child = true;
                 continue;
             }
-            let mut compound = Compound::parse(word)?;
+            let mut compound = Compound::parse(word, key)?;
             compound.child = std::mem::take(&mut child);
             words.push(compound);
         }
@@ -41,10 +53,18 @@ impl Selector {
         })
     }
 
-    /// The one element that fits.
-    pub fn one(&self, scan: &Scan<'_>) -> Result<usize, String> {
+    /// All elements that fit, in document order.
+    pub fn all(&self, scan: &Scan<'_>) -> impl Iterator<Item = usize> {
         let all = 0..scan.elements.len();
-        let found: Vec<usize> = all.filter(|id| fits(scan, *id, &self.words)).collect();
+        all.filter(|id| fits(scan, *id, &self.words))
+    }
+
+    /// The one element that fits.
+    ///
+    /// # Errors
+    /// When there are more or none.
+    pub fn one(&self, scan: &Scan<'_>) -> Result<usize, String> {
+        let found: Vec<usize> = self.all(scan).collect();
         match found[..] {
             [one] => Ok(one),
             _ => Err(format!("{} elements fit: {}", found.len(), self.text)),
@@ -68,7 +88,7 @@ fn split(text: &str) -> impl Iterator<Item = &str> {
 }
 
 impl Compound {
-    fn parse(word: &str) -> Result<Compound, String> {
+    fn parse(word: &str, key: &str) -> Result<Compound, String> {
         let bad = || format!("no word of a selector: {word}");
         let end = word.find(['#', '[', ':']).unwrap_or(word.len());
         let (name, mut rest) = word.split_at(end);
@@ -93,7 +113,7 @@ impl Compound {
             let end = body.find(['#', '[', ':']).unwrap_or(body.len());
             let (value, after) = body.split_at(end);
             if sort == '#' {
-                let attribute = ("name".to_owned(), value.to_owned());
+                let attribute = (key.to_owned(), value.to_owned());
                 compound.attributes.push(attribute);
             } else {
                 compound.nth = Some(value.parse().map_err(|_| bad())?);

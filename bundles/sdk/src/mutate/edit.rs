@@ -9,19 +9,37 @@ use super::select::Selector;
 /// What is done to an element.
 #[derive(Debug, Clone)]
 pub enum Action {
+    /// Removes the element.
     Drop,
+    /// Removes an attribute.
     DropAttribute(String),
+    /// Gives an attribute a value, and the element the attribute where it has none.
     Set(String, String),
+    /// Adds to an attribute that is a number.
+    Shift(String, f64),
+    /// Changes the sign of one.
+    Negate(String),
+    /// Copies the element.
     Duplicate,
+    /// Exchanges it with its next sibling.
     Swap,
+    /// Text before its content.
     Prepend(String),
+    /// Text after its content.
     Append(String),
+    /// Text before it.
     Before(String),
+    /// Text after it.
     After(String),
+    /// Text instead of it.
     Replace(String),
+    /// Another name for it.
     Rename(String),
+    /// Removes its end tag.
     Unclose,
+    /// Single quotes for its attributes.
     Quote,
+    /// Its attributes in reverse order.
     Reverse,
 }
 
@@ -32,6 +50,10 @@ pub type Edited = (String, BTreeSet<u64>);
 type Splices = Vec<(Range<usize>, String)>;
 
 impl Action {
+    /// Reads what is described in `bundles/xosc/tests/seeded/README.md`.
+    ///
+    /// # Errors
+    /// What cannot be read.
     pub fn parse(text: &str) -> Result<Action, String> {
         let bad = || format!("no edit: {text}");
         let (verb, rest) = text.split_once(' ').unwrap_or((text, ""));
@@ -45,6 +67,11 @@ impl Action {
                 }
                 Action::Set(name.to_owned(), value.to_owned())
             }
+            "shift" => {
+                let (name, by) = named()?.split_once('=').ok_or_else(bad)?;
+                Action::Shift(name.to_owned(), by.parse().map_err(|_| bad())?)
+            }
+            "negate" => Action::Negate(named()?.to_owned()),
             "drop" if !rest.is_empty() => Action::DropAttribute(named()?.to_owned()),
             "prepend" => Action::Prepend(owned()),
             "append" => Action::Append(owned()),
@@ -65,14 +92,26 @@ impl Action {
     }
 
     /// Changes the one element that the selector means.
+    ///
+    /// # Errors
+    /// When there is no such element, or the edit cannot be made.
     pub fn apply(&self, selector: &Selector, text: &str) -> Result<Edited, String> {
         let scan = Scan::of(text)?;
-        let id = selector.one(&scan)?;
-        let splices = self.splices(&scan, id)?;
-        let rows = self.rows(&scan, id);
+        let edited = self.apply_to(&scan, selector.one(&scan)?);
+        edited.map_err(|error| format!("{} | {error}", selector.text))
+    }
+
+    /// Changes an element.
+    ///
+    /// # Errors
+    /// When the edit cannot be made.
+    pub fn apply_to(&self, scan: &Scan<'_>, id: usize) -> Result<Edited, String> {
+        let text = scan.text;
+        let splices = self.splices(scan, id)?;
+        let rows = self.rows(scan, id);
         let edited = spliced(text, splices);
         if edited == text {
-            return Err(format!("changes nothing: {} | {self:?}", selector.text));
+            return Err(format!("changes nothing: {self:?}"));
         }
         if lines(&edited) != lines(text) {
             return Err(format!("changes the number of lines: {self:?}"));
@@ -96,6 +135,8 @@ impl Action {
                 Some(attribute) => vec![(attribute.value.clone(), value.clone())],
                 None => at(element.name.end, &format!(" {name}=\"{value}\"")),
             },
+            Action::Shift(name, by) => vec![calculated(scan, id, name, |old| old + by)?],
+            Action::Negate(name) => vec![calculated(scan, id, name, |old| -old)?],
             Action::Duplicate => at(
                 whole.end,
                 &text[whole].replace("\r\n", " ").replace('\n', " "),
@@ -171,6 +212,20 @@ impl Action {
 /// The lines of what is removed stay.
 fn gap(text: &str) -> String {
     "\n".repeat(lines(text))
+}
+
+/// An attribute that is a number, replaced by another.
+fn calculated(
+    scan: &Scan<'_>,
+    id: usize,
+    name: &str,
+    to: impl Fn(f64) -> f64,
+) -> Result<(Range<usize>, String), String> {
+    let attribute = scan.attribute(id, name);
+    let attribute = attribute.ok_or_else(|| format!("no attribute {name}"))?;
+    let old = &scan.text[attribute.value.clone()];
+    let number: f64 = old.parse().map_err(|_| format!("no number: {old}"))?;
+    Ok((attribute.value.clone(), to(number).to_string()))
 }
 
 fn spliced(text: &str, mut splices: Splices) -> String {

@@ -1,0 +1,196 @@
+//! What is changed in which file, and where that is to be seen.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Component, Path, PathBuf};
+
+use super::edit::Action;
+use super::encode::{Storage, text, with_text};
+use super::scan::Scan;
+use super::select::Selector;
+
+/// Files that are changed, below the directory; none: removed.
+pub type Changed = BTreeMap<PathBuf, Option<Vec<u8>>>;
+
+/// An element of a file, or the file.
+#[derive(Debug)]
+pub struct Target {
+    /// None: anywhere in it.
+    pub selector: Option<Selector>,
+    /// Below the directory.
+    pub file: PathBuf,
+}
+
+/// A change of a file.
+#[derive(Debug)]
+pub struct Edit {
+    change: Change,
+    /// Below the directory.
+    pub file: PathBuf,
+}
+
+#[derive(Debug)]
+enum Change {
+    Element(Selector, Action),
+    Storage(Storage),
+    Write(String),
+    Remove,
+}
+
+/// Rows of one file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Rows {
+    /// All of them.
+    Any,
+    /// Some.
+    These(BTreeSet<u64>),
+}
+
+impl Rows {
+    /// Whether a row is among them.
+    pub fn has(&self, row: u64) -> bool {
+        match self {
+            Rows::Any => true,
+            Rows::These(rows) => rows.contains(&row),
+        }
+    }
+}
+
+/// Rows by file, below the directory.
+pub type Spots = BTreeMap<PathBuf, Rows>;
+
+/// Applies edits in order: what becomes of the files, and where that must be found: at the targets, or where
+/// the edits are when there are none.
+///
+/// # Errors
+/// What cannot be done.
+pub fn apply(edits: &[Edit], at: &[Target], source: &Path) -> Result<(Changed, Spots), String> {
+    let (mut changed, mut edited) = (Changed::new(), Spots::new());
+    for edit in edits {
+        let rows = edit.apply(source, &mut changed)?;
+        add(&mut edited, &edit.file, Rows::These(rows));
+    }
+    if at.is_empty() {
+        return Ok((changed, edited));
+    }
+    let mut spots = Spots::new();
+    for target in at {
+        add(&mut spots, &target.file, target.rows(source, &changed)?);
+    }
+    Ok((changed, spots))
+}
+
+fn add(spots: &mut Spots, file: &Path, rows: Rows) {
+    match (spots.get_mut(file), rows) {
+        (Some(Rows::These(all)), Rows::These(more)) => all.extend(more),
+        (Some(Rows::Any), _) => {}
+        (_, rows) => _ = spots.insert(file.to_owned(), rows),
+    }
+}
+
+impl Edit {
+    /// `SELECTOR | EDIT`; the words are described in `bundles/xosc/tests/seeded/README.md`.
+    ///
+    /// # Errors
+    /// What cannot be read.
+    pub fn parse(line: &str, file: PathBuf) -> Result<Edit, String> {
+        let (selector, action) = line
+            .split_once(" | ")
+            .ok_or_else(|| format!("neither an edit nor a place: {line}"))?;
+        let change = match (selector.trim(), action.trim()) {
+            (".", "remove") => Change::Remove,
+            (".", action) => match action.strip_prefix("write ") {
+                Some(text) => Change::Write(text.to_owned()),
+                None => Change::Storage(Storage::parse(action)?),
+            },
+            (selector, action) => {
+                Change::Element(Selector::parse(selector)?, Action::parse(action)?)
+            }
+        };
+        Ok(Edit { change, file })
+    }
+
+    fn apply(&self, source: &Path, changed: &mut Changed) -> Result<BTreeSet<u64>, String> {
+        let top = BTreeSet::from([1]);
+        let (new, rows) = match &self.change {
+            Change::Write(_) if source.join(&self.file).exists() => {
+                return Err(format!("{} is there already", self.file.display()));
+            }
+            Change::Write(text) => (Some(text.clone().into_bytes()), top),
+            Change::Remove => {
+                content(source, changed, &self.file)?;
+                (None, top)
+            }
+            Change::Storage(storage) => {
+                let bytes = content(source, changed, &self.file)?;
+                (Some(storage.apply(&bytes)?), top)
+            }
+            Change::Element(selector, action) => {
+                let bytes = content(source, changed, &self.file)?;
+                let (edited, rows) = action.apply(selector, text(&bytes)?)?;
+                (Some(with_text(&bytes, &edited)), rows)
+            }
+        };
+        changed.insert(self.file.clone(), new);
+        Ok(rows)
+    }
+}
+
+impl Target {
+    /// A selector, or `.` for the whole file.
+    ///
+    /// # Errors
+    /// What cannot be read.
+    pub fn parse(selector: &str, file: PathBuf) -> Result<Target, String> {
+        let selector = (selector != ".").then(|| Selector::parse(selector));
+        let selector = selector.transpose()?;
+        Ok(Target { selector, file })
+    }
+
+    fn rows(&self, source: &Path, changed: &Changed) -> Result<Rows, String> {
+        let Some(selector) = &self.selector else {
+            return Ok(Rows::Any);
+        };
+        let bytes = content(source, changed, &self.file)?;
+        let scan = Scan::of(text(&bytes)?)?;
+        let id = selector.one(&scan)?;
+        Ok(Rows::These(scan.rows(id).collect()))
+    }
+}
+
+fn content(source: &Path, changed: &Changed, file: &Path) -> Result<Vec<u8>, String> {
+    match changed.get(file) {
+        Some(content) => {
+            let content = content.clone();
+            content.ok_or_else(|| format!("{} was removed", file.display()))
+        }
+        None => {
+            std::fs::read(source.join(file)).map_err(|error| format!("{}: {error}", file.display()))
+        }
+    }
+}
+
+/// A path that starts at the directory of a file, both below the directory that is mirrored.
+///
+/// # Errors
+/// When it leads out of there.
+pub fn beside(file: &Path, path: &str) -> Result<PathBuf, String> {
+    let folder = file.parent().unwrap_or(Path::new(""));
+    let path = normal(&folder.join(path));
+    if path.starts_with("..") {
+        return Err(format!("not in the directory: {}", path.display()));
+    }
+    Ok(path)
+}
+
+/// A path without `.` and, as far as can be, without `..`.
+pub fn normal(path: &Path) -> PathBuf {
+    let mut normal = PathBuf::new();
+    for component in path.components() {
+        match component {
+            Component::CurDir => {}
+            Component::ParentDir if normal.file_name().is_some() => _ = normal.pop(),
+            _ => normal.push(component),
+        }
+    }
+    normal
+}
