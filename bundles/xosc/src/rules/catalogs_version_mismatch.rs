@@ -23,6 +23,10 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     else {
         return;
     };
+    // What is no version of this language is said once, at the header.
+    if own.0 > 1 {
+        return;
+    }
     let mut newer = Once::new();
     for (reference, to) in catalogs::references(scenario) {
         let (Resolution::Entry(entry) | Resolution::OtherLocation(entry)) = to else {

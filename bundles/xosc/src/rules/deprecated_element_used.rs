@@ -8,7 +8,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_deprecated_element_used",
     uids: &["qcbus.dev:xosc:1.0.0:deprecated.element_used"],
     level: Level::Information,
-    versions: "1.1..",
+    versions: "1.1.0..2.0.0",
     after: super::READABLE,
     page: include_str!("deprecated_element_used.md"),
     run,

@@ -1,4 +1,4 @@
-use foldhash::HashMap;
+use foldhash::{HashMap, HashSet};
 use qcbus_openscenario::{Actors, Element, Entity, EntityKind, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
@@ -16,6 +16,8 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    // Who has been said to be no trailer, or not to fit to whom: actions may name the same two again.
+    let mut told = Told::default();
     // Who draws whom from the beginning, and the element that says so.
     let mut drawn: HashMap<&str, (&str, Element<'_, '_>)> = HashMap::default();
     for towing in scenario.entities().objects() {
@@ -25,8 +27,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let Some((trailer, at, attribute)) = vehicle.child("Trailer").and_then(trailer_of) else {
             continue;
         };
-        kind(trailer, at, attribute, found);
-        coupling(towing, trailer, at, attribute, found);
+        told.kind(trailer, at, attribute, found);
+        told.coupling(towing, trailer, at, attribute, found);
         if let Some((other, first)) = drawn.get(trailer.name()) {
             let text = format!(
                 "`{}` draws the trailer `{}`, but `{other}` does already",
@@ -44,7 +46,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         circle(towing, &mut drawn, found);
     }
     for action in scenario.elements_everywhere("ConnectTrailerAction") {
-        connect(action, found);
+        connect(action, &mut told, found);
     }
 }
 
@@ -61,52 +63,66 @@ fn trailer_of<'m, 'd>(
     Some((entity, at, attribute))
 }
 
-fn kind<'d>(trailer: &Entity<'d>, at: Element<'_, 'd>, attribute: &str, found: &mut Sink<'_>) {
-    if matches!(
-        trailer.kind(),
-        EntityKind::Pedestrian | EntityKind::MiscObject
-    ) {
-        let text = format!(
-            "the trailer {} is a `{}`, but must be a `Vehicle`",
-            quoted(at, attribute, trailer.name()),
-            trailer.kind().element()
-        );
-        let node = trailer.element(at.scenario()).node();
-        found.about(at, attribute, text).at(node, "the entity");
-    }
-}
+/// Pairs of a vehicle and its trailer, and those who are no trailer with nobody.
+#[derive(Default)]
+struct Told<'m>(HashSet<(&'m str, &'m str)>);
 
-/// A hitch on the one and a coupler on the other tell where the two are joined.
-fn coupling<'d>(
-    towing: &Entity<'d>,
-    trailer: &Entity<'d>,
-    at: Element<'_, 'd>,
-    attribute: &str,
-    found: &mut Sink<'_>,
-) {
-    let scenario = at.scenario();
-    let lacks = |entity: &Entity<'d>, part: &str| {
-        let vehicle = entity
-            .object(scenario)
-            .filter(|object| object.is("Vehicle"));
-        vehicle.is_some_and(|vehicle| vehicle.child(part).is_none())
-    };
-    let mut missing = Vec::new();
-    if lacks(towing, "TrailerHitch") {
-        missing.push(format!("`{}` has no `TrailerHitch`", towing.name()));
-    }
-    if lacks(trailer, "TrailerCoupler") {
-        missing.push(format!(
-            "the trailer `{}` has no `TrailerCoupler`",
-            trailer.name()
-        ));
-    }
-    if !missing.is_empty() {
-        let text = format!(
-            "{}; where the two are joined is up to the simulator",
-            missing.join(" and ")
+impl<'m> Told<'m> {
+    fn kind<'d>(
+        &mut self,
+        trailer: &'m Entity<'d>,
+        at: Element<'m, 'd>,
+        attribute: &str,
+        found: &mut Sink<'_>,
+    ) {
+        let is_other = matches!(
+            trailer.kind(),
+            EntityKind::Pedestrian | EntityKind::MiscObject
         );
-        found.about(at, attribute, text).level(Level::Warning);
+        if is_other && self.0.insert((trailer.name(), "")) {
+            let text = format!(
+                "the trailer {} is a `{}`, but must be a `Vehicle`",
+                quoted(at, attribute, trailer.name()),
+                trailer.kind().element()
+            );
+            let node = trailer.element(at.scenario()).node();
+            found.about(at, attribute, text).at(node, "the entity");
+        }
+    }
+
+    /// A hitch on the one and a coupler on the other tell where the two are joined.
+    fn coupling<'d>(
+        &mut self,
+        towing: &'m Entity<'d>,
+        trailer: &'m Entity<'d>,
+        at: Element<'m, 'd>,
+        attribute: &str,
+        found: &mut Sink<'_>,
+    ) {
+        let scenario = at.scenario();
+        let lacks = |entity: &Entity<'d>, part: &str| {
+            let vehicle = entity
+                .object(scenario)
+                .filter(|object| object.is("Vehicle"));
+            vehicle.is_some_and(|vehicle| vehicle.child(part).is_none())
+        };
+        let mut missing = Vec::new();
+        if lacks(towing, "TrailerHitch") {
+            missing.push(format!("`{}` has no `TrailerHitch`", towing.name()));
+        }
+        if lacks(trailer, "TrailerCoupler") {
+            missing.push(format!(
+                "the trailer `{}` has no `TrailerCoupler`",
+                trailer.name()
+            ));
+        }
+        if !missing.is_empty() && self.0.insert((towing.name(), trailer.name())) {
+            let text = format!(
+                "{}; where the two are joined is up to the simulator",
+                missing.join(" and ")
+            );
+            found.about(at, attribute, text).level(Level::Warning);
+        }
     }
 }
 
@@ -148,7 +164,7 @@ fn circle(
     }
 }
 
-fn connect(action: Element<'_, '_>, found: &mut Sink<'_>) {
+fn connect<'m, 'd>(action: Element<'m, 'd>, told: &mut Told<'m>, found: &mut Sink<'_>) {
     let scenario = action.scenario();
     let Some(name) = action.text("trailerRef") else {
         return;
@@ -156,14 +172,14 @@ fn connect(action: Element<'_, '_>, found: &mut Sink<'_>) {
     let Some(trailer) = scenario.entities().object(&name) else {
         return;
     };
-    kind(trailer, action, "trailerRef", found);
+    told.kind(trailer, action, "trailerRef", found);
     let actors = Actors::of(action).and_then(|actors| actors.names());
     for actor in actors.into_iter().flatten() {
         if actor == name {
             let text = format!("`{name}` is to be connected to itself as its trailer");
             found.about(action, "trailerRef", text);
         } else if let Some(towing) = scenario.entities().object(&actor) {
-            coupling(towing, trailer, action, "trailerRef", found);
+            told.coupling(towing, trailer, action, "trailerRef", found);
         }
     }
 }

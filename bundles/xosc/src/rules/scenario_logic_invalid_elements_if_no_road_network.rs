@@ -20,8 +20,9 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let network = scenario.root().child("RoadNetwork");
     let is_named = ["LogicFile", "Logics"].iter().any(|name| {
         let file = network.and_then(|network| network.child(name));
-        file.and_then(|file| file.written("filepath"))
-            .is_some_and(|path| !path.trim().is_empty())
+        let path = file.map(|file| file.written("filepath"));
+        // A file without its path is the schema's finding.
+        path.is_some_and(|path| path.is_none_or(|path| !path.trim().is_empty()))
     });
     if is_named {
         return;
