@@ -465,7 +465,8 @@ impl<'d> Scenario<'d> {
                 node: attribute.node(),
                 context,
             };
-            if self.declares_variable(&fault.name) {
+            // An entry of a catalog knows no scenario, and none of its variables.
+            if element.reference().is_none() && self.declares_variable(&fault.name) {
                 fault.kind = ValueFaultKind::Variable;
                 fault.text = format!(
                     "`{}` is a variable, whose value is known only when the scenario runs; `$` reads \

@@ -138,6 +138,9 @@ impl<'d> Storyboard<'d> {
                 if kind != StoryKind::Action {
                     self.add_within(child, Some(place));
                 }
+            } else if child.class().is_none() && around.class().is_some() {
+                // A misspelt story may have what a reference means.
+                self.complete = false;
             }
         }
     }
@@ -168,8 +171,8 @@ impl<'d> Storyboard<'d> {
         &self.elements
     }
 
-    /// Whether every name is known: a catalog's maneuver that was not found, or a name that cannot be
-    /// resolved, may be what a reference means.
+    /// Whether every name is known: a catalog's maneuver that was not found, an element that the schema does
+    /// not know, or a name that cannot be resolved may be what a reference means.
     pub fn is_complete(&self) -> bool {
         self.complete
     }

@@ -1,5 +1,5 @@
 use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Backport, Rule, Sink};
+use qcbus_sdk::{Rule, Sink};
 
 use crate::families::ranges;
 use crate::families::ranges::tables::TRANSITIONS;
@@ -8,8 +8,8 @@ use crate::model::Scene;
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_data_type_non_negative_transition_time_in_light_state_action",
     uids: &UIDS,
+    // Lights came with this version: an older file has none to look at.
     versions: "1.2.0..",
-    backport: Backport::Alike { since: "" },
     after: super::READABLE,
     page: include_str!("data_type_non_negative_transition_time_in_light_state_action.md"),
     run,

@@ -59,8 +59,11 @@ fn trailer_of<'m, 'd>(
         None => (block.child("Trailer")?, "name"),
     };
     let name = at.text(attribute)?;
-    let entity = block.scenario().entities().object(&name)?;
-    Some((entity, at, attribute))
+    let scenario = block.scenario();
+    let entity = scenario.entities().object(&name)?;
+    // A name that is taken leads to another one: that is another fault.
+    let is_it = at.is("TrailerRef") || entity.element(scenario).node() == at.node();
+    is_it.then_some((entity, at, attribute))
 }
 
 /// Pairs of a vehicle and its trailer, and those who are no trailer with nobody.

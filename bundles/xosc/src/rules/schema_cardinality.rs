@@ -20,7 +20,8 @@ pub static RULE: Rule<Scene> = Rule {
 const CONTAINERS: &[(&str, &[&str], &str)] = &[
     (
         "ManeuverGroup",
-        &["Maneuver", "CatalogReference"],
+        // The last one belongs to modular scenarios: that it is there is said by another rule.
+        &["Maneuver", "CatalogReference", "ScenarioReference"],
         "has neither a `Maneuver` nor a `CatalogReference`: nothing happens in it, and it is over at once",
     ),
     (

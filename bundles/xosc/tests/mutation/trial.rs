@@ -23,26 +23,24 @@ const fn base(name: &'static str) -> Base {
     Base { name, with: &[] }
 }
 
-pub const BASES: [Base; 8] = [
+pub const BASES: [Base; 11] = [
     base("1.0"),
+    base("1.1"),
     base("1.2"),
     base("1.3"),
     base("1.4"),
     Base {
         name: "minimal",
-        with: &[
-            "minsubset_",
-            "profile_esmini",
-            "header_license",
-            "expressions_unused",
-        ],
+        with: &["minsubset_", "header_license", "expressions_unused"],
     },
     Base {
         name: "carla",
-        with: &["profile_carla"],
+        with: &["profile_"],
     },
     base("deterministic"),
     base("stochastic"),
+    base("catalogs/maneuvers/maneuvers"),
+    base("catalogs/vehicles/vehicles"),
 ];
 
 /// A checker's rule: its id without what is in front of the name and without what marks a backport.
