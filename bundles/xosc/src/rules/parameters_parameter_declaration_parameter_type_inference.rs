@@ -1,4 +1,4 @@
-use qcbus_openscenario::{DataType, Scenario, ValueFaultKind};
+use qcbus_openscenario::{DataType, Scenario, ValueFault, ValueFaultKind};
 use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::declared;
@@ -20,19 +20,16 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         if values::is_of_other_rule(scenario, fault) {
             continue;
         }
-        let attribute = fault.attribute;
-        let declared = attribute.node().attr("parameterType");
-        let data_type = declared.and_then(DataType::of_declaration);
-        let whole = data_type.and_then(|data_type| values::whole(attribute.value(), data_type));
-        let level = if attribute.is("value") && whole.is_some() {
-            // Most simulators read `5.0` as 5.
-            Level::Warning
-        } else {
-            Level::Error
-        };
-        values::say(fault, found).level(level);
+        values::say(fault, found).level(level(fault));
     }
-    values::report_in_entries(scenario, &[ValueFaultKind::Parameter], found);
+    for (element, fault) in scenario.entry_faults_of(&kinds) {
+        let is_own = fault.kind == ValueFaultKind::Parameter || !values::is_about_time(fault);
+        if is_own {
+            let text = format!("{}: {}", values::written(fault.attribute), fault.text);
+            let name = fault.attribute.name();
+            found.about(element, name, text).level(level(fault));
+        }
+    }
     for declaration in scenario.elements("ParameterDeclaration") {
         if declared::type_of(declaration, "parameterType") == Some(DataType::Double)
             && declaration.double("value").is_some_and(f64::is_nan)
@@ -45,6 +42,19 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         }
     }
     run_time(scenario, found);
+}
+
+/// Most simulators read `5.0` as 5.
+fn level(fault: &ValueFault<'_>) -> Level {
+    let attribute = fault.attribute;
+    let declared = attribute.node().attr("parameterType");
+    let data_type = declared.and_then(DataType::of_declaration);
+    let whole = data_type.and_then(|data_type| values::whole(attribute.value(), data_type));
+    if attribute.is("value") && whole.is_some() {
+        Level::Warning
+    } else {
+        Level::Error
+    }
 }
 
 /// Values that a parameter is set to or compared with while the scenario runs.
