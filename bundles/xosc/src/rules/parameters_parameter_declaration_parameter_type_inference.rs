@@ -23,12 +23,15 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         values::say(fault, found).level(level(fault));
     }
     for (element, fault) in scenario.entry_faults_of(&kinds) {
-        let is_own = fault.kind == ValueFaultKind::Parameter || !values::is_about_time(fault);
-        if is_own {
-            let text = format!("{}: {}", values::written(fault.attribute), fault.text);
-            let name = fault.attribute.name();
-            found.about(element, name, text).level(level(fault));
-        }
+        let level = match fault.kind {
+            ValueFaultKind::Parameter => Level::Error,
+            _ if values::is_about_time(fault) => continue,
+            // An error in the catalog's own result; here the default may only be used as a text.
+            _ => Level::Warning,
+        };
+        let text = format!("{}: {}", values::written(fault.attribute), fault.text);
+        let name = fault.attribute.name();
+        found.about(element, name, text).level(level);
     }
     for declaration in scenario.elements("ParameterDeclaration") {
         if declared::type_of(declaration, "parameterType") == Some(DataType::Double)

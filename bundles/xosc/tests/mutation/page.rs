@@ -41,10 +41,6 @@ impl<'e> Row<'e> {
 }
 
 pub fn page(entries: &[Entry], trials: &[Trial<'_>]) -> String {
-    let of = |entry: &Entry| {
-        let rule = entry.rule.clone();
-        trials.iter().filter(move |trial| trial.entry.rule == rule)
-    };
     let checkers: BTreeSet<&str> = trials
         .iter()
         .flat_map(|trial| trial.said.iter())
@@ -73,11 +69,24 @@ pub fn page(entries: &[Entry], trials: &[Trial<'_>]) -> String {
         all.tried,
         all.unrelated
     );
+    text.push_str(&by_family(entries, trials));
+    text.push_str(&by_rule(entries, trials));
+    text.push_str("\n## Rules without an edit\n\n| rule | why |\n|---|---|\n");
+    for entry in entries {
+        if let Some(why) = &entry.without {
+            writeln!(text, "| {} | {why} |", entry.rule).unwrap();
+        }
+    }
+    text
+}
+
+fn by_family(entries: &[Entry], trials: &[Trial<'_>]) -> String {
+    let mut text = String::new();
     text.push_str(
         "| family | rules | edits | detected | not detected | unrelated |\n|---|--:|--:|--:|--:|--:|\n",
     );
     for (family, entries) in families(entries) {
-        let row = Row::of(entries.iter().flat_map(of));
+        let row = Row::of(entries.iter().flat_map(|entry| of(entry, trials)));
         let (rules, missed) = (entries.len(), row.tried - row.found);
         let Row {
             tried,
@@ -91,12 +100,17 @@ pub fn page(entries: &[Entry], trials: &[Trial<'_>]) -> String {
         )
         .unwrap();
     }
+    text
+}
+
+fn by_rule(entries: &[Entry], trials: &[Trial<'_>]) -> String {
+    let mut text = String::new();
     text.push_str(
         "\nWhat fires as well is a consequence of the same edit, or (*) the same fact said twice.\n\n\
          | rule | scenarios | edits | detected | fires as well |\n|---|---|--:|--:|---|\n",
     );
     for entry in entries.iter().filter(|entry| entry.without.is_none()) {
-        let row = Row::of(of(entry));
+        let row = Row::of(of(entry, trials));
         let bases: Vec<&str> = row.bases.iter().copied().collect();
         let star = |(rule, doubled): (&&str, &bool)| {
             format!("{rule}{}", if *doubled { " (*)" } else { "" })
@@ -106,11 +120,11 @@ pub fn page(entries: &[Entry], trials: &[Trial<'_>]) -> String {
         let (rule, tried, found) = (&entry.rule, row.tried, row.found);
         writeln!(text, "| {rule} | {bases} | {tried} | {found} | {also} |").unwrap();
     }
-    text.push_str("\n## Rules without an edit\n\n| rule | why |\n|---|---|\n");
-    for entry in entries {
-        if let Some(why) = &entry.without {
-            writeln!(text, "| {} | {why} |", entry.rule).unwrap();
-        }
-    }
     text
+}
+
+/// The trials of a rule's edits.
+fn of<'t>(entry: &Entry, trials: &'t [Trial<'t>]) -> impl Iterator<Item = &'t Trial<'t>> {
+    let rule = entry.rule.clone();
+    trials.iter().filter(move |trial| trial.entry.rule == rule)
 }
