@@ -336,3 +336,43 @@ fn a_map_that_may_not_be_read_is_no_acceptance() {
     let said = desk.qcbus(&["check", "scenarios"]);
     assert_eq!(said.code, Some(3), "{}", said.whole(&desk));
 }
+
+/// A map that can be read and is rejected: it has an attribute that nobody knows.
+fn rejected_map() -> String {
+    let farm = std::fs::read_to_string(sample_farm().join("maps/quay_straight.xodr")).unwrap();
+    farm.replacen("<geometry ", "<geometry paved=\"yes\" ", 1)
+}
+
+#[test]
+fn a_scenario_on_a_rejected_map_says_so_and_is_not_rejected_for_it() {
+    let desk = desk();
+    desk.write("maps/quay_straight.xodr", rejected_map());
+    desk.write("a/on_it.xosc", scenario());
+    desk.write("z/on_it.xosc", scenario());
+    let said = desk.qcbus(&[
+        "check",
+        "a/on_it.xosc",
+        "maps/quay_straight.xodr",
+        "z/on_it.xosc",
+        "--out",
+        "out",
+    ]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    for name in ["a", "z"] {
+        let line = format!("accepted: {name}/on_it.xosc: ");
+        assert!(said.stdout.contains(&line), "{line}\n{}", said.whole(&desk));
+        let results = desk.result(&format!("out/{name}/on_it.xosc.xqar"));
+        let remarks = remarks(&results);
+        let [(text, _)] = &*remarks else {
+            panic!("one remark: {remarks:?}");
+        };
+        assert!(
+            text.contains("maps/quay_straight.xodr is rejected itself"),
+            "{text}"
+        );
+    }
+    // Alone, nobody has judged the map.
+    let said = desk.qcbus(&["check", "a/on_it.xosc", "--out", "alone"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    assert_eq!(remarks(&desk.result("alone/a/on_it.xosc.xqar")), []);
+}

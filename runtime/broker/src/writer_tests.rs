@@ -56,6 +56,7 @@ fn finished(dir: &Path, epoch: u64) -> FinishedJob {
         prepared: Some(Arc::new(prepared)),
         unreadable: None,
         bundles: Vec::new(),
+        rejected_maps: Vec::new(),
         jury: Arc::new(Jury::default()),
         epoch: Epoch(epoch),
         elapsed: Duration::ZERO,

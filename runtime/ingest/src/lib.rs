@@ -30,4 +30,4 @@ pub use prepared::Prepared;
 pub use qcbus_document::BuildError;
 pub use read::{Content, FileStamp, Stat};
 pub use references::{Reference, references};
-pub use remarks::{faults_of_root, missing_references, remarks};
+pub use remarks::{faults_of_root, missing_references, rejected_map, remarks};

@@ -1,6 +1,6 @@
 //! What qcbus itself finds in a set of documents: faults and missing references, whoever demanded what.
 
-use qcbus_document::{Document, FaultCode, FaultGroup, Node};
+use qcbus_document::{Attribute, Document, FaultCode, FaultGroup, Node};
 use qcbus_formats::pool::{BundleOutcome, Remark};
 use qcbus_formats::xqar::{Issue, Level, Location, Locations};
 use qcbus_messages::{Absence, DocumentRole, MissingDocument};
@@ -72,6 +72,27 @@ fn missing_reference(root: &Document<'_>, missing: &MissingDocument) -> Remark {
     reference_remark(text, open, missing.level, vec![place])
 }
 
+/// That the map of a scenario is rejected itself: whoever runs the scenario should know, and its own
+/// verdict does not depend on it.
+pub fn rejected_map(root: &Document<'_>, referred_at: u32, path: &str, errors: u64) -> Remark {
+    let count = match errors {
+        1 => "it has one error".to_owned(),
+        _ => format!("it has {errors} errors"),
+    };
+    let text = format!(
+        "the map {path} is rejected itself: {count}; the scenario was checked on it as far as it can be read"
+    );
+    let mut nodes = root.root().into_iter().flat_map(|node| node.descendants());
+    let place = match nodes.find(|node| node.offset() == referred_at) {
+        Some(node) => match node.attribute("filepath") {
+            Some(path) => attribute_place(root, node, path),
+            None => place_at(root, referred_at, Some((node, "")), "the reference"),
+        },
+        None => place_at(root, referred_at, None, "here"),
+    };
+    reference_remark(text, String::new(), Level::Information, vec![place])
+}
+
 fn reference_remark(text: String, open: String, level: Level, locations: Vec<Locations>) -> Remark {
     Remark {
         checker: String::from("qcbus_references"),
@@ -98,13 +119,15 @@ fn place_of(root: &Document<'_>, missing: &MissingDocument) -> Locations {
         .attributes()
         .find(|attribute| attribute.value() == missing.reference);
     match attribute {
-        Some(attribute) => {
-            let name = attribute.name();
-            let label = format!("attribute `{name}` of element `{}`", node.name());
-            place_at(root, attribute.offset(), Some((node, name)), &label)
-        }
+        Some(attribute) => attribute_place(root, node, attribute),
         None => place_at(root, node.offset(), Some((node, "")), "the reference"),
     }
+}
+
+fn attribute_place(root: &Document<'_>, node: Node<'_>, attribute: Attribute<'_>) -> Locations {
+    let name = attribute.name();
+    let label = format!("attribute `{name}` of element `{}`", node.name());
+    place_at(root, attribute.offset(), Some((node, name)), &label)
 }
 
 fn place_at(

@@ -57,6 +57,9 @@ pub struct FileEntry {
     pub shut: bool,
     /// Not before then, after something failed for want of room or disk.
     pub not_before: Duration,
+    /// Its result says something that is so no more, though nothing that its verdict depends on has
+    /// changed: it is checked again even if it is read as before.
+    pub anew: bool,
     /// When something last made it wait, or somebody asked for it while it did: what is read for its
     /// verdict must not be older.
     pub asked: Duration,
@@ -163,6 +166,7 @@ impl Files {
                 doubted: false,
                 touched: false,
                 shut: false,
+                anew: false,
                 not_before: Duration::ZERO,
                 asked: Duration::ZERO,
                 judged: None,

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Duration;
 
 use qcbus_document::FileKind;
 use qcbus_messages::{JobId, Verdict};
@@ -18,11 +17,15 @@ use super::{Actions, State};
 impl State {
     /// When every share is there, the job is ready to be stored.
     pub(super) fn finish_if_over(&mut self, id: JobId) {
-        let Some(job) = self.jobs.get_mut(&id) else {
+        let Some(job) = self.jobs.get(&id) else {
             return;
         };
-        if job.stage == JobStage::Checking && job.shares.values().all(Share::is_over) {
-            job.stage = JobStage::Finished(Duration::ZERO);
+        if job.stage != JobStage::Checking || !job.shares.values().all(Share::is_over) {
+            return;
+        }
+        let at = self.storable_at(job);
+        if let Some(job) = self.jobs.get_mut(&id) {
+            job.stage = JobStage::Finished(at);
         }
     }
 
@@ -43,6 +46,9 @@ impl State {
             let finished = self.finished(id);
             if let (Some(finished), Some(job)) = (finished, self.jobs.get_mut(&id)) {
                 job.stage = JobStage::Storing;
+                if let Some(entry) = self.files.get_mut(job.file) {
+                    entry.anew = false;
+                }
                 self.storing += 1;
                 actions.push(Action::Store(Box::new(finished)));
             }
@@ -64,6 +70,7 @@ impl State {
                 .map(|(name, share)| outcome(name, share))
                 .chain(self.inapplicable(job.kind))
                 .collect(),
+            rejected_maps: self.rejected_maps(job),
             jury: State::jury(&job.shares),
             epoch: job.epoch,
             elapsed: self.now.saturating_sub(job.since),
@@ -135,11 +142,11 @@ impl State {
     fn is_judged(&mut self, file: FileId, judged: Arc<Judged>, actions: &mut Actions) {
         self.rate.note(self.now);
         if let Some(entry) = self.files.get_mut(file) {
-            entry.judged = Some(judged.clone());
+            let before = entry.judged.replace(judged.clone());
             entry.shut = false;
             let (path, fresh) = (entry.path.clone(), true);
             let doubted = entry.doubted && judged.verdict == Verdict::Accepted;
-            let (gated, told) = (path.clone(), judged);
+            let (gated, told, now) = (path.clone(), judged.clone(), judged);
             actions.push(Action::Judged {
                 path,
                 judged: told,
@@ -150,6 +157,7 @@ impl State {
                 entry.shut = true;
                 actions.push(Action::CloseGate { path: gated });
             }
+            self.map_is_judged(file, before.as_deref(), &now);
         }
         self.deliver_to_all(file, actions);
     }
@@ -175,6 +183,7 @@ impl State {
         }
         actions.push(Action::Release { job: id });
         self.files.set_stage(job.file, Stage::Idle);
+        self.map_is_over(job.file);
         let Some(entry) = self.files.get(job.file) else {
             return;
         };

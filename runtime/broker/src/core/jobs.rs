@@ -279,9 +279,9 @@ impl State {
             self.end_job(id, actions);
             return;
         }
-        let old = entry.judged.clone();
+        let (old, anew) = (entry.judged.clone(), entry.anew);
         self.depend(file, &prepared.inputs, actions);
-        let same = |judged: &Judged| judged.basis == prepared.basis;
+        let same = |judged: &Judged| judged.basis == prepared.basis && !anew;
         match old {
             Some(judged) if same(&judged) && self.stands(kind, &judged) => {
                 self.restamp(file, &judged, prepared, actions);

@@ -18,6 +18,7 @@ mod finishing;
 mod jobs;
 mod jury;
 mod leaving;
+mod maps;
 mod notice;
 mod outcome;
 mod reporters;

@@ -18,6 +18,7 @@ mod ending;
 mod exits;
 mod hands;
 mod limits;
+mod maps;
 mod membership;
 mod processes;
 mod reporting;

@@ -243,12 +243,25 @@ pub struct FinishedJob {
     pub unreadable: Option<String>,
     /// By bundle.
     pub bundles: Vec<ShareOutcome>,
+    /// Maps that it refers to and that are rejected themselves.
+    pub rejected_maps: Vec<RejectedMap>,
     /// Those who had to judge, and did.
     pub jury: Arc<Jury>,
     /// The epoch in which they were called: in a later one the job is not to be stored.
     pub epoch: Epoch,
     /// Time since the job was taken from the queue.
     pub elapsed: Duration,
+}
+
+/// A map that was rejected itself.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RejectedMap {
+    /// Its path, as the job's documents have it.
+    pub path: String,
+    /// Byte offset of the referring element in the root's image.
+    pub referred_at: u32,
+    /// How many errors it has.
+    pub errors: u64,
 }
 
 /// What storing a result gave.

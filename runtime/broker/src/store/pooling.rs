@@ -24,6 +24,9 @@ impl Store {
         match (&document, &job.prepared) {
             (Some(document), Some(prepared)) => {
                 remarks.extend(qcbus_ingest::remarks(document, &prepared.missing, &bundles));
+                remarks.extend(job.rejected_maps.iter().map(|map| {
+                    qcbus_ingest::rejected_map(document, map.referred_at, &map.path, map.errors)
+                }));
             }
             (None, Some(_)) => remarks.push(unseen_root()),
             (_, None) => {}

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::super::*;
 use super::things::*;
+use qcbus_messages::path_text::to_text;
 use qcbus_messages::{DocId, DocumentRole, JobDocument, Verdict};
 
 use super::world::World;
@@ -25,18 +26,24 @@ impl World {
             None => Err(PrepareFailure::Vanished),
             Some(_) if !room => Err(PrepareFailure::NoRoom("full".to_owned())),
             Some(digest) => {
-                let document = JobDocument {
+                let document = |role, input: &Input, digest| JobDocument {
                     doc: DocId(job.0),
-                    role: DocumentRole::Root,
-                    path: String::new(),
+                    role,
+                    path: to_text(&input.path),
                     digest,
                     referred_at: 0,
                 };
+                let root = document(DocumentRole::Root, &inputs[0], digest);
+                let maps = inputs[1..].iter().filter_map(|input| {
+                    let digest = input.digest().filter(|_| file_of(&input.path) < 6)?;
+                    Some(document(DocumentRole::Map, input, digest))
+                });
+                let documents = std::iter::once(root).chain(maps).collect();
                 Ok(Box::new(PreparedJob {
                     basis: basis(&inputs),
                     inputs,
                     racy: self.young,
-                    documents: vec![document],
+                    documents,
                     missing: Vec::new(),
                     bytes: 1,
                 }))
@@ -76,6 +83,9 @@ impl World {
             StoreOutcome::Failed("full".to_owned())
         } else {
             self.stored.push(file);
+            let maps = job.rejected_maps.iter();
+            let maps = maps.map(|map| file_of(Path::new(&map.path))).collect();
+            self.said_of_maps.insert(file, maps);
             let names = job.bundles.iter().map(|it| it.said.name.clone());
             self.judges.insert(file, names.collect());
             let why = job.bundles.iter().filter_map(|it| it.failure.clone());
@@ -84,10 +94,10 @@ impl World {
             self.failures.insert(file, why);
             let judged = Judged {
                 job: job.job,
-                verdict: if failed {
-                    Verdict::Undetermined
-                } else {
-                    Verdict::Accepted
+                verdict: match self.rejected.contains(&file) {
+                    _ if failed => Verdict::Undetermined,
+                    true => Verdict::Rejected,
+                    false => Verdict::Accepted,
                 },
                 digest: prepared.root().unwrap().1,
                 basis: prepared.basis,

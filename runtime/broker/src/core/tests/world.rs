@@ -59,6 +59,10 @@ pub struct World {
     pub desk: Desk,
     /// Why bundles have failed on each file, as stored.
     pub failures: BTreeMap<u8, Vec<String>>,
+    /// Files with an error in them.
+    pub rejected: BTreeSet<u8>,
+    /// The rejected maps that the result of each file names, as stored.
+    pub said_of_maps: BTreeMap<u8, Vec<u8>>,
     /// Whether files are so young that their stamps prove nothing.
     pub young: bool,
     /// How often the state machine has ended.
@@ -128,6 +132,8 @@ impl World {
             gate: Published::new(),
             desk: Desk::default(),
             failures: BTreeMap::new(),
+            rejected: BTreeSet::new(),
+            said_of_maps: BTreeMap::new(),
             young: false,
             stopped: 0,
         };

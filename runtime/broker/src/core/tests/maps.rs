@@ -1,0 +1,81 @@
+//! What the result of a file says of its map's verdict.
+
+use super::*;
+
+/// File 1 is a scenario on the map 0, as far as the state machine can tell.
+fn world() -> World {
+    let mut world = World::new();
+    world.join("First");
+    world.join("Second");
+    world
+}
+
+#[test]
+fn a_rejected_map_is_named_whichever_comes_first() {
+    for order in [[0, 1], [1, 0]] {
+        for together in [true, false] {
+            let mut world = world();
+            world.rejected.insert(0);
+            for file in order {
+                world.write(file);
+                if !together {
+                    world.settle();
+                }
+            }
+            world.settle();
+            assert_eq!(world.said_of_maps[&1], [0], "{order:?} {together}");
+            assert_eq!(world.judged[&1].1, Verdict::Accepted);
+        }
+    }
+}
+
+#[test]
+fn a_map_that_is_mended_is_named_no_more() {
+    let mut world = world();
+    world.rejected.insert(0);
+    world.write(0);
+    world.write(1);
+    world.settle();
+    world.rejected.clear();
+    world.write(0);
+    world.settle();
+    assert!(world.said_of_maps[&1].is_empty());
+}
+
+#[test]
+fn a_map_whose_verdict_is_the_same_has_nobody_judged_again() {
+    let mut world = world();
+    world.write(0);
+    world.write(1);
+    world.settle();
+    let before = world.stored.len();
+    world.step(&Step::Reconfigure(1));
+    world.settle();
+    // Each once, for the configuration.
+    assert_eq!(world.stored.len(), before + 2);
+}
+
+#[test]
+fn a_scenario_waits_for_its_map_and_not_for_ever() {
+    let mut world = world();
+    world.rejected.insert(0);
+    world.write(0);
+    world.write(1);
+    world.prepare(1, true);
+    world.prepare(0, true);
+    // The bundles have answered on both; the writer is slow with the map.
+    for _ in 0..8 {
+        world.answer(0);
+        world.answer(1);
+    }
+    let storing = |world: &World| -> Vec<u8> {
+        let jobs = world.storing.iter();
+        jobs.map(|job| file_of(&job.path)).collect()
+    };
+    assert_eq!(storing(&world), [0]);
+    world.pass(Duration::from_secs(3));
+    assert_eq!(storing(&world), [0, 1], "patience has an end");
+    // Its result did not know the map's verdict, and another one does.
+    world.settle();
+    assert_eq!(world.said_of_maps[&1], [0]);
+}
