@@ -2,10 +2,9 @@
 
 use std::borrow::Cow;
 
-use qcbus_document::{Attribute, FileKind, Node};
-use qcbus_schema::{Member, ValueType};
+use qcbus_document::{Attribute, Node};
+use qcbus_schema::ValueType;
 
-use crate::Version;
 use crate::data_type::{Value, parse_boolean, parse_double, parse_integer};
 use crate::reading::Reading;
 use crate::scenario::Scenario;
@@ -76,18 +75,6 @@ impl<'m, 'd> Element<'m, 'd> {
     pub fn value_type(self, name: &str) -> Option<ValueType> {
         let attribute = self.node.attribute(name)?;
         self.scenario.typing(self.context)?.value(attribute)
-    }
-
-    /// The first version after that of the scenario in which its type has something.
-    pub fn came_with(self, member: Member<'_>) -> Option<Version> {
-        let (major, minor) = self.scenario.version();
-        let version = qcbus_schema::Version {
-            major: u32::from(major),
-            minor: u32::from(minor),
-        };
-        let found = qcbus_schema::came_with(FileKind::Xosc, version, self.class()?, member)?;
-        let part = |number: u32| u16::try_from(number).ok();
-        part(found.major).zip(part(found.minor))
     }
 
     fn at(self, node: Node<'d>) -> Element<'m, 'd> {

@@ -36,7 +36,7 @@ pub use faults::{Dialect, ValueFault, ValueFaultKind};
 pub use form::Form;
 pub use inputs::{Inputs, LinkedCatalog, LinkedMap};
 pub use network::{LaneAt, Network, RoadNetwork};
-pub use qcbus_schema::{Member, closest};
+pub use qcbus_schema::closest;
 pub use reading::Reading;
 pub use roads_nearby::RoadsNearby;
 pub use scenario::Scenario;

@@ -16,7 +16,7 @@ mod model;
 pub use model::Validated;
 
 use model::{SCHEMA_DIR, SCHEMAS};
-use qcbus_schema::{Checked, Severity};
+use qcbus_schema::{Checked, Later, Severity, Version};
 use qcbus_sdk::{Level, Place, Rule, Sink};
 
 /// What the schema rules of all bundles have in common, for the `..` of one.
@@ -30,6 +30,9 @@ pub const RULE: Rule<Validated> = Rule {
 fn run(checked: &Checked<'_>, found: &mut Sink<'_>) {
     for fact in checked.provenance() {
         found.fact(fact.key, fact.value, fact.description);
+    }
+    if let Some(later) = &checked.later {
+        say_later(later, checked.version, found);
     }
     for violation in &checked.violations {
         let place = match violation.attribute {
@@ -53,6 +56,44 @@ fn run(checked: &Checked<'_>, found: &mut Sink<'_>) {
         found
             .issue(root, text)
             .level(level(checked.severity_of_rest(rest)));
+    }
+}
+
+/// Places of what is newer than the header that are shown.
+const MOST_SHOWN: usize = 3;
+
+/// Says that a file is written for a later version than its header names.
+fn say_later(later: &Later<'_>, stated: Option<Version>, found: &mut Sink<'_>) {
+    let Some((newest, stated)) = later.things.first().zip(stated) else {
+        return;
+    };
+    let position = newest.node.position();
+    let row = match &newest.attribute {
+        Some(attribute) => attribute.position().row,
+        None => position.row,
+    };
+    let wherein = if position.is_root_file {
+        format!("row {row}")
+    } else {
+        format!("row {row} of {}", position.path)
+    };
+    let more = match later.count.saturating_sub(1) {
+        0 => String::new(),
+        1 => ", and one more thing that came later".to_owned(),
+        more => format!(", and {more} more things that came later"),
+    };
+    let text = format!(
+        "the header says version {stated}, but the file uses {}, which came with version {} ({wherein}){more}; \
+         let `revMinor` be {}, or do without",
+        newest.what, newest.since, later.version.minor
+    );
+    let mut finding = found.issue(later.header, text);
+    for thing in later.things.iter().take(MOST_SHOWN) {
+        let what = format!("{}, of version {}", thing.what, thing.since);
+        finding = match thing.attribute {
+            Some(attribute) => finding.at(attribute, what),
+            None => finding.at(thing.node, what),
+        };
     }
 }
 

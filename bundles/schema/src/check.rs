@@ -1,9 +1,11 @@
 //! The bodies of the two schema rules.
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use qcbus_document::{Document, FileKind};
 
+use crate::later::{Later, later};
 use crate::model::Schema;
 use crate::validate::Overlay;
 use crate::versions::{SkipReason, Version, select, version_of};
@@ -76,6 +78,9 @@ pub struct Checked<'a> {
     /// The default namespace of the root, which was disregarded: the published schemas have none,
     /// or one that no file uses.
     pub namespace: Option<&'a str>,
+    /// What the document uses of later versions than its header names: one cause of many violations,
+    /// of which those are left out that the later version does not know.
+    pub later: Option<Later<'a>>,
     /// The violations in order of discovery.
     pub violations: Vec<Violation<'a>>,
     /// Violations beyond the limits, counted by kind.
@@ -189,7 +194,19 @@ fn checked<'a>(
     } else {
         Overlay::None
     };
-    let Report { violations, rest } = schema.validate_with(document, options.limits, overlay);
+    let report = schema.validate_with(document, options.limits, overlay);
+    let is_own = sources.is_empty() && !newer && kind != FileKind::Xodr && !report.is_valid();
+    let later = version
+        .filter(|_| is_own)
+        .and_then(|version| later(document, kind, version));
+    let meant = later.as_ref().and_then(|later| {
+        let schema = select(kind, later.version).ok()?.schema;
+        Some(schema.validate_with(document, options.limits, overlay))
+    });
+    let Report { violations, rest } = match meant {
+        Some(meant) => left_by(&report, meant),
+        None => report,
+    };
     let namespace = document
         .root()
         .and_then(|root| root.attr("xmlns"))
@@ -201,9 +218,24 @@ fn checked<'a>(
         newer,
         modular,
         namespace,
+        later,
         violations,
         rest,
     }
+}
+
+/// Of what a later version finds fault with, that with which the version of the header does so, too: the
+/// author may let the header name the one or do without what the other has.
+fn left_by<'a>(stated: &Report<'a>, mut meant: Report<'a>) -> Report<'a> {
+    // Where not all is listed, nobody knows what is left.
+    if stated.rest.is_empty() {
+        let places: HashSet<u32> = stated.violations.iter().map(Violation::offset).collect();
+        meant
+            .violations
+            .retain(|one| places.contains(&one.offset()));
+        meant.rest.clear();
+    }
+    meant
 }
 
 /// Whether the document is a modular scenario: it refers to scenarios, or offers attributes to be

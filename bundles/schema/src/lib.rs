@@ -11,6 +11,7 @@ mod constraint;
 mod defects;
 #[doc(hidden)]
 pub mod generate;
+mod later;
 mod model;
 mod names;
 mod notation;
@@ -30,6 +31,7 @@ pub use check::{Checked, Fact, Options, Outcome, Override, Severity, Source, che
 pub use compile::{CompileError, Problem, compile};
 #[doc(hidden)]
 pub use defects::known_conditions;
+pub use later::{Later, Thing};
 pub use model::{Edition, Schema};
 pub use notation::NotationError;
 pub use regex::{Pattern, PatternError};

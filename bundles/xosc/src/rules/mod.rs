@@ -65,7 +65,6 @@ mod header_date_plausible;
 mod header_license_present;
 mod header_metadata_filled;
 mod header_unsupported_version;
-mod header_version_feature_mismatch;
 mod minsubset_additional_axles_not_allowed;
 mod minsubset_allowed_conditions;
 mod minsubset_allowed_init_actions;
@@ -278,7 +277,6 @@ pub static RULES: &[&dyn AnyRule] = &[
     &range_trajectories::RULE,
     &general_file_ending::RULE,
     &header_unsupported_version::RULE,
-    &header_version_feature_mismatch::RULE,
     &header_metadata_filled::RULE,
     &header_date_plausible::RULE,
     &header_license_present::RULE,

@@ -1,0 +1,136 @@
+//! A header that names an older version than the file is written for: what the file uses of later ones.
+
+use std::collections::HashMap;
+
+use qcbus_document::{Attribute, Document, FileKind, Node};
+
+use crate::typing::{Member, Typing, came_with};
+use crate::versions::Version;
+
+/// What a document uses of versions after the one that its header names.
+#[derive(Clone, Debug)]
+pub struct Later<'a> {
+    /// The `revMinor` of the header, which would have to be another.
+    pub header: Attribute<'a>,
+    /// The first version that has all of it.
+    pub version: Version,
+    /// One of each kind, where it is first: the newest before the others.
+    pub things: Vec<Thing<'a>>,
+    /// How many there are, those that are said several times included.
+    pub count: usize,
+}
+
+/// Something that the version of the header does not have.
+#[derive(Clone, Debug)]
+pub struct Thing<'a> {
+    /// The element it is about.
+    pub node: Node<'a>,
+    /// The attribute it is about.
+    pub attribute: Option<Attribute<'a>>,
+    /// What it is: `` `name` of `Element` ``.
+    pub what: String,
+    /// The version that it came with.
+    pub since: Version,
+}
+
+/// By the type and what it does not have: the place in the list, when a later version has it.
+type Known<'a> = HashMap<(&'static str, Member<'a>), bool>;
+
+struct Search<'a> {
+    kind: FileKind,
+    version: Version,
+    typing: Typing,
+    known: Known<'a>,
+    things: Vec<Thing<'a>>,
+    count: usize,
+}
+
+/// What a document uses of later versions; `None` when that is nothing.
+pub(crate) fn later<'a>(
+    document: &Document<'a>,
+    kind: FileKind,
+    version: Version,
+) -> Option<Later<'a>> {
+    let root = document.root()?;
+    let header = root.child("FileHeader")?.attribute("revMinor")?;
+    let mut search = Search {
+        kind,
+        version,
+        typing: Typing::of(document, kind, version)?,
+        known: Known::new(),
+        things: Vec::new(),
+        count: 0,
+    };
+    for node in std::iter::once(root).chain(root.descendants()) {
+        search.look(node);
+    }
+    let Search {
+        mut things, count, ..
+    } = search;
+    things.sort_by_key(|thing| std::cmp::Reverse(thing.since));
+    let version = things.first()?.since;
+    Some(Later {
+        header,
+        version,
+        things,
+        count,
+    })
+}
+
+impl<'a> Search<'a> {
+    fn look(&mut self, node: Node<'a>) {
+        // What is within something unknown is not known to be new.
+        let unknown = self.typing.class(node).is_none();
+        let Some(parent) = node.parent().filter(|_| unknown) else {
+            for attribute in node.attributes() {
+                self.look_at(attribute);
+            }
+            return;
+        };
+        self.note(parent, Member::Child(node.name()), || Thing {
+            node,
+            attribute: None,
+            what: format!("`{}` in `{}`", node.name(), parent.name()),
+            since: Version { major: 0, minor: 0 },
+        });
+    }
+
+    fn look_at(&mut self, attribute: Attribute<'a>) {
+        let (node, name) = (attribute.node(), attribute.name());
+        let thing = |what| Thing {
+            node,
+            attribute: Some(attribute),
+            what,
+            since: Version { major: 0, minor: 0 },
+        };
+        let Some(value) = self.typing.value(attribute) else {
+            self.note(node, Member::Attribute(name), || {
+                thing(format!("`{name}` of `{}`", node.name()))
+            });
+            return;
+        };
+        let word = attribute.value().trim();
+        let words = value.words().unwrap_or(&[]);
+        if !words.is_empty() && words.iter().all(|known| **known != *word) {
+            self.note(node, Member::Word(name, word), || {
+                thing(format!("`{word}` as `{name}` of `{}`", node.name()))
+            });
+        }
+    }
+
+    fn note(&mut self, owner: Node<'a>, member: Member<'a>, say: impl FnOnce() -> Thing<'a>) {
+        let Some(class) = self.typing.class(owner) else {
+            return;
+        };
+        if let Some(is_new) = self.known.get(&(class, member)) {
+            self.count += usize::from(*is_new);
+            return;
+        }
+        let since = came_with(self.kind, self.version, class, member);
+        if let Some(since) = since {
+            self.things.push(Thing { since, ..say() });
+            self.count += 1;
+        }
+        self.known.insert((class, member), since.is_some());
+    }
+}
