@@ -179,6 +179,21 @@ impl Problem<'_> {
     }
 }
 
+/// The words that are allowed, the likely one as a question.
+fn one_of(found: &str, words: &[Box<str>]) -> String {
+    const MOST: usize = 12;
+    let shown = words.iter().take(MOST);
+    let list: Vec<String> = shown.map(|word| format!("`{word}`")).collect();
+    let mut text = format!("one of {}", list.join(", "));
+    if words.len() > MOST {
+        text.push_str(&format!(" and {} more", words.len() - MOST));
+    }
+    if let Some(near) = qcbus_schema::closest(found, words.iter().map(|word| &**word)) {
+        text.push_str(&format!("; perhaps `{near}` is meant"));
+    }
+    text
+}
+
 fn fit_parameter<'d>(
     value: &Value<'d>,
     expected: Expected,
@@ -191,8 +206,7 @@ fn fit_parameter<'d>(
             if words.iter().any(|word| **word == *text) {
                 Ok(Value::Text(text))
             } else {
-                let list: Vec<String> = words.iter().map(|word| format!("`{word}`")).collect();
-                Err((ValueFaultKind::Word, format!("one of {}", list.join(", "))))
+                Err((ValueFaultKind::Word, one_of(&text, words)))
             }
         }
         Expected::Type(data_type) => match data_type {

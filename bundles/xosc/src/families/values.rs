@@ -1,8 +1,10 @@
 //! Values that cannot be had as they are written: the model lists them once, each rule says its kinds.
 
+use foldhash::{HashMap, HashMapExt as _};
 use qcbus_document::Attribute;
 use qcbus_openscenario::{
-    DataType, Declared, Element, Form, Reading, Scenario, Value, ValueFault, ValueFaultKind,
+    DataType, Declaration, Declared, Element, Form, Reading, Scenario, Value, ValueFault,
+    ValueFaultKind,
 };
 use qcbus_sdk::{Finding, Sink};
 
@@ -25,6 +27,100 @@ pub(crate) fn report_in_entries(
     for (element, fault) in scenario.entry_faults_of(kinds) {
         let text = format!("{}: {}", written(fault.attribute), fault.text);
         found.about(element, fault.attribute.name(), text);
+    }
+}
+
+/// Uses of a parameter that are shown beside its declaration, or beside the first of them.
+const MOST_USES: usize = 3;
+
+/// Faults that are one: a parameter has a value that its uses do not take.
+struct Misfit<'m, 'd> {
+    declaration: &'m Declaration<'d>,
+    uses: Vec<&'m ValueFault<'d>>,
+}
+
+/// Says of the parameters in the document which values do not fit where they are used, each once: at the
+/// declaration where no use of it fits, else at the first use that does not.
+pub(crate) fn report_misfits(scenario: &Scenario<'_>, kind: ValueFaultKind, found: &mut Sink<'_>) {
+    let mut misfits: Vec<Misfit<'_, '_>> = Vec::new();
+    let mut known: HashMap<(u32, &str), usize> = HashMap::new();
+    for fault in faults(scenario, &[kind]) {
+        if is_of_other_rule(scenario, fault) {
+            continue;
+        }
+        let element = scenario.element(fault.attribute.node());
+        let Some(declaration) = element.parameter(&fault.name) else {
+            say(fault, found);
+            continue;
+        };
+        let key = (declaration.node.index(), fault.text.as_str());
+        let at = *known.entry(key).or_insert(misfits.len());
+        match misfits.get_mut(at) {
+            Some(misfit) => misfit.uses.push(fault),
+            None => misfits.push(Misfit {
+                declaration,
+                uses: vec![fault],
+            }),
+        }
+    }
+    if misfits.is_empty() {
+        return;
+    }
+    let uses = uses_by_declaration(scenario);
+    for misfit in &misfits {
+        let all = uses.get(&misfit.declaration.node.index()).copied();
+        misfit.say(all.unwrap_or(0) <= misfit.uses.len(), found);
+    }
+}
+
+/// How often each declared parameter is used in the document.
+fn uses_by_declaration(scenario: &Scenario<'_>) -> HashMap<u32, usize> {
+    let mut uses = HashMap::new();
+    for (attribute, name) in scenario.parameter_uses() {
+        if let Some(declaration) = scenario.element(attribute.node()).parameter(name) {
+            *uses.entry(declaration.node.index()).or_default() += 1;
+        }
+    }
+    uses
+}
+
+impl Misfit<'_, '_> {
+    fn say(&self, is_declarations: bool, found: &mut Sink<'_>) {
+        let Some(first) = self.uses.first() else {
+            return;
+        };
+        let declared = self.declaration.node.attribute("value");
+        let (mut finding, shown) = match declared.filter(|_| is_declarations) {
+            Some(value) => {
+                let text = format!("{}{}", first.text, self.unshown(0));
+                (found.issue(value, text), self.uses.as_slice())
+            }
+            None => {
+                let text = format!(
+                    "{}: {}{}",
+                    written(first.attribute),
+                    first.text,
+                    self.unshown(1)
+                );
+                let rest = self.uses.get(1..).unwrap_or(&[]);
+                (found.issue(first.attribute, text), rest)
+            }
+        };
+        for one in shown.iter().take(MOST_USES) {
+            finding = finding.at(one.attribute, written(one.attribute));
+        }
+        if let Some(value) = declared.filter(|_| !is_declarations) {
+            finding.at(value, "its declaration");
+        }
+    }
+
+    /// How many uses are neither the place itself nor shown beside it.
+    fn unshown(&self, said: usize) -> String {
+        match self.uses.len().saturating_sub(said + MOST_USES) {
+            0 => String::new(),
+            1 => "; the same holds for one more use".to_owned(),
+            more => format!("; the same holds for {more} more uses"),
+        }
     }
 }
 

@@ -14,5 +14,6 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    values::report(scenario, &[ValueFaultKind::Word], found);
+    values::report_misfits(scenario, ValueFaultKind::Word, found);
+    values::report_in_entries(scenario, &[ValueFaultKind::Word], found);
 }

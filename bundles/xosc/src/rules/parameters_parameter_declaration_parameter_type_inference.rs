@@ -15,13 +15,13 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    let kinds = [ValueFaultKind::Declared, ValueFaultKind::Parameter];
-    for fault in values::faults(scenario, &kinds) {
+    for fault in values::faults(scenario, &[ValueFaultKind::Declared]) {
         if values::is_of_other_rule(scenario, fault) {
             continue;
         }
         values::say(fault, found).level(level(fault));
     }
+    let kinds = [ValueFaultKind::Declared, ValueFaultKind::Parameter];
     for (element, fault) in scenario.entry_faults_of(&kinds) {
         let level = match fault.kind {
             ValueFaultKind::Parameter => Level::Error,
@@ -33,6 +33,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let name = fault.attribute.name();
         found.about(element, name, text).level(level);
     }
+    values::report_misfits(scenario, ValueFaultKind::Parameter, found);
     for declaration in scenario.elements("ParameterDeclaration") {
         if declared::type_of(declaration, "parameterType") == Some(DataType::Double)
             && declaration.double("value").is_some_and(f64::is_nan)
