@@ -42,7 +42,7 @@ impl<'p> Place<'p> {
             .map_or(Place::Node(node), Place::Attribute)
     }
 
-    fn document(&self) -> Document<'p> {
+    pub(crate) fn document(&self) -> Document<'p> {
         match self {
             Place::Node(node) => node.document(),
             Place::Attribute(attribute) => attribute.node().document(),

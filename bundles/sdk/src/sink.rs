@@ -1,5 +1,8 @@
 //! Where a rule puts what it found.
 
+use std::collections::HashMap;
+
+use qcbus_document::Node;
 use qcbus_formats::xqar::{DomainInfo, Issue, Level, Location, Metadata};
 
 use crate::param::MAX_ISSUES;
@@ -23,11 +26,28 @@ pub struct Sink<'d> {
     not_normative: Option<String>,
     kept: Vec<((usize, u32), Issue)>,
     suppressed: Option<Suppressed>,
+    /// What was found behind references: by the text and where the document's path lies in memory.
+    behind: HashMap<(String, usize, u32), Behind>,
     metadata: Vec<Metadata>,
+    /// The level of what is said once more and not kept.
+    unheard: Level,
     /// Takes what is said about findings that are not kept. In a box, because most checkers keep
     /// all of theirs, and many are at work at the same time.
     scratch: Option<Box<Issue>>,
 }
+
+/// A finding about something to which references lead.
+struct Behind {
+    /// Its place in `kept`, if it is there.
+    kept: Option<usize>,
+    /// Where the last reference stands.
+    last: u32,
+    /// The references after the first.
+    more: usize,
+}
+
+/// Further references to a fault that are shown.
+const MOST_REFERENCES: usize = 3;
 
 /// The findings beyond the limit.
 struct Suppressed {
@@ -53,7 +73,9 @@ impl<'d> Sink<'d> {
             not_normative,
             kept: Vec::new(),
             suppressed: None,
+            behind: HashMap::new(),
             metadata: Vec::new(),
+            unheard: Level::Information,
             scratch: None,
         }
     }
@@ -95,6 +117,58 @@ impl<'d> Sink<'d> {
             facts: self.facts,
             lowered,
             unlisted,
+        }
+    }
+
+    /// Says that something is wrong with what a reference leads to: at the reference, with the place
+    /// itself as second. Where several references lead to the same, it is said once, and the others are
+    /// further places.
+    pub fn issue_behind<'p>(
+        &mut self,
+        reference: Node<'p>,
+        at: impl Into<Place<'p>>,
+        text: impl Into<String>,
+    ) -> Finding<'_, 'd> {
+        let (place, text) = (at.into(), text.into());
+        let document = place.document().path().as_ptr() as usize;
+        let key = (text, document, place.offset());
+        if let Some(known) = self.behind.get_mut(&key) {
+            let is_other = known.last != reference.offset();
+            known.last = reference.offset();
+            known.more += usize::from(is_other);
+            let shown = known
+                .kept
+                .filter(|_| is_other && known.more <= MOST_REFERENCES);
+            if let Some((_, issue)) = shown.and_then(|kept| self.kept.get_mut(kept)) {
+                let what = "a further reference that leads there";
+                let spot = locate(self.subject, &Place::Node(reference), Some(what));
+                issue.locations.push(spot.locations);
+            }
+            return self.unheard();
+        }
+        let kept = self.kept.len();
+        let behind = Behind {
+            kept: (kept < self.limit()).then_some(kept),
+            last: reference.offset(),
+            more: 0,
+        };
+        let text = key.0.clone();
+        self.behind.insert(key, behind);
+        self.issue(reference, text)
+            .at(place, "the place in the catalog")
+    }
+
+    /// A finding that is said already.
+    fn unheard(&mut self) -> Finding<'_, 'd> {
+        let issue = scratch(&mut self.scratch);
+        issue.locations.clear();
+        issue.domain_info.clear();
+        Finding {
+            issue,
+            subject: self.subject,
+            facts: self.facts,
+            lowered: self.not_normative.is_some(),
+            unlisted: Some(&mut self.unheard),
         }
     }
 
@@ -144,6 +218,19 @@ impl<'d> Sink<'d> {
     /// Takes out the findings in document order, and facts about those that are not listed.
     pub(crate) fn finish(&mut self) -> (Vec<Issue>, Vec<Metadata>) {
         let mut kept = std::mem::take(&mut self.kept);
+        let mut behind: Vec<Behind> = std::mem::take(&mut self.behind).into_values().collect();
+        behind.sort_unstable_by_key(|behind| behind.kept);
+        for behind in behind {
+            let issue = behind.kept.and_then(|at| kept.get_mut(at));
+            let unsaid = behind.more.saturating_sub(MOST_REFERENCES);
+            if let Some((_, issue)) = issue.filter(|_| unsaid > 0) {
+                let text = match unsaid {
+                    1 => "; one more reference leads there".to_owned(),
+                    unsaid => format!("; {unsaid} more references lead there"),
+                };
+                issue.description.push_str(&text);
+            }
+        }
         kept.sort_by_key(|(order, _)| *order);
         let mut issues: Vec<Issue> = kept.into_iter().map(|(_, issue)| issue).collect();
         let mut facts = std::mem::take(&mut self.metadata);

@@ -99,7 +99,8 @@ fn incomplete(subject: &Subject<'_>) -> Vec<u32> {
 pub trait About<'d> {
     /// Says something about an attribute of an element, or about the element when the attribute is
     /// not there. What is written in the entry of a catalog is said at the reference to it, with the
-    /// place in the catalog as second: whoever mends it must know both.
+    /// place in the catalog as second: whoever mends it must know both. Where several references lead to
+    /// the same fault, it is said at the first, with the others as further places.
     fn about(
         &mut self,
         element: Element<'_, '_>,
@@ -121,7 +122,6 @@ impl<'d> About<'d> for Sink<'d> {
         };
         let entry = reference.attr("entryName").unwrap_or("");
         let text = format!("in the catalog's entry `{entry}`: {}", text.into());
-        self.issue(reference, text)
-            .at(place, "the place in the catalog")
+        self.issue_behind(reference, place, text)
     }
 }

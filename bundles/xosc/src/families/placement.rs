@@ -1,7 +1,6 @@
 //! Where entities begin: what places them, and in which order.
 
-use foldhash::{HashMap, HashSet};
-use qcbus_document::Node;
+use foldhash::HashSet;
 use qcbus_openscenario::{Actors, Element, Scenario};
 
 /// A `TeleportAction` of `Init` for one entity.
@@ -95,17 +94,4 @@ fn expanded(scenario: &Scenario<'_>, name: &str) -> Option<Vec<String>> {
             .map(|object| object.name().to_owned())
             .collect(),
     )
-}
-
-/// Elements of which each place in a file counts once, however many references lead to it: for what
-/// is the same with all of them.
-pub(crate) fn once<'m, 'd: 'm>(
-    elements: impl Iterator<Item = Element<'m, 'd>>,
-) -> impl Iterator<Item = Element<'m, 'd>> {
-    let mut seen: HashMap<(*const u8, u32), Node<'d>> = HashMap::default();
-    elements.filter(move |element| {
-        let node = element.node();
-        let key = (node.document().path().as_ptr(), node.offset());
-        seen.insert(key, node).is_none()
-    })
 }

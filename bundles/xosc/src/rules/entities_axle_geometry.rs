@@ -1,7 +1,6 @@
 use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
-use crate::families::placement;
 use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -33,7 +32,7 @@ const TWO_AXLED: [&str; 4] = ["car", "van", "truck", "bus"];
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let (least, most) = (found.number(&WHEELBASE), found.number(&WHEEL));
-    for vehicle in placement::once(scenario.elements_everywhere("Vehicle")) {
+    for vehicle in scenario.elements_everywhere("Vehicle") {
         let Some(axles) = vehicle.child("Axles") else {
             continue;
         };

@@ -1,7 +1,7 @@
 use qcbus_openscenario::Scenario;
 use qcbus_sdk::{Level, Rule, Sink};
 
-use crate::families::{catalogs, placement};
+use crate::families::catalogs;
 use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -16,7 +16,7 @@ pub static RULE: Rule<Scene> = Rule {
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for kind in ["Vehicle", "Pedestrian"] {
-        for object in placement::once(scenario.elements_everywhere(kind)) {
+        for object in scenario.elements_everywhere(kind) {
             let Some(dimensions) = object.path(&["BoundingBox", "Dimensions"]) else {
                 continue;
             };

@@ -1,7 +1,6 @@
 use qcbus_openscenario::Scenario;
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
-use crate::families::placement;
 use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -35,7 +34,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         ("maxAcceleration", acceleration, "m/s²"),
         ("maxDeceleration", acceleration, "m/s²"),
     ];
-    for performance in placement::once(scenario.elements_everywhere("Performance")) {
+    for performance in scenario.elements_everywhere("Performance") {
         let above = limits.iter().filter_map(|(name, most, unit)| {
             let value = performance.number(name).filter(|value| value > most)?;
             Some((
