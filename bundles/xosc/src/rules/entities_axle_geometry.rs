@@ -59,7 +59,8 @@ fn wheelbase(axles: Element<'_, '_>, least: f64, found: &mut Sink<'_>) {
     let (Some(x), Some(rear_x)) = (front.number("positionX"), rear.number("positionX")) else {
         return;
     };
-    if x - rear_x >= least {
+    // A front axle at a negative x is told by the rule about ranges.
+    if x - rear_x >= least || x < 0.0 {
         return;
     }
     let text = if x <= rear_x {

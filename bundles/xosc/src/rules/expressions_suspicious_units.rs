@@ -1,5 +1,3 @@
-use std::f64::consts::TAU;
-
 use qcbus_openscenario::Scenario;
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
@@ -18,9 +16,6 @@ pub static RULE: Rule<Scene> = Rule {
 
 /// Elements whose `value` is a speed in m/s.
 const SPEEDS: &[&str] = &["AbsoluteTargetSpeed", "AbsoluteSpeed", "SpeedCondition"];
-
-/// Elements whose angles are in radians.
-const ORIENTED: &[&str] = &["WorldPosition", "GeoPosition", "Orientation"];
 
 /// A speed beyond this stands for "as fast as you can", in whatever unit.
 const UNLIMITED: f64 = 1e4;
@@ -50,24 +45,6 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 speed / 3.6
             );
             found.about(element, "value", text);
-        }
-    }
-    for name in ORIENTED {
-        for element in scenario.elements_everywhere(name) {
-            for attribute in ["h", "p", "r"] {
-                let angle = element.number(attribute);
-                let Some(angle) = angle.filter(|angle| angle.abs() > 2.0 * TAU) else {
-                    continue;
-                };
-                let text = format!(
-                    "`{attribute}` of `{name}` is {}, more than two full turns; angles are in radians, {} degrees \
-                     would be {:.4}",
-                    short(angle),
-                    short(angle),
-                    angle.to_radians()
-                );
-                found.about(element, attribute, text);
-            }
         }
     }
 }

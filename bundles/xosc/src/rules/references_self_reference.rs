@@ -17,7 +17,7 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 /// Actions that need another one than their actor. That a lane or a single change of speed is counted
-/// from the actor itself is common, and well defined.
+/// from the actor itself is common, and well defined. Synchronising is a rule of its own.
 const ACTIONS: &[(&str, &str, &str)] = &[
     (
         "LongitudinalDistanceAction",
@@ -28,11 +28,6 @@ const ACTIONS: &[(&str, &str, &str)] = &[
         "LateralDistanceAction",
         "entityRef",
         "keep a distance to itself",
-    ),
-    (
-        "SynchronizeAction",
-        "masterEntityRef",
-        "arrive together with itself",
     ),
 ];
 
