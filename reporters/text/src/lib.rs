@@ -36,6 +36,8 @@ pub struct Options {
     pub color: bool,
     /// How many checkers that were skipped for one reason are named; the rest are counted.
     pub skipped_names: usize,
+    /// Whether those that do not apply to the file are listed with the reason, and not only counted.
+    pub inapplicable: bool,
 }
 
 impl Default for Options {
@@ -44,6 +46,7 @@ impl Default for Options {
             width: DEFAULT_WIDTH,
             color: false,
             skipped_names: usize::MAX,
+            inapplicable: true,
         }
     }
 }

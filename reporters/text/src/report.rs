@@ -39,6 +39,7 @@ impl Reporter for TextReporter {
         let options = Options {
             width: line_width(&result.params)?,
             color: self.color && streamed,
+            inapplicable: !streamed,
             ..Options::default()
         };
         let text = render(result, &options, sources);

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use qcbus_formats::pool::NotAsked;
-use qcbus_formats::xqar::{Level, Status};
+use qcbus_formats::pool::{BLOCKED, NotAsked};
+use qcbus_formats::xqar::{Checker, Level, Status};
 use qcbus_messages::{Digest, ResultMessage};
 use qcbus_reporter_sdk::{one_line, printable};
 
@@ -17,8 +17,8 @@ pub(crate) fn write(out: &mut String, result: &ResultMessage, paint: Paint, opti
     let path = paint.bold(&printable(&result.display_path));
     let word = paint.verdict(verdict, verdict.as_str());
     let _ = writeln!(out, "{word}: {path}: {}", issues(result));
-    let _ = writeln!(out, "  checkers: {}", checkers(result));
-    for group in groups(result) {
+    let _ = writeln!(out, "  checkers: {}", checkers(result, options));
+    for group in groups(result, options) {
         group.write(out, options);
     }
     let not_asked = NotAsked::of(&result.results);
@@ -56,14 +56,21 @@ fn counted(count: usize, one: &str, many: &str) -> Option<String> {
 }
 
 /// Counts by status; `completed` is said even when it is none.
-fn checkers(result: &ResultMessage) -> String {
-    let of = |status: Option<Status>| {
+fn checkers(result: &ResultMessage, options: &Options) -> String {
+    let all = || {
         let bundles = result.results.bundles.iter();
-        let checkers = bundles.flat_map(|bundle| &bundle.checkers);
-        checkers.filter(|checker| checker.status == status).count()
+        bundles.flat_map(|bundle| &bundle.checkers)
+    };
+    let of = |status| all().filter(|checker| checker.status == status).count();
+    let skipped = of(Some(Status::Skipped));
+    let inapplicable = all().filter(|checker| is_inapplicable(checker)).count();
+    let skips = match (options.inapplicable, inapplicable) {
+        (true, _) | (_, 0) => "skipped".to_owned(),
+        (false, all) if all == skipped => "skipped that do not apply to the file".to_owned(),
+        (false, some) => format!("skipped, {some} of which do not apply to the file"),
     };
     let rest = [
-        (of(Some(Status::Skipped)), "skipped"),
+        (skipped, skips.as_str()),
         (of(Some(Status::Error)), "gave no answer"),
         (of(None), "without a status"),
     ];
@@ -72,6 +79,13 @@ fn checkers(result: &ResultMessage) -> String {
         let _ = write!(text, ", {count} {word}");
     }
     text
+}
+
+/// Whether a checker was skipped because the file is none that it is for, and not because something
+/// was in its way.
+fn is_inapplicable(checker: &Checker) -> bool {
+    let is_blocked = || checker.metadata.iter().any(|fact| fact.key == BLOCKED);
+    checker.status == Some(Status::Skipped) && !is_blocked()
 }
 
 /// Checkers that ended alike for the same reason: when a file is not well-formed, all of the
@@ -120,13 +134,16 @@ impl Group {
 }
 
 /// The groups that did not complete, what failed before what was skipped.
-fn groups(result: &ResultMessage) -> Vec<Group> {
+fn groups(result: &ResultMessage, options: &Options) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for bundle in &result.results.bundles {
         for checker in &bundle.checkers {
             let Some(status @ (Status::Error | Status::Skipped)) = checker.status else {
                 continue;
             };
+            if is_inapplicable(checker) && !options.inapplicable {
+                continue;
+            }
             let name = printable(&format!("{}/{}", bundle.name, checker.id));
             let reason = without_count(&one_line(&checker.summary)).to_owned();
             let known = groups

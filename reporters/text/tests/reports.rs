@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 
 use qcbus_formats::location::OtherPlace;
+use qcbus_formats::pool::BLOCKED;
 use qcbus_formats::xqar::{
-    Checker, CheckerBundle, DomainInfo, InfoElement, Issue, Level, Location, Locations, Param,
-    Results, Status,
+    Checker, CheckerBundle, DomainInfo, InfoElement, Issue, Level, Location, Locations, Metadata,
+    Param, Results, Status,
 };
 use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
 use qcbus_report_text::{Options, TextReporter, render};
@@ -176,6 +177,40 @@ fn what_did_not_run_is_said_with_its_reason() {
         ),
     ];
     insta::assert_snapshot!(text(&result("a.xodr", Verdict::Undetermined, checkers)));
+}
+
+#[test]
+fn what_does_not_apply_is_counted_where_people_look() {
+    let options = Options {
+        inapplicable: false,
+        ..Options::default()
+    };
+    let newer = "The rule holds from 1.7.0 on, the file is of 1.4. 0 issue(s) are found.";
+    let mut checkers = vec![
+        checker("check_ids", Status::Completed, "", Vec::new()),
+        checker("check_lane_a", Status::Skipped, newer, Vec::new()),
+        checker("check_lane_b", Status::Skipped, newer, Vec::new()),
+    ];
+    let accepted = result("a.xodr", Verdict::Accepted, checkers.clone());
+    let said = render(&accepted, &options, &pages());
+    assert!(said.contains("1 completed, 2 skipped that do not apply to the file\n  sha256"));
+    let mut blocked = checker(
+        "check_road",
+        Status::Skipped,
+        "The road is broken.",
+        Vec::new(),
+    );
+    blocked.metadata.push(Metadata {
+        key: BLOCKED.into(),
+        value: "check_ids".into(),
+        description: String::new(),
+    });
+    checkers.push(blocked);
+    let undetermined = result("a.xodr", Verdict::Undetermined, checkers);
+    let said = render(&undetermined, &options, &pages());
+    assert!(said.contains("3 skipped, 2 of which do not apply to the file\n"));
+    assert!(said.contains("  skipped, 1: The road is broken.\n"));
+    assert!(!said.contains("The rule holds"));
 }
 
 #[test]

@@ -387,6 +387,7 @@ impl Printer {
                     width: talk::width(),
                     color: talk::color(),
                     skipped_names: 2,
+                    inapplicable: false,
                 };
                 let sources = FileSources::new(&message);
                 talk::print(&qcbus_report_text::render(&message, &options, &sources));
