@@ -94,7 +94,12 @@ fn page(checker: &Checker) -> String {
         let _ = writeln!(head, "  {uid}");
     }
     let level = format!("{:?}", facts.level).to_lowercase();
-    let _ = writeln!(head, "  level {level}, versions {}\n", facts.versions);
+    let versions = match &checker.range {
+        Ok(range) if range.is_everything() => "every version".to_owned(),
+        Ok(range) => format!("versions {range}"),
+        Err(why) => why.clone(),
+    };
+    let _ = writeln!(head, "  level {level}, {versions}\n");
     format!("{head}{}", facts.page)
 }
 
