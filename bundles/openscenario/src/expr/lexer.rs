@@ -2,6 +2,7 @@
 
 use super::words::FOREIGN;
 use super::{Fault, FaultKind, OPENING, is_blank, quoted};
+use crate::text::identifier;
 
 /// The signs of the language.
 const SIGNS: [char; 8] = ['+', '-', '*', '/', '%', '(', ')', ','];
@@ -39,11 +40,7 @@ pub(super) struct Lexer<'t> {
 
 /// The name that `rest` begins with.
 pub(super) fn name(rest: &str) -> Option<&str> {
-    if !rest.starts_with(|c: char| c == '_' || c.is_ascii_alphabetic()) {
-        return None;
-    }
-    let end = rest.find(|c: char| c != '_' && !c.is_ascii_alphanumeric());
-    Some(end.map_or(rest, |end| rest.split_at(end).0))
+    Some(identifier(rest)).filter(|name| !name.is_empty())
 }
 
 impl<'t> Lexer<'t> {
