@@ -6,7 +6,7 @@ use foldhash::{HashMap, HashMapExt as _, HashSet};
 use qcbus_openscenario::{DataType, Element, Scenario};
 use qcbus_sdk::{Level, Sink};
 
-use super::references;
+use super::references::{self, Dangling};
 use crate::model::About as _;
 
 /// A kind of declaration and the elements that refer to it.
@@ -110,6 +110,22 @@ impl Declarable {
         self.references(scenario, elements)
             .map(|(_, name)| name)
             .collect()
+    }
+
+    /// The names that elements refer to and nobody declares.
+    pub(crate) fn dangling(
+        &'static self,
+        scenario: &Scenario<'_>,
+        elements: &'static [&'static str],
+    ) -> Dangling {
+        let declared = self.by_name(scenario);
+        let mut dangling = Dangling::default();
+        for (_, name) in self.references(scenario, elements) {
+            if !declared.contains_key(&*name) {
+                dangling.add(&name);
+            }
+        }
+        dangling
     }
 
     /// Says which references name nothing that is declared.

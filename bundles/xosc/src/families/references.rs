@@ -1,15 +1,13 @@
 //! References by name: what names whom, and what to say when nobody bears the name.
 
-use qcbus_openscenario::Element;
+use foldhash::HashSet;
+use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::Sink;
 
 use crate::model::About;
 
-/// Attributes that name a scenario object or a selection.
-pub(crate) const ENTITY_REFERENCES: &[(&str, &str)] = &[
-    ("EntityRef", "entityRef"),
-    ("Private", "entityRef"),
-    ("EntityAction", "entityRef"),
+/// Attributes that name one entity, after the standard's table of entity type constraints.
+pub(crate) const SINGLE_ENTITY: &[(&str, &str)] = &[
     ("CentralObject", "entityRef"),
     ("FromCurrentEntity", "entityRef"),
     ("LateralDistanceAction", "entityRef"),
@@ -24,12 +22,24 @@ pub(crate) const ENTITY_REFERENCES: &[(&str, &str)] = &[
     ("RelativeTargetLaneOffset", "entityRef"),
     ("RelativeTargetSpeed", "entityRef"),
     ("RelativeWorldPosition", "entityRef"),
-    ("SpeedProfileAction", "entityRef"),
     ("TimeHeadwayCondition", "entityRef"),
     ("TrailerRef", "entityRef"),
     ("ConnectTrailerAction", "trailerRef"),
     ("SynchronizeAction", "masterEntityRef"),
 ];
+
+/// Attributes that name a scenario object or a selection.
+const ANY_ENTITY: &[(&str, &str)] = &[
+    ("EntityRef", "entityRef"),
+    ("Private", "entityRef"),
+    ("EntityAction", "entityRef"),
+    ("SpeedProfileAction", "entityRef"),
+];
+
+/// All attributes that name entities.
+pub(crate) fn entity_references() -> impl Iterator<Item = (&'static str, &'static str)> {
+    ANY_ENTITY.iter().chain(SINGLE_ENTITY).copied()
+}
 
 /// Findings of one rule that come with a hint.
 const MOST_HINTS: u64 = 100;
@@ -68,18 +78,55 @@ pub(crate) fn quoted(element: Element<'_, '_>, attribute: &str, value: &str) -> 
 
 /// What may have been meant: a name that differs by white space, case or a letter or two.
 pub(crate) fn hint<'n>(name: &str, names: impl Iterator<Item = &'n str>) -> String {
-    let mut names = names.peekable();
-    if names.peek().is_none() {
-        return String::new();
-    }
-    let names: Vec<&str> = names.collect();
-    let plain = |text: &str| text.split_whitespace().collect::<String>().to_lowercase();
-    let spaced = names
-        .iter()
-        .find(|other| plain(other) == plain(name))
-        .copied();
-    match spaced.or_else(|| qcbus_openscenario::closest(name, names.iter().copied())) {
+    match near(name, names) {
         Some(near) => format!("; `{near}` is there, names must be equal to the letter"),
         None => String::new(),
     }
+}
+
+/// The name that is probably meant by another.
+fn near<'n>(name: &str, names: impl Iterator<Item = &'n str>) -> Option<&'n str> {
+    let names: Vec<&str> = names.collect();
+    if names.is_empty() {
+        return None;
+    }
+    let plain = |text: &str| text.split_whitespace().collect::<String>().to_lowercase();
+    let wanted = plain(name);
+    let spaced = names.iter().find(|other| plain(other) == wanted).copied();
+    spaced.or_else(|| qcbus_openscenario::closest(name, names.iter().copied()))
+}
+
+/// Names that are referred to and lead nowhere, which is said. What they were probably meant to name is
+/// not said to be unused as well.
+#[derive(Default)]
+pub(crate) struct Dangling(HashSet<String>);
+
+impl Dangling {
+    /// Adds a name. There is an end to it where thousands of names meet thousands of faults.
+    pub(crate) fn add(&mut self, name: &str) {
+        const MOST: usize = 100;
+        if self.0.len() < MOST && !self.0.contains(name) {
+            self.0.insert(name.to_owned());
+        }
+    }
+
+    /// Whether one of them is probably this name misspelt.
+    pub(crate) fn may_mean(&self, name: &str) -> bool {
+        let mut all = self.0.iter();
+        all.any(|one| near(one, std::iter::once(name)).is_some())
+    }
+}
+
+/// The names of entities that there are not.
+pub(crate) fn dangling_entities(scenario: &Scenario<'_>) -> Dangling {
+    let mut dangling = Dangling::default();
+    for (element, attribute) in entity_references() {
+        for reference in scenario.elements_everywhere(element) {
+            let name = reference.text(attribute);
+            if let Some(name) = name.filter(|name| !scenario.entities().contains(name)) {
+                dangling.add(&name);
+            }
+        }
+    }
+    dangling
 }

@@ -1,7 +1,7 @@
 use qcbus_openscenario::{EntityKind, Form, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
-use crate::families::placement;
+use crate::families::{placement, references};
 use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -21,9 +21,10 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let Some(placed) = placement::placed(scenario) else {
         return;
     };
+    let dangling = references::dangling_entities(scenario);
     for entity in scenario.entities().objects() {
         let must_be = matches!(entity.kind(), EntityKind::Vehicle | EntityKind::Pedestrian);
-        if must_be && !placed.contains(entity.name()) {
+        if must_be && !placed.contains(entity.name()) && !dangling.may_mean(entity.name()) {
             let text = format!(
                 "nothing places the entity `{}`: no `TeleportAction`, no trajectory and no \
                  `AddEntityAction` is for it, and where it begins is up to the simulator",

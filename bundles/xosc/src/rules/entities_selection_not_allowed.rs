@@ -1,7 +1,7 @@
 use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
-use crate::families::references::quoted;
+use crate::families::references::{SINGLE_ENTITY, quoted};
 use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -14,28 +14,6 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// References to one entity, after the standard's table of entity type constraints.
-const SINGLE: &[(&str, &str)] = &[
-    ("CentralObject", "entityRef"),
-    ("LateralDistanceAction", "entityRef"),
-    ("LongitudinalDistanceAction", "entityRef"),
-    ("FromCurrentEntity", "entityRef"),
-    ("RelativeAngleCondition", "entityRef"),
-    ("RelativeDistanceCondition", "entityRef"),
-    ("RelativeLanePosition", "entityRef"),
-    ("RelativeObjectPosition", "entityRef"),
-    ("RelativeRoadPosition", "entityRef"),
-    ("RelativeSpeedCondition", "entityRef"),
-    ("RelativeTargetLane", "entityRef"),
-    ("RelativeTargetLaneOffset", "entityRef"),
-    ("RelativeTargetSpeed", "entityRef"),
-    ("RelativeWorldPosition", "entityRef"),
-    ("SynchronizeAction", "masterEntityRef"),
-    ("TimeHeadwayCondition", "entityRef"),
-    ("TrailerRef", "entityRef"),
-    ("ConnectTrailerAction", "trailerRef"),
-];
-
 /// Where an `EntityRef` is a reference to one entity.
 const AROUND: [&str; 2] = ["CollisionCondition", "TimeToCollisionConditionTarget"];
 
@@ -43,7 +21,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     if scenario.entities().selections().is_empty() {
         return;
     }
-    for (element, attribute) in SINGLE {
+    for (element, attribute) in SINGLE_ENTITY {
         for reference in scenario.elements_everywhere(element) {
             look(reference, attribute, found);
         }

@@ -4,7 +4,7 @@ use foldhash::HashSet;
 use qcbus_openscenario::{EntityKind, Form, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
-use crate::families::references::ENTITY_REFERENCES;
+use crate::families::references;
 use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -23,7 +23,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         return;
     }
     let mut used: HashSet<Cow<'_, str>> = HashSet::default();
-    for (element, attribute) in ENTITY_REFERENCES {
+    for (element, attribute) in references::entity_references() {
         for reference in scenario.elements_everywhere(element) {
             if !reference.has(attribute) {
                 continue;
@@ -34,6 +34,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             used.insert(name);
         }
     }
+    let dangling = references::dangling_entities(scenario);
+    let is_unused = |name: &str| !used.contains(name) && !dangling.may_mean(name);
     let entities = scenario.entities();
     let by_type = entities
         .selections()
@@ -43,13 +45,13 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let element = object.element(scenario);
         // Vehicles and pedestrians must at least be placed, which is a rule of its own.
         let is_other = matches!(object.kind(), EntityKind::MiscObject | EntityKind::External);
-        if is_other && !by_type && !element.is("Trailer") && !used.contains(object.name()) {
+        if is_other && !by_type && !element.is("Trailer") && is_unused(object.name()) {
             let text = format!("nothing refers to the entity `{}`", object.name());
             found.about(element, "name", text);
         }
     }
     for selection in entities.selections() {
-        if !used.contains(selection.name()) {
+        if is_unused(selection.name()) {
             let text = format!("nothing refers to the selection `{}`", selection.name());
             found.about(selection.element(scenario), "name", text);
         }

@@ -34,8 +34,9 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             changed.insert(name);
         }
     }
+    let dangling = declared::MONITORS.dangling(scenario, &["SetMonitorAction"]);
     for (action, declaration, name) in same {
-        if !changed.contains(&name) {
+        if !changed.contains(&name) && !dangling.may_mean(&name) {
             let value = action.text("value").unwrap_or_default();
             let text = format!(
                 "the monitor `{name}` is set to `{value}`, which it is from the beginning, and no action sets it \

@@ -20,9 +20,10 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         return;
     }
     let set = declared::MONITORS.names(scenario, &["SetMonitorAction"]);
+    let dangling = declared::MONITORS.dangling(scenario, &["SetMonitorAction"]);
     for declaration in declared::MONITORS.declarations(scenario) {
         let name = declaration.written("name").unwrap_or("");
-        if !set.contains(declared::bare(name)) {
+        if !set.contains(declared::bare(name)) && !dangling.may_mean(name) {
             let text = format!(
                 "no `SetMonitorAction` sets the monitor `{name}`, so that it reports its first value throughout \
                  the run"

@@ -22,11 +22,15 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         return;
     }
     let changed = declared::PARAMETERS.names(scenario, &["ParameterAction"]);
+    let dangling = declared::PARAMETERS.dangling(scenario, &["ParameterAction"]);
     for (element, name) in declared::PARAMETERS.references(scenario, &["ParameterCondition"]) {
         let declaration = scenario.root().parameter(&name);
         let Some(declaration) = declaration.filter(|_| !changed.contains(&name)) else {
             continue;
         };
+        if dangling.may_mean(&name) {
+            continue;
+        }
         let outcome = outcome(element, declaration)
             .map(|holds| format!(": with the declared value the condition is always {holds}"));
         let text = format!(

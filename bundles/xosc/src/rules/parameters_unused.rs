@@ -1,5 +1,5 @@
 use foldhash::{HashSet, HashSetExt as _};
-use qcbus_openscenario::{Form, Scenario, identifier};
+use qcbus_openscenario::{Form, Scenario, ValueFaultKind, identifier};
 use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::declared;
@@ -15,13 +15,20 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
+/// What refers to a parameter by its name alone.
+const USES: &[&str] = &["ParameterAction", "ParameterCondition"];
+
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     if scenario.form() == Form::Scenario && !scenario.storyboard().is_complete() {
         // What could not be read may use it.
         return;
     }
     let used = used(scenario);
-    let referred = declared::PARAMETERS.names(scenario, &["ParameterAction", "ParameterCondition"]);
+    let referred = declared::PARAMETERS.names(scenario, USES);
+    let mut dangling = declared::PARAMETERS.dangling(scenario, USES);
+    for fault in scenario.faults_of(&[ValueFaultKind::Undeclared]) {
+        dangling.add(&fault.name);
+    }
     for block in scenario.elements("ParameterDeclarations") {
         let Some(holder) = block.parent() else {
             continue;
@@ -30,7 +37,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         for declaration in holder.declarations() {
             let known = used.contains(&declaration.node.index())
                 || (at_top && referred.contains(declaration.name));
-            if !known {
+            if !known && !dangling.may_mean(declaration.name) {
                 let text = format!(
                     "the parameter `{}` is declared and never used within `{}`",
                     declaration.name,

@@ -1,7 +1,7 @@
 use qcbus_openscenario::{Form, Scenario};
 use qcbus_sdk::{Backport, Rule, Sink};
 
-use crate::families::references::{self, ENTITY_REFERENCES};
+use crate::families::references;
 use crate::model::Scene;
 
 pub static RULE: Rule<Scene> = Rule {
@@ -21,7 +21,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         return;
     }
     let entities = scenario.entities();
-    for (element, attribute) in ENTITY_REFERENCES {
+    for (element, attribute) in references::entity_references() {
         for reference in scenario.elements_everywhere(element) {
             let Some(name) = reference.text(attribute) else {
                 continue;

@@ -21,10 +21,14 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
     let declared = declared::VARIABLES.by_name(scenario);
     let written = declared::VARIABLES.names(scenario, &["VariableAction"]);
+    let dangling = declared::VARIABLES.dangling(scenario, &["VariableAction"]);
     for (condition, name) in declared::VARIABLES.references(scenario, &["VariableCondition"]) {
         let Some(declaration) = declared.get(&*name).filter(|_| !written.contains(&name)) else {
             continue;
         };
+        if dangling.may_mean(&name) {
+            continue;
+        }
         let text = format!(
             "no action sets the variable `{name}`: unless the outside does, it stays as it is declared and so \
              does this condition"

@@ -15,14 +15,18 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
+/// What uses a variable.
+const USES: &[&str] = &["VariableAction", "VariableCondition"];
+
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     if !scenario.storyboard().is_complete() {
         return;
     }
-    let used = declared::VARIABLES.names(scenario, &["VariableAction", "VariableCondition"]);
+    let used = declared::VARIABLES.names(scenario, USES);
+    let dangling = declared::VARIABLES.dangling(scenario, USES);
     for declaration in declared::VARIABLES.declarations(scenario) {
         let name = declared::bare(declaration.written("name").unwrap_or(""));
-        if !used.contains(name) {
+        if !used.contains(name) && !dangling.may_mean(name) {
             let text = format!(
                 "no action sets the variable `{name}` and no condition looks at it; only the outside can use it"
             );
