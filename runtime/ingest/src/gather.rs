@@ -8,7 +8,7 @@ use qcbus_document::{Document, FaultGroup, FileKind};
 use qcbus_formats::xqar::Level;
 use qcbus_messages::{Absence, DocumentRole, MissingDocument};
 
-use crate::references::{Reference, references};
+use crate::references::{Parameters, Reference, references};
 
 /// Where documents come from and go to.
 pub trait Source {
@@ -226,11 +226,12 @@ fn is_used(root: &Document<'_>, kind: &str, found: &BTreeSet<String>) -> bool {
         "TrajectoryCatalog" => &["FollowTrajectoryAction", "TrajectoryRef"],
         _ => &[],
     };
+    let parameters = Parameters::of(root);
     root.elements("CatalogReference").any(|reference| {
         let parent = reference.parent().map(|parent| parent.name());
-        let name = reference.attr("catalogName").unwrap_or("$");
+        let written = reference.attr("catalogName");
+        let name = written.and_then(|name| parameters.fill(name).ok());
         parent.is_some_and(|parent| users.contains(&parent))
-            && !name.contains('$')
-            && !found.contains(name)
+            && name.is_some_and(|name| !found.contains(&name))
     })
 }

@@ -263,13 +263,13 @@ fn unlisted(folder: &Path, error: &io::Error) -> Absence {
 }
 
 /// Values of the scenario's own parameters, as far as they are plain.
-struct Parameters<'d> {
+pub(crate) struct Parameters<'d> {
     defaults: HashMap<&'d str, &'d str>,
 }
 
 impl<'d> Parameters<'d> {
     /// The scenario's global declarations; those of catalogs and maneuvers hold in no path.
-    fn of(document: &Document<'d>) -> Parameters<'d> {
+    pub(crate) fn of(document: &Document<'d>) -> Parameters<'d> {
         let global = document
             .root()
             .and_then(|root| root.child("ParameterDeclarations"));
@@ -287,7 +287,7 @@ impl<'d> Parameters<'d> {
     }
 
     /// Replaces every `$name` by its declared default.
-    fn fill(&self, text: &str) -> Result<String, Absence> {
+    pub(crate) fn fill(&self, text: &str) -> Result<String, Absence> {
         let mut filled = String::new();
         let mut rest = text;
         while let Some(at) = rest.find('$') {

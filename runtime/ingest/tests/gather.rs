@@ -114,7 +114,8 @@ fn a_map_that_is_broken_is_kept_and_said() {
 
 fn catalog(users: &str) -> String {
     format!(
-        "<OpenSCENARIO><CatalogLocations><VehicleCatalog><Directory path='/nowhere/v'/>\
+        "<OpenSCENARIO><ParameterDeclarations><ParameterDeclaration name='p' value='V'/>\
+         </ParameterDeclarations><CatalogLocations><VehicleCatalog><Directory path='/nowhere/v'/>\
          </VehicleCatalog></CatalogLocations><Entities><ScenarioObject name='a'>{users}\
          </ScenarioObject></Entities></OpenSCENARIO>"
     )
@@ -126,6 +127,10 @@ fn a_catalog_location_that_is_not_there_weighs_what_its_use_weighs() {
         ("", Level::Warning),
         (
             "<CatalogReference catalogName='V' entryName='car'/>",
+            Level::Error,
+        ),
+        (
+            "<CatalogReference catalogName='$p' entryName='car'/>",
             Level::Error,
         ),
         (
