@@ -121,22 +121,21 @@ fn literal<'d>(raw: &'d str, expected: Expected) -> Result<Value<'d>, Problem<'d
         return Ok(Value::Text(Cow::Borrowed(raw)));
     };
     data_type.parse(raw).ok_or_else(|| {
-        let why = match data_type {
+        let allowed = match data_type {
             DataType::DateTime => DateTime::parse(raw)
                 .err()
-                .map(|error| format!("; it {error}")),
+                .map(|error| format!(": it {error}")),
             _ => None,
         };
+        let allowed = allowed.unwrap_or_else(|| format!(", which is {}", data_type.allowed()));
         let shown = if raw.is_empty() {
             "an empty text".to_owned()
         } else {
             format!("`{raw}`")
         };
         let text = format!(
-            "{shown} is no value of type `{}`, which is {}{}",
-            data_type.word(),
-            data_type.allowed(),
-            why.unwrap_or_default()
+            "{shown} is no value of type `{}`{allowed}",
+            data_type.word()
         );
         Problem::new(ValueFaultKind::Declared, 0, text)
     })

@@ -185,7 +185,7 @@ fn violations_teach() {
     assert!(texts.contains(&"<road> lacks <lanes>"), "{texts:?}");
     assert!(
         texts[0].contains(
-            "\"abc\" is no value of length in <road>, expected: a number greater than 0.0"
+            "length=\"abc\" of <road> does not fit, it must be a number greater than 0.0 (double)"
         ),
         "{texts:?}"
     );

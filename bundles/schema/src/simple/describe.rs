@@ -13,30 +13,41 @@ pub struct Expectation {
 }
 
 impl Expectation {
-    /// Both in one sentence part; long lists of values are cut.
+    /// Both in one sentence part; long lists of values are cut. What stands for a value, parameters and
+    /// expressions, comes last.
     pub fn sentence(&self) -> String {
         const SHOWN: usize = 12;
         let mut parts = self.words.clone();
+        parts.sort_by_key(|words| words.starts_with(PARAMETER) || words.starts_with(EXPRESSION));
         if !self.values.is_empty() {
-            let mut list: Vec<String> = self
+            let list: Vec<String> = self
                 .values
                 .iter()
                 .take(SHOWN)
                 .map(|value| format!("\"{value}\""))
                 .collect();
-            if self.values.len() > SHOWN {
-                list.push(format!("{} more", self.values.len() - SHOWN));
-            }
             let one_of = if self.values.len() == 1 {
                 ""
             } else {
                 "one of "
             };
-            parts.insert(0, format!("{one_of}{}", list.join(", ")));
+            let more = match self.values.len().saturating_sub(SHOWN) {
+                0 => String::new(),
+                more => format!(" and {more} more"),
+            };
+            parts.insert(0, format!("{one_of}{}{more}", list.join(", ")));
         }
-        parts.join(", or ")
+        match parts.split_last() {
+            Some((last, rest)) if !rest.is_empty() => format!("{}, or {last}", rest.join(", ")),
+            _ => parts.concat(),
+        }
     }
 }
+
+/// How the words for a parameter of OpenSCENARIO begin.
+const PARAMETER: &str = "a parameter";
+/// How the words for an expression begin.
+pub(crate) const EXPRESSION: &str = "an expression";
 
 impl SimpleType {
     /// What a value of this type looks like.
@@ -85,14 +96,8 @@ impl Facets {
     fn words(&self, name: Option<&str>, builtin: Builtin) -> String {
         let mut words = match (name, self.patterns.is_empty()) {
             // Named patterns speak for themselves: OpenSCENARIO's `parameter` and `expression`.
-            (Some(name @ ("parameter" | "expression")), false) => {
-                let example = if name == "parameter" {
-                    "$name"
-                } else {
-                    "${…}"
-                };
-                return format!("{} {name} ({example})", article(name));
-            }
+            (Some("parameter"), false) => return format!("{PARAMETER} ($name)"),
+            (Some("expression"), false) => return format!("{EXPRESSION} (${{…}})"),
             _ => noun(builtin).to_owned(),
         };
         words += &range(self.lowest.as_ref(), self.highest.as_ref());
@@ -107,15 +112,10 @@ impl Facets {
                 words += &format!(" of length {}{most}", least.unwrap_or(0));
             }
         }
+        if let Some(name) = standard_name(builtin) {
+            words += &format!(" ({name})");
+        }
         words
-    }
-}
-
-fn article(word: &str) -> &'static str {
-    if word.starts_with(['a', 'e', 'i', 'o', 'u']) {
-        "an"
-    } else {
-        "a"
     }
 }
 
@@ -140,6 +140,21 @@ fn range(lowest: Option<&Bound>, highest: Option<&Bound>) -> String {
         (Some(low), Some(high)) => format!("{low} and{high}"),
         (low, high) => low.or(high).unwrap_or_default(),
     }
+}
+
+/// What the standards call the types that authors know by their names.
+fn standard_name(builtin: Builtin) -> Option<&'static str> {
+    Some(match builtin {
+        Builtin::Boolean => "boolean",
+        Builtin::Float => "float",
+        Builtin::Double => "double",
+        Builtin::Integer => "integer",
+        Builtin::Int => "int",
+        Builtin::UnsignedInt => "unsignedInt",
+        Builtin::UnsignedShort => "unsignedShort",
+        Builtin::DateTime => "dateTime",
+        _ => return None,
+    })
 }
 
 fn noun(builtin: Builtin) -> &'static str {

@@ -9,6 +9,7 @@ use std::borrow::Cow;
 
 pub use builtin::{Builtin, Order};
 pub(crate) use builtin::{is_name_char, is_name_start};
+pub(crate) use describe::EXPRESSION;
 pub use describe::Expectation;
 pub(crate) use number::{Digits, float_value, is_decimal, is_float, is_integer};
 

@@ -9,7 +9,7 @@ use crate::defects;
 use crate::model::{AttributeUse, ElementDecl, Model, Schema};
 use crate::names::NameId;
 use crate::similar::closest;
-use crate::simple::SimpleType;
+use crate::simple::{EXPRESSION, SimpleType};
 use crate::work::steps;
 
 /// A violation without its place.
@@ -341,9 +341,9 @@ pub(super) fn invalid_value(
     let suggestion =
         closest(value.trim(), expectation.values.iter().map(String::as_str)).map(str::to_owned);
     let text = format!(
-        "{} is no value of {} in <{}>, expected: {}{}",
-        quote(value),
+        "{}={} of <{}> does not fit, it must be {}{}",
         attribute.name(),
+        quote(value),
         node.name(),
         expectation.sentence(),
         foreign_to_expressions(value, &expectation.words)
@@ -357,9 +357,7 @@ pub(super) fn invalid_value(
 
 /// What keeps a value from being the expression of OpenSCENARIO as which it is meant.
 fn foreign_to_expressions(value: &str, expected: &[String]) -> String {
-    let takes_one = expected
-        .iter()
-        .any(|words| words.starts_with("an expression"));
+    let takes_one = expected.iter().any(|words| words.starts_with(EXPRESSION));
     let inner = value.strip_prefix("${").filter(|_| takes_one);
     let Some(inner) = inner.map(|inner| inner.strip_suffix('}').unwrap_or(inner)) else {
         return String::new();
@@ -385,7 +383,7 @@ pub(super) fn invalid_text(
     let suggestion =
         closest(value.trim(), expectation.values.iter().map(String::as_str)).map(str::to_owned);
     let text = format!(
-        "the text {} of <{}> is no value, expected: {}",
+        "the text {} of <{}> does not fit, it must be {}",
         quote(value),
         node.name(),
         expectation.sentence()
@@ -464,7 +462,7 @@ pub(super) fn missing_attribute(
         .map(|ty| ty.expectation(schema).sentence())
         .unwrap_or_default();
     let text = format!(
-        "<{}> lacks its attribute {name}, whose value is {value}",
+        "<{}> lacks the attribute {name}, which must be {value}",
         node.name()
     );
     Wording::new("", text).expecting(vec![name.to_owned()])

@@ -141,10 +141,12 @@ pub(crate) fn faults<'m, 'd>(
 
 /// Says one fault.
 pub(crate) fn say<'s, 'd>(fault: &ValueFault<'_>, found: &'s mut Sink<'d>) -> Finding<'s, 'd> {
-    found.issue(
-        fault.attribute,
-        format!("{}: {}", written(fault.attribute), fault.text),
-    )
+    let text = match fault.kind {
+        // What is written is what is said.
+        ValueFaultKind::Declared => format!("the declared value {}", fault.text),
+        _ => format!("{}: {}", written(fault.attribute), fault.text),
+    };
+    found.issue(fault.attribute, text)
 }
 
 /// The attribute as it is written, for the beginning of a text.
