@@ -110,6 +110,12 @@ impl<'a> Search<'a> {
             return;
         };
         let word = attribute.value().trim();
+        if word.starts_with("${") && !value.takes_expressions() {
+            self.note(node, Member::Expression(name), || {
+                thing(format!("an expression as `{name}` of `{}`", node.name()))
+            });
+            return;
+        }
         let words = value.words().unwrap_or(&[]);
         if !words.is_empty() && words.iter().all(|known| **known != *word) {
             self.note(node, Member::Word(name, word), || {

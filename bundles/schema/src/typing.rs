@@ -102,6 +102,8 @@ pub enum Member<'a> {
     Attribute(&'a str),
     /// An attribute that may say this word.
     Word(&'a str, &'a str),
+    /// An attribute that may be an expression.
+    Expression(&'a str),
 }
 
 /// The first version after `version` in which the type of this name has something; `None` when it
@@ -141,6 +143,10 @@ fn has(schema: &'static Schema, class: &str, member: Member<'_>) -> Option<bool>
             let words = ValueType { schema, simple }.words()?;
             words.iter().any(|one| **one == *word)
         }
+        Member::Expression(name) => {
+            let simple = schema.simple.get(attribute(name)?.value as usize)?;
+            ValueType { schema, simple }.takes_expressions()
+        }
     })
 }
 
@@ -155,6 +161,17 @@ impl ValueType {
     /// The schema's name for it, `Double`.
     pub fn name(&self) -> Option<&'static str> {
         self.simple.name.as_deref()
+    }
+
+    /// Whether a value may be an expression of OpenSCENARIO.
+    pub fn takes_expressions(&self) -> bool {
+        let Variety::Union(members) = &self.simple.variety else {
+            return false;
+        };
+        let mut members = members
+            .iter()
+            .filter_map(|member| self.schema.simple.get(*member as usize));
+        members.any(|member| member.name.as_deref() == Some("expression"))
     }
 
     /// The words that are allowed, when it is an enumeration: its own, or those of the first of its

@@ -1,4 +1,5 @@
-use qcbus_openscenario::Scenario;
+use qcbus_document::Attribute;
+use qcbus_openscenario::{DataType, Scenario};
 use qcbus_sdk::{Place, Rule, Sink};
 
 use crate::families::values;
@@ -15,6 +16,13 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    // Where the schema takes no expression, the version is told by its rule.
+    if scenario
+        .written_expressions()
+        .any(|attribute| is_foreign(scenario, attribute))
+    {
+        return;
+    }
     let mut expressions = scenario.written_expressions();
     let Some(first) = expressions.next() else {
         return;
@@ -36,4 +44,12 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             "the version",
         );
     }
+}
+
+/// Whether the schema demands a value that no expression is.
+fn is_foreign<'d>(scenario: &Scenario<'d>, attribute: Attribute<'d>) -> bool {
+    let element = scenario.element(attribute.node());
+    let value = element.value_type(attribute.name());
+    let data_type = value.and_then(|value| DataType::of_schema(value.name()?));
+    data_type.is_some_and(|data_type| data_type != DataType::String)
 }
