@@ -167,13 +167,18 @@ impl<'d> Context<'d> {
             .flat_map(|block| block.children_named("ParameterDeclaration"));
         let mut later = later.skip_while(|other| *other != node);
         let is_it = |name: &str| name.strip_prefix('$').unwrap_or(name) == problem.name;
-        if later.any(|other| other.attr("name").is_some_and(is_it)) {
+        let later = later.find(|other| other.attr("name").is_some_and(is_it));
+        if let Some(later) = later {
             problem.kind = ValueFaultKind::Order;
-            problem.text = format!(
-                "`${}` is declared only here or further down; a declaration may use parameters that are \
-                 declared before it",
-                problem.name
-            );
+            let name = &problem.name;
+            let found = if later == node {
+                format!("`${name}` is this very parameter")
+            } else {
+                let row = later.position().row;
+                format!("`${name}` is declared only further down, in row {row}")
+            };
+            problem.text =
+                format!("{found}; a declaration may use parameters that are declared before it");
         }
     }
 
