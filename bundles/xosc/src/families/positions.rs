@@ -196,6 +196,18 @@ pub(crate) fn owner<'m, 'd>(kind: Element<'m, 'd>) -> Option<Element<'m, 'd>> {
     kind.parent()?.parent()
 }
 
+/// Ids and names in the order in which people look for them: numbers by their value, before words.
+pub(crate) fn sorted<'i>(ids: impl Iterator<Item = &'i str>) -> Vec<&'i str> {
+    let key = |id: &&str| {
+        id.parse::<i64>()
+            .map_or((true, 0), |number| (false, number))
+    };
+    let mut ids: Vec<&str> = ids.collect();
+    ids.sort_unstable_by(|one, other| key(one).cmp(&key(other)).then_with(|| one.cmp(other)));
+    ids.dedup();
+    ids
+}
+
 /// Some ids for a text: the first few, and how many more there are.
 pub(crate) fn listed<'i>(ids: impl Iterator<Item = &'i str>) -> String {
     const MOST: usize = 8;

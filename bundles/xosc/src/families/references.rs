@@ -4,6 +4,7 @@ use foldhash::HashSet;
 use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::Sink;
 
+use super::positions::{listed, sorted};
 use crate::model::About;
 
 /// Attributes that name one entity, after the standard's table of entity type constraints.
@@ -56,12 +57,12 @@ pub(crate) fn unresolved<'n>(
 ) {
     // A hint looks at all names; whoever has so many faults has another problem than a slip.
     let hint = if found.count() < MOST_HINTS {
-        hint(name, names)
+        hint_or_all(name, names)
     } else {
         String::new()
     };
     let text = format!(
-        "`{}` refers to the {what} {}, but there is none{hint}",
+        "`{}` refers to the {what} {}, but there is none of this name{hint}",
         reference.name(),
         quoted(reference, attribute, name)
     );
@@ -81,6 +82,21 @@ pub(crate) fn hint<'n>(name: &str, names: impl Iterator<Item = &'n str>) -> Stri
     match near(name, names) {
         Some(near) => format!("; `{near}` is there, names must be equal to the letter"),
         None => String::new(),
+    }
+}
+
+/// What may have been meant, or else what there is: some of it.
+pub(crate) fn hint_or_all<'n>(name: &str, names: impl Iterator<Item = &'n str>) -> String {
+    let names: Vec<&str> = names.filter(|name| !name.is_empty()).collect();
+    let hint = hint(name, names.iter().copied());
+    if !hint.is_empty() {
+        return hint;
+    }
+    let names = sorted(names.into_iter());
+    match names.as_slice() {
+        [] => String::new(),
+        [only] => format!("; there is only `{only}`"),
+        all => format!("; there are {}", listed(all.iter().copied())),
     }
 }
 

@@ -1,8 +1,9 @@
+use qcbus_document::Node;
 use qcbus_openscenario::{CatalogKind, Element, Resolution, Scenario};
 use qcbus_sdk::{Backport, Level, Rule, Sink};
 
 use crate::families::catalogs::{self, Fault, Once};
-use crate::families::references::{hint, quoted};
+use crate::families::references::{hint_or_all, quoted};
 use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -73,7 +74,7 @@ fn catalog(reference: Element<'_, '_>, count: u32, open: bool, found: &mut Sink<
     } else if names.is_empty() {
         text.push_str(", of which no file is a catalog");
     } else {
-        text.push_str(&hint(&name, names.iter().copied()));
+        text.push_str(&hint_or_all(&name, names.iter().copied()));
     }
     text.push_str(&catalogs::further(count));
     let finding = found.about(reference, "catalogName", text);
@@ -98,10 +99,22 @@ fn entry(reference: Element<'_, '_>, count: u32, found: &mut Sink<'_>) {
         "the catalog `{}` has no entry {}{}",
         catalog.attr("name").unwrap_or(""),
         quoted(reference, "entryName", &name),
-        hint(&name, names.iter().copied())
+        elsewhere(reference, &name).unwrap_or_else(|| hint_or_all(&name, names.iter().copied()))
     );
     text.push_str(&catalogs::further(count));
     found
         .about(reference, "entryName", text)
         .at(*catalog, "the catalog");
+}
+
+/// The other catalog that has the entry.
+fn elsewhere(reference: Element<'_, '_>, name: &str) -> Option<String> {
+    let kinds = catalogs::kinds(reference);
+    let fits = |entry: Node<'_>| {
+        entry.attr("name") == Some(name) && kinds.iter().any(|kind| entry.is(kind.element()))
+    };
+    let mut all = reference.scenario().catalogs();
+    let (_, catalog) = all.find(|(_, catalog)| catalog.children().any(fits))?;
+    let catalog = catalog.attr("name").filter(|name| !name.is_empty())?;
+    Some(format!("; the catalog `{catalog}` has one"))
 }

@@ -2,8 +2,9 @@ use qcbus_opendrive::{Road, RoadMap, SectionRef};
 use qcbus_openscenario::{Element, LaneAt, Network, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
-use crate::families::positions::{self, ON_ROAD, find_lane, lane_id, listed, metres};
+use crate::families::positions::{self, ON_ROAD, find_lane, lane_id, listed, metres, sorted};
 use crate::families::references::quoted;
+use crate::families::values::short;
 use crate::model::{About as _, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -15,6 +16,9 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
+/// Roads that are named in a text.
+const MOST_ROADS: usize = 8;
+
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let network = match scenario.network() {
         Network::Map(network) => network,
@@ -25,7 +29,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
 }
 
 fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    let roads = listed(map.roads().iter().map(Road::id));
+    let roads = roads(map);
     for name in ON_ROAD {
         for position in scenario.elements_everywhere(name) {
             let Some(id) = position.text("roadId") else {
@@ -39,6 +43,23 @@ fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
                 lane(position, road, found);
             }
         }
+    }
+}
+
+/// The first of the roads, with their names.
+fn roads(map: &RoadMap<'_>) -> String {
+    let ids = sorted(map.roads().iter().map(Road::id));
+    let named = ids.iter().take(MOST_ROADS).map(|id| {
+        let name = map.road(id).and_then(|road| road.node().attr("name"));
+        match name.filter(|name| !name.is_empty() && *name != *id) {
+            Some(name) => format!("`{id}` ({})", short(name)),
+            None => format!("`{id}`"),
+        }
+    });
+    let named: Vec<String> = named.collect();
+    match ids.len().saturating_sub(MOST_ROADS) {
+        0 => named.join(", "),
+        more => format!("{} and {more} more", named.join(", ")),
     }
 }
 
@@ -74,8 +95,10 @@ fn no_road(
 ) {
     let there = if roads.is_empty() {
         "has no roads at all".to_owned()
+    } else if map.roads().len() == 1 {
+        format!("has only the road {roads}")
     } else {
-        format!("has {roads}")
+        format!("has the roads {roads}")
     };
     let text = format!(
         "`{}` is on the road {}, but the road network {there}",
