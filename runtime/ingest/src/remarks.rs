@@ -61,10 +61,10 @@ fn missing_reference(root: &Document<'_>, missing: &MissingDocument) -> Remark {
         "" => String::new(),
         path if *why == Absence::NotThere && !reference.trim_start().starts_with('/') => {
             format!(
-                "; it was looked for at {path}, because paths start at the directory of the file"
+                "; it was looked for at `{path}`, because paths start at the directory of the file"
             )
         }
-        path => format!("; it was looked for at {path}"),
+        path => format!("; it was looked for at `{path}`"),
     };
     let text = format!("{what} `{reference}` {why}{looked}");
     let open = format!("where {what} `{reference}` leads is not known");
