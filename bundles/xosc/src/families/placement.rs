@@ -40,9 +40,12 @@ pub(crate) fn starts<'m, 'd>(scenario: &'m Scenario<'d>) -> Vec<Start<'m, 'd>> {
 /// The names of all entities that something places at some time; `None` when that is not known.
 pub(crate) fn placed(scenario: &Scenario<'_>) -> Option<HashSet<String>> {
     let mut placed = trailers(scenario)?;
-    let init = scenario.root().path(&["Storyboard", "Init", "Actions"]);
+    // That there is no `Init` is the schema's finding.
+    let init = scenario.root().path(&["Storyboard", "Init"])?;
     // What a simulator makes of an action of its own nobody else knows.
-    let is_open = init.is_some_and(|init| init.child("UserDefinedAction").is_some());
+    let is_open = init
+        .child("Actions")
+        .is_some_and(|actions| actions.child("UserDefinedAction").is_some());
     if is_open || !scenario.storyboard().is_complete() {
         return None;
     }

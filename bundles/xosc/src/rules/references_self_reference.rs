@@ -92,7 +92,9 @@ fn actor<'m, 'd>(
     let (Some(name), Some(cast)) = (action.text(attribute), casts.of(action)) else {
         return;
     };
-    if let Some(actor) = cast.by_name.get(&*name) {
+    if let Some(actor) = cast.by_name.get(&*name)
+        && action.scenario().entities().contains(&name)
+    {
         let text = format!(
             "the actor {} is to {what}",
             quoted(action, attribute, &name)
@@ -117,6 +119,7 @@ fn triggering(condition: Element<'_, '_>, always: &str, found: &mut Sink<'_>) {
         .map(|one| one.text("entityRef"));
     if let (Some(Some(only)), None) = (names.next(), names.next())
         && only == name
+        && condition.scenario().entities().contains(&name)
     {
         let text = format!(
             "the condition compares {} with itself: {always}",
