@@ -77,11 +77,11 @@ fn look_up<'d>(
         }
         (Some(first), Some(second)) => {
             let text = format!(
-                "{} may be any of {} elements of type `{}`; the name must lead to one, in front of it may \
-                 stand those of the elements around it: `outer::{name}`",
+                "{} may be any of {} elements of type `{}`; the name must lead to one{}",
                 quoted(condition, "storyboardElementRef", name),
                 of_kind.len(),
-                kind.word()
+                kind.word(),
+                paths(scenario, first, second)
             );
             let around = known
                 .entry((name.to_owned(), kind))
@@ -100,6 +100,35 @@ fn look_up<'d>(
         }
         _ => {}
     }
+}
+
+/// How two elements of one name can be told apart, where their names and those around them do.
+fn paths(scenario: &Scenario<'_>, first: &StoryElement<'_>, second: &StoryElement<'_>) -> String {
+    let paths = path(scenario, first).zip(path(scenario, second));
+    paths.map_or_else(String::new, |(first, second)| {
+        format!(", with the names of the elements around it in front: `{first}` or `{second}`")
+    })
+}
+
+/// The shortest path that leads to an element alone.
+fn path(scenario: &Scenario<'_>, one: &StoryElement<'_>) -> Option<String> {
+    let storyboard = scenario.storyboard();
+    let mut path = one.name()?.to_owned();
+    let mut around = one.parent();
+    while let Some(outer) = around.and_then(|at| storyboard.elements().get(at)) {
+        path = format!("{}::{path}", outer.name()?);
+        let found = storyboard.find(&path);
+        if found
+            .iter()
+            .filter(|other| other.kind() == one.kind())
+            .count()
+            == 1
+        {
+            return Some(path);
+        }
+        around = outer.parent();
+    }
+    None
 }
 
 fn nowhere<'d>(
