@@ -553,7 +553,13 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
             quick_xml::Error::Syntax(error) => error.to_string(),
             error => error.to_string(),
         };
-        self.fault(file, code, at, &text)?;
+        match open_quote(&file.text[at..]) {
+            Some(quote) if text.starts_with("attribute value") => {
+                let text = "the attribute's value has no closing quote";
+                self.fault(file, code, at + quote, text)?;
+            }
+            _ => self.fault(file, code, at, &text)?,
+        }
         Err(Stop::File)
     }
 
@@ -692,4 +698,20 @@ pub(super) fn offset(position: u64) -> usize {
 #[inline]
 fn narrow(at: usize) -> u32 {
     u32::try_from(at).unwrap_or(u32::MAX)
+}
+
+/// Where the value begins in a tag that has no closing quote: the first whose text up to the next quote
+/// has a `<`, which no value may have, or that goes on to the end.
+fn open_quote(tag: &str) -> Option<usize> {
+    let mut at = 0;
+    loop {
+        let rest = &tag[at..];
+        let open = at + rest.find(['"', '\''])?;
+        let quote = tag.as_bytes().get(open).copied()?;
+        let value = &tag[open + 1..];
+        match value.find(char::from(quote)) {
+            Some(len) if !value[..len].contains('<') => at = open + len + 2,
+            _ => return Some(open),
+        }
+    }
 }
