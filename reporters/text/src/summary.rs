@@ -159,8 +159,30 @@ fn groups(result: &ResultMessage, options: &Options) -> Vec<Group> {
             }
         }
     }
+    if !options.inapplicable {
+        groups = by_cause(groups);
+    }
     groups.sort_by_key(|group| group.status != Status::Error);
     groups
+}
+
+/// Checkers that wait for one that was skipped, with those that were skipped for what stopped that one.
+fn by_cause(groups: Vec<Group>) -> Vec<Group> {
+    let mut merged: Vec<Group> = Vec::new();
+    for group in groups {
+        let waits_for = group.reason.strip_suffix("` was skipped.");
+        let waits_for = waits_for.and_then(|rest| rest.strip_prefix('`'));
+        let stopped = waits_for.and_then(|id| {
+            let is_it = |name: &String| name.rsplit('/').next() == Some(id);
+            let mut earlier = merged.iter_mut();
+            earlier.find(|other| other.status == group.status && other.checkers.iter().any(is_it))
+        });
+        match stopped {
+            Some(other) => other.checkers.extend(group.checkers),
+            None => merged.push(group),
+        }
+    }
+    merged
 }
 
 /// A summary without its status, which is said already, and without the count that pooling and
