@@ -18,7 +18,7 @@ pub struct Fault<'a> {
 pub enum FaultGroup {
     /// The text breaks XML's own grammar.
     NotWellFormed,
-    /// A document type declaration, which qcbus refuses (it can pull in files and blow up).
+    /// A document type declaration of more than a name, which qcbus refuses (it can pull in files and blow up).
     Doctype,
     /// Bytes and their declared encoding.
     Encoding,
@@ -102,7 +102,7 @@ fault_codes! {
     /// A prefix that no `xmlns:` binds.
     UnboundPrefix = 17, "unbound-prefix", NotWellFormed, true;
 
-    /// A document type declaration.
+    /// A document type declaration that says more than a name, or stands where none may.
     Doctype = 32, "doctype", Doctype, true;
 
     /// Bytes that do not decode in the encoding that they should have.

@@ -47,6 +47,8 @@ fn well_formed_documents_have_no_fault() {
         "<a xml:space='preserve'>x &amp; y &#65; <![CDATA[<&]]]> ]]</a>",
         "<straße ä='ö'><b><b/></b></straße>",
         "<a><?pi?><!----></a>",
+        "<?xml version='1.0'?>\n<!DOCTYPE a>\n<a/>",
+        "<!-- x --><!DOCTYPE  a-b\n ><a/>",
         "<a>\u{7F}\u{85}\u{FFFD}</a>",
     ] {
         assert_eq!(faults(text), [], "{text}");
@@ -104,6 +106,14 @@ fn each_violation_is_found_at_its_place() {
         ("<a>\n <p:b/></a>", F::UnboundPrefix, 2, 3),
         ("<a p:b=''/>", F::UnboundPrefix, 1, 4),
         ("<!DOCTYPE a [<!ENTITY x 'y'>]><a>&x;</a>", F::Doctype, 1, 1),
+        ("<!DOCTYPE a []><a/>", F::Doctype, 1, 1),
+        ("<!DOCTYPE a SYSTEM 'a.dtd'><a/>", F::Doctype, 1, 1),
+        ("<!DOCTYPE a PUBLIC 'a' 'a.dtd'><a/>", F::Doctype, 1, 1),
+        ("<!DOCTYPE a>\n<!DOCTYPE a><a/>", F::Doctype, 2, 1),
+        ("<a/>\n<!DOCTYPE a>", F::Doctype, 2, 1),
+        ("<a>\n<!DOCTYPE a></a>", F::Doctype, 2, 1),
+        ("<!DOCTYPE 1><a/>", F::Doctype, 1, 1),
+        ("<!DOCTYPE a><a>&x;</a>", F::BadReference, 1, 16),
     ] {
         assert_eq!(faults(text), [(code, row, column)], "{text:?}");
     }

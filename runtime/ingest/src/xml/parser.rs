@@ -127,6 +127,7 @@ struct Parser<'p, 't, S> {
     included: u32,
     /// Includes are spliced in OpenDRIVE only.
     splices: bool,
+    seen_doctype: bool,
     refused_doctype: bool,
     run: Run,
     prefixes: Prefixes<'t>,
@@ -146,6 +147,7 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
             chain: Vec::new(),
             included: 0,
             splices: false,
+            seen_doctype: false,
             refused_doctype: false,
             run: Run::default(),
             prefixes: Prefixes::default(),
@@ -213,7 +215,7 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
                 Ok(Event::Comment(_)) => self.comment(file, from, to)?,
                 Ok(Event::PI(_)) => self.instruction(file, from, to)?,
                 Ok(Event::Decl(_)) => self.declaration(file, from, to, from == mark)?,
-                Ok(Event::DocType(_)) => self.doctype(file, from)?,
+                Ok(Event::DocType(_)) => self.doctype(file, from, to, seen_root)?,
                 Ok(Event::Eof) => return self.end_of_file(file, seen_root),
                 Err(error) => return self.broken(file, from, &error),
             }

@@ -62,7 +62,19 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
         }
     }
 
-    pub(super) fn doctype(&mut self, file: File<'t>, from: usize) -> Result<(), Stop> {
+    /// A document type declaration. One that only names the root says nothing and does no harm, and
+    /// tools write it; whatever declares or refers to something is refused.
+    pub(super) fn doctype(
+        &mut self,
+        file: File<'t>,
+        from: usize,
+        to: usize,
+        seen_root: bool,
+    ) -> Result<(), Stop> {
+        let first = !std::mem::replace(&mut self.seen_doctype, true);
+        if first && !seen_root && self.stack.len() == file.floor && is_bare(&file.text[from..to]) {
+            return Ok(());
+        }
         if std::mem::replace(&mut self.refused_doctype, true) {
             return Ok(());
         }
@@ -70,6 +82,17 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
                     neither it nor its entities are read";
         self.fault(file, FaultCode::Doctype, from, text)
     }
+}
+
+/// Whether a document type declaration has nothing but a name: no subset, and no reference to one.
+fn is_bare(declaration: &str) -> bool {
+    let inside = declaration
+        .strip_prefix("<!DOCTYPE")
+        .and_then(|rest| rest.strip_suffix('>'))
+        .filter(|inside| inside.starts_with([' ', '\t', '\n', '\r']));
+    inside.is_some_and(|inside| {
+        name_with_colon(inside.trim_matches([' ', '\t', '\n', '\r'])).is_some()
+    })
 }
 
 /// What is wrong with the inside of an XML declaration, which is `version`, `encoding`,
