@@ -100,47 +100,65 @@ impl RoadsNearby {
     /// The roads on whose lanes a place lies, in the order of the map, which is the one that this was
     /// made of.
     pub fn roads_at<'m, 'r>(&self, map: &'m RoadMap<'r>, x: f64, y: f64) -> Vec<&'m Road<'r>> {
-        let reach = self.widest.min(10.0 * CELL) + self.step;
-        let mut roads: Vec<usize> = Vec::new();
-        for near in self.around(x, y, reach) {
-            if roads.contains(&near.road) {
-                continue;
-            }
-            let (along, _) = seen_from(near.pose, x, y);
-            if along.abs() <= self.step && is_on(map, near.road, near.s + along, x, y) {
-                roads.push(near.road);
-            }
-        }
+        let stations = self.stations_at(map, x, y);
+        let mut roads: Vec<usize> = stations.map(|(road, _, _)| road).collect();
         roads.sort_unstable();
+        roads.dedup();
         let roads = roads.into_iter();
         roads.filter_map(|at| map.roads().get(at)).collect()
     }
+
+    /// The road of the map on whose lanes a place lies, with the place's s and t on it; `None` where it
+    /// is none, or more than one.
+    pub fn only_road_at<'m, 'r>(
+        &self,
+        map: &'m RoadMap<'r>,
+        x: f64,
+        y: f64,
+    ) -> Option<(&'m Road<'r>, f64, f64)> {
+        let mut all = self.stations_at(map, x, y);
+        let (road, s, t) = all.next()?;
+        let is_only = all.all(|(other, at, _)| other == road && (at - s).abs() < 0.1);
+        let road = map.roads().get(road).filter(|_| is_only)?;
+        Some((road, s, t))
+    }
+
+    /// Where a place lies on lanes: the road, s and t, perhaps more than once.
+    fn stations_at(
+        &self,
+        map: &RoadMap<'_>,
+        x: f64,
+        y: f64,
+    ) -> impl Iterator<Item = (usize, f64, f64)> {
+        let reach = self.widest.min(10.0 * CELL) + self.step;
+        self.around(x, y, reach).filter_map(move |near| {
+            let (along, _) = seen_from(near.pose, x, y);
+            let is_near = along.abs() <= self.step;
+            let road = map.roads().get(near.road).filter(|_| is_near)?;
+            let (s, t) = on(road, near.s + along, x, y)?;
+            Some((near.road, s, t))
+        })
+    }
 }
 
-/// Whether a place lies well within the lanes of a road near a station.
-fn is_on(map: &RoadMap<'_>, road: usize, near: f64, x: f64, y: f64) -> bool {
+/// The s and t of a place that lies well within the lanes of a road near a station.
+fn on(road: &Road<'_>, near: f64, x: f64, y: f64) -> Option<(f64, f64)> {
     const WITHIN: f64 = 0.25;
-    let Some(road) = map.roads().get(road) else {
-        return false;
-    };
-    let Some(length) = road.length() else {
-        return false;
-    };
+    let length = road.length()?;
     let mut s = near;
     for _ in 0..4 {
-        let Some(found) = sample(road, s.clamp(0.0, length)) else {
-            return false;
-        };
+        let found = sample(road, s.clamp(0.0, length))?;
         let (along, t) = seen_from(found.pose, x, y);
         if along.abs() < 0.01 {
-            return t > found.right + WITHIN && t < found.left - WITHIN;
+            let is_within = t > found.right + WITHIN && t < found.left - WITHIN;
+            return is_within.then_some((found.s, t));
         }
         s = found.s + along;
         if s < 0.0 || s > length {
-            return false;
+            return None;
         }
     }
-    false
+    None
 }
 
 fn sample(road: &Road<'_>, s: f64) -> Option<Sample> {

@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 
 use foldhash::{HashMap, HashSet};
+use qcbus_opendrive::RoadMap;
 use qcbus_openscenario::{Element, EntityKind, Scenario};
 
-use crate::families::placement;
+use crate::families::origins::{Origins, or};
+use crate::families::placement::{self, Start};
 
 /// A vehicle or pedestrian where `Init` places it at last.
 pub(crate) struct Body<'m, 'd> {
@@ -38,19 +40,34 @@ enum Standing {
 /// The bodies whose boxes and places are known, in document order. Trailers stand where their vehicle
 /// is; who is added later may come when the place is free.
 pub(crate) fn bodies<'m, 'd>(scenario: &'m Scenario<'d>) -> Vec<Body<'m, 'd>> {
+    let on_map = scenario.on_map(|map| bodies_on(scenario, Some(map)));
+    on_map.unwrap_or_else(|| bodies_on(scenario, None))
+}
+
+fn bodies_on<'m, 'd>(scenario: &'m Scenario<'d>, map: Option<&RoadMap<'_>>) -> Vec<Body<'m, 'd>> {
     let (Some(trailers), Some(added)) = (placement::trailers(scenario), added(scenario)) else {
         return Vec::new();
     };
     let mut last: HashMap<String, usize> = HashMap::default();
-    let starts = placement::starts(scenario);
-    for (at, start) in starts.iter().enumerate() {
+    let origins = Origins::of(scenario, map);
+    for (at, start) in origins.starts.iter().enumerate() {
         last.insert(start.name.clone(), at);
     }
     let mut bodies = Vec::new();
-    for (at, start) in starts.into_iter().enumerate() {
+    for (at, start) in origins.starts.iter().enumerate() {
         let apart = !trailers.contains(&start.name) && !added.contains(&start.name);
         if apart && last.get(&start.name) == Some(&at) {
-            bodies.extend(body(scenario, start.name, start.position));
+            // On a map all are compared in the world, which roads in a junction share.
+            let standing = match origins.place(at) {
+                Some(place) => Some(Standing::World {
+                    x: place.x,
+                    y: place.y,
+                    z: place.z,
+                    h: place.heading,
+                }),
+                None => place(start.position),
+            };
+            bodies.extend(standing.and_then(|standing| body(scenario, start, standing)));
         }
     }
     bodies
@@ -68,10 +85,10 @@ fn added(scenario: &Scenario<'_>) -> Option<HashSet<String>> {
 
 fn body<'m, 'd>(
     scenario: &'m Scenario<'d>,
-    name: String,
-    position: Element<'m, 'd>,
+    start: &Start<'m, 'd>,
+    place: Standing,
 ) -> Option<Body<'m, 'd>> {
-    let entity = scenario.entities().object(&name)?;
+    let entity = scenario.entities().object(&start.name)?;
     if !matches!(entity.kind(), EntityKind::Vehicle | EntityKind::Pedestrian) {
         return None;
     }
@@ -82,32 +99,17 @@ fn body<'m, 'd>(
         return None;
     }
     Some(Body {
-        place: place(position)?,
+        place,
         half,
         center: (center.number("x")?, center.number("y")?),
         height: size.number("height")?,
-        name,
-        position,
+        name: start.name.clone(),
+        position: start.position,
     })
-}
-
-/// A number that need not be there; `None` when it is there and not known.
-fn or(element: Element<'_, '_>, name: &str, otherwise: f64) -> Option<f64> {
-    if element.has(name) {
-        element.number(name)
-    } else {
-        Some(otherwise)
-    }
 }
 
 fn place(position: Element<'_, '_>) -> Option<Standing> {
     match position.name() {
-        "WorldPosition" => Some(Standing::World {
-            x: position.number("x")?,
-            y: position.number("y")?,
-            z: position.number("z"),
-            h: or(position, "h", 0.0)?,
-        }),
         "LanePosition" => {
             let lane = position.integer("laneId")?;
             let turned = position.child("Orientation").is_some();

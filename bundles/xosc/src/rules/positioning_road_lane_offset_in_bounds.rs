@@ -1,8 +1,11 @@
-use qcbus_opendrive::{Road, RoadMap, Side};
+use foldhash::HashSet;
+use qcbus_opendrive::{LaneRef, Road, RoadMap, Side};
 use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
+use crate::families::origins::{OnRoad, Origins};
 use crate::families::positions::{ON_ROAD, lane_of, metres, road_of, section_of, shown, station};
+use crate::families::relative::{self, Reach};
 use crate::model::{About as _, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -55,6 +58,112 @@ fn look(scenario: &Scenario<'_>, map: Option<&RoadMap<'_>>, found: &mut Sink<'_>
             }
         }
     }
+    if let Some(map) = map {
+        relative_to_others(scenario, map, slack, found);
+    }
+}
+
+/// The positions of `Init` that are relative to where another entity begins.
+fn relative_to_others(
+    scenario: &Scenario<'_>,
+    map: &RoadMap<'_>,
+    slack: f64,
+    found: &mut Sink<'_>,
+) {
+    let origins = Origins::of(scenario, Some(map));
+    let mut reach = Reach::of(map);
+    let mut said = HashSet::default();
+    for (at, start) in origins.starts.iter().enumerate() {
+        let position = start.position;
+        let is_along = ["RelativeLanePosition", "RelativeRoadPosition"].contains(&position.name());
+        if !is_along || !said.insert(position.node().offset()) {
+            continue;
+        }
+        let Some((name, base)) = origins.base(position) else {
+            continue;
+        };
+        let Some((on, ways)) = base
+            .on
+            .and_then(|on| Some((on, relative::ways(position, on)?)))
+        else {
+            continue;
+        };
+        if let Some(place) = origins.place(at).and_then(|place| place.on) {
+            beside_after_all(position, place, slack, found);
+            continue;
+        }
+        // The farthest that one gets on any way on which it is understood.
+        let missing = ways.iter().map(|ds| {
+            let reach = reach.as_mut()?;
+            let most = reach.from(on.road, on.s, *ds > 0.0)?;
+            (ds.abs() > most + slack + most * 1e-6).then_some(most)
+        });
+        let Some(most) = missing.collect::<Option<Vec<f64>>>() else {
+            continue;
+        };
+        let Some((ds, most)) = ways.first().zip(most.first()) else {
+            continue;
+        };
+        let direction = if *ds > 0.0 { "along" } else { "against" };
+        let text = format!(
+            "`{}` leads {} {direction} the road `{}` from s = {}, where `{name}` begins, but the roads there end \
+             after {}",
+            position.name(),
+            shown(position, "ds", &metres(ds.abs())),
+            on.road.id(),
+            metres(on.s),
+            metres(*most)
+        );
+        found
+            .about(position, "ds", text)
+            .at(on.road.node(), "the road");
+    }
+}
+
+/// Looks whether a relative position lies within its lane or its road's lanes.
+fn beside_after_all(
+    position: Element<'_, '_>,
+    place: OnRoad<'_, '_>,
+    slack: f64,
+    found: &mut Sink<'_>,
+) {
+    let road = place.road;
+    if position.is("RelativeRoadPosition") {
+        let Some((right, left)) = reach_of_lanes(road, place.s) else {
+            return;
+        };
+        if place.t <= left + slack && place.t >= right - slack {
+            return;
+        }
+        let text = format!(
+            "`RelativeRoadPosition` leads to t = {}, but the lanes of road `{}` reach from t = {} to t = {} at \
+             s = {}",
+            metres(place.t),
+            road.id(),
+            metres(right),
+            metres(left),
+            metres(place.s)
+        );
+        let finding = found.about(position, "dt", text).level(Level::Warning);
+        finding.at(road.node(), "the road");
+        return;
+    }
+    let Some(offset) = position.number("offset") else {
+        return;
+    };
+    let section = place
+        .lane
+        .and_then(|id| section_of(road, Side::of_lane_id(id)?, place.s)?.lane(id));
+    let Some(lane) = section else { return };
+    wide_of(position, offset, lane, place.s, slack, found);
+}
+
+fn reach_of_lanes(road: &Road<'_>, s: f64) -> Option<(f64, f64)> {
+    let edge = |side| {
+        let section = section_of(road, side, s)?;
+        section.edge_t(side, s - section.s()?)
+    };
+    edge(Side::Right).zip(edge(Side::Left))
 }
 
 fn before(position: Element<'_, '_>, s: f64, road: Option<&Road<'_>>, found: &mut Sink<'_>) {
@@ -84,9 +193,20 @@ fn beside_lane(position: Element<'_, '_>, road: &Road<'_>, slack: f64, found: &m
     let Some(offset) = position.number("offset") else {
         return;
     };
-    let Some((lane, s)) = lane_of(position, road) else {
-        return;
-    };
+    if let Some((lane, s)) = lane_of(position, road) {
+        wide_of(position, offset, lane, s, slack, found);
+    }
+}
+
+/// Says that an offset leads out of a lane.
+fn wide_of(
+    position: Element<'_, '_>,
+    offset: f64,
+    lane: LaneRef<'_, '_>,
+    s: f64,
+    slack: f64,
+    found: &mut Sink<'_>,
+) {
     // The center lane has no width: that it is named at all is what matters.
     if lane.id() == Some(0) {
         return;
@@ -96,11 +216,12 @@ fn beside_lane(position: Element<'_, '_>, road: &Road<'_>, slack: f64, found: &m
         return;
     };
     let text = format!(
-        "the `offset` of `LanePosition` is {}, but the lane `{}` of road `{}` is {} wide at s = {}: the \
+        "the `offset` of `{}` is {}, but the lane `{}` of road `{}` is {} wide at s = {}: the \
          position is {} outside of it",
+        position.name(),
         shown(position, "offset", &metres(offset)),
         lane.id_text().unwrap_or(""),
-        road.id(),
+        lane.at.road.id(),
         metres(width),
         metres(s),
         metres(offset.abs() - width / 2.0)
@@ -115,11 +236,7 @@ fn beside_lanes(position: Element<'_, '_>, road: &Road<'_>, slack: f64, found: &
     let Some((t, s)) = position.number("t").zip(station(position, road)) else {
         return;
     };
-    let edge = |side| {
-        let section = section_of(road, side, s)?;
-        section.edge_t(side, s - section.s()?)
-    };
-    let (Some(left), Some(right)) = (edge(Side::Left), edge(Side::Right)) else {
+    let Some((right, left)) = reach_of_lanes(road, s) else {
         return;
     };
     if t <= left + slack && t >= right - slack {

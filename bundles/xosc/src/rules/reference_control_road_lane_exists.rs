@@ -1,9 +1,12 @@
+use foldhash::HashSet;
 use qcbus_opendrive::{Road, RoadMap, SectionRef};
 use qcbus_openscenario::{Element, LaneAt, Network, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
+use crate::families::origins::{self, Origins};
 use crate::families::positions::{self, ON_ROAD, find_lane, lane_id, listed, metres, sorted};
 use crate::families::references::quoted;
+use crate::families::relative;
 use crate::families::values::short;
 use crate::model::{About as _, Scene};
 
@@ -44,6 +47,56 @@ fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
             }
         }
     }
+    let origins = Origins::of(scenario, Some(map));
+    let mut said = HashSet::default();
+    for start in &origins.starts {
+        let is_new = said.insert(start.position.node().offset());
+        if is_new && start.position.is("RelativeLanePosition") {
+            beside(start.position, &origins, found);
+        }
+    }
+}
+
+/// Says that there is no lane where a position relative to an entity's first place would be, however
+/// lanes are counted.
+fn beside<'m, 'd>(
+    position: Element<'m, 'd>,
+    origins: &Origins<'m, 'd, '_, '_>,
+    found: &mut Sink<'_>,
+) {
+    let Some((name, place)) = origins.base(position) else {
+        return;
+    };
+    let Some(on) = place.on else { return };
+    let (Some(lanes), Some(ways)) = (relative::lanes(position, on), relative::ways(position, on))
+    else {
+        return;
+    };
+    let mut nowhere = None;
+    for ds in ways {
+        let Some(s) = origins::within(on.road, on.s + ds) else {
+            return;
+        };
+        for id in &lanes {
+            let LaneAt::None(section) = find_lane(on.road, s, *id) else {
+                return;
+            };
+            nowhere = nowhere.or(Some((*id, s, section)));
+        }
+    }
+    let (Some((id, s, section)), Some(from)) = (nowhere, on.lane) else {
+        return;
+    };
+    let text = format!(
+        "`RelativeLanePosition` leads from the lane `{from}` of road `{}`, where `{name}` begins, to the lane \
+         `{id}` at s = {}, but the lane section there {}",
+        on.road.id(),
+        metres(s),
+        lanes_of(section)
+    );
+    found
+        .about(position, "dLane", text)
+        .at(on.road.node(), "the road");
 }
 
 /// The first of the roads, with their names.
@@ -135,7 +188,7 @@ fn lane(position: Element<'_, '_>, road: &Road<'_>, found: &mut Sink<'_>) {
             quoted(position, "laneId", &text),
             road.id(),
             metres(s),
-            lanes(section)
+            lanes_of(section)
         );
         found
             .about(position, "laneId", text)
@@ -144,7 +197,7 @@ fn lane(position: Element<'_, '_>, road: &Road<'_>, found: &mut Sink<'_>) {
 }
 
 /// What lanes there are instead.
-fn lanes(section: SectionRef<'_, '_>) -> String {
+fn lanes_of(section: SectionRef<'_, '_>) -> String {
     let mut ids: Vec<i64> = section.lanes().filter_map(|lane| lane.id()).collect();
     ids.retain(|id| *id != 0);
     ids.sort_unstable_by_key(|id| (-id.signum(), id.unsigned_abs()));

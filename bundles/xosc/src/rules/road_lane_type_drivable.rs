@@ -1,8 +1,10 @@
+use foldhash::HashSet;
 use qcbus_opendrive::{LaneRef, RoadMap};
-use qcbus_openscenario::{Element, Entity, EntityKind, Scenario};
+use qcbus_openscenario::{Element, Entity, EntityKind, LaneAt, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
-use crate::families::positions::{lane_of, metres, moved, owner, road_of};
+use crate::families::origins::Origins;
+use crate::families::positions::{find_lane, lane_of, metres, moved, owner, road_of};
 use crate::model::{About as _, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -66,6 +68,36 @@ fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
             break;
         }
     }
+    relative_to_others(scenario, map, found);
+}
+
+/// Who begins on a lane that the place of another leads to.
+fn relative_to_others(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let origins = Origins::of(scenario, Some(map));
+    let mut said = HashSet::default();
+    for (at, start) in origins.starts.iter().enumerate() {
+        let position = start.position;
+        let is_relative = position.name().starts_with("Relative");
+        let entity = scenario.entities().object(&start.name);
+        let Some(entity) = entity.filter(|_| is_relative) else {
+            continue;
+        };
+        let place = origins.place(at).and_then(|place| place.on);
+        let lane = place.and_then(|on| Some((on.road, on.lane.filter(|id| *id != 0)?, on.s)));
+        let Some((road, id, s)) = lane else { continue };
+        let LaneAt::Lane(lane) = find_lane(road, s, id) else {
+            continue;
+        };
+        let level = lane
+            .kind()
+            .and_then(|kind| Some((kind, unfit(scenario, entity, lane, kind, true)?)));
+        if let Some((kind, level)) = level
+            && said.insert(position.node().offset())
+        {
+            let goes = "begins, relative to another,";
+            say(position, entity, goes, (lane, kind, s), level, found);
+        }
+    }
 }
 
 fn say(
@@ -89,7 +121,15 @@ fn say(
         metres(s)
     );
     found
-        .about(position, "laneId", text)
+        .about(
+            position,
+            if position.has("dLane") {
+                "dLane"
+            } else {
+                "laneId"
+            },
+            text,
+        )
         .level(level)
         .at(lane.node(), "the lane");
 }

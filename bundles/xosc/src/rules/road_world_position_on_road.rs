@@ -1,6 +1,8 @@
-use qcbus_openscenario::{EntityKind, Scenario};
+use qcbus_opendrive::RoadMap;
+use qcbus_openscenario::{EntityKind, RoadNetwork, Scenario};
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
+use crate::families::origins::Origins;
 use crate::families::positions::{metres, moved, owner};
 use crate::model::{About as _, Scene};
 
@@ -54,5 +56,39 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         );
         let z = position.number("z").unwrap_or(0.0);
         found.about(position, "", text).point(x, y, z);
+    }
+    network.with(|map| relative_to_others(scenario, (network, map), distance, found));
+}
+
+/// Who begins beside all roads, where the place of another leads to.
+fn relative_to_others(
+    scenario: &Scenario<'_>,
+    (network, map): (&RoadNetwork, &RoadMap<'_>),
+    distance: f64,
+    found: &mut Sink<'_>,
+) {
+    let origins = Origins::of(scenario, Some(map));
+    for (at, start) in origins.starts.iter().enumerate() {
+        let position = start.position;
+        let is_free =
+            ["RelativeWorldPosition", "RelativeObjectPosition"].contains(&position.name());
+        let entity = scenario.entities().object(&start.name);
+        let is_vehicle = entity.is_some_and(|entity| entity.kind() == EntityKind::Vehicle);
+        let place = (is_free && is_vehicle).then(|| origins.place(at)).flatten();
+        let Some(place) = place else { continue };
+        let nearby = network.nearby();
+        if nearby.is_empty() || nearby.is_near(place.x, place.y, distance) {
+            continue;
+        }
+        let text = format!(
+            "the place of the vehicle `{}`, which is x = {}, y = {}, is more than {} away from every lane of \
+             the road network",
+            start.name,
+            metres(place.x),
+            metres(place.y),
+            metres(distance)
+        );
+        let z = place.z.unwrap_or(0.0);
+        found.about(position, "", text).point(place.x, place.y, z);
     }
 }

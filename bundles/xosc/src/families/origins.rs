@@ -1,0 +1,324 @@
+//! Where entities stand when the run begins, those among them that are placed relative to others.
+
+use std::cell::RefCell;
+
+use foldhash::{HashMap, HashMapExt as _};
+use qcbus_opendrive::{Road, RoadMap, Side, TrafficRule};
+use qcbus_openscenario::{Element, LaneAt, Scenario};
+
+use crate::families::placement::{self, Start};
+use crate::families::positions::{AT_END, find_lane, lane_of, road_of, section_of, station};
+use crate::families::relative;
+
+/// Where something stands: in the world, and on the road if it is known which.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Place<'w, 'r> {
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+    /// `None` where that is not known.
+    pub(crate) z: Option<f64>,
+    /// Which way it looks.
+    pub(crate) heading: f64,
+    /// Whether every simulator understands the heading like this. On the left of a road some let it look
+    /// along the road and some against it.
+    pub(crate) is_sure: bool,
+    pub(crate) on: Option<OnRoad<'w, 'r>>,
+}
+
+/// A place on a road.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct OnRoad<'w, 'r> {
+    pub(crate) road: &'w Road<'r>,
+    pub(crate) s: f64,
+    pub(crate) t: f64,
+    /// The lane, if it is known which.
+    pub(crate) lane: Option<i64>,
+    /// Whether what is there surely looks along the road.
+    pub(crate) along: bool,
+}
+
+enum Memo<'w, 'r> {
+    New,
+    /// It is being computed: who comes here again goes round in a circle.
+    Open,
+    Done(Option<Place<'w, 'r>>),
+}
+
+/// The places of all who are teleported in `Init`.
+pub(crate) struct Origins<'m, 'd, 'w, 'r> {
+    pub(crate) starts: Vec<Start<'m, 'd>>,
+    /// `None` for who is teleported more than once.
+    by_name: HashMap<String, Option<usize>>,
+    memo: RefCell<Vec<Memo<'w, 'r>>>,
+    map: Option<&'w RoadMap<'r>>,
+}
+
+/// Positions that are relative to an entity.
+const RELATIVE: &[&str] = &[
+    "RelativeLanePosition",
+    "RelativeRoadPosition",
+    "RelativeWorldPosition",
+    "RelativeObjectPosition",
+];
+
+impl<'m, 'd, 'w, 'r> Origins<'m, 'd, 'w, 'r> {
+    /// `map` is the scenario's, if it is known.
+    pub(crate) fn of(
+        scenario: &'m Scenario<'d>,
+        map: Option<&'w RoadMap<'r>>,
+    ) -> Origins<'m, 'd, 'w, 'r> {
+        let starts = placement::starts(scenario);
+        let mut by_name = HashMap::new();
+        for (at, start) in starts.iter().enumerate() {
+            by_name
+                .entry(start.name.clone())
+                .and_modify(|place| *place = None)
+                .or_insert(Some(at));
+        }
+        Origins {
+            memo: RefCell::new(starts.iter().map(|_| Memo::New).collect()),
+            starts,
+            by_name,
+            map,
+        }
+    }
+
+    /// The entity that a position is relative to, and where it stands.
+    pub(crate) fn base(&self, position: Element<'m, 'd>) -> Option<(String, Place<'w, 'r>)> {
+        let name = relative_to(position)?;
+        let at = (*self.by_name.get(&name)?)?;
+        Some((name, self.place(at)?))
+    }
+
+    /// Where the entity of a start stands.
+    pub(crate) fn place(&self, at: usize) -> Option<Place<'w, 'r>> {
+        let mut way = Vec::new();
+        let mut next = Some(at);
+        while let Some(here) = next {
+            match self.memo.borrow_mut().get_mut(here) {
+                Some(memo @ Memo::New) => *memo = Memo::Open,
+                _ => break,
+            }
+            way.push(here);
+            let name = self
+                .starts
+                .get(here)
+                .and_then(|start| relative_to(start.position));
+            next = name.and_then(|name| self.by_name.get(&name).copied().flatten());
+        }
+        while let Some(here) = way.pop() {
+            let place = self.starts.get(here).and_then(|start| {
+                let base = relative_to(start.position).map(|name| self.known(&name));
+                self.compute(start.position, base)
+            });
+            if let Some(memo) = self.memo.borrow_mut().get_mut(here) {
+                *memo = Memo::Done(place);
+            }
+        }
+        match self.memo.borrow().get(at) {
+            Some(Memo::Done(place)) => *place,
+            _ => None,
+        }
+    }
+
+    /// Where an entity stands, as far as that is computed.
+    fn known(&self, name: &str) -> Option<Place<'w, 'r>> {
+        let at = (*self.by_name.get(name)?)?;
+        match self.memo.borrow().get(at) {
+            Some(Memo::Done(place)) => *place,
+            _ => None,
+        }
+    }
+
+    fn compute(
+        &self,
+        position: Element<'m, 'd>,
+        base: Option<Option<Place<'w, 'r>>>,
+    ) -> Option<Place<'w, 'r>> {
+        match (position.name(), base) {
+            ("WorldPosition", _) => {
+                let place = Place {
+                    x: position.number("x")?,
+                    y: position.number("y")?,
+                    z: position.number("z"),
+                    heading: or(position, "h", 0.0)?,
+                    is_sure: true,
+                    on: None,
+                };
+                Some(self.on_road(position, place))
+            }
+            ("LanePosition", _) => {
+                let road = road_of(position, self.map?)?;
+                let (lane, s) = lane_of(position, road)?;
+                let t = middle(lane, s)? + or(position, "offset", 0.0)?;
+                oriented(position, on_map(road, s, t, lane.id())?)
+            }
+            ("RoadPosition", _) => {
+                let road = road_of(position, self.map?)?;
+                let (s, t) = (station(position, road)?, position.number("t")?);
+                oriented(position, on_map(road, s, t, lane_at(road, s, t))?)
+            }
+            ("RelativeRoadPosition", Some(base)) => {
+                let on = base?.on?;
+                let s = within(on.road, on.s + position.number("ds")?)?;
+                let t = on.t + position.number("dt")?;
+                oriented(position, on_map(on.road, s, t, lane_at(on.road, s, t))?)
+            }
+            ("RelativeLanePosition", Some(base)) => beside(position, base?.on?),
+            ("RelativeWorldPosition", Some(base)) => self.moved(position, base?, 0.0),
+            ("RelativeObjectPosition", Some(base)) => {
+                let base = base.filter(|base| base.is_sure)?;
+                self.moved(position, base, base.heading)
+            }
+            _ => None,
+        }
+    }
+
+    /// A place by its distances in directions that are turned by an angle.
+    fn moved(
+        &self,
+        position: Element<'m, 'd>,
+        base: Place<'w, 'r>,
+        turned: f64,
+    ) -> Option<Place<'w, 'r>> {
+        let (dx, dy) = (position.number("dx")?, position.number("dy")?);
+        let (sin, cos) = turned.sin_cos();
+        let place = Place {
+            x: base.x + dx * cos - dy * sin,
+            y: base.y + dx * sin + dy * cos,
+            // What stands farther off stands as high as its own ground.
+            z: position.number("dz").and_then(|dz| Some(base.z? + dz)),
+            on: None,
+            ..base
+        };
+        oriented(position, self.on_road(position, place))
+    }
+
+    /// A place in the world with the road that it lies on, if there is only one.
+    fn on_road(&self, position: Element<'m, 'd>, place: Place<'w, 'r>) -> Place<'w, 'r> {
+        let on = self.map.and_then(|map| {
+            let nearby = position.scenario().network().map()?.nearby();
+            let (road, s, t) = nearby.only_road_at(map, place.x, place.y)?;
+            let hdg = road.pose(s)?.hdg;
+            Some(OnRoad {
+                road,
+                s,
+                t,
+                lane: lane_at(road, s, t),
+                along: place.is_sure && (place.heading - hdg).cos() > 0.5,
+            })
+        });
+        Place { on, ..place }
+    }
+}
+
+/// Whom a position is relative to.
+fn relative_to(position: Element<'_, '_>) -> Option<String> {
+    let name = RELATIVE
+        .contains(&position.name())
+        .then(|| position.text("entityRef"))??;
+    Some(name.into_owned())
+}
+
+/// A number that need not be there; `None` when it is there and not known.
+pub(crate) fn or(element: Element<'_, '_>, name: &str, otherwise: f64) -> Option<f64> {
+    if element.has(name) {
+        element.number(name)
+    } else {
+        Some(otherwise)
+    }
+}
+
+/// The middle of a lane.
+fn middle(lane: qcbus_opendrive::LaneRef<'_, '_>, s: f64) -> Option<f64> {
+    let ds = s - lane.at.s()?;
+    Some(f64::midpoint(lane.inner_t(ds)?, lane.outer_t(ds)?))
+}
+
+/// A station, if the road has it.
+pub(crate) fn within(road: &Road<'_>, s: f64) -> Option<f64> {
+    let length = road.length()?;
+    (s >= -AT_END && s <= length + AT_END).then(|| s.clamp(0.0, length))
+}
+
+/// A place beside a road, looking as traffic does.
+fn on_map<'w, 'r>(road: &'w Road<'r>, s: f64, t: f64, lane: Option<i64>) -> Option<Place<'w, 'r>> {
+    let pose = road.pose(s)?;
+    let point = pose.beside(t)?;
+    let along = t < 0.0 && road.traffic_rule() != Some(TrafficRule::LeftHand);
+    let turned = if t > 0.0 { std::f64::consts::PI } else { 0.0 };
+    Some(Place {
+        x: point.x,
+        y: point.y,
+        z: road.surface_point(s, t).map(|point| point.z),
+        heading: pose.hdg + turned,
+        is_sure: along,
+        on: Some(OnRoad {
+            road,
+            s,
+            t,
+            lane,
+            along,
+        }),
+    })
+}
+
+/// The place with what the position's `Orientation` says.
+fn oriented<'w, 'r>(position: Element<'_, '_>, place: Place<'w, 'r>) -> Option<Place<'w, 'r>> {
+    let Some(orientation) = position.child("Orientation") else {
+        return Some(place);
+    };
+    let h = or(orientation, "h", 0.0)?;
+    let is_absolute = orientation.has("type") && &*orientation.word("type")? == "absolute";
+    let (heading, is_sure) = if is_absolute {
+        (h, true)
+    } else {
+        (place.heading + h, place.is_sure)
+    };
+    let turned = (heading - place.heading).cos() < 0.5;
+    let on = place.on.map(|on| OnRoad {
+        along: on.along && !turned,
+        ..on
+    });
+    Some(Place {
+        heading,
+        is_sure,
+        on,
+        ..place
+    })
+}
+
+/// The lane within which a place lies.
+fn lane_at(road: &Road<'_>, s: f64, t: f64) -> Option<i64> {
+    let side = if t > 0.0 { Side::Left } else { Side::Right };
+    let section = section_of(road, side, s)?;
+    let ds = s - section.s()?;
+    let mut lanes = section.side(side).filter(|lane| {
+        let borders = lane.inner_t(ds).zip(lane.outer_t(ds));
+        borders.is_some_and(|(inner, outer)| {
+            t > inner.min(outer) + AT_END && t < inner.max(outer) - AT_END
+        })
+    });
+    let lane = lanes.next()?;
+    lanes.next().is_none().then(|| lane.id())?
+}
+
+/// Where a `RelativeLanePosition` is, if there is only one way to understand it.
+fn beside<'w, 'r>(position: Element<'_, '_>, on: OnRoad<'w, 'r>) -> Option<Place<'w, 'r>> {
+    let lanes = relative::lanes(position, on)?;
+    let ds = relative::ways(position, on)?;
+    let &[ds] = ds.as_slice() else { return None };
+    let s = within(on.road, on.s + ds)?;
+    let mut there = lanes
+        .into_iter()
+        .filter_map(|id| match find_lane(on.road, s, id) {
+            LaneAt::Lane(lane) => Some(lane),
+            LaneAt::None(_) | LaneAt::Unknown => None,
+        });
+    let lane = there.next()?;
+    if there.next().is_some() {
+        return None;
+    }
+    let t = middle(lane, s)? + or(position, "offset", 0.0)?;
+    oriented(position, on_map(on.road, s, t, lane.id())?)
+}

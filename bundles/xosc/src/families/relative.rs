@@ -1,0 +1,120 @@
+//! Positions beside another on the same road: what lane, what station, and whether there is road enough.
+
+use foldhash::{HashMap, HashMapExt as _};
+use qcbus_opendrive::{ContactPoint, Road, RoadEnd, RoadMap};
+use qcbus_openscenario::Element;
+
+use crate::families::origins::OnRoad;
+
+/// The lanes that a `RelativeLanePosition` may mean: whether the center lane counts is understood in two
+/// ways, and so is which way is left of who looks against the road.
+pub(crate) fn lanes(position: Element<'_, '_>, on: OnRoad<'_, '_>) -> Option<Vec<i64>> {
+    let from = on.lane.filter(|lane| *lane != 0)?;
+    let by = position.integer("dLane")?;
+    let mut lanes = Vec::new();
+    let signs: &[i64] = if on.along || by == 0 { &[1] } else { &[1, -1] };
+    for sign in signs {
+        let by = by.checked_mul(*sign)?;
+        let plain = from.checked_add(by)?;
+        let crosses = plain == 0 || (plain > 0) != (from > 0);
+        if crosses {
+            lanes.push(plain.checked_add(by.signum())?);
+        }
+        if plain != 0 {
+            lanes.push(plain);
+        }
+    }
+    Some(lanes)
+}
+
+/// How far along the road a position may be: against the road it is understood in two ways.
+pub(crate) fn ways(position: Element<'_, '_>, on: OnRoad<'_, '_>) -> Option<Vec<f64>> {
+    let ds = position.number("ds")?;
+    let is_plain = on.along || ds == 0.0 || position.is("RelativeRoadPosition");
+    Some(if is_plain { vec![ds] } else { vec![ds, -ds] })
+}
+
+/// How far one gets on a map from the ends of its roads.
+pub(crate) struct Reach<'m, 'd> {
+    map: &'m RoadMap<'d>,
+    /// The longest way on through a road that is entered at an end; `None` where there is no end to it,
+    /// or it is not known.
+    longest: HashMap<RoadEnd, Option<f64>>,
+}
+
+impl<'m, 'd> Reach<'m, 'd> {
+    /// `None` where roads are left midway.
+    pub(crate) fn of(map: &'m RoadMap<'d>) -> Option<Reach<'m, 'd>> {
+        let is_virtual = |kind: Option<&str>| kind == Some("virtual");
+        let mut junctions = map.junctions().iter();
+        if junctions.any(|junction| is_virtual(junction.node().attr("type"))) {
+            return None;
+        }
+        Some(Reach {
+            map,
+            longest: HashMap::new(),
+        })
+    }
+
+    /// How far one gets at most from a station, along the road or against it.
+    pub(crate) fn from(&mut self, road: &Road<'d>, s: f64, along: bool) -> Option<f64> {
+        let (end, rest) = if along {
+            (ContactPoint::End, road.length()? - s)
+        } else {
+            (ContactPoint::Start, s)
+        };
+        Some(rest + self.beyond(road, end)?)
+    }
+
+    /// How far one gets beyond an end of a road.
+    fn beyond(&mut self, road: &Road<'d>, end: ContactPoint) -> Option<f64> {
+        // Ends that are left, and what is still to be looked at beyond each.
+        let start = RoadEnd {
+            road: road.index(),
+            end,
+        };
+        let mut way = vec![(start, self.next(start)?, 0.0_f64)];
+        loop {
+            let (here, open, best) = way.last_mut()?;
+            let Some(entered) = open.pop() else {
+                let (here, best) = (*here, *best);
+                self.longest.insert(here, Some(best));
+                way.pop();
+                let Some((_, _, around)) = way.last_mut() else {
+                    return Some(best);
+                };
+                let length = self.map.road_at(here.road)?.length()?;
+                *around = around.max(best + length);
+                continue;
+            };
+            let left = RoadEnd {
+                road: entered.road,
+                end: entered.end.other(),
+            };
+            if let Some(known) = self.longest.get(&left) {
+                let length = self.map.road_at(left.road)?.length()?;
+                *best = best.max((*known)? + length);
+                continue;
+            }
+            const MOST: usize = 2_000;
+            let round = way.iter().any(|(one, _, _)| *one == left);
+            let next = self.next(left);
+            match next.filter(|_| !round && way.len() < MOST) {
+                Some(next) => way.push((left, next, 0.0)),
+                None => {
+                    for (one, _, _) in way {
+                        self.longest.insert(one, None);
+                    }
+                    return None;
+                }
+            }
+        }
+    }
+
+    /// The ends of other roads that an end touches; `None` where a link leads nobody knows where.
+    fn next(&self, end: RoadEnd) -> Option<Vec<RoadEnd>> {
+        let road = self.map.road_at(end.road)?;
+        let next = self.map.neighbours(road, end.end);
+        (!next.is_empty() || road.link(end.end).is_none()).then_some(next)
+    }
+}
