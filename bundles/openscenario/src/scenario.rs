@@ -16,7 +16,7 @@ use crate::faults::{ValueFault, ValueFaultKind};
 use crate::form::Form;
 use crate::inputs::{Inputs, LinkedMap};
 use crate::reading::{self, Expected, Reading, resolve};
-use crate::scope::{Context, ContextId, DeclarationProblem, operand};
+use crate::scope::{Context, ContextId, DeclarationProblem, Declared, operand};
 use crate::storyboard::Storyboard;
 
 /// A document of OpenSCENARIO and all that it refers to.
@@ -50,9 +50,18 @@ impl<'d> Scenario<'d> {
     /// Reads declarations and follows references to catalogs; the rest is read when first asked for.
     /// `None` when the document has no root element.
     pub fn new(inputs: &Inputs<'d>) -> Option<Scenario<'d>> {
+        Scenario::with_values(inputs, &HashMap::new())
+    }
+
+    /// Like [`new`](Scenario::new), with values for parameters that the document itself declares, as a
+    /// distribution sets them.
+    pub fn with_values(
+        inputs: &Inputs<'d>,
+        values: &HashMap<&'d str, Declared<'d>>,
+    ) -> Option<Scenario<'d>> {
         let root = inputs.document.root()?;
         let version = inputs.version.unwrap_or(NEWEST);
-        let (context, declaration_problems) = Context::new(root, version, &HashMap::new());
+        let (context, declaration_problems) = Context::new(root, version, values);
         let mut scenario = Scenario {
             document: inputs.document,
             version,

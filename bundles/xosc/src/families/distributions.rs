@@ -18,6 +18,11 @@ pub(crate) fn target<'d>(
     scenario: &Scenario<'_>,
     subject: &'d Subject<'d>,
 ) -> Option<Scenario<'d>> {
+    Scenario::new(&inputs(scenario, subject)?)
+}
+
+/// What the scenario that a distribution is for is read from.
+pub(crate) fn inputs<'d>(scenario: &Scenario<'_>, subject: &'d Subject<'d>) -> Option<Inputs<'d>> {
     if scenario.form() != Form::Distribution {
         return None;
     }
@@ -27,7 +32,7 @@ pub(crate) fn target<'d>(
     }
     let header = linked.document.root()?.child("FileHeader");
     let part = |name| header?.attr(name)?.trim().parse::<u16>().ok();
-    Scenario::new(&Inputs {
+    Some(Inputs {
         document: linked.document,
         kind: FileKind::Xosc,
         version: part("revMajor").zip(part("revMinor")),

@@ -35,6 +35,7 @@ mod dialect_ros_substitution;
 mod distribution_parameter_known;
 mod distribution_range_valid;
 mod distribution_scenario_file;
+mod distribution_values_at_use;
 mod distribution_values_satisfy_constraints;
 mod distribution_weights;
 mod entities_axle_geometry;
@@ -362,6 +363,7 @@ pub static RULES: &[&dyn AnyRule] = &[
     &distribution_scenario_file::RULE,
     &distribution_parameter_known::RULE,
     &distribution_range_valid::RULE,
+    &distribution_values_at_use::RULE,
     &distribution_weights::RULE,
     &distribution_values_satisfy_constraints::RULE,
     &entities_none::RULE,

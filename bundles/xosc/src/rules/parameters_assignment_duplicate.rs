@@ -1,4 +1,4 @@
-use foldhash::HashMap;
+use foldhash::{HashMap, HashSet};
 use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Level, Place, Rule, Sink};
 
@@ -40,6 +40,47 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 .children()
                 .filter(|child| children.contains(&child.name()));
             within(block, children, attribute, found);
+        }
+    }
+    for block in scenario.elements("Deterministic") {
+        across(block, found);
+    }
+}
+
+/// Distributions of one `Deterministic` that set a parameter which another sets already, one of them by
+/// sets of values.
+fn across(block: Element<'_, '_>, found: &mut Sink<'_>) {
+    let mut first: HashMap<&str, Element<'_, '_>> = HashMap::default();
+    for distribution in block.children() {
+        let is_multi = distribution.is("DeterministicMultiParameterDistribution");
+        let sources: Vec<_> = if is_multi {
+            let all = distribution.descendants_named("ParameterAssignment");
+            all.filter_map(|one| Some((one, "parameterRef", one.written("parameterRef")?)))
+                .collect()
+        } else {
+            let name = distribution.written("parameterName");
+            name.map(|name| (distribution, "parameterName", name))
+                .into_iter()
+                .collect()
+        };
+        let mut said: HashSet<&str> = HashSet::default();
+        for (source, attribute, name) in sources {
+            let name = name.strip_prefix('$').unwrap_or(name);
+            let other = *first.entry(name).or_insert(distribution);
+            if other == distribution || !said.insert(name) {
+                continue;
+            }
+            // Of two single ones the other check tells.
+            if !is_multi && !other.is("DeterministicMultiParameterDistribution") {
+                continue;
+            }
+            let text = format!(
+                "the parameter `{name}` already has its values from another distribution of this \
+                 `Deterministic`: which of them hold is up to the simulator"
+            );
+            found
+                .issue(Place::attribute_or_node(source.node(), attribute), text)
+                .at(other.node(), "the other distribution");
         }
     }
 }

@@ -323,6 +323,25 @@ fn say<'s, 'd>(
     value: f64,
     found: &'s mut Sink<'d>,
 ) -> Finding<'s, 'd> {
+    let (text, level) = told(row, element, value);
+    found.about(element, row.attribute, text).level(level)
+}
+
+/// The values of all tables that break a scenario because they are out of range, with what is to be
+/// said of each.
+pub(crate) fn broken<'m, 'd>(
+    scenario: &'m Scenario<'d>,
+) -> impl Iterator<Item = (Element<'m, 'd>, &'static str, String)> {
+    let rows = tables::ALL.iter().copied();
+    rows.flat_map(|rows| out_of_range(scenario, rows))
+        .filter_map(|(row, element, value)| {
+            let (text, level) = told(row, element, value);
+            (level == Level::Error).then_some((element, row.attribute, text))
+        })
+}
+
+/// What is said of a value that is out of range, and how bad it is.
+fn told(row: &Row, element: Element<'_, '_>, value: f64) -> (String, Level) {
     let level = (row.judge)(element, value);
     let (must, excuse) = match level {
         Level::Error => ("must", ""),
@@ -340,7 +359,7 @@ fn say<'s, 'd>(
         text.push_str("; ");
         text.push_str(remark);
     }
-    found.about(element, row.attribute, text).level(level)
+    (text, level)
 }
 
 /// A value in backticks, and what is written where a parameter or an expression led to it.

@@ -288,3 +288,23 @@ table! {
     TRANSITIONS:
         from_zero LightStateAction transitionTime "s" "lightstateaction_transitiontime";
 }
+
+/// All tables.
+pub(crate) const ALL: &[&[Row]] = &[
+    ACTIONS,
+    APPEARANCE,
+    CONDITIONS,
+    CONDITION_DELAY,
+    DISTANCES,
+    ENTITIES,
+    ENVIRONMENT,
+    GEO,
+    EXECUTIONS,
+    OVERRIDES,
+    PHASES,
+    POSITIONS,
+    TIMING,
+    TRAFFIC,
+    TRAJECTORIES,
+    TRANSITIONS,
+];
