@@ -16,8 +16,9 @@ mod model;
 pub use model::Validated;
 
 use model::{SCHEMA_DIR, SCHEMAS};
-use qcbus_schema::{Checked, Later, Severity, Version};
-use qcbus_sdk::{Level, Place, Rule, Sink};
+use qcbus_document::{Attribute, Document, Node};
+use qcbus_schema::{Checked, Code, Later, Outcome, Severity, Version, Violation};
+use qcbus_sdk::{Level, Place, Rule, Sink, Subject};
 
 /// What the schema rules of all bundles have in common, for the `..` of one.
 pub const RULE: Rule<Validated> = Rule {
@@ -94,6 +95,56 @@ fn say_later(later: &Later<'_>, stated: Option<Version>, found: &mut Sink<'_>) {
             Some(attribute) => finding.at(attribute, what),
             None => finding.at(thing.node, what),
         };
+    }
+}
+
+/// Something that a document's schema does not allow.
+pub struct Breach<'a> {
+    /// The element that it is about.
+    pub node: Node<'a>,
+    /// The attribute that it is about.
+    pub attribute: Option<Attribute<'a>>,
+    /// What is wrong.
+    pub text: String,
+    /// Whether something cannot be read: a value that is none, or nothing where something must be. What
+    /// is only too much, or not where it belongs, many readers pass over.
+    pub unreadable: bool,
+}
+
+/// Where a document that a root refers to breaks its schema, in document order: the user's schema, or the
+/// one that comes with qcbus. Where the schema is known to be wrong, or is not that of the document's
+/// version, nothing is said.
+pub fn breaches<'a>(subject: &Subject<'_>, document: &Document<'a>) -> Vec<Breach<'a>> {
+    let Outcome::Checked(checked) =
+        qcbus_schema::check(document, subject.kind(), &model::options(subject))
+    else {
+        return Vec::new();
+    };
+    let mut breaches: Vec<Breach<'a>> = checked
+        .violations
+        .iter()
+        .filter(|violation| checked.severity(violation) == Severity::Error)
+        .map(|violation| Breach {
+            node: violation.node,
+            attribute: violation.attribute,
+            text: violation.text.clone(),
+            unreadable: is_unreadable(violation),
+        })
+        .collect();
+    breaches.sort_by_key(|breach| breach.node.index());
+    breaches
+}
+
+fn is_unreadable(violation: &Violation<'_>) -> bool {
+    match violation.code {
+        // Expressions came with a later version, and readers of that take them anywhere.
+        Code::InvalidValue => !violation
+            .attribute
+            .is_some_and(|attribute| attribute.value().contains('$')),
+        Code::InvalidText | Code::MissingAttribute | Code::MissingElement | Code::UnknownType => {
+            true
+        }
+        _ => false,
     }
 }
 

@@ -16,12 +16,7 @@ impl Model for Validated {
     type Part = ();
 
     fn build<'d>(subject: &'d Subject<'d>) -> Result<Checked<'d>, Unbuilt> {
-        let own = subject.resource::<Overrides>();
-        let options = Options {
-            overrides: own.map(|it| it.0.clone()).unwrap_or_default(),
-            ..Options::default()
-        };
-        match qcbus_schema::check(&subject.root(), subject.kind(), &options) {
+        match qcbus_schema::check(&subject.root(), subject.kind(), &options(subject)) {
             Outcome::Checked(checked) => Ok(checked),
             Outcome::Skipped(reason) => Err(unbuilt(&reason)),
         }
@@ -29,6 +24,15 @@ impl Model for Validated {
 
     fn parts(_: &Checked<'_>) -> Vec<()> {
         vec![()]
+    }
+}
+
+/// The user's schemas come first.
+pub(crate) fn options(subject: &Subject<'_>) -> Options {
+    let own = subject.resource::<Overrides>();
+    Options {
+        overrides: own.map(|it| it.0.clone()).unwrap_or_default(),
+        ..Options::default()
     }
 }
 

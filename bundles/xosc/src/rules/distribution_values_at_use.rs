@@ -4,7 +4,7 @@ use qcbus_openscenario::{Declared, Element, Inputs, Scenario, Value, ValueFaultK
 use qcbus_sdk::{Place, Rule, Sink};
 
 use crate::families::distributions;
-use crate::families::references::{ENTITY_REFERENCES, hint};
+use crate::families::references::{entity_references, hint};
 use crate::families::{allowed_values, ranges, values};
 use crate::model::Scene;
 
@@ -286,7 +286,7 @@ fn problems<'t>(scenario: &Scenario<'t>) -> Vec<(Attribute<'t>, String)> {
         problems.extend(element.attribute(attribute).map(|it| (it, text)));
     }
     let entities = scenario.entities();
-    for (name, attribute) in ENTITY_REFERENCES {
+    for (name, attribute) in entity_references() {
         for reference in scenario.elements(name) {
             let text = reference.text(attribute);
             let named = reference.attribute(attribute).zip(text);

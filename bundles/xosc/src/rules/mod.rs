@@ -15,6 +15,7 @@ mod action_step_dynamics_zero;
 mod action_synchronize;
 mod action_transition_not_zero;
 mod catalogs_duplicate_across_files;
+mod catalogs_entry_schema;
 mod catalogs_file_valid;
 mod catalogs_kind_mismatch;
 mod catalogs_location_missing;
@@ -349,6 +350,7 @@ pub static RULES: &[&dyn AnyRule] = &[
     &parameters_assignment_duplicate::RULE,
     &catalogs_location_missing::RULE,
     &catalogs_kind_mismatch::RULE,
+    &catalogs_entry_schema::RULE,
     &catalogs_file_valid::RULE,
     &catalogs_duplicate_across_files::RULE,
     &catalogs_mixed_document::RULE,
