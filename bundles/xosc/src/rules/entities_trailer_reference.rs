@@ -48,6 +48,55 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for action in scenario.elements_everywhere("ConnectTrailerAction") {
         connect(action, &mut told, found);
     }
+    disconnect(scenario, found);
+}
+
+/// Says who is to let go of a trailer and never draws one.
+fn disconnect(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let Some(towing) = towing(scenario) else {
+        return;
+    };
+    for action in scenario.elements_everywhere("DisconnectTrailerAction") {
+        for name in Actors::of(action)
+            .and_then(|actors| actors.names())
+            .into_iter()
+            .flatten()
+        {
+            let entity = scenario.entities().object(&name);
+            let is_known = entity.is_some_and(|entity| {
+                !matches!(entity.kind(), EntityKind::External | EntityKind::Unknown)
+            });
+            if is_known && !towing.contains(&*name) {
+                let text = format!(
+                    "`{name}` is to let go of its trailer, but has none: neither its `Vehicle` names one nor does a \
+                     `ConnectTrailerAction` connect one"
+                );
+                found.about(action, "", text).level(Level::Warning);
+            }
+        }
+    }
+}
+
+/// The names of all who draw a trailer at some time; `None` when that is not known.
+fn towing(scenario: &Scenario<'_>) -> Option<HashSet<String>> {
+    if !scenario.storyboard().is_complete() {
+        return None;
+    }
+    let mut towing: HashSet<String> = HashSet::default();
+    for entity in scenario.entities().objects() {
+        let vehicle = entity.object(scenario);
+        if vehicle.is_some_and(|vehicle| vehicle.child("Trailer").is_some()) {
+            towing.insert(entity.name().to_owned());
+        }
+    }
+    for action in scenario.elements_everywhere("ConnectTrailerAction") {
+        for name in Actors::of(action)?.names()? {
+            for entity in scenario.entities().expand(&name)? {
+                towing.insert(entity.name().to_owned());
+            }
+        }
+    }
+    Some(towing)
 }
 
 /// The trailer that a vehicle's `Trailer` names or is, and where that is said.

@@ -153,6 +153,7 @@ mod reference_control_uniquely_resolvable_entity_references;
 mod reference_control_valid_actor_reference_in_private_actions;
 mod references_init_order;
 mod references_self_reference;
+mod references_traffic_name;
 mod road_lane_id_zero;
 mod road_lane_type_drivable;
 mod road_signal_condition;
@@ -172,7 +173,9 @@ mod scenario_logic_targetspeed_maxspeed_general;
 mod scenario_logic_targetspeed_maxspeed_speedprofileaction;
 mod schema_cardinality;
 mod schema_choice_single_alternative;
+mod signal_condition_never;
 mod signal_delay_without_reference;
+mod signal_phase_duplicate;
 mod signal_reference_cycle;
 mod signal_state_unknown;
 mod signal_zero_cycle;
@@ -197,6 +200,7 @@ mod trajectory_timing_scale;
 mod trigger_contradiction;
 mod trigger_edge_on_state;
 mod trigger_float_equal;
+mod trigger_never_true;
 mod trigger_simulation_time_equal;
 mod trigger_time_unordered;
 mod trigger_traveled_distance_stopped;
@@ -335,6 +339,7 @@ pub static RULES: &[&dyn AnyRule] = &[
     &action_negative_lane_change::RULE,
     &action_custom_command_portable::RULE,
     &trigger_contradiction::RULE,
+    &trigger_never_true::RULE,
     &trigger_time_unordered::RULE,
     &trigger_simulation_time_equal::RULE,
     &trigger_float_equal::RULE,
@@ -380,6 +385,7 @@ pub static RULES: &[&dyn AnyRule] = &[
     &entities_overlapping_spawn::RULE,
     &general_references_to_scenario_object::RULE,
     &references_self_reference::RULE,
+    &references_traffic_name::RULE,
     &references_init_order::RULE,
     &scenario_logic_controller_activation::RULE,
     &reference_control_road_network_reference::RULE,
@@ -394,9 +400,11 @@ pub static RULES: &[&dyn AnyRule] = &[
     &reference_control_traffic_signal_controller_action_references::RULE,
     &reference_control_traffic_signal_controller_condition_references::RULE,
     &signal_delay_without_reference::RULE,
+    &signal_phase_duplicate::RULE,
     &signal_reference_cycle::RULE,
     &signal_zero_cycle::RULE,
     &signal_state_unknown::RULE,
+    &signal_condition_never::RULE,
     &reference_control_road_lane_exists::RULE,
     &positioning_road_lane_offset_in_bounds::RULE,
     &positioning_geodetic_datum_defined::RULE,

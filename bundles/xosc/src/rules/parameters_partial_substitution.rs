@@ -1,4 +1,5 @@
-use qcbus_openscenario::{Scenario, ValueFaultKind};
+use qcbus_document::Attribute;
+use qcbus_openscenario::{DataType, Element, Scenario, ValueFaultKind};
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
 use crate::families::values;
@@ -29,7 +30,43 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let element = scenario.element(fault.attribute.node());
         // Else it is a text with a `$` in it.
         if element.parameter(&fault.name).is_some() {
-            values::say(fault, found);
+            let level = if is_number(element, fault.attribute) {
+                Level::Error
+            } else {
+                Level::Warning
+            };
+            values::say(fault, found).level(level);
         }
     }
+}
+
+/// Whether a number, or true or false, is due, which a text with a parameter in it never is, replaced
+/// or not.
+fn is_number(element: Element<'_, '_>, attribute: Attribute<'_>) -> bool {
+    let declared = match element.name() {
+        _ if !attribute.is("value") => None,
+        "ParameterDeclaration" => element
+            .written("parameterType")
+            .and_then(DataType::of_declaration),
+        "ParameterAssignment" => assigned(element),
+        _ => None,
+    };
+    let value = attribute.value().trim();
+    // `-$speed` is a number where the text is replaced.
+    let value = value.strip_prefix(['-', '+']).unwrap_or(value);
+    declared.is_some_and(|declared| !matches!(declared, DataType::String | DataType::DateTime))
+        && value.contains(['*', '/', '+', '-', '(', ' '])
+}
+
+/// The type of the entry's parameter that an assignment is for.
+fn assigned(assignment: Element<'_, '_>) -> Option<DataType> {
+    let reference = assignment.parent()?.parent()?;
+    let entry = assignment.scenario().entry(reference)?;
+    let name = assignment.written("parameterRef")?;
+    let name = name.strip_prefix('$').unwrap_or(name);
+    entry
+        .declarations()
+        .iter()
+        .find(|one| one.name == name)?
+        .data_type
 }

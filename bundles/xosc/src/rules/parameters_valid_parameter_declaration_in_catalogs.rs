@@ -1,9 +1,10 @@
-use foldhash::{HashMap, HashMapExt as _};
-use qcbus_openscenario::{Form, Scenario, ValueFaultKind};
+use foldhash::{HashMap, HashMapExt as _, HashSet};
+use qcbus_document::{Attribute, Node};
+use qcbus_openscenario::{DataType, Declared, Element, Form, Scenario, ValueFaultKind, identifier};
 use qcbus_sdk::{Backport, Rule, Sink};
 
-use crate::families::values;
-use crate::model::Scene;
+use crate::families::{catalogs, values};
+use crate::model::{About as _, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_parameters_valid_parameter_declaration_in_catalogs",
@@ -18,7 +19,7 @@ pub static RULE: Rule<Scene> = Rule {
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     if scenario.form() != Form::Catalog {
-        return;
+        return without_value(scenario, found);
     }
     values::report(scenario, &[ValueFaultKind::Undeclared], found);
     let mut uses = HashMap::new();
@@ -43,4 +44,59 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             finding.at(*used, "where it is used first");
         }
     }
+}
+
+/// The parameters of entries that have an empty default, are used, and get nothing by a reference.
+fn without_value(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let mut said: HashSet<Node<'_>> = HashSet::default();
+    for (reference, _) in catalogs::references(scenario) {
+        let Some(entry) = scenario.entry(reference) else {
+            continue;
+        };
+        for declaration in entry.declarations() {
+            let default = declaration.node.attr("value");
+            let is_empty = default.is_some_and(|value| value.trim().is_empty());
+            let is_text = declaration
+                .data_type
+                .is_none_or(|data_type| data_type == DataType::String);
+            let is_open = declaration.declared == Declared::Faulty && is_empty && !is_text;
+            // What was assigned and does not fit is said there.
+            if !is_open || assigns(reference, declaration.name) || !said.insert(declaration.node) {
+                continue;
+            }
+            let Some(used) = first_use(entry.node(), declaration.name) else {
+                continue;
+            };
+            let text = format!(
+                "the parameter `{}` of the catalog's entry `{}` has no default, and nothing is assigned to it, but \
+                 it is used: its value must be one of type `{}`",
+                declaration.name,
+                reference.text("entryName").unwrap_or_default(),
+                declaration.node.attr("parameterType").unwrap_or("")
+            );
+            found
+                .about(reference, "", text)
+                .at(declaration.node, "the declaration")
+                .at(used, "where it is used first");
+        }
+    }
+}
+
+fn assigns(reference: Element<'_, '_>, name: &str) -> bool {
+    let block = reference.child("ParameterAssignments");
+    let mut assignments = block
+        .into_iter()
+        .flat_map(|block| block.children_named("ParameterAssignment"));
+    assignments.any(|assignment| {
+        let own = assignment.written("parameterRef").unwrap_or("");
+        own.strip_prefix('$').unwrap_or(own) == name
+    })
+}
+
+/// The first attribute within an entry that is written with a parameter.
+fn first_use<'d>(entry: Node<'d>, name: &str) -> Option<Attribute<'d>> {
+    let uses = |text: &str| text.split('$').skip(1).any(|rest| identifier(rest) == name);
+    let all = std::iter::once(entry).chain(entry.descendants());
+    let mut attributes = all.flat_map(|node| node.attributes());
+    attributes.find(|attribute| uses(attribute.value()))
 }

@@ -1,10 +1,13 @@
 use std::cell::OnceCell;
 
-use qcbus_opendrive::RoadMap;
-use qcbus_openscenario::{Element, Scenario};
+use qcbus_opendrive::{Road, RoadMap, Side, TrafficRule};
+use qcbus_openscenario::{Element, LaneAt, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
-use crate::families::positions::{metres, road_of, shown, station};
+use crate::families::positions::{
+    find_lane, lane_id, lane_of, metres, road_of, section_of, shown, station,
+};
+use crate::families::relative::Reach;
 use crate::families::routes::waypoints;
 use crate::model::{About as _, Scene};
 
@@ -19,6 +22,10 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    scenario.on_map(|map| look(scenario, map, found));
+}
+
+fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let all_roads = OnceCell::new();
     for position in scenario.elements_everywhere("RoutePosition") {
         let place = position.child("InRoutePosition");
@@ -31,7 +38,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let (Some(place), Some(route)) = (place, route) else {
             continue;
         };
-        let (Some(at), Some(length)) = (place.number("pathS"), Length::of(route, &all_roads))
+        let (Some(at), Some(length)) = (place.number("pathS"), Length::of(route, map, &all_roads))
         else {
             continue;
         };
@@ -40,7 +47,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             let (long, why) = if length.is_exact {
                 ("", "its waypoints all lie on one road")
             } else {
-                ("at most ", "all roads together allow no more")
+                ("at most ", "the roads allow no more")
             };
             let text = format!(
                 "`pathS` is {}, but the route is {long}{} long: {why}",
@@ -50,32 +57,73 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             found
                 .about(place, "pathS", text)
                 .at(route.node(), "the route");
+        } else if let Some((road, from, sign)) = length.line {
+            beside(place, road, from + sign * at, found);
         }
+    }
+}
+
+/// Looks at what a place has besides `pathS`, where the station is known.
+fn beside(place: Element<'_, '_>, road: &Road<'_>, s: f64, found: &mut Sink<'_>) {
+    if let Some(text) = place.text("laneId") {
+        let id = lane_id(&text).filter(|id| *id != 0);
+        // A lane that no road has is said elsewhere.
+        let is_somewhere = road
+            .sections()
+            .any(|section| id.is_some_and(|id| section.lane(id).is_some()));
+        if let Some(id) = id.filter(|_| is_somewhere)
+            && let LaneAt::None(section) = find_lane(road, s, id)
+        {
+            let text = format!(
+                "`laneId` is `{id}`, but the road `{}`, on which the route runs, has no such lane at s = {}",
+                road.id(),
+                metres(s)
+            );
+            let node = section.section().node();
+            found
+                .about(place, "laneId", text)
+                .at(node, "the lane section");
+        }
+    }
+    let edge = |side| {
+        let section = section_of(road, side, s)?;
+        section.edge_t(side, s - section.s()?)
+    };
+    let edges = edge(Side::Right).zip(edge(Side::Left));
+    if let (Some(t), Some((right, left))) = (place.number("t"), edges)
+        && t.abs() > left.max(-right) + 1e-3
+    {
+        let text = format!(
+            "`t` is {}, but the lanes of road `{}`, on which the route runs, reach from {} to {} at s = {}",
+            shown(place, "t", &metres(t)),
+            road.id(),
+            metres(right),
+            metres(left),
+            metres(s)
+        );
+        found.about(place, "t", text).at(road.node(), "the road");
     }
 }
 
 /// How long a route may be.
-struct Length {
+struct Length<'w, 'r> {
     most: f64,
     is_exact: bool,
+    /// The road that it runs on, where it begins there, and in which direction it goes on.
+    line: Option<(&'w Road<'r>, f64, f64)>,
 }
 
-impl Length {
+impl<'w, 'r> Length<'w, 'r> {
     /// The length, where it does not depend on the way that a simulator finds because all waypoints
     /// follow each other in one direction of one road; else no leg passes any road twice.
-    fn of(route: Element<'_, '_>, all_roads: &OnceCell<Option<f64>>) -> Option<Length> {
+    fn of(
+        route: Element<'_, '_>,
+        map: &'w RoadMap<'r>,
+        all_roads: &OnceCell<Option<f64>>,
+    ) -> Option<Length<'w, 'r>> {
         if route.flag("closed")? {
             return None;
         }
-        let scenario = route.scenario();
-        scenario.on_map(|map| Length::on(map, route, all_roads))?
-    }
-
-    fn on(
-        map: &RoadMap<'_>,
-        route: Element<'_, '_>,
-        all_roads: &OnceCell<Option<f64>>,
-    ) -> Option<Length> {
         let mut stations = Vec::new();
         let mut roads = Vec::new();
         for (_, position) in waypoints(route) {
@@ -91,15 +139,38 @@ impl Length {
         let one_road = roads.windows(2).all(|pair| pair.first() == pair.last());
         let legs = stations.len().checked_sub(1).filter(|legs| *legs > 0)?;
         if one_way && one_road {
+            let road = map.roads().get(*roads.first()?)?;
             return Some(Length {
                 most: (last - first).abs(),
                 is_exact: true,
+                line: Some((road, *first, (last - first).signum())),
             });
         }
         let all = || map.roads().iter().map(|road| road.length()).sum();
+        let most = (*all_roads.get_or_init(all))? * f64::from(u32::try_from(legs).ok()?);
+        let onward = onward(route, map);
         Some(Length {
-            most: (*all_roads.get_or_init(all))? * f64::from(u32::try_from(legs).ok()?),
+            most: onward.map_or(most, |onward| onward.min(most)),
             is_exact: false,
+            line: None,
         })
     }
+}
+
+/// How far one gets at most from the first waypoint to the last: the farthest that one gets at all from the
+/// first, without what is left of the last one's road. `None` where roads lead round in a circle, or where
+/// it is not known which way one sets out.
+fn onward<'d>(route: Element<'_, 'd>, map: &RoadMap<'_>) -> Option<f64> {
+    let ends = |position: Element<'_, 'd>| {
+        let road = road_of(position, map).filter(|_| position.is("LanePosition"))?;
+        let (lane, s) = lane_of(position, road)?;
+        let is_right = lane.id()? < 0;
+        let is_left_hand = road.traffic_rule() == Some(TrafficRule::LeftHand);
+        Some((road, s, is_right != is_left_hand))
+    };
+    let mut positions = waypoints(route).map(|(_, position)| position);
+    let (road, s, along) = ends(positions.next()??)?;
+    let (last, at, onward) = ends(positions.last()??)?;
+    let rest = if onward { last.length()? - at } else { at };
+    Some(Reach::of(map)?.from(road, s, along)? - rest)
 }

@@ -1,3 +1,5 @@
+use std::collections::BTreeSet;
+
 use foldhash::HashSet;
 use qcbus_opendrive::{Road, RoadMap, SectionRef};
 use qcbus_openscenario::{Element, LaneAt, Network, Scenario};
@@ -47,6 +49,7 @@ fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
             }
         }
     }
+    on_any_road(scenario, map, found);
     let origins = Origins::of(scenario, Some(map));
     let mut said = HashSet::default();
     for start in &origins.starts {
@@ -55,6 +58,49 @@ fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
             beside(start.position, &origins, found);
         }
     }
+}
+
+/// Lanes of roads that are not named: some road of the map must have such a lane.
+fn on_any_road(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    const UNPLACED: &[(&str, &str)] = &[
+        ("AbsoluteTargetLane", "value"),
+        ("FromLaneCoordinates", "laneId"),
+    ];
+    let mut all = None;
+    for (name, attribute) in UNPLACED {
+        for element in scenario.elements_everywhere(name) {
+            let Some(text) = element.text(attribute) else {
+                continue;
+            };
+            let all: &Option<BTreeSet<i64>> = all.get_or_insert_with(|| lane_ids(map));
+            let Some(all) = all else { return };
+            if lane_id(&text).is_some_and(|id| id == 0 || all.contains(&id)) {
+                continue;
+            }
+            let ids: Vec<String> = all.iter().map(ToString::to_string).collect();
+            let there = if ids.is_empty() {
+                "no road has lanes".to_owned()
+            } else {
+                format!("roads have only {}", listed(ids.iter().map(String::as_str)))
+            };
+            let text = format!(
+                "`{name}` leads to the lane {}, but no road of the road network has such a lane: {there}",
+                quoted(element, attribute, &text)
+            );
+            let finding = found.about(element, attribute, text);
+            if let Some(root) = map.root() {
+                finding.at(root, "the road network");
+            }
+        }
+    }
+}
+
+/// The ids of all lanes but the center lanes; `None` when one is not known.
+fn lane_ids(map: &RoadMap<'_>) -> Option<BTreeSet<i64>> {
+    let ids: Option<BTreeSet<i64>> = map.lanes().map(|lane| lane.id()).collect();
+    let mut ids = ids?;
+    ids.remove(&0);
+    Some(ids)
 }
 
 /// Says that there is no lane where a position relative to an entity's first place would be, however
@@ -169,14 +215,21 @@ fn lane(position: Element<'_, '_>, road: &Road<'_>, found: &mut Sink<'_>) {
         return;
     };
     let Some(id) = lane_id(&text) else {
+        // Tools that write such names write them into the map as well.
+        let is_written = road
+            .sections()
+            .flat_map(|section| section.lanes())
+            .all(|lane| lane.id().is_some());
+        let (level, why) = if is_written {
+            (Level::Error, "so there is none of this name")
+        } else {
+            (Level::Information, "so this one was not looked for")
+        };
         let text = format!(
-            "`LanePosition` names the lane {}, which is no integer; lanes of roads have integer ids, so \
-             this one was not looked for",
+            "`LanePosition` names the lane {}, which is no integer; lanes of roads have integer ids, {why}",
             quoted(position, "laneId", &text)
         );
-        found
-            .about(position, "laneId", text)
-            .level(Level::Information);
+        found.about(position, "laneId", text).level(level);
         return;
     };
     let Some(s) = positions::station(position, road) else {

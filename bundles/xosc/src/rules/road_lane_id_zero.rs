@@ -29,4 +29,15 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             found.about(position, "laneId", text);
         }
     }
+    for target in scenario.elements_everywhere("AbsoluteTargetLane") {
+        let Some(id) = target.text("value").filter(|id| lane_id(id) == Some(0)) else {
+            continue;
+        };
+        let text = format!(
+            "`AbsoluteTargetLane` leads to the lane {}, the center lane, which has no width: the vehicle would \
+             drive on the line between the two sides of the road; if that is meant, an offset says so",
+            quoted(target, "value", &id)
+        );
+        found.about(target, "value", text);
+    }
 }

@@ -1,5 +1,5 @@
 use qcbus_opendrive::RoadMap;
-use qcbus_openscenario::{EntityKind, RoadNetwork, Scenario};
+use qcbus_openscenario::{EntityKind, RoadNetwork, RoadsNearby, Scenario};
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
 use crate::families::origins::Origins;
@@ -55,7 +55,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             metres(distance)
         );
         let z = position.number("z").unwrap_or(0.0);
-        found.about(position, "", text).point(x, y, z);
+        let level = level(nearby, x, y, distance);
+        found.about(position, "", text).level(level).point(x, y, z);
     }
     network.with(|map| relative_to_others(scenario, (network, map), distance, found));
 }
@@ -89,6 +90,17 @@ fn relative_to_others(
             metres(distance)
         );
         let z = place.z.unwrap_or(0.0);
-        found.about(position, "", text).point(place.x, place.y, z);
+        let level = level(nearby, place.x, place.y, distance);
+        let finding = found.about(position, "", text).level(level);
+        finding.point(place.x, place.y, z);
+    }
+}
+
+/// Beside a road there may be a yard; what is far from all of them is on another map.
+fn level(nearby: &RoadsNearby, x: f64, y: f64, distance: f64) -> Level {
+    if nearby.is_near(x, y, 5.0 * distance) {
+        Level::Information
+    } else {
+        Level::Warning
     }
 }

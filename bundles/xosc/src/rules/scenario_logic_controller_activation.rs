@@ -131,10 +131,11 @@ fn activate(
         .flatten();
     for entity in objects {
         let own = assigned.get(entity.name()).map_or(&[][..], Vec::as_slice);
-        if wanted.is_empty() {
+        let names_one = action.has("objectControllerRef") || action.has("controllerRef");
+        if wanted.is_empty() && !names_one {
             continue;
         }
-        if own.is_empty() {
+        if own.is_empty() && !names_one {
             let text = format!(
                 "no controller is ever assigned to `{}`, so there is none to activate",
                 entity.name()
@@ -142,7 +143,7 @@ fn activate(
             found.about(action, "", text).level(Level::Warning);
             continue;
         }
-        let Some(meant) = meant(action, entity.name(), own, found) else {
+        let Some(meant) = meant(action, entity.name(), own, assigned, found) else {
             continue;
         };
         for (domain, _, group) in &wanted {
@@ -160,6 +161,7 @@ fn meant<'c, 'd>(
     action: Element<'_, '_>,
     entity: &str,
     own: &'c [Assigned<'d>],
+    assigned: &HashMap<String, Vec<Assigned<'_>>>,
     found: &mut Sink<'_>,
 ) -> Option<Vec<&'c Assigned<'d>>> {
     for attribute in ["objectControllerRef", "controllerRef"] {
@@ -176,12 +178,22 @@ fn meant<'c, 'd>(
             .filter(|one| own_name(one) == Some(&*name))
             .collect();
         if meant.is_empty() {
+            // A controller's name and that of its `ObjectController` are mistaken for each other.
+            let bears = |one: &Assigned<'_>| {
+                one.name.as_deref() == Some(&*name) || one.object_name.as_deref() == Some(&*name)
+            };
+            let exists = assigned.values().flatten().any(bears);
+            let (level, whom) = if exists {
+                (Level::Warning, format!("`{entity}`"))
+            } else {
+                (Level::Error, format!("`{entity}` or anybody else"))
+            };
             let text = format!(
-                "no controller {} is ever assigned to `{entity}`{}",
+                "no controller {} is ever assigned to {whom}{}",
                 quoted(action, attribute, &name),
                 hint(&name, own.iter().filter_map(own_name))
             );
-            found.about(action, attribute, text).level(Level::Warning);
+            found.about(action, attribute, text).level(level);
             return None;
         }
         return Some(meant);

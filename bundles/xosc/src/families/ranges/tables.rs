@@ -28,6 +28,7 @@ macro_rules! table {
     };
 }
 
+const BEHIND: &str = "zero is where the rear axle is";
 const A_RATE: &str = "a rate is a magnitude, the target says which way it goes";
 const A_TURN: &str = "a turn away it is the same direction";
 const ANY_ANGLE: &str = "it takes any angle";
@@ -143,7 +144,7 @@ table! {
         // Many files in use write degrees, and most simulators do not read it.
         between(0.0, PI) Axle maxSteering "rad" "axle_maxsteering" .called(AXLES).judged(warning, "");
         // A reference point before the rear axle is odd, and well defined.
-        from_zero Axle positionX "m" "axle_positionx" .called(AXLES).judged(warning, "");
+        from_zero Axle positionX "m" "axle_positionx" .called(AXLES).judged(an_axle_may_be_behind, BEHIND);
         from_zero Axle positionZ "m" "axle_positionz" .called(AXLES).judged(warning, "");
         from_zero Axle trackWidth "m" "axle_trackwidth" .called(AXLES);
         above_zero Axle wheelDiameter "m" "axle_wheeldiameter" .called(AXLES).judged(zero_is_harmless, ZERO);
@@ -158,6 +159,15 @@ table! {
         from_zero Performance maxDecelerationRate "m/s³" "performance_maxdecelerationrate";
         from_zero Performance maxSpeed "m/s" "performance_maxspeed";
         from_zero Vehicle mass "kg" "vehicle_mass";
+}
+
+/// The rear axle is at zero, and many a further axle stands behind it.
+fn an_axle_may_be_behind(element: Element<'_, '_>, _: f64) -> Level {
+    if element.is("AdditionalAxle") {
+        Level::Information
+    } else {
+        Level::Warning
+    }
 }
 
 const AXLES: &[&str] = &["FrontAxle", "RearAxle", "AdditionalAxle"];

@@ -1,0 +1,46 @@
+use foldhash::HashSet;
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::references;
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_references_traffic_name",
+    uids: &["qcbus.dev:xosc:1.0.0:references.traffic_name"],
+    versions: "1.1.0..",
+    after: super::READABLE,
+    page: include_str!("references_traffic_name.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    if !scenario.storyboard().is_complete() {
+        return;
+    }
+    let mut started = HashSet::default();
+    let mut stops = Vec::new();
+    for action in scenario.elements_everywhere("TrafficAction") {
+        if action.child("TrafficStopAction").is_some() {
+            stops.push(action);
+        } else if action.has("trafficName") {
+            // A name that is not known may be any.
+            let Some(name) = action.text("trafficName") else {
+                return;
+            };
+            started.insert(name.into_owned());
+        }
+    }
+    for stop in stops {
+        let Some(name) = stop.text("trafficName") else {
+            continue;
+        };
+        if !started.contains(&*name) {
+            let mut names: Vec<&str> = started.iter().map(String::as_str).collect();
+            names.sort_unstable();
+            let names = names.into_iter();
+            references::unresolved(stop, "trafficName", &name, "started traffic", names, found);
+        }
+    }
+}

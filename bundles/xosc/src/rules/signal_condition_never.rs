@@ -1,0 +1,76 @@
+use std::collections::BTreeSet;
+
+use foldhash::HashMap;
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::positions::listed;
+use crate::families::references::quoted;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_signal_condition_never",
+    uids: &["qcbus.dev:xosc:1.0.0:signal.condition_never"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("signal_condition_never.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let Some(states) = states(scenario) else {
+        return;
+    };
+    for condition in scenario.elements_everywhere("TrafficSignalCondition") {
+        let (Some(signal), Some(state)) = (condition.text("name"), condition.text("state")) else {
+            continue;
+        };
+        let Some(shown) = states.get(&*signal) else {
+            continue;
+        };
+        if shown.contains(state.trim()) {
+            continue;
+        }
+        let text = format!(
+            "the condition waits for the state {} of the signal `{signal}`, but its phases set it only to {}: \
+             unless the simulator does something else, it is never true",
+            quoted(condition, "state", &state),
+            listed(shown.iter().map(String::as_str))
+        );
+        found.about(condition, "state", text);
+    }
+}
+
+/// The states that the scenario gives each signal that is in a phase; `None` when that is not known.
+fn states(scenario: &Scenario<'_>) -> Option<HashMap<String, BTreeSet<String>>> {
+    if !scenario.storyboard().is_complete() {
+        return None;
+    }
+    // Which signals a group has only the road network's own controllers say.
+    if scenario
+        .elements_everywhere("TrafficSignalGroupState")
+        .next()
+        .is_some()
+    {
+        return None;
+    }
+    let mut states: HashMap<String, BTreeSet<String>> = HashMap::default();
+    for state in scenario.elements_everywhere("TrafficSignalState") {
+        let signal = state.text("trafficSignalId")?;
+        let own = states.entry(signal.into_owned()).or_default();
+        own.insert(trimmed(state)?);
+    }
+    for action in scenario.elements_everywhere("TrafficSignalStateAction") {
+        let signal = action.text("name")?;
+        // Without a phase it begins as the simulator likes.
+        if let Some(own) = states.get_mut(&*signal) {
+            own.insert(trimmed(action)?);
+        }
+    }
+    Some(states)
+}
+
+fn trimmed(element: Element<'_, '_>) -> Option<String> {
+    Some(element.text("state")?.trim().to_owned())
+}

@@ -1,0 +1,49 @@
+use foldhash::HashMap;
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::references::quoted;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_signal_phase_duplicate",
+    uids: &["qcbus.dev:xosc:1.0.0:signal.phase_duplicate"],
+    after: super::READABLE,
+    page: include_str!("signal_phase_duplicate.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for phase in scenario.elements_everywhere("Phase") {
+        let mut known: HashMap<String, Element<'_, '_>> = HashMap::default();
+        for state in phase.children_named("TrafficSignalState") {
+            let Some(signal) = state.text("trafficSignalId") else {
+                continue;
+            };
+            let Some(first) = known.get(&*signal).copied() else {
+                known.insert(signal.into_owned(), state);
+                continue;
+            };
+            let (one, other) = (first.text("state"), state.text("state"));
+            let Some((one, other)) = one.zip(other) else {
+                continue;
+            };
+            let signal = quoted(state, "trafficSignalId", &signal);
+            let (level, text) = if one == other {
+                let text = format!("the phase gives the signal {signal} its state twice");
+                (Level::Information, text)
+            } else {
+                let text = format!(
+                    "the phase sets the signal {signal} to `{other}` and to `{one}` before: which of them it \
+                     shows is up to the simulator"
+                );
+                (Level::Error, text)
+            };
+            found
+                .about(state, "trafficSignalId", text)
+                .level(level)
+                .at(first.node(), "its first state");
+        }
+    }
+}

@@ -1,0 +1,57 @@
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::actions::stated;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_trigger_never_true",
+    uids: &["qcbus.dev:xosc:1.0.0:trigger.never_true"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("trigger_never_true.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// Conditions about what is never below zero, and what that is.
+const NEVER_NEGATIVE: &[(&str, &str)] = &[
+    ("SimulationTimeCondition", "the simulation time"),
+    ("TimeHeadwayCondition", "a time headway"),
+    ("TimeToCollisionCondition", "a time to collision"),
+    ("DistanceCondition", "a distance"),
+    ("RelativeDistanceCondition", "a distance"),
+];
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    for (name, what) in NEVER_NEGATIVE {
+        for condition in scenario.elements_everywhere(name) {
+            let (Some(value), Some(rule)) = (condition.number("value"), condition.word("rule"))
+            else {
+                continue;
+            };
+            let never = match &*rule {
+                "lessThan" => value <= 0.0,
+                "lessOrEqual" | "equalTo" => value < 0.0,
+                _ => false,
+            };
+            // Numbers below zero are out of range elsewhere, and an edge that never comes is said there.
+            let is_time = condition.is("SimulationTimeCondition");
+            if !never || (value < 0.0 && !is_time) || (is_time && rises(condition, &rule)) {
+                continue;
+            }
+            let text = format!(
+                "the condition demands `{rule}` {}, but {what} is never below 0: it is never true",
+                stated(condition, "value", value)
+            );
+            found.about(condition, "value", text);
+        }
+    }
+}
+
+fn rises(condition: Element<'_, '_>, rule: &str) -> bool {
+    let edge = condition
+        .ancestor("Condition")
+        .and_then(|around| around.word("conditionEdge"));
+    rule != "equalTo" && edge.as_deref() == Some("rising")
+}
