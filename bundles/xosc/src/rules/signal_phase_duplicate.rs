@@ -8,6 +8,7 @@ use crate::model::{About, Scene};
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_signal_phase_duplicate",
     uids: &["qcbus.dev:xosc:1.0.0:signal.phase_duplicate"],
+    level: Level::Warning,
     after: super::READABLE,
     page: include_str!("signal_phase_duplicate.md"),
     run,
@@ -36,9 +37,9 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             } else {
                 let text = format!(
                     "the phase sets the signal {signal} to `{other}` and to `{one}` before: which of them it \
-                     shows is up to the simulator"
+                     shows, or whether both, is up to the simulator"
                 );
-                (Level::Error, text)
+                (Level::Warning, text)
             };
             found
                 .about(state, "trafficSignalId", text)
