@@ -41,6 +41,7 @@ mod distribution_values_satisfy_constraints;
 mod distribution_weights;
 mod entities_axle_geometry;
 mod entities_bounding_box_positive;
+mod entities_dimensions_plausible;
 mod entities_none;
 mod entities_not_positioned;
 mod entities_overlapping_spawn;
@@ -182,6 +183,7 @@ mod signal_zero_cycle;
 mod storyboard_act_never_starts;
 mod storyboard_action_conflict;
 mod storyboard_empty;
+mod storyboard_ends_at_once;
 mod storyboard_event_never_starts;
 mod storyboard_init_private_unknown;
 mod storyboard_maximum_execution_count;
@@ -316,6 +318,7 @@ pub static RULES: &[&dyn AnyRule] = &[
     &reference_control_valid_actor_reference_in_private_actions::RULE,
     &reference_control_resolvable_storyboard_element_reference::RULE,
     &storyboard_stop_trigger::RULE,
+    &storyboard_ends_at_once::RULE,
     &storyboard_act_never_starts::RULE,
     &storyboard_event_never_starts::RULE,
     &storyboard_empty::RULE,
@@ -381,6 +384,7 @@ pub static RULES: &[&dyn AnyRule] = &[
     &entities_bounding_box_positive::RULE,
     &entities_axle_geometry::RULE,
     &entities_performance_plausible::RULE,
+    &entities_dimensions_plausible::RULE,
     &entities_trailer_reference::RULE,
     &entities_overlapping_spawn::RULE,
     &general_references_to_scenario_object::RULE,

@@ -1,7 +1,7 @@
 use std::collections::BTreeSet;
 
 use foldhash::HashSet;
-use qcbus_opendrive::{Road, RoadMap, SectionRef};
+use qcbus_opendrive::{Road, RoadMap, SectionRef, Side};
 use qcbus_openscenario::{Element, LaneAt, Network, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
@@ -50,6 +50,7 @@ fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
         }
     }
     on_any_road(scenario, map, found);
+    too_many(scenario, map, found);
     let origins = Origins::of(scenario, Some(map));
     let mut said = HashSet::default();
     for start in &origins.starts {
@@ -93,6 +94,43 @@ fn on_any_road(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>)
             }
         }
     }
+}
+
+/// Changes by more lanes than any road has.
+fn too_many(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let mut most = None;
+    for target in scenario.elements_everywhere("RelativeTargetLane") {
+        let Some(by) = target.integer("value") else {
+            continue;
+        };
+        let most = *most.get_or_insert_with(|| widest(map));
+        // Whether the center lane counts is understood in two ways.
+        if by.unsigned_abs() <= most {
+            continue;
+        }
+        let text = format!(
+            "the `value` of `RelativeTargetLane` is {}, but no road of the road network has more than {most} lanes",
+            quoted(target, "value", &by.to_string())
+        );
+        let finding = found.about(target, "value", text);
+        if let Some(root) = map.root() {
+            finding.at(root, "the road network");
+        }
+    }
+}
+
+/// The most lanes that a road has side by side.
+fn widest(map: &RoadMap<'_>) -> u64 {
+    let of_road = |road: &Road<'_>| {
+        let mut most = [0, 0];
+        for section in road.sections() {
+            for (most, side) in most.iter_mut().zip(Side::BOTH) {
+                *most = (*most).max(section.side(side).count() as u64);
+            }
+        }
+        most.iter().sum::<u64>()
+    };
+    map.roads().iter().map(of_road).max().unwrap_or(0)
 }
 
 /// The ids of all lanes but the center lanes; `None` when one is not known.

@@ -1,0 +1,88 @@
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Level, Param, Rule, Sink};
+
+use crate::families::actions::stated;
+use crate::families::placement;
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_entities_dimensions_plausible",
+    uids: &["qcbus.dev:xosc:1.0.0:entities.dimensions_plausible"],
+    level: Level::Warning,
+    after: super::READABLE,
+    params: &[LENGTH, ACROSS, WHEEL],
+    page: include_str!("entities_dimensions_plausible.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const LENGTH: Param = Param::number(
+    "length",
+    100.0,
+    "m",
+    "a road vehicle or a pedestrian that is longer is taken for a mistake",
+);
+const ACROSS: Param = Param::number(
+    "across",
+    15.0,
+    "m",
+    "one that is wider or higher is taken for a mistake",
+);
+const WHEEL: Param = Param::number(
+    "wheel",
+    5.0,
+    "m",
+    "a wheel of a greater diameter is taken for a mistake",
+);
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let (length, across) = (found.number(&LENGTH), found.number(&ACROSS));
+    for size in placement::once(scenario.elements_everywhere("Dimensions")) {
+        let object = size.ancestors().nth(1);
+        let Some(object) = object.filter(|object| is_road_user(*object)) else {
+            continue;
+        };
+        for (name, most) in [("length", length), ("width", across), ("height", across)] {
+            too_large(object, size, name, most, found);
+        }
+    }
+    let wheel = found.number(&WHEEL);
+    for axle in ["FrontAxle", "RearAxle", "AdditionalAxle"] {
+        for axle in placement::once(scenario.elements_everywhere(axle)) {
+            if let Some(vehicle) = axle.ancestor("Vehicle") {
+                too_large(vehicle, axle, "wheelDiameter", wheel, found);
+            }
+        }
+    }
+}
+
+/// Whether something goes by road, and is of no more than ordinary size.
+fn is_road_user(object: Element<'_, '_>) -> bool {
+    match object.name() {
+        "Pedestrian" => true,
+        "Vehicle" => {
+            let category = object.word("vehicleCategory");
+            category.is_some_and(|category| !matches!(&*category, "train" | "tram"))
+        }
+        _ => false,
+    }
+}
+
+fn too_large(
+    object: Element<'_, '_>,
+    element: Element<'_, '_>,
+    attribute: &str,
+    most: f64,
+    found: &mut Sink<'_>,
+) {
+    let Some(value) = element.number(attribute).filter(|value| *value > most) else {
+        return;
+    };
+    let text = format!(
+        "the `{attribute}` of the `{}` `{}` is {} m, more than {most} m; lengths are in metres",
+        object.name(),
+        object.text("name").unwrap_or_default(),
+        stated(element, attribute, value)
+    );
+    found.about(element, attribute, text);
+}

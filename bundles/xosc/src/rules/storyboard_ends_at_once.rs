@@ -1,0 +1,73 @@
+use qcbus_openscenario::{Element, Scenario};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::actions::stated;
+use crate::families::triggers::{groups, time};
+use crate::model::{About, Scene};
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_storyboard_ends_at_once",
+    uids: &["qcbus.dev:xosc:1.0.0:storyboard.ends_at_once"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("storyboard_ends_at_once.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let Some(storyboard) = scenario.root().child("Storyboard") else {
+        return;
+    };
+    // Without anything to happen there is nothing to miss.
+    if storyboard.child("Story").is_none() {
+        return;
+    }
+    let Some(trigger) = storyboard.child("StopTrigger") else {
+        return;
+    };
+    for group in groups(trigger) {
+        let Some(first) = group.first() else { continue };
+        if !group.iter().all(|condition| holds_at_once(*condition)) {
+            continue;
+        }
+        let shown = time(*first).and_then(|time| {
+            let value = time.number("value")?;
+            Some(format!(
+                "`{}` {} s",
+                time.word("rule")?,
+                stated(time, "value", value)
+            ))
+        });
+        let text = format!(
+            "the storyboard stops when the simulation time is {}, which it is from the beginning: the run ends \
+             before anything happens",
+            shown.unwrap_or_default()
+        );
+        found.about(time(*first).unwrap_or(*first), "value", text);
+    }
+}
+
+/// Whether a condition is true in the first or second step.
+fn holds_at_once(condition: Element<'_, '_>) -> bool {
+    let holds = || {
+        let time = time(condition)?;
+        let value = time.number("value")?;
+        let delay = if condition.has("delay") {
+            condition.number("delay")?
+        } else {
+            0.0
+        };
+        let edge = condition.word("conditionEdge")?;
+        let holds = match &*time.word("rule")? {
+            "greaterThan" | "greaterOrEqual" => value <= 0.0 && &*edge != "falling",
+            "lessThan" => value > 0.0 && &*edge == "none",
+            "lessOrEqual" => value >= 0.0 && &*edge == "none",
+            "notEqualTo" => value < 0.0 && &*edge == "none",
+            "equalTo" => value == 0.0 && &*edge == "none",
+            _ => false,
+        };
+        Some(holds && delay <= 0.0)
+    };
+    holds().unwrap_or(false)
+}
