@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use foldhash::{HashMap, HashMapExt as _};
 use qcbus_opendrive::{Road, RoadMap, Side, TrafficRule};
-use qcbus_openscenario::{Element, LaneAt, Scenario};
+use qcbus_openscenario::{Element, LaneAt, RoadNetwork, Scenario};
 
 use crate::families::placement::{self, Start};
 use crate::families::positions::{AT_END, find_lane, lane_of, road_of, section_of, station};
@@ -22,7 +22,8 @@ pub(crate) struct Place<'w, 'r> {
     /// Whether every simulator understands the heading like this. On the left of a road some let it look
     /// along the road and some against it.
     pub(crate) is_sure: bool,
-    pub(crate) on: Option<OnRoad<'w, 'r>>,
+    /// Where it stands on a road, if it was placed on one; else [`Origins::on`] looks for it.
+    on: Option<OnRoad<'w, 'r>>,
 }
 
 /// A place on a road.
@@ -51,6 +52,7 @@ pub(crate) struct Origins<'m, 'd, 'w, 'r> {
     by_name: HashMap<String, Option<usize>>,
     memo: RefCell<Vec<Memo<'w, 'r>>>,
     map: Option<&'w RoadMap<'r>>,
+    network: Option<&'m RoadNetwork>,
 }
 
 /// Positions that are relative to an entity.
@@ -80,6 +82,7 @@ impl<'m, 'd, 'w, 'r> Origins<'m, 'd, 'w, 'r> {
             starts,
             by_name,
             map,
+            network: scenario.network().map(),
         }
     }
 
@@ -136,17 +139,14 @@ impl<'m, 'd, 'w, 'r> Origins<'m, 'd, 'w, 'r> {
         base: Option<Option<Place<'w, 'r>>>,
     ) -> Option<Place<'w, 'r>> {
         match (position.name(), base) {
-            ("WorldPosition", _) => {
-                let place = Place {
-                    x: position.number("x")?,
-                    y: position.number("y")?,
-                    z: position.number("z"),
-                    heading: or(position, "h", 0.0)?,
-                    is_sure: true,
-                    on: None,
-                };
-                Some(self.on_road(position, place))
-            }
+            ("WorldPosition", _) => Some(Place {
+                x: position.number("x")?,
+                y: position.number("y")?,
+                z: position.number("z"),
+                heading: or(position, "h", 0.0)?,
+                is_sure: true,
+                on: None,
+            }),
             ("LanePosition", _) => {
                 let road = road_of(position, self.map?)?;
                 let (lane, s) = lane_of(position, road)?;
@@ -159,57 +159,57 @@ impl<'m, 'd, 'w, 'r> Origins<'m, 'd, 'w, 'r> {
                 oriented(position, on_map(road, s, t, lane_at(road, s, t))?)
             }
             ("RelativeRoadPosition", Some(base)) => {
-                let on = base?.on?;
+                let on = self.on(&base?)?;
                 let s = within(on.road, on.s + position.number("ds")?)?;
                 let t = on.t + position.number("dt")?;
                 oriented(position, on_map(on.road, s, t, lane_at(on.road, s, t))?)
             }
-            ("RelativeLanePosition", Some(base)) => beside(position, base?.on?),
-            ("RelativeWorldPosition", Some(base)) => self.moved(position, base?, 0.0),
+            ("RelativeLanePosition", Some(base)) => beside(position, self.on(&base?)?),
+            ("RelativeWorldPosition", Some(base)) => moved(position, base?, 0.0),
             ("RelativeObjectPosition", Some(base)) => {
                 let base = base.filter(|base| base.is_sure)?;
-                self.moved(position, base, base.heading)
+                moved(position, base, base.heading)
             }
             _ => None,
         }
     }
 
-    /// A place by its distances in directions that are turned by an angle.
-    fn moved(
-        &self,
-        position: Element<'m, 'd>,
-        base: Place<'w, 'r>,
-        turned: f64,
-    ) -> Option<Place<'w, 'r>> {
-        let (dx, dy) = (position.number("dx")?, position.number("dy")?);
-        let (sin, cos) = turned.sin_cos();
-        let place = Place {
-            x: base.x + dx * cos - dy * sin,
-            y: base.y + dx * sin + dy * cos,
-            // What stands farther off stands as high as its own ground.
-            z: position.number("dz").and_then(|dz| Some(base.z? + dz)),
-            on: None,
-            ..base
-        };
-        oriented(position, self.on_road(position, place))
+    /// Where a place is on a road, if there is only one there.
+    pub(crate) fn on(&self, place: &Place<'w, 'r>) -> Option<OnRoad<'w, 'r>> {
+        if place.on.is_some() {
+            return place.on;
+        }
+        let map = self.map?;
+        let nearby = self.network?.nearby();
+        let (road, s, t) = nearby.only_road_at(map, place.x, place.y)?;
+        let hdg = road.pose(s)?.hdg;
+        Some(OnRoad {
+            road,
+            s,
+            t,
+            lane: lane_at(road, s, t),
+            along: place.is_sure && (place.heading - hdg).cos() > 0.5,
+        })
     }
+}
 
-    /// A place in the world with the road that it lies on, if there is only one.
-    fn on_road(&self, position: Element<'m, 'd>, place: Place<'w, 'r>) -> Place<'w, 'r> {
-        let on = self.map.and_then(|map| {
-            let nearby = position.scenario().network().map()?.nearby();
-            let (road, s, t) = nearby.only_road_at(map, place.x, place.y)?;
-            let hdg = road.pose(s)?.hdg;
-            Some(OnRoad {
-                road,
-                s,
-                t,
-                lane: lane_at(road, s, t),
-                along: place.is_sure && (place.heading - hdg).cos() > 0.5,
-            })
-        });
-        Place { on, ..place }
-    }
+/// A place by its distances in directions that are turned by an angle.
+fn moved<'w, 'r>(
+    position: Element<'_, '_>,
+    base: Place<'w, 'r>,
+    turned: f64,
+) -> Option<Place<'w, 'r>> {
+    let (dx, dy) = (position.number("dx")?, position.number("dy")?);
+    let (sin, cos) = turned.sin_cos();
+    let place = Place {
+        x: base.x + dx * cos - dy * sin,
+        y: base.y + dx * sin + dy * cos,
+        // What stands farther off stands as high as its own ground.
+        z: position.number("dz").and_then(|dz| Some(base.z? + dz)),
+        on: None,
+        ..base
+    };
+    oriented(position, place)
 }
 
 /// Whom a position is relative to.

@@ -2,7 +2,6 @@ use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
 use crate::families::actions::stated;
-use crate::families::placement;
 use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -37,7 +36,7 @@ const WHEEL: Param = Param::number(
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let (length, across) = (found.number(&LENGTH), found.number(&ACROSS));
-    for size in placement::once(scenario.elements_everywhere("Dimensions")) {
+    for size in scenario.elements_everywhere("Dimensions") {
         let object = size.ancestors().nth(1);
         let Some(object) = object.filter(|object| is_road_user(*object)) else {
             continue;
@@ -48,7 +47,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
     let wheel = found.number(&WHEEL);
     for axle in ["FrontAxle", "RearAxle", "AdditionalAxle"] {
-        for axle in placement::once(scenario.elements_everywhere(axle)) {
+        for axle in scenario.elements_everywhere(axle) {
             if let Some(vehicle) = axle.ancestor("Vehicle") {
                 too_large(vehicle, axle, "wheelDiameter", wheel, found);
             }

@@ -82,13 +82,13 @@ fn relative_to_others(
         let Some((name, base)) = origins.base(position) else {
             continue;
         };
-        let Some((on, ways)) = base
-            .on
+        let Some((on, ways)) = origins
+            .on(&base)
             .and_then(|on| Some((on, relative::ways(position, on)?)))
         else {
             continue;
         };
-        if let Some(place) = origins.place(at).and_then(|place| place.on) {
+        if let Some(place) = origins.place(at).and_then(|place| origins.on(&place)) {
             beside_after_all(position, place, slack, found);
             continue;
         }

@@ -151,7 +151,9 @@ fn beside<'m, 'd>(
     let Some((name, place)) = origins.base(position) else {
         return;
     };
-    let Some(on) = place.on else { return };
+    let Some(on) = origins.on(&place) else {
+        return;
+    };
     let (Some(lanes), Some(ways)) = (relative::lanes(position, on), relative::ways(position, on))
     else {
         return;

@@ -82,7 +82,7 @@ fn relative_to_others(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Si
         let Some(entity) = entity.filter(|_| is_relative) else {
             continue;
         };
-        let place = origins.place(at).and_then(|place| place.on);
+        let place = origins.place(at).and_then(|place| origins.on(&place));
         let lane = place.and_then(|on| Some((on.road, on.lane.filter(|id| *id != 0)?, on.s)));
         let Some((road, id, s)) = lane else { continue };
         let LaneAt::Lane(lane) = find_lane(road, s, id) else {
