@@ -1,5 +1,6 @@
 //! The road network that a scenario takes place on.
 
+use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
 use qcbus_document::{Image, ImageError};
@@ -42,6 +43,8 @@ pub struct RoadNetwork {
     map: OwnedMap,
     nearby: OnceLock<RoadsNearby>,
     ways: OnceLock<Option<Ways>>,
+    lane_ids: OnceLock<Option<BTreeSet<i64>>>,
+    most_lanes: OnceLock<u64>,
 }
 
 impl RoadNetwork {
@@ -54,6 +57,8 @@ impl RoadNetwork {
             map: OwnedMap::of(image)?,
             nearby: OnceLock::new(),
             ways: OnceLock::new(),
+            lane_ids: OnceLock::new(),
+            most_lanes: OnceLock::new(),
         })
     }
 
@@ -71,6 +76,31 @@ impl RoadNetwork {
     pub fn ways(&self) -> Option<&Ways> {
         self.ways.get_or_init(|| self.with(Ways::of)).as_ref()
     }
+
+    /// The ids of all lanes but the center lanes; `None` when one is not known.
+    pub fn lane_ids(&self) -> Option<&BTreeSet<i64>> {
+        let ids = self.lane_ids.get_or_init(|| {
+            self.with(|map| {
+                let ids = map.lanes().map(|lane| lane.id());
+                ids.filter(|id| *id != Some(0)).collect()
+            })
+        });
+        ids.as_ref()
+    }
+
+    /// The most lanes that a road has on both sides together, in whichever of its lane sections.
+    pub fn most_lanes(&self) -> u64 {
+        *self.most_lanes.get_or_init(|| {
+            self.with(|map| map.roads().iter().map(lanes_of).max())
+                .unwrap_or(0)
+        })
+    }
+}
+
+fn lanes_of(road: &Road<'_>) -> u64 {
+    let most = |side| road.sections().map(move |section| section.side(side).count());
+    let most = Side::BOTH.map(|side| most(side).max().unwrap_or(0) as u64);
+    most.iter().sum()
 }
 
 /// Whether a road has a lane at a station.

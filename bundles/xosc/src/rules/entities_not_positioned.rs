@@ -1,3 +1,5 @@
+use std::cell::LazyCell;
+
 use qcbus_openscenario::{EntityKind, Form, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
@@ -21,7 +23,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let Some(placed) = placement::placed(scenario) else {
         return;
     };
-    let dangling = references::dangling_entities(scenario);
+    let dangling = LazyCell::new(|| references::dangling_entities(scenario));
     for entity in scenario.entities().objects() {
         let must_be = matches!(entity.kind(), EntityKind::Vehicle | EntityKind::Pedestrian);
         if must_be && !placed.contains(entity.name()) && !dangling.may_mean(entity.name()) {

@@ -1,4 +1,5 @@
 use std::borrow::Cow;
+use std::cell::LazyCell;
 
 use foldhash::HashSet;
 use qcbus_openscenario::{EntityKind, Form, Scenario};
@@ -34,7 +35,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             used.insert(name);
         }
     }
-    let dangling = references::dangling_entities(scenario);
+    let dangling = LazyCell::new(|| references::dangling_entities(scenario));
     let is_unused = |name: &str| !used.contains(name) && !dangling.may_mean(name);
     let entities = scenario.entities();
     let by_type = entities

@@ -1,8 +1,8 @@
-use std::collections::BTreeSet;
+use std::cell::LazyCell;
 
 use foldhash::HashSet;
-use qcbus_opendrive::{Road, RoadMap, SectionRef, Side};
-use qcbus_openscenario::{Element, LaneAt, Network, Scenario};
+use qcbus_opendrive::{Road, RoadMap, SectionRef};
+use qcbus_openscenario::{Element, LaneAt, Network, RoadNetwork, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::origins::{self, Origins};
@@ -30,11 +30,11 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         Network::NotHad => return not_looked_for(scenario, found),
         Network::Unnamed | Network::Simulator | Network::Foreign => return,
     };
-    network.with(|map| look(scenario, map, found));
+    network.with(|map| look(scenario, network, map, found));
 }
 
-fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    let roads = roads(map);
+fn look(scenario: &Scenario<'_>, network: &RoadNetwork, map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let roads = LazyCell::new(|| roads(map));
     for name in ON_ROAD {
         for position in scenario.elements_everywhere(name) {
             let Some(id) = position.text("roadId") else {
@@ -49,8 +49,8 @@ fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
             }
         }
     }
-    on_any_road(scenario, map, found);
-    too_many(scenario, map, found);
+    on_any_road(scenario, network, map, found);
+    too_many(scenario, network, map, found);
     let origins = Origins::of(scenario, Some(map));
     let mut said = HashSet::default();
     for start in &origins.starts {
@@ -62,19 +62,24 @@ fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
 }
 
 /// Lanes of roads that are not named: some road of the map must have such a lane.
-fn on_any_road(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
+fn on_any_road(
+    scenario: &Scenario<'_>,
+    network: &RoadNetwork,
+    map: &RoadMap<'_>,
+    found: &mut Sink<'_>,
+) {
     const UNPLACED: &[(&str, &str)] = &[
         ("AbsoluteTargetLane", "value"),
         ("FromLaneCoordinates", "laneId"),
     ];
-    let mut all = None;
     for (name, attribute) in UNPLACED {
         for element in scenario.elements_everywhere(name) {
             let Some(text) = element.text(attribute) else {
                 continue;
             };
-            let all: &Option<BTreeSet<i64>> = all.get_or_insert_with(|| lane_ids(map));
-            let Some(all) = all else { return };
+            let Some(all) = network.lane_ids() else {
+                return;
+            };
             if lane_id(&text).is_some_and(|id| id == 0 || all.contains(&id)) {
                 continue;
             }
@@ -97,13 +102,17 @@ fn on_any_road(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>)
 }
 
 /// Changes by more lanes than any road has.
-fn too_many(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    let mut most = None;
+fn too_many(
+    scenario: &Scenario<'_>,
+    network: &RoadNetwork,
+    map: &RoadMap<'_>,
+    found: &mut Sink<'_>,
+) {
     for target in scenario.elements_everywhere("RelativeTargetLane") {
         let Some(by) = target.integer("value") else {
             continue;
         };
-        let most = *most.get_or_insert_with(|| widest(map));
+        let most = network.most_lanes();
         // Whether the center lane counts is understood in two ways.
         if by.unsigned_abs() <= most {
             continue;
@@ -117,28 +126,6 @@ fn too_many(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
             finding.at(root, "the road network");
         }
     }
-}
-
-/// The most lanes that a road has side by side.
-fn widest(map: &RoadMap<'_>) -> u64 {
-    let of_road = |road: &Road<'_>| {
-        let mut most = [0, 0];
-        for section in road.sections() {
-            for (most, side) in most.iter_mut().zip(Side::BOTH) {
-                *most = (*most).max(section.side(side).count() as u64);
-            }
-        }
-        most.iter().sum::<u64>()
-    };
-    map.roads().iter().map(of_road).max().unwrap_or(0)
-}
-
-/// The ids of all lanes but the center lanes; `None` when one is not known.
-fn lane_ids(map: &RoadMap<'_>) -> Option<BTreeSet<i64>> {
-    let ids: Option<BTreeSet<i64>> = map.lanes().map(|lane| lane.id()).collect();
-    let mut ids = ids?;
-    ids.remove(&0);
-    Some(ids)
 }
 
 /// Says that there is no lane where a position relative to an entity's first place would be, however

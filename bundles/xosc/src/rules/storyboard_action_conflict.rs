@@ -1,5 +1,5 @@
 use foldhash::{HashMap, HashMapExt as _};
-use qcbus_openscenario::{Element, Scenario};
+use qcbus_openscenario::{Element, Entity, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::actions::{Domain, acting, domains};
@@ -31,19 +31,29 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         }
         let mut kinds = Kinds::default();
         let mut taken: HashMap<(usize, &str, Domain), Taken<'_, '_>> = HashMap::new();
+        // All events of a maneuver have the same actors.
+        let mut of_maneuver = None;
         for event in events {
             let trigger = kinds.of(event.child("StartTrigger"));
+            let maneuver = event.parent();
+            let actors = match &of_maneuver {
+                Some((known, actors)) if *known == maneuver => actors,
+                _ => {
+                    let actors = acting(event).unwrap_or_default();
+                    &of_maneuver.insert((maneuver, actors)).1
+                }
+            };
             for action in event.children_named("Action") {
-                take(trigger, event, action, &mut taken, found);
+                take((trigger, event), action, actors, &mut taken, found);
             }
         }
     }
 }
 
 fn take<'m, 'd>(
-    trigger: usize,
-    event: Element<'m, 'd>,
+    (trigger, event): (usize, Element<'m, 'd>),
     action: Element<'m, 'd>,
+    actors: &[&'m Entity<'d>],
     taken: &mut HashMap<(usize, &'m str, Domain), Taken<'m, 'd>>,
     found: &mut Sink<'_>,
 ) {
@@ -54,7 +64,7 @@ fn take<'m, 'd>(
     if domains.is_empty() {
         return;
     }
-    for entity in acting(action).unwrap_or_default() {
+    for entity in actors {
         for domain in &domains {
             let key = (trigger, entity.name(), *domain);
             let Some((other, its_event)) = taken.get(&key).copied() else {
