@@ -106,9 +106,19 @@ pub struct Breach<'a> {
     pub attribute: Option<Attribute<'a>>,
     /// What is wrong.
     pub text: String,
-    /// Whether something cannot be read: a value that is none, or nothing where something must be. What
-    /// is only too much, or not where it belongs, many readers pass over.
-    pub unreadable: bool,
+    /// What readers make of it.
+    pub weight: Weight,
+}
+
+/// What readers make of something that a schema does not allow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Weight {
+    /// It cannot be read: a value that is none, or nothing where something must be.
+    Unreadable,
+    /// It is only too much, or not where it belongs: many readers pass over it.
+    Superfluous,
+    /// It came with a later version than the header names: who knows that one reads it.
+    Later,
 }
 
 /// Where a document that a root refers to breaks its schema, in document order: the user's schema, or the
@@ -120,7 +130,7 @@ pub fn breaches<'a>(subject: &Subject<'_>, document: &Document<'a>) -> Vec<Breac
     else {
         return Vec::new();
     };
-    let mut breaches: Vec<Breach<'a>> = checked
+    let violations = checked
         .violations
         .iter()
         .filter(|violation| checked.severity(violation) == Severity::Error)
@@ -128,11 +138,36 @@ pub fn breaches<'a>(subject: &Subject<'_>, document: &Document<'a>) -> Vec<Breac
             node: violation.node,
             attribute: violation.attribute,
             text: violation.text.clone(),
-            unreadable: is_unreadable(violation),
-        })
-        .collect();
+            weight: if is_unreadable(violation) {
+                Weight::Unreadable
+            } else {
+                Weight::Superfluous
+            },
+        });
+    let mut breaches: Vec<Breach<'a>> = violations.collect();
+    if let (Some(later), Some(stated)) = (&checked.later, checked.version) {
+        breaches.extend(newer_than(later, stated));
+    }
     breaches.sort_by_key(|breach| breach.node.index());
     breaches
+}
+
+/// All that a document uses of later versions than its header names.
+fn newer_than<'a>(later: &Later<'a>, stated: Version) -> impl Iterator<Item = Breach<'a>> {
+    let things = later.things.iter();
+    things.flat_map(move |thing| {
+        let text = format!(
+            "{} came with version {}, but its header says {stated}",
+            thing.what, thing.since
+        );
+        let name = thing.attribute.map(|attribute| attribute.name());
+        thing.nodes.iter().map(move |node| Breach {
+            node: *node,
+            attribute: name.and_then(|name| node.attribute(name)),
+            text: text.clone(),
+            weight: Weight::Later,
+        })
+    })
 }
 
 fn is_unreadable(violation: &Violation<'_>) -> bool {

@@ -31,10 +31,12 @@ pub struct Thing<'a> {
     pub what: String,
     /// The version that it came with.
     pub since: Version,
+    /// All elements that it is about, in document order.
+    pub nodes: Vec<Node<'a>>,
 }
 
 /// By the type and what it does not have: the place in the list, when a later version has it.
-type Known<'a> = HashMap<(&'static str, Member<'a>), bool>;
+type Known<'a> = HashMap<(&'static str, Member<'a>), Option<usize>>;
 
 struct Search<'a> {
     kind: FileKind,
@@ -87,56 +89,64 @@ impl<'a> Search<'a> {
             }
             return;
         };
-        self.note(parent, Member::Child(node.name()), || Thing {
-            node,
-            attribute: None,
-            what: format!("`{}` in `{}`", node.name(), parent.name()),
-            since: Version { major: 0, minor: 0 },
+        self.note(parent, Member::Child(node.name()), (node, None), || {
+            format!("`{}` in `{}`", node.name(), parent.name())
         });
     }
 
     fn look_at(&mut self, attribute: Attribute<'a>) {
         let (node, name) = (attribute.node(), attribute.name());
-        let thing = |what| Thing {
-            node,
-            attribute: Some(attribute),
-            what,
-            since: Version { major: 0, minor: 0 },
-        };
+        let at = (node, Some(attribute));
         let Some(value) = self.typing.value(attribute) else {
-            self.note(node, Member::Attribute(name), || {
-                thing(format!("`{name}` of `{}`", node.name()))
+            self.note(node, Member::Attribute(name), at, || {
+                format!("`{name}` of `{}`", node.name())
             });
             return;
         };
         let word = attribute.value().trim();
         if word.starts_with("${") && !value.takes_expressions() {
-            self.note(node, Member::Expression(name), || {
-                thing(format!("an expression as `{name}` of `{}`", node.name()))
+            self.note(node, Member::Expression(name), at, || {
+                format!("an expression as `{name}` of `{}`", node.name())
             });
             return;
         }
         let words = value.words().unwrap_or(&[]);
         if !words.is_empty() && words.iter().all(|known| **known != *word) {
-            self.note(node, Member::Word(name, word), || {
-                thing(format!("`{word}` as `{name}` of `{}`", node.name()))
+            self.note(node, Member::Word(name, word), at, || {
+                format!("`{word}` as `{name}` of `{}`", node.name())
             });
         }
     }
 
-    fn note(&mut self, owner: Node<'a>, member: Member<'a>, say: impl FnOnce() -> Thing<'a>) {
+    fn note(
+        &mut self,
+        owner: Node<'a>,
+        member: Member<'a>,
+        (node, attribute): (Node<'a>, Option<Attribute<'a>>),
+        say: impl FnOnce() -> String,
+    ) {
         let Some(class) = self.typing.class(owner) else {
             return;
         };
-        if let Some(is_new) = self.known.get(&(class, member)) {
-            self.count += usize::from(*is_new);
+        if let Some(place) = self.known.get(&(class, member)) {
+            if let Some(thing) = place.and_then(|place| self.things.get_mut(place)) {
+                thing.nodes.push(node);
+                self.count += 1;
+            }
             return;
         }
         let since = came_with(self.kind, self.version, class, member);
-        if let Some(since) = since {
-            self.things.push(Thing { since, ..say() });
+        let place = since.map(|since| {
+            self.things.push(Thing {
+                node,
+                attribute,
+                what: say(),
+                since,
+                nodes: vec![node],
+            });
             self.count += 1;
-        }
-        self.known.insert((class, member), since.is_some());
+            self.things.len() - 1
+        });
+        self.known.insert((class, member), place);
     }
 }

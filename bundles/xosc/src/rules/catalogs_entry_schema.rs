@@ -1,7 +1,7 @@
-use foldhash::HashMap;
+use foldhash::{HashMap, HashSet};
 use qcbus_document::Node;
 use qcbus_openscenario::{Element, Resolution, Scenario};
-use qcbus_schema_rule::{Breach, breaches};
+use qcbus_schema_rule::{Breach, Weight, breaches};
 use qcbus_sdk::{Level, Place, Rule, Sink};
 
 use crate::families::catalogs;
@@ -31,6 +31,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
     let subject = found.subject();
     let mut known: HashMap<&str, Vec<Breach<'_>>> = HashMap::default();
+    let mut older: HashSet<&str> = HashSet::default();
     for (entry, reference, count) in uses {
         // An entry of the document itself is the schema's own checker's.
         if entry.document().path() == subject.root().path() {
@@ -45,33 +46,55 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let within: Vec<_> = within
             .take_while(|breach| breach.node.index() < entry.subtree_end())
             .collect();
-        let unreadable = within.iter().find(|breach| breach.unreadable);
-        let Some(first) = unreadable.or(within.first()) else {
-            continue;
-        };
-        let more = match within.len() {
-            0 | 1 => String::new(),
-            2 => "; there is one further fault in it".to_owned(),
-            all => format!("; there are {} further faults in it", all - 1),
-        };
-        let (level, who) = if first.unreadable {
-            (Level::Error, "so it cannot be read")
-        } else {
-            (Level::Information, "which many simulators pass over")
-        };
-        let text = format!(
-            "the catalog's entry `{}` is not what its schema allows, {who}: {}{more}{}",
-            reference.text("entryName").unwrap_or_default(),
-            first.text,
-            catalogs::further(count)
-        );
-        let place = match first.attribute {
-            Some(attribute) => Place::from(attribute),
-            None => Place::from(first.node),
-        };
-        found
-            .about(reference, "entryName", text)
-            .level(level)
-            .at(place, "the place in the catalog");
+        let of = |weight| within.iter().copied().filter(move |it| it.weight == weight);
+        let (mut unreadable, mut superfluous) = (of(Weight::Unreadable), of(Weight::Superfluous));
+        let first = unreadable.next().or_else(|| superfluous.next());
+        if let Some(first) = first {
+            let more = unreadable.count() + superfluous.count();
+            say(reference, first, (more, count), found);
+        } else if let Some(first) = of(Weight::Later).next()
+            && older.insert(document.path())
+        {
+            // The header is one fault, whatever uses more than it says.
+            say(reference, first, (0, 1), found);
+        }
     }
+}
+
+/// Says what is wrong with the entry that a reference leads to: how many faults and references there are
+/// besides.
+fn say(
+    reference: Element<'_, '_>,
+    first: &Breach<'_>,
+    (more, count): (usize, u32),
+    found: &mut Sink<'_>,
+) {
+    let more = match more {
+        0 => String::new(),
+        1 => "; there is one further fault in it".to_owned(),
+        more => format!("; there are {more} further faults in it"),
+    };
+    let what = match first.weight {
+        Weight::Unreadable => "is not what its schema allows, so it cannot be read",
+        Weight::Superfluous => "is not what its schema allows, which many simulators pass over",
+        Weight::Later => "needs a newer version than its file is said to be of",
+    };
+    let level = match first.weight {
+        Weight::Unreadable => Level::Error,
+        Weight::Superfluous | Weight::Later => Level::Information,
+    };
+    let text = format!(
+        "the catalog's entry `{}` {what}: {}{more}{}",
+        reference.text("entryName").unwrap_or_default(),
+        first.text,
+        catalogs::further(count)
+    );
+    let place = match first.attribute {
+        Some(attribute) => Place::from(attribute),
+        None => Place::from(first.node),
+    };
+    found
+        .about(reference, "entryName", text)
+        .level(level)
+        .at(place, "the place in the catalog");
 }
