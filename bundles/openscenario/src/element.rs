@@ -58,6 +58,13 @@ impl<'m, 'd> Element<'m, 'd> {
         self.scenario.typing(self.context)?.class(self.node)
     }
 
+    /// The version that the header of its own file names: of the catalog for an entry.
+    pub fn stated_version(self) -> Option<crate::Version> {
+        let document = self.node.document();
+        let stated = qcbus_schema::version_of(&document, self.scenario.kind())?;
+        Some((stated.major.try_into().ok()?, stated.minor.try_into().ok()?))
+    }
+
     /// The `CatalogReference` of the document that is checked that leads here; `None` for what is
     /// written in that document itself.
     pub fn reference(self) -> Option<Node<'d>> {

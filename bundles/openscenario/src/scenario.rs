@@ -95,6 +95,11 @@ impl<'d> Scenario<'d> {
         self.version
     }
 
+    /// The kind of file.
+    pub(crate) fn kind(&self) -> FileKind {
+        self.kind
+    }
+
     /// What kind of document it is.
     pub fn form(&self) -> Form {
         self.form

@@ -1,4 +1,4 @@
-use qcbus_openscenario::Scenario;
+use qcbus_openscenario::{Scenario, Version};
 use qcbus_sdk::{Rule, Sink};
 
 use crate::families::routes::{routes, waypoints};
@@ -13,13 +13,14 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// The last version whose schema counts the waypoints of the document itself.
-const LAST_SCHEMA: (u16, u16) = (1, 3);
+/// The last version whose schema counts waypoints.
+const LAST_SCHEMA: Version = (1, 3);
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    let by_schema = scenario.version() <= LAST_SCHEMA;
     for route in routes(scenario) {
-        if by_schema && route.reference().is_none() {
+        // Each file has the schema of its own header, and entries of catalogs are held against theirs.
+        let stated = route.stated_version();
+        if stated.is_some_and(|version| version <= LAST_SCHEMA) {
             continue;
         }
         let count = waypoints(route).take(2).count();
