@@ -78,6 +78,30 @@ pub(crate) fn earliest(condition: Element<'_, '_>) -> Option<f64> {
     }
 }
 
+/// Whether a condition is true in the first or second step.
+pub(crate) fn holds_at_once(condition: Element<'_, '_>) -> bool {
+    let holds = || {
+        let time = time(condition)?;
+        let value = time.number("value")?;
+        let delay = if condition.has("delay") {
+            condition.number("delay")?
+        } else {
+            0.0
+        };
+        let edge = condition.word("conditionEdge")?;
+        let holds = match &*time.word("rule")? {
+            "greaterThan" | "greaterOrEqual" => value <= 0.0 && &*edge != "falling",
+            "lessThan" => value > 0.0 && &*edge == "none",
+            "lessOrEqual" => value >= 0.0 && &*edge == "none",
+            "notEqualTo" => value < 0.0 && &*edge == "none",
+            "equalTo" => value == 0.0 && &*edge == "none",
+            _ => false,
+        };
+        Some(holds && delay <= 0.0)
+    };
+    holds().unwrap_or(false)
+}
+
 /// An element with all that matters of it as one text: what has the same text means the same. Names
 /// of conditions say nothing.
 pub(crate) fn canonical(element: Element<'_, '_>) -> String {

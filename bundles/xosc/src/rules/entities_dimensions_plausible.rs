@@ -9,7 +9,7 @@ pub static RULE: Rule<Scene> = Rule {
     uids: &["qcbus.dev:xosc:1.0.0:entities.dimensions_plausible"],
     level: Level::Warning,
     after: super::READABLE,
-    params: &[LENGTH, ACROSS, WHEEL],
+    params: &[LENGTH, ACROSS],
     page: include_str!("entities_dimensions_plausible.md"),
     run,
     ..Rule::DEFAULTS
@@ -27,12 +27,6 @@ const ACROSS: Param = Param::number(
     "m",
     "one that is wider or higher is taken for a mistake",
 );
-const WHEEL: Param = Param::number(
-    "wheel",
-    5.0,
-    "m",
-    "a wheel of a greater diameter is taken for a mistake",
-);
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let (length, across) = (found.number(&LENGTH), found.number(&ACROSS));
@@ -43,14 +37,6 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         };
         for (name, most) in [("length", length), ("width", across), ("height", across)] {
             too_large(object, size, name, most, found);
-        }
-    }
-    let wheel = found.number(&WHEEL);
-    for axle in ["FrontAxle", "RearAxle", "AdditionalAxle"] {
-        for axle in scenario.elements_everywhere(axle) {
-            if let Some(vehicle) = axle.ancestor("Vehicle") {
-                too_large(vehicle, axle, "wheelDiameter", wheel, found);
-            }
         }
     }
 }

@@ -44,6 +44,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
 }
 
 fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let mut unfit_there = HashSet::default();
     for position in scenario.elements_everywhere("LanePosition") {
         let Some(owner) = owner(position) else {
             continue;
@@ -60,19 +61,29 @@ fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let Some(kind) = lane.kind() else { continue };
         let is_init = owner.ancestor("Init").is_some();
         let entities = moved(position).unwrap_or_default();
-        for entity in entities {
-            let Some(level) = unfit(scenario, entity, lane, kind, is_init) else {
-                continue;
-            };
-            say(position, entity, goes, (lane, kind, s), level, found);
-            break;
+        let judged = entities.into_iter().filter_map(|entity| {
+            let level = unfit(scenario, entity, lane, kind, is_init)?;
+            Some((entity, level))
+        });
+        for (at, (entity, level)) in judged.enumerate() {
+            if at == 0 {
+                say(position, entity, goes, (lane, kind, s), level, found);
+            }
+            if is_init {
+                unfit_there.insert(entity.name().to_owned());
+            }
         }
     }
-    relative_to_others(scenario, map, found);
+    relative_to_others(scenario, map, unfit_there, found);
 }
 
-/// Who begins on a lane that the place of another leads to.
-fn relative_to_others(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
+/// Who begins on a lane that the place of another leads to, unless that one is said to be wrong there.
+fn relative_to_others(
+    scenario: &Scenario<'_>,
+    map: &RoadMap<'_>,
+    mut said_of: HashSet<String>,
+    found: &mut Sink<'_>,
+) {
     let origins = Origins::of(scenario, Some(map));
     let mut said = HashSet::default();
     for (at, start) in origins.starts.iter().enumerate() {
@@ -91,6 +102,15 @@ fn relative_to_others(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Si
         let level = lane
             .kind()
             .and_then(|kind| Some((kind, unfit(scenario, entity, lane, kind, true)?)));
+        let same_lane = position.number("dLane") == Some(0.0);
+        let other = position.text("entityRef").filter(|_| same_lane);
+        let follows = other.is_some_and(|other| said_of.contains(&*other));
+        if level.is_some() {
+            said_of.insert(start.name.clone());
+        }
+        if follows {
+            continue;
+        }
         if let Some((kind, level)) = level
             && said.insert(position.node().offset())
         {

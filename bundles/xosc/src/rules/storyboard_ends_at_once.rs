@@ -1,8 +1,8 @@
-use qcbus_openscenario::{Element, Scenario};
+use qcbus_openscenario::Scenario;
 use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::actions::stated;
-use crate::families::triggers::{groups, time};
+use crate::families::triggers::{groups, holds_at_once, time};
 use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -46,28 +46,4 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         );
         found.about(time(*first).unwrap_or(*first), "value", text);
     }
-}
-
-/// Whether a condition is true in the first or second step.
-fn holds_at_once(condition: Element<'_, '_>) -> bool {
-    let holds = || {
-        let time = time(condition)?;
-        let value = time.number("value")?;
-        let delay = if condition.has("delay") {
-            condition.number("delay")?
-        } else {
-            0.0
-        };
-        let edge = condition.word("conditionEdge")?;
-        let holds = match &*time.word("rule")? {
-            "greaterThan" | "greaterOrEqual" => value <= 0.0 && &*edge != "falling",
-            "lessThan" => value > 0.0 && &*edge == "none",
-            "lessOrEqual" => value >= 0.0 && &*edge == "none",
-            "notEqualTo" => value < 0.0 && &*edge == "none",
-            "equalTo" => value == 0.0 && &*edge == "none",
-            _ => false,
-        };
-        Some(holds && delay <= 0.0)
-    };
-    holds().unwrap_or(false)
 }

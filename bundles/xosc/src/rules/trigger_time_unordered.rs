@@ -2,7 +2,7 @@ use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::actions::short;
-use crate::families::triggers::{self, called, earliest, groups, time};
+use crate::families::triggers::{self, called, earliest, groups, holds_at_once, time};
 use crate::model::{About, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
@@ -26,7 +26,10 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let Some(storyboard) = scenario.root().child("Storyboard") else {
         return;
     };
-    let run_ends = end(storyboard).map(|moment| (moment, "the run"));
+    // That nothing starts in a run that ends at once need not be said of everything.
+    let run_ends = end(storyboard)
+        .filter(|_| !ends_at_once(storyboard))
+        .map(|moment| (moment, "the run"));
     for story in storyboard.children_named("Story") {
         for act in story.children_named("Act") {
             let act_ends = end(act).map(|moment| (moment, "its act"));
@@ -44,6 +47,14 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             }
         }
     }
+}
+
+fn ends_at_once(storyboard: Element<'_, '_>) -> bool {
+    let at_once = |group: Vec<Element<'_, '_>>| {
+        !group.is_empty() && group.iter().all(|one| holds_at_once(*one))
+    };
+    let trigger = storyboard.child("StopTrigger");
+    trigger.is_some_and(|trigger| groups(trigger).any(at_once))
 }
 
 /// Says that an element cannot start before the end.
