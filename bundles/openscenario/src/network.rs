@@ -98,7 +98,10 @@ impl RoadNetwork {
 }
 
 fn lanes_of(road: &Road<'_>) -> u64 {
-    let most = |side| road.sections().map(move |section| section.side(side).count());
+    let most = |side| {
+        road.sections()
+            .map(move |section| section.side(side).count())
+    };
     let most = Side::BOTH.map(|side| most(side).max().unwrap_or(0) as u64);
     most.iter().sum()
 }

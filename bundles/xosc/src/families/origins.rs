@@ -12,7 +12,7 @@ use crate::families::relative;
 
 /// Where something stands: in the world, and on the road if it is known which.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Place<'w, 'r> {
+pub(crate) struct Whereabouts<'w, 'r> {
     pub(crate) x: f64,
     pub(crate) y: f64,
     /// `None` where that is not known.
@@ -42,7 +42,7 @@ enum Memo<'w, 'r> {
     New,
     /// It is being computed: who comes here again goes round in a circle.
     Open,
-    Done(Option<Place<'w, 'r>>),
+    Done(Option<Whereabouts<'w, 'r>>),
 }
 
 /// The places of all who are teleported in `Init`.
@@ -87,14 +87,14 @@ impl<'m, 'd, 'w, 'r> Origins<'m, 'd, 'w, 'r> {
     }
 
     /// The entity that a position is relative to, and where it stands.
-    pub(crate) fn base(&self, position: Element<'m, 'd>) -> Option<(String, Place<'w, 'r>)> {
+    pub(crate) fn base(&self, position: Element<'m, 'd>) -> Option<(String, Whereabouts<'w, 'r>)> {
         let name = relative_to(position)?;
         let at = (*self.by_name.get(&name)?)?;
         Some((name, self.place(at)?))
     }
 
     /// Where the entity of a start stands.
-    pub(crate) fn place(&self, at: usize) -> Option<Place<'w, 'r>> {
+    pub(crate) fn place(&self, at: usize) -> Option<Whereabouts<'w, 'r>> {
         let mut way = Vec::new();
         let mut next = Some(at);
         while let Some(here) = next {
@@ -125,7 +125,7 @@ impl<'m, 'd, 'w, 'r> Origins<'m, 'd, 'w, 'r> {
     }
 
     /// Where an entity stands, as far as that is computed.
-    fn known(&self, name: &str) -> Option<Place<'w, 'r>> {
+    fn known(&self, name: &str) -> Option<Whereabouts<'w, 'r>> {
         let at = (*self.by_name.get(name)?)?;
         match self.memo.borrow().get(at) {
             Some(Memo::Done(place)) => *place,
@@ -136,10 +136,10 @@ impl<'m, 'd, 'w, 'r> Origins<'m, 'd, 'w, 'r> {
     fn compute(
         &self,
         position: Element<'m, 'd>,
-        base: Option<Option<Place<'w, 'r>>>,
-    ) -> Option<Place<'w, 'r>> {
+        base: Option<Option<Whereabouts<'w, 'r>>>,
+    ) -> Option<Whereabouts<'w, 'r>> {
         match (position.name(), base) {
-            ("WorldPosition", _) => Some(Place {
+            ("WorldPosition", _) => Some(Whereabouts {
                 x: position.number("x")?,
                 y: position.number("y")?,
                 z: position.number("z"),
@@ -175,7 +175,7 @@ impl<'m, 'd, 'w, 'r> Origins<'m, 'd, 'w, 'r> {
     }
 
     /// Where a place is on a road, if there is only one there.
-    pub(crate) fn on(&self, place: &Place<'w, 'r>) -> Option<OnRoad<'w, 'r>> {
+    pub(crate) fn on(&self, place: &Whereabouts<'w, 'r>) -> Option<OnRoad<'w, 'r>> {
         if place.on.is_some() {
             return place.on;
         }
@@ -196,12 +196,12 @@ impl<'m, 'd, 'w, 'r> Origins<'m, 'd, 'w, 'r> {
 /// A place by its distances in directions that are turned by an angle.
 fn moved<'w, 'r>(
     position: Element<'_, '_>,
-    base: Place<'w, 'r>,
+    base: Whereabouts<'w, 'r>,
     turned: f64,
-) -> Option<Place<'w, 'r>> {
+) -> Option<Whereabouts<'w, 'r>> {
     let (dx, dy) = (position.number("dx")?, position.number("dy")?);
     let (sin, cos) = turned.sin_cos();
-    let place = Place {
+    let place = Whereabouts {
         x: base.x + dx * cos - dy * sin,
         y: base.y + dx * sin + dy * cos,
         // What stands farther off stands as high as its own ground.
@@ -242,12 +242,17 @@ pub(crate) fn within(road: &Road<'_>, s: f64) -> Option<f64> {
 }
 
 /// A place beside a road, looking as traffic does.
-fn on_map<'w, 'r>(road: &'w Road<'r>, s: f64, t: f64, lane: Option<i64>) -> Option<Place<'w, 'r>> {
+fn on_map<'w, 'r>(
+    road: &'w Road<'r>,
+    s: f64,
+    t: f64,
+    lane: Option<i64>,
+) -> Option<Whereabouts<'w, 'r>> {
     let pose = road.pose(s)?;
     let point = pose.beside(t)?;
     let along = t < 0.0 && road.traffic_rule() != Some(TrafficRule::LeftHand);
     let turned = if t > 0.0 { std::f64::consts::PI } else { 0.0 };
-    Some(Place {
+    Some(Whereabouts {
         x: point.x,
         y: point.y,
         z: road.surface_point(s, t).map(|point| point.z),
@@ -264,7 +269,10 @@ fn on_map<'w, 'r>(road: &'w Road<'r>, s: f64, t: f64, lane: Option<i64>) -> Opti
 }
 
 /// The place with what the position's `Orientation` says.
-fn oriented<'w, 'r>(position: Element<'_, '_>, place: Place<'w, 'r>) -> Option<Place<'w, 'r>> {
+fn oriented<'w, 'r>(
+    position: Element<'_, '_>,
+    place: Whereabouts<'w, 'r>,
+) -> Option<Whereabouts<'w, 'r>> {
     let Some(orientation) = position.child("Orientation") else {
         return Some(place);
     };
@@ -280,7 +288,7 @@ fn oriented<'w, 'r>(position: Element<'_, '_>, place: Place<'w, 'r>) -> Option<P
         along: on.along && !turned,
         ..on
     });
-    Some(Place {
+    Some(Whereabouts {
         heading,
         is_sure,
         on,
@@ -304,7 +312,7 @@ fn lane_at(road: &Road<'_>, s: f64, t: f64) -> Option<i64> {
 }
 
 /// Where a `RelativeLanePosition` is, if there is only one way to understand it.
-fn beside<'w, 'r>(position: Element<'_, '_>, on: OnRoad<'w, 'r>) -> Option<Place<'w, 'r>> {
+fn beside<'w, 'r>(position: Element<'_, '_>, on: OnRoad<'w, 'r>) -> Option<Whereabouts<'w, 'r>> {
     let lanes = relative::lanes(position, on)?;
     let ds = relative::ways(position, on)?;
     let &[ds] = ds.as_slice() else { return None };
