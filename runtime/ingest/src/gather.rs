@@ -194,8 +194,12 @@ impl<S: Source> Walk<'_, S> {
     fn weighed(self) -> Vec<MissingDocument> {
         let weigh = |(mut missing, catalogs): (MissingDocument, Option<String>)| {
             let gone = matches!(missing.why, Absence::NotThere | Absence::NotAFile);
-            if gone && catalogs.is_some_and(|kind| is_used(self.root, &kind, &self.catalogs)) {
-                missing.level = Level::Error;
+            if let Some(kind) = catalogs.filter(|_| gone) {
+                missing.level = match need_of(self.root, &kind, &self.catalogs) {
+                    Need::Used => Level::Error,
+                    Need::Unknown => Level::Warning,
+                    Need::Unused => Level::Information,
+                };
             }
             missing
         };
@@ -215,8 +219,17 @@ fn level(role: DocumentRole, path: &Path, why: &Absence) -> Level {
     }
 }
 
-/// Whether the scenario names a catalog that was not found where only a catalog of this kind will do.
-fn is_used(root: &Document<'_>, kind: &str, found: &BTreeSet<String>) -> bool {
+/// Whether a scenario needs catalogs of a directory that is not there.
+enum Need {
+    /// It names one that was not found where only a catalog of this kind will do.
+    Used,
+    /// All that it refers to was found.
+    Unused,
+    /// It may be an entry of another catalog that needs it.
+    Unknown,
+}
+
+fn need_of(root: &Document<'_>, kind: &str, found: &BTreeSet<String>) -> Need {
     let users: &[&str] = match kind {
         "VehicleCatalog" | "PedestrianCatalog" | "MiscObjectCatalog" => &["ScenarioObject"],
         "ControllerCatalog" => &["ObjectController", "AssignControllerAction"],
@@ -227,11 +240,18 @@ fn is_used(root: &Document<'_>, kind: &str, found: &BTreeSet<String>) -> bool {
         _ => &[],
     };
     let parameters = Parameters::of(root);
-    root.elements("CatalogReference").any(|reference| {
-        let parent = reference.parent().map(|parent| parent.name());
+    let mut need = Need::Unused;
+    for reference in root.elements("CatalogReference") {
+        let parent = reference.parent().map_or("", |parent| parent.name());
         let written = reference.attr("catalogName");
         let name = written.and_then(|name| parameters.fill(name).ok());
-        parent.is_some_and(|parent| users.contains(&parent))
-            && name.is_some_and(|name| !found.contains(&name))
-    })
+        let is_found = name.map(|name| found.contains(&name));
+        match is_found {
+            Some(false) if users.contains(&parent) => return Need::Used,
+            // Maneuvers of catalogs refer to catalogs of other kinds themselves.
+            Some(true) if parent != "ManeuverGroup" => {}
+            _ => need = Need::Unknown,
+        }
+    }
+    need
 }

@@ -66,7 +66,11 @@ fn missing_reference(root: &Document<'_>, missing: &MissingDocument) -> Remark {
         }
         path => format!("; it was looked for at `{path}`"),
     };
-    let text = format!("{what} `{reference}` {why}{looked}");
+    let unused = match (missing.role, missing.level) {
+        (DocumentRole::Catalog, Level::Information) => "; nothing of it is referred to",
+        _ => "",
+    };
+    let text = format!("{what} `{reference}` {why}{looked}{unused}");
     let open = format!("where {what} `{reference}` leads is not known");
     let place = place_of(root, missing);
     reference_remark(text, open, missing.level, vec![place])

@@ -124,7 +124,7 @@ fn catalog(users: &str) -> String {
 #[test]
 fn a_catalog_location_that_is_not_there_weighs_what_its_use_weighs() {
     for (users, level) in [
-        ("", Level::Warning),
+        ("", Level::Information),
         (
             "<CatalogReference catalogName='V' entryName='car'/>",
             Level::Error,
