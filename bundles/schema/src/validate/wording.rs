@@ -321,7 +321,18 @@ pub(super) fn missing_children(
         let text = format!("<{}> is incomplete, expected next: {list}", node.name());
         return Wording::new("", text).expecting(names);
     }
-    let text = format!("<{}> lacks {}", node.name(), elements(&needed));
+    let there = match &*needed {
+        [one] => node.children_named(one).count(),
+        _ => 0,
+    };
+    let text = match there {
+        0 => format!("<{}> lacks {}", node.name(), elements(&needed)),
+        _ => format!(
+            "<{}> has {there} {}, and needs more of them",
+            node.name(),
+            elements(&needed)
+        ),
+    };
     Wording::new("", text).expecting(needed).excused(defect)
 }
 
