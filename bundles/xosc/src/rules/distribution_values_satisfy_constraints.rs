@@ -74,15 +74,15 @@ impl Draw<'_, '_> {
                     .about(holder, "value", text)
                     .at(self.declaration.node, "the declaration");
             }
-            Some(value) => self.allowed(holder, "value", &value, found),
+            Some(value) => self.allowed((holder, "value"), &value, Level::Error, found),
         }
     }
 
     fn allowed(
         &self,
-        holder: Element<'_, '_>,
-        attribute: &str,
+        (holder, attribute): (Element<'_, '_>, &str),
         value: &Value<'_>,
+        level: Level,
         found: &mut Sink<'_>,
     ) {
         let declaration = self.target.element(self.declaration.node);
@@ -94,6 +94,7 @@ impl Draw<'_, '_> {
             );
             found
                 .about(holder, attribute, text)
+                .level(level)
                 .at(self.declaration.node, "the declaration");
         }
     }
@@ -155,9 +156,20 @@ impl Draw<'_, '_> {
                 .at(self.declaration.node, "the declaration");
             return;
         }
-        self.allowed(range, "lowerLimit", &Value::Double(lower), found);
-        if last > lower {
-            self.allowed(range, "upperLimit", &Value::Double(last), found);
+        let ends = [("lowerLimit", lower), ("upperLimit", last)];
+        let ends = ends.into_iter().take(1 + usize::from(last > lower));
+        let declaration = self.target.element(self.declaration.node);
+        let is_allowed =
+            |value: f64| allowed_values::violated(declaration, &Value::Double(value)).is_none();
+        // Generators drop values that the scenario excludes; where one of the ends is none of them, some
+        // runs are left.
+        let level = if ends.clone().any(|(_, end)| is_allowed(end)) {
+            Level::Warning
+        } else {
+            Level::Error
+        };
+        for (attribute, end) in ends {
+            self.allowed((range, attribute), &Value::Double(end), level, found);
         }
     }
 
