@@ -21,7 +21,12 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let Some(data_type) = declared::type_of(declaration, "parameterType") else {
             continue;
         };
-        for group in constraints::groups(declaration, data_type) {
+        let groups = constraints::groups(declaration, data_type);
+        // One group is enough: without any there is no value at all that the parameter may have.
+        let none_left = groups
+            .iter()
+            .all(|group| group.contradiction(data_type).is_some());
+        for group in groups {
             if let Some((first, second)) = group.contradiction(data_type) {
                 let text = format!(
                     "{} and {} exclude each other: no value of type `{}` satisfies this group",
@@ -29,10 +34,13 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                     second.shown(),
                     data_type.word()
                 );
-                found
+                let finding = found
                     .issue(group.element.node(), text)
                     .at(first.element.node(), "the first of the two")
                     .at(second.element.node(), "the second of the two");
+                if none_left {
+                    finding.level(Level::Error);
+                }
             }
         }
     }
