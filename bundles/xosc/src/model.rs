@@ -16,6 +16,11 @@ impl Model for Scene {
     type Part = ();
 
     fn build<'d>(subject: &'d Subject<'d>) -> Result<Scenario<'d>, Unbuilt> {
+        if let Some(version) = subject.version().filter(|version| version.major != 1) {
+            // What has the same name in another language may mean something else.
+            let why = format!("OpenSCENARIO {version} is not known, only 1.0 to 1.4 are");
+            return Err(Unbuilt::Broken(why));
+        }
         let inputs = Inputs {
             document: subject.root(),
             kind: subject.kind(),

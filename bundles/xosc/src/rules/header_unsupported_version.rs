@@ -1,9 +1,7 @@
-use qcbus_openscenario::Scenario;
+use qcbus_document::Document;
 use qcbus_sdk::{Level, Place, Rule, Sink};
 
-use crate::model::Scene;
-
-pub static RULE: Rule<Scene> = Rule {
+pub static RULE: Rule<Document> = Rule {
     id: "check_qcbus_xosc_header_unsupported_version",
     uids: &["qcbus.dev:xosc:1.0.0:header.unsupported_version"],
     level: Level::Warning,
@@ -13,25 +11,28 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+fn run(document: &Document<'_>, found: &mut Sink<'_>) {
     // A version that is missing or no number is the finding of the rule about the header.
-    let (Some(header), Some(_)) = (scenario.root().child("FileHeader"), found.version()) else {
+    let header = document.root().and_then(|root| root.child("FileHeader"));
+    let (Some(header), Some(version)) = (header, found.version()) else {
         return;
     };
-    let (major, minor) = scenario.version();
+    let (major, minor) = (version.major, version.minor);
     let why = match (major, minor) {
         (1, 0..=4) => return,
         (0, _) => {
-            "that was a draft with other elements, which simulators of today do not read; rules that need \
-             a schema say nothing about it"
+            "that was a draft with other elements, which simulators of today do not read; it is not looked at \
+             any further"
         }
         (1, _) => {
             "it is looked at as if it were the newest of them, and what came later is not known"
         }
-        (2.., _) => "that is another language, which is not written in XML",
+        (2.., _) => {
+            "that is another language, which is not written in XML; it is not looked at any further"
+        }
     };
     let text =
         format!("the file says that its version is {major}.{minor}; 1.0 to 1.4 are known: {why}");
     let attribute = if major == 1 { "revMinor" } else { "revMajor" };
-    found.issue(Place::attribute_or_node(header.node(), attribute), text);
+    found.issue(Place::attribute_or_node(header, attribute), text);
 }
