@@ -80,9 +80,17 @@ pub(crate) fn quoted(element: Element<'_, '_>, attribute: &str, value: &str) -> 
 /// What may have been meant: a name that differs by white space, case or a letter or two.
 pub(crate) fn hint<'n>(name: &str, names: impl Iterator<Item = &'n str>) -> String {
     match near(name, names) {
-        Some(near) => format!("; `{near}` is there, names must be equal to the letter"),
+        Some(near) if plain(near) == plain(name) => {
+            format!("; `{near}` is there, names must be equal to the letter")
+        }
+        Some(near) => format!("; perhaps `{near}` is meant"),
         None => String::new(),
     }
+}
+
+/// A name without what is easily overlooked.
+fn plain(name: &str) -> String {
+    name.split_whitespace().collect::<String>().to_lowercase()
 }
 
 /// What may have been meant, or else what there is: some of it.
@@ -106,7 +114,6 @@ fn near<'n>(name: &str, names: impl Iterator<Item = &'n str>) -> Option<&'n str>
     if names.is_empty() {
         return None;
     }
-    let plain = |text: &str| text.split_whitespace().collect::<String>().to_lowercase();
     let wanted = plain(name);
     let spaced = names.iter().find(|other| plain(other) == wanted).copied();
     spaced.or_else(|| qcbus_openscenario::closest(name, names.iter().copied()))
