@@ -68,11 +68,20 @@ impl<'m, 'd> Element<'m, 'd> {
     /// The `CatalogReference` of the document that is checked that leads here; `None` for what is
     /// written in that document itself.
     pub fn reference(self) -> Option<Node<'d>> {
-        let mut context = self.context;
+        self.led_to().map(|(reference, _)| reference)
+    }
+
+    /// The entry that [`Element::reference`] leads to: this is in it, or in one that it refers to.
+    pub fn entry(self) -> Option<Node<'d>> {
+        self.led_to().map(|(_, entry)| entry)
+    }
+
+    fn led_to(self) -> Option<(Node<'d>, Node<'d>)> {
+        let mut context = self.scenario.context(self.context);
         let mut found = None;
-        while let Some((node, outer)) = self.scenario.context(context).reference {
-            found = Some(node);
-            context = outer;
+        while let Some((reference, outer)) = context.reference {
+            found = Some((reference, context.top));
+            context = self.scenario.context(outer);
         }
         found
     }

@@ -82,6 +82,8 @@ impl<'d> Scenario<'d> {
             storyboard: OnceCell::new(),
         };
         scenario.follow_references();
+        // Names that are written as parameters were read before all documents were known.
+        scenario.typings = OnceCell::new();
         Some(scenario)
     }
 

@@ -122,10 +122,10 @@ impl<'d> About<'d> for Sink<'d> {
         text: impl Into<String>,
     ) -> Finding<'_, 'd> {
         let place = Place::attribute_or_node(element.node(), attribute);
-        let Some(reference) = element.reference() else {
+        let (Some(reference), Some(entry)) = (element.reference(), element.entry()) else {
             return self.issue(place, text);
         };
-        let entry = reference.attr("entryName").unwrap_or("");
+        let entry = entry.attr("name").unwrap_or("");
         let text = format!("in the catalog's entry `{entry}`: {}", text.into());
         self.issue_behind(reference, place, text)
     }
