@@ -34,6 +34,7 @@ mod steps;
 mod strips;
 mod surface;
 mod touching;
+mod traffic;
 mod value;
 mod view;
 
@@ -71,4 +72,5 @@ pub use station::Station;
 pub use strips::{CrossSectionSurface, Strip, StripMode};
 pub use surface::{BorderPoint, Frame};
 pub use touching::TouchingLanes;
+pub use traffic::Traffic;
 pub use value::{ContactPoint, Direction, LayerKind, Side, is_user_data};

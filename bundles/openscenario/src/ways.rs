@@ -1,7 +1,7 @@
 //! Whether traffic gets from one place of a map to another.
 
 use foldhash::{HashMap, HashMapExt as _, HashSet, HashSetExt as _};
-use qcbus_opendrive::{ContactPoint, LaneRef, Road, RoadMap, Side, TrafficRule};
+use qcbus_opendrive::{ContactPoint, LaneRef, Road, RoadMap, Side, Traffic};
 
 /// A lane section of a road, and whether one goes along it or against it.
 type Stretch = (usize, usize, bool);
@@ -184,35 +184,12 @@ const ASIDE: &[&str] = &[
     "tram", "walking",
 ];
 
-/// Lanes without traffic that runs in one direction.
-const UNDIRECTED: &[&str] = &[
-    "bidirectional",
-    "border",
-    "curb",
-    "median",
-    "none",
-    "parking",
-    "shoulder",
-    "sidewalk",
-    "special1",
-    "special2",
-    "special3",
-    "walking",
-];
-
 /// Whether traffic may run on a lane along the road or against it; where that is not known, it may.
 fn may_run(lane: LaneRef<'_, '_>, along: bool) -> bool {
-    let (Some(side), Some(rule)) = (lane.side(), lane.at.road.traffic_rule()) else {
-        return true;
+    let towards = if along {
+        ContactPoint::End
+    } else {
+        ContactPoint::Start
     };
-    let is_undirected = lane.kind().is_none_or(|kind| UNDIRECTED.contains(&kind));
-    if is_undirected || lane.dynamic_direction() == Some(true) {
-        return true;
-    }
-    let standard = (side == Side::Right) == (rule == TrafficRule::RightHand);
-    match lane.direction() {
-        None | Some("standard") => along == standard,
-        Some("reversed") => along != standard,
-        Some(_) => true,
-    }
+    Traffic::of(lane).may_run_towards(towards)
 }

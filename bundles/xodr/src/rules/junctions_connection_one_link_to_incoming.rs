@@ -1,8 +1,7 @@
-use qcbus_opendrive::{LaneJoint, RoadMap};
+use qcbus_opendrive::{LaneJoint, RoadMap, Traffic};
 use qcbus_sdk::{Backport, Rule, Sink};
 
 use crate::families::connections::{repeated, report_repeated};
-use crate::families::driving::Traffic;
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::model::Roads;
 
