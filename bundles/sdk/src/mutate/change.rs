@@ -93,6 +93,14 @@ impl Edit {
     /// # Errors
     /// What cannot be read.
     pub fn parse(line: &str, file: PathBuf) -> Result<Edit, String> {
+        Edit::by(line, file, "name")
+    }
+
+    /// Likewise; `#value` in a selector means the attribute `key`.
+    ///
+    /// # Errors
+    /// What cannot be read.
+    pub fn by(line: &str, file: PathBuf, key: &str) -> Result<Edit, String> {
         let (selector, action) = line
             .split_once(" | ")
             .ok_or_else(|| format!("neither an edit nor a place: {line}"))?;
@@ -103,7 +111,7 @@ impl Edit {
                 None => Change::Storage(Storage::parse(action)?),
             },
             (selector, action) => {
-                Change::Element(Selector::parse(selector)?, Action::parse(action)?)
+                Change::Element(Selector::by(selector, key)?, Action::parse(action)?)
             }
         };
         Ok(Edit { change, file })
@@ -141,7 +149,15 @@ impl Target {
     /// # Errors
     /// What cannot be read.
     pub fn parse(selector: &str, file: PathBuf) -> Result<Target, String> {
-        let selector = (selector != ".").then(|| Selector::parse(selector));
+        Target::by(selector, file, "name")
+    }
+
+    /// Likewise; `#value` in a selector means the attribute `key`.
+    ///
+    /// # Errors
+    /// What cannot be read.
+    pub fn by(selector: &str, file: PathBuf, key: &str) -> Result<Target, String> {
+        let selector = (selector != ".").then(|| Selector::by(selector, key));
         let selector = selector.transpose()?;
         Ok(Target { selector, file })
     }

@@ -11,6 +11,7 @@ mod encode;
 mod overlay;
 mod said;
 mod scan;
+pub mod seeded;
 mod select;
 #[cfg(test)]
 mod tests;

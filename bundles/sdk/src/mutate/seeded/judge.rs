@@ -1,9 +1,9 @@
-//! Whether what is said of an edited scenario is what should be said.
+//! Whether what is said of an edited file is what should be said.
 
 use std::path::PathBuf;
 
-use qcbus_sdk::Level;
-use qcbus_sdk::mutate::{Said, Spots};
+use crate::Level;
+use crate::mutate::{Said, Spots};
 
 use super::table::Entry;
 
@@ -16,6 +16,8 @@ pub struct Trial<'e> {
     pub spots: Spots,
     /// What was not said before.
     pub new: Vec<Said>,
+    /// Whether one of these is an error where it should be.
+    pub has_error: bool,
     /// How many of these are errors that are nowhere near.
     pub further: usize,
 }
@@ -37,6 +39,11 @@ pub enum Found {
 impl Found {
     pub fn is_enough(self) -> bool {
         matches!(self, Found::Here | Found::Beside)
+    }
+
+    /// Whether anything is said at the place.
+    pub fn is_there(self) -> bool {
+        self.is_enough() || self == Found::Weakly
     }
 }
 
@@ -71,6 +78,9 @@ pub fn judge(entry: &Entry, spots: Spots, new: Vec<Said>) -> Trial<'_> {
     } else {
         Found::Not
     };
+    let has_error = new
+        .iter()
+        .any(|said| said.level == Level::Error && near(said));
     let far = |said: &&Said| said.level == Level::Error && !near(said);
     let further = new.iter().filter(far).count();
     Trial {
@@ -78,6 +88,7 @@ pub fn judge(entry: &Entry, spots: Spots, new: Vec<Said>) -> Trial<'_> {
         found,
         spots,
         new,
+        has_error,
         further,
     }
 }

@@ -1,17 +1,17 @@
-//! The lists of faults and of harmless variants; `README.md` describes how they are written.
+//! The lists of faults and of harmless variants; `bundles/xosc/tests/seeded/README.md` describes how they are written.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-use qcbus_sdk::Level;
-use qcbus_sdk::mutate::{Edit, Target, beside};
+use crate::Level;
+use crate::mutate::{Edit, Target, beside};
 
-/// A scenario and how it is changed.
+/// A real file and how it is changed.
 #[derive(Debug)]
 pub struct Entry {
     pub id: String,
     pub category: String,
-    pub scenario: Scenario,
+    pub original: Original,
     /// The least level of what must be found; none for a harmless variant.
     pub level: Option<Level>,
     pub edits: Vec<Edit>,
@@ -22,14 +22,15 @@ pub struct Entry {
 
 /// A real file.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Scenario {
+pub struct Original {
     pub producer: String,
     /// Below the producer's directory.
     pub path: PathBuf,
 }
 
-/// Reads a list; the text of an error begins with the line's number.
-pub fn read(text: &str) -> Result<Vec<Entry>, String> {
+/// Reads a list, whose selectors mean the attribute `key` by `#`; the text of an error begins with the
+/// line's number.
+pub fn read(text: &str, key: &str) -> Result<Vec<Entry>, String> {
     let (mut aliases, mut all) = (BTreeMap::new(), Vec::<Entry>::new());
     for (number, line) in text.lines().enumerate() {
         let trimmed = line.trim();
@@ -38,7 +39,7 @@ pub fn read(text: &str) -> Result<Vec<Entry>, String> {
         }
         let read = if line.starts_with(' ') {
             let entry = all.last_mut().ok_or_else(|| "there is no entry".to_owned());
-            entry.and_then(|entry| entry.line(trimmed))
+            entry.and_then(|entry| entry.line(trimmed, key))
         } else if let Some((name, file)) = alias(trimmed) {
             let before = aliases.insert(name, file);
             before.map_or(Ok(()), |_| Err(format!("@{name} is given twice")))
@@ -84,7 +85,7 @@ impl Entry {
         Ok(Entry {
             id: id.to_owned(),
             category: category.to_owned(),
-            scenario: Scenario {
+            original: Original {
                 producer: producer.to_owned(),
                 path: path.into(),
             },
@@ -95,18 +96,18 @@ impl Entry {
         })
     }
 
-    fn line(&mut self, line: &str) -> Result<(), String> {
+    fn line(&mut self, line: &str, key: &str) -> Result<(), String> {
         if let Some(why) = line.strip_prefix("why: ") {
             why.clone_into(&mut self.why);
             return Ok(());
         }
         let (line, file) = match line.rsplit_once(" | in: ") {
-            Some((line, file)) => (line, beside(&self.scenario.path, file.trim())?),
-            None => (line, self.scenario.path.clone()),
+            Some((line, file)) => (line, beside(&self.original.path, file.trim())?),
+            None => (line, self.original.path.clone()),
         };
         match line.strip_prefix("at: ") {
-            Some(selector) => self.at.push(Target::parse(selector, file)?),
-            None => self.edits.push(Edit::parse(line, file)?),
+            Some(selector) => self.at.push(Target::by(selector, file, key)?),
+            None => self.edits.push(Edit::by(line, file, key)?),
         }
         Ok(())
     }

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use qcbus_sdk::Level;
-use qcbus_sdk::mutate::{Rows, Said, Spots, new_ones};
+use crate::Level;
+use crate::mutate::{Rows, Said, Spots, new_ones};
 
 use super::judge::{Found, judge};
 use super::table;
@@ -13,7 +13,7 @@ use super::table;
 fn a_list_is_read() {
     let head = "@a = p:d/a.xosc\nid | sort | @a | warning\n";
     let entry = format!("{head}  A | set @b=c | in: ../m.xodr\n  at: A B\n  at: .\n  why: so\n");
-    let all = table::read(&entry).unwrap();
+    let all = table::read(&entry, "name").unwrap();
     assert_eq!((all.len(), all[0].at.len()), (1, 2));
     assert_eq!(all[0].edits[0].file, Path::new("m.xodr"));
     assert_eq!(all[0].level, Some(Level::Warning));
@@ -32,7 +32,7 @@ fn a_list_is_read() {
         ("id | sort | @b | error\n".to_owned(), "no alias"),
         ("id | sort | p:b | grave\n".to_owned(), "no level"),
     ] {
-        let error = table::read(&wrong).unwrap_err();
+        let error = table::read(&wrong, "name").unwrap_err();
         assert!(error.contains(why), "{wrong}: {error}");
     }
 }
@@ -40,7 +40,7 @@ fn a_list_is_read() {
 #[test]
 fn a_fault_is_found_where_it_is() {
     let list = "id | sort | p:a.xosc | error\n  Act#c | drop\n  why: so\n";
-    let entries = table::read(list).unwrap();
+    let entries = table::read(list, "name").unwrap();
     let said = |level: Level, rows: &[u64]| Said {
         checker: "c".to_owned(),
         level,
