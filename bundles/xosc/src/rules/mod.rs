@@ -101,6 +101,7 @@ mod naming_non_ascii_or_control;
 mod naming_parameter_declaration_name_prefix_reserved;
 mod naming_parameter_declaration_parameter_name;
 mod naming_unique_element_names_on_same_level;
+mod number_finite;
 mod parameters_assignment_duplicate;
 mod parameters_assignment_type;
 mod parameters_assignment_unknown;
@@ -417,6 +418,7 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_world_position_on_road::RULE,
     &position_orientation_range::RULE,
     &position_finite::RULE,
+    &number_finite::RULE,
     &position_relative_lane_exclusive::RULE,
     &position_route_reference::RULE,
     &routing_route_waypoints_locations::RULE,

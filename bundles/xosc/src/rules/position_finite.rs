@@ -1,8 +1,8 @@
 use qcbus_openscenario::Scenario;
 use qcbus_sdk::{Rule, Sink};
 
-use crate::families::references::quoted;
-use crate::model::{About as _, Scene};
+use crate::families::{self, finite::Numbers};
+use crate::model::Scene;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_position_finite",
@@ -14,7 +14,7 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 /// What positions are made of, with the attributes that are numbers.
-const NUMBERS: &[(&str, &[&str])] = &[
+const NUMBERS: &Numbers = &[
     ("WorldPosition", &["x", "y", "z", "h", "p", "r"]),
     ("RelativeWorldPosition", &["dx", "dy", "dz"]),
     ("RelativeObjectPosition", &["dx", "dy", "dz"]),
@@ -40,27 +40,6 @@ const NUMBERS: &[(&str, &[&str])] = &[
 ];
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    for (name, attributes) in NUMBERS {
-        for element in scenario.elements_everywhere(name) {
-            for attribute in *attributes {
-                let Some(value) = element.double(attribute).filter(|value| !value.is_finite())
-                else {
-                    continue;
-                };
-                let shown = if value.is_nan() {
-                    "NaN"
-                } else if value > 0.0 {
-                    "INF"
-                } else {
-                    "-INF"
-                };
-                let text = format!(
-                    "`{attribute}` of `{name}` is {}; nothing can be there, coordinates and angles are finite \
-                     numbers",
-                    quoted(element, attribute, shown)
-                );
-                found.about(element, attribute, text);
-            }
-        }
-    }
+    let why = "nothing can be there, coordinates and angles are finite numbers";
+    families::finite::report(scenario, NUMBERS, why, found);
 }

@@ -1,0 +1,34 @@
+//! Numbers that can be neither infinite nor `NaN`, both of which are doubles for the schema.
+
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::Sink;
+
+use crate::families::references::quoted;
+use crate::model::About as _;
+
+/// Elements with those of their attributes that are such numbers.
+pub(crate) type Numbers = [(&'static str, &'static [&'static str])];
+
+/// Says which of the numbers are not finite, and why they must be.
+pub(crate) fn report(scenario: &Scenario<'_>, numbers: &Numbers, why: &str, found: &mut Sink<'_>) {
+    for (name, attributes) in numbers {
+        for element in scenario.elements_everywhere(name) {
+            for attribute in *attributes {
+                let Some(value) = element.double(attribute).filter(|value| !value.is_finite())
+                else {
+                    continue;
+                };
+                let shown = if value.is_nan() {
+                    "NaN"
+                } else if value > 0.0 {
+                    "INF"
+                } else {
+                    "-INF"
+                };
+                let shown = quoted(element, attribute, shown);
+                let text = format!("`{attribute}` of `{name}` is {shown}; {why}");
+                found.about(element, attribute, text);
+            }
+        }
+    }
+}

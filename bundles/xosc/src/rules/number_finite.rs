@@ -1,0 +1,43 @@
+use qcbus_openscenario::Scenario;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::{self, finite::Numbers};
+use crate::model::Scene;
+
+pub static RULE: Rule<Scene> = Rule {
+    id: "check_qcbus_xosc_number_finite",
+    uids: &["qcbus.dev:xosc:1.0.0:number.finite"],
+    after: super::READABLE,
+    page: include_str!("number_finite.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// What is neither part of a position nor has a range of its own.
+const NUMBERS: &Numbers = &[
+    ("AbsoluteTargetLaneOffset", &["value"]),
+    ("AbsoluteTargetSpeed", &["value"]),
+    ("RelativeTargetLaneOffset", &["value"]),
+    ("RelativeTargetSpeed", &["value"]),
+    ("RelativeSpeedToMaster", &["value"]),
+    ("SpeedProfileEntry", &["speed"]),
+    ("LaneChangeAction", &["targetLaneOffset"]),
+    ("FollowTrajectoryAction", &["initialDistanceOffset"]),
+    ("Center", &["x", "y", "z"]),
+    ("TrailerCoupler", &["dx", "dz"]),
+    ("TrailerHitch", &["dx", "dz"]),
+    ("Clothoid", &["curvature", "curvatureDot", "curvaturePrime"]),
+    ("ClothoidSpline", &["timeEnd"]),
+    ("ClothoidSplineSegment", &["curvatureStart", "curvatureEnd"]),
+    ("ControlPoint", &["weight"]),
+    ("Knot", &["value"]),
+    ("AccelerationCondition", &["value"]),
+    ("RelativeSpeedCondition", &["value"]),
+    ("SpeedCondition", &["value"]),
+    ("SimulationTimeCondition", &["value"]),
+];
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let why = "no simulator can reach it or compare with it, it must be a finite number";
+    families::finite::report(scenario, NUMBERS, why, found);
+}
