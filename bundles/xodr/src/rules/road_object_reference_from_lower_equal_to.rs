@@ -8,7 +8,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_object_reference_from_lower_equal_to",
     uids: &["asam.net:xodr:1.7.0:road.object.reference.from_lower_equal_to"],
     versions: "1.7.0..",
-    backport: Backport::Lower { since: "" },
+    backport: Backport::Alike { since: "" },
     after: super::READABLE,
     page: include_str!("road_object_reference_from_lower_equal_to.md"),
     run,
