@@ -2,7 +2,7 @@
 
 use qcbus_document::Node;
 use qcbus_opendrive::{RoadMap, is_user_data};
-use qcbus_sdk::Finding;
+use qcbus_sdk::{Finding, Sink};
 
 /// The points of an outline.
 pub(crate) const CORNERS: [&str; 3] = ["cornerRoad", "cornerLocal", "curveLocal"];
@@ -55,6 +55,19 @@ pub(crate) fn polylines<'a>(map: &RoadMap<'a>) -> impl Iterator<Item = Node<'a>>
 /// A finite number.
 pub(crate) fn number(node: Node<'_>, attribute: &str) -> Option<f64> {
     node.f64(attribute).ok().filter(|value| value.is_finite())
+}
+
+/// Whether the file is of an older version than this.
+pub(crate) fn is_before(found: &Sink<'_>, edition: (u16, u16)) -> bool {
+    let version = found.version();
+    version.is_some_and(|version| (version.major, version.minor) < edition)
+}
+
+/// Whether the schema of the file's version is one of those of the versions `from` to `to`, by which a fact
+/// is reported already.
+pub(crate) fn is_by_schema(found: &Sink<'_>, from: (u16, u16), to: (u16, u16)) -> bool {
+    let version = found.version();
+    version.is_some_and(|version| (from..=to).contains(&(version.major, version.minor)))
 }
 
 /// Whether a text attribute is missing or blank.

@@ -2,14 +2,14 @@ use qcbus_document::Node;
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Backport, Level, Place, Rule, Sink};
 
-use crate::families::object_parts::{Stands, listed, named, number, objects};
+use crate::families::object_parts::{self, Stands, listed, named, number, objects};
 use crate::model::Roads;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_object_circular_vs_angular",
     uids: &["asam.net:xodr:1.7.0:road.object.circular_vs_angular"],
     versions: "1.7.0..",
-    backport: Backport::Lower { since: "" },
+    backport: Backport::Alike { since: "" },
     after: super::READABLE,
     page: include_str!("road_object_circular_vs_angular.md"),
     run,
@@ -17,6 +17,13 @@ pub static RULE: Rule<Roads> = Rule {
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    // Two volumes that contradict each other are a fault in every version, as one is the alternative to the
+    // other in all of them; what can be understood is none before the rule was written down.
+    let mild = if object_parts::is_before(found, (1, 7)) {
+        Level::Information
+    } else {
+        Level::Warning
+    };
     for object in objects(map) {
         let [radius, length, width] = ["radius", "length", "width"].map(|name| object.attr(name));
         let sides: Vec<&str> = [("length", length), ("width", width)]
@@ -24,7 +31,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             .filter_map(|(name, value)| value.map(|_| name))
             .collect();
         match (radius, sides.as_slice()) {
-            (Some(_), [_, ..]) => both(map, object, &sides, found),
+            (Some(_), [_, ..]) => both(map, object, &sides, mild, found),
             (None, [only]) if !is_completed(object) => {
                 let other = if *only == "length" { "width" } else { "length" };
                 let text = format!(
@@ -33,7 +40,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                 );
                 found
                     .issue(Place::attribute_or_node(object, only), text)
-                    .level(Level::Warning)
+                    .level(mild)
                     .stands(map, object);
             }
             _ => {}
@@ -49,7 +56,13 @@ fn is_completed(object: Node<'_>) -> bool {
 }
 
 /// A size of zero stands for "none" in many files.
-fn both<'a>(map: &RoadMap<'a>, object: Node<'a>, sides: &[&str], found: &mut Sink<'_>) {
+fn both<'a>(
+    map: &RoadMap<'a>,
+    object: Node<'a>,
+    sides: &[&str],
+    mild: Level,
+    found: &mut Sink<'_>,
+) {
     let is_zero = |name: &&str| number(object, name) == Some(0.0);
     let says_none = is_zero(&"radius") || sides.iter().all(is_zero);
     let text = format!(
@@ -58,8 +71,13 @@ fn both<'a>(map: &RoadMap<'a>, object: Node<'a>, sides: &[&str], found: &mut Sin
         listed(sides)
     );
     let place = Place::attribute_or_node(object, "radius");
+    let older = object_parts::is_before(found, (1, 5));
     let finding = found.issue(place, text).stands(map, object);
+    // Before 1.5 the two were alternatives by the words of a table only, and tools wrote both; one side with a
+    // radius makes no box.
     if says_none {
+        finding.level(mild);
+    } else if older || (sides.len() < 2 && mild == Level::Information) {
         finding.level(Level::Warning);
     }
 }

@@ -2,14 +2,14 @@ use qcbus_document::Node;
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Backport, Level, Rule, Sink};
 
-use crate::families::object_parts::{CORNERS, Stands, objects, outlines};
+use crate::families::object_parts::{CORNERS, Stands, is_before, objects, outlines};
 use crate::model::Roads;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_object_outline_outline_followed_by_corner",
     uids: &[OUTLINE, LOCAL, ROAD, CURVE],
     versions: "1.7.0..",
-    backport: Backport::Lower { since: "" },
+    backport: Backport::Alike { since: "" },
     after: super::READABLE,
     page: include_str!("road_object_outline_outline_followed_by_corner.md"),
     run,
@@ -35,7 +35,12 @@ fn check<'a>(map: &RoadMap<'a>, object: Node<'a>, outline: Node<'a>, found: &mut
     if is_closed && road.max(local) == 2 && curves == 0 {
         let text =
             "the outline is closed, but two corners enclose no area; that needs at least three";
-        let finding = found.issue(outline, text).level(Level::Warning);
+        let mild = if is_before(found, (1, 7)) {
+            Level::Information
+        } else {
+            Level::Warning
+        };
+        let finding = found.issue(outline, text).level(mild);
         let uid = if road == 2 { ROAD } else { LOCAL };
         finding.stands(map, object).uid(uid);
     }
