@@ -2,14 +2,14 @@ use qcbus_document::Node;
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink};
 
-use crate::families::object_parts::{number, objects};
+use crate::families::object_parts::{is_before, is_by_schema, number, objects};
 use crate::model::Roads;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_object_repeating_valid_s_length",
     uids: &[VALID, LATERAL],
     versions: "1.9.0..",
-    backport: Backport::Lower { since: "" },
+    backport: Backport::Alike { since: "" },
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_object_repeating_valid_s_length.md"),
@@ -42,15 +42,23 @@ fn along<'a>(map: &RoadMap<'a>, repeat: Node<'a>, tolerance: f64, found: &mut Si
     let (Some(s), Some(length)) = (number(repeat, "s"), number(repeat, "length")) else {
         return;
     };
+    // A negative length cannot be meant in any version; what lies beyond the road was only forbidden with 1.9.
+    let older = is_before(found, (1, 9));
     if length < 0.0 {
-        let text =
-            format!("the repetition is {length} m long, but its length must not be negative");
-        found.issue(Place::attribute_or_node(repeat, "length"), text);
+        if !is_by_schema(found, (1, 5), (1, 8)) {
+            let text =
+                format!("the repetition is {length} m long, but its length must not be negative");
+            found.issue(Place::attribute_or_node(repeat, "length"), text);
+        }
     } else if length == 0.0 && number(repeat, "distance") == Some(0.0) {
         let text = "the repetition is a continuous one of length 0 m, of which nothing remains";
         found
             .issue(Place::attribute_or_node(repeat, "length"), text)
-            .level(Level::Warning);
+            .level(if older {
+                Level::Information
+            } else {
+                Level::Warning
+            });
     }
     let Some(road) = map.road_of(repeat) else {
         return;
@@ -70,9 +78,11 @@ fn along<'a>(map: &RoadMap<'a>, repeat: Node<'a>, tolerance: f64, found: &mut Si
         return;
     };
     let text = format!("{text}, but road `{}` reaches from 0 to {end} m", road.id());
-    found
-        .issue(Place::attribute_or_node(repeat, attribute), text)
-        .road(road.id(), s, number(repeat, "tStart").unwrap_or(0.0));
+    let finding = found.issue(Place::attribute_or_node(repeat, attribute), text);
+    let finding = finding.road(road.id(), s, number(repeat, "tStart").unwrap_or(0.0));
+    if older {
+        finding.level(Level::Warning);
+    }
 }
 
 /// A cubic for t must arrive at `tEnd`.
