@@ -3,7 +3,7 @@ use qcbus_opendrive::{LaneRef, RoadMap, SectionRef};
 use qcbus_sdk::{Level, Param, Place, Rule, Sink};
 
 use crate::families::ascending;
-use crate::families::object_parts::{named, number};
+use crate::families::object_parts::{is_by_schema, named, number};
 use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
@@ -11,7 +11,7 @@ pub static RULE: Rule<Roads> = Rule {
     uids: &["qcbus.dev:xodr:1.0.0:road.records_within_extent"],
     level: Level::Warning,
     after: super::READABLE,
-    params: &[TOLERANCE],
+    params: &[TOLERANCE, CLEAR],
     page: include_str!("road_records_within_extent.md"),
     each: Some(each),
     ..Rule::DEFAULTS
@@ -19,6 +19,13 @@ pub static RULE: Rule<Roads> = Rule {
 
 const TOLERANCE: Param =
     Param::number("tolerance", 1e-3, "m", "how far beyond the end is accepted");
+
+const CLEAR: Param = Param::number(
+    "clear",
+    1.0,
+    "m",
+    "how far beyond the end signals, references, tunnels and bridges may lie without being an error",
+);
 
 /// The records of a lane that start at `sOffset`.
 const LANE_RECORDS: [&str; 8] = [
@@ -121,17 +128,22 @@ impl Extent<'_> {
     fn stands(&self, parent: Option<Node<'_>>, name: &'static str, found: &mut Sink<'_>) {
         let limit = self.length + found.number(&TOLERANCE);
         for node in ascending::children(parent, name) {
-            let Some(s) = node.f64(self.start).ok().filter(|s| *s > limit) else {
+            if self.begins_before(node, found) {
+                continue;
+            }
+            let Some(s) = number(node, self.start).filter(|s| *s > limit) else {
                 continue;
             };
             let text = format!(
-                "{} stands at s = {s}, but {} is {} m long; it should stand on the road",
+                "{} stands at s = {s}, but {} is {} m long; it must stand on the road",
                 named(node),
                 self.what,
                 self.length
             );
+            let level = self.severity(s, found);
             found
                 .issue(Place::attribute_or_node(node, self.start), text)
+                .level(level)
                 .road(self.road, s, number(node, "t").unwrap_or(0.0));
         }
     }
@@ -140,22 +152,56 @@ impl Extent<'_> {
     fn ends(&self, parent: Option<Node<'_>>, name: &'static str, found: &mut Sink<'_>) {
         let limit = self.length + found.number(&TOLERANCE);
         for node in ascending::children(parent, name) {
+            if self.begins_before(node, found) {
+                continue;
+            }
             let Some((s, length)) = number(node, self.start).zip(number(node, "length")) else {
                 continue;
             };
             if s + length > limit {
                 let text = format!(
-                    "{} reaches from s = {s} to s = {}, but {} is {} m long; it should end on the road",
+                    "{} reaches from s = {s} to s = {}, but {} is {} m long; it must end on the road",
                     named(node),
                     s + length,
                     self.what,
                     self.length
                 );
+                let level = self.severity(s + length, found);
                 found
                     .issue(Place::attribute_or_node(node, "length"), text)
+                    .level(level)
                     .road(self.road, self.length, 0.0);
             }
         }
+    }
+
+    /// An error where no rounding explains it.
+    fn severity(&self, s: f64, found: &Sink<'_>) -> Level {
+        if s > self.length + found.number(&CLEAR) {
+            Level::Error
+        } else {
+            Level::Warning
+        }
+    }
+
+    /// Reports an element that begins before the road does, which the schemas of some versions forbid.
+    fn begins_before(&self, node: Node<'_>, found: &mut Sink<'_>) -> bool {
+        let tolerance = found.number(&TOLERANCE);
+        let Some(s) = number(node, self.start).filter(|s| *s < -tolerance) else {
+            return false;
+        };
+        if !is_by_schema(found, (1, 5), (1, 8)) {
+            let text = format!(
+                "{} has s = {s}, but {} begins at s = 0; no s is less than that",
+                named(node),
+                self.what
+            );
+            found
+                .issue(Place::attribute_or_node(node, self.start), text)
+                .level(Level::Error)
+                .road(self.road, s, number(node, "t").unwrap_or(0.0));
+        }
+        true
     }
 
     /// Reports the first record of this name that starts beyond the end.
