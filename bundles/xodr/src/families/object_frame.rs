@@ -2,8 +2,9 @@
 
 use qcbus_document::Node;
 use qcbus_opendrive::{Corner, CornerKind, Object, ObjectPoint, Outline, Polyline, Road};
-use qcbus_sdk::{Param, Sink};
+use qcbus_sdk::{Level, Param, Sink};
 
+use super::object_parts::is_before;
 use super::on_road::OnRoad;
 
 pub(crate) const TOLERANCE: Param = Param::number(
@@ -12,6 +13,10 @@ pub(crate) const TOLERANCE: Param = Param::number(
     "m",
     "how much larger than the bounding volume the object may be",
 );
+
+/// From how many times the size, and from how many metres more, an object is out of all proportion.
+const GROSS_SHARE: f64 = 3.0;
+const GROSS: f64 = 100.0;
 
 /// A point of an object in u, v and z of the object, in metres.
 #[derive(Clone, Copy)]
@@ -129,18 +134,27 @@ pub(crate) fn report_too_large(
     found: &mut Sink<'_>,
 ) {
     let tolerance = found.number(&TOLERANCE);
+    let older = is_before(found, (1, 7));
     let worst = AXES
         .iter()
         .enumerate()
         .filter_map(|(axis, (name, attribute))| {
             let (size, attribute) = size_of(object, axis, attribute)?;
-            let low = points.iter().map(|point| point.at[axis] + point.reach);
-            let low = low.reduce(f64::min)?;
+            let nearest = |one: &&LocalPoint<'_>| one.at[axis] + one.reach;
             let farthest = |one: &&LocalPoint<'_>| one.at[axis] - one.reach;
-            let far = points
+            let low = points
+                .iter()
+                .min_by(|one, other| nearest(one).total_cmp(&nearest(other)))?;
+            let high = points
                 .iter()
                 .max_by(|one, other| farthest(one).total_cmp(&farthest(other)))?;
-            let extent = farthest(&far) - low;
+            let extent = farthest(&high) - nearest(&low);
+            // The one that is farther from the origin is more likely to be wrong.
+            let far = if low.at[axis].abs() > high.at[axis].abs() {
+                low
+            } else {
+                high
+            };
             (extent > size + tolerance).then_some((
                 extent - size,
                 extent,
@@ -151,17 +165,65 @@ pub(crate) fn report_too_large(
             ))
         });
     let worst = worst.max_by(|one, other| one.0.total_cmp(&other.0));
-    if let Some((_, extent, size, axis, attribute, node)) = worst {
-        let text = format!(
-            "{what} of object `{}` extends over {extent:.3} m along {axis}, but its bounding volume only over \
-             {size:.3} m (`{attribute}`); all of it must lie inside",
-            object.id().unwrap_or_default()
-        );
-        found
-            .issue(node, text)
-            .on(road, object.s().unwrap_or(0.0), object.t().unwrap_or(0.0))
-            .at(object.node(), "the object");
+    let Some((_, extent, size, axis, attribute, node)) = worst else {
+        report_away(road, object, points, what, found);
+        return;
+    };
+    let text = format!(
+        "{what} of object `{}` extends over {extent:.3} m along {axis}, but its bounding volume only over \
+         {size:.3} m (`{attribute}`); all of it must lie inside",
+        object.id().unwrap_or_default()
+    );
+    let finding = found
+        .issue(node, text)
+        .on(road, object.s().unwrap_or(0.0), object.t().unwrap_or(0.0))
+        .at(object.node(), "the object");
+    // Several times as large and by far is no matter of a version; a level is lowered for older ones.
+    if older && extent > GROSS_SHARE * size && extent - size > GROSS {
+        finding.level(Level::Error);
     }
+}
+
+/// Reports points that lie outside of the bounding volume although they would fit into it: farther from the
+/// origin than the volume is large, so that no volume around the origin has both.
+fn report_away(
+    road: &Road<'_>,
+    object: &Object<'_>,
+    points: &[LocalPoint<'_>],
+    what: &str,
+    found: &mut Sink<'_>,
+) {
+    let tolerance = found.number(&TOLERANCE);
+    let far = AXES
+        .iter()
+        .enumerate()
+        .filter_map(|(axis, (name, attribute))| {
+            let (size, attribute) = size_of(object, axis, attribute)?;
+            let away = |one: &LocalPoint<'_>| one.at[axis].abs() - one.reach;
+            let point = points
+                .iter()
+                .max_by(|one, other| away(one).total_cmp(&away(other)))?;
+            (away(point) > size + tolerance).then_some((
+                away(point),
+                size,
+                *name,
+                attribute,
+                point.node,
+            ))
+        });
+    let far = far.max_by(|one, other| (one.0 - one.1).total_cmp(&(other.0 - other.1)));
+    let Some((away, size, axis, attribute, node)) = far else {
+        return;
+    };
+    let text = format!(
+        "{what} of object `{}` reaches {away:.3} m from its origin along {axis}, but its bounding volume is only \
+         {size:.3} m large there (`{attribute}`); all of it must lie inside",
+        object.id().unwrap_or_default()
+    );
+    found
+        .issue(node, text)
+        .on(road, object.s().unwrap_or(0.0), object.t().unwrap_or(0.0))
+        .at(object.node(), "the object");
 }
 
 /// The axes with the attribute that gives the size along each.
