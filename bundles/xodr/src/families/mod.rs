@@ -31,6 +31,7 @@ pub(crate) mod profile_steps;
 pub(crate) mod rails;
 pub(crate) mod redundancy;
 pub(crate) mod refline;
+pub(crate) mod roadside;
 pub(crate) mod strips;
 pub(crate) mod surface_boxes;
 pub(crate) mod switches;

@@ -1,8 +1,8 @@
 use qcbus_document::Node;
 use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink};
+use qcbus_sdk::{Backport, Param, Place, Rule, Sink};
 
-use crate::families::object_parts::{Stands, listed, named, number, objects};
+use crate::families::object_parts::{listed, named, number, objects};
 use crate::model::Roads;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -11,7 +11,7 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Lower { since: "" },
     after: super::READABLE,
-    params: &[TOLERANCE, FAR],
+    params: &[TOLERANCE],
     page: include_str!("road_object_s_t_coords.md"),
     run,
     ..Rule::DEFAULTS
@@ -23,15 +23,9 @@ const TOLERANCE: Param = Param::number(
     "m",
     "how far beyond the ends of the road `s` may lie",
 );
-const FAR: Param = Param::number(
-    "far",
-    200.0,
-    "m",
-    "lateral distance from which an object is called far",
-);
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    let (tolerance, far) = (found.number(&TOLERANCE), found.number(&FAR));
+    let tolerance = found.number(&TOLERANCE);
     for object in objects(map) {
         let missing: Vec<&str> = ["s", "t"]
             .into_iter()
@@ -46,17 +40,6 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             found.issue(object, text);
         }
         on_road(map, object, tolerance, found);
-        if let Some(t) = number(object, "t").filter(|t| t.abs() > far) {
-            let text = format!(
-                "{} stands {} m beside the reference line, which is unusually far (more than {far} m)",
-                named(object),
-                t.abs()
-            );
-            found
-                .issue(Place::attribute_or_node(object, "t"), text)
-                .level(Level::Information)
-                .stands(map, object);
-        }
     }
 }
 

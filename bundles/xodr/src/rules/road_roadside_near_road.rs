@@ -1,0 +1,152 @@
+use qcbus_document::Node;
+use qcbus_opendrive::{Road, RoadMap};
+use qcbus_sdk::{Level, Param, Place, Rule, Sink};
+
+use crate::families::object_parts::{named, number};
+use crate::families::on_road::OnRoad;
+use crate::families::roadside::{NearRoads, beside, place, stands_itself, things};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_roadside_near_road",
+    uids: &["qcbus.dev:xodr:1.0.0:road.roadside.near_road"],
+    level: Level::Warning,
+    after: super::READABLE,
+    params: &[FAR_SIGNAL, FAR_OBJECT, HIGH, HIGH_SIGNAL, DEEP, DEEP_SIGNAL],
+    page: include_str!("road_roadside_near_road.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const FAR_SIGNAL: Param = Param::number(
+    "far_signal",
+    100.0,
+    "m",
+    "how far beside all roads a signal may stand",
+);
+const FAR_OBJECT: Param = Param::number(
+    "far_object",
+    500.0,
+    "m",
+    "how far beside all roads an object may stand",
+);
+const HIGH: Param = Param::number(
+    "high",
+    30.0,
+    "m",
+    "how high above its road an object may begin, which is more beside the road",
+);
+const HIGH_SIGNAL: Param = Param::number(
+    "high_signal",
+    20.0,
+    "m",
+    "how high above its road a signal may hang",
+);
+const DEEP: Param = Param::number(
+    "deep",
+    20.0,
+    "m",
+    "how deep below its road an object may begin, which is more beside the road",
+);
+const DEEP_SIGNAL: Param = Param::number(
+    "deep_signal",
+    5.0,
+    "m",
+    "how deep below its road a signal may begin",
+);
+
+/// How much higher or lower the ground may be per metre beside the road.
+const SLOPE: f64 = 0.5;
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let near_signals = NearRoads::new(found.number(&FAR_SIGNAL));
+    let near_objects = NearRoads::new(found.number(&FAR_OBJECT));
+    for road in map.roads() {
+        for thing in things(road).filter(|thing| stands_itself(*thing)) {
+            if thing.is("signal") {
+                beside_all(map, road, thing, &near_signals, found);
+            } else {
+                beside_all(map, road, thing, &near_objects, found);
+            }
+            above_or_below(road, thing, ["zOffset", "t"], found);
+        }
+        for repeat in road.objects().flat_map(|object| object.repeats()) {
+            above_or_below(road, repeat.node(), ["zOffsetStart", "tStart"], found);
+        }
+    }
+}
+
+fn beside_all(
+    map: &RoadMap<'_>,
+    road: &Road<'_>,
+    thing: Node<'_>,
+    near: &NearRoads,
+    found: &mut Sink<'_>,
+) {
+    let (far, whose) = if thing.is("signal") {
+        (found.number(&FAR_SIGNAL), "a signal")
+    } else {
+        (found.number(&FAR_OBJECT), "an object")
+    };
+    let Some((s, t)) = place(thing, road).filter(|(_, t)| t.abs() > far) else {
+        return;
+    };
+    let distance = beside(road, s, t);
+    if distance <= far || near.any(map, road, s, t) != Some(false) {
+        return;
+    }
+    let text = format!(
+        "{} stands {distance:.0} m beside the lanes of road `{}`, and no other road is near; {whose} should stand \
+         within {far} m of a road",
+        named(thing),
+        road.id()
+    );
+    found
+        .issue(Place::attribute_or_node(thing, "t"), text)
+        .on(road, s, t);
+}
+
+/// What is above the road or below it by metres that only a mistaken unit or sign explains, or a height
+/// above the sea in place of one above the road.
+fn above_or_below(road: &Road<'_>, thing: Node<'_>, [up, across]: [&str; 2], found: &mut Sink<'_>) {
+    let of_signal = thing.is("signal");
+    let (high, deep) = if of_signal {
+        (found.number(&HIGH_SIGNAL), found.number(&DEEP_SIGNAL))
+    } else {
+        (found.number(&HIGH), found.number(&DEEP))
+    };
+    let Some(z) = number(thing, up).filter(|z| *z > high || *z < -deep) else {
+        return;
+    };
+    let Some((s, t)) = number(thing, "s").zip(number(thing, across)) else {
+        return;
+    };
+    let ground = if of_signal {
+        0.0
+    } else {
+        SLOPE * beside(road, s, t)
+    };
+    let (word, limit) = if z > 0.0 {
+        ("above", high)
+    } else {
+        ("below", deep)
+    };
+    if z.abs() <= limit + ground {
+        return;
+    }
+    let name = if thing.is("repeat") {
+        "the repetition begins".to_owned()
+    } else {
+        format!("{} begins", named(thing))
+    };
+    let text = format!(
+        "{name} {:.1} m {word} the reference line of road `{}`; `{up}` counts metres from there, at most {:.0} m \
+         are plausible here",
+        z.abs(),
+        road.id(),
+        limit + ground
+    );
+    found
+        .issue(Place::attribute_or_node(thing, up), text)
+        .on(road, s, t);
+}
