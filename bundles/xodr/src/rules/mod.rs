@@ -215,6 +215,7 @@ mod road_railroad_rail_refline_centered;
 mod road_railroad_switch_check_switch_conn;
 mod road_railroad_switch_single_switch_no_partner;
 mod road_records_within_extent;
+mod road_roadside_angles_in_radians;
 mod road_roadside_near_road;
 mod road_shape_elem_asc_order;
 mod road_shape_t_definition_coverage;
@@ -488,4 +489,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &lane_smoothness_profile_no_horizontal_gaps::RULE,
     &road_lane_link_lanes_across_roads::RULE,
     &road_roadside_near_road::RULE,
+    &road_roadside_angles_in_radians::RULE,
 ];

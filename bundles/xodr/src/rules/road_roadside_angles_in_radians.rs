@@ -1,0 +1,61 @@
+use std::f64::consts::TAU;
+
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Param, Place, Rule, Sink};
+
+use crate::families::object_parts::{named, number};
+use crate::families::on_road::OnRoad;
+use crate::families::roadside::{place, things};
+use crate::model::{Part, Roads};
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_roadside_angles_in_radians",
+    uids: &["qcbus.dev:xodr:1.0.0:road.roadside.angles_in_radians"],
+    level: Level::Warning,
+    after: super::READABLE,
+    params: &[LARGE],
+    page: include_str!("road_roadside_angles_in_radians.md"),
+    each: Some(each),
+    ..Rule::DEFAULTS
+};
+
+const LARGE: Param = Param::number(
+    "large",
+    100.0,
+    "rad",
+    "an angle beyond this is taken for degrees, even if it is no round number",
+);
+
+const ANGLES: [&str; 4] = ["hOffset", "hdg", "pitch", "roll"];
+
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    let large = found.number(&LARGE);
+    for road in map.part(part).roads() {
+        for thing in things(road) {
+            for (name, angle) in ANGLES
+                .iter()
+                .filter_map(|name| in_degrees(thing, name, large))
+            {
+                let text = format!(
+                    "`{name}` of {} is {angle}, which is {:.1} full turns; angles are in radians: {angle}° are {:.4}",
+                    named(thing),
+                    angle.abs() / TAU,
+                    angle.to_radians()
+                );
+                let finding = found.issue(Place::attribute_or_node(thing, name), text);
+                if let Some((s, t)) = place(thing, road) {
+                    finding.on(road, s, t);
+                }
+            }
+        }
+    }
+}
+
+/// An angle beyond a full turn that is a round number of degrees. Those that are not come from adding
+/// up turns, which is odd and harmless.
+fn in_degrees<'n>(thing: Node<'_>, name: &'n str, large: f64) -> Option<(&'n str, f64)> {
+    let angle = number(thing, name).filter(|angle| angle.abs() > TAU + 1e-3)?;
+    let is_round = (angle * 2.0 - (angle * 2.0).round()).abs() < 1e-9;
+    (is_round || angle.abs() > large).then_some((name, angle))
+}
