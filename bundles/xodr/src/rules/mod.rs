@@ -217,6 +217,7 @@ mod road_railroad_switch_single_switch_no_partner;
 mod road_records_within_extent;
 mod road_roadside_angles_in_radians;
 mod road_roadside_near_road;
+mod road_roadside_no_twins;
 mod road_shape_elem_asc_order;
 mod road_shape_t_definition_coverage;
 mod road_signal_boards_multi_board_have_sub_boards;
@@ -490,4 +491,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_lane_link_lanes_across_roads::RULE,
     &road_roadside_near_road::RULE,
     &road_roadside_angles_in_radians::RULE,
+    &road_roadside_no_twins::RULE,
 ];

@@ -1,0 +1,81 @@
+use foldhash::HashMap;
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Param, Place, Rule, Sink};
+
+use crate::families::object_parts::{named, number};
+use crate::families::on_road::OnRoad;
+use crate::families::roadside::{place, things};
+use crate::model::{Part, Roads};
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_roadside_no_twins",
+    uids: &["qcbus.dev:xodr:1.0.0:road.roadside.no_twins"],
+    level: Level::Warning,
+    after: super::READABLE,
+    params: &[NEAR],
+    page: include_str!("road_roadside_no_twins.md"),
+    each: Some(each),
+    ..Rule::DEFAULTS
+};
+
+const NEAR: Param = Param::number(
+    "near",
+    0.01,
+    "m",
+    "the grid in which places count as the same",
+);
+
+/// What tells two signals or objects of one place apart.
+const WORDS: [&str; 6] = ["type", "subtype", "name", "orientation", "value", "text"];
+const NUMBERS: [&str; 5] = ["s", "t", "zOffset", "hOffset", "hdg"];
+/// What an object or signal consists of or holds for; those that have one of these may share a place.
+const PARTS: [&str; 9] = [
+    "repeat",
+    "outline",
+    "outlines",
+    "skeleton",
+    "validity",
+    "staticBoard",
+    "vmsBoard",
+    "multiBoard",
+    "positionInertial",
+];
+
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    let grid = found.number(&NEAR).max(1e-9);
+    for road in map.part(part).roads() {
+        let mut seen: HashMap<(&str, [Option<&str>; 6], [i64; 5]), Node<'_>> = HashMap::default();
+        for thing in things(road) {
+            let Some((s, t)) = place(thing, road) else {
+                continue;
+            };
+            if PARTS.iter().any(|part| thing.child(part).is_some()) {
+                continue;
+            }
+            let cell = |name: &str| (number(thing, name).unwrap_or(0.0) / grid).round() as i64;
+            let key = (
+                thing.name(),
+                WORDS.map(|name| thing.attr(name).filter(|text| !text.is_empty())),
+                NUMBERS.map(cell),
+            );
+            let Some(first) = seen.get(&key).copied() else {
+                seen.insert(key, thing);
+                continue;
+            };
+            // Two of one id are a matter of their ids.
+            if first.attr("id") == thing.attr("id") {
+                continue;
+            }
+            let text = format!(
+                "{} stands where {} stands already, and is of the same kind; one of them should go",
+                named(thing),
+                named(first)
+            );
+            found
+                .issue(Place::attribute_or_node(thing, "id"), text)
+                .on(road, s, t)
+                .at(first, "the one before it");
+        }
+    }
+}
