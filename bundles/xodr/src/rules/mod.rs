@@ -216,6 +216,7 @@ mod road_railroad_switch_check_switch_conn;
 mod road_railroad_switch_single_switch_no_partner;
 mod road_records_within_extent;
 mod road_roadside_angles_in_radians;
+mod road_roadside_clear_of_lanes;
 mod road_roadside_near_road;
 mod road_roadside_no_twins;
 mod road_shape_elem_asc_order;
@@ -492,4 +493,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_roadside_near_road::RULE,
     &road_roadside_angles_in_radians::RULE,
     &road_roadside_no_twins::RULE,
+    &road_roadside_clear_of_lanes::RULE,
 ];

@@ -1,0 +1,130 @@
+use qcbus_document::Node;
+use qcbus_opendrive::{Road, RoadMap};
+use qcbus_sdk::{Level, Param, Place, Rule, Sink};
+
+use crate::families::object_parts::{has_outline, named, number};
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::families::roadside::{Spot, lane_at, place, stands_itself, things};
+use crate::model::{Part, Roads};
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_roadside_clear_of_lanes",
+    uids: &["qcbus.dev:xodr:1.0.0:road.roadside.clear_of_lanes"],
+    level: Level::Warning,
+    after: super::READABLE,
+    params: &[DEPTH, CLEARANCE],
+    page: include_str!("road_roadside_clear_of_lanes.md"),
+    each: Some(each),
+    ..Rule::DEFAULTS
+};
+
+const DEPTH: Param = Param::number(
+    "depth",
+    0.5,
+    "m",
+    "how far within a lane something may stand before it is in the way",
+);
+const CLEARANCE: Param = Param::number(
+    "clearance",
+    2.0,
+    "m",
+    "from which height above the road on vehicles pass below",
+);
+
+/// Lanes that vehicles drive along all the time.
+const LANES: [&str; 10] = [
+    "driving",
+    "entry",
+    "exit",
+    "onRamp",
+    "offRamp",
+    "connectingRamp",
+    "slipLane",
+    "bus",
+    "taxi",
+    "HOV",
+];
+/// What nobody puts onto a lane; barriers, obstacles and patches may be meant there.
+const FIXED: [&str; 5] = ["pole", "tree", "vegetation", "streetLamp", "building"];
+
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
+        for thing in things(road).filter(|thing| stands_itself(*thing)) {
+            if thing.attr("type") == Some("parkingSpace") {
+                parking(road, thing, found);
+            } else if thing.is("object")
+                && thing.attr("type").is_some_and(|kind| FIXED.contains(&kind))
+            {
+                object(road, thing, found);
+            } else if thing.is("signal") {
+                sign(road, thing, found);
+            }
+        }
+    }
+}
+
+/// The lane in whose way something is.
+fn blocked<'m, 'a>(road: &'m Road<'a>, s: f64, t: f64, depth: f64) -> Option<Spot<'m, 'a>> {
+    let spot = lane_at(road, s, t).filter(|spot| spot.depth > depth)?;
+    spot.lane
+        .kind()
+        .is_some_and(|kind| LANES.contains(&kind))
+        .then_some(spot)
+}
+
+fn object(road: &Road<'_>, node: Node<'_>, found: &mut Sink<'_>) {
+    let low = number(node, "zOffset").unwrap_or(0.0);
+    let height = number(node, "height");
+    let is_flat = height.is_some_and(|height| low + height < 0.3);
+    if low > found.number(&CLEARANCE)
+        || is_flat
+        || has_outline(node)
+        || node.child("skeleton").is_some()
+    {
+        return;
+    }
+    report(road, node, "should stand beside it", found);
+}
+
+fn parking(road: &Road<'_>, node: Node<'_>, found: &mut Sink<'_>) {
+    if !has_outline(node) {
+        report(
+            road,
+            node,
+            "should lie beside it or on a lane for parking",
+            found,
+        );
+    }
+}
+
+/// A sign on a post of its own, not one that hangs over the lane, is painted on it or shares the place of
+/// the reference line, where signs are put that stand nowhere.
+fn sign(road: &Road<'_>, node: Node<'_>, found: &mut Sink<'_>) {
+    let is_static = node.attr("dynamic") == Some("no");
+    let height = number(node, "zOffset").unwrap_or(0.0);
+    let on_post = (1.0..=3.0).contains(&height);
+    let anywhere = number(node, "t").is_some_and(|t| t.abs() < 1e-6);
+    if is_static && on_post && !anywhere {
+        report(road, node, "should stand beside it", found);
+    }
+}
+
+fn report(road: &Road<'_>, node: Node<'_>, should: &str, found: &mut Sink<'_>) {
+    let Some((s, t)) = place(node, road) else {
+        return;
+    };
+    let Some(spot) = blocked(road, s, t, found.number(&DEPTH)) else {
+        return;
+    };
+    let text = format!(
+        "{} of type `{}` stands in the middle of {}, {:.2} m from its border; it {should}",
+        named(node),
+        node.attr("type").unwrap_or_default(),
+        lane_name(spot.lane),
+        spot.depth
+    );
+    found
+        .issue(Place::attribute_or_node(node, "t"), text)
+        .on(road, s, t)
+        .at(spot.lane.node(), "the lane");
+}
