@@ -43,7 +43,7 @@ fn signals_and_controllers() {
             r#"<controller id="3" name="c"><control signalId="{signal}" type="0"/></controller>"#
         )
     };
-    let one = signals(&[signal("1", "50", "")]);
+    let one = signals(&[signal("1", "50", "").replace(r#"dynamic="no""#, r#"dynamic="yes""#)]);
     let rows: Vec<Row> = vec![
         ("right lanes", with(&valid(["-2", "-1"]), "RHT"), &[]),
         (
@@ -156,7 +156,7 @@ fn objects() {
         (
             "a tunnel that goes on",
             tunnel("60"),
-            &["warning road_records_within_extent"],
+            &["error road_records_within_extent"],
         ),
     ];
     crate::run(&rows);

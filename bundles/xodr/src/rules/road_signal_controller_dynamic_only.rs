@@ -1,0 +1,53 @@
+use foldhash::HashMap;
+use qcbus_opendrive::{RoadMap, Signal};
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::families::object_parts::named;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_signal_controller_dynamic_only",
+    uids: &["qcbus.dev:xodr:1.1.0:road.signal.controller.dynamic_only"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("road_signal_controller_dynamic_only.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    if map.controllers().next().is_none() {
+        return;
+    }
+    // Where an id belongs to several signals, nobody can say which of them is switched.
+    let mut signals: HashMap<&str, Option<Signal<'_>>> = HashMap::default();
+    for (_, signal) in map.signals() {
+        let Some(id) = signal.id() else { continue };
+        let known = signals.entry(id).or_insert(Some(signal));
+        if known.is_some_and(|known| known.node() != signal.node()) {
+            *known = None;
+        }
+    }
+    for controller in map.controllers() {
+        for control in controller.controls() {
+            let signal = control
+                .signal_id()
+                .and_then(|id| signals.get(id).copied().flatten());
+            let Some(signal) = signal.filter(|signal| signal.dynamic() == Some(false)) else {
+                continue;
+            };
+            let text = format!(
+                "{} switches {} of type `{}`, whose `dynamic` is `no`; only signals that change should be switched",
+                named(controller.node()),
+                named(signal.node()),
+                signal.kind().unwrap_or_default()
+            );
+            found
+                .issue(Place::attribute_or_node(control.node(), "signalId"), text)
+                .at(
+                    Place::attribute_or_node(signal.node(), "dynamic"),
+                    "the signal",
+                );
+        }
+    }
+}
