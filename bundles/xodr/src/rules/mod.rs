@@ -227,6 +227,7 @@ mod road_signal_boards_multi_board_use_dynamic_true;
 mod road_signal_boards_static_board_use_correct_type;
 mod road_signal_boards_static_boards_no_single_signal;
 mod road_signal_controller_dynamic_only;
+mod road_signal_controller_one_per_light;
 mod road_signal_controller_valid_for_signals;
 mod road_signal_gantry_all_variable_boards_same_gantry;
 mod road_signal_gantry_vmsgroup_at_least_one_reference;
@@ -496,4 +497,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_roadside_no_twins::RULE,
     &road_roadside_clear_of_lanes::RULE,
     &road_signal_controller_dynamic_only::RULE,
+    &road_signal_controller_one_per_light::RULE,
 ];

@@ -1,0 +1,131 @@
+use foldhash::{HashMap, HashSet};
+use qcbus_document::Node;
+use qcbus_opendrive::{Control, Controller, RoadMap, Signal};
+use qcbus_sdk::{Level, Param, Place, Rule, Sink};
+
+use crate::families::object_parts::{Stands, named};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_signal_controller_one_per_light",
+    uids: &["qcbus.dev:xodr:1.1.0:road.signal.controller.one_per_light"],
+    level: Level::Warning,
+    after: super::READABLE,
+    params: &[SHARE],
+    page: include_str!("road_signal_controller_one_per_light.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const SHARE: Param = Param::number(
+    "share",
+    0.4,
+    "",
+    "share of a map's lights that are exceptions at most; more of them are the map's way",
+);
+
+/// A light as controllers name it.
+struct Switched<'a> {
+    control: Control<'a>,
+    controller: Controller<'a>,
+}
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let mut switched: HashMap<&str, Vec<Switched<'_>>> = HashMap::default();
+    for controller in map.controllers() {
+        for control in controller.controls() {
+            if let Some(id) = control.signal_id() {
+                let by = switched.entry(id).or_default();
+                by.push(Switched {
+                    control,
+                    controller,
+                });
+            }
+        }
+    }
+    if switched.is_empty() {
+        return;
+    }
+    let share = found.number(&SHARE);
+    by_several(&switched, share, found);
+    by_none(map, &switched, share, found);
+}
+
+/// Lights of two controllers. Some tools write a controller per phase, in which lights return; then most
+/// lights have several.
+fn by_several(switched: &HashMap<&str, Vec<Switched<'_>>>, share: f64, found: &mut Sink<'_>) {
+    let mut several: Vec<_> = switched.iter().filter(|(_, by)| by.len() > 1).collect();
+    if several.len() as f64 > share * switched.len() as f64 {
+        return;
+    }
+    several.sort_by_key(|(_, by)| by.first().map(|one| one.control.node()));
+    for (id, by) in several {
+        let [first, others @ ..] = by.as_slice() else {
+            continue;
+        };
+        for other in others {
+            let text = format!(
+                "signal `{id}` is switched by {} and by {}; a light should have one controller",
+                named(first.controller.node()),
+                if other.controller.node() == first.controller.node() {
+                    "the same once more".to_owned()
+                } else {
+                    named(other.controller.node())
+                }
+            );
+            found
+                .issue(
+                    Place::attribute_or_node(other.control.node(), "signalId"),
+                    text,
+                )
+                .at(first.control.node(), "the first to switch it");
+        }
+    }
+}
+
+/// Lights of no controller, in maps whose other lights of that type have one.
+fn by_none(
+    map: &RoadMap<'_>,
+    switched: &HashMap<&str, Vec<Switched<'_>>>,
+    share: f64,
+    found: &mut Sink<'_>,
+) {
+    let lights: Vec<Signal<'_>> = map
+        .signals()
+        .map(|(_, signal)| signal)
+        .filter(|signal| signal.dynamic() == Some(true))
+        .collect();
+    let is_switched = |signal: &Signal<'_>| signal.id().is_some_and(|id| switched.contains_key(id));
+    let depends = dependents(&lights);
+    let kinds: HashSet<Option<&str>> = lights
+        .iter()
+        .filter(|signal| is_switched(signal))
+        .map(Signal::kind)
+        .collect();
+    let alone: Vec<&Signal<'_>> = lights
+        .iter()
+        .filter(|signal| !is_switched(signal) && kinds.contains(&signal.kind()))
+        .filter(|signal| signal.id().is_none_or(|id| !depends.contains(id)))
+        .collect();
+    if alone.len() as f64 > share * lights.len() as f64 {
+        return;
+    }
+    for signal in alone {
+        let node: Node<'_> = signal.node();
+        let text = format!(
+            "no controller switches {} of type `{}`, though other lights of this type have one; a `control` with \
+             its id should name it",
+            named(node),
+            signal.kind().unwrap_or_default()
+        );
+        found
+            .issue(Place::attribute_or_node(node, "id"), text)
+            .stands(map, node);
+    }
+}
+
+/// Signals that are switched by others.
+fn dependents<'a>(lights: &[Signal<'a>]) -> HashSet<&'a str> {
+    let all = lights.iter().flat_map(|signal| signal.dependencies());
+    all.filter_map(|dependency| dependency.id()).collect()
+}
