@@ -237,6 +237,7 @@ mod road_signal_reference_right_hand_traffic_lane_ids;
 mod road_signal_reference_specify_direction;
 mod road_signal_reference_used_for_signals_only;
 mod road_signal_signal_type;
+mod road_signal_speed_value;
 mod road_signal_use_country_code;
 mod road_signal_validity_left_hand_traffic_lane_ids;
 mod road_signal_validity_right_hand_traffic_lane_ids;
@@ -498,4 +499,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_roadside_clear_of_lanes::RULE,
     &road_signal_controller_dynamic_only::RULE,
     &road_signal_controller_one_per_light::RULE,
+    &road_signal_speed_value::RULE,
 ];

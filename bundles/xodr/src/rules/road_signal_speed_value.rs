@@ -1,0 +1,192 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Param, Place, Rule, Sink};
+
+use crate::families::object_parts::{Stands, below, is_before, is_blank, named, number};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_signal_speed_value",
+    uids: &[SPEED, UNIT],
+    level: Level::Warning,
+    after: super::READABLE,
+    params: &[HIGHEST],
+    page: include_str!("road_signal_speed_value.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const SPEED: &str = "qcbus.dev:xodr:1.2.0:road.signal.speed_value";
+const UNIT: &str = "qcbus.dev:xodr:1.5.0:road.signal.value_with_unit";
+const HIGHEST: Param = Param::number(
+    "highest",
+    70.0,
+    "m/s",
+    "the highest speed limit that is plausible",
+);
+
+/// Units of speed with how many metres per second they are.
+const UNITS: [(&str, f64); 3] = [("km/h", 1.0 / 3.6), ("mph", 0.44704), ("m/s", 1.0)];
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let needs_unit = !is_before(found, (1, 5)) && found.version().is_some();
+    for signal in below(map, "signal", "signals") {
+        if needs_unit {
+            unit(map, signal, found);
+        }
+        value(map, signal, found);
+        semantics(map, signal, found);
+    }
+}
+
+/// The value of a signal; -1 stands for none in most files.
+fn given(signal: Node<'_>) -> Option<f64> {
+    number(signal, "value").filter(|value| *value != -1.0)
+}
+
+/// The types of maximum speed whose value follows from nothing else.
+fn is_limit(signal: Node<'_>) -> bool {
+    let country = signal.attr("country").unwrap_or_default();
+    let german = ["opendrive", "de", "deu", "germany"];
+    let is_german = german.iter().any(|name| country.eq_ignore_ascii_case(name));
+    (is_german && signal.attr("type") == Some("274")) || signal_speeds(signal).next().is_some()
+}
+
+fn signal_speeds(signal: Node<'_>) -> impl Iterator<Item = Node<'_>> {
+    signal
+        .children_named("semantics")
+        .flat_map(|semantics| semantics.children_named("speed"))
+}
+
+/// A value and its unit as metres per second.
+fn speed(node: Node<'_>) -> Option<f64> {
+    let unit = node.attr("unit")?;
+    let (_, factor) = UNITS.iter().find(|(name, _)| *name == unit)?;
+    Some(given(node)? * factor)
+}
+
+fn unit<'a>(map: &RoadMap<'a>, signal: Node<'a>, found: &mut Sink<'_>) {
+    // Zero stands for no value as well, in the standard's own examples, too.
+    let value = given(signal).filter(|value| *value != 0.0);
+    let Some(value) = value.filter(|_| is_blank(signal, "unit")) else {
+        return;
+    };
+    let text = format!(
+        "{} has the value {value}, but no `unit`; with a value the unit is mandatory",
+        named(signal)
+    );
+    let finding = found
+        .issue(Place::attribute_or_node(signal, "unit"), text)
+        .uid(UNIT);
+    let finding = finding.stands(map, signal);
+    if is_limit(signal) {
+        finding.level(Level::Error);
+    }
+}
+
+fn value<'a>(map: &RoadMap<'a>, signal: Node<'a>, found: &mut Sink<'_>) {
+    if given(signal).is_none()
+        && signal
+            .attr("value")
+            .is_none_or(|text| matches!(text.trim(), "" | "-1"))
+    {
+        // Numbers of subtypes name the speed, as do names of models that stand for one.
+        let subtype = signal.attr("subtype").unwrap_or_default();
+        let named_there =
+            subtype.bytes().any(|byte| byte.is_ascii_digit()) && subtype.trim() != "-1";
+        if is_limit(signal) && !named_there && signal_speeds(signal).next().is_none() {
+            let text = format!(
+                "{} limits the speed, but says neither by `value` nor by `subtype` to what; it should have a `value` \
+                 and a `unit`",
+                named(signal)
+            );
+            found
+                .issue(Place::attribute_or_node(signal, "value"), text)
+                .stands(map, signal);
+        }
+        return;
+    }
+    plausible(map, signal, signal, found);
+}
+
+/// A speed that no sign shows.
+fn plausible<'a>(map: &RoadMap<'a>, signal: Node<'a>, node: Node<'a>, found: &mut Sink<'_>) {
+    let (Some(value), Some(unit)) = (given(node), node.attr("unit")) else {
+        return;
+    };
+    let Some(speed) = speed(node) else { return };
+    let highest = found.number(&HIGHEST);
+    let text = if speed < 0.0 || (speed == 0.0 && is_limit(signal)) {
+        format!(
+            "{} limits the speed to {value} {unit}; a speed limit must be more than 0",
+            named(signal)
+        )
+    } else if speed > highest {
+        format!(
+            "{} limits the speed to {value} {unit}, which is {speed:.0} m/s; at most {highest} m/s are plausible",
+            named(signal)
+        )
+    } else if let Some(meant) = meant(value, unit) {
+        format!(
+            "{} limits the speed to {value:.3} {unit}; in m/s this would be {meant}, so the value or the unit is wrong",
+            named(signal)
+        )
+    } else {
+        return;
+    };
+    found
+        .issue(Place::attribute_or_node(node, "value"), text)
+        .stands(map, signal);
+}
+
+/// The round speed that a crooked one is in metres per second.
+fn meant(value: f64, unit: &str) -> Option<String> {
+    let near = |value: f64, step: f64| (value / step - (value / step).round()).abs() * step < 1e-3;
+    if unit == "m/s" || near(value, 1.0) {
+        return None;
+    }
+    let (kilometres, miles) = (value * 3.6, value / 0.44704);
+    if near(kilometres, 5.0) {
+        Some(format!("{kilometres:.0} km/h"))
+    } else {
+        near(miles, 5.0).then(|| format!("{miles:.0} mph"))
+    }
+}
+
+/// What the semantics say must be what the signal says.
+fn semantics<'a>(map: &RoadMap<'a>, signal: Node<'a>, found: &mut Sink<'_>) {
+    let before = found.count();
+    for speeds in signal_speeds(signal) {
+        plausible(map, signal, speeds, found);
+    }
+    // What is implausible is so for one reason.
+    if found.count() > before {
+        return;
+    }
+    let Some(shown) = speed(signal).filter(|speed| *speed > 0.0) else {
+        return;
+    };
+    let differs =
+        |node: &Node<'_>| speed(*node).is_some_and(|said| (said - shown).abs() > 0.02 * shown);
+    if !signal_speeds(signal).all(|node| differs(&node)) {
+        return;
+    }
+    let Some(node) = signal_speeds(signal).next() else {
+        return;
+    };
+    let text = format!(
+        "the semantics of {} say {} {}, but the signal itself shows {} {}; both should agree",
+        named(signal),
+        node.attr("value").unwrap_or_default(),
+        node.attr("unit").unwrap_or_default(),
+        given(signal).unwrap_or_default(),
+        signal.attr("unit").unwrap_or_default()
+    );
+    found
+        .issue(Place::attribute_or_node(node, "value"), text)
+        .stands(map, signal)
+        .at(
+            Place::attribute_or_node(signal, "value"),
+            "what the signal shows",
+        );
+}
