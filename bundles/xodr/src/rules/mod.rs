@@ -169,6 +169,7 @@ mod road_object_borders_use_complete_outline_true;
 mod road_object_bridges_from_lower_equal_to;
 mod road_object_bridges_type_definition;
 mod road_object_circular_vs_angular;
+mod road_object_crosswalk_crosses_lanes;
 mod road_object_marking_colour;
 mod road_object_marking_complete_or_partial_on_outline;
 mod road_object_marking_markings_with_outline;
@@ -500,4 +501,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_signal_controller_dynamic_only::RULE,
     &road_signal_controller_one_per_light::RULE,
     &road_signal_speed_value::RULE,
+    &road_object_crosswalk_crosses_lanes::RULE,
 ];
