@@ -185,6 +185,7 @@ mod road_object_outline_exactly_one_outer;
 mod road_object_outline_inner_outline_touches_outer;
 mod road_object_outline_outline_followed_by_corner;
 mod road_object_outline_points_inside_box;
+mod road_object_positive_size;
 mod road_object_reference_from_lower_equal_to;
 mod road_object_repeating_attributes_with_outline_skeleton;
 mod road_object_repeating_no_widthstart_end_with_radius;
@@ -502,4 +503,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_signal_controller_one_per_light::RULE,
     &road_signal_speed_value::RULE,
     &road_object_crosswalk_crosses_lanes::RULE,
+    &road_object_positive_size::RULE,
 ];

@@ -1,0 +1,102 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::families::object_parts::{Stands, has_outline, is_by_schema, named, number, objects};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_object_positive_size",
+    uids: &["qcbus.dev:xodr:1.0.0:road.object.positive_size"],
+    after: super::READABLE,
+    page: include_str!("road_object_positive_size.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// Sizes, and whether the schema of 1.7 and 1.8 forbids negative ones.
+const SIZES: [(&str, bool); 4] = [
+    ("length", true),
+    ("width", false),
+    ("height", true),
+    ("radius", true),
+];
+/// What has a body.
+const BODIES: [&str; 6] = [
+    "building",
+    "pole",
+    "tree",
+    "vegetation",
+    "streetLamp",
+    "gantry",
+];
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let by_schema = is_by_schema(found, (1, 7), (1, 8));
+    for object in objects(map) {
+        for (name, known) in SIZES {
+            let Some(size) = number(object, name).filter(|size| *size < 0.0) else {
+                continue;
+            };
+            if known && by_schema {
+                continue;
+            }
+            let text = format!(
+                "`{name}` of {} is {size} m, but a size must not be negative",
+                named(object)
+            );
+            found
+                .issue(Place::attribute_or_node(object, name), text)
+                .stands(map, object);
+        }
+        flat(map, object, found);
+    }
+}
+
+/// A thing that has an extent on the ground and none above it, or the other way round.
+fn flat<'a>(map: &RoadMap<'a>, object: Node<'a>, found: &mut Sink<'_>) {
+    let has_body = object
+        .attr("type")
+        .is_some_and(|kind| BODIES.contains(&kind));
+    let is_elsewhere = has_outline(object)
+        || object.child("skeleton").is_some()
+        || object.child("repeat").is_some();
+    if !has_body || is_elsewhere {
+        return;
+    }
+    let is = |name: &str, wanted: fn(f64) -> bool| number(object, name).is_some_and(wanted);
+    let zero = SIZES
+        .iter()
+        .map(|(name, _)| *name)
+        .find(|name| is(name, |size| size == 0.0));
+    let other = SIZES
+        .iter()
+        .map(|(name, _)| *name)
+        .find(|name| is(name, |size| size > 0.0));
+    let (Some(zero), Some(other)) = (zero, other) else {
+        return;
+    };
+    // A cylinder has a radius and no sides, a box the other way round.
+    let round = is("radius", |size| size > 0.0);
+    let sides = is("length", |size| size > 0.0) && is("width", |size| size > 0.0);
+    if (round && matches!(zero, "length" | "width") || sides && zero == "radius")
+        && !is("height", |size| size == 0.0)
+    {
+        return;
+    }
+    let zero = if is("height", |size| size == 0.0) {
+        "height"
+    } else {
+        zero
+    };
+    let text = format!(
+        "`{zero}` of {} of type `{}` is 0 m, though its `{other}` is not; a body should have an extent in all \
+         directions",
+        named(object),
+        object.attr("type").unwrap_or_default()
+    );
+    found
+        .issue(Place::attribute_or_node(object, zero), text)
+        .level(Level::Warning)
+        .stands(map, object);
+}
