@@ -183,6 +183,7 @@ mod road_object_object_marking_outline_corner_reference_count;
 mod road_object_orientation;
 mod road_object_outline_exactly_one_outer;
 mod road_object_outline_inner_outline_touches_outer;
+mod road_object_outline_not_crossed;
 mod road_object_outline_outline_followed_by_corner;
 mod road_object_outline_points_inside_box;
 mod road_object_positive_size;
@@ -504,4 +505,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_signal_speed_value::RULE,
     &road_object_crosswalk_crosses_lanes::RULE,
     &road_object_positive_size::RULE,
+    &road_object_outline_not_crossed::RULE,
 ];

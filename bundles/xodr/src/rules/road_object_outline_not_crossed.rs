@@ -1,0 +1,119 @@
+use qcbus_document::Node;
+use qcbus_opendrive::geometry::Point;
+use qcbus_opendrive::{Corner, CornerKind, Object, Outline, Road, RoadMap};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::object_parts::named;
+use crate::families::on_road::OnRoad;
+use crate::model::{Part, Roads};
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_object_outline_not_crossed",
+    uids: &["qcbus.dev:xodr:1.4.0:road.object.outline.not_crossed"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("road_object_outline_not_crossed.md"),
+    each: Some(each),
+    ..Rule::DEFAULTS
+};
+
+/// Outlines of more corners are not looked at: each side is compared with each other.
+const MOST: usize = 200;
+/// Crossings nearer to a corner than this share of a side are rounding.
+const ROUNDING: f64 = 1e-6;
+
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for (road, object) in map.part(part).objects() {
+        for outline in object.outlines() {
+            check(road, &object, &outline, found);
+        }
+    }
+}
+
+fn check(road: &Road<'_>, object: &Object<'_>, outline: &Outline<'_>, found: &mut Sink<'_>) {
+    let Some(corners) = corners(outline) else {
+        return;
+    };
+    let count = corners.len();
+    if !(4..=MOST).contains(&count) {
+        return;
+    }
+    // Without the last side if the outline is open.
+    let sides = if outline.closed() == Some(false) {
+        count - 1
+    } else {
+        count
+    };
+    let side = |index: usize| Some((corners.get(index)?, corners.get((index + 1) % count)?));
+    for one in 0..sides {
+        for other in one + 2..sides {
+            if one == 0 && other + 1 == count {
+                continue;
+            }
+            let (Some(first), Some(second)) = (side(one), side(other)) else {
+                continue;
+            };
+            if cross([first.0.1, first.1.1], [second.0.1, second.1.1]) {
+                let text = format!(
+                    "the outline of {} crosses itself: its side from corner {} to the next meets the one from corner {}; \
+                     the corners should go around once",
+                    named(object.node()),
+                    one + 1,
+                    other + 1
+                );
+                found
+                    .issue(outline.node(), text)
+                    .on(road, object.s().unwrap_or(0.0), object.t().unwrap_or(0.0))
+                    .at(first.0.0, "where the one side begins")
+                    .at(second.0.0, "where the other begins");
+                return;
+            }
+        }
+    }
+}
+
+/// The corners in a plane: in s and t if all are on the road, in u and v if all are local. Curves bend
+/// away from the line between their ends, so that nothing is known.
+fn corners<'a>(outline: &Outline<'a>) -> Option<Vec<(Node<'a>, Point)>> {
+    let mut kind = None;
+    let mut points: Vec<(Node<'a>, Point)> = Vec::new();
+    for Corner { kind: of, point } in outline.corners() {
+        if *kind.get_or_insert(of) != of {
+            return None;
+        }
+        let place = match of {
+            CornerKind::Road => Point::finite(point.s()?, point.t()?),
+            CornerKind::Local => Point::finite(point.u()?, point.v()?),
+            CornerKind::Curve => None,
+        }?;
+        // Corners that are written twice make no side.
+        if points
+            .last()
+            .is_none_or(|(_, last)| last.distance(place) > 1e-9)
+        {
+            points.push((point.node(), place));
+        }
+    }
+    let closes = points.len() > 1
+        && points
+            .first()
+            .zip(points.last())
+            .is_some_and(|(first, last)| first.1.distance(last.1) < 1e-9);
+    if closes {
+        points.pop();
+    }
+    Some(points)
+}
+
+/// Whether two sides cross between their ends.
+fn cross([a, b]: [Point; 2], [c, d]: [Point; 2]) -> bool {
+    let (rx, ry, qx, qy) = (b.x - a.x, b.y - a.y, d.x - c.x, d.y - c.y);
+    let area = rx * qy - ry * qx;
+    if area == 0.0 {
+        return false;
+    }
+    let (dx, dy) = (c.x - a.x, c.y - a.y);
+    let (along, across) = ((dx * qy - dy * qx) / area, (dx * ry - dy * rx) / area);
+    let between = |share: f64| share > ROUNDING && share < 1.0 - ROUNDING;
+    between(along) && between(across)
+}
