@@ -189,6 +189,7 @@ mod road_object_outline_points_inside_box;
 mod road_object_positive_size;
 mod road_object_reference_from_lower_equal_to;
 mod road_object_repeating_attributes_with_outline_skeleton;
+mod road_object_repeating_count;
 mod road_object_repeating_no_widthstart_end_with_radius;
 mod road_object_repeating_outline_use_cornerlocal;
 mod road_object_repeating_valid_s_length;
@@ -506,4 +507,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_object_crosswalk_crosses_lanes::RULE,
     &road_object_positive_size::RULE,
     &road_object_outline_not_crossed::RULE,
+    &road_object_repeating_count::RULE,
 ];

@@ -1,0 +1,54 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Param, Place, Rule, Sink};
+
+use crate::families::object_parts::named;
+use crate::families::on_road::OnRoad;
+use crate::model::{Part, Roads};
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_object_repeating_count",
+    uids: &["qcbus.dev:xodr:1.4.0:road.object.repeating.count"],
+    level: Level::Warning,
+    after: super::READABLE,
+    params: &[MOST],
+    page: include_str!("road_object_repeating_count.md"),
+    each: Some(each),
+    ..Rule::DEFAULTS
+};
+
+const MOST: Param = Param::number(
+    "most",
+    10_000.0,
+    "",
+    "the most copies that a repetition may make",
+);
+
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    let most = found.number(&MOST);
+    for (road, object) in map.part(part).objects() {
+        for repeat in object.repeats() {
+            let values = repeat.length().zip(repeat.distance());
+            let Some((length, distance)) =
+                values.filter(|(length, distance)| *length > 0.0 && *distance > 0.0)
+            else {
+                continue;
+            };
+            let count = length / distance;
+            if count <= most {
+                continue;
+            }
+            let text = format!(
+                "{} is repeated every {distance} m over {length} m, which makes {count:.0} copies; at most {most} are \
+                 accepted, and one long object is a `distance` of 0",
+                named(object.node())
+            );
+            found
+                .issue(Place::attribute_or_node(repeat.node(), "distance"), text)
+                .on(
+                    road,
+                    repeat.s().unwrap_or(0.0),
+                    repeat.t_start().unwrap_or(0.0),
+                );
+        }
+    }
+}
