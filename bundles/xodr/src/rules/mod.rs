@@ -218,6 +218,7 @@ mod road_railroad_rail_lane_width_validity;
 mod road_railroad_rail_refline_centered;
 mod road_railroad_switch_check_switch_conn;
 mod road_railroad_switch_single_switch_no_partner;
+mod road_ranges_not_reversed;
 mod road_records_within_extent;
 mod road_roadside_angles_in_radians;
 mod road_roadside_clear_of_lanes;
@@ -508,4 +509,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_object_positive_size::RULE,
     &road_object_outline_not_crossed::RULE,
     &road_object_repeating_count::RULE,
+    &road_ranges_not_reversed::RULE,
 ];

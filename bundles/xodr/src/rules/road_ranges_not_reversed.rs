@@ -1,0 +1,45 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::families::object_parts::{below, number};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_ranges_not_reversed",
+    uids: &["qcbus.dev:xodr:1.1.0:road.ranges_not_reversed"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("road_ranges_not_reversed.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// Elements with `sStart` and `sEnd` on one road, below these parents, and what they are.
+const RANGES: [(&str, &str, &str); 2] = [
+    ("CRG", "surface", "the CRG record"),
+    ("segment", "platform", "the segment of the platform"),
+];
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for (name, parent, what) in RANGES {
+        for node in below(map, name, parent) {
+            check(map, node, what, found);
+        }
+    }
+}
+
+fn check<'a>(map: &RoadMap<'a>, node: Node<'a>, what: &str, found: &mut Sink<'_>) {
+    let range = number(node, "sStart").zip(number(node, "sEnd"));
+    let Some((start, end)) = range.filter(|(start, end)| end < start) else {
+        return;
+    };
+    let text = format!(
+        "{what} begins at s = {start} and ends before that, at s = {end}; `sEnd` should be the larger one"
+    );
+    let finding = found.issue(Place::attribute_or_node(node, "sEnd"), text);
+    let road = node.attr("roadId").and_then(|id| map.road(id));
+    if let Some(road) = road.or_else(|| map.road_of(node)) {
+        finding.road(road.id(), start, 0.0);
+    }
+}
