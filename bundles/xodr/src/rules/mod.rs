@@ -77,6 +77,7 @@ mod road_corner_road_first_id_zero;
 mod road_corner_road_mandatory_id_with_markings;
 mod road_corner_road_sequential_id_values;
 mod road_crg_attach_vs_friction;
+mod road_crg_file_named;
 mod road_crg_friction_no_z_offset_scale;
 mod road_crg_h_offset_only_genuine_global;
 mod road_crg_junction;
@@ -510,4 +511,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_object_outline_not_crossed::RULE,
     &road_object_repeating_count::RULE,
     &road_ranges_not_reversed::RULE,
+    &road_crg_file_named::RULE,
 ];

@@ -1,0 +1,48 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::families::object_parts::{below, is_by_schema};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_crg_file_named",
+    uids: &["qcbus.dev:xodr:1.1.0:road.crg.file_named"],
+    after: super::READABLE,
+    page: include_str!("road_crg_file_named.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    // From 1.5 on the schema demands the attribute, yet lets it be empty.
+    let by_schema = is_by_schema(found, (1, 5), (1, 8));
+    for record in below(map, "CRG", "surface") {
+        check(record, by_schema, found);
+    }
+}
+
+fn check(record: Node<'_>, by_schema: bool, found: &mut Sink<'_>) {
+    let place = Place::attribute_or_node(record, "file");
+    match record.attr("file") {
+        None if !by_schema => {
+            found.issue(
+                place,
+                "the CRG record has no `file`; it must name the file with the surface",
+            );
+        }
+        Some(file) if file.trim().is_empty() => {
+            found.issue(
+                place,
+                "`file` of the CRG record is empty; it must name the file with the surface",
+            );
+        }
+        Some(file) if !file.trim().to_ascii_lowercase().ends_with(".crg") => {
+            let text = format!(
+                "`file` of the CRG record is `{file}`, but OpenCRG files are named `….crg`"
+            );
+            found.issue(place, text).level(Level::Information);
+        }
+        _ => {}
+    }
+}
