@@ -250,6 +250,7 @@ mod road_signal_validity_right_hand_traffic_lane_ids;
 mod road_superelevation_elem_asc_order;
 mod road_type_elem_asc_order;
 mod road_type_only_alpha_2_country_codes;
+mod road_validity_lanes_exist;
 mod xml_fileheader_is_present;
 mod xml_root_tag_is_opendrive;
 mod xml_valid_schema;
@@ -512,4 +513,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_object_repeating_count::RULE,
     &road_ranges_not_reversed::RULE,
     &road_crg_file_named::RULE,
+    &road_validity_lanes_exist::RULE,
 ];
