@@ -37,7 +37,7 @@ pub struct Shipped {
 macro_rules! shipped {
     ($($kind:ident $major:literal $minor:literal $file:literal)*) => {
         /// All shipped tables, oldest first.
-        pub static SHIPPED: [Shipped; 12] = [$(Shipped {
+        pub static SHIPPED: [Shipped; 13] = [$(Shipped {
             kind: FileKind::$kind,
             version: Version { major: $major, minor: $minor },
             notation: include_str!(concat!("../tables/", $file)),
@@ -47,7 +47,8 @@ macro_rules! shipped {
 }
 
 // OpenDRIVE 1.8 means 1.8.1, and OpenSCENARIO 1.1 means 1.1.1: headers do not tell the patch
-// releases apart, and the later ones correct the earlier.
+// releases apart, and the later ones correct the earlier. The tables of OpenDRIVE 1.9 are written by hand: those
+// of 1.8.1 with the elements, attributes and words that the text of 1.9.0 adds.
 shipped! {
     Xodr 1 1 "xodr-1.1.tbl"
     Xodr 1 2 "xodr-1.2.tbl"
@@ -57,6 +58,7 @@ shipped! {
     Xodr 1 6 "xodr-1.6.tbl"
     Xodr 1 7 "xodr-1.7.tbl"
     Xodr 1 8 "xodr-1.8.tbl"
+    Xodr 1 9 "xodr-1.9.tbl"
     Xosc 1 0 "xosc-1.0.tbl"
     Xosc 1 1 "xosc-1.1.tbl"
     Xosc 1 2 "xosc-1.2.tbl"
