@@ -9,7 +9,7 @@ use crate::later::{Later, later};
 use crate::model::Schema;
 use crate::validate::Overlay;
 use crate::versions::{SkipReason, Version, select, version_of};
-use crate::violation::{Limits, Report, Rest, Violation};
+use crate::violation::{Code, Limits, Report, Rest, Violation};
 
 /// A user schema: used instead of the shipped one.
 #[derive(Clone, Debug)]
@@ -195,17 +195,23 @@ fn checked<'a>(
         Overlay::None
     };
     let report = schema.validate_with(document, options.limits, overlay);
-    let is_own = sources.is_empty() && !newer && kind != FileKind::Xodr && !report.is_valid();
+    let is_own = sources.is_empty() && !newer && !report.is_valid();
     let later = version
         .filter(|_| is_own)
         .and_then(|version| later(document, kind, version));
-    let meant = later.as_ref().and_then(|later| {
-        let schema = select(kind, later.version).ok()?.schema;
-        Some(schema.validate_with(document, options.limits, overlay))
-    });
-    let Report { violations, rest } = match meant {
-        Some(meant) => left_by(&report, meant),
+    let Report { violations, rest } = match &later {
         None => report,
+        Some(later) if kind == FileKind::Xodr => without(later, report),
+        Some(later) => match select(kind, later.version) {
+            Err(_) => report,
+            Ok(meant) => {
+                let schema = meant.schema;
+                left_by(
+                    &report,
+                    schema.validate_with(document, options.limits, overlay),
+                )
+            }
+        },
     };
     let namespace = document
         .root()
@@ -222,6 +228,36 @@ fn checked<'a>(
         violations,
         rest,
     }
+}
+
+/// What the version of the header finds fault with beside what came later. Versions of OpenDRIVE change so
+/// much that a file of one is no file of the next: judged by the later one it would have other faults.
+fn without<'a>(later: &Later<'a>, mut report: Report<'a>) -> Report<'a> {
+    let mut places: HashSet<(u32, Option<&str>)> = HashSet::new();
+    let mut subjects: HashSet<String> = HashSet::new();
+    for thing in &later.things {
+        let name = thing.attribute.map(|attribute| attribute.name());
+        let nodes = thing.nodes.iter();
+        places.extend(nodes.map(|node| (node.index(), name)));
+        subjects.insert(match name {
+            Some(name) => format!("{}/@{name}", thing.node.name()),
+            None => thing.node.name().to_owned(),
+        });
+    }
+    let is_strange = |code| {
+        matches!(
+            code,
+            Code::UnexpectedElement | Code::UnexpectedAttribute | Code::InvalidValue
+        )
+    };
+    report.violations.retain(|one| {
+        let name = one.attribute.map(|attribute| attribute.name());
+        !is_strange(one.code) || !places.contains(&(one.node.index(), name))
+    });
+    report
+        .rest
+        .retain(|rest| !is_strange(rest.code) || !subjects.contains(&rest.subject));
+    report
 }
 
 /// Of what a later version finds fault with, that with which the version of the header does so, too: the

@@ -4,7 +4,9 @@
 //! The compiled form of a condition is its name here, so the entries follow the tables and not a
 //! line number; a test makes sure that every entry still occurs in a shipped table.
 
-use qcbus_document::Node;
+use qcbus_document::{Attribute, Node};
+
+use crate::violation::Code;
 
 pub(crate) const COMPLETE_OUTLINE: &str =
     "(if @useCompleteOutline (not cornerReference) (> (count cornerReference) 1))";
@@ -97,11 +99,112 @@ pub(crate) fn condition(node: Node<'_>, condition: &str) -> Option<&'static str>
     }
 }
 
-/// Why a missing child is the schema's fault, if it is.
-pub(crate) fn missing_child(names: &[String]) -> Option<&'static str> {
-    names.iter().any(|name| name == "_OpenDriveElement").then_some(
-        "it demands a child <_OpenDriveElement>, the name of an internal base type that no file can be meant to contain",
-    )
+/// Why a missing child is the fault of the schema of this title, if it is.
+pub(crate) fn missing_child(
+    parent: Node<'_>,
+    names: &[String],
+    title: &str,
+) -> Option<&'static str> {
+    if names.iter().any(|name| name == "_OpenDriveElement") {
+        return Some(
+            "it demands a child <_OpenDriveElement>, the name of an internal base type that no file can be meant to contain",
+        );
+    }
+    let profile = parent.is("elevationProfile") || parent.is("lateralProfile");
+    if profile && matches!(title, "OpenDRIVE 1.4" | "OpenDRIVE 1.5") {
+        return Some(
+            "it demands records of a profile that may be left out, so that an empty one, which says the same, is rejected",
+        );
+    }
+    let alternatives = ALTERNATIVES.iter().find(|(name, _)| parent.is(name));
+    let one_is_there = |both: &[&str; 2]| both.iter().any(|one| parent.child(one).is_some());
+    (title == "OpenSCENARIO 1.2" && alternatives.is_some_and(|(_, both)| one_is_there(both)))
+        .then_some("it demands both children in a row, where the standard has one or the other")
+}
+
+/// Elements of OpenSCENARIO 1.2 whose children are alternatives, which its schema lists as a sequence.
+const ALTERNATIVES: [(&str, [&str; 2]); 3] = [
+    ("AppearanceAction", ["LightStateAction", "AnimationAction"]),
+    ("LightType", ["VehicleLight", "UserDefinedLight"]),
+    (
+        "ComponentAnimation",
+        ["VehicleComponent", "UserDefinedComponent"],
+    ),
+];
+
+/// Why an attribute, or its value, is only by the fault of the schema of this title what `code` says.
+pub(crate) fn attribute(code: Code, attribute: Attribute<'_>, title: &str) -> Option<&'static str> {
+    match (code, title) {
+        (Code::InvalidValue, _) => value(attribute, title),
+        (Code::UnexpectedAttribute, "OpenDRIVE 1.1")
+            if attribute.name() == "level" && is_in_center(attribute.node()) =>
+        {
+            Some(
+                "it knows level at the lanes on both sides, but not at the center lane, where files have it as well",
+            )
+        }
+        (Code::UnexpectedAttribute, "OpenDRIVE 1.1" | "OpenDRIVE 1.2")
+            if attribute.name() == "signalId" && attribute.node().is("control") =>
+        {
+            Some("it spells signalID what all files and the later versions spell signalId")
+        }
+        _ => None,
+    }
+}
+
+fn is_in_center(lane: Node<'_>) -> bool {
+    lane.is("lane") && lane.parent().is_some_and(|parent| parent.is("center"))
+}
+
+/// The words for the type of a lane that files of version 1.1 have.
+const LANE_TYPES: [&str; 23] = [
+    "none",
+    "driving",
+    "stop",
+    "shoulder",
+    "biking",
+    "sidewalk",
+    "border",
+    "restricted",
+    "parking",
+    "bidirectional",
+    "median",
+    "special1",
+    "special2",
+    "special3",
+    "roadWorks",
+    "tram",
+    "rail",
+    "entry",
+    "exit",
+    "offRamp",
+    "onRamp",
+    "mwyEntry",
+    "mwyExit",
+];
+
+fn value(attribute: Attribute<'_>, title: &str) -> Option<&'static str> {
+    let (node, word) = (attribute.node(), attribute.value().trim());
+    match (title, attribute.name()) {
+        ("OpenDRIVE 1.1", "type") if node.is("lane") && LANE_TYPES.contains(&word) => Some(
+            "it has numbers for the types of lanes, where the standard and all files have words",
+        ),
+        ("OpenDRIVE 1.1", "level") if node.is("lane") && matches!(word, "true" | "false") => {
+            Some("it has numbers for level, where the standard and all files have true and false")
+        }
+        ("OpenDRIVE 1.4", "max") if node.is("speed") && is_decimal(word) => Some(
+            "it takes whole numbers only, although speeds in m/s seldom are any; later versions take decimals",
+        ),
+        ("OpenDRIVE 1.8.1", "sStart" | "sEnd") if node.is("segment") && word == "begin" => {
+            Some("it takes start, where the standard's text and examples have begin")
+        }
+        _ => None,
+    }
+}
+
+fn is_decimal(word: &str) -> bool {
+    word.parse()
+        .is_ok_and(|speed: f64| speed.is_finite() && speed >= 0.0)
 }
 
 /// The conditions that are explained or known to be defective, for the test that they still occur.

@@ -4,8 +4,10 @@ use std::collections::HashMap;
 
 use qcbus_document::{Attribute, Document, FileKind, Node};
 
+use crate::defects;
 use crate::typing::{Member, Typing, came_with};
-use crate::versions::Version;
+use crate::versions::{SHIPPED, Version};
+use crate::violation::Code;
 
 /// What a document uses of versions after the one that its header names.
 #[derive(Clone, Debug)]
@@ -35,13 +37,16 @@ pub struct Thing<'a> {
     pub nodes: Vec<Node<'a>>,
 }
 
-/// By the type and what it does not have: the place in the list, when a later version has it.
-type Known<'a> = HashMap<(&'static str, Member<'a>), Option<usize>>;
+/// By the number of the type and what it does not have: the place in the list, when a later version has it.
+type Known<'a> = HashMap<(u32, Member<'a>), Option<usize>>;
 
 struct Search<'a> {
+    document: Document<'a>,
     kind: FileKind,
     version: Version,
     typing: Typing,
+    /// The same document as the later versions type it, once that has been asked for.
+    successors: Option<Vec<(Version, Typing)>>,
     known: Known<'a>,
     things: Vec<Thing<'a>>,
     count: usize,
@@ -54,11 +59,17 @@ pub(crate) fn later<'a>(
     version: Version,
 ) -> Option<Later<'a>> {
     let root = document.root()?;
-    let header = root.child("FileHeader")?.attribute("revMinor")?;
+    let name = match kind {
+        FileKind::Xodr => "header",
+        _ => "FileHeader",
+    };
+    let header = root.child(name)?.attribute("revMinor")?;
     let mut search = Search {
+        document: *document,
         kind,
         version,
         typing: Typing::of(document, kind, version)?,
+        successors: None,
         known: Known::new(),
         things: Vec::new(),
         count: 0,
@@ -82,13 +93,16 @@ pub(crate) fn later<'a>(
 impl<'a> Search<'a> {
     fn look(&mut self, node: Node<'a>) {
         // What is within something unknown is not known to be new.
-        let unknown = self.typing.class(node).is_none();
+        let unknown = self.typing.number(node).is_none();
         let Some(parent) = node.parent().filter(|_| unknown) else {
             for attribute in node.attributes() {
                 self.look_at(attribute);
             }
             return;
         };
+        if self.typing.declares(node) {
+            return;
+        }
         self.note(parent, Member::Child(node.name()), (node, None), || {
             format!("`{}` in `{}`", node.name(), parent.name())
         });
@@ -125,17 +139,17 @@ impl<'a> Search<'a> {
         (node, attribute): (Node<'a>, Option<Attribute<'a>>),
         say: impl FnOnce() -> String,
     ) {
-        let Some(class) = self.typing.class(owner) else {
+        let Some(number) = self.typing.number(owner) else {
             return;
         };
-        if let Some(place) = self.known.get(&(class, member)) {
+        if let Some(place) = self.known.get(&(number, member)) {
             if let Some(thing) = place.and_then(|place| self.things.get_mut(place)) {
                 thing.nodes.push(node);
                 self.count += 1;
             }
             return;
         }
-        let since = came_with(self.kind, self.version, class, member);
+        let since = self.came_with(owner, member, (node, attribute));
         let place = since.map(|since| {
             self.things.push(Thing {
                 node,
@@ -147,6 +161,45 @@ impl<'a> Search<'a> {
             self.count += 1;
             self.things.len() - 1
         });
-        self.known.insert((class, member), place);
+        self.known.insert((number, member), place);
+    }
+
+    /// The first later version that has it, unless its lack is a defect of this version's schema.
+    fn came_with(
+        &mut self,
+        owner: Node<'a>,
+        member: Member<'a>,
+        (node, attribute): (Node<'a>, Option<Attribute<'a>>),
+    ) -> Option<Version> {
+        if self.kind != FileKind::Xodr {
+            return came_with(self.kind, self.version, self.typing.class(owner)?, member);
+        }
+        // The types of OpenDRIVE have other names in every version: its elements are told by their place.
+        let title = &self.typing.schema().title;
+        let code = match member {
+            Member::Attribute(_) => Code::UnexpectedAttribute,
+            _ => Code::InvalidValue,
+        };
+        let is_defect = |one| defects::attribute(code, one, title).is_some();
+        if attribute.is_some_and(is_defect) {
+            return None;
+        }
+        let (document, kind, version) = (self.document, self.kind, self.version);
+        let successors = self.successors.get_or_insert_with(|| {
+            let later = SHIPPED.iter().map(|one| (one.kind, one.version));
+            let later = later.filter(|(of, later)| *of == kind && *later > version);
+            later
+                .filter_map(|(_, later)| Some((later, Typing::of(&document, kind, later)?)))
+                .collect()
+        });
+        let mut having = successors.iter().filter(|(_, typing)| match attribute {
+            None => typing.declares(node),
+            Some(attribute) => typing.value(attribute).is_some_and(|value| {
+                let word = attribute.value().trim();
+                let words = value.words().unwrap_or(&[]);
+                words.is_empty() || words.iter().any(|known| **known == *word)
+            }),
+        });
+        having.next().map(|(version, _)| *version)
     }
 }

@@ -60,6 +60,27 @@ impl Typing {
         Some(ValueType { schema, simple })
     }
 
+    /// The schema that gives the types.
+    pub(crate) fn schema(&self) -> &'static Schema {
+        self.schema
+    }
+
+    /// The number of an element's complex type, which tells the types of one schema apart.
+    pub(crate) fn number(&self, node: Node<'_>) -> Option<u32> {
+        Some(get(&self.types, node)).filter(|number| *number != UNKNOWN)
+    }
+
+    /// Whether the type of the element around it has this child, be it of a complex type or not.
+    pub(crate) fn declares(&self, node: Node<'_>) -> bool {
+        let around = node.parent().and_then(|parent| self.complex(parent));
+        let name = self.schema.names.find(node.name());
+        let declared = around.zip(name).map(|(around, name)| {
+            let mut children = around.content.children().iter();
+            children.any(|child| child.name == name)
+        });
+        declared.unwrap_or(false)
+    }
+
     fn complex(&self, node: Node<'_>) -> Option<&'static ComplexType> {
         let number = get(&self.types, node);
         self.schema.complex.get(number as usize)

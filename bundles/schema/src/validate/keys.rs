@@ -76,7 +76,7 @@ impl<'a, 's> Keys<'a, 's> {
     pub(super) fn enter(
         &mut self,
         opening: &Opening<'a, 's, '_>,
-        reporter: &mut Reporter<'a>,
+        reporter: &mut Reporter<'a, 's>,
     ) -> Mark {
         let mark = Mark {
             from: self.active.len(),
@@ -119,7 +119,7 @@ impl<'a, 's> Keys<'a, 's> {
         mark
     }
 
-    pub(super) fn leave(&mut self, mark: Mark, reporter: &mut Reporter<'a>) {
+    pub(super) fn leave(&mut self, mark: Mark, reporter: &mut Reporter<'a, 's>) {
         self.active.truncate(mark.from);
         self.from = mark.before;
         if !mark.scope {
@@ -168,7 +168,7 @@ impl<'a, 's> Keys<'a, 's> {
         scope: usize,
         hits: &[u16],
         opening: &Opening<'a, 's, '_>,
-        reporter: &mut Reporter<'a>,
+        reporter: &mut Reporter<'a, 's>,
     ) {
         for &index in hits {
             steps(1);

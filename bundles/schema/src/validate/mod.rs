@@ -60,7 +60,7 @@ impl Schema {
             keys: Keys::default(),
             memo: Memo::default(),
             bindings: Bindings::default(),
-            reporter: Reporter::new(limits),
+            reporter: Reporter::new(limits, &self.title),
             overlay,
         };
         walk.run(root);
@@ -89,7 +89,7 @@ struct Walk<'a, 's> {
     memo: Memo<'s>,
     /// The prefixes bound by open elements.
     bindings: Bindings<'a>,
-    reporter: Reporter<'a>,
+    reporter: Reporter<'a, 's>,
     overlay: Overlay,
 }
 

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use qcbus_document::{Attribute, Node};
 
 use super::wording::Wording;
+use crate::defects;
 use crate::violation::{Code, Limits, Report, Rest, Violation};
 
 /// What makes two violations the same kind, beside their code: the type or model they are about and
@@ -25,16 +26,23 @@ struct Tally {
 }
 
 #[derive(Debug)]
-pub(super) struct Reporter<'a> {
+pub(super) struct Reporter<'a, 's> {
     limits: Limits,
+    /// What the schema is called.
+    title: &'s str,
     violations: Vec<Violation<'a>>,
-    kinds: HashMap<(Code, KindKey), Tally>,
+    /// By code, kind, and whether they are known to be the schema's fault before they are worded.
+    kinds: HashMap<(Code, KindKey, bool), Tally>,
 }
 
-impl<'a> Reporter<'a> {
-    pub(super) fn new(limits: Limits) -> Self {
+/// How many violations of one kind are listed that are the schema's fault and stand in every such file.
+const LISTED_DEFECTS: u32 = 1;
+
+impl<'a, 's> Reporter<'a, 's> {
+    pub(super) fn new(limits: Limits, title: &'s str) -> Self {
         Self {
             limits,
+            title,
             violations: Vec::new(),
             kinds: HashMap::new(),
         }
@@ -67,11 +75,17 @@ impl<'a> Reporter<'a> {
     ) {
         let full = self.is_full();
         let order = self.kinds.len();
-        let crowded = order >= MAX_KINDS && !self.kinds.contains_key(&(code, kind));
+        let known = attribute.and_then(|one| defects::attribute(code, one, self.title));
+        let is_known = known.is_some();
+        let crowded = order >= MAX_KINDS && !self.kinds.contains_key(&(code, kind, is_known));
         let key = if crowded {
-            (code, (usize::MAX, u32::MAX))
+            (code, (usize::MAX, u32::MAX), is_known)
         } else {
-            (code, kind)
+            (code, kind, is_known)
+        };
+        let most = match is_known {
+            true => LISTED_DEFECTS.min(self.limits.per_kind),
+            false => self.limits.per_kind,
         };
         let tally = self.kinds.entry(key).or_insert_with(|| Tally {
             subject: if crowded {
@@ -82,12 +96,12 @@ impl<'a> Reporter<'a> {
             listed: 0,
             unlisted: 0,
             // No other violations are ever the schema's fault, so they need not be worded to know.
-            defect: matches!(code, Code::ConditionFailed | Code::MissingElement),
+            defect: is_known || matches!(code, Code::ConditionFailed | Code::MissingElement),
             order,
         });
-        if full || crowded || tally.listed >= self.limits.per_kind {
+        if full || crowded || tally.listed >= most {
             tally.unlisted += 1;
-            tally.defect = tally.defect && word().defect.is_some();
+            tally.defect = tally.defect && (is_known || word().defect.is_some());
             return;
         }
         tally.listed += 1;
@@ -97,7 +111,10 @@ impl<'a> Reporter<'a> {
             suggestion,
             defect,
             text,
-        } = word();
+        } = match known {
+            Some(_) => word().excused(known),
+            None => word(),
+        };
         tally.defect &= defect.is_some();
         let violation = Violation {
             code,
@@ -117,7 +134,7 @@ impl<'a> Reporter<'a> {
             .kinds
             .into_iter()
             .filter(|(_, tally)| tally.unlisted > 0)
-            .map(|((code, _), tally)| {
+            .map(|((code, _, _), tally)| {
                 (
                     tally.order,
                     Rest {

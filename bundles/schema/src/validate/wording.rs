@@ -44,7 +44,7 @@ impl Wording {
         self
     }
 
-    fn excused(mut self, defect: Option<&'static str>) -> Self {
+    pub(super) fn excused(mut self, defect: Option<&'static str>) -> Self {
         if let Some(defect) = defect {
             self.text += &format!("; known defect of the published schema: {defect}");
             self.defect = Some(defect);
@@ -155,7 +155,7 @@ pub(super) fn missing_before(
     schema: &Schema,
 ) -> Wording {
     let names = texts(skipped.iter().copied(), schema);
-    let defect = defects::missing_child(&names);
+    let defect = defects::missing_child(parent, &names, &schema.title);
     let (name, parent_name, list) = (node.name(), parent.name(), elements(&names));
     let comes_later = || {
         let mut siblings = parent.children().take(MAX_SIBLINGS);
@@ -315,7 +315,7 @@ pub(super) fn missing_children(
 ) -> Wording {
     let names = texts(expected.iter().copied(), schema);
     let needed = texts(skipped.iter().copied(), schema);
-    let defect = defects::missing_child(&needed);
+    let defect = defects::missing_child(node, &needed, &schema.title);
     if needed.is_empty() {
         let list = elements(&names);
         let text = format!("<{}> is incomplete, expected next: {list}", node.name());
@@ -444,12 +444,27 @@ pub(super) fn unexpected_attribute(
     let list = match (&suggestion, free.as_slice()) {
         (Some(_), _) => String::new(),
         (None, []) if declared.is_empty() => ": it takes none".to_owned(),
-        (None, []) => ", and all that it has are there".to_owned(),
+        (None, []) => format!(
+            ": {} knows {} for it, and no more",
+            schema.title,
+            names_of(declared, schema)
+        ),
         (None, free) => format!(", attributes not used yet: {}", free.join(", ")),
     };
     Wording::new(attribute.name(), text + &list)
         .expecting(free)
         .suggesting(suggestion.as_deref())
+}
+
+/// What an element may have, said in full while that is short.
+fn names_of(declared: &[AttributeUse], schema: &Schema) -> String {
+    const SHOWN: usize = 8;
+    let names = declared.iter().map(|one| schema.names.text(one.name));
+    let mut list: Vec<String> = names.take(SHOWN).map(str::to_owned).collect();
+    if let Some(more) = declared.len().checked_sub(SHOWN).filter(|more| *more > 0) {
+        list.push(format!("{more} more"));
+    }
+    list.join(", ")
 }
 
 /// An attribute such as `xsi:type` whose prefix means something else, or nothing.
