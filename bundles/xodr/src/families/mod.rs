@@ -32,6 +32,7 @@ pub(crate) mod rails;
 pub(crate) mod redundancy;
 pub(crate) mod refline;
 pub(crate) mod roadside;
+pub(crate) mod shown;
 pub(crate) mod strips;
 pub(crate) mod surface_boxes;
 pub(crate) mod switches;

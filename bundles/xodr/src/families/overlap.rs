@@ -5,7 +5,7 @@
 
 use std::collections::hash_map::Entry;
 
-use foldhash::{HashMap, HashSet};
+use foldhash::HashMap;
 use qcbus_opendrive::geometry::Point;
 use qcbus_opendrive::{LaneLayer, LaneRef, Road, RoadMap, SectionRef, Side, Station};
 
@@ -14,6 +14,9 @@ use super::driving::is_drivable;
 /// Length of a piece, in metres; more on maps with more than [`MOST_PIECES`] of them.
 const STEP: f64 = 5.0;
 const MOST_PIECES: f64 = 400_000.0;
+
+/// Heights that differ from the clearance by less, in metres, keep it.
+const SAME: f64 = 1e-6;
 
 /// Size of a cell of the grid, in metres, and the greatest number of cells that a piece may touch.
 const CELL: f64 = 10.0;
@@ -51,11 +54,11 @@ impl Bounds {
     }
 }
 
-/// Two pieces that cover the same ground.
+/// A place where two roads cover the same ground, named by the two pieces that share most of it.
 pub(crate) struct Overlap<'p> {
     pub one: &'p Slice,
     pub other: &'p Slice,
-    /// In square metres.
+    /// In square metres, of the whole place.
     pub area: f64,
     /// A point that both cover.
     pub point: Point,
@@ -68,7 +71,7 @@ pub(crate) struct Limits {
     pub area: f64,
     /// By how much either edge is moved inward, in metres.
     pub shrink: f64,
-    /// Roads that are farther apart in height, in metres, lie over each other.
+    /// Roads that are so far apart in height, in metres, lie over each other.
     pub clearance: f64,
 }
 
@@ -190,48 +193,135 @@ pub(crate) fn turn(a: Point, b: Point, c: Point) -> f64 {
     (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y)
 }
 
-/// Calls `found` with overlapping pieces, at most once for each pair of roads that `wanted`
-/// accepts for a pair of pieces.
+/// Calls `found` with the places where two roads, or two parts of one, cover the same ground: one for each
+/// pair and place, if two pieces that `wanted` accepts share more than the least area there. The pieces
+/// are those that share most, the area is that of the whole place.
 pub(crate) fn overlaps<'p>(
     slices: &'p [Slice],
     limits: &Limits,
     wanted: impl Fn(&Slice, &Slice) -> bool,
-    mut found: impl FnMut(Overlap<'p>),
+    found: impl FnMut(Overlap<'p>),
 ) {
     let mut cells = Cells::default();
-    let mut reported: HashSet<(usize, usize)> = HashSet::default();
+    let mut spots = Spots::default();
     // Enough for every map that is one; pieces heaped up at one place are not compared for ever.
     let mut budget = 10_000_000 + 100 * slices.len();
-    for (one, at) in slices.iter().zip(0_u32..) {
+    'all: for (one, at) in slices.iter().zip(0_u32..) {
         for cell in cells_of(one) {
             let here = cells.put(cell, at);
             for other in here.filter_map(|other| slices.get(other as usize)) {
                 budget = budget.saturating_sub(1);
                 if budget == 0 {
-                    return;
+                    break 'all;
                 }
-                let pair = (other.road.min(one.road), other.road.max(one.road));
-                let level = (one.z - other.z).abs() <= limits.clearance;
+                let level = (one.z - other.z).abs() < limits.clearance - SAME;
                 let near = level && one.bounds.meets(&other.bounds);
-                if !near || !wanted(other, one) || reported.contains(&pair) {
-                    continue;
-                }
-                if let Some((area, point)) =
-                    common(one, other).filter(|(area, _)| *area > limits.area)
-                {
-                    reported.insert(pair);
-                    let z = one.z;
-                    found(Overlap {
-                        one: other,
-                        other: one,
-                        area,
-                        point,
-                        z,
-                    });
+                // Pieces that share several cells are met in the first of them only.
+                if near && first_common(one, other) == cell && wanted(other, one) {
+                    budget = budget.saturating_sub(COMPARED);
+                    if let Some((area, point)) = common(one, other) {
+                        spots.put(other, one, area, point);
+                    }
                 }
             }
         }
     }
+    spots.tell(limits, found);
+}
+
+/// How many pairs of pieces may be met in the time in which one is compared.
+const COMPARED: usize = 8;
+
+/// The first cell that two pieces share whose rectangles meet.
+fn first_common(one: &Slice, other: &Slice) -> (i64, i64) {
+    let first = |one: [f64; 2], other: [f64; 2]| (one[0].max(other[0]) / CELL).floor() as i64;
+    (
+        first(one.bounds.0, other.bounds.0),
+        first(one.bounds.1, other.bounds.1),
+    )
+}
+
+/// By this much more two pieces must share to stand for their place: of equals it is the first.
+const MUCH_MORE: f64 = 1.01;
+
+/// More places than this are not told apart for one pair of roads.
+const MOST_SPOTS: usize = 16;
+
+/// Places where roads cover the same ground, in the order in which they were found.
+#[derive(Default)]
+struct Spots<'p> {
+    spots: Vec<Spot<'p>>,
+    /// Those of each pair of roads.
+    of_pair: HashMap<(usize, usize), Vec<usize>>,
+}
+
+struct Spot<'p> {
+    main: Overlap<'p>,
+    /// The greatest area that two pieces share.
+    most: f64,
+    /// How far the place goes along the one road and the other.
+    ranges: [[f64; 2]; 2],
+}
+
+impl<'p> Spots<'p> {
+    fn put(&mut self, one: &'p Slice, other: &'p Slice, area: f64, point: Point) {
+        let of_pair = self.of_pair.entry((one.road, other.road)).or_default();
+        let ranges = [one, other].map(|slice| [slice.from, slice.to]);
+        let next_to = |index: &&usize| {
+            let spot = self.spots.get(**index);
+            spot.is_some_and(|spot| spot.ranges.iter().zip(&ranges).all(|(a, b)| touch(*a, *b)))
+        };
+        let full = of_pair.len() >= MOST_SPOTS;
+        let at = of_pair
+            .iter()
+            .find(next_to)
+            .or(of_pair.last().filter(|_| full));
+        if let Some(spot) = at.and_then(|at| self.spots.get_mut(*at)) {
+            let whole = spot.main.area + area;
+            if area > MUCH_MORE * spot.most {
+                let z = other.z;
+                spot.main = Overlap {
+                    one,
+                    other,
+                    area,
+                    point,
+                    z,
+                };
+            }
+            spot.main.area = whole;
+            spot.most = spot.most.max(area);
+            for (all, range) in spot.ranges.iter_mut().zip(&ranges) {
+                *all = [all[0].min(range[0]), all[1].max(range[1])];
+            }
+            return;
+        }
+        of_pair.push(self.spots.len());
+        self.spots.push(Spot {
+            main: Overlap {
+                one,
+                other,
+                area,
+                point,
+                z: other.z,
+            },
+            most: area,
+            ranges,
+        });
+    }
+
+    fn tell(self, limits: &Limits, mut found: impl FnMut(Overlap<'p>)) {
+        let large = self
+            .spots
+            .into_iter()
+            .filter(|spot| spot.most > limits.area);
+        large.for_each(|spot| found(spot.main));
+    }
+}
+
+/// Whether two stretches of a road lie next to each other, but for one piece.
+fn touch(one: [f64; 2], other: [f64; 2]) -> bool {
+    let piece = other[1] - other[0];
+    one[0] <= other[1] + piece && other[0] <= one[1] + piece
 }
 
 /// Which pieces touch which cell, in the order in which they were put there. All lists share their

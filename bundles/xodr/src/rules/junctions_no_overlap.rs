@@ -26,12 +26,15 @@ const CLEARANCE: Param = Param::number(
     "clearance",
     3.0,
     "m",
-    "junctions that are farther apart in height lie over each other",
+    "junctions that are so far apart in height lie over each other",
 );
 
 /// Length of the pieces of roads that are compared, in metres, and by how much they are narrower.
 const STEP: f64 = 2.0;
 const SHRINK: f64 = 0.05;
+
+/// Heights that differ from the clearance by less, in metres, keep it.
+const SAME: f64 = 1e-6;
 
 /// No more pairs of roads and pieces are compared, and no more points are taken along a straight side of a boundary.
 const BUDGET: usize = 10_000_000;
@@ -204,7 +207,7 @@ fn check(
     let clearance = found.number(&CLEARANCE);
     let apart = (one.heights[0] - other.heights[1]).max(other.heights[0] - one.heights[1]);
     match (&one.shape, &other.shape) {
-        (Shape::Ring(_), Shape::Ring(_)) if apart > clearance => false,
+        (Shape::Ring(_), Shape::Ring(_)) if apart >= clearance - SAME => false,
         (Shape::Ring(here), Shape::Ring(there)) => {
             let deepest = deepest(here, there).filter(|(deep, _)| *deep > found.number(&DEPTH));
             let Some((deep, point)) = deepest else {
@@ -292,7 +295,8 @@ fn roads_overlap(
                 a.elevation().at_or_zero(here.from),
                 b.elevation().at_or_zero(there.from),
             ];
-            if matches!(heights, [Some(one), Some(other)] if (one - other).abs() <= clearance) {
+            if matches!(heights, [Some(one), Some(other)] if (one - other).abs() < clearance - SAME)
+            {
                 total += area(&shape);
                 place = place.or_else(|| Some((middle(&shape)?, here.from, there.from)));
             }

@@ -26,8 +26,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
 
 fn check(lane: LaneRef<'_, '_>, mark: &LaneRecord<'_>, found: &mut Sink<'_>) {
     let ds = mark.s_offset().unwrap_or(0.0);
-    let Some(half) = lane
-        .width(ds)
+    let Some(half) = widest(lane, ds)
         .map(|width| 0.5 * width)
         .filter(|half| *half > 0.0)
     else {
@@ -39,14 +38,19 @@ fn check(lane: LaneRef<'_, '_>, mark: &LaneRecord<'_>, found: &mut Sink<'_>) {
         .filter(|child| child.is("type") || child.is("explicit"));
     let lines = kinds.flat_map(|kind| kind.children().filter(|child| child.is("line")));
     let offsets: Option<Vec<f64>> = lines.map(|line| line.f64("tOffset").ok()).collect();
-    let Some(nearest) = offsets.and_then(|all| all.into_iter().map(f64::abs).reduce(f64::min))
-    else {
+    let Some(offsets) = offsets else { return };
+    // Lines on both sides of the border are a mark that lies on it.
+    let either = |side: fn(&f64) -> bool| offsets.iter().any(side);
+    if either(|t| *t <= 0.0) && either(|t| *t >= 0.0) {
+        return;
+    }
+    let Some(nearest) = offsets.into_iter().map(f64::abs).reduce(f64::min) else {
         return;
     };
     if nearest > half {
         let text = format!(
             "every line of this road mark lies at least {nearest:.2} m away from the outer border of {}, more than \
-             half its width of {:.2} m; a road mark describes the marking at the outer border",
+             half of the {:.2} m that it is wide; a road mark describes the marking at the outer border",
             lane_name(lane),
             2.0 * half
         );
@@ -54,4 +58,16 @@ fn check(lane: LaneRef<'_, '_>, mark: &LaneRecord<'_>, found: &mut Sink<'_>) {
         let t = lane.outer_t(ds).unwrap_or(0.0);
         found.issue(mark.node(), text).on(lane.at.road, s, t);
     }
+}
+
+/// The greatest width of a lane from `ds` on: where it opens, any line lies beside it.
+fn widest(lane: LaneRef<'_, '_>, ds: f64) -> Option<f64> {
+    let length = lane.length()?;
+    let stretches = lane.widths().stretches(length);
+    let behind = stretches.filter(|stretch| stretch.from + stretch.length() > ds);
+    let widest = behind.filter_map(|stretch| {
+        let greatest = stretch.cubic.maximum(0.0, stretch.length())?;
+        Some(greatest.value)
+    });
+    widest.reduce(f64::max).or_else(|| lane.width(ds))
 }

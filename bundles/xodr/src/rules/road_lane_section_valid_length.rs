@@ -1,6 +1,7 @@
 use qcbus_opendrive::{RoadMap, SectionRef, Side};
 use qcbus_sdk::{Level, Param, Place, Rule, Sink};
 
+use crate::families::shown::number;
 use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
@@ -14,7 +15,7 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-const LEAST: Param = Param::number("least", 1e-6, "m", "a length up to this counts as none");
+const LEAST: Param = Param::number("least", 0.0, "m", "a length up to this counts as none");
 const SHORT: Param = Param::number("short", 0.01, "m", "a length up to this is a warning");
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
@@ -54,11 +55,12 @@ fn report(
     } else {
         (
             Level::Warning,
-            "so short a section is fragile in calculations",
+            "so short a section may count as none where lengths are rounded",
         )
     };
     let text = format!(
-        "the lane section starts at s = {s} and {what} at s = {end}, which makes it {length} m long; {allowed}"
+        "the lane section starts at s = {s} and {what} at s = {end}, which makes it {} m long; {allowed}",
+        number(length)
     );
     let finding = found
         .issue(Place::attribute_or_node(section.node(), "s"), text)

@@ -2,6 +2,7 @@ use qcbus_opendrive::{LaneRef, RoadMap, Stretch};
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
 use crate::families::on_road::{OnRoad, lane_name};
+use crate::families::shown::beside;
 use crate::model::{Part, Roads};
 
 const TOLERANCE: Param = Param::number(
@@ -9,6 +10,13 @@ const TOLERANCE: Param = Param::number(
     0.001,
     "m",
     "how far below zero a width is no more than a matter of rounding",
+);
+
+const SMALL: Param = Param::number(
+    "small",
+    0.01,
+    "m",
+    "how far below zero a width may come of a fitted curve, which is a warning",
 );
 
 /// Below zero by less than this, in metres, a width is zero.
@@ -19,7 +27,7 @@ pub static RULE: Rule<Roads> = Rule {
     uids: &["asam.net:xodr:1.4.0:road.lane.width.lane_width_validity"],
     versions: "1.4.0..",
     after: super::READABLE,
-    params: &[TOLERANCE],
+    params: &[TOLERANCE, SMALL],
     page: include_str!("road_lane_width_lane_width_validity.md"),
     each: Some(each),
     ..Rule::DEFAULTS
@@ -46,13 +54,17 @@ fn check(lane: LaneRef<'_, '_>, stretch: &Stretch<'_, '_>, found: &mut Sink<'_>)
     let ds = stretch.from + lowest.at;
     let s = lane.at.s().unwrap_or(0.0) + ds;
     let text = format!(
-        "the width of {} falls to {:.6} m at s = {s:.3}; it must not be negative",
+        "the width of {} falls to {} m at s = {s:.3}; it must not be negative",
         lane_name(lane),
-        lowest.value
+        beside(lowest.value, 0.0)
     );
-    let is_rounding = lowest.value >= -found.number(&TOLERANCE);
-    let finding = found.issue(stretch.record.node(), text).in_lane(lane, ds);
-    if is_rounding {
-        finding.level(Level::Information);
-    }
+    let level = match -lowest.value {
+        below if below <= found.number(&TOLERANCE) => Level::Information,
+        below if below <= found.number(&SMALL) => Level::Warning,
+        _ => Level::Error,
+    };
+    found
+        .issue(stretch.record.node(), text)
+        .level(level)
+        .in_lane(lane, ds);
 }

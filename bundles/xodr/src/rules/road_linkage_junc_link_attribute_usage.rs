@@ -1,5 +1,5 @@
 use qcbus_opendrive::{ContactPoint, Junction, JunctionType, RoadLink, RoadMap};
-use qcbus_sdk::{Backport, Level, Rule, Sink};
+use qcbus_sdk::{Backport, Level, Rule, Sink, Version};
 
 use crate::model::{Part, Roads};
 
@@ -39,13 +39,21 @@ fn check(map: &RoadMap<'_>, link: RoadLink<'_>, found: &mut Sink<'_>) {
     if map.junction(id).is_some_and(is_virtual) {
         return;
     }
+    // A contact point is written by habit. A place within the junction's road says that another kind of
+    // junction is meant, or another link, whatever the version.
+    let before = found.version() < Some(Version::new(1, 7));
     for name in ["contactPoint", "elementS", "elementDir"] {
+        let level = match name {
+            "contactPoint" => Level::Warning,
+            _ if before => Level::Error,
+            _ => Level::Warning,
+        };
         if let Some(attribute) = link.node().attribute(name) {
             let text = format!(
                 "the link to junction `{id}` has the attribute `{name}`, which belongs to links to roads; links \
                  to junctions have `elementType` and `elementId`"
             );
-            found.issue(attribute, text).level(Level::Warning);
+            found.issue(attribute, text).level(level);
         }
     }
 }

@@ -1,5 +1,5 @@
 use qcbus_opendrive::{ContactPoint, JunctionType, Road, RoadLink, RoadMap};
-use qcbus_sdk::{Backport, Param, Place, Rule, Sink};
+use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink};
 
 use crate::families::virtual_links;
 use crate::model::{Part, Roads};
@@ -33,7 +33,11 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             .filter_map(|end| road.link(end))
         {
             if has(link, "elementS") || has(link, "elementDir") {
-                within(map, link, found);
+                if virtual_links::may_be_within(map, road) {
+                    within(map, link, found);
+                } else if has(link, "contactPoint") && link.element_type() == Some("road") {
+                    superfluous(link, found);
+                }
             } else if virtual_links::leads_to_main_road(map, road, link) {
                 at_an_end(map, road, link, found);
             }
@@ -43,6 +47,22 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
 
 fn has(link: RoadLink<'_>, name: &str) -> bool {
     link.node().attribute(name).is_some()
+}
+
+/// A link with `elementS` or `elementDir` of a road that virtual junctions have nothing to do with: who
+/// writes them beside a contact point means the contact point.
+fn superfluous(link: RoadLink<'_>, found: &mut Sink<'_>) {
+    for attribute in ["elementS", "elementDir"] {
+        let Some(attribute) = link.node().attribute(attribute) else {
+            continue;
+        };
+        let text = format!(
+            "the link has `{}`, which is for links into the middle of the main road of a virtual junction; this \
+             one leads to an end of a road and needs `contactPoint` only",
+            attribute.name()
+        );
+        found.issue(attribute, text).level(Level::Information);
+    }
 }
 
 /// A link with `elementS` or `elementDir`.

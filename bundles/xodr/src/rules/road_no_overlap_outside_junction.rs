@@ -23,7 +23,7 @@ const CLEARANCE: Param = Param::number(
     "clearance",
     3.0,
     "m",
-    "roads that are farther apart in height lie over each other",
+    "roads that are so far apart in height lie over each other",
 );
 
 const INSIDE: &str = "asam.net:xodr:1.4.0:road.overlap_inside_junction";

@@ -3,6 +3,7 @@ use qcbus_opendrive::{Road, RoadMap};
 use qcbus_sdk::{Level, Place, Rule, Sink};
 
 use crate::families::ascending::TOLERANCE;
+use crate::families::shown::number;
 use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
@@ -34,21 +35,30 @@ fn check(road: &Road<'_>, lateral: Node<'_>, found: &mut Sink<'_>) {
         let Some((before, last_s, last_t)) = last.replace((shape, s, t)) else {
             continue;
         };
-        let ahead = format!("the one listed before it has s = {last_s}, t = {last_t}");
-        if s < last_s - tolerance || (s <= last_s + tolerance && t < last_t - tolerance) {
+        let ahead = format!(
+            "the one listed before it has s = {}, t = {}",
+            number(last_s),
+            number(last_t)
+        );
+        // A step ahead is one, however small.
+        if s < last_s - tolerance || (s <= last_s && t < last_t - tolerance) {
             let by = if s < last_s - tolerance { "s" } else { "t" };
             let text = format!(
-                "this `shape` has s = {s}, t = {t}, but {ahead}; `shape` elements must be listed in \
-                 ascending order of `s`, those with the same `s` in ascending order of `t`"
+                "this `shape` has s = {}, t = {}, but {ahead}; `shape` elements must be listed in \
+                 ascending order of `s`, those with the same `s` in ascending order of `t`",
+                number(s),
+                number(t)
             );
             found
                 .issue(Place::attribute_or_node(shape, by), text)
                 .road(road.id(), s, t)
                 .at(before, "the one listed before it");
-        } else if s <= last_s + tolerance && t <= last_t + tolerance {
+        } else if s <= last_s + tolerance && (t - last_t).abs() <= tolerance {
             let text = format!(
-                "this `shape` has s = {s}, t = {t} like the one listed before it, which therefore never \
-                 applies; each must have a place of its own"
+                "this `shape` has s = {}, t = {} like the one listed before it, which therefore never \
+                 applies; each must have a place of its own",
+                number(s),
+                number(t)
             );
             found
                 .issue(Place::attribute_or_node(shape, "t"), text)

@@ -1,9 +1,10 @@
-use qcbus_opendrive::geometry::Minimum;
+use qcbus_opendrive::geometry::{Cubic, Minimum};
 use qcbus_opendrive::{LaneRef, Road, RoadMap, Side};
-use qcbus_sdk::{Param, Place, Rule, Sink, Version};
+use qcbus_sdk::{Level, Param, Place, Rule, Sink, Version};
 
 use crate::families::edges::border;
 use crate::families::on_road::OnRoad;
+use crate::families::shown::number;
 use crate::model::{Part, Roads};
 
 const TOLERANCE: Param = Param::number(
@@ -55,6 +56,7 @@ fn right_edge(road: &Road<'_>) -> Option<Minimum> {
 }
 
 fn check(road: &Road<'_>, edge: Minimum, found: &mut Sink<'_>) {
+    let flat = is_flat(road);
     for row in road.lateral().shape.rows() {
         let Some(first) = row.profile.in_order().next() else {
             continue;
@@ -66,18 +68,30 @@ fn check(road: &Road<'_>, edge: Minimum, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "the shapes at s = {} begin at t = {begin}, but the lanes of road `{}` reach to t = {:.3} on the right \
+            "the shapes at s = {} begin at t = {}, but the lanes of road `{}` reach to t = {:.3} on the right \
              (at s = {:.2}); shapes must cover the whole width of the road",
-            row.s,
+            number(row.s),
+            number(begin),
             road.id(),
             edge.value,
             edge.at
         );
         let newer = found.version() >= Some(Version::new(1, 9));
         let place = Place::attribute_or_node(first.node(), "t");
-        let finding = found.issue(place, text).on(road, row.s, edge.value);
+        let mut finding = found.issue(place, text).on(road, row.s, edge.value);
+        if flat {
+            finding = finding.level(Level::Information);
+        }
         if begin >= 0.0 && newer {
             finding.uid(STARTS_RIGHT);
         }
     }
+}
+
+/// Whether no shape of the road changes its height anywhere: then nothing changes beside them either,
+/// whatever readers take for what is not said.
+fn is_flat(road: &Road<'_>) -> bool {
+    let rows = road.lateral().shape.rows().iter();
+    let mut records = rows.flat_map(|row| row.profile.records());
+    records.all(|record| record.cubic() == Some(Cubic::constant(0.0)))
 }
