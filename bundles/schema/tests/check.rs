@@ -248,3 +248,110 @@ fn messages_say_where_a_late_child_belongs_and_what_a_short_attribute_meant() {
     );
     assert_eq!(found("<a/>").len(), 1);
 }
+
+/// The violations of a map: how much they weigh, where, and their texts.
+fn weighed(version: &str, text: &str) -> Vec<(Severity, u32, String)> {
+    let header = format!("<OpenDRIVE><header revMajor=\"1\" revMinor=\"{version}\"/>");
+    let bytes = image("t.xodr", &(header + text + "</OpenDRIVE>"));
+    let document = open(&bytes);
+    let Outcome::Checked(checked) = check(&document, FileKind::Xodr, &Options::default()) else {
+        panic!("skipped")
+    };
+    let violations = checked.violations.iter();
+    let listed = violations.map(|one| {
+        let row = one.node.position().row;
+        (checked.severity(one), row, one.text.clone())
+    });
+    let later = checked.later.iter().flat_map(|later| {
+        let things = later.things.iter();
+        things.map(|thing| {
+            (
+                Severity::Error,
+                0,
+                format!("{} {}", thing.what, thing.since),
+            )
+        })
+    });
+    listed.chain(later).collect()
+}
+
+const ROAD: &str = "<road name=\"\" length=\"9\" id=\"1\" junction=\"-1\"><planView>\
+    <geometry s=\"0\" x=\"0\" y=\"0\" hdg=\"0\" length=\"9\"><line/></geometry></planView>";
+
+#[test]
+fn words_for_the_numbers_of_the_first_schema_weigh_less_and_slips_do_not() {
+    let map = |first: &str, second: &str| {
+        format!(
+            "{ROAD}<lanes><laneSection s=\"0\"><center><lane id=\"0\" type=\"none\" level=\"false\"/></center><right>\
+             <lane id=\"-1\" type=\"{first}\" level=\"0\"><width sOffset=\"0\" a=\"3\" b=\"0\" c=\"0\" d=\"0\"/></lane>\
+             <lane id=\"-2\" type=\"{second}\" level=\"0\"><width sOffset=\"0\" a=\"3\" b=\"0\" c=\"0\" d=\"0\"/></lane>\
+             </right></laneSection></lanes></road>"
+        )
+    };
+    let said = weighed("1", &map("driving", "sidewalk"));
+    assert!(
+        said.iter()
+            .all(|(severity, ..)| *severity == Severity::Warning),
+        "{said:?}"
+    );
+    // Of each kind one stands for all.
+    assert_eq!(said.len(), 3, "{said:?}");
+    let said = weighed("1", &map("driving", "sidewlak"));
+    let errors = said
+        .iter()
+        .filter(|(severity, ..)| *severity == Severity::Error);
+    assert_eq!(errors.count(), 1, "{said:?}");
+}
+
+#[test]
+fn what_a_later_version_of_opendrive_has_is_said_once() {
+    let speed = |max: &str| {
+        format!(
+            "<road name=\"\" length=\"9\" id=\"1\" junction=\"-1\" rule=\"RHT\">\
+             <type s=\"0\" type=\"rural\"><speed max=\"{max}\"/></type><planView>\
+             <geometry s=\"0\" x=\"0\" y=\"0\" hdg=\"0\" length=\"9\"><line/></geometry></planView>\
+             <elevationProfile/><lanes><laneSection s=\"0\"><center><lane id=\"0\" type=\"none\"/></center><right>\
+             <lane id=\"-1\" type=\"driving\"><width sOffset=\"0\" a=\"3\" b=\"0\" c=\"0\" d=\"0\"/></lane>\
+             </right></laneSection></lanes></road>"
+        )
+    };
+    let said = weighed("4", &speed("13.9"));
+    let levels: Vec<Severity> = said.iter().map(|(severity, ..)| *severity).collect();
+    assert_eq!(
+        levels,
+        [Severity::Warning, Severity::Warning, Severity::Error],
+        "{said:?}"
+    );
+    assert_eq!(said[2].2, "`rule` of `road` 1.5");
+    assert!(weighed("6", &speed("13.9")).is_empty());
+    assert_eq!(weighed("4", &speed("fast")).len(), 3);
+}
+
+#[test]
+fn lights_of_openscenario_1_2_are_alternatives() {
+    let schema = support::table("xosc-1.2");
+    let scenario = |light: &str| {
+        format!(
+            "<OpenSCENARIO><FileHeader revMajor=\"1\" revMinor=\"2\" date=\"2026-01-01T00:00:00\" description=\"\" \
+             author=\"\"/><CatalogLocations/><RoadNetwork/><Entities/><Storyboard><Init><Actions><Private \
+             entityRef=\"a\"><PrivateAction><AppearanceAction><LightStateAction><LightType>{light}</LightType>\
+             <LightState mode=\"on\"/></LightStateAction></AppearanceAction></PrivateAction></Private></Actions></Init>\
+             <StopTrigger/></Storyboard></OpenSCENARIO>"
+        )
+    };
+    let bytes = image(
+        "t.xosc",
+        &scenario("<VehicleLight vehicleLightType=\"fogLights\"/>"),
+    );
+    let report = schema.validate(&open(&bytes), qcbus_schema::Limits::default());
+    let excused = report.violations.iter();
+    let excused = excused.filter(|one| one.known_schema_defect.is_some());
+    assert_eq!(excused.count(), 2, "{:?}", report.violations);
+    assert_eq!(report.violations.len(), 2, "{:?}", report.violations);
+    // Neither of them is a fault of the file.
+    let bytes = image("t.xosc", &scenario(""));
+    let report = schema.validate(&open(&bytes), qcbus_schema::Limits::default());
+    let faults = report.violations.iter();
+    let faults = faults.filter(|one| one.known_schema_defect.is_none());
+    assert_eq!(faults.count(), 1, "{:?}", report.violations);
+}
