@@ -122,6 +122,20 @@ pub(crate) fn missing_child(
         .then_some("it demands both children in a row, where the standard has one or the other")
 }
 
+/// Why a child that has no place is there only by the fault of the schema of this title.
+pub(crate) fn misplaced_child(
+    child: Node<'_>,
+    parent: Node<'_>,
+    title: &str,
+) -> Option<&'static str> {
+    let is_addition = ["userData", "include", "dataQuality"]
+        .iter()
+        .any(|name| child.is(name));
+    (title == "OpenDRIVE 1.5" && parent.is("geometry") && is_addition).then_some(
+        "it takes additional data in place of a curve only, where every other version takes them beside it",
+    )
+}
+
 /// Elements of OpenSCENARIO 1.2 whose children are alternatives, which its schema lists as a sequence.
 const ALTERNATIVES: [(&str, [&str; 2]); 3] = [
     ("AppearanceAction", ["LightStateAction", "AnimationAction"]),

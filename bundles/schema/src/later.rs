@@ -192,14 +192,20 @@ impl<'a> Search<'a> {
                 .filter_map(|(_, later)| Some((later, Typing::of(&document, kind, later)?)))
                 .collect()
         });
-        let mut having = successors.iter().filter(|(_, typing)| match attribute {
+        let has = |typing: &Typing| match attribute {
             None => typing.declares(node),
             Some(attribute) => typing.value(attribute).is_some_and(|value| {
                 let word = attribute.value().trim();
                 let words = value.words().unwrap_or(&[]);
                 words.is_empty() || words.iter().any(|known| **known == *word)
             }),
-        });
-        having.next().map(|(version, _)| *version)
+        };
+        // What has gone again is no reason to take a later version for the one that is meant.
+        let is_there_still = successors.last().is_some_and(|(_, typing)| has(typing));
+        let mut having = successors.iter().filter(|(_, typing)| has(typing));
+        having
+            .next()
+            .filter(|_| is_there_still)
+            .map(|(version, _)| *version)
     }
 }

@@ -96,7 +96,11 @@ impl<'a, 's> Reporter<'a, 's> {
             listed: 0,
             unlisted: 0,
             // No other violations are ever the schema's fault, so they need not be worded to know.
-            defect: is_known || matches!(code, Code::ConditionFailed | Code::MissingElement),
+            defect: is_known
+                || matches!(
+                    code,
+                    Code::ConditionFailed | Code::MissingElement | Code::MisplacedElement
+                ),
             order,
         });
         if full || crowded || tally.listed >= most {

@@ -239,7 +239,9 @@ pub(super) fn misplaced<'s>(
             "<{name}> may occur in <{parent_name}>, but not at this place: children have a fixed order, expected here: {words}"
         ),
     };
-    Wording::new(name, text).expecting(expected)
+    Wording::new(name, text)
+        .expecting(expected)
+        .excused(defects::misplaced_child(node, parent, &schema.title))
 }
 
 pub(super) fn unexpected_child(
