@@ -21,6 +21,8 @@ mod reference_lines;
 mod road_links;
 #[path = "tricky/roadside.rs"]
 mod roadside;
+#[path = "tricky/slight.rs"]
+mod slight;
 
 use std::collections::BTreeSet;
 use std::path::Path;

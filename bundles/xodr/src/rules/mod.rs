@@ -5,6 +5,7 @@
 use qcbus_sdk::AnyRule;
 
 mod default_regulations_only_speed_priority;
+mod geometry_length_not_negative;
 mod header_attributes;
 mod header_offset_centered_coords;
 mod header_proj_max_one_proj;
@@ -61,6 +62,7 @@ mod junctions_virtual_linked_lanes_smooth_fit;
 mod junctions_virtual_main_road_only;
 mod junctions_virtual_no_controllers;
 mod junctions_virtual_only_one_start_end;
+mod lane_section_single_side;
 mod lane_smoothness_contact_point_no_horizontal_gaps;
 mod lane_smoothness_contact_point_no_horizontal_kinks;
 mod lane_smoothness_contact_point_no_vertical_gaps;
@@ -69,6 +71,8 @@ mod lane_smoothness_no_vertical_jumps_t;
 mod lane_smoothness_profile_no_horizontal_gaps;
 mod lane_smoothness_profile_no_vertical_gaps;
 mod performance_avoid_redundant_info;
+mod profiles_begin_with_road;
+mod records_are_complete;
 mod road_corner_local_first_id_zero;
 mod road_corner_local_mandatory_id_with_markings;
 mod road_corner_local_sequential_id_values;
@@ -514,4 +518,8 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_ranges_not_reversed::RULE,
     &road_crg_file_named::RULE,
     &road_validity_lanes_exist::RULE,
+    &geometry_length_not_negative::RULE,
+    &lane_section_single_side::RULE,
+    &profiles_begin_with_road::RULE,
+    &records_are_complete::RULE,
 ];

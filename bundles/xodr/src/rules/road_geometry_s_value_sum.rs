@@ -1,15 +1,16 @@
 use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Param, Place, Rule, Sink};
+use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink, Version};
 
+use crate::families::shown::number;
 use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_geometry_s_value_sum",
     uids: &["asam.net:xodr:1.9.0:road.geometry.s-value_sum"],
     versions: "1.9.0..",
-    backport: Backport::Lower { since: "1.4.0" },
+    backport: Backport::Alike { since: "1.4.0" },
     after: super::READABLE,
-    params: &[TOLERANCE],
+    params: &[TOLERANCE, GRAVE],
     page: include_str!("road_geometry_s_value_sum.md"),
     each: Some(each),
     ..Rule::DEFAULTS
@@ -21,20 +22,34 @@ const TOLERANCE: Param = Param::number(
     "m",
     "largest deviation that is accepted, on long roads a millionth of the sum",
 );
+const GRAVE: Param = Param::number(
+    "grave",
+    0.1,
+    "m",
+    "in versions before 1.9, a deviation up to this is a warning",
+);
 /// What a sum of lengths written with few digits may be off, as a share of it.
 const RELATIVE: f64 = 1e-6;
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let tolerance = found.number(&TOLERANCE);
+    let grave = found.number(&GRAVE);
+    let older = found.version() < Some(Version::new(1, 9));
     for road in map.part(part).roads() {
         let mut sum = 0.0;
         let mut first = None;
+        let mut greatest = 0.0_f64;
         let mut further = 0;
         for geometry in road.plan_view().geometries() {
             let (Some(s), Some(length)) = (geometry.s(), geometry.length()) else {
                 break;
             };
+            // Another checker's business, and nothing adds up from here on.
+            if length < 0.0 {
+                break;
+            }
             if (s - sum).abs() > tolerance.max(RELATIVE * sum) {
+                greatest = greatest.max((s - sum).abs());
                 match first {
                     None => first = Some((geometry, s, sum)),
                     Some(_) => further += 1,
@@ -52,14 +67,23 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         };
         let demand = match sum {
             0.0 => "the reference line starts at s = 0".to_owned(),
-            sum => format!("the geometries before this one are {sum} m long together"),
+            _ => format!(
+                "the geometries before this one are {} m long together",
+                number(sum)
+            ),
         };
         let text = format!(
-            "s is {s}, but {demand}; s must be the sum of all lengths before (accepted: {tolerance} m){more}"
+            "s is {}, but {demand}; s must be the sum of all lengths before (accepted: {tolerance} m){more}",
+            number(s)
         );
         let finding = found
             .issue(Place::attribute_or_node(geometry.node(), "s"), text)
             .road(road.id(), s, 0.0);
+        let finding = if older && greatest <= grave {
+            finding.level(Level::Warning)
+        } else {
+            finding
+        };
         if let Some(at) = geometry.origin() {
             finding.point(at.x, at.y, 0.0);
         }

@@ -1,15 +1,16 @@
 use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Param, Place, Rule, Sink};
+use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink, Version};
 
+use crate::families::shown::number;
 use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_lane_sect_first",
     uids: &["asam.net:xodr:1.9.0:road.lane.lane_sect_first"],
     versions: "1.9.0..",
-    backport: Backport::Lower { since: "1.4.0" },
+    backport: Backport::Alike { since: "1.4.0" },
     after: super::READABLE,
-    params: &[TOLERANCE],
+    params: &[TOLERANCE, GRAVE],
     page: include_str!("road_lane_lane_sect_first.md"),
     each: Some(each),
     ..Rule::DEFAULTS
@@ -20,6 +21,13 @@ const TOLERANCE: Param = Param::number(
     1e-6,
     "m",
     "largest distance from 0 that is accepted",
+);
+
+const GRAVE: Param = Param::number(
+    "grave",
+    0.1,
+    "m",
+    "in versions before 1.9, a first section that starts no farther from 0 is a warning",
 );
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
@@ -33,13 +41,19 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         };
         if s.abs() > tolerance {
             let text = format!(
-                "the first lane section of road `{}` starts at s = {s}; it must start at s = 0, so that \
+                "the first lane section of road `{}` starts at s = {}; it must start at s = 0, so that \
                  the road has lanes from its beginning",
-                road.id()
+                road.id(),
+                number(s)
             );
-            found
+            let older = found.version() < Some(Version::new(1, 9));
+            let is_mild = older && s.abs() <= found.number(&GRAVE);
+            let finding = found
                 .issue(Place::attribute_or_node(section.node(), "s"), text)
                 .road(road.id(), s, 0.0);
+            if is_mild {
+                finding.level(Level::Warning);
+            }
         }
     }
 }

@@ -1,7 +1,8 @@
+use qcbus_document::Node;
 use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Rule, Sink};
+use qcbus_sdk::{Level, Rule, Sink};
 
-use crate::families::ascending;
+use crate::families::ascending::{self, Equal};
 use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
@@ -16,5 +17,25 @@ pub static RULE: Rule<Roads> = Rule {
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
-    ascending::lane_records(map.part(part), "roadMark", ascending::PARALLEL, found);
+    ascending::lane_records(map.part(part), "roadMark", MARKS, found);
+}
+
+/// Two lines at one place are solid or broken, unless the file says where beside each other they lie.
+const MARKS: Equal = |before, mark| match contradict(before, mark) {
+    true => Some(Level::Warning),
+    false => ascending::PARALLEL(before, mark),
+};
+
+fn contradict(before: Node<'_>, mark: Node<'_>) -> bool {
+    let line = |mark: Node<'_>| {
+        mark.attr("type")
+            .filter(|kind| *kind != "none")
+            .map(str::to_owned)
+    };
+    let is_drawn =
+        |mark: Node<'_>| mark.child("type").is_some() || mark.child("explicit").is_some();
+    let differ = line(before)
+        .zip(line(mark))
+        .is_some_and(|(one, other)| one != other);
+    differ && !is_drawn(before) && !is_drawn(mark)
 }

@@ -1,15 +1,16 @@
 use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Param, Place, Rule, Sink};
+use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink, Version};
 
+use crate::families::shown::number;
 use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_width_width_defined_whole_section",
     uids: &["asam.net:xodr:1.7.0:road.lane.width.width_defined_whole_section"],
     versions: "1.7.0..",
-    backport: Backport::Lower { since: "1.4.0" },
+    backport: Backport::Alike { since: "1.4.0" },
     after: super::READABLE,
-    params: &[TOLERANCE],
+    params: &[TOLERANCE, GRAVE],
     page: include_str!("road_lane_width_width_defined_whole_section.md"),
     each: Some(each),
     ..Rule::DEFAULTS
@@ -20,6 +21,13 @@ const TOLERANCE: Param = Param::number(
     1e-6,
     "m",
     "largest sOffset of the first record that is accepted",
+);
+
+const GRAVE: Param = Param::number(
+    "grave",
+    0.1,
+    "m",
+    "in versions before 1.7, a first record that starts no later than this is a warning",
 );
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
@@ -48,12 +56,18 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         };
         if let Some(begin) = first.start().filter(|begin| begin.abs() > tolerance) {
             let text = format!(
-                "the first `{name}` of lane {id} has sOffset = {begin}; there must be one with sOffset = 0, \
-                 so that it is defined for the whole lane section"
+                "the first `{name}` of lane {id} has sOffset = {}; there must be one with sOffset = 0, \
+                 so that it is defined for the whole lane section",
+                number(begin)
             );
-            found
+            let older = found.version() < Some(Version::new(1, 7));
+            let is_mild = older && begin.abs() <= found.number(&GRAVE);
+            let finding = found
                 .issue(Place::attribute_or_node(first.node(), "sOffset"), text)
                 .road(lane.at.road.id(), s, 0.0);
+            if is_mild {
+                finding.level(Level::Warning);
+            }
         }
     }
 }

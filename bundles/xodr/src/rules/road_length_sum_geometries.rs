@@ -1,6 +1,7 @@
 use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink};
+use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink, Version};
 
+use crate::families::shown::number;
 use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
@@ -8,9 +9,9 @@ pub static RULE: Rule<Roads> = Rule {
     uids: &["asam.net:xodr:1.9.0:road.length_sum_geometries"],
     level: Level::Warning,
     versions: "1.9.0..",
-    backport: Backport::Lower { since: "1.4.0" },
+    backport: Backport::Alike { since: "1.4.0" },
     after: super::READABLE,
-    params: &[TOLERANCE],
+    params: &[TOLERANCE, GRAVE],
     page: include_str!("road_length_sum_geometries.md"),
     each: Some(each),
     ..Rule::DEFAULTS
@@ -22,6 +23,12 @@ const TOLERANCE: Param = Param::number(
     "m",
     "largest difference that is accepted, on long roads a millionth of the length",
 );
+const GRAVE: Param = Param::number(
+    "grave",
+    1.0,
+    "m",
+    "a road that is longer than its geometries by more has a stretch without a place, which is an error",
+);
 /// What a sum of lengths written with few digits may be off, as a share of it.
 const RELATIVE: f64 = 1e-6;
 
@@ -29,6 +36,12 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let tolerance = found.number(&TOLERANCE);
     for road in map.part(part).roads() {
         let geometries = road.plan_view().geometries();
+        if geometries
+            .iter()
+            .any(|one| one.length().is_some_and(|length| length < 0.0))
+        {
+            continue;
+        }
         let sum: Option<f64> = geometries.iter().map(|geometry| geometry.length()).sum();
         let (Some(length), Some(sum)) = (road.length(), sum.filter(|_| !geometries.is_empty()))
         else {
@@ -36,12 +49,22 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         };
         if (length - sum).abs() > tolerance.max(RELATIVE * sum) {
             let text = format!(
-                "road `{}` is said to be {length} m long, but its geometries are {sum} m long together; the \
+                "road `{}` is said to be {} m long, but its geometries are {} m long together; the \
                  two should be equal (accepted: {tolerance} m)",
-                road.id()
+                road.id(),
+                number(length),
+                number(sum)
             );
+            let level = if length - sum > found.number(&GRAVE) {
+                Level::Error
+            } else if found.version() < Some(Version::new(1, 9)) {
+                Level::Information
+            } else {
+                Level::Warning
+            };
             found
                 .issue(Place::attribute_or_node(road.node(), "length"), text)
+                .level(level)
                 .road(road.id(), length.min(sum), 0.0);
         }
     }

@@ -1,0 +1,34 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Place, Rule, Sink};
+
+use crate::families::shown::number;
+use crate::model::{Part, Roads};
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_geometry_length_not_negative",
+    uids: &["qcbus.dev:xodr:1.0.0:geometry.length_not_negative"],
+    // From 1.5 on the schema says so.
+    versions: "..1.5.0",
+    after: super::READABLE,
+    page: include_str!("geometry_length_not_negative.md"),
+    each: Some(each),
+    ..Rule::DEFAULTS
+};
+
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
+        for geometry in road.plan_view().geometries() {
+            let Some(length) = geometry.length().filter(|length| *length < 0.0) else {
+                continue;
+            };
+            let text = format!(
+                "this piece of the reference line is {} m long; a length must not be negative",
+                number(length)
+            );
+            let finding = found.issue(Place::attribute_or_node(geometry.node(), "length"), text);
+            if let Some(s) = geometry.s() {
+                finding.road(road.id(), s, 0.0);
+            }
+        }
+    }
+}

@@ -1,0 +1,61 @@
+use qcbus_opendrive::{Profile, Road, RoadMap};
+use qcbus_sdk::{Level, Param, Place, Rule, Sink};
+
+use crate::families::shown::number;
+use crate::model::{Part, Roads};
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_profiles_begin_with_road",
+    uids: &["qcbus.dev:xodr:1.0.0:profiles.begin_with_road"],
+    level: Level::Warning,
+    after: super::READABLE,
+    params: &[TOLERANCE],
+    page: include_str!("profiles_begin_with_road.md"),
+    each: Some(each),
+    ..Rule::DEFAULTS
+};
+
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    0.01,
+    "m",
+    "a first record that starts no later than this counts as one at s = 0",
+);
+
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
+        check(road, "elevation", road.elevation(), found);
+        check(
+            road,
+            "superelevation",
+            &road.lateral().superelevation,
+            found,
+        );
+        if let Some(layer) = road.permanent() {
+            check(road, "lane offset", layer.offset(), found);
+        }
+    }
+}
+
+fn check(road: &Road<'_>, what: &str, profile: &Profile<'_>, found: &mut Sink<'_>) {
+    let Some(first) = profile.in_order().next() else {
+        return;
+    };
+    let Some(s) = first.start().filter(|s| *s > found.number(&TOLERANCE)) else {
+        return;
+    };
+    // Whoever writes nothing but zeros says the same with every record.
+    let flat = |at: f64| first.at(at) == Some(0.0);
+    if profile.records().len() == 1 && flat(0.0) && flat(1.0) && flat(2.0) {
+        return;
+    }
+    let text = format!(
+        "the first record of the {what} of road `{}` starts at s = {}, and nothing says what holds before; there \
+         should be one at s = 0",
+        road.id(),
+        number(s)
+    );
+    found
+        .issue(Place::attribute_or_node(first.node(), "s"), text)
+        .road(road.id(), s, 0.0);
+}

@@ -1,0 +1,92 @@
+use qcbus_document::Node;
+use qcbus_opendrive::{Profile, Road, RoadMap};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::model::{Part, Roads};
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_records_are_complete",
+    uids: &["qcbus.dev:xodr:1.0.0:records.are_complete"],
+    level: Level::Warning,
+    // From 1.5 on the schema demands these attributes.
+    versions: "..1.5.0",
+    after: super::READABLE,
+    page: include_str!("records_are_complete.md"),
+    each: Some(each),
+    ..Rule::DEFAULTS
+};
+
+const CUBIC: [&str; 5] = ["s", "a", "b", "c", "d"];
+const IN_SECTION: [&str; 5] = ["sOffset", "a", "b", "c", "d"];
+const SHAPE: [&str; 6] = ["s", "t", "a", "b", "c", "d"];
+const GEOMETRY: [&str; 5] = ["s", "x", "y", "hdg", "length"];
+
+/// What the curves of a reference line must have.
+const CURVES: [(&str, &[&str]); 4] = [
+    ("arc", &["curvature"]),
+    ("spiral", &["curvStart", "curvEnd"]),
+    ("poly3", &["a", "b", "c", "d"]),
+    (
+        "paramPoly3",
+        &["aU", "bU", "cU", "dU", "aV", "bV", "cV", "dV"],
+    ),
+];
+
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
+        of_reference_line(road, found);
+        of_profile(road, road.elevation(), found);
+        of_profile(road, &road.lateral().superelevation, found);
+        for row in road.lateral().shape.rows() {
+            for record in row.profile.records() {
+                check(road, record.node(), &SHAPE, found);
+            }
+        }
+        if let Some(layer) = road.permanent() {
+            of_profile(road, layer.offset(), found);
+        }
+    }
+    for lane in map.part(part).lanes() {
+        for profile in [lane.widths(), lane.borders()] {
+            for record in profile.records() {
+                check(lane.at.road, record.node(), &IN_SECTION, found);
+            }
+        }
+    }
+}
+
+fn of_reference_line(road: &Road<'_>, found: &mut Sink<'_>) {
+    for geometry in road.plan_view().geometries() {
+        check(road, geometry.node(), &GEOMETRY, found);
+        for shape in geometry.shapes() {
+            if let Some((_, names)) = CURVES.iter().find(|(name, _)| shape.is(name)) {
+                check(road, shape, names, found);
+            }
+        }
+    }
+}
+
+fn of_profile(road: &Road<'_>, profile: &Profile<'_>, found: &mut Sink<'_>) {
+    for record in profile.records() {
+        check(road, record.node(), &CUBIC, found);
+    }
+}
+
+fn check(road: &Road<'_>, node: Node<'_>, names: &[&str], found: &mut Sink<'_>) {
+    let missing: Vec<String> = names
+        .iter()
+        .filter(|name| node.attribute(name).is_none())
+        .map(|name| format!("`{name}`"))
+        .collect();
+    if missing.is_empty() {
+        return;
+    }
+    let text = format!(
+        "this `{}` of road `{}` has no {}; it should have all of {}, for readers make up what is missing",
+        node.name(),
+        road.id(),
+        missing.join(" and no "),
+        names.join(", ")
+    );
+    found.issue(node, text);
+}
