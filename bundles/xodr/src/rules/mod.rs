@@ -9,6 +9,7 @@ mod geometry_length_not_negative;
 mod header_attributes;
 mod header_offset_centered_coords;
 mod header_proj_max_one_proj;
+mod header_version_published;
 mod ids_id_unique_in_class;
 mod ids_id_unique_in_lane_section;
 mod ids_only_ref_defined_ids;
@@ -522,4 +523,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &lane_section_single_side::RULE,
     &profiles_begin_with_road::RULE,
     &records_are_complete::RULE,
+    &header_version_published::RULE,
 ];

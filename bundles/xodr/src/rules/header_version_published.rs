@@ -1,0 +1,50 @@
+use qcbus_document::Document;
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+pub static RULE: Rule<Document> = Rule {
+    id: "check_qcbus_xodr_header_version_published",
+    uids: &["qcbus.dev:xodr:1.4.0:header.version_published"],
+    after: super::READABLE,
+    page: include_str!("header_version_published.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(document: &Document<'_>, found: &mut Sink<'_>) {
+    // A version that is missing or no number is the finding of the rule about the header.
+    let header = document.root().and_then(|root| root.child("header"));
+    let (Some(header), Some(version)) = (header, found.version()) else {
+        return;
+    };
+    let (level, why) = match (version.major, version.minor) {
+        (1, 0..=9) => return,
+        (0, _) => (
+            Level::Warning,
+            "numbers before that were drafts, which readers of today do not know",
+        ),
+        (1, 10) => (
+            Level::Warning,
+            "the next one is not known yet; the file is judged as if it were 1.9",
+        ),
+        (1, _) => (
+            Level::Error,
+            "nobody can say what holds for such a file; it is judged as if it were 1.9",
+        ),
+        _ => (
+            Level::Error,
+            "nobody can say what holds for such a file; it is judged by the rules of 1.9 as far as they apply",
+        ),
+    };
+    let text = format!(
+        "the file says that its version is {}.{}; published are 1.0 to 1.9: {why}",
+        version.major, version.minor
+    );
+    let attribute = if version.major == 1 {
+        "revMinor"
+    } else {
+        "revMajor"
+    };
+    found
+        .issue(Place::attribute_or_node(header, attribute), text)
+        .level(level);
+}
