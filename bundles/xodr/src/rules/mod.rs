@@ -7,6 +7,7 @@ use qcbus_sdk::AnyRule;
 mod default_regulations_only_speed_priority;
 mod geometry_length_not_negative;
 mod header_attributes;
+mod header_geo_reference;
 mod header_offset_centered_coords;
 mod header_proj_max_one_proj;
 mod header_version_published;
@@ -524,4 +525,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &profiles_begin_with_road::RULE,
     &records_are_complete::RULE,
     &header_version_published::RULE,
+    &header_geo_reference::RULE,
 ];

@@ -1,0 +1,141 @@
+//! In which form a `geoReference` is written. The standard asks for a PROJ string; what PROJ reads besides, such as
+//! well-known text and codes of EPSG, is found in maps as well and does no harm where PROJ itself reads the map.
+
+use qcbus_sdk::Level;
+
+use super::proj_string::{self, Flaw};
+
+/// The names with which well-known text begins; the last ones give degrees, no plane.
+const WKT: &[&str] = &[
+    "PROJCS",
+    "PROJCRS",
+    "PROJECTEDCRS",
+    "DERIVEDPROJCRS",
+    "COMPD_CS",
+    "COMPOUNDCRS",
+    "BOUNDCRS",
+    "LOCAL_CS",
+    "ENGCRS",
+    "ENGINEERINGCRS",
+];
+const WKT_IN_DEGREES: &[&str] = &[
+    "GEOGCS",
+    "GEOGCRS",
+    "GEOGRAPHICCRS",
+    "GEODCRS",
+    "GEODETICCRS",
+    "GEOCCS",
+];
+
+/// Those who give codes for reference systems that PROJ knows.
+const AUTHORITIES: &[&str] = &["EPSG", "ESRI", "IGNF", "IAU_2015", "NKG", "OGC"];
+
+/// Codes of EPSG for coordinates in degrees: WGS 84, with height, ETRS89, NAD83.
+const DEGREES: &[u32] = &[4326, 4979, 4258, 4269];
+
+/// What is wrong with the text of a `geoReference` that is not empty.
+pub(crate) fn flaws(text: &str) -> Vec<Flaw> {
+    if text.starts_with("<![CDATA[") {
+        return vec![warning(format!(
+            "the text begins with `{}`: the marks of CDATA are escaped and so part of the text, which then is no \
+             PROJ string; they must be written as they are, or be left out",
+            short(text)
+        ))];
+    }
+    if let Some(found) = wkt(text).or_else(|| code(text)) {
+        return vec![found];
+    }
+    if text.starts_with('{') && text.ends_with('}') {
+        return vec![other_form("PROJ's JSON")];
+    }
+    if proj_string::is_one(text) {
+        return proj_string::flaws(text);
+    }
+    vec![warning(format!(
+        "`{}` is no PROJ string; it must name a projection, such as `+proj=utm +zone=32`",
+        short(text)
+    ))]
+}
+
+fn wkt(text: &str) -> Option<Flaw> {
+    let head = text.split(['[', '(']).next()?.trim().to_ascii_uppercase();
+    let in_degrees = WKT_IN_DEGREES.contains(&head.as_str());
+    if head.len() == text.len() || !(in_degrees || WKT.contains(&head.as_str())) {
+        return None;
+    }
+    let depth = text.split('"').step_by(2).flat_map(str::chars);
+    let depth = depth.fold(0_i64, |depth, letter| match letter {
+        '[' | '(' => depth + 1,
+        ']' | ')' => depth - 1,
+        _ => depth,
+    });
+    Some(if depth != 0 || text.matches('"').count() % 2 == 1 {
+        warning(format!(
+            "the well-known text that begins with `{}` is cut off or broken: its brackets or quotes are not closed",
+            short(text)
+        ))
+    } else if in_degrees {
+        no_plane(&head)
+    } else {
+        other_form("well-known text")
+    })
+}
+
+fn code(text: &str) -> Option<Flaw> {
+    let lower = text.to_ascii_lowercase();
+    if lower.starts_with("urn:ogc:def:crs:") || lower.contains("opengis.net/def/crs/") {
+        return Some(other_form("a URN or URL"));
+    }
+    let (authority, code) = text.split_once(':')?;
+    let (authority, code) = (authority.trim().to_ascii_uppercase(), code.trim());
+    if !AUTHORITIES.contains(&authority.as_str()) {
+        return None;
+    }
+    if authority != "EPSG" {
+        return Some(other_form("a code"));
+    }
+    let horizontal = code.split('+').next()?.trim();
+    Some(match horizontal.parse() {
+        Ok(number) if DEGREES.contains(&number) => no_plane(text),
+        Ok(1024..=32_767) => other_form("a code of EPSG"),
+        _ => warning(format!(
+            "`{}` is no code of EPSG, which are numbers from 1024 to 32767",
+            short(text)
+        )),
+    })
+}
+
+fn other_form(form: &str) -> Flaw {
+    Flaw {
+        level: Level::Information,
+        text: format!(
+            "`geoReference` is {form}, which not every reader of maps understands; a PROJ string is asked for, such \
+             as `+proj=utm +zone=32`"
+        ),
+    }
+}
+
+fn no_plane(what: &str) -> Flaw {
+    warning(format!(
+        "`{what}` gives degrees and no projection onto a plane, but x and y of the map are metres on one"
+    ))
+}
+
+fn warning(text: String) -> Flaw {
+    Flaw {
+        level: Level::Warning,
+        text,
+    }
+}
+
+/// The beginning of a long text.
+fn short(text: &str) -> String {
+    let mut letters = text.chars();
+    let start: String = letters.by_ref().take(40).collect();
+    let start = start.split_whitespace().collect::<Vec<_>>().join(" ");
+    if letters.next().is_some() {
+        format!("{start}…")
+    } else {
+        start
+    }
+}

@@ -1,0 +1,38 @@
+//! The names that PROJ knows, <https://proj.org>: its operations, ellipsoids, datums, prime meridians and units,
+//! as listed by `proj -l`, `-le`, `-ld`, `-lm` and `-lu` of PROJ 9. They are compared as PROJ does it, with case.
+
+/// What `+proj=` may name.
+pub(crate) const OPERATIONS: &str = "\
+    adams_hemi adams_ws1 adams_ws2 aea aeqd affine airocean airy aitoff alsk apian august axisswap bacon bertin1953 \
+    bipc boggs bonne calcofi cart cass cc ccon cea chamb col_urban collg comill crast defmodel deformation denoy \
+    eck1 eck2 eck3 eck4 eck5 eck6 eqc eqdc eqearth etmerc euler fahey fouc fouc_s gall geoc geocent geogoffset geos \
+    gins8 gn_sinu gnom goode gridshift gs48 gs50 gstmerc gtoc guyou hammer hatano healpix helmert hgridshift horner \
+    igh igh_o imoll imoll_o imw_p isea kav5 kav7 krovak labrd laea lagrng larr lask latlon latlong lcc lcca leac \
+    lee_os longlat lonlat loxim lsat mbt_fps mbt_s mbtfpp mbtfpq mbtfps merc mil_os mill misrsom mod_krovak moll \
+    molobadekas molodensky murd1 murd2 murd3 natearth natearth2 nell nell_h nicol noop nsper nzmg ob_tran ocea oea \
+    omerc ortel ortho patterson pconic peirce_q pipeline poly pop push putp1 putp2 putp3 putp3p putp4p putp5 putp5p \
+    putp6 putp6p qsc qua_aut rhealpix robin rouss rpoly s2 sch set sinu som somerc spilhaus stere sterea tcc tcea \
+    times tinshift tissot tmerc tobmerc topocentric tpeqd tpers unitconvert ups urm5 urmfps utm vandg vandg2 vandg3 \
+    vandg4 vertoffset vgridshift vitk1 wag1 wag2 wag3 wag4 wag5 wag6 wag7 webmerc weren wink1 wink2 wintri \
+    xyzgridshift";
+
+/// What `+ellps=` may name.
+pub(crate) const ELLIPSOIDS: &str = "\
+    APL4.9 CPM danish GRS67 GRS80 GSK2011 IAU76 MERIT NWL9D PZ90 SEasia SGS85 WGS60 WGS66 WGS72 WGS84 airy andrae \
+    aust_SA bess_nam bessel clrk66 clrk80 clrk80ign delmbr engelis evrst30 evrst48 evrst56 evrst69 evrstSS fschr60 \
+    fschr60m fschr68 helmert hough intl kaula krass lerch mod_airy mprts new_intl plessis sphere walbeck";
+
+/// What `+datum=` may name.
+pub(crate) const DATUMS: &str =
+    "WGS84 GGRS87 NAD83 NAD27 potsdam carthage hermannskogel ire65 nzgd49 OSGB36";
+
+/// What `+pm=` may name beside a number.
+pub(crate) const MERIDIANS: &str = "\
+    greenwich lisbon paris bogota madrid rome bern jakarta ferro brussels stockholm athens oslo copenhagen";
+
+/// What `+units=` and `+vunits=` may name.
+pub(crate) const UNITS: &str = "\
+    m km dm cm mm kmi in ft yd mi fath ch link us-in us-ft us-yd us-ch us-mi ind-yd ind-ft ind-ch";
+
+/// Operations whose result is not in metres on a plane: degrees, or coordinates from the Earth's centre.
+pub(crate) const NO_PROJECTIONS: &str = "longlat lonlat latlong latlon geocent cart noop";

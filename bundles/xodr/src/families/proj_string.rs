@@ -1,0 +1,341 @@
+//! What is wrong with a PROJ string. PROJ itself stays silent about much of it: it ignores names that it does not
+//! know, and takes defaults for what is missing.
+
+use qcbus_schema::closest;
+use qcbus_sdk::Level;
+
+use super::proj_names::{DATUMS, ELLIPSOIDS, MERIDIANS, NO_PROJECTIONS, OPERATIONS, UNITS};
+
+/// One thing that is wrong, in words.
+pub(crate) struct Flaw {
+    pub(crate) level: Level,
+    pub(crate) text: String,
+}
+
+/// The parameters that are angles, with the greatest value [°].
+const ANGLES: &[(&str, f64)] = &[
+    ("lat_0", 90.0),
+    ("lat_1", 90.0),
+    ("lat_2", 90.0),
+    ("lat_3", 90.0),
+    ("lat_ts", 90.0),
+    ("lon_0", 360.0),
+    ("lon_1", 360.0),
+    ("lon_2", 360.0),
+    ("lon_3", 360.0),
+    ("lonc", 360.0),
+    ("alpha", 360.0),
+    ("gamma", 360.0),
+];
+
+/// The parameters that are numbers; whether they must be greater than zero.
+const NUMBERS: &[(&str, bool)] = &[
+    ("x_0", false),
+    ("y_0", false),
+    ("z_0", false),
+    ("k", true),
+    ("k_0", true),
+    ("a", true),
+    ("b", true),
+    ("R", true),
+    ("rf", true),
+    ("to_meter", true),
+];
+
+/// The parameters that name something, and what.
+const CHOICES: &[(&str, &str, &str)] = &[
+    ("proj", "projection", OPERATIONS),
+    ("ellps", "ellipsoid", ELLIPSOIDS),
+    ("datum", "datum", DATUMS),
+    ("units", "unit of length", UNITS),
+    ("vunits", "unit of length", UNITS),
+];
+
+/// Projections onto a cone, which one or two latitudes define.
+const CONES: &[&str] = &["lcc", "aea", "eqdc"];
+
+/// A word of the string: `+key=value` or `+key`.
+struct Word<'t> {
+    key: &'t str,
+    value: Option<&'t str>,
+}
+
+/// Whether a text means to be a PROJ string.
+pub(crate) fn is_one(text: &str) -> bool {
+    joined(text).split_whitespace().any(|word| {
+        let name = word.trim_start_matches('+');
+        word.len() > name.len() || name.starts_with("proj=") || name.starts_with("init=")
+    })
+}
+
+/// All that is wrong with it.
+pub(crate) fn flaws(text: &str) -> Vec<Flaw> {
+    let text = joined(text);
+    let words: Vec<Word<'_>> = text.split_whitespace().map(word).collect();
+    let value = |key: &str| words.iter().find(|word| word.key == key)?.value;
+    let projection = value("proj");
+    let is_pipeline = words.iter().any(|word| word.value == Some("pipeline"));
+    let mut flaws = Vec::new();
+    let mut warn = |text: String| {
+        flaws.push(Flaw {
+            level: Level::Warning,
+            text,
+        });
+    };
+    if !words.iter().any(|word| matches!(word.key, "proj" | "init")) {
+        warn(
+            "`geoReference` names no projection; a PROJ string needs one, such as `+proj=utm +zone=32` or \
+             `+proj=tmerc +lat_0=48 +lon_0=11`"
+                .to_owned(),
+        );
+    }
+    for word in &words {
+        // The steps of a pipeline have parameters of their own.
+        if (!is_pipeline || word.key == "proj")
+            && let Some(text) = flaw(word)
+        {
+            warn(text);
+        }
+    }
+    if is_pipeline {
+        return flaws;
+    }
+    if let Some(name) = projection.filter(|name| names(NO_PROJECTIONS).any(|one| one == *name)) {
+        warn(format!(
+            "`+proj={name}` is no projection onto a plane, but x and y of the map are metres on one, such as \
+             `+proj=utm` or `+proj=tmerc` give"
+        ));
+    }
+    if projection == Some("utm") {
+        warn_of_zone(value("zone"), value("lon_0"), &mut warn);
+    }
+    let latitude = |key| value(key).and_then(degrees).unwrap_or(0.0);
+    if let Some(cone) = projection.filter(|name| CONES.contains(name))
+        && latitude("lat_1") + latitude("lat_2") == 0.0
+    {
+        warn(format!(
+            "`+proj={cone}` needs the latitudes of its cone, `+lat_1` and mostly `+lat_2`, which must not cancel each other"
+        ));
+    }
+    twice(&words, &mut warn);
+    flaws
+}
+
+/// The string without blanks around `=`, which PROJ allows; a value that is missing stays missing.
+fn joined(text: &str) -> String {
+    let mut all = String::with_capacity(text.len());
+    for (index, part) in text.split('=').map(str::trim).enumerate() {
+        if index > 0 {
+            all.push('=');
+            let next = part.strip_prefix('+').and_then(|part| part.chars().next());
+            if next.is_some_and(char::is_alphabetic) {
+                all.push(' ');
+            }
+        }
+        all.push_str(part);
+    }
+    all
+}
+
+fn word(text: &str) -> Word<'_> {
+    let text = text.trim_start_matches('+');
+    match text.split_once('=') {
+        Some((key, value)) => Word {
+            key,
+            value: Some(value.trim_matches('"')),
+        },
+        None => Word {
+            key: text,
+            value: None,
+        },
+    }
+}
+
+fn names(list: &'static str) -> impl Iterator<Item = &'static str> {
+    list.split_whitespace()
+}
+
+/// The parameters that need a value.
+fn keys() -> impl Iterator<Item = &'static str> {
+    let angles = ANGLES.iter().map(|(key, _)| *key);
+    let numbers = NUMBERS.iter().map(|(key, _)| *key);
+    let choices = CHOICES.iter().map(|(key, ..)| *key);
+    angles
+        .chain(numbers)
+        .chain(choices)
+        .chain(["zone", "pm", "init"])
+}
+
+fn flaw(word: &Word<'_>) -> Option<String> {
+    let key = word.key;
+    let Some(value) = word.value.filter(|value| !value.is_empty()) else {
+        return without_value(word);
+    };
+    if let Some((_, most)) = ANGLES.iter().find(|(name, _)| *name == key) {
+        let what = if *most < 100.0 { "latitude" } else { "angle" };
+        return match degrees(value) {
+            Some(angle) if angle.abs() <= *most => None,
+            Some(_) => Some(format!(
+                "`+{key}={value}` is no {what}; it must lie between -{most}° and {most}°"
+            )),
+            None => Some(format!(
+                "`+{key}={value}` is no {what}; it must be a number of degrees, with a point for the decimals"
+            )),
+        };
+    }
+    if let Some((_, positive)) = NUMBERS.iter().find(|(name, _)| *name == key) {
+        return match number(value) {
+            Some(number) if !positive || number > 0.0 => scale(key, value, number),
+            Some(_) => Some(format!("`+{key}={value}` must be greater than zero")),
+            None => Some(format!(
+                "`+{key}={value}` is no number; PROJ reads digits with a point for the decimals"
+            )),
+        };
+    }
+    if let Some((_, what, list)) = CHOICES.iter().find(|(name, ..)| *name == key) {
+        return unknown(key, value, what, list);
+    }
+    if key == "pm" && degrees(value).is_none() {
+        return unknown(key, value, "prime meridian", MERIDIANS);
+    }
+    misspelt(key)
+}
+
+/// Scales far from 1 and units other than metres: the coordinates of a map are metres.
+fn scale(key: &str, value: &str, number: f64) -> Option<String> {
+    match key {
+        "k" | "k_0" if !(0.5..=2.0).contains(&number) => Some(format!(
+            "`+{key}={value}` scales all lengths by that factor, which is 1 or little less, such as 0.9996"
+        )),
+        "to_meter" if (number - 1.0).abs() > 1e-9 => Some(format!(
+            "`+{key}={value}` counts in units of {value} m, but x and y of the map are metres"
+        )),
+        _ => None,
+    }
+}
+
+fn unknown(key: &str, value: &str, what: &str, list: &'static str) -> Option<String> {
+    if names(list).any(|name| name == value) {
+        return (key == "units" && value != "m").then(|| {
+            format!("`+units={value}` counts in `{value}`, but x and y of the map are metres, `+units=m`")
+        });
+    }
+    let meant = match closest(value, names(list)) {
+        Some(meant) => format!("; did you mean `{meant}`?"),
+        None if names(list).count() < 15 => {
+            format!(
+                "; it knows `{}`",
+                names(list).collect::<Vec<_>>().join("`, `")
+            )
+        }
+        None => String::new(),
+    };
+    Some(format!(
+        "`+{key}={value}`: PROJ knows no {what} of that name{meant}"
+    ))
+}
+
+/// `+lat_0`, `+lat_0=` and `+lat_048`.
+fn without_value(word: &Word<'_>) -> Option<String> {
+    let key = word.key;
+    let run_together = |name: &&str| {
+        let rest = key.strip_prefix(*name);
+        word.value.is_none() && rest.is_some_and(|rest| !rest.is_empty() && number(rest).is_some())
+    };
+    if let Some(name) = keys().find(|name| *name == key) {
+        return Some(format!("`+{name}` has no value; write `+{name}=…`"));
+    }
+    // The longest one: `lat_048` is `lat_0`, and neither `k` nor `a` takes digits without being one of these.
+    let name = keys().filter(|name| name.len() > 2).find(run_together)?;
+    let rest = key.strip_prefix(name)?;
+    Some(format!("`+{key}` lacks the `=`; write `+{name}={rest}`"))
+}
+
+/// `+lat0` and `+Lon_0`, which PROJ ignores without a word.
+fn misspelt(key: &str) -> Option<String> {
+    let plain = |name: &str| name.replace(['_', '-'], "").to_ascii_lowercase();
+    let meant = keys().find(|name| name.len() > 1 && plain(name) == plain(key) && *name != key)?;
+    Some(format!(
+        "PROJ knows no parameter `+{key}` and ignores it; did you mean `+{meant}`?"
+    ))
+}
+
+fn warn_of_zone(zone: Option<&str>, longitude: Option<&str>, warn: &mut impl FnMut(String)) {
+    match zone {
+        Some("") => {}
+        Some(zone) if zone.parse::<u8>().is_ok_and(|zone| (1..=60).contains(&zone)) => {}
+        Some(zone) => warn(format!(
+            "`+zone={zone}` is no zone of UTM; there are zones 1 to 60, the south is named with `+south`"
+        )),
+        None if longitude.is_none() => warn(
+            "`+proj=utm` has no `+zone`; without it PROJ takes zone 31, so the zone must be given, from 1 to 60"
+                .to_owned(),
+        ),
+        None => {}
+    }
+}
+
+/// One parameter with two values: PROJ takes the first.
+fn twice(words: &[Word<'_>], warn: &mut impl FnMut(String)) {
+    for (index, word) in words.iter().enumerate() {
+        let mut before = words.iter().take(index);
+        // Two projections are a finding of their own.
+        if let Some(value) = word.value
+            && word.key != "proj"
+            && keys().any(|key| key == word.key)
+            && let Some(first) = before.find(|first| first.key == word.key)
+            && first.value.is_some_and(|first| first != value)
+        {
+            warn(format!(
+                "`+{}` is given twice, as `{}` and as `{value}`; PROJ takes the first",
+                word.key,
+                first.value.unwrap_or_default()
+            ));
+        }
+    }
+}
+
+fn number(text: &str) -> Option<f64> {
+    text.parse().ok().filter(|number: &f64| number.is_finite())
+}
+
+/// Degrees as PROJ writes them: `11.5`, `-12d30'15.5"`, `9E`, `0.2r` (radians).
+fn degrees(text: &str) -> Option<f64> {
+    if let Some(degrees) = number(text) {
+        return Some(degrees);
+    }
+    if let Some(radians) = text.strip_suffix('r').and_then(number) {
+        return Some(radians.to_degrees());
+    }
+    let (text, sign) = match text.strip_suffix(['S', 's', 'W', 'w']) {
+        Some(text) => (text, -1.0),
+        None => (text.strip_suffix(['N', 'n', 'E', 'e']).unwrap_or(text), 1.0),
+    };
+    let sign = if text.starts_with('-') { -sign } else { sign };
+    let text = text.trim_start_matches(['-', '+']);
+    let mut parts = text.split(['d', 'D', '°', '\'', '"']);
+    let whole = parts.next().and_then(number)?;
+    let mut sum = whole;
+    for (part, share) in parts.zip([60.0, 3600.0, f64::INFINITY]) {
+        if !part.is_empty() {
+            sum += number(part)? / share;
+        }
+    }
+    Some(sign * sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::degrees;
+
+    #[test]
+    fn degrees_as_proj_writes_them() {
+        assert_eq!(degrees("11.5"), Some(11.5));
+        assert_eq!(degrees("-12d30'"), Some(-12.5));
+        assert_eq!(degrees("12d30'36\"W"), Some(-12.51));
+        assert_eq!(degrees("9E"), Some(9.0));
+        for wrong in ["48,1", "north", "", "d", "12x"] {
+            assert_eq!(degrees(wrong), None, "{wrong}");
+        }
+    }
+}

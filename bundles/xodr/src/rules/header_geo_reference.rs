@@ -1,0 +1,47 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::georeference::flaws;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_header_geo_reference",
+    uids: &["qcbus.dev:xodr:1.4.0:header.geo_reference"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("header_geo_reference.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let header = map.header().into_iter();
+    for reference in header.flat_map(|header| header.children_named("geoReference")) {
+        check(reference, found);
+    }
+}
+
+fn check(reference: Node<'_>, found: &mut Sink<'_>) {
+    let text = reference.text();
+    let text = text.trim();
+    if !text.is_empty() {
+        for flaw in flaws(text) {
+            found.issue(reference, flaw.text).level(flaw.level);
+        }
+        return;
+    }
+    // What is included is not known here.
+    if reference.child("include").is_some() {
+        return;
+    }
+    let what = match reference.children().find(|child| !child.is("userData")) {
+        Some(child) => format!("holds `{}` and no text", child.name()),
+        None => "is empty".to_owned(),
+    };
+    let text = format!(
+        "`geoReference` {what}; it must name a projection, such as `+proj=utm +zone=32`, or be left out where the \
+         map lies nowhere on Earth"
+    );
+    found.issue(reference, text);
+}
