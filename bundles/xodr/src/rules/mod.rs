@@ -9,6 +9,7 @@ mod geometry_length_not_negative;
 mod header_attributes;
 mod header_geo_reference;
 mod header_offset_centered_coords;
+mod header_offset_plausible;
 mod header_proj_max_one_proj;
 mod header_version_published;
 mod ids_id_unique_in_class;
@@ -526,4 +527,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &records_are_complete::RULE,
     &header_version_published::RULE,
     &header_geo_reference::RULE,
+    &header_offset_plausible::RULE,
 ];

@@ -1,0 +1,76 @@
+use std::f64::consts::TAU;
+
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Param, Place, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_header_offset_plausible",
+    uids: &["qcbus.dev:xodr:1.4.0:header.offset_plausible"],
+    level: Level::Warning,
+    after: super::READABLE,
+    params: &[DISTANCE, HEIGHT],
+    page: include_str!("header_offset_plausible.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// Zones of Gauss and Krüger may be written in front of the easting: 60 500 000 is the middle of the sixtieth.
+const DISTANCE: Param = Param::number(
+    "distance",
+    1e8,
+    "m",
+    "largest x and y of the offset that a projection can give",
+);
+
+const HEIGHT: Param = Param::number(
+    "height",
+    1e4,
+    "m",
+    "largest z of the offset that is taken for a height on Earth",
+);
+
+/// Headings smaller than this turn nothing: at 100 km they are 0.1 mm.
+const LEAST_HEADING: f64 = 1e-9;
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let Some(offset) = map.header().and_then(|header| header.child("offset")) else {
+        return;
+    };
+    // What is no finite number is another rule's finding.
+    let value = |name| offset.f64(name).ok().filter(|number| number.is_finite());
+    for (name, limit) in [("x", &DISTANCE), ("y", &DISTANCE), ("z", &HEIGHT)] {
+        let limit = found.number(limit);
+        if let Some(number) = value(name).filter(|number| number.abs() > limit) {
+            let text = format!(
+                "`{name}` of the offset is {number} m, which no place on Earth has in any projection (accepted: {limit} m)"
+            );
+            found.issue(Place::attribute_or_node(offset, name), text);
+        }
+    }
+    let Some(heading) = value("hdg").filter(|heading| heading.abs() > LEAST_HEADING) else {
+        return;
+    };
+    let (level, text) = if heading.abs() > TAU {
+        (
+            Level::Warning,
+            format!(
+                "`hdg` of the offset is {heading} rad, more than a full turn of 6.283; was it meant in degrees? then it \
+                 is {:.6} rad",
+                heading.to_radians()
+            ),
+        )
+    } else {
+        (
+            Level::Information,
+            format!(
+                "`hdg` of the offset turns the whole map by {:.3}°; rotation should be avoided, as many readers ignore it",
+                heading.to_degrees()
+            ),
+        )
+    };
+    found
+        .issue(Place::attribute_or_node(offset, "hdg"), text)
+        .level(level);
+}
