@@ -9,6 +9,8 @@
 mod beyond;
 #[path = "tricky/build.rs"]
 mod build;
+#[path = "tricky/header.rs"]
+mod header;
 #[path = "tricky/junctions.rs"]
 mod junctions;
 #[path = "tricky/lane_links.rs"]
@@ -68,10 +70,16 @@ fn findings(plan: &Plan, file: &[u8]) -> BTreeSet<String> {
 
 /// Runs a table over maps of version 1.9.
 fn run(rows: &[Row]) {
+    let whole = |(what, map, expected): &Row| (*what, build::file("9", map), *expected);
+    run_files(&rows.iter().map(whole).collect::<Vec<_>>());
+}
+
+/// Runs a table over whole files.
+fn run_files(rows: &[Row]) {
     let plan = Plan::by_default(&BUNDLE);
     let mut faults = Vec::new();
-    for (what, map, expected) in rows {
-        let found = findings(&plan, build::file("9", map).as_bytes());
+    for (what, file, expected) in rows {
+        let found = findings(&plan, file.as_bytes());
         let expected: BTreeSet<String> = expected.iter().map(|it| (*it).to_owned()).collect();
         if found != expected {
             faults.push(format!("{what}: found {found:?}, expected {expected:?}"));

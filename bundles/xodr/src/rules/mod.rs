@@ -7,6 +7,7 @@ use qcbus_sdk::AnyRule;
 mod default_regulations_only_speed_priority;
 mod geometry_length_not_negative;
 mod header_attributes;
+mod header_bounds_contain_roads;
 mod header_geo_reference;
 mod header_offset_centered_coords;
 mod header_offset_plausible;
@@ -527,5 +528,6 @@ pub static RULES: &[&dyn AnyRule] = &[
     &records_are_complete::RULE,
     &header_version_published::RULE,
     &header_geo_reference::RULE,
+    &header_bounds_contain_roads::RULE,
     &header_offset_plausible::RULE,
 ];
