@@ -40,8 +40,16 @@ const MAPS: [(&str, &str); 4] = [
     ("1.9", include_str!("mutation/all-1.9.xodr")),
 ];
 
-/// Everything that is on by default: read from the rules' pages once, not for every map.
-static PLAN: LazyLock<Plan> = LazyLock::new(|| Plan::by_default(&BUNDLE));
+/// Everything that is on by default, and the profiles of simulators: read from the rules' pages once, not for
+/// every map.
+static PLAN: LazyLock<Plan> = LazyLock::new(|| {
+    let is_on = |id: &'static str, by_default| by_default || name(id).starts_with("profile_");
+    Plan::new(
+        &BUNDLE,
+        |checker| is_on(checker.facts.id, checker.facts.default_on),
+        |_, _| None,
+    )
+});
 
 /// What the rules say of a map, by their names.
 #[derive(Default)]

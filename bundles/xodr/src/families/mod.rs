@@ -36,6 +36,7 @@ pub(crate) mod redundancy;
 pub(crate) mod refline;
 pub(crate) mod roadside;
 pub(crate) mod shown;
+pub(crate) mod simulators;
 pub(crate) mod strips;
 pub(crate) mod surface_boxes;
 pub(crate) mod switches;

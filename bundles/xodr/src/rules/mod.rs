@@ -77,6 +77,9 @@ mod lane_smoothness_profile_no_vertical_gaps;
 mod performance_avoid_redundant_info;
 mod profiles_begin_with_road;
 mod records_are_complete;
+mod profile_carla_ids;
+mod profile_carla_supported;
+mod profile_esmini_supported;
 mod road_corner_local_first_id_zero;
 mod road_corner_local_mandatory_id_with_markings;
 mod road_corner_local_sequential_id_values;
@@ -530,4 +533,7 @@ pub static RULES: &[&dyn AnyRule] = &[
     &header_geo_reference::RULE,
     &header_bounds_contain_roads::RULE,
     &header_offset_plausible::RULE,
+    &profile_carla_ids::RULE,
+    &profile_carla_supported::RULE,
+    &profile_esmini_supported::RULE,
 ];

@@ -1,0 +1,58 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::families::simulators::further;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_profile_carla_ids",
+    uids: &["qcbus.dev:xodr:1.4.0:profile.carla_ids"],
+    level: Level::Warning,
+    after: super::READABLE,
+    default_on: false,
+    page: include_str!("profile_carla_ids.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let roads = map.roads().iter().map(|road| road.node());
+    report("road", "4294967295", is_natural, roads, found);
+    let junctions = || map.junctions().iter().map(|junction| junction.node());
+    report("junction", "2147483647", is_integer, junctions(), found);
+    let connections = junctions().flat_map(|junction| junction.children_named("connection"));
+    report("connection", "4294967295", is_natural, connections, found);
+}
+
+fn is_natural(id: &str) -> bool {
+    id.trim().parse::<u32>().is_ok()
+}
+
+/// Junctions may have the number that means none.
+fn is_integer(id: &str) -> bool {
+    id.trim().parse::<i32>().is_ok()
+}
+
+/// Says the first element whose id is no number of that kind, and how many more there are.
+fn report<'d>(
+    name: &str,
+    most: &str,
+    is_number: fn(&str) -> bool,
+    elements: impl Iterator<Item = Node<'d>>,
+    found: &mut Sink<'_>,
+) {
+    let mut others = elements.filter_map(|element| {
+        let id = element.attr("id")?;
+        (!is_number(id)).then_some((element, id))
+    });
+    let Some((first, id)) = others.next() else {
+        return;
+    };
+    let text = format!(
+        "the id of the {name} is `{id}`, but CARLA reads ids of {name}s as whole numbers up to {most} and takes all \
+         others for 0{}",
+        further(others.count())
+    );
+    found.issue(Place::attribute_or_node(first, "id"), text);
+}

@@ -1,0 +1,65 @@
+use qcbus_document::Node;
+use qcbus_opendrive::{RoadMap, ShapeKind};
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::families::simulators::{self, Gap, lane_border};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_profile_carla_supported",
+    uids: &["qcbus.dev:xodr:1.4.0:profile.carla_supported"],
+    level: Level::Information,
+    after: super::READABLE,
+    default_on: false,
+    page: include_str!("profile_carla_supported.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+const GAPS: &[Gap] = &[
+    Gap {
+        element: "border",
+        is_meant: lane_border,
+        text: "CARLA takes the width of a lane from `width` alone, and a default where there is none; this lane has \
+               only `border`",
+    },
+    Gap {
+        element: "geometry",
+        is_meant: begins_otherwise,
+        text: "CARLA takes the first element within `geometry` for its shape, and leaves out the piece if that is none",
+    },
+    Gap {
+        element: "connection",
+        is_meant: is_direct,
+        text: "CARLA reads `connectingRoad` of a connection and no `linkedRoad`, so direct junctions lead to road 0",
+    },
+];
+
+/// The last version that CARLA's documentation names.
+const NEWEST: (u16, u16) = (1, 4);
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    if let (Some(header), Some(version)) = (map.header(), map.version())
+        && (version.major, version.minor) > NEWEST
+    {
+        let text = format!(
+            "CARLA is written for OpenDRIVE 1.4, and this file says {version}: what came later is not read"
+        );
+        let attribute = if version.major == 1 {
+            "revMinor"
+        } else {
+            "revMajor"
+        };
+        found.issue(Place::attribute_or_node(header, attribute), text);
+    }
+    simulators::report(map, GAPS, found);
+}
+
+fn begins_otherwise(geometry: Node<'_>) -> bool {
+    let first = geometry.children().next();
+    first.is_some_and(|first| ShapeKind::of(first).is_none())
+}
+
+fn is_direct(connection: Node<'_>) -> bool {
+    connection.attr("linkedRoad").is_some() && connection.attr("connectingRoad").is_none()
+}

@@ -1,0 +1,51 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::simulators::{self, Gap, any, lane_border};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_profile_esmini_supported",
+    uids: &["qcbus.dev:xodr:1.4.0:profile.esmini_supported"],
+    level: Level::Information,
+    after: super::READABLE,
+    default_on: false,
+    page: include_str!("profile_esmini_supported.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// What decides where roads and lanes lie, and so where vehicles drive.
+const GAPS: &[Gap] = &[
+    Gap {
+        element: "border",
+        is_meant: lane_border,
+        text: "esmini takes the width of a lane from `width` alone; this lane has only `border`",
+    },
+    Gap {
+        element: "crossfall",
+        is_meant: any,
+        text: "esmini does not read `crossfall`; the road stays level across",
+    },
+    Gap {
+        element: "shape",
+        is_meant: is_of_road,
+        text: "esmini does not read `shape` of a road; its surface stays as `superelevation` says",
+    },
+    Gap {
+        element: "CRG",
+        is_meant: any,
+        text: "esmini does not read `CRG`; the surface stays smooth",
+    },
+];
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    simulators::report(map, GAPS, found);
+}
+
+fn is_of_road(shape: Node<'_>) -> bool {
+    shape
+        .parent()
+        .is_some_and(|above| above.is("lateralProfile"))
+}
