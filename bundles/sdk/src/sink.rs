@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use qcbus_document::Node;
-use qcbus_formats::xqar::{DomainInfo, Issue, Level, Location, Metadata};
+use qcbus_formats::xqar::{DomainInfo, InfoElement, Issue, Level, Location, Metadata};
 
 use crate::param::MAX_ISSUES;
 use crate::place::{Place, Spot, locate};
@@ -88,8 +88,7 @@ impl<'d> Sink<'d> {
         text: impl Into<String>,
     ) -> Finding<'_, 'd> {
         let place = at.into();
-        let lowered = self.not_normative.is_some();
-        let level = if lowered {
+        let level = if self.not_normative.is_some() {
             lower(self.facts.level)
         } else {
             self.facts.level
@@ -115,7 +114,7 @@ impl<'d> Sink<'d> {
             issue,
             subject: self.subject,
             facts: self.facts,
-            lowered,
+            note: self.not_normative.as_deref(),
             unlisted,
         }
     }
@@ -167,7 +166,7 @@ impl<'d> Sink<'d> {
             issue,
             subject: self.subject,
             facts: self.facts,
-            lowered: self.not_normative.is_some(),
+            note: self.not_normative.as_deref(),
             unlisted: Some(&mut self.unheard),
         }
     }
@@ -295,7 +294,8 @@ pub struct Finding<'s, 'd> {
     issue: &'s mut Issue,
     subject: &'d Subject<'d>,
     facts: &'s Facts,
-    lowered: bool,
+    /// What is said where the rule is not normative, and levels are lowered.
+    note: Option<&'s str>,
     /// Set when the finding is only counted: where its level is kept.
     unlisted: Option<&'s mut Level>,
 }
@@ -341,13 +341,50 @@ impl Finding<'_, '_> {
         self
     }
 
+    /// Names a further rule of the standard that the same fact violates. An issue has one UID, so that this
+    /// one is a fact of its own, `qcbus.rule`.
+    pub fn also_violates(self, uid: &str) -> Self {
+        let rule = InfoElement {
+            name: "Rule".to_owned(),
+            attributes: vec![("ruleUID".to_owned(), uid.to_owned())],
+            text: String::new(),
+            children: Vec::new(),
+        };
+        self.info(DomainInfo {
+            name: "qcbus.rule".to_owned(),
+            content: vec![rule],
+        })
+    }
+
     /// Another severity than the rule's. It is lowered as the rule's would be.
     pub fn level(mut self, level: Level) -> Self {
-        self.issue.level = if self.lowered { lower(level) } else { level };
-        if let Some(level) = &mut self.unlisted {
-            **level = self.issue.level;
+        let level = if self.note.is_some() {
+            lower(level)
+        } else {
+            level
+        };
+        self.set_level(level);
+        self
+    }
+
+    /// A severity for what is wrong in every version, whether the standard said so already or not: it is
+    /// not lowered, and nothing is said about when the rule became normative.
+    pub fn in_every_version(mut self, level: Level) -> Self {
+        self.set_level(level);
+        let text = self
+            .note
+            .and_then(|note| self.issue.description.strip_suffix(note));
+        if let Some(length) = text.map(str::len) {
+            self.issue.description.truncate(length);
         }
         self
+    }
+
+    fn set_level(&mut self, level: Level) {
+        self.issue.level = level;
+        if let Some(unlisted) = &mut self.unlisted {
+            **unlisted = level;
+        }
     }
 
     /// Another UID of the rule than its first.

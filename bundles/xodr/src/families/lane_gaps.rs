@@ -18,6 +18,8 @@ pub(crate) struct LaneGap<'m, 'a> {
     pub to: LaneRef<'m, 'a>,
     /// One statement that links the groups.
     pub joint: LaneJoint<'a>,
+    /// How far apart they lie as a whole, in metres: no more than a corner may be missing elsewhere.
+    pub whole: f64,
     /// The distances in metres at the edges that miss each other, and the point in between.
     pub edges: Vec<(f64, Point3)>,
 }
@@ -41,14 +43,14 @@ pub(crate) fn lane_gaps<'m, 'a>(
             boundaries.push(((section(low), section(high)), touches.len()));
             touches.push(touch);
         } else if astray.insert((low, high)) {
-            gaps.extend(gaps_of(&[touch], limit));
+            gaps.extend(gaps_of(&[touch], limit, false));
         }
     }
     boundaries.sort_unstable();
     for boundary in boundaries.chunk_by(|(one, _), (next, _)| one == next) {
         let touches = boundary.iter().filter_map(|(_, at)| touches.get(*at));
         let groups = hanging_together(touches.copied()).into_iter();
-        gaps.extend(groups.flat_map(|group| gaps_of(&group, limit)));
+        gaps.extend(groups.flat_map(|group| gaps_of(&group, limit, true)));
     }
     gaps
 }
@@ -176,7 +178,7 @@ fn edges<'m, 'a>(sides: impl Iterator<Item = Side<'m, 'a>>) -> Option<[GroupEdge
     extremes
 }
 
-fn gaps_of<'m, 'a>(group: &[Touch<'m, 'a>], limit: f64) -> Vec<LaneGap<'m, 'a>> {
+fn gaps_of<'m, 'a>(group: &[Touch<'m, 'a>], limit: f64, overlap: bool) -> Vec<LaneGap<'m, 'a>> {
     let Some(first) = group.iter().min_by_key(|touch| touch.joint.node) else {
         return Vec::new();
     };
@@ -198,6 +200,7 @@ fn gaps_of<'m, 'a>(group: &[Touch<'m, 'a>], limit: f64) -> Vec<LaneGap<'m, 'a>> 
     } else {
         [least, most]
     };
+    let whole = apart(&here, &there, overlap);
     let mut gaps: Vec<LaneGap<'m, 'a>> = Vec::new();
     for ((from, _, start), (to, _, end)) in here.into_iter().zip(there) {
         let distance = start.plan().distance(end.plan());
@@ -213,11 +216,26 @@ fn gaps_of<'m, 'a>(group: &[Touch<'m, 'a>], limit: f64) -> Vec<LaneGap<'m, 'a>> 
                 from,
                 to,
                 joint: *joint,
+                whole,
                 edges: vec![edge],
             }),
         }
     }
     gaps
+}
+
+/// How far two groups lie apart as a whole: their middles, and where they have some width in common also
+/// either edge. Where one is only wider than the other, an edge or the middle may be where it should.
+fn apart(here: &[GroupEdge<'_, '_>; 2], there: &[GroupEdge<'_, '_>; 2], overlap: bool) -> f64 {
+    let [(.., a), (.., b)] = here;
+    let [(.., c), (.., d)] = there;
+    let between = |one: Point3, other: Point3| one.plan().distance(other.plan());
+    let middles = between(middle(*a, *b), middle(*c, *d));
+    if overlap {
+        middles.min(between(*a, *c)).min(between(*b, *d))
+    } else {
+        middles
+    }
 }
 
 fn middle(one: Point3, other: Point3) -> Point3 {

@@ -6,6 +6,7 @@ use qcbus_document::Node;
 use qcbus_opendrive::{Profile, Road, Side, Station};
 use qcbus_sdk::Sink;
 
+use super::gap_levels::Misfit;
 use super::on_road::OnRoad;
 use super::touching::STEP;
 
@@ -30,7 +31,8 @@ pub(crate) fn elevation(road: &Road<'_>, found: &mut Sink<'_>) {
                  {limit} m is allowed",
                 road.id()
             );
-            found.issue(node, text).on(road, s, 0.0);
+            let misfit = Misfit::step(step, found);
+            misfit.put(found.issue(node, text)).on(road, s, 0.0);
         }
     }
 }
@@ -90,6 +92,7 @@ fn report(
              m is allowed",
             road.id()
         );
-        found.issue(node, text).on(road, s, t);
+        let misfit = Misfit::step(step, found);
+        misfit.put(found.issue(node, text)).on(road, s, t);
     }
 }

@@ -2,6 +2,10 @@
 
 use qcbus_opendrive::geometry::{Cubic, ParamPoly3};
 use qcbus_opendrive::{Geometry, Road, ShapeKind};
+use qcbus_sdk::{Finding, Sink};
+
+use super::gap_levels::Misfit;
+use super::on_road::OnRoad;
 
 /// Each geometry with the next one, in ascending order of s.
 pub(crate) fn joints<'m, 'a>(
@@ -14,6 +18,42 @@ pub(crate) fn joints<'m, 'a>(
 /// The name of a geometry's shape, for texts.
 pub(crate) fn shape_name(geometry: &Geometry<'_>) -> &'static str {
     geometry.kind().map_or("no shape", ShapeKind::as_str)
+}
+
+/// Reports geometries that do not begin where the one before them ends, but more than `limit` metres away.
+/// `complete` may add to a finding.
+pub(crate) fn report_gaps<'d>(
+    road: &Road<'_>,
+    limit: f64,
+    found: &mut Sink<'d>,
+    complete: impl Fn(Finding<'_, 'd>),
+) {
+    for (one, next) in joints(road) {
+        let (Some(end), Some(start)) = (one.end_point(), next.start_point()) else {
+            continue;
+        };
+        let gap = end.distance(start);
+        if gap <= limit {
+            continue;
+        }
+        let text = format!(
+            "the geometry before it ({}) ends at ({:.3}, {:.3}), {gap:.3} m away from ({:.3}, {:.3}), where this \
+             one ({}) starts; at most {limit} m is allowed",
+            shape_name(one),
+            end.x,
+            end.y,
+            start.x,
+            start.y,
+            shape_name(next)
+        );
+        let misfit = Misfit::gap(gap, gap, found);
+        let finding = misfit
+            .put(found.issue(next.node(), text))
+            .on(road, next.s().unwrap_or(0.0), 0.0)
+            .at(one.node(), "the geometry before it")
+            .point(end.x, end.y, 0.0);
+        complete(finding);
+    }
 }
 
 /// The parameter at which both coordinates of a parametric curve stand still.

@@ -9,8 +9,8 @@ use qcbus_opendrive::{
 use qcbus_sdk::{Finding, Param, Sink};
 
 use super::driving::is_drivable;
-use super::lane_gaps::lane_gaps;
-use super::on_road::{OnRoad, lane_name};
+use super::gap_levels::Misfit;
+use super::on_road::lane_name;
 
 pub(crate) const GAP: Param = Param::number(
     "gap",
@@ -80,7 +80,7 @@ fn pairs_of<'m, 'a>(
     })
 }
 
-fn place_of(
+pub(crate) fn place_of(
     map: &RoadMap<'_>,
     joint: &LaneJoint<'_>,
     from: LaneRef<'_, '_>,
@@ -220,7 +220,8 @@ pub(crate) fn report_kink(pair: &Pair<'_, '_>, found: &mut Sink<'_>) {
             edge.amount,
             edge.amount.to_degrees()
         );
-        pair.report(&text, edge.point, found);
+        let misfit = Misfit::kink(edge.amount, found);
+        misfit.put(pair.report(&text, edge.point, found));
     }
 }
 
@@ -234,24 +235,19 @@ pub(crate) fn report_step(pair: &Pair<'_, '_>, found: &mut Sink<'_>) -> bool {
         "their {} edges differ by {:.3} m in height where they touch; at most {limit} m is allowed",
         edge.side, edge.amount
     );
-    pair.report(&text, edge.point, found);
+    let misfit = Misfit::step(edge.amount, found);
+    misfit.put(pair.report(&text, edge.point, found));
     true
 }
 
-/// Reports gaps, kinks and steps between linked lanes at places of one sort: what `smooth` means
-/// for junctions.
+/// Reports kinks and steps between linked lanes at places of one sort: with gaps, what `smooth` means for
+/// junctions. Gaps are said by `lane_smoothness.contact_point_no_horizontal_gaps`.
 pub(crate) fn report_misfits(
     map: &RoadMap<'_>,
     mine: impl Fn(Where) -> bool,
     found: &mut Sink<'_>,
 ) {
-    let gap = found.number(&GAP);
-    let mut apart = false;
     for pair in pairs_of(map, map.touching_lanes()).filter(|pair| mine(pair.at)) {
-        let edges = pair.touching.edges().into_iter();
-        apart |= edges
-            .map(|[here, there]| distance(here, there))
-            .any(|one| one > gap);
         report_kink(&pair, found);
         let has_grid = pair.at
             == Where::Connection {
@@ -260,34 +256,5 @@ pub(crate) fn report_misfits(
         if !has_grid {
             report_step(&pair, found);
         }
-    }
-    if apart {
-        report_gaps(map, &mine, found);
-    }
-}
-
-/// Gaps are a matter of all lanes that are linked at one place: one may split into two.
-fn report_gaps(map: &RoadMap<'_>, mine: &impl Fn(Where) -> bool, found: &mut Sink<'_>) {
-    let limit = found.number(&GAP);
-    for gap in lane_gaps(map, limit, NO_WIDTH) {
-        if !mine(place_of(map, &gap.joint, gap.from, gap.to)) {
-            continue;
-        }
-        let widest = gap
-            .edges
-            .iter()
-            .map(|(apart, _)| *apart)
-            .fold(0.0, f64::max);
-        let text = format!(
-            "{} and {} are linked, but their edges lie up to {widest:.3} m apart where they should touch; at \
-             most {limit} m is allowed",
-            lane_name(gap.from),
-            lane_name(gap.to)
-        );
-        found
-            .issue(gap.joint.node, text)
-            .at_lane_end(gap.from, gap.joint.from.end)
-            .at(gap.from.node(), "the one lane")
-            .at(gap.to.node(), "the other lane");
     }
 }

@@ -1,16 +1,25 @@
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Backport, Rule, Sink};
 
+use crate::families::gap_levels::{KINK_ERROR_FROM, STEP_BROKEN_FROM, STEP_ERROR_FROM};
 use crate::families::touching::{GAP, KINK, STEP, Where, report_misfits};
 use crate::model::Roads;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_connection_smooth_fit",
     uids: &["asam.net:xodr:1.9.0:junctions.connection.smooth_fit"],
-    versions: "1.9.0..",
+    // Said in the text about connecting roads since 1.6; its UID is of 1.9.
+    versions: "1.6.0..",
     backport: Backport::Lower { since: "" },
     after: super::READABLE,
-    params: &[GAP, KINK, STEP],
+    params: &[
+        GAP,
+        KINK,
+        STEP,
+        KINK_ERROR_FROM,
+        STEP_ERROR_FROM,
+        STEP_BROKEN_FROM,
+    ],
     page: include_str!("junctions_connection_smooth_fit.md"),
     run,
     ..Rule::DEFAULTS

@@ -1,6 +1,7 @@
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Rule, Sink};
 
+use crate::families::gap_levels::{KINK_ERROR_FROM, STEP_BROKEN_FROM, STEP_ERROR_FROM};
 use crate::families::touching::{GAP, KINK, STEP, Where, report_misfits};
 use crate::model::Roads;
 
@@ -9,7 +10,14 @@ pub static RULE: Rule<Roads> = Rule {
     uids: &["asam.net:xodr:1.7.0:junctions.direct.linked_lane_smoothness"],
     versions: "1.7.0..",
     after: super::READABLE,
-    params: &[GAP, KINK, STEP],
+    params: &[
+        GAP,
+        KINK,
+        STEP,
+        KINK_ERROR_FROM,
+        STEP_ERROR_FROM,
+        STEP_BROKEN_FROM,
+    ],
     page: include_str!("junctions_direct_linked_lane_smoothness.md"),
     run,
     ..Rule::DEFAULTS

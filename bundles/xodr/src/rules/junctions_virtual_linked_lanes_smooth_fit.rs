@@ -2,9 +2,12 @@ use std::f64::consts::PI;
 
 use qcbus_opendrive::geometry::heading_difference;
 use qcbus_opendrive::{BorderPoint, Edge, LaneLink, LaneRef, RoadMap, Side};
-use qcbus_sdk::{Backport, Rule, Sink};
+use qcbus_sdk::{Rule, Sink};
 
 use crate::families::driving::is_drivable;
+use crate::families::gap_levels::{
+    GAP_BROKEN_FROM, GAP_ERROR_FROM, KINK_ERROR_FROM, Misfit, STEP_BROKEN_FROM, STEP_ERROR_FROM,
+};
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::touching::{GAP, KINK, STEP};
 use crate::families::virtual_junctions::{Branch, all_branches};
@@ -13,10 +16,19 @@ use crate::model::Roads;
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_virtual_linked_lanes_smooth_fit",
     uids: &["asam.net:xodr:1.9.0:junctions.virtual.linked_lanes_smooth_fit"],
-    versions: "1.9.0..",
-    backport: Backport::Lower { since: "1.6.0" },
+    // Said in the text about virtual junctions since 1.6; its UID is of 1.9.
+    versions: "1.6.0..",
     after: super::READABLE,
-    params: &[GAP, KINK, STEP],
+    params: &[
+        GAP,
+        KINK,
+        STEP,
+        GAP_ERROR_FROM,
+        GAP_BROKEN_FROM,
+        KINK_ERROR_FROM,
+        STEP_ERROR_FROM,
+        STEP_BROKEN_FROM,
+    ],
     page: include_str!("junctions_virtual_linked_lanes_smooth_fit.md"),
     run,
     ..Rule::DEFAULTS
@@ -69,9 +81,11 @@ fn check(branch: &Branch<'_, '_>, lane: LaneRef<'_, '_>, link: LaneLink<'_>, fou
         [outer, inner]
     };
     let faults = faults(own, there, found);
-    if faults.is_empty() {
+    let Some((_, misfit)) = faults.iter().max_by_key(|(_, misfit)| *misfit) else {
         return;
-    }
+    };
+    let misfit = *misfit;
+    let faults: Vec<&str> = faults.iter().map(|(text, _)| text.as_str()).collect();
     let text = format!(
         "{} is linked to {} at s = {}, but {}",
         lane_name(lane),
@@ -79,8 +93,8 @@ fn check(branch: &Branch<'_, '_>, lane: LaneRef<'_, '_>, link: LaneLink<'_>, fou
         branch.s,
         faults.join(" and ")
     );
-    found
-        .issue(link.node(), text)
+    misfit
+        .put(found.issue(link.node(), text))
         .at_lane_end(lane, branch.end)
         .at(main.node(), "the lane of the main road")
         .in_lane(main, ds);
@@ -93,7 +107,11 @@ fn main_lane<'m, 'a>(branch: &Branch<'m, 'a>, id: i64) -> Option<LaneRef<'m, 'a>
         .lane(id)
 }
 
-fn faults(own: [BorderPoint; 2], there: [BorderPoint; 2], found: &Sink<'_>) -> Vec<String> {
+fn faults(
+    own: [BorderPoint; 2],
+    there: [BorderPoint; 2],
+    found: &Sink<'_>,
+) -> Vec<(String, Misfit)> {
     let [gap, kink, step] = [GAP, KINK, STEP].map(|param| found.number(&param));
     let mut worst = [0.0_f64; 3];
     for (one, other) in own.into_iter().zip(there) {
@@ -116,19 +134,19 @@ fn faults(own: [BorderPoint; 2], there: [BorderPoint; 2], found: &Sink<'_>) -> V
     let [apart, turn, high] = worst;
     let mut faults = Vec::new();
     if apart > gap {
-        faults.push(format!(
-            "their edges lie {apart:.3} m apart (at most {gap} m is allowed)"
-        ));
+        let text = format!("their edges lie {apart:.3} m apart (at most {gap} m is allowed)");
+        faults.push((text, Misfit::gap(apart, apart, found)));
     }
     if turn > kink {
-        faults.push(format!(
+        let text = format!(
             "their edges differ by {turn:.4} rad in heading (at most {kink} rad is allowed)"
-        ));
+        );
+        faults.push((text, Misfit::kink(turn, found)));
     }
     if high > step {
-        faults.push(format!(
-            "their edges differ by {high:.3} m in height (at most {step} m is allowed)"
-        ));
+        let text =
+            format!("their edges differ by {high:.3} m in height (at most {step} m is allowed)");
+        faults.push((text, Misfit::step(high, found)));
     }
     faults
 }

@@ -1,8 +1,12 @@
-use qcbus_opendrive::{Road, RoadMap};
-use qcbus_sdk::{Backport, Param, Rule, Sink};
+use qcbus_opendrive::{LaneEnd, RoadEnd, RoadMap};
+use qcbus_sdk::{Backport, Param, Rule, Sink, Version};
 
+use crate::families::gap_levels::{GAP_BROKEN_FROM, GAP_ERROR_FROM, Misfit};
 use crate::families::lane_gaps::{LaneGap, lane_gaps};
+use crate::families::mouths;
 use crate::families::on_road::{OnRoad, lane_name};
+use crate::families::refline::report_gaps;
+use crate::families::touching::{Where, place_of};
 use crate::families::zero_width::ZERO_WIDTH;
 use crate::model::{Part, Roads};
 
@@ -19,49 +23,54 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Separate { since: "" },
     after: super::READABLE,
-    params: &[GAP, ZERO_WIDTH],
+    params: &[GAP, ZERO_WIDTH, GAP_ERROR_FROM, GAP_BROKEN_FROM],
     page: include_str!("lane_smoothness_contact_point_no_horizontal_gaps.md"),
     each: Some(each),
     run,
     ..Rule::DEFAULTS
 };
 
+/// The first version in which this rule is the one that speaks of reference lines.
+const NORMATIVE: Version = Version::new(1, 7);
+
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    // In older files `road.geometry.refline_no_gaps` says it.
+    if found.version() < Some(NORMATIVE) {
+        return;
+    }
+    let limit = found.number(&GAP);
     for road in map.part(part).roads() {
-        reference_line(road, found);
+        report_gaps(road, limit, found, |finding| {
+            finding.also_violates("asam.net:xodr:1.4.0:road.geometry.refline_no_gaps");
+        });
     }
 }
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     for gap in lane_gaps(map, found.number(&GAP), found.number(&ZERO_WIDTH)) {
-        report(&gap, found);
-    }
-}
-
-fn reference_line(road: &Road<'_>, found: &mut Sink<'_>) {
-    let limit = found.number(&GAP);
-    let geometries: Vec<_> = road.plan_view().in_order().collect();
-    for pair in geometries.windows(2) {
-        let (one, next) = (pair[0], pair[1]);
-        let (Some(end), Some(start)) = (one.end_point(), next.start_point()) else {
-            continue;
-        };
-        let distance = end.distance(start);
-        if distance > limit {
-            let text = format!(
-                "the reference line of road `{}` ends {distance:.3} m away from the point where its next \
-                 geometry starts; at most {limit} m is allowed",
-                road.id()
-            );
-            found
-                .issue(next.node(), text)
-                .on(road, next.s().unwrap_or(0.0), 0.0)
-                .at(one.node(), "the geometry before it");
+        if !is_of_roads(map, &gap, found) {
+            report(map, &gap, found);
         }
     }
 }
 
-fn report(gap: &LaneGap<'_, '_>, found: &mut Sink<'_>) {
+/// Whether it is not the lanes but the roads that do not meet, of which other rules speak:
+/// `road.geometry.contact_point` and `road.linkage.ends_meet`.
+fn is_of_roads(map: &RoadMap<'_>, gap: &LaneGap<'_, '_>, found: &Sink<'_>) -> bool {
+    let [from, to] = [gap.joint.from, gap.joint.to].map(road_end);
+    let apart = || mouths::apart(map, from, to).unwrap_or(0.0);
+    let mouths = from.road != to.road;
+    mouths && apart() >= found.number(&GAP_BROKEN_FROM)
+}
+
+fn road_end(at: LaneEnd) -> RoadEnd {
+    RoadEnd {
+        road: at.lane.road as usize,
+        end: at.end,
+    }
+}
+
+fn report(map: &RoadMap<'_>, gap: &LaneGap<'_, '_>, found: &mut Sink<'_>) {
     let limit = found.number(&GAP);
     let apart = match gap.edges.as_slice() {
         [(one, _), (other, _)] => {
@@ -76,12 +85,23 @@ fn report(gap: &LaneGap<'_, '_>, found: &mut Sink<'_>) {
         lane_name(gap.from),
         lane_name(gap.to)
     );
-    let mut finding = found
-        .issue(gap.from.node(), text)
+    let widest = gap.edges.iter().map(|(apart, _)| *apart);
+    let misfit = Misfit::gap(widest.fold(0.0, f64::max), gap.whole, found);
+    let mut finding = misfit
+        .put(found.issue(gap.from.node(), text))
         .at_lane_end(gap.from, gap.joint.from.end)
         .at(gap.to.node(), "the linked lane");
     for (_, middle) in &gap.edges {
         finding = finding.point(middle.x, middle.y, middle.z);
     }
-    finding.at(gap.joint.node, "the link");
+    finding = finding.at(gap.joint.node, "the link");
+    match place_of(map, &gap.joint, gap.from, gap.to) {
+        Where::Roads => {}
+        Where::Connection { .. } => {
+            finding.also_violates("asam.net:xodr:1.9.0:junctions.connection.smooth_fit");
+        }
+        Where::Direct => {
+            finding.also_violates("asam.net:xodr:1.7.0:junctions.direct.linked_lane_smoothness");
+        }
+    }
 }

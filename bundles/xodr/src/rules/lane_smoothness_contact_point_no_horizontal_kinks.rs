@@ -1,6 +1,7 @@
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Backport, Rule, Sink};
 
+use crate::families::gap_levels::KINK_ERROR_FROM;
 use crate::families::touching::{GAP, KINK, Where, pairs, report_kink};
 use crate::model::{Part, Roads};
 
@@ -10,7 +11,7 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
     backport: Backport::Lower { since: "" },
     after: super::READABLE,
-    params: &[GAP, KINK],
+    params: &[GAP, KINK, KINK_ERROR_FROM],
     page: include_str!("lane_smoothness_contact_point_no_horizontal_kinks.md"),
     each: Some(each),
     ..Rule::DEFAULTS

@@ -1,6 +1,7 @@
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Backport, Param, Rule, Sink};
 
+use crate::families::gap_levels::{KINK_ERROR_FROM, Misfit, STEP_BROKEN_FROM, STEP_ERROR_FROM};
 use crate::families::touching::{Pair, STEP, Where, pairs, report_step};
 use crate::model::{Part, Roads};
 
@@ -20,7 +21,13 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
     backport: Backport::Lower { since: "" },
     after: super::READABLE,
-    params: &[STEP, ROLL],
+    params: &[
+        STEP,
+        ROLL,
+        STEP_ERROR_FROM,
+        STEP_BROKEN_FROM,
+        KINK_ERROR_FROM,
+    ],
     page: include_str!("lane_smoothness_contact_point_no_vertical_gaps.md"),
     each: Some(each),
     ..Rule::DEFAULTS
@@ -43,6 +50,7 @@ fn report_roll(pair: &Pair<'_, '_>, found: &mut Sink<'_>) {
             "their crossfalls differ by {roll:.4} rad ({:.2}°) where they touch; at most {limit} rad is allowed",
             roll.to_degrees()
         );
-        pair.report(&text, pair.touching.left[0], found);
+        let misfit = Misfit::kink(roll, found);
+        misfit.put(pair.report(&text, pair.touching.left[0], found));
     }
 }

@@ -1,6 +1,7 @@
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Backport, Rule, Sink};
 
+use crate::families::gap_levels::{STEP_BROKEN_FROM, STEP_ERROR_FROM};
 use crate::families::profile_steps::{elevation, lateral};
 use crate::families::touching::STEP;
 use crate::model::{Part, Roads};
@@ -11,7 +12,7 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
     backport: Backport::Lower { since: "" },
     after: super::READABLE,
-    params: &[STEP],
+    params: &[STEP, STEP_ERROR_FROM, STEP_BROKEN_FROM],
     page: include_str!("lane_smoothness_profile_no_vertical_gaps.md"),
     each: Some(each),
     ..Rule::DEFAULTS

@@ -75,11 +75,11 @@ mod lane_smoothness_no_vertical_jumps_t;
 mod lane_smoothness_profile_no_horizontal_gaps;
 mod lane_smoothness_profile_no_vertical_gaps;
 mod performance_avoid_redundant_info;
-mod profiles_begin_with_road;
-mod records_are_complete;
 mod profile_carla_ids;
 mod profile_carla_supported;
 mod profile_esmini_supported;
+mod profiles_begin_with_road;
+mod records_are_complete;
 mod road_corner_local_first_id_zero;
 mod road_corner_local_mandatory_id_with_markings;
 mod road_corner_local_sequential_id_values;
@@ -171,6 +171,7 @@ mod road_lane_width_width_defined_whole_section;
 mod road_lanes_lane_offset_elem_asc_order;
 mod road_length_sum_geometries;
 mod road_linkage_both_sides_consistency;
+mod road_linkage_ends_meet;
 mod road_linkage_is_junction_needed;
 mod road_linkage_junc_link_attribute_usage;
 mod road_linkage_road_link_attribute_usage;
@@ -536,4 +537,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &profile_carla_ids::RULE,
     &profile_carla_supported::RULE,
     &profile_esmini_supported::RULE,
+    &road_linkage_ends_meet::RULE,
 ];

@@ -2,6 +2,10 @@ use qcbus_opendrive::geometry::Point3;
 use qcbus_opendrive::{ContactPoint, Road, RoadEnd, RoadMap};
 use qcbus_sdk::{Backport, Param, Rule, Sink};
 
+use crate::families::gap_levels::{
+    GAP_BROKEN_FROM, GAP_ERROR_FROM, Misfit, STEP_BROKEN_FROM, STEP_ERROR_FROM,
+};
+use crate::families::mouths::Mouth;
 use crate::families::on_road::OnRoad;
 use crate::model::{Part, Roads};
 
@@ -18,7 +22,13 @@ pub static RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Separate { since: "" },
     after: super::READABLE,
-    params: &[GAP],
+    params: &[
+        GAP,
+        GAP_ERROR_FROM,
+        GAP_BROKEN_FROM,
+        STEP_ERROR_FROM,
+        STEP_BROKEN_FROM,
+    ],
     page: include_str!("road_geometry_contact_point.md"),
     each: Some(each),
     ..Rule::DEFAULTS
@@ -64,11 +74,25 @@ fn check<'a>(map: &RoadMap<'a>, road: &Road<'a>, end: ContactPoint, found: &mut 
         linked.id(),
         end.link_name()
     );
-    found
-        .issue(road.node(), text)
+    let misfit = misfit((road, end), (linked, other), [gap, step], found);
+    misfit
+        .put(found.issue(road.node(), text))
         .at_end(road, end)
         .at(contact.node, "the link")
         .at_end(linked, other);
+}
+
+/// Reference lines that lie beside each other have lanes that may meet all the same: they do not where the
+/// mouths of the roads lie apart.
+fn misfit(
+    (road, end): (&Road<'_>, ContactPoint),
+    (linked, other): (&Road<'_>, ContactPoint),
+    [gap, step]: [f64; 2],
+    found: &Sink<'_>,
+) -> Misfit {
+    let mouths = Mouth::of(road, end).zip(Mouth::of(linked, other));
+    let whole = mouths.map_or(gap, |(here, there)| here.distance(there));
+    Misfit::gap(gap, whole, found).max(Misfit::step(step, found))
 }
 
 fn place(road: &Road<'_>, end: ContactPoint) -> Option<Point3> {

@@ -1,7 +1,8 @@
 use qcbus_opendrive::geometry::heading_difference;
 use qcbus_opendrive::{Geometry, Road, RoadMap};
-use qcbus_sdk::{Level, Param, Rule, Sink};
+use qcbus_sdk::{Level, Param, Rule, Sink, Version};
 
+use crate::families::gap_levels::KINK_ERROR_FROM;
 use crate::families::on_road::OnRoad;
 use crate::families::refline::{joints, shape_name, standstill};
 use crate::model::{Part, Roads};
@@ -22,11 +23,14 @@ pub static RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.4.0..",
     after: super::READABLE,
-    params: &[KINK],
+    params: &[KINK, KINK_ERROR_FROM],
     page: include_str!("road_geometry_refline_no_kinks.md"),
     each: Some(each),
     ..Rule::DEFAULTS
 };
+
+/// The first version with rules about smooth lanes.
+const ANNEX_D: Version = Version::new(1, 8);
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     for road in map.part(part).roads() {
@@ -65,8 +69,17 @@ fn check(road: &Road<'_>, one: &Geometry<'_>, next: &Geometry<'_>, found: &mut S
         start.hdg,
         kink.to_degrees()
     );
+    // Section 9.2 says that there should be none; annex D.1.3 that there shall not.
+    let demanded = found.version() >= Some(ANNEX_D);
+    let is_error = demanded && kink >= found.number(&KINK_ERROR_FROM);
+    let level = if is_error {
+        Level::Error
+    } else {
+        Level::Warning
+    };
     found
         .issue(next.node(), text)
+        .level(level)
         .on(road, next.s().unwrap_or(0.0), 0.0)
         .at(one.node(), "the geometry before it");
 }

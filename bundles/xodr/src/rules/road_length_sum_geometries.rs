@@ -1,5 +1,5 @@
 use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink, Version};
+use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink};
 
 use crate::families::shown::number;
 use crate::model::{Part, Roads};
@@ -9,9 +9,9 @@ pub static RULE: Rule<Roads> = Rule {
     uids: &["asam.net:xodr:1.9.0:road.length_sum_geometries"],
     level: Level::Warning,
     versions: "1.9.0..",
-    backport: Backport::Alike { since: "1.4.0" },
+    backport: Backport::Lower { since: "1.4.0" },
     after: super::READABLE,
-    params: &[TOLERANCE, GRAVE],
+    params: &[TOLERANCE, BROKEN_FROM],
     page: include_str!("road_length_sum_geometries.md"),
     each: Some(each),
     ..Rule::DEFAULTS
@@ -23,17 +23,19 @@ const TOLERANCE: Param = Param::number(
     "m",
     "largest difference that is accepted, on long roads a millionth of the length",
 );
-const GRAVE: Param = Param::number(
-    "grave",
+const BROKEN_FROM: Param = Param::number(
+    "broken_from",
     1.0,
     "m",
-    "a road that is longer than its geometries by more has a stretch without a place, which is an error",
+    "from this difference on a part of the road has no place, or a part of its line no road, which is an error \
+     in every version",
 );
 /// What a sum of lengths written with few digits may be off, as a share of it.
 const RELATIVE: f64 = 1e-6;
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let tolerance = found.number(&TOLERANCE);
+    let broken_from = found.number(&BROKEN_FROM);
     for road in map.part(part).roads() {
         let geometries = road.plan_view().geometries();
         if geometries
@@ -55,17 +57,13 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                 number(length),
                 number(sum)
             );
-            let level = if length - sum > found.number(&GRAVE) {
-                Level::Error
-            } else if found.version() < Some(Version::new(1, 9)) {
-                Level::Information
+            let finding = found.issue(Place::attribute_or_node(road.node(), "length"), text);
+            let finding = if (length - sum).abs() >= broken_from {
+                finding.in_every_version(Level::Error)
             } else {
-                Level::Warning
+                finding
             };
-            found
-                .issue(Place::attribute_or_node(road.node(), "length"), text)
-                .level(level)
-                .road(road.id(), length.min(sum), 0.0);
+            finding.road(road.id(), length.min(sum), 0.0);
         }
     }
 }

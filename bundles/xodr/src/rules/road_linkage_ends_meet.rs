@@ -1,0 +1,202 @@
+use foldhash::HashSet;
+use qcbus_opendrive::{ContactPoint, JunctionType, Road, RoadContact, RoadEnd, RoadMap};
+use qcbus_sdk::{Param, Rule, Sink};
+
+use crate::families::gap_levels::GAP_BROKEN_FROM;
+use crate::families::mouths;
+use crate::families::on_road::OnRoad;
+use crate::model::Roads;
+
+const FAR: Param = Param::number(
+    "far",
+    20.0,
+    "m",
+    "how far a road may end from a junction that has no connection for it, or the junction's size if that is more",
+);
+
+/// Of junctions with more roads than this nothing is said about roads that they do not connect.
+const MOST_ENDS: usize = 256;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_linkage_ends_meet",
+    uids: &["qcbus.dev:xodr:1.4.0:road.linkage.ends_meet"],
+    after: super::READABLE,
+    params: &[GAP_BROKEN_FROM, FAR],
+    page: include_str!("road_linkage_ends_meet.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let mut told: HashSet<(RoadEnd, RoadEnd)> = HashSet::default();
+    // Which junctions say that they are at which road ends.
+    let mut joined: HashSet<(usize, RoadEnd)> = HashSet::default();
+    for contact in contacts(map) {
+        let (one, other) = (contact.from, contact.to);
+        if told.insert((one.min(other), one.max(other))) {
+            check(map, &contact, found);
+        }
+        let junction = contact.junction.or_else(|| junction_of(map, one));
+        joined.extend(junction.into_iter().flat_map(|at| [(at, one), (at, other)]));
+    }
+    for road in map.roads() {
+        for end in ContactPoint::BOTH {
+            junction(map, (road, end), &joined, found);
+        }
+    }
+}
+
+/// The place of the junction that a road belongs to.
+fn junction_of(map: &RoadMap<'_>, at: RoadEnd) -> Option<usize> {
+    let id = map.road_at(at.road)?.junction()?;
+    Some(map.junction(id)?.index())
+}
+
+/// What links of roads and connections of junctions say to meet, as far as a junction has a part in it. Of
+/// roads outside of junctions `road.geometry.contact_point` speaks.
+fn contacts<'m, 'a>(map: &'m RoadMap<'a>) -> impl Iterator<Item = RoadContact<'a>> {
+    let links = map.roads().iter().flat_map(move |road| {
+        let contacts = ContactPoint::BOTH.map(|end| map.linked_end(road, end));
+        contacts.into_iter().flatten().filter(move |contact| {
+            let linked = map.road_at(contact.to.road);
+            let within =
+                [Some(road), linked].map(|road| road.is_some_and(|one| one.junction().is_some()));
+            within.contains(&true)
+        })
+    });
+    let connections = map
+        .connections()
+        .filter_map(|(junction, connection)| map.connection_contact(junction, connection));
+    links.chain(connections).filter(|contact| {
+        let roads = [contact.from, contact.to].map(|end| map.road_at(end.road));
+        roads.into_iter().flatten().all(|road| cuts(map, road))
+    })
+}
+
+/// Whether a road belongs to no junction, or to one that cuts roads. Virtual ones lie somewhere along them.
+fn cuts(map: &RoadMap<'_>, road: &Road<'_>) -> bool {
+    let junction = road.junction().and_then(|id| map.junction(id));
+    junction.is_none_or(|one| {
+        matches!(
+            one.kind(),
+            Some(JunctionType::Common | JunctionType::Direct)
+        )
+    })
+}
+
+fn check(map: &RoadMap<'_>, contact: &RoadContact<'_>, found: &mut Sink<'_>) {
+    let limit = found.number(&GAP_BROKEN_FROM);
+    let roads = map
+        .road_at(contact.from.road)
+        .zip(map.road_at(contact.to.road));
+    let apart = mouths::apart(map, contact.from, contact.to);
+    let (Some((one, other)), Some(apart)) = (roads, apart.filter(|apart| *apart >= limit)) else {
+        return;
+    };
+    let says = match contact.junction {
+        Some(_) => "the connection",
+        None => "the link",
+    };
+    let text = format!(
+        "{says} says that the {} of road `{}` meets the {} of road `{}`, but they lie {apart:.3} m apart; ends that \
+         meet must lie at one place (at most {limit} m)",
+        contact.from.end,
+        one.id(),
+        contact.to.end,
+        other.id()
+    );
+    found
+        .issue(contact.node, text)
+        .at_end(one, contact.from.end)
+        .at(one.node(), "the one road")
+        .at(other.node(), "the other road")
+        .at_end(other, contact.to.end);
+}
+
+/// Looks at a road end whose link names a junction that says nothing about it.
+fn junction(
+    map: &RoadMap<'_>,
+    (road, end): (&Road<'_>, ContactPoint),
+    joined: &HashSet<(usize, RoadEnd)>,
+    found: &mut Sink<'_>,
+) {
+    let Some((link, id)) = road
+        .link(end)
+        .and_then(|link| Some((link, link.junction_id()?)))
+    else {
+        return;
+    };
+    let mut junctions = map.junctions_with_id(id);
+    let (Some(junction), None) = (junctions.next(), junctions.next()) else {
+        return;
+    };
+    let cuts = matches!(
+        junction.kind(),
+        Some(JunctionType::Common | JunctionType::Direct)
+    );
+    let at = RoadEnd {
+        road: road.index(),
+        end,
+    };
+    if !cuts || road.junction() == Some(id) || joined.contains(&(junction.index(), at)) {
+        return;
+    }
+    let of_roads = junction
+        .connections()
+        .filter_map(|one| map.road(one.target_road()?));
+    let ends: Vec<(&Road<'_>, ContactPoint)> = of_roads
+        .flat_map(|road| ContactPoint::BOTH.map(|end| (road, end)))
+        .take(MOST_ENDS + 1)
+        .collect();
+    let Some(apart) = nearest((road, end), &ends, found.number(&FAR)) else {
+        return;
+    };
+    let text = format!(
+        "the {} of road `{}` is junction `{id}`, but the nearest end of one of the junction's roads lies {apart:.1} m \
+         away, farther than the junction is wide; a road must end at the junction that it names",
+        end.link_name(),
+        road.id()
+    );
+    found
+        .issue(link.node(), text)
+        .at_end(road, end)
+        .at(junction.node(), "the junction");
+}
+
+/// How far a road end lies from the nearest end of a junction's roads, if that is farther than they lie from
+/// each other, and than `far`.
+fn nearest(
+    (road, end): (&Road<'_>, ContactPoint),
+    ends: &[(&Road<'_>, ContactPoint)],
+    far: f64,
+) -> Option<f64> {
+    if ends.is_empty() || ends.len() > MOST_ENDS {
+        return None;
+    }
+    let here = mouths::Mouth::of(road, end)?;
+    let mut bounds = Bounds::default();
+    let mut apart = f64::INFINITY;
+    for (road, end) in ends {
+        apart = apart.min(here.distance(mouths::Mouth::of(road, *end)?));
+        let pose = road.end_frame(*end)?.pose;
+        bounds.include(pose.x, pose.y);
+    }
+    (apart > far.max(bounds.diagonal())).then_some(apart)
+}
+
+/// The rectangle around some points.
+#[derive(Default)]
+struct Bounds(Option<[f64; 4]>);
+
+impl Bounds {
+    fn include(&mut self, x: f64, y: f64) {
+        let [left, right, low, high] = self.0.unwrap_or([x, x, y, y]);
+        self.0 = Some([left.min(x), right.max(x), low.min(y), high.max(y)]);
+    }
+
+    fn diagonal(&self) -> f64 {
+        self.0.map_or(0.0, |[left, right, low, high]| {
+            (right - left).hypot(high - low)
+        })
+    }
+}
