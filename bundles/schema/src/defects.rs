@@ -131,8 +131,9 @@ pub(crate) fn misplaced_child(
     let is_addition = ["userData", "include", "dataQuality"]
         .iter()
         .any(|name| child.is(name));
-    (title == "OpenDRIVE 1.5" && parent.is("geometry") && is_addition).then_some(
-        "it takes additional data in place of a curve only, where every other version takes them beside it",
+    let either = matches!(title, "OpenDRIVE 1.5" | "OpenDRIVE 1.6");
+    (either && parent.is("geometry") && is_addition).then_some(
+        "it takes additional data in place of a curve only, where the other versions take them beside it",
     )
 }
 
