@@ -45,7 +45,7 @@ pub(crate) fn flaws(text: &str) -> Vec<Flaw> {
     if let Some(found) = wkt(text).or_else(|| code(text)) {
         return vec![found];
     }
-    if text.starts_with('{') && text.ends_with('}') {
+    if text.starts_with('{') && text.ends_with('}') && text.contains("\"type\"") {
         return vec![other_form("PROJ's JSON")];
     }
     if proj_string::is_one(text) {
@@ -81,7 +81,8 @@ fn wkt(text: &str) -> Option<Flaw> {
     })
 }
 
-fn code(text: &str) -> Option<Flaw> {
+/// A code of a system, such as `EPSG:25832`, which `+init=` takes as well.
+pub(crate) fn code(text: &str) -> Option<Flaw> {
     let lower = text.to_ascii_lowercase();
     if lower.starts_with("urn:ogc:def:crs:") || lower.contains("opengis.net/def/crs/") {
         return Some(other_form("a URN or URL"));

@@ -33,6 +33,7 @@ pub(crate) mod polygons;
 pub(crate) mod profile_steps;
 pub(crate) mod proj_names;
 pub(crate) mod proj_string;
+pub(crate) mod proj_values;
 pub(crate) mod rails;
 pub(crate) mod redundancy;
 pub(crate) mod refline;

@@ -60,6 +60,21 @@ fn geographic_references() {
         ("a code of one in degrees", reference("EPSG:4326"), FLAWED),
         ("half a code", reference("EPSG:"), FLAWED),
         (
+            "a code to begin with",
+            reference("+init=epsg:25832 +units=m"),
+            &[],
+        ),
+        (
+            "one that cannot be",
+            reference("+init=epsg:2583200"),
+            FLAWED,
+        ),
+        (
+            "JSON, but not as PROJ writes it",
+            reference("{\"lat\": 57.7}"),
+            FLAWED,
+        ),
+        (
             "brackets in quotes are text",
             reference("PROJCS[\"a ] b\",UNIT[\"metre\",1]]"),
             &[],
