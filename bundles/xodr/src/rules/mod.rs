@@ -49,6 +49,7 @@ mod junctions_direct_road_ramp_heading;
 mod junctions_direct_split_or_merge;
 mod junctions_elevation_grid_entry_exit_smoothness;
 mod junctions_elevation_grid_only_one_elev_grid;
+mod junctions_elevation_grid_placed;
 mod junctions_elevation_grid_valid_for_entire_boundry;
 mod junctions_geometry_correct_junction_boundry;
 mod junctions_geometry_only_one_line_element;
@@ -538,4 +539,12 @@ pub static RULES: &[&dyn AnyRule] = &[
     &profile_carla_supported::RULE,
     &profile_esmini_supported::RULE,
     &road_linkage_ends_meet::RULE,
+    &header_version_published::RULE,
+    &header_geo_reference::RULE,
+    &header_bounds_contain_roads::RULE,
+    &header_offset_plausible::RULE,
+    &profile_carla_ids::RULE,
+    &profile_carla_supported::RULE,
+    &profile_esmini_supported::RULE,
+    &junctions_elevation_grid_placed::RULE,
 ];
