@@ -1,5 +1,6 @@
-//! The names that PROJ knows, <https://proj.org>: its operations, ellipsoids, datums, prime meridians and units,
-//! as listed by `proj -l`, `-le`, `-ld`, `-lm` and `-lu` of PROJ 9. They are compared as PROJ does it, with case.
+//! The names that PROJ knows, <https://proj.org>: its operations, ellipsoids, datums, prime meridians and units, as its
+//! sources list them up to PROJ 9 (`pj_list.h`, `ellps.cpp`, `datums.cpp`, `units.cpp`), and its most common
+//! parameters. They are compared as PROJ does it, with case.
 
 /// What `+proj=` may name.
 pub(crate) const OPERATIONS: &str = "\
@@ -36,3 +37,61 @@ pub(crate) const UNITS: &str = "\
 
 /// Operations whose result is not in metres on a plane: degrees, or coordinates from the Earth's centre.
 pub(crate) const NO_PROJECTIONS: &str = "longlat lonlat latlong latlon geocent cart noop";
+
+/// The parameters that are angles, with the greatest value [°].
+pub(crate) const ANGLES: &[(&str, f64)] = &[
+    ("lat_0", 90.0),
+    ("lat_1", 90.0),
+    ("lat_2", 90.0),
+    ("lat_3", 90.0),
+    ("lat_ts", 90.0),
+    ("lon_0", 360.0),
+    ("lon_1", 360.0),
+    ("lon_2", 360.0),
+    ("lon_3", 360.0),
+    ("lonc", 360.0),
+    ("alpha", 360.0),
+    ("gamma", 360.0),
+];
+
+/// The parameters that are numbers; whether they must be greater than zero.
+pub(crate) const NUMBERS: &[(&str, bool)] = &[
+    ("x_0", false),
+    ("y_0", false),
+    ("z_0", false),
+    ("k", true),
+    ("k_0", true),
+    ("a", true),
+    ("b", true),
+    ("R", true),
+    ("rf", true),
+    ("to_meter", true),
+];
+
+/// The parameters that name something, and what.
+pub(crate) const CHOICES: &[(&str, &str, &str)] = &[
+    ("proj", "projection", OPERATIONS),
+    ("ellps", "ellipsoid", ELLIPSOIDS),
+    ("datum", "datum", DATUMS),
+    ("units", "unit of length", UNITS),
+    ("vunits", "unit of length", UNITS),
+];
+
+/// Projections onto a cone, which one or two latitudes define.
+pub(crate) const CONES: &[&str] = &["lcc", "aea", "eqdc"];
+
+/// The names of a list.
+pub(crate) fn names(list: &'static str) -> impl Iterator<Item = &'static str> {
+    list.split_whitespace()
+}
+
+/// The parameters that need a value.
+pub(crate) fn keys() -> impl Iterator<Item = &'static str> {
+    let angles = ANGLES.iter().map(|(key, _)| *key);
+    let numbers = NUMBERS.iter().map(|(key, _)| *key);
+    let choices = CHOICES.iter().map(|(key, ..)| *key);
+    angles
+        .chain(numbers)
+        .chain(choices)
+        .chain(["zone", "pm", "init"])
+}

@@ -5,7 +5,7 @@ use qcbus_schema::closest;
 use qcbus_sdk::Level;
 
 use super::georeference::code;
-use super::proj_names::{DATUMS, ELLIPSOIDS, MERIDIANS, NO_PROJECTIONS, OPERATIONS, UNITS};
+use super::proj_names::{ANGLES, CHOICES, CONES, MERIDIANS, NO_PROJECTIONS, NUMBERS, keys, names};
 use super::proj_values::{degrees, number};
 
 /// One thing that is wrong, in words.
@@ -14,47 +14,9 @@ pub(crate) struct Flaw {
     pub(crate) text: String,
 }
 
-/// The parameters that are angles, with the greatest value [°].
-const ANGLES: &[(&str, f64)] = &[
-    ("lat_0", 90.0),
-    ("lat_1", 90.0),
-    ("lat_2", 90.0),
-    ("lat_3", 90.0),
-    ("lat_ts", 90.0),
-    ("lon_0", 360.0),
-    ("lon_1", 360.0),
-    ("lon_2", 360.0),
-    ("lon_3", 360.0),
-    ("lonc", 360.0),
-    ("alpha", 360.0),
-    ("gamma", 360.0),
-];
-
-/// The parameters that are numbers; whether they must be greater than zero.
-const NUMBERS: &[(&str, bool)] = &[
-    ("x_0", false),
-    ("y_0", false),
-    ("z_0", false),
-    ("k", true),
-    ("k_0", true),
-    ("a", true),
-    ("b", true),
-    ("R", true),
-    ("rf", true),
-    ("to_meter", true),
-];
-
-/// The parameters that name something, and what.
-const CHOICES: &[(&str, &str, &str)] = &[
-    ("proj", "projection", OPERATIONS),
-    ("ellps", "ellipsoid", ELLIPSOIDS),
-    ("datum", "datum", DATUMS),
-    ("units", "unit of length", UNITS),
-    ("vunits", "unit of length", UNITS),
-];
-
-/// Projections onto a cone, which one or two latitudes define.
-const CONES: &[&str] = &["lcc", "aea", "eqdc"];
+/// A string has a dozen words; of a longer one than this no more is looked at, and of words no more than so many bytes.
+const MOST_WORDS: usize = 200;
+const LONGEST_WORD: usize = 100;
 
 /// A word of the string: `+key=value` or `+key`.
 struct Word<'t> {
@@ -73,7 +35,8 @@ pub(crate) fn is_one(text: &str) -> bool {
 /// All that is wrong with it.
 pub(crate) fn flaws(text: &str) -> Vec<Flaw> {
     let text = joined(text);
-    let words: Vec<Word<'_>> = text.split_whitespace().map(word).collect();
+    let words = text.split_whitespace().take(MOST_WORDS);
+    let words: Vec<Word<'_>> = words.map(word).collect();
     let value = |key: &str| words.iter().find(|word| word.key == key)?.value;
     let projection = value("proj");
     let is_pipeline = words.iter().any(|word| word.value == Some("pipeline"));
@@ -141,6 +104,7 @@ fn joined(text: &str) -> String {
 
 fn word(text: &str) -> Word<'_> {
     let text = text.trim_start_matches('+');
+    let text = &text[..text.floor_char_boundary(LONGEST_WORD)];
     match text.split_once('=') {
         Some((key, value)) => Word {
             key,
@@ -153,28 +117,17 @@ fn word(text: &str) -> Word<'_> {
     }
 }
 
-fn names(list: &'static str) -> impl Iterator<Item = &'static str> {
-    list.split_whitespace()
-}
-
-/// The parameters that need a value.
-fn keys() -> impl Iterator<Item = &'static str> {
-    let angles = ANGLES.iter().map(|(key, _)| *key);
-    let numbers = NUMBERS.iter().map(|(key, _)| *key);
-    let choices = CHOICES.iter().map(|(key, ..)| *key);
-    angles
-        .chain(numbers)
-        .chain(choices)
-        .chain(["zone", "pm", "init"])
-}
-
 fn flaw(word: &Word<'_>) -> Option<String> {
     let key = word.key;
     let Some(value) = word.value.filter(|value| !value.is_empty()) else {
         return without_value(word);
     };
     if let Some((_, most)) = ANGLES.iter().find(|(name, _)| *name == key) {
-        let what = if *most < 100.0 { "latitude" } else { "angle" };
+        let what = match key {
+            _ if key.starts_with("lat") => "latitude",
+            _ if key.starts_with("lon") => "longitude",
+            _ => "angle",
+        };
         return match degrees(value) {
             Some(angle) if angle.abs() <= *most => None,
             Some(_) => Some(format!(
@@ -251,7 +204,7 @@ fn without_value(word: &Word<'_>) -> Option<String> {
     if let Some(name) = keys().find(|name| *name == key) {
         return Some(format!("`+{name}` has no value; write `+{name}=…`"));
     }
-    // The longest one: `lat_048` is `lat_0`, and neither `k` nor `a` takes digits without being one of these.
+    // Such as `lat_048`; what begins with `k` or `a` may be anything.
     let name = keys().filter(|name| name.len() > 2).find(run_together)?;
     let rest = key.strip_prefix(name)?;
     Some(format!("`+{key}` lacks the `=`; write `+{name}={rest}`"))
@@ -269,14 +222,16 @@ fn misspelt(key: &str) -> Option<String> {
 fn warn_of_zone(zone: Option<&str>, longitude: Option<&str>, warn: &mut impl FnMut(String)) {
     match zone {
         Some("") => {}
-        Some(zone) if zone.parse::<u8>().is_ok_and(|zone| (1..=60).contains(&zone)) => {}
+        Some(zone)
+            if zone
+                .parse::<u8>()
+                .is_ok_and(|zone| (1..=60).contains(&zone)) => {}
         Some(zone) => warn(format!(
             "`+zone={zone}` is no zone of UTM; there are zones 1 to 60, the south is named with `+south`"
         )),
-        None if longitude.is_none() => warn(
-            "`+proj=utm` has no `+zone`; without it PROJ takes zone 31, so the zone must be given, from 1 to 60"
-                .to_owned(),
-        ),
+        None if longitude.is_none() => {
+            warn("`+proj=utm` has no `+zone`; it must be given, from 1 to 60".to_owned());
+        }
         None => {}
     }
 }
