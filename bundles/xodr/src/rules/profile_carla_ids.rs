@@ -50,8 +50,8 @@ fn report<'d>(
         return;
     };
     let text = format!(
-        "the id of the {name} is `{id}`, but CARLA reads ids of {name}s as whole numbers up to {most} and takes all \
-         others for 0{}",
+        "the id of the {name} is `{id}`, but CARLA reads ids of {name}s as whole numbers up to {most}; anything else \
+         becomes another number, mostly 0{}",
         further(others.count())
     );
     found.issue(Place::attribute_or_node(first, "id"), text);
