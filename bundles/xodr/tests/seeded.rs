@@ -8,20 +8,39 @@ use qcbus_xodr::BUNDLE;
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 
-#[test]
-fn faults_are_found_and_harmless_variants_are_not_rejected() {
+/// A study of maps; `least` of the faults must be found at the due level, in hundredths.
+fn run(place: &'static str, lists: [&str; 2], page: &str, least: usize) {
     let root = Path::new(ROOT);
+    let [faults, harmless] = lists;
     let study = Study {
         bundle: &BUNDLE,
         what: "maps",
         key: "id",
-        faults: include_str!("seeded/faults.txt"),
-        harmless: include_str!("seeded/harmless.txt"),
-        place: "bundles/xodr/tests/seeded",
+        faults,
+        harmless,
+        place,
         shared: &root.join("../shared/cases/real"),
         fetched: "QCBUS_MAPS",
-        page: &root.join("docs/evidence/seeded-maps.md"),
-        least: 60,
+        page: &root.join("docs/evidence").join(page),
+        least,
     };
     study.run();
+}
+
+#[test]
+fn faults_are_found_and_harmless_variants_are_not_rejected() {
+    let lists = [
+        include_str!("seeded/faults.txt"),
+        include_str!("seeded/harmless.txt"),
+    ];
+    run("bundles/xodr/tests/seeded", lists, "seeded-maps.md", 90);
+}
+
+#[test]
+fn faults_of_another_hand_are_found_as_well() {
+    let lists = [
+        include_str!("held-out/faults.txt"),
+        include_str!("held-out/harmless.txt"),
+    ];
+    run("bundles/xodr/tests/held-out", lists, "held-out-maps.md", 60);
 }

@@ -8,7 +8,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_header_proj_max_one_proj",
     uids: &["asam.net:xodr:1.9.0:header.proj.max_one_proj"],
     versions: "1.9.0..",
-    backport: Backport::Lower { since: "1.4.0" },
+    backport: Backport::Lower { since: "1.1.0" },
     after: super::READABLE,
     page: include_str!("header_proj_max_one_proj.md"),
     run,

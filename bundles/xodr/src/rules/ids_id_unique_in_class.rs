@@ -7,7 +7,7 @@ use crate::families::ids::{KINDS, Kind, Scope};
 pub static RULE: Rule<Document> = Rule {
     id: "check_asam_xodr_ids_id_unique_in_class",
     uids: &["asam.net:xodr:1.4.0:ids.id_unique_in_class"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("ids_id_unique_in_class.md"),
     run,

@@ -11,7 +11,7 @@ pub static RULE: Rule<Roads> = Rule {
         "asam.net:xodr:1.4.0:ids.id_unique_in_lane_section",
         "asam.net:xodr:1.9.0:road.lane.lane_id_unique",
     ],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("ids_id_unique_in_lane_section.md"),
     each: Some(each),

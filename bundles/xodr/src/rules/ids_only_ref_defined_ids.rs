@@ -11,7 +11,7 @@ use crate::model::{Part, Roads};
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_ids_only_ref_defined_ids",
     uids: &["asam.net:xodr:1.4.0:ids.only_ref_defined_ids"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("ids_only_ref_defined_ids.md"),
     each: Some(each),

@@ -6,7 +6,7 @@ use crate::model::Roads;
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_common_junctions_no_pred_succ",
     uids: &["asam.net:xodr:1.4.0:junctions.common.junctions_no_pred_succ"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("junctions_common_junctions_no_pred_succ.md"),
     run,

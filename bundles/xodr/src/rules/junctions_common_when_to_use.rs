@@ -11,7 +11,7 @@ pub static RULE: Rule<Roads> = Rule {
         "asam.net:xodr:1.9.0:junctions.common.not_only_two",
     ],
     level: Level::Warning,
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("junctions_common_when_to_use.md"),
     run,

@@ -1,7 +1,7 @@
 use std::collections::BTreeSet;
 
 use qcbus_opendrive::{JunctionType, RoadMap};
-use qcbus_sdk::{Place, Rule, Sink};
+use qcbus_sdk::{Backport, Place, Rule, Sink};
 
 use crate::families::on_road::OnRoad;
 use crate::model::Roads;
@@ -10,6 +10,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_connection_connect_road_no_incoming_road",
     uids: &["asam.net:xodr:1.4.0:junctions.connection.connect_road_no_incoming_road"],
     versions: "1.4.0..",
+    backport: Backport::Alike { since: "1.1.0" },
     after: super::READABLE,
     page: include_str!("junctions_connection_connect_road_no_incoming_road.md"),
     run,

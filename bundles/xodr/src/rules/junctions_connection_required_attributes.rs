@@ -7,7 +7,7 @@ use crate::model::Roads;
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_junctions_connection_required_attributes",
     uids: &["qcbus.dev:xodr:1.4.0:junctions.connection.required_attributes"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("junctions_connection_required_attributes.md"),
     run,

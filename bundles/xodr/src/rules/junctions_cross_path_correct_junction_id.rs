@@ -9,7 +9,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_cross_path_correct_junction_id",
     uids: &["asam.net:xodr:1.8.0:junctions.cross_path.correct_junction_id"],
     versions: "1.8.0..",
-    backport: Backport::Lower { since: "1.4.0" },
+    backport: Backport::Lower { since: "1.1.0" },
     after: super::READABLE,
     page: include_str!("junctions_cross_path_correct_junction_id.md"),
     run,

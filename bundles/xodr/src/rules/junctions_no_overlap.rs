@@ -43,7 +43,7 @@ const MOST_POINTS: f64 = 64.0;
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_no_overlap",
     uids: &["asam.net:xodr:1.4.0:junctions.no_overlap"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     params: &[AREA, DEPTH, CLEARANCE],
     page: include_str!("junctions_no_overlap.md"),

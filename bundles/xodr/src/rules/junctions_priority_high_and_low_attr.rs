@@ -7,7 +7,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_priority_high_and_low_attr",
     uids: &["asam.net:xodr:1.8.0:junctions.priority.high_and_low_attr"],
     versions: "1.8.0..",
-    backport: Backport::Lower { since: "1.4.0" },
+    backport: Backport::Lower { since: "1.1.0" },
     after: super::READABLE,
     page: include_str!("junctions_priority_high_and_low_attr.md"),
     run,

@@ -19,7 +19,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_lane_smoothness_profile_no_horizontal_gaps",
     uids: &["qcbus.dev:xodr:1.4.0:lane_smoothness.profile_no_horizontal_gaps"],
     level: Level::Warning,
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     params: &[GAP],
     page: include_str!("lane_smoothness_profile_no_horizontal_gaps.md"),

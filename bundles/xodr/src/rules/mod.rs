@@ -539,12 +539,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &profile_carla_supported::RULE,
     &profile_esmini_supported::RULE,
     &road_linkage_ends_meet::RULE,
-    &header_version_published::RULE,
-    &header_geo_reference::RULE,
-    &header_bounds_contain_roads::RULE,
-    &header_offset_plausible::RULE,
-    &profile_carla_ids::RULE,
-    &profile_carla_supported::RULE,
-    &profile_esmini_supported::RULE,
     &junctions_elevation_grid_placed::RULE,
 ];

@@ -1,5 +1,5 @@
 use qcbus_opendrive::{Road, RoadMap};
-use qcbus_sdk::{Level, Param, Place, Rule, Sink};
+use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink};
 
 use crate::families::on_road::OnRoad;
 use crate::model::{Part, Roads};
@@ -15,6 +15,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_geometry_elem_asc_order",
     uids: &["asam.net:xodr:1.4.0:road.geometry.elem_asc_order"],
     versions: "1.4.0..",
+    backport: Backport::Alike { since: "1.1.0" },
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_geometry_elem_asc_order.md"),

@@ -6,7 +6,7 @@ use crate::model::{Part, Roads};
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_geometry_one_geom_elem_per_spec",
     uids: &["asam.net:xodr:1.4.0:road.geometry.one_geom_elem_per_spec"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("road_geometry_one_geom_elem_per_spec.md"),
     each: Some(each),

@@ -6,7 +6,7 @@ use crate::model::{Part, Roads};
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_geometry_only_one_refline",
     uids: &["asam.net:xodr:1.4.0:road.geometry.only_one_refline"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("road_geometry_only_one_refline.md"),
     each: Some(each),

@@ -6,7 +6,7 @@ use crate::model::{Part, Roads};
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_geometry_refline_exists",
     uids: &["asam.net:xodr:1.4.0:road.geometry.refline_exists"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("road_geometry_refline_exists.md"),
     each: Some(each),

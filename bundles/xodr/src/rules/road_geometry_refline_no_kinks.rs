@@ -21,7 +21,7 @@ pub static RULE: Rule<Roads> = Rule {
         "qcbus.dev:xodr:1.8.0:lane_smoothness.refline_no_horizontal_kinks",
     ],
     level: Level::Warning,
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     params: &[KINK, KINK_ERROR_FROM],
     page: include_str!("road_geometry_refline_no_kinks.md"),

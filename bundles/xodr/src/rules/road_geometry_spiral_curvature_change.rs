@@ -8,7 +8,7 @@ pub static RULE: Rule<Roads> = Rule {
     uids: &["asam.net:xodr:1.9.0:road.geometry.spiral.curvature_change"],
     level: Level::Warning,
     versions: "1.9.0..",
-    backport: Backport::Lower { since: "1.4.0" },
+    backport: Backport::Lower { since: "1.1.0" },
     after: super::READABLE,
     params: &[LEAST],
     page: include_str!("road_geometry_spiral_curvature_change.md"),

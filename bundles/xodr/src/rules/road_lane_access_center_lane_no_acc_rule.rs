@@ -7,7 +7,7 @@ use crate::model::{Part, Roads};
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_access_center_lane_no_acc_rule",
     uids: &["asam.net:xodr:1.4.0:road.lane.access.center_lane_no_acc_rule"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("road_lane_access_center_lane_no_acc_rule.md"),
     each: Some(each),

@@ -8,7 +8,7 @@ use crate::model::{Part, Roads};
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_access_elem_asc_order",
     uids: &["asam.net:xodr:1.4.0:road.lane.access.elem_asc_order"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     params: &[ascending::TOLERANCE],
     page: include_str!("road_lane_access_elem_asc_order.md"),

@@ -10,7 +10,7 @@ pub static RULE: Rule<Roads> = Rule {
         "asam.net:xodr:1.4.0:road.lane.border.exclusive_offset_border",
         "asam.net:xodr:1.4.0:road.lanes.lane_offset.no_offset_if_border_defined",
     ],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("road_lane_border_exclusive_offset_border.md"),
     each: Some(each),

@@ -10,7 +10,7 @@ pub static RULE: Rule<Roads> = Rule {
         "asam.net:xodr:1.4.0:road.lane.border.exclusive_width_border",
         "asam.net:xodr:1.9.0:road.lane.width.no_width_with_border",
     ],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("road_lane_border_exclusive_width_border.md"),
     each: Some(each),

@@ -1,6 +1,6 @@
 use qcbus_opendrive::geometry::Minimum;
 use qcbus_opendrive::{LaneRef, RoadMap, Side, Stretch};
-use qcbus_sdk::{Param, Rule, Sink};
+use qcbus_sdk::{Backport, Param, Rule, Sink};
 
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::model::{Part, Roads};
@@ -16,6 +16,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_border_overlap_with_inner_lanes",
     uids: &["asam.net:xodr:1.4.0:road.lane.border.overlap_with_inner_lanes"],
     versions: "1.4.0..",
+    backport: Backport::Alike { since: "1.1.0" },
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_lane_border_overlap_with_inner_lanes.md"),

@@ -12,7 +12,7 @@ pub static RULE: Rule<Roads> = Rule {
         "asam.net:xodr:1.9.0:road.lane.center_lane_singular",
         "asam.net:xodr:1.9.0:road.lane.layer.center_lane_permanent",
     ],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("road_lane_center_elem_definition.md"),
     each: Some(each),

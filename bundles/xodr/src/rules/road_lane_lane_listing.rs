@@ -7,7 +7,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_lane_listing",
     uids: &["asam.net:xodr:1.4.0:road.lane.lane_listing"],
     level: Level::Warning,
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("road_lane_lane_listing.md"),
     each: Some(each),

@@ -7,7 +7,7 @@ use crate::model::{Part, Roads};
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_lane_order_no_gaps",
     uids: &["asam.net:xodr:1.4.0:road.lane.lane_order_no_gaps"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("road_lane_lane_order_no_gaps.md"),
     each: Some(each),

@@ -12,7 +12,7 @@ pub static RULE: Rule<Roads> = Rule {
         "asam.net:xodr:1.4.0:road.lane.border.elem_asc_order",
         "asam.net:xodr:1.4.0:road.lane.height.elem_asc_order",
     ],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     params: &[ascending::TOLERANCE],
     page: include_str!("road_lane_lane_properties_elem_asc_order.md"),

@@ -22,7 +22,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_lane_reverse_left_right",
     uids: &["asam.net:xodr:1.4.0:road.lane.lane_reverse_left_right"],
     level: Level::Warning,
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("road_lane_lane_reverse_left_right.md"),
     each: Some(each),

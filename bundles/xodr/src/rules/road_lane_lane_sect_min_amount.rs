@@ -9,7 +9,7 @@ pub static RULE: Rule<Roads> = Rule {
         "asam.net:xodr:1.4.0:road.lane.lane_sect_min_amount",
         "asam.net:xodr:1.4.0:road.lane_section.lane_sect_req",
     ],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("road_lane_lane_sect_min_amount.md"),
     each: Some(each),

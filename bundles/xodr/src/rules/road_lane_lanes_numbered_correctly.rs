@@ -15,7 +15,7 @@ const TOLERANCE: Param = Param::number(
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_lanes_numbered_correctly",
     uids: &["asam.net:xodr:1.4.0:road.lane.lanes_numbered_correctly"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_lane_lanes_numbered_correctly.md"),

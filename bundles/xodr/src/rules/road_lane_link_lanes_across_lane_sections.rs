@@ -1,7 +1,7 @@
 use qcbus_opendrive::{
     ContactPoint, LaneJoint, LaneRef, LaneSpan, MapPart, RoadMap, SectionRef, Side, Station,
 };
-use qcbus_sdk::{Level, Param, Rule, Sink};
+use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
 
 use crate::families::driving::is_drivable;
 use crate::families::on_road::{OnRoad, lane_name};
@@ -28,6 +28,7 @@ pub static RULE: Rule<Roads> = Rule {
         ANNEX_F,
     ],
     versions: "1.4.0..",
+    backport: Backport::Alike { since: "1.1.0" },
     after: super::READABLE,
     params: &[OVERLAP],
     page: include_str!("road_lane_link_lanes_across_lane_sections.md"),

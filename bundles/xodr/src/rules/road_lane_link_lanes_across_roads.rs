@@ -22,7 +22,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_lane_link_lanes_across_roads",
     uids: &["qcbus.dev:xodr:1.4.0:road.lane.link.lanes_across_roads"],
     level: Level::Warning,
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     params: &[NEAR],
     page: include_str!("road_lane_link_lanes_across_roads.md"),

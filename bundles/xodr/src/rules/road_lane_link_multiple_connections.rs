@@ -8,7 +8,7 @@ use crate::model::{Part, Roads};
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_link_multiple_connections",
     uids: &["asam.net:xodr:1.4.0:road.lane.link.multiple_connections"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("road_lane_link_multiple_connections.md"),
     each: Some(each),

@@ -1,5 +1,5 @@
 use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Rule, Sink};
+use qcbus_sdk::{Backport, Rule, Sink};
 
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::zero_width::{ZERO_WIDTH, is_zero_at, opens};
@@ -9,6 +9,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_link_new_lane_appear",
     uids: &["asam.net:xodr:1.4.0:road.lane.link.new_lane_appear"],
     versions: "1.4.0..",
+    backport: Backport::Alike { since: "1.1.0" },
     after: super::READABLE,
     params: &[ZERO_WIDTH],
     page: include_str!("road_lane_link_new_lane_appear.md"),

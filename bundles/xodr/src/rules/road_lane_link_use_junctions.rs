@@ -9,7 +9,7 @@ use crate::model::Roads;
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_link_use_junctions",
     uids: &["asam.net:xodr:1.4.0:road.lane.link.use_junctions"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("road_lane_link_use_junctions.md"),
     run,

@@ -6,7 +6,7 @@ use crate::model::{Part, Roads};
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_s_attr_value",
     uids: &["asam.net:xodr:1.4.0:road.lane.s_attr_value"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("road_lane_s_attr_value.md"),
     each: Some(each),

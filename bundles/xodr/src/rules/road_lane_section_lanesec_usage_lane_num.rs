@@ -9,7 +9,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_section_lanesec_usage_lane_num",
     uids: &["asam.net:xodr:1.4.0:road.lane_section.lanesec_usage_lane_num"],
     level: Level::Information,
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("road_lane_section_lanesec_usage_lane_num.md"),
     each: Some(each),

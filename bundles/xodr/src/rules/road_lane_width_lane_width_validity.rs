@@ -25,7 +25,7 @@ const NOTHING: f64 = 1e-9;
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_width_lane_width_validity",
     uids: &["asam.net:xodr:1.4.0:road.lane.width.lane_width_validity"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     params: &[TOLERANCE, SMALL],
     page: include_str!("road_lane_width_lane_width_validity.md"),

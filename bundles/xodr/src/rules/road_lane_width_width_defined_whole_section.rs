@@ -8,7 +8,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_width_width_defined_whole_section",
     uids: &["asam.net:xodr:1.7.0:road.lane.width.width_defined_whole_section"],
     versions: "1.7.0..",
-    backport: Backport::Alike { since: "1.4.0" },
+    backport: Backport::Alike { since: "1.1.0" },
     after: super::READABLE,
     params: &[TOLERANCE, GRAVE],
     page: include_str!("road_lane_width_width_defined_whole_section.md"),

@@ -9,7 +9,7 @@ pub static RULE: Rule<Roads> = Rule {
     uids: &["asam.net:xodr:1.9.0:road.length_sum_geometries"],
     level: Level::Warning,
     versions: "1.9.0..",
-    backport: Backport::Lower { since: "1.4.0" },
+    backport: Backport::Lower { since: "1.1.0" },
     after: super::READABLE,
     params: &[TOLERANCE, BROKEN_FROM],
     page: include_str!("road_length_sum_geometries.md"),

@@ -10,7 +10,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_linkage_both_sides_consistency",
     uids: &["asam.net:xodr:1.9.0:road.linkage.both_sides_consistency"],
     versions: "1.9.0..",
-    backport: Backport::Lower { since: "1.4.0" },
+    backport: Backport::Lower { since: "1.1.0" },
     after: super::READABLE,
     page: include_str!("road_linkage_both_sides_consistency.md"),
     run,

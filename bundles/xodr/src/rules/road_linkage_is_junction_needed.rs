@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 
 use qcbus_document::Node;
 use qcbus_opendrive::{ContactPoint, RoadEnd, RoadMap};
-use qcbus_sdk::{Rule, Sink};
+use qcbus_sdk::{Backport, Rule, Sink};
 
 use crate::families::on_road::{MAX_PLACES, OnRoad};
 use crate::model::Roads;
@@ -11,6 +11,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_linkage_is_junction_needed",
     uids: &["asam.net:xodr:1.4.0:road.linkage.is_junction_needed"],
     versions: "1.4.0..",
+    backport: Backport::Alike { since: "1.1.0" },
     after: super::READABLE,
     page: include_str!("road_linkage_is_junction_needed.md"),
     run,

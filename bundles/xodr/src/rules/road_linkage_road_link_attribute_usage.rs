@@ -7,7 +7,7 @@ use crate::model::{Part, Roads};
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_linkage_road_link_attribute_usage",
     uids: &["asam.net:xodr:1.4.0:road.linkage.road_link_attribute_usage"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("road_linkage_road_link_attribute_usage.md"),
     each: Some(each),

@@ -43,7 +43,7 @@ pub static RULE: Rule<Roads> = Rule {
         "asam.net:xodr:1.4.0:road.overlap_inside_junction",
         "asam.net:xodr:1.4.0:road.no_overlap_self",
     ],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     params: &[AREA, SHRINK, CLEARANCE],
     page: include_str!("road_no_overlap_outside_junction.md"),

@@ -22,7 +22,7 @@ pub static RULE: Rule<Roads> = Rule {
         "asam.net:xodr:1.4.0:road.shape.t_definition_coverage",
         "asam.net:xodr:1.9.0:road.use_cases.shape_elements_start_right",
     ],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     params: &[TOLERANCE],
     page: include_str!("road_shape_t_definition_coverage.md"),

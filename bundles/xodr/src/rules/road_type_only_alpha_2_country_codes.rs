@@ -7,7 +7,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_type_only_alpha_2_country_codes",
     uids: &["asam.net:xodr:1.7.0:road.type.only_alpha_2_country_codes"],
     versions: "1.7.0..",
-    backport: Backport::Lower { since: "1.4.0" },
+    backport: Backport::Lower { since: "1.1.0" },
     after: super::READABLE,
     page: include_str!("road_type_only_alpha_2_country_codes.md"),
     each: Some(each),
