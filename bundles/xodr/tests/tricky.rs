@@ -25,6 +25,8 @@ mod road_links;
 mod roadside;
 #[path = "tricky/slight.rs"]
 mod slight;
+#[path = "tricky/stands.rs"]
+mod stands;
 
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -57,7 +57,8 @@ pub(crate) fn beside(road: &Road<'_>, s: f64, t: f64) -> f64 {
 
 /// Whether roads pass near a place. The roads are laid out when it is asked for the first time.
 pub(crate) struct NearRoads {
-    reach: f64,
+    /// A quarter of the reach, in metres.
+    cell: f64,
     cells: OnceCell<HashSet<(i64, i64)>>,
 }
 
@@ -67,9 +68,10 @@ const MOST_PLACES: f64 = 1e6;
 impl NearRoads {
     /// For distances of `reach` metres.
     pub fn new(reach: f64) -> NearRoads {
-        let cells = OnceCell::new();
-        let reach = reach.max(1.0);
-        NearRoads { reach, cells }
+        NearRoads {
+            cell: 0.25 * reach.max(1.0),
+            cells: OnceCell::new(),
+        }
     }
 
     /// Whether a road may pass within the reach of a place beside this one. Sure when it says no.
@@ -77,21 +79,21 @@ impl NearRoads {
         let place = road.pose(s)?.beside(t)?;
         let cells = self.cells.get_or_init(|| self.lay_out(map));
         let (x, y) = self.cell(place.x, place.y);
-        let around = (-2..=2).flat_map(|dx| (-2..=2).map(move |dy| (x + dx, y + dy)));
+        let around = (-5..=5).flat_map(|dx| (-5..=5).map(move |dy| (x + dx, y + dy)));
         Some(around.into_iter().any(|cell| cells.contains(&cell)))
     }
 
     fn cell(&self, x: f64, y: f64) -> (i64, i64) {
         (
-            (x / self.reach).floor() as i64,
-            (y / self.reach).floor() as i64,
+            (x / self.cell).floor() as i64,
+            (y / self.cell).floor() as i64,
         )
     }
 
     fn lay_out(&self, map: &RoadMap<'_>) -> HashSet<(i64, i64)> {
         let lengths = map.roads().iter().filter_map(Road::length);
         let all: f64 = lengths.filter(|length| *length > 0.0).sum();
-        let step = self.reach.max(all / MOST_PLACES);
+        let step = self.cell.max(all / MOST_PLACES);
         let mut cells = HashSet::default();
         for road in map.roads() {
             let Some(length) = road.length().filter(|length| *length >= 0.0) else {

@@ -111,19 +111,24 @@ fn value<'a>(map: &RoadMap<'a>, signal: Node<'a>, found: &mut Sink<'_>) {
 
 /// A speed that no sign shows.
 fn plausible<'a>(map: &RoadMap<'a>, signal: Node<'a>, node: Node<'a>, found: &mut Sink<'_>) {
-    let (Some(value), Some(unit)) = (given(node), node.attr("unit")) else {
+    let Some(value) = given(node) else { return };
+    let highest = found.number(&HIGHEST);
+    // Without a unit, what no unit makes plausible.
+    let unit = node.attr("unit").unwrap_or_default();
+    let guess = (unit.trim().is_empty() && is_limit(signal)).then_some(value / 3.6);
+    let Some(speed) = speed(node).or(guess) else {
         return;
     };
-    let Some(speed) = speed(node) else { return };
-    let highest = found.number(&HIGHEST);
-    let text = if speed < 0.0 || (speed == 0.0 && is_limit(signal)) {
+    let shown = format!("{value} {unit}");
+    let shown = shown.trim_end();
+    let text = if speed < 0.0 || (speed == 0.0 && is_limit(signal) && guess.is_none()) {
         format!(
-            "{} limits the speed to {value} {unit}; a speed limit must be more than 0",
+            "{} limits the speed to {shown}; a speed limit must be more than 0",
             named(signal)
         )
     } else if speed > highest {
         format!(
-            "{} limits the speed to {value} {unit}, which is {speed:.0} m/s; at most {highest} m/s are plausible",
+            "{} limits the speed to {shown}, which is {speed:.0} m/s; at most {highest} m/s are plausible",
             named(signal)
         )
     } else if let Some(meant) = meant(value, unit) {
@@ -142,7 +147,7 @@ fn plausible<'a>(map: &RoadMap<'a>, signal: Node<'a>, node: Node<'a>, found: &mu
 /// The round speed that a crooked one is in metres per second.
 fn meant(value: f64, unit: &str) -> Option<String> {
     let near = |value: f64, step: f64| (value / step - (value / step).round()).abs() * step < 1e-3;
-    if unit == "m/s" || near(value, 1.0) {
+    if matches!(unit, "m/s" | "") || near(value, 0.1) {
         return None;
     }
     let (kilometres, miles) = (value * 3.6, value / 0.44704);
