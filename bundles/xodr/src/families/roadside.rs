@@ -79,7 +79,8 @@ impl NearRoads {
         let place = road.pose(s)?.beside(t)?;
         let cells = self.cells.get_or_init(|| self.lay_out(map));
         let (x, y) = self.cell(place.x, place.y);
-        let around = (-5..=5).flat_map(|dx| (-5..=5).map(move |dy| (x + dx, y + dy)));
+        let beside = |one: i64| (-5..=5).map(move |by| one.saturating_add(by));
+        let around = beside(x).flat_map(|x| beside(y).map(move |y| (x, y)));
         Some(around.into_iter().any(|cell| cells.contains(&cell)))
     }
 

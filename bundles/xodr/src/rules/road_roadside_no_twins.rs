@@ -42,10 +42,13 @@ const PARTS: [&str; 9] = [
     "positionInertial",
 ];
 
+/// The element's name, its words, and its numbers as places in the grid.
+type Key<'a> = (&'a str, [Option<&'a str>; 6], [i64; 5]);
+
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let grid = found.number(&NEAR).max(1e-9);
     for road in map.part(part).roads() {
-        let mut seen: HashMap<(&str, [Option<&str>; 6], [i64; 5]), Node<'_>> = HashMap::default();
+        let mut seen: HashMap<Key<'_>, Node<'_>> = HashMap::default();
         for thing in things(road) {
             let Some((s, t)) = place(thing, road) else {
                 continue;
