@@ -110,14 +110,27 @@ fn sign(road: &Road<'_>, node: Node<'_>, found: &mut Sink<'_>) {
 }
 
 fn report(road: &Road<'_>, node: Node<'_>, should: &str, found: &mut Sink<'_>) {
-    let Some((s, t)) = place(node, road) else {
+    let depth = found.number(&DEPTH);
+    let Some(origin) = place(node, road) else {
         return;
     };
-    let Some(spot) = blocked(road, s, t, found.number(&DEPTH)) else {
+    let on_road = |s: f64| {
+        road.length()
+            .is_some_and(|length| (0.0..=length).contains(&s))
+    };
+    let corners = corners(node, origin).filter(|(s, _)| on_road(*s));
+    let places = std::iter::once(origin).chain(corners);
+    let mut hits = places.filter_map(|(s, t)| Some((s, t, blocked(road, s, t, depth)?)));
+    let Some((s, t, spot)) = hits.next() else {
         return;
+    };
+    let part = if (s, t) == origin {
+        "stands in the middle of"
+    } else {
+        "reaches with a corner into"
     };
     let text = format!(
-        "{} of type `{}` stands in the middle of {}, {:.2} m from its border; it {should}",
+        "{} of type `{}` {part} {}, {:.2} m from its border; it {should}",
         named(node),
         node.attr("type").unwrap_or_default(),
         lane_name(spot.lane),
@@ -127,4 +140,18 @@ fn report(road: &Road<'_>, node: Node<'_>, should: &str, found: &mut Sink<'_>) {
         .issue(Place::attribute_or_node(node, "t"), text)
         .on(road, s, t)
         .at(spot.lane.node(), "the lane");
+}
+
+/// The corners of a building's box in s and t, as if the road were straight there.
+fn corners(node: Node<'_>, (s, t): (f64, f64)) -> impl Iterator<Item = (f64, f64)> {
+    let size = number(node, "length").zip(number(node, "width"));
+    let size = size.filter(|_| node.attr("type") == Some("building"));
+    let (sin, cos) = number(node, "hdg").unwrap_or(0.0).sin_cos();
+    size.into_iter().flat_map(move |(length, width)| {
+        let signs = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)];
+        signs.map(|(u, v)| {
+            let (u, v) = (u * length, v * width);
+            (s + u * cos - v * sin, t + u * sin + v * cos)
+        })
+    })
 }

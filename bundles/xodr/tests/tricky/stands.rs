@@ -73,6 +73,18 @@ fn places() {
         ),
         ("far from all roads", far, near),
         (
+            "a building next to the lanes",
+            building(r#"s="50" t="12" zOffset="0" hdg="0" length="20" width="9""#)
+                .replace(r#" radius="0.2""#, ""),
+            &[],
+        ),
+        (
+            "a building turned into the lanes",
+            building(r#"s="50" t="12" zOffset="0" hdg="0.7" length="20" width="9""#)
+                .replace(r#" radius="0.2""#, ""),
+            &["warning road_roadside_clear_of_lanes"],
+        ),
+        (
             "on a hill",
             building(r#"s="50" t="100" zOffset="60" hdg="0""#),
             &[],
