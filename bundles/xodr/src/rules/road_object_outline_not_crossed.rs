@@ -19,8 +19,8 @@ pub static RULE: Rule<Roads> = Rule {
 
 /// Outlines of more corners are not looked at: each side is compared with each other.
 const MOST: usize = 200;
-/// Crossings nearer to a corner than this share of a side are rounding.
-const ROUNDING: f64 = 1e-6;
+/// How far a side must reach beyond another, in metres, to cross it.
+const ROUNDING: f64 = 1e-3;
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     for (road, object) in map.part(part).objects() {
@@ -105,15 +105,17 @@ fn corners<'a>(outline: &Outline<'a>) -> Option<Vec<(Node<'a>, Point)>> {
     Some(points)
 }
 
-/// Whether two sides cross between their ends.
+/// Whether two sides cross, each reaching to both sides of the other by more than rounding. Marks that
+/// are lines without width go there and back.
 fn cross([a, b]: [Point; 2], [c, d]: [Point; 2]) -> bool {
-    let (rx, ry, qx, qy) = (b.x - a.x, b.y - a.y, d.x - c.x, d.y - c.y);
-    let area = rx * qy - ry * qx;
-    if area == 0.0 {
-        return false;
-    }
-    let (dx, dy) = (c.x - a.x, c.y - a.y);
-    let (along, across) = ((dx * qy - dy * qx) / area, (dx * ry - dy * rx) / area);
-    let between = |share: f64| share > ROUNDING && share < 1.0 - ROUNDING;
-    between(along) && between(across)
+    divides([a, b], [c, d]) && divides([c, d], [a, b])
+}
+
+/// Whether the line through two points has the two others clearly on either side.
+fn divides([a, b]: [Point; 2], [c, d]: [Point; 2]) -> bool {
+    let (x, y) = (b.x - a.x, b.y - a.y);
+    let length = x.hypot(y);
+    let off = |point: Point| (x * (point.y - a.y) - y * (point.x - a.x)) / length;
+    let (one, other) = (off(c), off(d));
+    one.min(other) < -ROUNDING && one.max(other) > ROUNDING
 }

@@ -347,6 +347,20 @@ fn shapes() {
             &[],
         ),
         (
+            "there and back on a line",
+            outline(
+                r#"id="0" outer="true" closed="true""#,
+                &[
+                    ["-2", "0"],
+                    ["0", "0.0000001"],
+                    ["2", "-0.0000001"],
+                    ["1", "0.0000002"],
+                    ["-1", "0"],
+                ],
+            ),
+            &[],
+        ),
+        (
             "a notch",
             outline(
                 r#"id="0" outer="true""#,
