@@ -18,6 +18,8 @@ pub struct Fault<'a> {
 pub enum FaultGroup {
     /// The text breaks XML's own grammar.
     NotWellFormed,
+    /// The text follows XML's grammar, but not that of its namespaces.
+    Namespaces,
     /// A document type declaration of more than a name, which qcbus refuses (it can pull in files and blow up).
     Doctype,
     /// Bytes and their declared encoding.
@@ -100,7 +102,7 @@ fault_codes! {
     /// `]]>` in character data.
     BadText = 16, "bad-text", NotWellFormed, true;
     /// A prefix that no `xmlns:` binds.
-    UnboundPrefix = 17, "unbound-prefix", NotWellFormed, true;
+    UnboundPrefix = 17, "unbound-prefix", Namespaces, true;
 
     /// A document type declaration that says more than a name, or stands where none may.
     Doctype = 32, "doctype", Doctype, true;

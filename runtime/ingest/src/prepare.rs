@@ -127,18 +127,37 @@ fn decoded(
 ) -> NamedText {
     let decoded = decode(bytes, limits);
     faults.extend(decoded.faults);
-    let named = crate::xml::chars::forbidden(&decoded.text)
-        .take(8)
-        .map(|(at, c)| {
-            let text = format!("the character U+{:04X} is not allowed in XML", u32::from(c));
-            TextFault::new(FaultCode::BadCharacter, at, text)
-        });
-    faults.extend(named);
+    faults.extend(forbidden_runs(&decoded.text));
     NamedText {
         path,
         text: decoded.text,
         faults,
     }
+}
+
+/// The characters that XML forbids: so many places are told, and a row of equal ones as one.
+fn forbidden_runs(text: &str) -> Vec<TextFault> {
+    const MOST: usize = 8;
+    let mut runs: Vec<(usize, char, usize)> = Vec::new();
+    for (at, c) in crate::xml::chars::forbidden(text) {
+        let full = runs.len() == MOST;
+        match runs.last_mut() {
+            Some((from, same, count)) if *same == c && *from + *count * c.len_utf8() == at => {
+                *count += 1;
+            }
+            _ if full => break,
+            _ => runs.push((at, c, 1)),
+        }
+    }
+    let faults = runs.into_iter().map(|(at, c, count)| {
+        let c = u32::from(c);
+        let text = match count {
+            1 => format!("the character U+{c:04X} is not allowed in XML"),
+            _ => format!("{count} characters U+{c:04X} in a row, which is not allowed in XML"),
+        };
+        TextFault::new(FaultCode::BadCharacter, at, text)
+    });
+    faults.collect()
 }
 
 fn promises_gzip(path: &Path) -> bool {

@@ -451,7 +451,8 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
             return Ok(());
         };
         let text = format!(
-            "the prefix of {} is not bound; xmlns:{} is missing",
+            "the prefix of {} belongs to no namespace, so that readers that know namespaces refuse the file; \
+             xmlns:{} is missing",
             shown(name),
             shown(prefix)
         );
