@@ -1,6 +1,6 @@
 //! Where a finding lies on its road, and how texts name roads and lanes.
 
-use qcbus_opendrive::{ContactPoint, LaneRef, Road, Station};
+use qcbus_opendrive::{ContactPoint, LaneRef, LayerKind, Road, Station};
 use qcbus_sdk::Finding;
 
 /// How many further places of one kind a finding names at most; more help nobody, and a hostile file
@@ -64,15 +64,20 @@ impl OnRoad for Finding<'_, '_> {
     }
 }
 
-/// ``lane `-1` of road `5` ``, with the section where the road has several.
+/// ``lane `-1` of road `5` ``, with the section where the layer has several, and with the layer where it is not
+/// the one that every road has.
 pub(crate) fn lane_name(lane: LaneRef<'_, '_>) -> String {
     let section = if lane.at.layer.section_count() > 1 {
         format!(" in lane section {} of", lane.at.index() + 1)
     } else {
         " of".to_owned()
     };
+    let layer = match lane.at.layer.kind() {
+        LayerKind::Temporary => " the temporary layer of",
+        LayerKind::Permanent | LayerKind::Unknown => "",
+    };
     format!(
-        "lane `{}`{section} road `{}`",
+        "lane `{}`{section}{layer} road `{}`",
         lane.id_text().unwrap_or_default(),
         lane.at.road.id()
     )

@@ -1,4 +1,7 @@
-use qcbus_opendrive::{ContactPoint, Junction, JunctionType, Road, RoadEnd, RoadMap, Side};
+use qcbus_opendrive::{
+    ContactPoint, Junction, JunctionType, LaneLayer, LayerKind, Road, RoadEnd, RoadMap, SectionRef,
+    Side,
+};
 use qcbus_sdk::{Rule, Sink};
 
 use crate::model::{Part, Roads};
@@ -17,7 +20,9 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     for road in map.part(part).roads() {
         for end in ContactPoint::BOTH {
             if let Some(why) = nothing_to_link(map, road, end) {
-                check(road, end, &why, found);
+                for layer in road.layers() {
+                    check(road, layer, (end, &why), found);
+                }
             }
         }
     }
@@ -45,17 +50,25 @@ fn nothing_to_link(map: &RoadMap<'_>, road: &Road<'_>, end: ContactPoint) -> Opt
     is_cut.then(|| format!("junction `{id}` lies there, whose connections say which lanes follow"))
 }
 
-fn check(road: &Road<'_>, end: ContactPoint, why: &str, found: &mut Sink<'_>) {
-    let Some(layer) = road.permanent() else {
-        return;
-    };
+fn check<'a>(
+    road: &Road<'a>,
+    layer: &LaneLayer<'a>,
+    (end, why): (ContactPoint, &str),
+    found: &mut Sink<'_>,
+) {
+    let is_temporary = layer.kind() == LayerKind::Temporary;
     let sections = Side::BOTH.into_iter().filter_map(|side| {
         let section = layer.end_section(road, side, end)?;
-        Some(section.side(side))
+        let reaches = !is_temporary || reaches(road, section, (side, end));
+        reaches.then(|| section.side(side))
     });
-    let links = sections
-        .flatten()
-        .filter_map(|lane| Some((lane, lane.links(end).next()?)));
+    let links = sections.flatten().filter_map(|lane| {
+        // Links from temporary lanes to the permanent ones may mean those of the same road.
+        let mut links = lane.links(end);
+        let link =
+            links.find(|link| !is_temporary || link.node().attr("layer") == Some("temporary"))?;
+        Some((lane, link))
+    });
     let links: Vec<_> = links.collect();
     let Some((_, first)) = links.first() else {
         return;
@@ -64,8 +77,13 @@ fn check(road: &Road<'_>, end: ContactPoint, why: &str, found: &mut Sink<'_>) {
         .iter()
         .filter_map(|(lane, _)| lane.id_text())
         .collect();
+    let what = if is_temporary {
+        "temporary lanes"
+    } else {
+        "lanes"
+    };
     let text = format!(
-        "lanes of road `{}` have a {} at the {end} of the road ({}), but {why}; such links must be \
+        "{what} of road `{}` have a {} at the {end} of the road ({}), but {why}; such links must be \
          omitted",
         road.id(),
         end.link_name(),
@@ -75,4 +93,20 @@ fn check(road: &Road<'_>, end: ContactPoint, why: &str, found: &mut Sink<'_>) {
     if let Some(s) = road.end_s(end) {
         finding.road(road.id(), s, 0.0);
     }
+}
+
+/// Whether a section reaches an end of its road.
+fn reaches(
+    road: &Road<'_>,
+    section: SectionRef<'_, '_>,
+    (side, end): (Side, ContactPoint),
+) -> bool {
+    const SAME: f64 = 1e-3;
+    let own = match end {
+        ContactPoint::Start => section.s(),
+        ContactPoint::End => section.end(side),
+    };
+    let of_road = road.end_s(end);
+    own.zip(of_road)
+        .is_some_and(|(own, end)| (own - end).abs() <= SAME)
 }

@@ -90,7 +90,7 @@ fn check(lane: LaneRef<'_, '_>, end: ContactPoint, found: &mut Sink<'_>) {
         return;
     }
     let text = format!(
-        "the temporary {} has no `{}` on the permanent layer at the {end} of the temporary lanes; without one \
+        "{} has no `{}` on the permanent layer at the {end} of the temporary lanes; without one \
          nobody can {} it",
         lane_name(lane),
         end.link_name(),
