@@ -28,8 +28,6 @@ const NOT_NUMBERS: &str =
     "the junction's id is no number, so ASAM's checker takes connecting roads for ordinary ones";
 const CONNECTING: &str = "the roads belong to a junction, which the rule excludes; ASAM's checker means \
      to leave them out, but compares `junction` with 1";
-const CROSSED: &str = "the connections name the wrong contact points, so that the lanes that they link are 10 m \
-     apart; ASAM's checker looks only where the roads' own links agree";
 const NO_WIDTH: &str = "the lane has no width where it is linked, so it has no edges that could miss any; \
      its link is reported by `new_lane_appear` and `zero_width_at_…`";
 
@@ -98,11 +96,6 @@ const DEVIATIONS: &[Deviations] = &[
         checker: GAPS,
         inputs: &["performance_avoid_redundant_info_lane_width_invalid.xodr"],
         reason: "the third is a biking lane that is not advisory; annex D.1 does not count it as drivable",
-    },
-    Deviations {
-        checker: GAPS,
-        inputs: &["junction_connection_linkage_invalid.xodr"],
-        reason: CROSSED,
     },
     Deviations {
         checker: GAPS,

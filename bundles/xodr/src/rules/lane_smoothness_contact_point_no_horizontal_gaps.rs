@@ -17,13 +17,27 @@ const GAP: Param = Param::number(
     "largest distance in the plan view that is accepted",
 );
 
+/// ASAM's checker takes every gap between lanes for an error, so that this one does.
+const LANE_ERROR_FROM: Param = Param::number(
+    "lane_error_from",
+    0.01,
+    "m",
+    "from 1.7 on, gaps between lanes from this size on are errors; in older files `gap_error_from` holds",
+);
+
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_lane_smoothness_contact_point_no_horizontal_gaps",
     uids: &["asam.net:xodr:1.7.0:lane_smoothness.contact_point_no_horizontal_gaps"],
     versions: "1.7.0..",
     backport: Backport::Separate { since: "" },
     after: super::READABLE,
-    params: &[GAP, ZERO_WIDTH, GAP_ERROR_FROM, GAP_BROKEN_FROM],
+    params: &[
+        GAP,
+        ZERO_WIDTH,
+        LANE_ERROR_FROM,
+        GAP_ERROR_FROM,
+        GAP_BROKEN_FROM,
+    ],
     page: include_str!("lane_smoothness_contact_point_no_horizontal_gaps.md"),
     each: Some(each),
     run,
@@ -35,7 +49,7 @@ const NORMATIVE: Version = Version::new(1, 7);
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     // In older files `road.geometry.refline_no_gaps` says it.
-    if found.version() < Some(NORMATIVE) {
+    if !is_normative(found) {
         return;
     }
     let limit = found.number(&GAP);
@@ -44,6 +58,10 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             finding.also_violates("asam.net:xodr:1.4.0:road.geometry.refline_no_gaps");
         });
     }
+}
+
+fn is_normative(found: &Sink<'_>) -> bool {
+    found.version() >= Some(NORMATIVE)
 }
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
@@ -86,7 +104,13 @@ fn report(map: &RoadMap<'_>, gap: &LaneGap<'_, '_>, found: &mut Sink<'_>) {
         lane_name(gap.to)
     );
     let widest = gap.edges.iter().map(|(apart, _)| *apart);
-    let misfit = Misfit::gap(widest.fold(0.0, f64::max), gap.whole, found);
+    let widest = widest.fold(0.0, f64::max);
+    let misfit = match Misfit::gap(widest, gap.whole, found) {
+        Misfit::Slight if is_normative(found) && widest >= found.number(&LANE_ERROR_FROM) => {
+            Misfit::Plain
+        }
+        misfit => misfit,
+    };
     let mut finding = misfit
         .put(found.issue(gap.from.node(), text))
         .at_lane_end(gap.from, gap.joint.from.end)

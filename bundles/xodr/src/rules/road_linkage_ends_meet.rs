@@ -1,10 +1,11 @@
 use foldhash::HashSet;
 use qcbus_opendrive::{ContactPoint, JunctionType, Road, RoadContact, RoadEnd, RoadMap};
-use qcbus_sdk::{Param, Rule, Sink};
+use qcbus_sdk::{Param, Rule, Sink, Version};
 
 use crate::families::gap_levels::GAP_BROKEN_FROM;
 use crate::families::mouths;
 use crate::families::on_road::OnRoad;
+use crate::families::virtual_links::leads_to_main_road;
 use crate::model::Roads;
 
 const FAR: Param = Param::number(
@@ -31,7 +32,9 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let mut told: HashSet<(RoadEnd, RoadEnd)> = HashSet::default();
     // Which junctions say that they are at which road ends.
     let mut joined: HashSet<(usize, RoadEnd)> = HashSet::default();
-    for contact in contacts(map) {
+    // `junctions.connection.start_along_linkage` and `…end_opposite_linkage` say so.
+    let contradicted = found.version() >= Some(Version::new(1, 7));
+    for contact in contacts(map, contradicted) {
         let (one, other) = (contact.from, contact.to);
         if told.insert((one.min(other), one.max(other))) {
             check(map, &contact, found);
@@ -53,34 +56,44 @@ fn junction_of(map: &RoadMap<'_>, at: RoadEnd) -> Option<usize> {
 }
 
 /// What links of roads and connections of junctions say to meet, as far as a junction has a part in it. Of
-/// roads outside of junctions `road.geometry.contact_point` speaks.
-fn contacts<'m, 'a>(map: &'m RoadMap<'a>) -> impl Iterator<Item = RoadContact<'a>> {
+/// roads outside of junctions `road.geometry.contact_point` speaks; connections that the links contradict are
+/// left out if they are `contradicted` by a rule of their own.
+fn contacts<'m, 'a>(
+    map: &'m RoadMap<'a>,
+    contradicted: bool,
+) -> impl Iterator<Item = RoadContact<'a>> {
     let links = map.roads().iter().flat_map(move |road| {
-        let contacts = ContactPoint::BOTH.map(|end| map.linked_end(road, end));
-        contacts.into_iter().flatten().filter(move |contact| {
+        // The main road of a virtual junction is not cut, and met somewhere along it.
+        let links = ContactPoint::BOTH.map(|end| Some((end, road.link(end)?)));
+        let links = links.into_iter().flatten();
+        let cut = links.filter(move |(_, link)| !leads_to_main_road(map, road, *link));
+        let contacts = cut.filter_map(move |(end, _)| map.linked_end(road, end));
+        contacts.filter(move |contact| {
             let linked = map.road_at(contact.to.road);
-            let within =
-                [Some(road), linked].map(|road| road.is_some_and(|one| one.junction().is_some()));
-            within.contains(&true)
+            let roads = [Some(road), linked];
+            roads
+                .into_iter()
+                .flatten()
+                .any(|one| one.junction().is_some())
         })
     });
     let connections = map
         .connections()
-        .filter_map(|(junction, connection)| map.connection_contact(junction, connection));
-    links.chain(connections).filter(|contact| {
-        let roads = [contact.from, contact.to].map(|end| map.road_at(end.road));
-        roads.into_iter().flatten().all(|road| cuts(map, road))
-    })
+        .filter_map(|(junction, connection)| map.connection_contact(junction, connection))
+        .filter(move |contact| !contradicted || !is_contradicted(map, contact));
+    links.chain(connections)
 }
 
-/// Whether a road belongs to no junction, or to one that cuts roads. Virtual ones lie somewhere along them.
-fn cuts(map: &RoadMap<'_>, road: &Road<'_>) -> bool {
-    let junction = road.junction().and_then(|id| map.junction(id));
-    junction.is_none_or(|one| {
-        matches!(
-            one.kind(),
-            Some(JunctionType::Common | JunctionType::Direct)
-        )
+/// Whether the connecting road says of that end that it meets another road than the incoming one.
+fn is_contradicted(map: &RoadMap<'_>, contact: &RoadContact<'_>) -> bool {
+    let roads = map
+        .road_at(contact.from.road)
+        .zip(map.road_at(contact.to.road));
+    roads.is_some_and(|(incoming, connecting)| {
+        let linked = connecting
+            .link(contact.to.end)
+            .and_then(|link| link.road_id());
+        linked.is_some_and(|id| id != incoming.id())
     })
 }
 

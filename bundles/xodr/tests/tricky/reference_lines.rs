@@ -49,16 +49,13 @@ fn geometries() {
         (
             "a metre is one",
             two(["50", "51", "0", "0"]),
-            &[
-                "error lane_smoothness_contact_point_no_horizontal_gaps",
-                "error road_geometry_refline_no_gaps",
-            ],
+            &["error lane_smoothness_contact_point_no_horizontal_gaps"],
         ),
         (
             "turning back is a kink",
             two(["50", "50", "0", PI]),
             &[
-                "warning road_geometry_refline_no_kinks",
+                "error road_geometry_refline_no_kinks",
                 "error road_no_overlap_outside_junction",
             ],
         ),

@@ -164,10 +164,7 @@ fn between_two_roads() {
                 ..ALONG
             }
             .text(),
-            &[
-                "error lane_smoothness_contact_point_no_horizontal_gaps",
-                "error road_geometry_contact_point",
-            ],
+            &["error road_geometry_contact_point"],
         ),
         (
             "the wrong end",
@@ -177,7 +174,6 @@ fn between_two_roads() {
             }
             .text(),
             &[
-                "error lane_smoothness_contact_point_no_horizontal_gaps",
                 "error road_geometry_contact_point",
                 "error road_lane_link_lanes_across_lane_sections",
                 "error road_linkage_both_sides_consistency",
