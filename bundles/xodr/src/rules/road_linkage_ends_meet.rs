@@ -58,10 +58,7 @@ fn junction_of(map: &RoadMap<'_>, at: RoadEnd) -> Option<usize> {
 /// What links of roads and connections of junctions say to meet, as far as a junction has a part in it. Of
 /// roads outside of junctions `road.geometry.contact_point` speaks; connections that the links contradict are
 /// left out if they are `contradicted` by a rule of their own.
-fn contacts<'m, 'a>(
-    map: &'m RoadMap<'a>,
-    contradicted: bool,
-) -> impl Iterator<Item = RoadContact<'a>> {
+fn contacts<'a>(map: &RoadMap<'a>, contradicted: bool) -> impl Iterator<Item = RoadContact<'a>> {
     let links = map.roads().iter().flat_map(move |road| {
         // The main road of a virtual junction is not cut, and met somewhere along it.
         let links = ContactPoint::BOTH.map(|end| Some((end, road.link(end)?)));

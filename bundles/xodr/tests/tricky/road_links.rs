@@ -167,6 +167,30 @@ fn between_two_roads() {
             &["error road_geometry_contact_point"],
         ),
         (
+            "half a metre in between: the roads touch, their lanes do not",
+            Pair {
+                second: ["100.5", "0"],
+                ..ALONG
+            }
+            .text(),
+            &[
+                "error lane_smoothness_contact_point_no_horizontal_gaps",
+                "error road_geometry_contact_point",
+            ],
+        ),
+        (
+            "three centimetres in between",
+            Pair {
+                second: ["100.03", "0"],
+                ..ALONG
+            }
+            .text(),
+            &[
+                "error lane_smoothness_contact_point_no_horizontal_gaps",
+                "warning road_geometry_contact_point",
+            ],
+        ),
+        (
             "the wrong end",
             Pair {
                 links: ["s2 end", "p1 end"],
