@@ -27,6 +27,8 @@ mod roadside;
 mod slight;
 #[path = "tricky/stands.rs"]
 mod stands;
+#[path = "tricky/topology.rs"]
+mod topology;
 
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -25,8 +25,14 @@ mod junctions_common_direct_junction_attributes;
 mod junctions_common_junctions_no_pred_succ;
 mod junctions_common_virtual_junction_attributes;
 mod junctions_common_when_to_use;
+mod junctions_connecting_lane_linked;
+mod junctions_connecting_road_linked;
+mod junctions_connecting_road_place;
+mod junctions_connecting_road_used;
 mod junctions_connection_connect_road_no_incoming_road;
 mod junctions_connection_end_opposite_linkage;
+mod junctions_connection_lane_link_once;
+mod junctions_connection_lane_links_agree;
 mod junctions_connection_one_connection_element;
 mod junctions_connection_one_link_to_incoming;
 mod junctions_connection_required_attributes;
@@ -54,7 +60,10 @@ mod junctions_elevation_grid_valid_for_entire_boundry;
 mod junctions_geometry_correct_junction_boundry;
 mod junctions_geometry_only_one_line_element;
 mod junctions_geometry_ref_line_definition;
+mod junctions_incoming_lane_used;
+mod junctions_incoming_road_linked;
 mod junctions_no_overlap;
+mod junctions_priority_acyclic;
 mod junctions_priority_high_and_low_attr;
 mod junctions_priority_no_signals;
 mod junctions_type_default_no_linked_road;
@@ -144,12 +153,15 @@ mod road_lane_layer_layer_limits;
 mod road_lane_layer_layer_mandatory_permanent;
 mod road_lane_layer_length_only_temporary;
 mod road_lane_level_true_one_side;
+mod road_lane_link_center_lane;
+mod road_lane_link_direction;
 mod road_lane_link_lanes_across_lane_sections;
 mod road_lane_link_lanes_across_roads;
 mod road_lane_link_multiple_connections;
 mod road_lane_link_new_lane_appear;
 mod road_lane_link_no_link;
 mod road_lane_link_temporary_layer_section_link_permanent;
+mod road_lane_link_types;
 mod road_lane_link_use_junctions;
 mod road_lane_link_zero_width_at_end;
 mod road_lane_link_zero_width_at_start;
@@ -176,7 +188,10 @@ mod road_linkage_ends_meet;
 mod road_linkage_is_junction_needed;
 mod road_linkage_junc_link_attribute_usage;
 mod road_linkage_road_link_attribute_usage;
+mod road_linkage_touching_ends;
 mod road_linkage_virtjunc_link_attribute_usage;
+mod road_network_connected;
+mod road_network_drivable;
 mod road_no_overlap_outside_junction;
 mod road_object_borders_different_outlineids;
 mod road_object_borders_use_complete_outline_true;
@@ -540,4 +555,19 @@ pub static RULES: &[&dyn AnyRule] = &[
     &profile_esmini_supported::RULE,
     &road_linkage_ends_meet::RULE,
     &junctions_elevation_grid_placed::RULE,
+    &junctions_connecting_lane_linked::RULE,
+    &junctions_connecting_road_linked::RULE,
+    &junctions_connecting_road_place::RULE,
+    &junctions_connecting_road_used::RULE,
+    &junctions_connection_lane_link_once::RULE,
+    &junctions_connection_lane_links_agree::RULE,
+    &junctions_incoming_lane_used::RULE,
+    &junctions_incoming_road_linked::RULE,
+    &junctions_priority_acyclic::RULE,
+    &road_lane_link_center_lane::RULE,
+    &road_lane_link_direction::RULE,
+    &road_lane_link_types::RULE,
+    &road_linkage_touching_ends::RULE,
+    &road_network_connected::RULE,
+    &road_network_drivable::RULE,
 ];

@@ -102,7 +102,12 @@ impl Common<'_> {
             junction: self.id,
             pose: ["110", "-15", "1.5707963267948966"],
             link: &link(&["p5 end"]),
-            lanes: &section("\"0\"", "", &lane("-1", "p-1")),
+            lanes: &section(
+                "\"0\"",
+                "",
+                // It leads nowhere, so that it is not for everybody.
+                &lane("-1", "p-1").replace("driving", "restricted"),
+            ),
             rule: self.rule,
             ..Road::default()
         };
@@ -215,6 +220,7 @@ fn common() {
                 "error junctions_connection_one_link_to_incoming",
                 "error road_linkage_both_sides_consistency",
                 "warning junctions_common_when_to_use",
+                "warning junctions_incoming_lane_used",
             ],
         ),
     ];

@@ -88,7 +88,10 @@ fn between_two_roads() {
                 ..HEAD_ON
             }
             .text(),
-            &["error lane_smoothness_contact_point_no_horizontal_gaps"],
+            &[
+                "error lane_smoothness_contact_point_no_horizontal_gaps",
+                "error road_lane_link_direction",
+            ],
         ),
         (
             "a slope goes on against s",

@@ -1,0 +1,106 @@
+//! Which roads hang together.
+
+use foldhash::HashMap;
+use qcbus_opendrive::{ContactPoint, Road, RoadMap};
+
+use super::routes::is_route;
+
+/// The roads of a map, joined where the file says in whatever way that they belong together.
+pub(crate) struct Parts {
+    above: Vec<usize>,
+}
+
+/// Roads that hang together.
+pub(crate) struct Piece {
+    /// The first of its roads that has a lane for vehicles, by its place in the map.
+    pub first: usize,
+    /// How many roads with such lanes there are.
+    pub roads: usize,
+    /// Their length in all, in metres.
+    pub length: f64,
+}
+
+impl Parts {
+    /// Joins what roads and junctions name.
+    pub fn of(map: &RoadMap<'_>) -> Parts {
+        let roads = map.roads().len();
+        let junctions = map.junctions().len();
+        let mut parts = Parts {
+            above: (0..roads + junctions).collect(),
+        };
+        for road in map.roads() {
+            let links = ContactPoint::BOTH
+                .into_iter()
+                .filter_map(|end| road.link(end));
+            for link in links {
+                let linked = link.road_id().and_then(|id| map.road(id));
+                let junction = link.junction_id().and_then(|id| map.junction(id));
+                parts.join(road.index(), linked.map(Road::index));
+                parts.join(road.index(), junction.map(|it| roads + it.index()));
+            }
+            let junction = road.junction().and_then(|id| map.junction(id));
+            parts.join(road.index(), junction.map(|it| roads + it.index()));
+        }
+        for junction in map.junctions() {
+            let connections = junction.connections();
+            let named = connections.flat_map(|one| [one.incoming_road(), one.target_road()]);
+            let crossed = junction.cross_paths();
+            let crossed = crossed
+                .flat_map(|one| [one.crossing_road(), one.road_at_start(), one.road_at_end()]);
+            let sections = junction.road_sections().map(|one| one.road_id());
+            let named = named
+                .chain(crossed)
+                .chain(sections)
+                .chain([junction.main_road()]);
+            for road in named.flatten().filter_map(|id| map.road(id)) {
+                parts.join(roads + junction.index(), Some(road.index()));
+            }
+        }
+        parts
+    }
+
+    /// The root of a set, which is brought nearer on the way.
+    fn root(&mut self, mut at: usize) -> usize {
+        while let Some(above) = self.above.get(at).copied().filter(|above| *above != at) {
+            let further = self.above.get(above).copied().unwrap_or(above);
+            if let Some(slot) = self.above.get_mut(at) {
+                *slot = further;
+            }
+            at = further;
+        }
+        at
+    }
+
+    fn join(&mut self, one: usize, other: Option<usize>) {
+        let Some(other) = other else { return };
+        let (one, other) = (self.root(one), self.root(other));
+        if let Some(slot) = self.above.get_mut(one.max(other)) {
+            *slot = one.min(other);
+        }
+    }
+
+    /// The pieces that have lanes for vehicles, by their first road.
+    pub fn pieces(mut self, map: &RoadMap<'_>) -> Vec<Piece> {
+        let mut places: HashMap<usize, usize> = HashMap::default();
+        let mut pieces: Vec<Piece> = Vec::new();
+        for road in map.roads() {
+            if !road.sections().any(|section| section.lanes().any(is_route)) {
+                continue;
+            }
+            let root = self.root(road.index());
+            let place = *places.entry(root).or_insert(pieces.len());
+            if place == pieces.len() {
+                pieces.push(Piece {
+                    first: road.index(),
+                    roads: 0,
+                    length: 0.0,
+                });
+            }
+            if let Some(piece) = pieces.get_mut(place) {
+                piece.roads += 1;
+                piece.length += road.length().unwrap_or(0.0).max(0.0);
+            }
+        }
+        pieces
+    }
+}

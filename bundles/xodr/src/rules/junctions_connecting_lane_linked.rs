@@ -1,0 +1,109 @@
+use foldhash::HashSet;
+use qcbus_opendrive::{
+    ContactPoint, JunctionType, LaneEnd, LaneRef, Road, RoadEnd, RoadMap, Traffic,
+};
+use qcbus_sdk::{Level, Param, Rule, Sink};
+
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::families::routes::{NARROW, routes_at};
+use crate::model::Roads;
+
+const NEAR: Param = Param::number(
+    "near",
+    0.1,
+    "m",
+    "how near the edges of two lanes must be for one to go on as the other",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_junctions_connecting_lane_linked",
+    uids: &["qcbus.dev:xodr:1.4.0:junctions.connecting_lane_linked"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[NARROW, NEAR],
+    page: include_str!("junctions_connecting_lane_linked.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let mut seen = HashSet::default();
+    let joints = map.junction_joints().iter();
+    let taken: HashSet<LaneEnd> = joints.flat_map(|joint| [joint.from, joint.to]).collect();
+    for (junction, connection) in map.connections() {
+        if junction.kind() != Some(JunctionType::Common) || connection.is_virtual() {
+            continue;
+        }
+        let connecting = connection.connecting_road().and_then(|id| map.road(id));
+        let Some(road) = connecting.filter(|road| seen.insert(road.index())) else {
+            continue;
+        };
+        for end in ContactPoint::BOTH {
+            if let Some(contact) = map.linked_end(road, end) {
+                check(map, &taken, (road, end), contact.to, found);
+            }
+        }
+    }
+}
+
+fn check(
+    map: &RoadMap<'_>,
+    taken: &HashSet<LaneEnd>,
+    (road, end): (&Road<'_>, ContactPoint),
+    there: RoadEnd,
+    found: &mut Sink<'_>,
+) {
+    let narrow = found.number(&NARROW);
+    let open = |lane: &LaneRef<'_, '_>| {
+        let at = LaneEnd {
+            lane: lane.key(),
+            end,
+        };
+        lane.links(end).next().is_none() && !taken.contains(&at)
+    };
+    let mut open = routes_at(road, end, narrow).filter(open).peekable();
+    let Some(other) = map.road_at(there.road).filter(|_| open.peek().is_some()) else {
+        return;
+    };
+    let open: Vec<_> = open.collect();
+    for lane in open {
+        let near = found.number(&NEAR);
+        let touches = |next: &LaneRef<'_, '_>| touch((lane, end), (*next, there.end), near);
+        let Some(next) = routes_at(other, there.end, narrow).find(touches) else {
+            continue;
+        };
+        let text = format!(
+            "{} of a connecting road goes on as {}, but has no {}, so that routes end there; lanes of connecting roads \
+             must be linked at both ends",
+            lane_name(lane),
+            lane_name(next),
+            end.link_name()
+        );
+        // Who links a lane at one end and not at the other one, out of which traffic comes, has forgotten it.
+        let begun = lane.links(end.other()).next().is_some();
+        let forgotten = begun && Traffic::of(lane) == Traffic::Towards(end);
+        let level = if forgotten {
+            Level::Error
+        } else {
+            Level::Warning
+        };
+        found
+            .issue(lane.node(), text)
+            .level(level)
+            .at_lane_end(lane, end)
+            .at(next.node(), "the lane that it goes on as");
+    }
+}
+
+/// Whether two lanes have both edges in common.
+fn touch(
+    (lane, end): (LaneRef<'_, '_>, ContactPoint),
+    (next, at): (LaneRef<'_, '_>, ContactPoint),
+    near: f64,
+) -> bool {
+    let Some((one, other)) = lane.borders_at(end).zip(next.borders_at(at)) else {
+        return false;
+    };
+    let mut pairs = one.iter().zip(&other);
+    pairs.all(|(edge, touch)| edge.point.plan().distance(touch.point.plan()) <= near)
+}

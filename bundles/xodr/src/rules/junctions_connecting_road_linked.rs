@@ -1,0 +1,66 @@
+use foldhash::HashSet;
+use qcbus_opendrive::{ContactPoint, JunctionType, Road, RoadMap};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::on_road::OnRoad;
+use crate::families::routes::{NARROW, lanes_at, routes_at};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_junctions_connecting_road_linked",
+    uids: &["qcbus.dev:xodr:1.4.0:junctions.connecting_road_linked"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[NARROW],
+    page: include_str!("junctions_connecting_road_linked.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let mut seen = HashSet::default();
+    for (junction, connection) in map.connections() {
+        if junction.kind() != Some(JunctionType::Common) || connection.is_virtual() {
+            continue;
+        }
+        let connecting = connection.connecting_road().and_then(|id| map.road(id));
+        let inside = connecting.filter(|road| road.junction() == Some(junction.id()));
+        let Some(road) = inside.filter(|road| seen.insert(road.index())) else {
+            continue;
+        };
+        for end in ContactPoint::BOTH {
+            let enters = connection.contact_point() == Some(end);
+            if is_open(road, end, found.number(&NARROW)) && (enters || !has_lane_links(road, end)) {
+                let text = format!(
+                    "the connecting road `{}` of junction `{}` has no {}, so that nobody can tell which road it \
+                     joins at its {end}; a connecting road must be linked at both ends",
+                    road.id(),
+                    junction.id(),
+                    end.link_name()
+                );
+                // Where it is entered it must be linked; elsewhere it may be a piece that somebody left out.
+                let known = connection.incoming_road().and_then(|id| map.road(id));
+                let level = if enters && known.is_some() {
+                    Level::Error
+                } else {
+                    Level::Warning
+                };
+                found
+                    .issue(road.link_node().unwrap_or(road.node()), text)
+                    .level(level)
+                    .at_end(road, end)
+                    .at(connection.node(), "the connection that uses the road");
+            }
+        }
+    }
+}
+
+/// Whether traffic gets to an end of a road that is linked to nothing.
+fn is_open(road: &Road<'_>, end: ContactPoint, narrow: f64) -> bool {
+    road.link(end).is_none() && routes_at(road, end, narrow).next().is_some()
+}
+
+/// Whether lanes are linked at an end of their road although the road is not: another rule's business.
+fn has_lane_links(road: &Road<'_>, end: ContactPoint) -> bool {
+    lanes_at(road, end).any(|lane| lane.links(end).next().is_some())
+}

@@ -1,0 +1,39 @@
+use foldhash::HashMap;
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_junctions_connection_lane_link_once",
+    uids: &["qcbus.dev:xodr:1.4.0:junctions.connection.lane_link_once"],
+    level: Level::Warning,
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("junctions_connection_lane_link_once.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for (_, connection) in map.connections() {
+        let mut first: HashMap<_, Node<'_>> = HashMap::default();
+        for link in connection.lane_links() {
+            let (Some(from), Some(to)) = (link.from(), link.to()) else {
+                continue;
+            };
+            let key = (from, to, link.from_layer(), link.to_layer());
+            let Some(before) = first.get(&key) else {
+                first.insert(key, link.node());
+                continue;
+            };
+            let text = format!(
+                "connection `{}` links lane `{from}` to lane `{to}` a second time; once says it all, and a second lane \
+                 link is probably meant for other lanes",
+                connection.id().unwrap_or_default()
+            );
+            found.issue(link.node(), text).at(*before, "the first one");
+        }
+    }
+}

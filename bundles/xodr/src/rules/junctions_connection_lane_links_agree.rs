@@ -1,0 +1,122 @@
+use qcbus_document::Node;
+use qcbus_opendrive::{ContactPoint, LaneRef, LayerKind, RoadMap, Traffic};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::connection_links::{Bundle, bundles};
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::families::routes::{NARROW, routes_at};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_junctions_connection_lane_links_agree",
+    uids: &["qcbus.dev:xodr:1.4.0:junctions.connection.lane_links_agree"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[NARROW],
+    page: include_str!("junctions_connection_lane_links_agree.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for bundle in bundles(map) {
+        for link in &bundle.links {
+            contradicted(map, &bundle, *link, found);
+        }
+        left_out(map, &bundle, found);
+    }
+}
+
+/// A lane link that the connecting lane contradicts: it names another lane of the incoming road.
+fn contradicted(
+    map: &RoadMap<'_>,
+    bundle: &Bundle<'_>,
+    (from, to, node): (i64, i64, Node<'_>),
+    found: &mut Sink<'_>,
+) {
+    let end = bundle.to.end;
+    let lane = map
+        .lane_at_road_end(bundle.to, to, LayerKind::Permanent)
+        .and_then(|at| map.lane(at.lane));
+    // A lane that does not exist, or the center lane, is wrong anyway.
+    let other = map.lane_at_road_end(bundle.from, from, LayerKind::Permanent);
+    let Some(lane) = lane.filter(|_| from != 0 && other.is_some()) else {
+        return;
+    };
+    let own: Vec<i64> = named(lane, end).collect();
+    let (Some(first), false) = (own.first(), own.contains(&from)) else {
+        return;
+    };
+    let incoming = map.road_at(bundle.from.road).map_or("", |road| road.id());
+    let text = format!(
+        "the lane link leads from lane `{from}` of road `{incoming}` to {}, but that lane names lane `{first}` as its \
+         {}; both must name the same lane",
+        lane_name(lane),
+        end.link_name()
+    );
+    let place = lane
+        .links(end)
+        .next()
+        .map_or(lane.node(), |link| link.node());
+    found
+        .issue(node, text)
+        .at_lane_end(lane, end)
+        .at(place, "what the lane says");
+}
+
+/// A connecting lane that comes from a lane of which the connection knows nothing.
+fn left_out(map: &RoadMap<'_>, bundle: &Bundle<'_>, found: &mut Sink<'_>) {
+    let end = bundle.to.end;
+    let (Some(road), Some(incoming)) = (map.road_at(bundle.to.road), map.road_at(bundle.from.road))
+    else {
+        return;
+    };
+    // A lane link that leads to no lane is the one that is missing.
+    let exists = |id| {
+        map.lane_at_road_end(bundle.to, id, LayerKind::Permanent)
+            .is_some()
+    };
+    if !bundle
+        .links
+        .iter()
+        .all(|(_, to, _)| *to != 0 && exists(*to))
+    {
+        return;
+    }
+    for lane in routes_at(road, end, found.number(&NARROW)) {
+        let id = lane.id().unwrap_or(0);
+        let enters = Traffic::of(lane) == Traffic::Towards(end.other());
+        if !enters || bundle.links.iter().any(|(_, to, _)| *to == id) {
+            continue;
+        }
+        // Without any lane links, lanes of the same number are linked.
+        let by_number = bundle.links.is_empty();
+        let Some(from) = named(lane, end).find(|from| !(by_number && *from == id)) else {
+            continue;
+        };
+        let without = if by_number {
+            "has no lane links, which stands for lanes of the same number only"
+        } else {
+            "has no lane link for it"
+        };
+        let text = format!(
+            "{} goes on from lane `{from}` of road `{}`, but the connection between them {without}; nobody can turn \
+             there without a lane link",
+            lane_name(lane),
+            incoming.id()
+        );
+        found
+            .issue(bundle.connection.node(), text)
+            .level(Level::Warning)
+            .at_lane_end(lane, end)
+            .at(lane.node(), "the lane");
+    }
+}
+
+/// The lanes that a lane names at an end.
+fn named<'a>(lane: LaneRef<'_, 'a>, end: ContactPoint) -> impl Iterator<Item = i64> + use<'a> {
+    let links = lane.links(end);
+    links
+        .filter(|link| link.layer() == LayerKind::Permanent)
+        .filter_map(|link| link.id())
+}

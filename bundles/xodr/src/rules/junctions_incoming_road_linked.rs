@@ -1,0 +1,65 @@
+use foldhash::HashSet;
+use qcbus_opendrive::{ContactPoint, Junction, JunctionType, Road, RoadLink, RoadMap};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::families::on_road::OnRoad;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_junctions_incoming_road_linked",
+    uids: &["qcbus.dev:xodr:1.4.0:junctions.incoming_road_linked"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("junctions_incoming_road_linked.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    // The first connecting road that is seen from each incoming road, and who is told about.
+    let mut first = foldhash::HashMap::default();
+    let mut told = HashSet::default();
+    for (junction, connection) in map.connections() {
+        if junction.kind() != Some(JunctionType::Common) || connection.is_virtual() {
+            continue;
+        }
+        let incoming = connection.incoming_road().and_then(|id| map.road(id));
+        let roads = incoming.zip(connection.connecting_road());
+        let Some((road, connecting)) = roads.filter(|(road, _)| road.junction().is_none()) else {
+            continue;
+        };
+        let key = (junction.index(), road.index());
+        let is_choice = *first.entry(key).or_insert(connecting) != connecting;
+        if !is_choice || map.ends_at(junction, road).contains(&true) || !told.insert(key) {
+            continue;
+        }
+        if let Some((link, end)) = link_within(map, road, junction) {
+            let text = format!(
+                "the {} of road `{}` is road `{}`, one of several that lead on from there in junction `{}`; the \
+                 road must be linked to the junction, else the other ways cannot be found",
+                end.link_name(),
+                road.id(),
+                link.road_id().unwrap_or_default(),
+                junction.id()
+            );
+            found
+                .issue(link.node(), text)
+                .at_end(road, end)
+                .at(connection.node(), "another way to go on");
+        }
+    }
+}
+
+/// The link of a road that leads to a road within a junction.
+fn link_within<'a>(
+    map: &RoadMap<'a>,
+    road: &Road<'a>,
+    junction: &Junction<'a>,
+) -> Option<(RoadLink<'a>, ContactPoint)> {
+    let links = ContactPoint::BOTH.into_iter();
+    let mut links = links.filter_map(|end| Some((road.link(end)?, end)));
+    links.find(|(link, _)| {
+        let linked = link.road_id().and_then(|id| map.road(id));
+        linked.is_some_and(|linked| linked.junction() == Some(junction.id()))
+    })
+}

@@ -1,0 +1,69 @@
+use foldhash::HashMap;
+use qcbus_opendrive::{Junction, Priority, RoadMap};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_junctions_priority_acyclic",
+    uids: &["qcbus.dev:xodr:1.4.0:junctions.priority.acyclic"],
+    level: Level::Warning,
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("junctions_priority_acyclic.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for junction in map.junctions() {
+        check(junction, found);
+    }
+}
+
+/// Takes away, one after the other, the roads over which none has priority. What is left gives way in a circle,
+/// or to such a circle.
+fn check(junction: &Junction<'_>, found: &mut Sink<'_>) {
+    let records: Vec<(&str, &str, Priority<'_>)> = junction
+        .priorities()
+        .filter_map(|one| Some((one.high()?, one.low()?, one)))
+        .filter(|(high, low, _)| high != low)
+        .collect();
+    let mut above: HashMap<&str, usize> = HashMap::default();
+    let mut over: HashMap<&str, Vec<&str>> = HashMap::default();
+    for (high, low, _) in &records {
+        *above.entry(low).or_default() += 1;
+        above.entry(high).or_default();
+        over.entry(high).or_default().push(low);
+    }
+    let mut free: Vec<&str> = above
+        .iter()
+        .filter_map(|(road, count)| (*count == 0).then_some(*road))
+        .collect();
+    while let Some(road) = free.pop() {
+        for low in over.get(road).into_iter().flatten() {
+            if let Some(count) = above.get_mut(low) {
+                *count = count.saturating_sub(1);
+                if *count == 0 {
+                    free.push(low);
+                }
+            }
+        }
+    }
+    let stuck = |road: &str| above.get(road).is_some_and(|count| *count > 0);
+    let mut circle = records
+        .iter()
+        .filter(|(high, low, _)| stuck(high) && stuck(low));
+    let Some((high, low, first)) = circle.next() else {
+        return;
+    };
+    let text = format!(
+        "road `{high}` has priority over road `{low}`, but by the other records of junction `{}` road `{high}` gives \
+         way to it in turn; priorities that run in a circle let nobody go first",
+        junction.id()
+    );
+    let mut finding = found.issue(first.node(), text);
+    for (_, _, other) in circle.take(crate::families::on_road::MAX_PLACES) {
+        finding = finding.at(other.node(), "a further record of the circle");
+    }
+}

@@ -1,0 +1,93 @@
+use foldhash::HashSet;
+use qcbus_opendrive::{LaneJoint, LaneRef, RoadMap, Traffic};
+use qcbus_sdk::{Param, Rule, Sink};
+
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::families::routes::is_route;
+use crate::model::Roads;
+
+const FAR: Param = Param::number(
+    "far",
+    10.0,
+    "m",
+    "a linked lane that lies farther away is the wrong one, whatever its direction",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_lane_link_direction",
+    uids: &["qcbus.dev:xodr:1.4.0:road.lane.link.direction"],
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[FAR],
+    page: include_str!("road_lane_link_direction.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let mut told = HashSet::default();
+    for joint in map.roads().iter().flat_map(|road| map.joints_of(road)) {
+        let lanes = map.lane(joint.from.lane).zip(map.lane(joint.to.lane));
+        let Some((from, to)) = lanes.filter(|(from, to)| is_route(*from) && is_route(*to)) else {
+            continue;
+        };
+        let Some(collide) = against(joint, from, to) else {
+            continue;
+        };
+        let far = found.number(&FAR);
+        if !is_elsewhere(joint, from, to, far)
+            && told.insert((joint.from.min(joint.to), joint.from.max(joint.to)))
+        {
+            report(joint, from, to, collide, found);
+        }
+    }
+}
+
+/// What happens to traffic where two lanes meet, if it does not get from the one onto the other.
+fn against(
+    joint: &LaneJoint<'_>,
+    from: LaneRef<'_, '_>,
+    to: LaneRef<'_, '_>,
+) -> Option<&'static str> {
+    let (Traffic::Towards(one), Traffic::Towards(other)) = (Traffic::of(from), Traffic::of(to))
+    else {
+        return None;
+    };
+    match (one == joint.from.end, other == joint.to.end) {
+        (true, true) => Some("traffic on both runs towards the other"),
+        (false, false) => Some("traffic on both runs away from the other"),
+        _ => None,
+    }
+}
+
+/// Whether two lanes lie so far apart that the link, not the direction, is wrong.
+fn is_elsewhere(
+    joint: &LaneJoint<'_>,
+    from: LaneRef<'_, '_>,
+    to: LaneRef<'_, '_>,
+    far: f64,
+) -> bool {
+    let edges = from
+        .borders_at(joint.from.end)
+        .zip(to.borders_at(joint.to.end));
+    edges.is_some_and(|([one, _], [other, _])| one.point.plan().distance(other.point.plan()) > far)
+}
+
+fn report(
+    joint: &LaneJoint<'_>,
+    from: LaneRef<'_, '_>,
+    to: LaneRef<'_, '_>,
+    collide: &str,
+    found: &mut Sink<'_>,
+) {
+    let text = format!(
+        "the {} of {} is {}, but {collide}; lanes that are linked must have the same direction of travel",
+        joint.from.end.link_name(),
+        lane_name(from),
+        lane_name(to)
+    );
+    found
+        .issue(joint.node, text)
+        .at_lane_end(from, joint.from.end)
+        .at(to.node(), "the linked lane");
+}

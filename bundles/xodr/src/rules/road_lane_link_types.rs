@@ -1,0 +1,60 @@
+use foldhash::HashSet;
+use qcbus_opendrive::{LaneJoint, LaneRef, RoadMap};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::families::routes::{NARROW, is_route};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_lane_link_types",
+    uids: &["qcbus.dev:xodr:1.4.0:road.lane.link.types"],
+    level: Level::Warning,
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[NARROW],
+    page: include_str!("road_lane_link_types.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// Lanes on which no vehicle drives, whatever lies before or behind them.
+const FOR_OTHERS: &[&str] = &["sidewalk", "walking", "curb", "median", "rail", "tram"];
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let mut told = HashSet::default();
+    for joint in map.lane_joints() {
+        let lanes = map.lane(joint.from.lane).zip(map.lane(joint.to.lane));
+        let Some((from, to)) = lanes else { continue };
+        let clash = (is_route(from) && is_for_others(to)) || (is_route(to) && is_for_others(from));
+        if !clash || !is_wide(joint, from, to, found.number(&NARROW)) {
+            continue;
+        }
+        if !told.insert((joint.from.min(joint.to), joint.from.max(joint.to))) {
+            continue;
+        }
+        let text = format!(
+            "{}, a lane of the type `{}`, goes on as {}, which has the type `{}`; what vehicles drive on should not go \
+             on as something that they do not",
+            lane_name(from),
+            from.kind().unwrap_or_default(),
+            lane_name(to),
+            to.kind().unwrap_or_default()
+        );
+        found
+            .issue(joint.node, text)
+            .at_lane_end(from, joint.from.end)
+            .at(to.node(), "the linked lane");
+    }
+}
+
+fn is_for_others(lane: LaneRef<'_, '_>) -> bool {
+    lane.kind().is_some_and(|kind| FOR_OTHERS.contains(&kind))
+}
+
+fn is_wide(joint: &LaneJoint<'_>, from: LaneRef<'_, '_>, to: LaneRef<'_, '_>, narrow: f64) -> bool {
+    let widths = [from.width_at(joint.from.end), to.width_at(joint.to.end)];
+    widths
+        .into_iter()
+        .all(|width| width.is_some_and(|it| it >= narrow))
+}

@@ -1,0 +1,117 @@
+use foldhash::HashMap;
+use qcbus_opendrive::geometry::heading_difference;
+use qcbus_opendrive::{ContactPoint, Frame, Road, RoadEnd, RoadMap};
+use qcbus_sdk::{Level, Param, Rule, Sink};
+
+use crate::families::on_road::OnRoad;
+use crate::families::routes::{NARROW, routes_at};
+use crate::model::Roads;
+
+const NEAR: Param = Param::number(
+    "near",
+    0.05,
+    "m",
+    "how near two road ends must be to touch, also in height",
+);
+const TURN: Param = Param::number(
+    "turn",
+    0.05,
+    "rad",
+    "largest difference between their directions",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_linkage_touching_ends",
+    uids: &["qcbus.dev:xodr:1.4.0:road.linkage.touching_ends"],
+    level: Level::Warning,
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[NEAR, TURN, NARROW],
+    page: include_str!("road_linkage_touching_ends.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// Open ends in one cell of the grid that are compared. Where more meet, somebody has piled roads up.
+const MOST_IN_CELL: usize = 16;
+
+/// An end of a road that nothing is linked to.
+struct Open<'m, 'a> {
+    road: &'m Road<'a>,
+    end: ContactPoint,
+    frame: Frame,
+}
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let near = found.number(&NEAR);
+    let size = near.max(1e-6) * 2.0;
+    let open: Vec<Open<'_, '_>> = open_ends(map, found.number(&NARROW)).collect();
+    let mut grid: HashMap<[i64; 2], Vec<usize>> = HashMap::default();
+    for (at, here) in open.iter().enumerate() {
+        let cell = [here.frame.pose.x, here.frame.pose.y].map(|it| (it / size).floor() as i64);
+        for (dx, dy) in (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (dx, dy))) {
+            let beside = [cell[0].saturating_add(dx), cell[1].saturating_add(dy)];
+            let others = grid.get(&beside).into_iter().flatten();
+            for other in others.filter_map(|other| open.get(*other)) {
+                if touch(other, here, near, found.number(&TURN)) {
+                    report(other, here, found);
+                }
+            }
+        }
+        let places = grid.entry(cell).or_default();
+        if places.len() < MOST_IN_CELL {
+            places.push(at);
+        }
+    }
+}
+
+/// The ends outside of junctions at which traffic arrives and nothing is said about what lies there.
+fn open_ends<'m, 'a>(map: &'m RoadMap<'a>, narrow: f64) -> impl Iterator<Item = Open<'m, 'a>> {
+    let outside = map.roads().iter().filter(|road| road.junction().is_none());
+    let ends = outside.flat_map(|road| ContactPoint::BOTH.map(|end| (road, end)));
+    ends.filter_map(move |(road, end)| {
+        let own = RoadEnd {
+            road: road.index(),
+            end,
+        };
+        let linked = road.link(end).is_some() || map.contacts_of(own).next().is_some();
+        if linked || routes_at(road, end, narrow).next().is_none() {
+            return None;
+        }
+        Some(Open {
+            road,
+            end,
+            frame: road.end_frame(end)?,
+        })
+    })
+}
+
+/// Whether one road goes on as the other: the same place, and no turning round.
+fn touch(one: &Open<'_, '_>, other: &Open<'_, '_>, near: f64, turn: f64) -> bool {
+    let (here, there) = (one.frame, other.frame);
+    let round = if one.end == other.end {
+        std::f64::consts::PI
+    } else {
+        0.0
+    };
+    let bend = heading_difference(here.pose.hdg, there.pose.hdg + round);
+    one.road.index() != other.road.index()
+        && here.pose.point().distance(there.pose.point()) <= near
+        && (here.z - there.z).abs() <= near
+        && bend.is_some_and(|bend| bend.abs() <= turn)
+}
+
+fn report(one: &Open<'_, '_>, other: &Open<'_, '_>, found: &mut Sink<'_>) {
+    let text = format!(
+        "the {} of road `{}` goes on as the {} of road `{}`, but neither names the other, so that routes end there; \
+         roads that go on should be linked in both directions",
+        one.end,
+        one.road.id(),
+        other.end,
+        other.road.id()
+    );
+    found
+        .issue(one.road.node(), text)
+        .at_end(one.road, one.end)
+        .at(other.road.node(), "the other road");
+}

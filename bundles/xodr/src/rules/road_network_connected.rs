@@ -1,0 +1,59 @@
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Param, Rule, Sink};
+
+use crate::families::network::{Parts, Piece};
+use crate::families::on_road::OnRoad;
+use crate::model::Roads;
+
+const SHARE: Param = Param::number(
+    "share",
+    0.25,
+    "",
+    "a piece with at most this share of the length of the largest one is an island",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_network_connected",
+    uids: &["qcbus.dev:xodr:1.4.0:road.network.connected"],
+    level: Level::Warning,
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[SHARE],
+    page: include_str!("road_network_connected.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let pieces = Parts::of(map).pieces(map);
+    let by_length = |one: &&Piece, other: &&Piece| one.length.total_cmp(&other.length);
+    let Some(largest) = pieces.iter().max_by(by_length) else {
+        return;
+    };
+    let share = found.number(&SHARE);
+    let small =
+        |piece: &&Piece| piece.first != largest.first && piece.length <= share * largest.length;
+    // Where most roads stand alone, the map is a collection of them, not a network.
+    let alone = pieces.iter().filter(small).count();
+    if largest.roads < 2 || alone >= largest.roads {
+        return;
+    }
+    for piece in pieces.iter().filter(small) {
+        let Some(road) = map.road_at(piece.first) else {
+            continue;
+        };
+        let with = match piece.roads {
+            1 => String::new(),
+            count => format!(" and {} roads with it", count - 1),
+        };
+        let text = format!(
+            "road `{}`{with} ({:.0} m in all) has no link to the rest of the map ({} roads, {:.0} m); no route leads \
+             there",
+            road.id(),
+            piece.length,
+            largest.roads,
+            largest.length
+        );
+        found.issue(road.node(), text).on(road, 0.0, 0.0);
+    }
+}

@@ -1,0 +1,34 @@
+use qcbus_opendrive::{LaneRef, RoadMap};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::routes::is_route;
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_network_drivable",
+    uids: &["qcbus.dev:xodr:1.4.0:road.network.drivable"],
+    level: Level::Warning,
+    versions: "1.4.0..",
+    after: super::READABLE,
+    page: include_str!("road_network_drivable.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let leads = |lane: LaneRef<'_, '_>| lane.side().is_some() && is_for_others_too(lane);
+    let Some(root) = map.root().filter(|_| !map.lanes().any(leads)) else {
+        return;
+    };
+    // A road without any lanes has rules of its own.
+    if map.lanes().any(|lane| lane.side().is_some()) {
+        let text = "no lane of this map is one that vehicles get along on, such as `driving`; a simulator finds no place \
+                    for them";
+        found.issue(root, text.to_owned());
+    }
+}
+
+/// Whether anybody gets along on a lane who needs a lane: on tracks that is somebody else.
+fn is_for_others_too(lane: LaneRef<'_, '_>) -> bool {
+    is_route(lane) || matches!(lane.kind(), None | Some("rail" | "tram" | "restricted"))
+}
