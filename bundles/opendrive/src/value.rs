@@ -1,4 +1,4 @@
-//! Attribute values as the model reads them: present, well-formed and finite, or `None`.
+//! Attribute values as the model reads them: present, well-formed, finite and not absurdly large, or `None`.
 
 use std::fmt;
 
@@ -22,7 +22,11 @@ fn trim(text: &str) -> &str {
     text.trim_matches([' ', '\t', '\r', '\n'])
 }
 
-/// A finite number, or `None`.
+/// No geometry survives a number beyond this: squares and cubes of it overflow, and what is computed from
+/// it is rounded by more than the Earth is wide.
+const LARGEST: f64 = 1e30;
+
+/// A finite number that can be computed with, or `None`.
 pub(crate) fn parse_number(text: &str) -> Option<f64> {
     // More than half of the coefficients of real maps are zero: as people write it, and as `%.16e`
     // of C does.
@@ -30,7 +34,7 @@ pub(crate) fn parse_number(text: &str) -> Option<f64> {
         return Some(0.0);
     }
     let value: f64 = trim(text).parse().ok()?;
-    value.is_finite().then_some(value)
+    (value.abs() <= LARGEST).then_some(value)
 }
 
 /// An integer of at most 64 bits, or `None`.
@@ -238,7 +242,7 @@ mod tests {
     #[test]
     fn numbers_are_finite_or_absent() {
         assert_eq!(parse_number(" 1.5e2\n"), Some(150.0));
-        for text in ["", "INF", "inf", "NaN", "nan", "1e999", "1,5", "infinity"] {
+        for text in ["", "INF", "inf", "NaN", "nan", "1e999", "1e31", "1,5", "infinity"] {
             assert_eq!(parse_number(text), None, "{text}");
         }
         assert_eq!(parse_integer(" -7 "), Some(-7));
