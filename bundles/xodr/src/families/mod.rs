@@ -50,5 +50,6 @@ pub(crate) mod touching;
 pub(crate) mod vertices;
 pub(crate) mod virtual_junctions;
 pub(crate) mod virtual_links;
+pub(crate) mod written_numbers;
 pub(crate) mod zero_stretches;
 pub(crate) mod zero_width;

@@ -84,6 +84,7 @@ mod lane_smoothness_contact_point_no_vertical_kinks;
 mod lane_smoothness_no_vertical_jumps_t;
 mod lane_smoothness_profile_no_horizontal_gaps;
 mod lane_smoothness_profile_no_vertical_gaps;
+mod numbers_computable;
 mod performance_avoid_redundant_info;
 mod profile_carla_ids;
 mod profile_carla_supported;
@@ -570,4 +571,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_linkage_touching_ends::RULE,
     &road_network_connected::RULE,
     &road_network_drivable::RULE,
+    &numbers_computable::RULE,
 ];

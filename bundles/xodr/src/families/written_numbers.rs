@@ -1,0 +1,260 @@
+//! Numbers as they are written in attributes, of which some cannot be computed with.
+
+/// Attributes that are numbers, and what they measure. Those that are whole numbers in every version and
+/// those that are words are not among them.
+const MEASURES: &[(Measure, &[&str])] = &[
+    (
+        Measure::Extent,
+        &[
+            "a",
+            "aU",
+            "aV",
+            "back",
+            "displayHeight",
+            "displayWidth",
+            "distance",
+            "ds",
+            "dz",
+            "elementS",
+            "forward",
+            "gridSpacing",
+            "height",
+            "heightEnd",
+            "heightStart",
+            "inner",
+            "left",
+            "length",
+            "lengthEnd",
+            "lengthStart",
+            "lineLength",
+            "outer",
+            "overlapZone",
+            "radius",
+            "radiusEnd",
+            "radiusStart",
+            "right",
+            "s",
+            "sEnd",
+            "sOffset",
+            "sStart",
+            "space",
+            "spaceLength",
+            "startOffset",
+            "stopOffset",
+            "t",
+            "tEnd",
+            "tOffset",
+            "tStart",
+            "transitionLength",
+            "u",
+            "v",
+            "validLength",
+            "width",
+            "widthEnd",
+            "widthStart",
+            "x",
+            "xOffset",
+            "y",
+            "yOffset",
+            "z",
+            "zOffset",
+            "zOffsetEnd",
+            "zOffsetStart",
+        ],
+    ),
+    (
+        Measure::Turn,
+        &[
+            "curvEnd",
+            "curvStart",
+            "curvature",
+            "hOffset",
+            "hdg",
+            "pitch",
+            "roll",
+        ],
+    ),
+    (
+        Measure::Coefficient,
+        &["b", "bU", "bV", "c", "cU", "cV", "d", "dU", "dV"],
+    ),
+    (Measure::Speed, &["max"]),
+    (
+        Measure::Other,
+        &[
+            "contactPoint",
+            "daylight",
+            "friction",
+            "lighting",
+            "roughness",
+            "value",
+            "xyAbsolute",
+            "xyRelative",
+            "zAbsolute",
+            "zRelative",
+            "zScale",
+        ],
+    ),
+];
+
+/// What a number measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Measure {
+    /// A place or a size: within what there is on Earth.
+    Extent,
+    /// An angle or a curvature.
+    Turn,
+    /// A coefficient of higher degree, which may be large where its polynomial holds for millimetres.
+    Coefficient,
+    /// A speed, for which "without limit" has words of its own.
+    Speed,
+    /// Anything that may be of any size.
+    Other,
+}
+
+impl Measure {
+    /// What an attribute of an element measures; `None` when it is no number to be looked at here.
+    pub(crate) fn of(element: &str, attribute: &str) -> Option<Measure> {
+        // Numbers of the header are looked at with its other attributes.
+        let is_other =
+            element == "header" || (attribute == "value" && matches!(element, "userData" | "rule"));
+        let mut measures = MEASURES.iter().filter(|_| !is_other);
+        measures
+            .find(|(_, names)| names.contains(&attribute))
+            .map(|(measure, _)| *measure)
+    }
+}
+
+/// What a text says that was written for a number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Written {
+    /// Not a number.
+    Nan,
+    /// Infinite, by a word.
+    Infinite,
+    /// Digits that stand for more than a double holds.
+    Overflow,
+    /// An ordinary number.
+    Finite(f64),
+}
+
+impl Written {
+    /// Reads a number in any of the spellings that parsers of XML Schema, C and Python know.
+    pub(crate) fn read(text: &str) -> Option<Written> {
+        let text = text.trim();
+        if let Ok(value) = text.parse::<f64>() {
+            let is_word = !text.bytes().any(|byte| byte.is_ascii_digit());
+            return Some(match value {
+                _ if value.is_nan() => Written::Nan,
+                _ if value.is_finite() => Written::Finite(value),
+                _ if is_word => Written::Infinite,
+                _ => Written::Overflow,
+            });
+        }
+        let lower = text.trim_start_matches(['+', '-']).to_ascii_lowercase();
+        if lower.starts_with("1.#inf") {
+            return Some(Written::Infinite);
+        }
+        let is_nan = ["nan(", "1.#ind", "1.#qnan", "1.#snan", "1.#nan"]
+            .iter()
+            .any(|start| lower.starts_with(start));
+        is_nan.then_some(Written::Nan)
+    }
+}
+
+/// Whether a text may be a number that is infinite, none, or large. Asked of every attribute of a map, so
+/// it looks at a few bytes only and does not miss any.
+pub(crate) fn is_suspicious(text: &str) -> bool {
+    let mut bytes = text.as_bytes();
+    while let [b' ' | b'\t' | b'\n' | b'\r' | b'+' | b'-', rest @ ..] = bytes {
+        bytes = rest;
+    }
+    match bytes {
+        [b'n' | b'N', b'a' | b'A', ..] | [b'i' | b'I', b'n' | b'N', ..] => true,
+        [b'1', b'.', b'#', ..] => true,
+        [b'0'..=b'9' | b'.', ..] => is_long(bytes) || has_large_exponent(bytes),
+        _ => false,
+    }
+}
+
+/// Eight or more digits before the point.
+fn is_long(bytes: &[u8]) -> bool {
+    matches!(bytes.get(..8), Some(head) if head.iter().all(u8::is_ascii_digit))
+}
+
+/// An exponent of two digits or more that is not negative, which stands in the last bytes.
+fn has_large_exponent(bytes: &[u8]) -> bool {
+    let tail = bytes.get(bytes.len().saturating_sub(12)..).unwrap_or(bytes);
+    let Some(at) = tail.iter().position(|byte| matches!(byte, b'e' | b'E')) else {
+        return false;
+    };
+    match tail.get(at + 1..) {
+        Some([b'-', ..]) | None => false,
+        Some([b'+', digits @ ..] | digits) => {
+            // `e+00` of C is by far the most common.
+            digits.iter().skip_while(|digit| **digit == b'0').count() > 0
+        }
+    }
+}
+
+/// A number as written, cut when it is long.
+pub(crate) fn shown(text: &str) -> String {
+    const MOST: usize = 24;
+    let text = text.trim();
+    match text.char_indices().nth(MOST) {
+        Some((end, _)) => format!("{}…", text.get(..end).unwrap_or_default()),
+        None => text.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spellings() {
+        for text in ["NaN", "nan", "-nan(ind)", "1.#QNAN", "-1.#IND", " NaN "] {
+            assert_eq!(Written::read(text), Some(Written::Nan), "{text}");
+            assert!(is_suspicious(text), "{text}");
+        }
+        for text in [
+            "INF",
+            "-INF",
+            "+INF",
+            "inf",
+            "Infinity",
+            "1.#INF",
+            "-infinity",
+        ] {
+            assert_eq!(Written::read(text), Some(Written::Infinite), "{text}");
+            assert!(is_suspicious(text), "{text}");
+        }
+        let long = "9".repeat(400);
+        for text in ["1e999", "-1E+400", long.as_str()] {
+            assert_eq!(Written::read(text), Some(Written::Overflow), "{text}");
+            assert!(is_suspicious(text), "{text}");
+        }
+        for text in ["1e300", "1e9", "123456789", "1.5E+0012", "+100000000.5"] {
+            assert!(is_suspicious(text), "{text}");
+        }
+        for text in [
+            "0",
+            "-12.5",
+            "1.0e+00",
+            "3.0000000000000000e-02",
+            "1e-300",
+            "road",
+            "none",
+            "4.9e-324",
+            "",
+        ] {
+            assert!(!is_suspicious(text), "{text}");
+        }
+    }
+
+    #[test]
+    fn long_ones_are_cut() {
+        assert_eq!(shown(" 1.5 "), "1.5");
+        assert_eq!(shown(&"9".repeat(400)).chars().count(), 25);
+    }
+}

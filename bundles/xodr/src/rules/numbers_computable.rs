@@ -1,0 +1,169 @@
+use foldhash::HashSet;
+use qcbus_document::Attribute;
+use qcbus_opendrive::{RoadMap, is_user_data};
+use qcbus_sdk::{Level, Param, Rule, Sink};
+
+use crate::families::written_numbers::{Measure, Written, is_suspicious, shown};
+use crate::model::Roads;
+
+const MOST: Param = Param::number(
+    "most",
+    1e9,
+    "m",
+    "a place, size or angle beyond this cannot be computed with",
+);
+const EARTH: Param = Param::number(
+    "earth",
+    5e7,
+    "m",
+    "a place or size beyond this is farther than once around the Earth",
+);
+const COEFFICIENT: Param = Param::number(
+    "coefficient",
+    1e30,
+    "",
+    "a coefficient of first or higher degree beyond this cannot be computed with",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_numbers_computable",
+    uids: &["qcbus.dev:xodr:1.4.0:numbers.computable"],
+    after: super::READABLE,
+    params: &[MOST, EARTH, COEFFICIENT],
+    page: include_str!("numbers_computable.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let Some(root) = map.root() else {
+        return;
+    };
+    let attributes = std::iter::once(root)
+        .chain(root.descendants())
+        .flat_map(|node| node.attributes());
+    let mut odd: Vec<Odd<'_>> = attributes
+        .filter(|attribute| is_suspicious(attribute.value()))
+        .filter_map(|attribute| Odd::of(attribute, attribute.value(), found))
+        .collect();
+    odd.extend(of_grids(map, found));
+    if odd.is_empty() {
+        return;
+    }
+    // What the schema does not take is its finding, but who asks it for everything has to wait for it.
+    let document = found.subject().root();
+    let refused: HashSet<u32> = qcbus_schema_rule::breaches(found.subject(), &document)
+        .iter()
+        .filter_map(|breach| Some(breach.attribute?.offset()))
+        .collect();
+    for one in odd {
+        if !refused.contains(&one.attribute.offset()) {
+            found.issue(one.attribute, one.text).level(one.level);
+        }
+    }
+}
+
+/// A number that cannot be computed with.
+struct Odd<'a> {
+    attribute: Attribute<'a>,
+    level: Level,
+    text: String,
+}
+
+impl<'a> Odd<'a> {
+    /// What is to be said about a text that stands for a number, or for one of several, in an attribute.
+    fn of(attribute: Attribute<'a>, text: &str, found: &Sink<'_>) -> Option<Odd<'a>> {
+        let written = Written::read(text)?;
+        let node = attribute.node();
+        let measure = Measure::of(node.name(), attribute.name())?;
+        let (level, why) = judge(written, measure, found)?;
+        if is_user_data(node) {
+            return None;
+        }
+        let text = format!(
+            "`{}` of `<{}>` is `{}`, {why}",
+            attribute.name(),
+            node.name(),
+            shown(text)
+        );
+        Some(Odd {
+            attribute,
+            level,
+            text,
+        })
+    }
+}
+
+/// The heights of elevation grids, of which one attribute has many.
+fn of_grids<'a>(map: &RoadMap<'a>, found: &Sink<'_>) -> Vec<Odd<'a>> {
+    let mut odd = Vec::new();
+    let Some(root) = map.root() else {
+        return odd;
+    };
+    let rows = root
+        .descendants_named("elevationGrid")
+        .flat_map(|grid| grid.children().filter(|child| child.is("elevation")));
+    for attribute in rows.flat_map(|row| row.attributes()) {
+        let mut heights = attribute.value().split_ascii_whitespace();
+        let is_list = ["center", "left", "right"].contains(&attribute.name());
+        // One height alone is found with all others, unless its name is not among theirs.
+        let known = Measure::of("elevation", attribute.name()).is_some();
+        if !is_list || (known && heights.clone().nth(1).is_none()) {
+            continue;
+        }
+        odd.extend(heights.find_map(|text| {
+            let (level, why) = judge(Written::read(text)?, Measure::Extent, found)?;
+            let text = format!(
+                "a height in `{}` is `{}`, {why}",
+                attribute.name(),
+                shown(text)
+            );
+            Some(Odd {
+                attribute,
+                level,
+                text,
+            })
+        }));
+    }
+    odd
+}
+
+/// How bad a number is, and why; `None` when it can be computed with.
+fn judge(written: Written, measure: Measure, found: &Sink<'_>) -> Option<(Level, String)> {
+    let value = match written {
+        Written::Nan => {
+            let why = "which is not a number; it must be a finite number";
+            return Some((Level::Error, why.to_owned()));
+        }
+        // As good as the words for it, wherever it is understood.
+        Written::Infinite if measure == Measure::Speed => {
+            let why = "which is infinite; where there is no limit, the word is `no limit`";
+            return Some((Level::Warning, why.to_owned()));
+        }
+        Written::Infinite => {
+            let why = "which is infinite; it must be a finite number";
+            return Some((Level::Error, why.to_owned()));
+        }
+        Written::Overflow => {
+            let why = "which is more than a number of double precision can hold (about 1.8e308) and is read as \
+                       infinite; it must be a finite number";
+            return Some((Level::Error, why.to_owned()));
+        }
+        Written::Finite(value) => value.abs(),
+    };
+    let (most, level) = match measure {
+        Measure::Extent => match (found.number(&MOST), found.number(&EARTH)) {
+            (most, _) if value > most => (most, Level::Error),
+            (_, earth) if value > earth => (earth, Level::Warning),
+            _ => return None,
+        },
+        Measure::Turn => (found.number(&MOST), Level::Error),
+        Measure::Coefficient => (found.number(&COEFFICIENT), Level::Error),
+        Measure::Speed | Measure::Other => return None,
+    };
+    let why = match level {
+        Level::Error => "with which no geometry can be computed",
+        _ => "which is farther than once around the Earth",
+    };
+    (value > most).then(|| (level, format!("{why}; at most {most:e} is sensible here")))
+}
