@@ -1,0 +1,206 @@
+use std::f64::consts::TAU;
+
+use qcbus_opendrive::geometry::{Curve, Placed};
+use qcbus_opendrive::{Geometry, LaneRef, Road, RoadMap, Side};
+use qcbus_sdk::{Level, Param, Place, Rule, Sink};
+
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::families::traffic_lanes::is_for_traffic;
+use crate::model::{Part, Roads};
+
+const BACKWARDS: Param = Param::number(
+    "backwards",
+    0.5,
+    "m",
+    "how far the edge of a lane may run backwards",
+);
+const RADIUS: Param = Param::number(
+    "radius",
+    1.0,
+    "m",
+    "a curve of less than this must not turn around more than once",
+);
+
+/// Curves that are wider than this, in metres, have room for any lanes.
+const WIDE: f64 = 60.0;
+/// At how many places of a curve its edges are looked at.
+const PLACES: u32 = 8;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_geometry_lanes_no_fold",
+    uids: &["qcbus.dev:xodr:1.4.0:road.geometry.lanes_no_fold"],
+    level: Level::Warning,
+    after: super::READABLE,
+    params: &[BACKWARDS, RADIUS],
+    page: include_str!("road_geometry_lanes_no_fold.md"),
+    each: Some(each),
+    ..Rule::DEFAULTS
+};
+
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
+        for geometry in road.plan_view().geometries() {
+            let Some(length) = geometry.length().filter(|length| *length > 0.0) else {
+                continue;
+            };
+            let Some(curve) = geometry.curve() else {
+                continue;
+            };
+            if sharpest(&curve, length) * WIDE > 1.0
+                && !winds(geometry, &curve, length, road, found)
+            {
+                folds(geometry, length, road, found);
+            }
+        }
+    }
+}
+
+/// The greatest curvature of a shape, for polynomials among some places.
+fn sharpest(curve: &Curve, length: f64) -> f64 {
+    let greatest = |curvatures: [Option<f64>; 5]| {
+        let known = curvatures.into_iter().flatten().map(f64::abs);
+        known.fold(0.0, f64::max)
+    };
+    const SHARES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+    match curve {
+        Curve::Line => 0.0,
+        Curve::Arc { curvature } => curvature.abs(),
+        Curve::Spiral(spiral) => spiral.start.abs().max(spiral.curvature(length).abs()),
+        Curve::ParamPoly3(curve) => {
+            let last = curve.last_parameter(length);
+            greatest(SHARES.map(|share| Some(curve.pose(share * last)?.curvature)))
+        }
+        Curve::Poly3(curve) => {
+            greatest(SHARES.map(|share| Some(curve.pose(share * length)?.curvature)))
+        }
+    }
+}
+
+/// Reports a curve that turns around and around within centimetres.
+fn winds(
+    geometry: &Geometry<'_>,
+    curve: &Curve,
+    length: f64,
+    road: &Road<'_>,
+    found: &mut Sink<'_>,
+) -> bool {
+    let (name, curvature) = match curve {
+        Curve::Arc { curvature } => ("curvature", *curvature),
+        Curve::Spiral(spiral) => {
+            let (start, end) = (spiral.start, spiral.curvature(length));
+            let name = if start.abs() > end.abs() {
+                "curvStart"
+            } else {
+                "curvEnd"
+            };
+            (name, if start.abs() > end.abs() { start } else { end })
+        }
+        _ => return false,
+    };
+    let share = if matches!(curve, Curve::Spiral(_)) {
+        0.5
+    } else {
+        1.0
+    };
+    let turns = share * curvature.abs() * length / TAU;
+    let least = found.number(&RADIUS);
+    if curvature.abs() * least <= 1.0 || turns <= 1.0 {
+        return false;
+    }
+    let text = format!(
+        "the curve of road `{}` has a radius of {:.4} m and goes around {turns:.1} times; a curvature is one through \
+         the radius, and curves with a radius of less than {least} m must not go around more than once",
+        road.id(),
+        1.0 / curvature.abs()
+    );
+    let shape = geometry.shape_node().unwrap_or(geometry.node());
+    let finding = found.issue(Place::attribute_or_node(shape, name), text);
+    if let Some(s) = geometry.s() {
+        finding.on(road, s, 0.0);
+    }
+    true
+}
+
+/// The edge of a lane that runs backwards.
+struct Fold<'m, 'a> {
+    lane: LaneRef<'m, 'a>,
+    s: f64,
+    t: f64,
+    radius: f64,
+}
+
+/// Reports the lane whose outer edge lies beyond the center of the curve.
+fn folds(geometry: &Geometry<'_>, length: f64, road: &Road<'_>, found: &mut Sink<'_>) {
+    let (Some(start), Some(placed)) = (geometry.s(), geometry.placed()) else {
+        return;
+    };
+    let mut backwards = 0.0;
+    let mut worst: Option<Fold<'_, '_>> = None;
+    let step = length / f64::from(PLACES);
+    for place in 0..PLACES {
+        let ds = (f64::from(place) + 0.5) * step;
+        let Some(fold) = fold_at(road, &placed, start, ds) else {
+            continue;
+        };
+        let beyond = fold.t.abs() - fold.radius;
+        backwards += step * beyond / fold.radius;
+        if worst
+            .as_ref()
+            .is_none_or(|worst| beyond > worst.t.abs() - worst.radius)
+        {
+            worst = Some(fold);
+        }
+    }
+    let most = found.number(&BACKWARDS);
+    let Some(fold) = worst.filter(|_| backwards > most) else {
+        return;
+    };
+    let text = format!(
+        "the curve has a radius of {:.2} m at s = {:.2}, but the outer edge of {} lies {:.2} m to that side and runs \
+         {backwards:.2} m backwards; the lanes on the inside of a curve must fit within its radius",
+        fold.radius,
+        fold.s,
+        lane_name(fold.lane),
+        fold.t.abs(),
+    );
+    let shape = geometry.shape_node().unwrap_or(geometry.node());
+    found
+        .issue(shape, text)
+        .on(road, fold.s, fold.t)
+        .at(fold.lane.node(), "the lane");
+}
+
+/// The outermost lane for vehicles on the inside of a curve, if it reaches beyond the curve's center.
+fn fold_at<'m, 'a>(
+    road: &'m Road<'a>,
+    placed: &Placed,
+    start: f64,
+    ds: f64,
+) -> Option<Fold<'m, 'a>> {
+    let curvature = placed.pose(ds)?.curvature;
+    let radius = 1.0 / curvature.abs();
+    if radius.is_nan() || radius > WIDE {
+        return None;
+    }
+    let side = if curvature > 0.0 {
+        Side::Left
+    } else {
+        Side::Right
+    };
+    let s = start + ds;
+    let section = road.permanent()?.section_at(road, side, s)?;
+    let station = s - section.s()?;
+    let outermost = section.each_span(side, station).filter(|span| {
+        let width = (span.outer - span.inner).abs();
+        width > 0.1 && is_for_traffic(span.lane)
+    });
+    let span = outermost.last()?;
+    let t = span.outer;
+    let is_beyond = t * side.sign() > radius;
+    is_beyond.then_some(Fold {
+        lane: span.lane,
+        s,
+        t,
+        radius,
+    })
+}
