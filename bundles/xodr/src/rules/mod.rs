@@ -118,6 +118,7 @@ mod road_elevation_elem_asc_order;
 mod road_geometry_arc_no_zero_curvature;
 mod road_geometry_contact_point;
 mod road_geometry_elem_asc_order;
+mod road_geometry_hdg_in_radians;
 mod road_geometry_lanes_no_fold;
 mod road_geometry_one_geom_elem_per_spec;
 mod road_geometry_only_one_refline;
@@ -573,5 +574,6 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_network_connected::RULE,
     &road_network_drivable::RULE,
     &numbers_computable::RULE,
+    &road_geometry_hdg_in_radians::RULE,
     &road_geometry_lanes_no_fold::RULE,
 ];
