@@ -183,6 +183,7 @@ mod road_lane_section_valid_length;
 mod road_lane_speed_center_lane_no_spd_lmt;
 mod road_lane_speed_elem_asc_order;
 mod road_lane_width_lane_width_validity;
+mod road_lane_width_plausible;
 mod road_lane_width_width_defined_whole_section;
 mod road_lanes_lane_offset_elem_asc_order;
 mod road_length_sum_geometries;
@@ -576,4 +577,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &numbers_computable::RULE,
     &road_geometry_hdg_in_radians::RULE,
     &road_geometry_lanes_no_fold::RULE,
+    &road_lane_width_plausible::RULE,
 ];

@@ -1,0 +1,137 @@
+use qcbus_opendrive::{LaneRef, RoadMap, Stretch};
+use qcbus_sdk::{Level, Param, Rule, Sink};
+
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::families::traffic_lanes::is_for_traffic;
+use crate::model::{Part, Roads};
+
+const LEAST: Param = Param::number(
+    "least",
+    1.5,
+    "m",
+    "width from which on vehicles find room in a lane",
+);
+const MOST: Param = Param::number(
+    "most",
+    12.0,
+    "m",
+    "width up to which a lane for vehicles is one lane",
+);
+const ANY: Param = Param::number(
+    "any",
+    500.0,
+    "m",
+    "width up to which any other lane is believed",
+);
+const LENGTH: Param = Param::number(
+    "length",
+    10.0,
+    "m",
+    "over how many metres a lane must be narrow or wide to be told",
+);
+
+/// Lanes whose width changes by more than this, in metres, open or close.
+const STEADY: f64 = 0.3;
+/// Nothing that is narrower, in metres, is meant to be a lane there.
+const NOTHING: f64 = 0.05;
+
+/// What is beyond this, in metres, comes from numbers that are reported themselves.
+const ABSURD: f64 = 1e9;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_lane_width_plausible",
+    uids: &["qcbus.dev:xodr:1.4.0:road.lane.width_plausible"],
+    level: Level::Warning,
+    after: super::READABLE,
+    params: &[LEAST, MOST, ANY, LENGTH],
+    page: include_str!("road_lane_width_plausible.md"),
+    each: Some(each),
+    ..Rule::DEFAULTS
+};
+
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for lane in map.part(part).lanes() {
+        let Some(length) = lane.length() else {
+            continue;
+        };
+        let traffic = is_for_traffic(lane);
+        let wide = lane
+            .widths()
+            .stretches(length)
+            .find_map(|stretch| Some((stretch, wide(&stretch, traffic, found)?)));
+        match wide {
+            Some((stretch, width)) => report_wide(lane, &stretch, width, traffic, found),
+            None if traffic && length >= found.number(&LENGTH) => narrow(lane, length, found),
+            None => {}
+        }
+    }
+}
+
+/// The width of a stretch that is too wide to be a lane.
+fn wide(stretch: &Stretch<'_, '_>, traffic: bool, found: &Sink<'_>) -> Option<f64> {
+    let length = stretch.length();
+    let any = found.number(&ANY);
+    let greatest = stretch.cubic.maximum(0.0, length)?.value;
+    if greatest > any {
+        return (greatest < ABSURD).then_some(greatest);
+    }
+    let most = found.number(&MOST);
+    if !traffic || greatest <= most || length < found.number(&LENGTH) {
+        return None;
+    }
+    // Mouths of junctions widen at their ends only.
+    let least = [0.25, 0.5, 0.75]
+        .map(|share| stretch.cubic.value(share * length))
+        .into_iter()
+        .fold(f64::INFINITY, f64::min);
+    (least > most).then_some(greatest)
+}
+
+fn report_wide(
+    lane: LaneRef<'_, '_>,
+    stretch: &Stretch<'_, '_>,
+    width: f64,
+    traffic: bool,
+    found: &mut Sink<'_>,
+) {
+    let (most, what) = if traffic {
+        (found.number(&MOST), "lane for vehicles")
+    } else {
+        (found.number(&ANY), "lane")
+    };
+    let text = format!(
+        "{} is up to {width:.1} m wide; a {what} of more than {most} m is hardly meant, widths are in metres",
+        lane_name(lane)
+    );
+    let ds = 0.5 * (stretch.from + stretch.to);
+    found.issue(stretch.record.node(), text).in_lane(lane, ds);
+}
+
+/// Reports a lane that is narrow all along, and does not just open or close.
+fn narrow(lane: LaneRef<'_, '_>, length: f64, found: &mut Sink<'_>) {
+    let least = found.number(&LEAST);
+    let (mut low, mut high) = (f64::INFINITY, 0.0_f64);
+    let mut first = None;
+    for stretch in lane.widths().stretches(length) {
+        let (Some(lowest), Some(highest)) = (
+            stretch.cubic.minimum(0.0, stretch.length()),
+            stretch.cubic.maximum(0.0, stretch.length()),
+        ) else {
+            return;
+        };
+        low = low.min(lowest.value);
+        high = high.max(highest.value);
+        first = first.or(Some(stretch.record.node()));
+        if high >= least {
+            return;
+        }
+    }
+    let Some(node) = first.filter(|_| low > NOTHING && high - low < STEADY) else {
+        return;
+    };
+    let text = format!(
+        "{} is at most {high:.3} m wide over {length:.1} m; vehicles need at least {least} m",
+        lane_name(lane)
+    );
+    found.issue(node, text).in_lane(lane, 0.5 * length);
+}
