@@ -180,6 +180,7 @@ mod road_lane_section_lanesec_length_limit_road;
 mod road_lane_section_lanesec_usage_lane_num;
 mod road_lane_section_new_lanesec_link_temp_to_perm;
 mod road_lane_section_valid_length;
+mod road_lane_sizes_plausible;
 mod road_lane_speed_center_lane_no_spd_lmt;
 mod road_lane_speed_elem_asc_order;
 mod road_lane_width_lane_width_validity;
@@ -577,5 +578,6 @@ pub static RULES: &[&dyn AnyRule] = &[
     &numbers_computable::RULE,
     &road_geometry_hdg_in_radians::RULE,
     &road_geometry_lanes_no_fold::RULE,
+    &road_lane_sizes_plausible::RULE,
     &road_lane_width_plausible::RULE,
 ];

@@ -1,0 +1,115 @@
+use qcbus_document::Node;
+use qcbus_opendrive::{LaneRef, RoadMap};
+use qcbus_sdk::{Level, Param, Place, Rule, Sink};
+
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::model::{Part, Roads};
+
+const MARK_WIDTH: Param = Param::number(
+    "mark_width",
+    1.0,
+    "m",
+    "greatest width of a line that is believed",
+);
+const MARK_HEIGHT: Param = Param::number(
+    "mark_height",
+    0.5,
+    "m",
+    "greatest height of a road mark that is believed",
+);
+const LANE_HEIGHT: Param = Param::number(
+    "lane_height",
+    1.0,
+    "m",
+    "greatest height of a lane above or below the road that is believed",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_lane_sizes_plausible",
+    uids: &["qcbus.dev:xodr:1.4.0:road.lane.sizes_plausible"],
+    level: Level::Warning,
+    after: super::READABLE,
+    params: &[MARK_WIDTH, MARK_HEIGHT, LANE_HEIGHT],
+    page: include_str!("road_lane_sizes_plausible.md"),
+    each: Some(each),
+    ..Rule::DEFAULTS
+};
+
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for lane in map.part(part).lanes() {
+        for height in lane.heights() {
+            let limit = found.number(&LANE_HEIGHT);
+            let node = height.node();
+            let edges = [("inner", height.inner()), ("outer", height.outer())];
+            let odd = edges
+                .into_iter()
+                .filter_map(|(name, value)| {
+                    Some((name, value.filter(|value| value.abs() > limit)?))
+                })
+                .max_by(|one, other| one.1.abs().total_cmp(&other.1.abs()));
+            if let Some((name, value)) = odd {
+                say(
+                    lane,
+                    node,
+                    node,
+                    name,
+                    (value, limit),
+                    "the height of this lane",
+                    found,
+                );
+            }
+        }
+        for mark in lane.elements("roadMark") {
+            // What is not painted has no size; a strip of grass has any.
+            if !matches!(mark.attr("type"), Some("none" | "grass")) {
+                look_at_mark(lane, mark, found);
+            }
+        }
+    }
+}
+
+/// Reports sizes of a mark and, where there are any, of the lines that it is made of.
+fn look_at_mark(lane: LaneRef<'_, '_>, mark: Node<'_>, found: &mut Sink<'_>) {
+    let (width, height) = (found.number(&MARK_WIDTH), found.number(&MARK_HEIGHT));
+    for (name, limit, what) in [
+        ("width", width, "the width of this road mark"),
+        ("height", height, "the height of this road mark"),
+    ] {
+        if let Some(value) = too_large(mark, name, limit) {
+            say(lane, mark, mark, name, (value, limit), what, found);
+        }
+    }
+    let parts = mark
+        .children()
+        .filter(|child| child.is("type") || child.is("explicit"));
+    for line in parts.flat_map(|part| part.children_named("line")) {
+        if let Some(value) = too_large(line, "width", width) {
+            let what = "the width of this line of a road mark";
+            say(lane, mark, line, "width", (value, width), what, found);
+        }
+    }
+}
+
+fn too_large(node: Node<'_>, name: &'static str, limit: f64) -> Option<f64> {
+    let value = node.f64(name).ok()?;
+    (value.is_finite() && value.abs() > limit).then_some(value)
+}
+
+fn say(
+    lane: LaneRef<'_, '_>,
+    record: Node<'_>,
+    node: Node<'_>,
+    name: &str,
+    (value, limit): (f64, f64),
+    what: &str,
+    found: &mut Sink<'_>,
+) {
+    let text = format!(
+        "{what} is {value} m, on {}; more than {limit} m is hardly meant, sizes are in metres",
+        lane_name(lane)
+    );
+    let finding = found.issue(Place::attribute_or_node(node, name), text);
+    if let Ok(ds) = record.f64("sOffset") {
+        finding.in_lane(lane, ds);
+    }
+}
