@@ -1,0 +1,99 @@
+use qcbus_opendrive::{Profile, Road, RoadMap, Stretch};
+use qcbus_sdk::{Level, Param, Rule, Sink};
+
+use crate::families::on_road::OnRoad;
+use crate::model::{Part, Roads};
+
+const SLOPE: Param = Param::number(
+    "slope",
+    0.35,
+    "",
+    "steepest slope of a road that is believed, as rise over run",
+);
+const BANKING: Param = Param::number(
+    "banking",
+    0.8,
+    "rad",
+    "greatest superelevation that is believed",
+);
+const LENGTH: Param = Param::number(
+    "length",
+    2.0,
+    "m",
+    "over how many metres a road must be steep to be told",
+);
+
+/// What is beyond this comes from numbers that are reported themselves.
+const ABSURD: f64 = 1e9;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_slope_plausible",
+    uids: &["qcbus.dev:xodr:1.4.0:road.slope_plausible"],
+    level: Level::Warning,
+    after: super::READABLE,
+    params: &[SLOPE, BANKING, LENGTH],
+    page: include_str!("road_slope_plausible.md"),
+    each: Some(each),
+    ..Rule::DEFAULTS
+};
+
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
+        let most = found.number(&SLOPE);
+        let slope = |stretch: &Stretch<'_, '_>, ds: f64| stretch.cubic.slope(ds);
+        if let Some((stretch, ds, slope)) = worst(road.elevation(), road, slope, most, found) {
+            let text = format!(
+                "road `{}` {} by {:.0} % over {:.1} m; slopes are written as rise over run (0.05 for 5 %), and more \
+                 than {:.0} % is hardly meant",
+                road.id(),
+                if slope > 0.0 { "climbs" } else { "falls" },
+                100.0 * slope.abs(),
+                stretch.length(),
+                100.0 * most
+            );
+            let s = stretch.from + ds;
+            found.issue(stretch.record.node(), text).on(road, s, 0.0);
+        }
+        let most = found.number(&BANKING);
+        let roll = &road.lateral().superelevation;
+        let value = |stretch: &Stretch<'_, '_>, ds: f64| stretch.cubic.value(ds);
+        if let Some((stretch, ds, value)) = worst(roll, road, value, most, found) {
+            let text = format!(
+                "road `{}` leans by {value:.3} rad, which is {:.0}°; superelevation is in radians, and more than \
+                 {most} rad ({:.0}°) is hardly meant",
+                road.id(),
+                value.abs().to_degrees(),
+                most.to_degrees()
+            );
+            let s = stretch.from + ds;
+            found.issue(stretch.record.node(), text).on(road, s, 0.0);
+        }
+    }
+}
+
+/// The stretch of a profile on which something is greatest and beyond `most`, the distance from its start and
+/// how much it is there. Looked at are places within it: what is steep at an end only is no slope but a step.
+fn worst<'p, 'a>(
+    profile: &'p Profile<'a>,
+    road: &Road<'a>,
+    measure: impl Fn(&Stretch<'p, 'a>, f64) -> f64,
+    most: f64,
+    found: &Sink<'_>,
+) -> Option<(Stretch<'p, 'a>, f64, f64)> {
+    let mut worst: Option<(Stretch<'p, 'a>, f64, f64)> = None;
+    for stretch in profile.stretches(road.length()?) {
+        let length = stretch.length();
+        if length < found.number(&LENGTH) {
+            continue;
+        }
+        for share in [0.25, 0.5, 0.75] {
+            let ds = share * length;
+            let value = measure(&stretch, ds);
+            let so_far = worst.as_ref().map_or(most, |worst| worst.2.abs());
+            if value.abs() < ABSURD && value.abs() > so_far {
+                worst = Some((stretch, ds, value));
+            }
+        }
+    }
+    worst
+}
