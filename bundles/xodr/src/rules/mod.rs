@@ -259,6 +259,7 @@ mod road_roadside_clear_of_lanes;
 mod road_roadside_near_road;
 mod road_roadside_no_twins;
 mod road_shape_elem_asc_order;
+mod road_shape_no_step;
 mod road_shape_t_definition_coverage;
 mod road_signal_boards_multi_board_have_sub_boards;
 mod road_signal_boards_multi_board_use_correct_type;
@@ -581,5 +582,6 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_geometry_lanes_no_fold::RULE,
     &road_lane_sizes_plausible::RULE,
     &road_lane_width_plausible::RULE,
+    &road_shape_no_step::RULE,
     &road_slope_plausible::RULE,
 ];
