@@ -17,6 +17,8 @@ mod junctions;
 mod lane_links;
 #[path = "tricky/lanes.rs"]
 mod lanes;
+#[path = "tricky/numbers.rs"]
+mod numbers;
 #[path = "tricky/reference_lines.rs"]
 mod reference_lines;
 #[path = "tricky/road_links.rs"]

@@ -282,6 +282,7 @@ mod road_signal_use_country_code;
 mod road_signal_validity_left_hand_traffic_lane_ids;
 mod road_signal_validity_right_hand_traffic_lane_ids;
 mod road_slope_plausible;
+mod road_speed_plausible;
 mod road_superelevation_elem_asc_order;
 mod road_type_elem_asc_order;
 mod road_type_only_alpha_2_country_codes;
@@ -584,4 +585,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_lane_width_plausible::RULE,
     &road_shape_no_step::RULE,
     &road_slope_plausible::RULE,
+    &road_speed_plausible::RULE,
 ];

@@ -1,0 +1,130 @@
+use qcbus_document::Node;
+use qcbus_opendrive::{Road, RoadMap};
+use qcbus_sdk::{Level, Param, Place, Rule, Sink};
+
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::families::traffic_lanes::is_for_traffic;
+use crate::model::{Part, Roads};
+
+const SLOW: Param = Param::number(
+    "slow",
+    20.0,
+    "m/s",
+    "highest limit that is believed where people walk, play or cycle",
+);
+const TOWN: Param = Param::number(
+    "town",
+    40.0,
+    "m/s",
+    "highest limit that is believed in a town",
+);
+const RURAL: Param = Param::number(
+    "rural",
+    50.0,
+    "m/s",
+    "highest limit that is believed on a rural road",
+);
+const MOST: Param = Param::number(
+    "most",
+    90.0,
+    "m/s",
+    "highest limit that is believed anywhere",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_speed_plausible",
+    uids: &["qcbus.dev:xodr:1.4.0:road.speed_plausible"],
+    level: Level::Warning,
+    after: super::READABLE,
+    params: &[SLOW, TOWN, RURAL, MOST],
+    page: include_str!("road_speed_plausible.md"),
+    each: Some(each),
+    ..Rule::DEFAULTS
+};
+
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    let part = map.part(part);
+    for road in part.roads() {
+        for record in road.types() {
+            for speed in record.node().children_named("speed") {
+                let Some(text) = judge(speed, record.kind(), found) else {
+                    continue;
+                };
+                let finding = found.issue(Place::attribute_or_node(speed, "max"), text);
+                if let Some(s) = record.s() {
+                    finding.on(road, s, 0.0);
+                }
+            }
+        }
+    }
+    for lane in part.lanes().filter(|lane| is_for_traffic(*lane)) {
+        for speed in lane.elements("speed") {
+            let ds = speed.f64("sOffset").unwrap_or(0.0);
+            let kind = lane.at.s().and_then(|s| kind_at(lane.at.road, s + ds));
+            if let Some(text) = judge(speed, kind, found) {
+                let text = format!("{text} ({})", lane_name(lane));
+                found
+                    .issue(Place::attribute_or_node(speed, "max"), text)
+                    .in_lane(lane, ds);
+            }
+        }
+    }
+}
+
+/// The type of a road at s.
+fn kind_at<'a>(road: &Road<'a>, s: f64) -> Option<&'a str> {
+    let before = road.types().filter(|record| {
+        let start = record.s();
+        start.is_some_and(|start| start <= s + 1e-9)
+    });
+    before
+        .max_by(|one, other| one.s().unwrap_or(0.0).total_cmp(&other.s().unwrap_or(0.0)))?
+        .kind()
+}
+
+/// What is odd about a limit on a road of a type. Limits below zero are no limits at all, which is said by
+/// the schema; so are words.
+fn judge(speed: Node<'_>, kind: Option<&str>, found: &Sink<'_>) -> Option<String> {
+    let max = speed.f64("max").ok().filter(|max| *max >= 0.0)?;
+    let (unit, factor) = match speed.attr("unit") {
+        None | Some("" | "m/s") => ("m/s", 1.0),
+        Some("km/h") => ("km/h", 1.0 / 3.6),
+        Some("mph") => ("mph", 0.44704),
+        Some(_) => return None,
+    };
+    if max == 0.0 {
+        return Some(
+            "a speed limit of 0 lets nobody move; without a limit the element is left out, or says `no limit` or \
+             `undefined`"
+                .to_owned(),
+        );
+    }
+    let (most, place) = match kind {
+        Some("lowSpeed" | "pedestrian" | "bicycle" | "townPlayStreet") => {
+            (found.number(&SLOW), kind)
+        }
+        Some(
+            "town" | "townExpressway" | "townCollector" | "townArterial" | "townPrivate"
+            | "townLocal",
+        ) => (found.number(&TOWN), kind),
+        Some("rural") => (found.number(&RURAL), kind),
+        _ => (found.number(&MOST), None),
+    };
+    if max * factor <= most {
+        return None;
+    }
+    let place = place.map_or_else(String::new, |kind| format!(" on a road of type `{kind}`"));
+    let doubt = match (speed.attr("unit"), unit) {
+        (None, _) => "; without `unit` it is m/s",
+        (Some(_), "m/s") => "; its unit is m/s",
+        _ => "",
+    };
+    let in_km = match unit {
+        "km/h" => String::new(),
+        _ => format!(" ({:.0} km/h)", 3.6 * max * factor),
+    };
+    Some(format!(
+        "the speed limit is {max} {unit}{in_km}{doubt}; more than {:.0} km/h is hardly meant{place}",
+        3.6 * most
+    ))
+}
