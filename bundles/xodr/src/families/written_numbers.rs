@@ -207,6 +207,15 @@ pub(crate) fn shown(text: &str) -> String {
     }
 }
 
+/// A value with so many decimals, or with its power of ten where it has too many digits to be read.
+pub(crate) fn brief(value: f64, decimals: usize) -> String {
+    if value.abs() < 1e7 {
+        format!("{value:.decimals$}")
+    } else {
+        format!("{value:.1e}")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -254,6 +263,8 @@ mod tests {
 
     #[test]
     fn long_ones_are_cut() {
+        assert_eq!(brief(12.345, 1), "12.3");
+        assert_eq!(brief(1.234e19, 3), "1.2e19");
         assert_eq!(shown(" 1.5 "), "1.5");
         assert_eq!(shown(&"9".repeat(400)).chars().count(), 25);
     }

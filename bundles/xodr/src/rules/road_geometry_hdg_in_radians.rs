@@ -42,9 +42,9 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             .map(|(at, hdg)| Odd {
                 at,
                 hdg,
-                meant: meant(map, road, at, hdg),
+                fit: fit(map, road, at, hdg),
             })
-            .filter(|odd| odd.meant != Some(Unit::Radians))
+            .filter(|odd| odd.fit != Some(Fit::Meets))
             .collect();
         if !odd.is_empty() {
             report(road, &odd, found);
@@ -52,11 +52,15 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// What a heading is written in, as far as the pieces before and after it tell.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Unit {
-    Radians,
-    Degrees,
+/// How a geometry with such a heading fits what comes before and after it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Fit {
+    /// It goes on: many turns are meant.
+    Meets,
+    /// It ends so many metres away from what follows.
+    Misses(f64),
+    /// The same, but read as degrees it meets what follows.
+    MeetsInDegrees(f64),
 }
 
 /// A heading of many turns.
@@ -64,13 +68,21 @@ struct Odd {
     /// Its geometry's place in the road.
     at: usize,
     hdg: f64,
-    meant: Option<Unit>,
+    fit: Option<Fit>,
 }
 
 /// Reports the first heading of a road, with the others as further places.
 fn report(road: &Road<'_>, odd: &[Odd], found: &mut Sink<'_>) {
     let geometries = road.plan_view().geometries();
-    let certain = odd.iter().any(|odd| odd.meant == Some(Unit::Degrees));
+    let proof = odd.iter().find_map(|odd| match odd.fit? {
+        Fit::Meets => None,
+        Fit::Misses(gap) => Some(format!(
+            "; with it, the piece ends {gap:.2} m away from what follows"
+        )),
+        Fit::MeetsInDegrees(gap) => Some(format!(
+            "; with it, the piece ends {gap:.2} m away from what follows, and would meet it if the heading were in degrees"
+        )),
+    });
     let mut places = odd
         .iter()
         .filter_map(|odd| Some((geometries.get(odd.at)?, odd.hdg)));
@@ -78,11 +90,8 @@ fn report(road: &Road<'_>, odd: &[Odd], found: &mut Sink<'_>) {
         return;
     };
     let turns = (hdg / TAU).abs();
-    let proof = if certain {
-        "; read as degrees, the road meets what follows it, as radians it does not"
-    } else {
-        ""
-    };
+    let certain = proof.is_some();
+    let proof = proof.unwrap_or_default();
     let text = format!(
         "the heading is {hdg:.6}, which is {turns:.1} full turns; headings are in radians, not in degrees, and less \
          than a full turn (6.28) says all{proof}"
@@ -100,14 +109,14 @@ fn report(road: &Road<'_>, odd: &[Odd], found: &mut Sink<'_>) {
     }
 }
 
-/// By which reading a geometry leads to what follows it, or goes on in the direction of what is before it.
-fn meant<'a>(map: &RoadMap<'a>, road: &Road<'a>, at: usize, hdg: f64) -> Option<Unit> {
+/// How a geometry fits what follows it and the direction of what is before it; `None` where that is not known.
+fn fit<'a>(map: &RoadMap<'a>, road: &Road<'a>, at: usize, hdg: f64) -> Option<Fit> {
     let geometries = road.plan_view().geometries();
     let geometry: &Geometry<'_> = geometries.get(at)?;
     let before = at.checked_sub(1).and_then(|at| geometries.get(at)?.end());
     let turn = before.and_then(|before| heading_difference(before.hdg, hdg));
     if turn.is_some_and(|turn| turn.abs() < NEAR) {
-        return Some(Unit::Radians);
+        return Some(Fit::Meets);
     }
     let (start, end) = (geometry.origin()?, geometry.end_point()?);
     let (sin, cos) = (hdg.to_radians() - hdg).sin_cos();
@@ -128,9 +137,12 @@ fn meant<'a>(map: &RoadMap<'a>, road: &Road<'a>, at: usize, hdg: f64) -> Option<
     };
     let near = NEAR * geometry.length()?.max(1.0);
     let (radians, degrees) = (gap(end)?, gap(turned)?);
-    match (radians < near, degrees < near) {
-        (true, _) => Some(Unit::Radians),
-        (false, true) if radians > FAR.max(10.0 * near) => Some(Unit::Degrees),
-        _ => None,
+    if radians < near {
+        return Some(Fit::Meets);
     }
+    (radians > FAR.max(10.0 * near)).then_some(if degrees < near {
+        Fit::MeetsInDegrees(radians)
+    } else {
+        Fit::Misses(radians)
+    })
 }

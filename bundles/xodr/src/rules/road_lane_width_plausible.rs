@@ -3,6 +3,7 @@ use qcbus_sdk::{Level, Param, Rule, Sink};
 
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::traffic_lanes::is_for_traffic;
+use crate::families::written_numbers::brief;
 use crate::model::{Part, Roads};
 
 const LEAST: Param = Param::number(
@@ -35,7 +36,7 @@ const STEADY: f64 = 0.3;
 /// Nothing that is narrower, in metres, is meant to be a lane there.
 const NOTHING: f64 = 0.05;
 
-/// What is beyond this, in metres, comes from numbers that are reported themselves.
+/// A record that begins with more than this, in metres, is reported as a number that is none.
 const ABSURD: f64 = 1e9;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -73,7 +74,7 @@ fn wide(stretch: &Stretch<'_, '_>, traffic: bool, found: &Sink<'_>) -> Option<f6
     let any = found.number(&ANY);
     let greatest = stretch.cubic.maximum(0.0, length)?.value;
     if greatest > any {
-        return (greatest < ABSURD).then_some(greatest);
+        return (stretch.cubic.a.abs() < ABSURD).then_some(greatest);
     }
     let most = found.number(&MOST);
     if !traffic || greatest <= most || length < found.number(&LENGTH) {
@@ -100,8 +101,9 @@ fn report_wide(
         (found.number(&ANY), "lane")
     };
     let text = format!(
-        "{} is up to {width:.1} m wide; a {what} of more than {most} m is hardly meant, widths are in metres",
-        lane_name(lane)
+        "{} is up to {} m wide; a {what} of more than {most} m is hardly meant, widths are in metres",
+        lane_name(lane),
+        brief(width, 1)
     );
     let ds = 0.5 * (stretch.from + stretch.to);
     found.issue(stretch.record.node(), text).in_lane(lane, ds);

@@ -2,6 +2,7 @@ use qcbus_opendrive::{Profile, Road, RoadMap, Stretch};
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
 use crate::families::on_road::OnRoad;
+use crate::families::written_numbers::brief;
 use crate::model::{Part, Roads};
 
 const SLOPE: Param = Param::number(
@@ -23,9 +24,6 @@ const LENGTH: Param = Param::number(
     "over how many metres a road must be steep to be told",
 );
 
-/// What is beyond this comes from numbers that are reported themselves.
-const ABSURD: f64 = 1e9;
-
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_slope_plausible",
     uids: &["qcbus.dev:xodr:1.4.0:road.slope_plausible"],
@@ -43,11 +41,11 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         let slope = |stretch: &Stretch<'_, '_>, ds: f64| stretch.cubic.slope(ds);
         if let Some((stretch, ds, slope)) = worst(road.elevation(), road, slope, most, found) {
             let text = format!(
-                "road `{}` {} by {:.0} % over {:.1} m; slopes are written as rise over run (0.05 for 5 %), and more \
+                "road `{}` {} by {} % over {:.1} m; slopes are written as rise over run (0.05 for 5 %), and more \
                  than {:.0} % is hardly meant",
                 road.id(),
                 if slope > 0.0 { "climbs" } else { "falls" },
-                100.0 * slope.abs(),
+                brief(100.0 * slope.abs(), 0),
                 stretch.length(),
                 100.0 * most
             );
@@ -59,10 +57,11 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         let value = |stretch: &Stretch<'_, '_>, ds: f64| stretch.cubic.value(ds);
         if let Some((stretch, ds, value)) = worst(roll, road, value, most, found) {
             let text = format!(
-                "road `{}` leans by {value:.3} rad, which is {:.0}°; superelevation is in radians, and more than \
+                "road `{}` leans by {} rad, which is {}°; superelevation is in radians, and more than \
                  {most} rad ({:.0}°) is hardly meant",
                 road.id(),
-                value.abs().to_degrees(),
+                brief(value, 3),
+                brief(value.abs().to_degrees(), 0),
                 most.to_degrees()
             );
             let s = stretch.from + ds;
@@ -90,7 +89,7 @@ fn worst<'p, 'a>(
             let ds = share * length;
             let value = measure(&stretch, ds);
             let so_far = worst.as_ref().map_or(most, |worst| worst.2.abs());
-            if value.abs() < ABSURD && value.abs() > so_far {
+            if value.is_finite() && value.abs() > so_far {
                 worst = Some((stretch, ds, value));
             }
         }
