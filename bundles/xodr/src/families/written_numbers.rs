@@ -172,29 +172,42 @@ pub(crate) fn is_suspicious(text: &str) -> bool {
     match bytes {
         [b'n' | b'N', b'a' | b'A', ..] | [b'i' | b'I', b'n' | b'N', ..] => true,
         [b'1', b'.', b'#', ..] => true,
-        [b'0'..=b'9' | b'.', ..] => is_long(bytes) || has_large_exponent(bytes),
+        [b'0'..=b'9' | b'.', ..] => is_large(bytes),
         _ => false,
     }
 }
 
-/// Eight or more digits before the point.
-fn is_long(bytes: &[u8]) -> bool {
-    matches!(bytes.get(..8), Some(head) if head.iter().all(u8::is_ascii_digit))
+/// Whether a number without sign may be of ten millions and more: by its digits before the point and its power of
+/// ten, without reading it.
+fn is_large(bytes: &[u8]) -> bool {
+    const DIGITS: usize = 8;
+    let digits = bytes.iter().take(DIGITS);
+    let before = digits.take_while(|byte| byte.is_ascii_digit()).count();
+    before + power_of_ten(bytes) >= DIGITS
 }
 
-/// An exponent of two digits or more that is not negative, which stands in the last bytes.
-fn has_large_exponent(bytes: &[u8]) -> bool {
-    let tail = bytes.get(bytes.len().saturating_sub(12)..).unwrap_or(bytes);
-    let Some(at) = tail.iter().position(|byte| matches!(byte, b'e' | b'E')) else {
-        return false;
+/// The power of ten that ends a number, if it is positive; most numbers end in `e+00`, `e-03` or in none.
+fn power_of_ten(bytes: &[u8]) -> usize {
+    let white = |byte: &u8| byte.is_ascii_whitespace();
+    let digits = bytes.iter().rev().skip_while(|byte| white(byte));
+    let count = digits
+        .clone()
+        .take_while(|byte| byte.is_ascii_digit())
+        .count();
+    let power = digits.clone().take(count.min(6)).enumerate();
+    let mut before = digits.skip(count);
+    let is_power = match before.next() {
+        Some(b'e' | b'E') => true,
+        Some(b'+') => matches!(before.next(), Some(b'e' | b'E')),
+        _ => false,
     };
-    match tail.get(at + 1..) {
-        Some([b'-', ..]) | None => false,
-        Some([b'+', digits @ ..] | digits) => {
-            // `e+00` of C is by far the most common.
-            digits.iter().skip_while(|digit| **digit == b'0').count() > 0
-        }
+    if !is_power {
+        return 0;
     }
+    power.fold(0, |sum, (place, digit)| {
+        let scale = 10_usize.saturating_pow(u32::try_from(place).unwrap_or(u32::MAX));
+        sum + scale * usize::from(digit - b'0')
+    })
 }
 
 /// A number as written, cut when it is long.
@@ -243,7 +256,15 @@ mod tests {
             assert_eq!(Written::read(text), Some(Written::Overflow), "{text}");
             assert!(is_suspicious(text), "{text}");
         }
-        for text in ["1e300", "1e9", "123456789", "1.5E+0012", "+100000000.5"] {
+        for text in [
+            "1e300",
+            "1e9",
+            "123456789",
+            "1.5E+0012",
+            "+100000000.5",
+            "1234567e1",
+            "5e+007 ",
+        ] {
             assert!(is_suspicious(text), "{text}");
         }
         for text in [
