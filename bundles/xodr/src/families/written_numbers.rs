@@ -188,13 +188,16 @@ fn is_large(bytes: &[u8]) -> bool {
 
 /// The power of ten that ends a number, if it is positive; most numbers end in `e+00`, `e-03` or in none.
 fn power_of_ten(bytes: &[u8]) -> usize {
+    const MOST: usize = 6;
     let white = |byte: &u8| byte.is_ascii_whitespace();
     let digits = bytes.iter().rev().skip_while(|byte| white(byte));
-    let count = digits
-        .clone()
-        .take_while(|byte| byte.is_ascii_digit())
-        .count();
-    let power = digits.clone().take(count.min(6)).enumerate();
+    // Longer runs of digits are decimals, which most numbers have many of.
+    let end = digits.clone().take(MOST + 1);
+    let count = end.take_while(|byte| byte.is_ascii_digit()).count();
+    if count > MOST {
+        return 0;
+    }
+    let power = digits.clone().take(count).enumerate();
     let mut before = digits.skip(count);
     let is_power = match before.next() {
         Some(b'e' | b'E') => true,

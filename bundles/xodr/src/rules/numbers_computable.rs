@@ -74,6 +74,12 @@ impl<'a> Odd<'a> {
     /// What is to be said about a text that stands for a number, or for one of several, in an attribute.
     fn of(attribute: Attribute<'a>, text: &str, found: &Sink<'_>) -> Option<Odd<'a>> {
         let written = Written::read(text)?;
+        // Ids are long as well, and what an attribute measures takes a while to look up.
+        let least = found.number(&MOST).min(found.number(&EARTH));
+        if matches!(written, Written::Finite(value) if value.abs() <= least.min(found.number(&COEFFICIENT)))
+        {
+            return None;
+        }
         let node = attribute.node();
         let measure = Measure::of(node.name(), attribute.name())?;
         let (level, why) = judge(written, measure, found)?;
