@@ -242,7 +242,9 @@ mod tests {
     #[test]
     fn numbers_are_finite_or_absent() {
         assert_eq!(parse_number(" 1.5e2\n"), Some(150.0));
-        for text in ["", "INF", "inf", "NaN", "nan", "1e999", "1e31", "1,5", "infinity"] {
+        for text in [
+            "", "INF", "inf", "NaN", "nan", "1e999", "1e31", "1,5", "infinity",
+        ] {
             assert_eq!(parse_number(text), None, "{text}");
         }
         assert_eq!(parse_integer(" -7 "), Some(-7));
