@@ -137,6 +137,14 @@ pub(crate) fn misplaced_child(
     )
 }
 
+/// Why elements within one that may not have any are there only by the fault of the schema of this title.
+pub(crate) fn children_of_none(parent: Node<'_>, title: &str) -> Option<&'static str> {
+    let is_old = matches!(title, "OpenDRIVE 1.1" | "OpenDRIVE 1.2");
+    (is_old && parent.is("userData")).then_some(
+        "it takes no elements within userData, where later versions take whatever an application needs",
+    )
+}
+
 /// Elements of OpenSCENARIO 1.2 whose children are alternatives, which its schema lists as a sequence.
 const ALTERNATIVES: [(&str, [&str; 2]); 3] = [
     ("AppearanceAction", ["LightStateAction", "AnimationAction"]),
@@ -204,6 +212,9 @@ fn value(attribute: Attribute<'_>, title: &str) -> Option<&'static str> {
         ("OpenDRIVE 1.1", "type") if node.is("lane") && LANE_TYPES.contains(&word) => Some(
             "it has numbers for the types of lanes, where the standard and all files have words",
         ),
+        ("OpenDRIVE 1.1", "type") if node.is("object") && is_word(word) => Some(
+            "it has numbers for the types of objects, where files and the later versions have words",
+        ),
         ("OpenDRIVE 1.1", "level") if node.is("lane") && matches!(word, "true" | "false") => {
             Some("it has numbers for level, where the standard and all files have true and false")
         }
@@ -215,6 +226,10 @@ fn value(attribute: Attribute<'_>, title: &str) -> Option<&'static str> {
         }
         _ => None,
     }
+}
+
+fn is_word(text: &str) -> bool {
+    text.starts_with(|c: char| c.is_ascii_alphabetic())
 }
 
 fn is_decimal(word: &str) -> bool {

@@ -63,7 +63,7 @@ impl<'a, 's> Walk<'a, 's> {
                 let parent = self.document.node(frame.node)?;
                 let key = (0, u32::from(node.name_number()));
                 self.reporter.add(Code::UnexpectedElement, key, node, || {
-                    wording::no_children(node, parent)
+                    wording::no_children(node, parent, &self.schema.title)
                 });
                 None
             }
@@ -206,7 +206,7 @@ impl<'a, 's> Walk<'a, 's> {
         if !self.overlay.allows_element(parent.name(), node.name()) {
             let key = (0, u32::from(node.name_number()));
             self.reporter.add(Code::UnexpectedElement, key, node, || {
-                wording::no_children(node, parent)
+                wording::no_children(node, parent, &self.schema.title)
             });
         }
     }

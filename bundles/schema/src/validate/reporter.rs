@@ -99,7 +99,10 @@ impl<'a, 's> Reporter<'a, 's> {
             defect: is_known
                 || matches!(
                     code,
-                    Code::ConditionFailed | Code::MissingElement | Code::MisplacedElement
+                    Code::ConditionFailed
+                        | Code::MissingElement
+                        | Code::MisplacedElement
+                        | Code::UnexpectedElement
                 ),
             order,
         });

@@ -134,7 +134,7 @@ pub(super) fn repeated(node: Node<'_>, parent: Node<'_>, count: u32, most: u32) 
     Wording::new(node.name(), text).expecting(vec![limit])
 }
 
-pub(super) fn no_children(node: Node<'_>, parent: Node<'_>) -> Wording {
+pub(super) fn no_children(node: Node<'_>, parent: Node<'_>, title: &str) -> Wording {
     Wording::new(
         node.name(),
         format!(
@@ -143,6 +143,7 @@ pub(super) fn no_children(node: Node<'_>, parent: Node<'_>) -> Wording {
             node.name()
         ),
     )
+    .excused(defects::children_of_none(parent, title))
 }
 
 /// Siblings looked at to say how a child and they belong together.

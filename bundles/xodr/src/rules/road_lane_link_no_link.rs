@@ -20,7 +20,9 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     for road in map.part(part).roads() {
         for end in ContactPoint::BOTH {
             if let Some(why) = nothing_to_link(map, road, end) {
-                for layer in road.layers() {
+                let temporary = |layer: &&LaneLayer<'_>| layer.kind() == LayerKind::Temporary;
+                let temporary = road.layers().iter().filter(temporary);
+                for layer in road.permanent().into_iter().chain(temporary) {
                     check(road, layer, (end, &why), found);
                 }
             }
