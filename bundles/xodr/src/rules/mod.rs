@@ -27,7 +27,6 @@ mod junctions_common_virtual_junction_attributes;
 mod junctions_common_when_to_use;
 mod junctions_connecting_lane_linked;
 mod junctions_connecting_road_linked;
-mod junctions_connecting_road_place;
 mod junctions_connecting_road_used;
 mod junctions_connection_connect_road_no_incoming_road;
 mod junctions_connection_end_opposite_linkage;
@@ -565,7 +564,6 @@ pub static RULES: &[&dyn AnyRule] = &[
     &junctions_elevation_grid_placed::RULE,
     &junctions_connecting_lane_linked::RULE,
     &junctions_connecting_road_linked::RULE,
-    &junctions_connecting_road_place::RULE,
     &junctions_connecting_road_used::RULE,
     &junctions_connection_lane_link_once::RULE,
     &junctions_connection_lane_links_agree::RULE,

@@ -1,10 +1,13 @@
-use foldhash::HashSet;
+use std::cell::OnceCell;
+
+use foldhash::{HashMap, HashSet};
 use qcbus_opendrive::{ContactPoint, JunctionType, Road, RoadContact, RoadEnd, RoadMap};
 use qcbus_sdk::{Param, Rule, Sink, Version};
 
 use crate::families::gap_levels::GAP_BROKEN_FROM;
 use crate::families::mouths;
 use crate::families::on_road::OnRoad;
+use crate::families::shown::beside;
 use crate::families::virtual_links::leads_to_main_road;
 use crate::model::Roads;
 
@@ -14,6 +17,12 @@ const FAR: Param = Param::number(
     "m",
     "how far a road may end from a junction that has no connection for it, or the junction's size if that is more",
 );
+
+/// A road that lies nearer than this, in metres, is the one that is meant.
+const THERE: f64 = 0.1;
+
+/// Roads around one junction that are looked at when one of its links is wrong. No real junction has as many.
+const MOST_ARMS: usize = 64;
 
 /// Of junctions with more roads than this nothing is said about roads that they do not connect.
 const MOST_ENDS: usize = 256;
@@ -33,11 +42,15 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     // Which junctions say that they are at which road ends.
     let mut joined: HashSet<(usize, RoadEnd)> = HashSet::default();
     // `junctions.connection.start_along_linkage` and `…end_opposite_linkage` say so.
+    let arms = Arms {
+        map,
+        by_junction: OnceCell::new(),
+    };
     let contradicted = found.version() >= Some(Version::new(1, 7));
     for contact in contacts(map, contradicted) {
         let (one, other) = (contact.from, contact.to);
         if told.insert((one.min(other), one.max(other))) {
-            check(map, &contact, found);
+            check(map, &contact, &arms, found);
         }
         let junction = contact.junction.or_else(|| junction_of(map, one));
         joined.extend(junction.into_iter().flat_map(|at| [(at, one), (at, other)]));
@@ -94,7 +107,12 @@ fn is_contradicted(map: &RoadMap<'_>, contact: &RoadContact<'_>) -> bool {
     })
 }
 
-fn check(map: &RoadMap<'_>, contact: &RoadContact<'_>, found: &mut Sink<'_>) {
+fn check<'a>(
+    map: &RoadMap<'a>,
+    contact: &RoadContact<'_>,
+    arms: &Arms<'_, 'a>,
+    found: &mut Sink<'_>,
+) {
     let limit = found.number(&GAP_BROKEN_FROM);
     let roads = map
         .road_at(contact.from.road)
@@ -107,13 +125,21 @@ fn check(map: &RoadMap<'_>, contact: &RoadContact<'_>, found: &mut Sink<'_>) {
         Some(_) => "the connection",
         None => "the link",
     };
+    let meant = contact
+        .junction
+        .is_none()
+        .then(|| arms.at(one, contact.from));
+    let meant = meant.flatten().map_or(String::new(), |(road, end)| {
+        format!(" (the {end} of road `{}` lies there)", road.id())
+    });
     let text = format!(
-        "{says} says that the {} of road `{}` meets the {} of road `{}`, but they lie {apart:.3} m apart; ends that \
-         meet must lie at one place (at most {limit} m)",
+        "{says} says that the {} of road `{}` meets the {} of road `{}`, but they lie {} m apart{meant}; ends that \
+         meet must lie at one place (at most {limit} m apart)",
         contact.from.end,
         one.id(),
         contact.to.end,
-        other.id()
+        other.id(),
+        beside(apart, limit)
     );
     found
         .issue(contact.node, text)
@@ -121,6 +147,50 @@ fn check(map: &RoadMap<'_>, contact: &RoadContact<'_>, found: &mut Sink<'_>) {
         .at(one.node(), "the one road")
         .at(other.node(), "the other road")
         .at_end(other, contact.to.end);
+}
+
+/// The road ends around the junctions.
+struct Arms<'m, 'd> {
+    map: &'m RoadMap<'d>,
+    /// Found out when something is wrong somewhere.
+    by_junction: OnceCell<HashMap<&'d str, Vec<RoadEnd>>>,
+}
+
+impl<'m, 'd> Arms<'m, 'd> {
+    /// The road around the junction that lies at an end of one of its connecting roads.
+    fn at(&self, connecting: &Road<'d>, here: RoadEnd) -> Option<(&'m Road<'d>, ContactPoint)> {
+        let junction = connecting.junction()?;
+        let arms = self
+            .by_junction
+            .get_or_init(|| self.gather())
+            .get(junction)?;
+        let mouth = mouths::Mouth::at(self.map, here)?;
+        let lies_there = |arm: &&RoadEnd| {
+            let there = mouths::Mouth::at(self.map, **arm);
+            there.is_some_and(|there| mouth.distance(there) < THERE)
+        };
+        let arm = arms.iter().find(lies_there)?;
+        Some((self.map.road_at(arm.road)?, arm.end))
+    }
+
+    fn gather(&self) -> HashMap<&'d str, Vec<RoadEnd>> {
+        let mut arms: HashMap<&'d str, Vec<RoadEnd>> = HashMap::default();
+        for road in self.map.roads() {
+            for end in ContactPoint::BOTH {
+                let Some(id) = road.link(end).and_then(|link| link.junction_id()) else {
+                    continue;
+                };
+                let arms = arms.entry(id).or_default();
+                if arms.len() < MOST_ARMS {
+                    arms.push(RoadEnd {
+                        road: road.index(),
+                        end,
+                    });
+                }
+            }
+        }
+        arms
+    }
 }
 
 /// Looks at a road end whose link names a junction that says nothing about it.
