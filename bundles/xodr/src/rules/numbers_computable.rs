@@ -14,7 +14,7 @@ const MOST: Param = Param::number(
 );
 const EARTH: Param = Param::number(
     "earth",
-    5e7,
+    1e8,
     "m",
     "a place or size beyond this is farther than once around the Earth",
 );
@@ -81,6 +81,10 @@ impl<'a> Odd<'a> {
             return None;
         }
         let node = attribute.node();
+        // How far the map may be moved is the business of `header_offset_plausible`.
+        if node.is("offset") && matches!(written, Written::Finite(_)) {
+            return None;
+        }
         let measure = Measure::of(node.name(), attribute.name())?;
         let (level, why) = judge(written, measure, found)?;
         if is_user_data(node) {

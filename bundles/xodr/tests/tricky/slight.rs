@@ -261,7 +261,7 @@ fn lengths_of_geometries() {
         (
             "a road that ends before its geometries do",
             road("80", &plain),
-            &["warning road_length_sum_geometries"],
+            &["error road_length_sum_geometries"],
         ),
     ];
     crate::run(&rows);
