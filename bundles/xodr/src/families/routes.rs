@@ -1,6 +1,6 @@
 //! Lanes that routes lead along, and where they enter and leave roads and junctions.
 
-use qcbus_opendrive::{ContactPoint, Junction, JunctionType, LaneRef, Road, RoadMap, Side};
+use qcbus_opendrive::{ContactPoint, LaneRef, Road, Side};
 use qcbus_sdk::Param;
 
 /// Narrower lanes lead nobody anywhere.
@@ -57,13 +57,4 @@ pub(crate) fn routes_at<'m, 'a>(
     lanes_at(road, end)
         .filter(|lane| is_route(*lane))
         .filter(wide)
-}
-
-/// The common junction within which a road lies, if there is one.
-pub(crate) fn common_junction<'m, 'a>(
-    map: &'m RoadMap<'a>,
-    road: &Road<'a>,
-) -> Option<&'m Junction<'a>> {
-    let junction = map.junction(road.junction()?)?;
-    (junction.kind() == Some(JunctionType::Common)).then_some(junction)
 }
