@@ -130,6 +130,7 @@ mod road_geometry_refline_no_gaps;
 mod road_geometry_refline_no_kinks;
 mod road_geometry_s_value_sum;
 mod road_geometry_spiral_curvature_change;
+mod road_height_among_others;
 mod road_lane_access_center_lane_no_acc_rule;
 mod road_lane_access_elem_asc_order;
 mod road_lane_access_no_mix_of_deny_or_allow;
@@ -575,6 +576,7 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_lane_link_types::RULE,
     &road_linkage_touching_ends::RULE,
     &road_network_connected::RULE,
+    &road_height_among_others::RULE,
     &road_network_drivable::RULE,
     &numbers_computable::RULE,
     &road_geometry_hdg_in_radians::RULE,
