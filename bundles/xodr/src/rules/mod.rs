@@ -267,6 +267,7 @@ mod road_signal_boards_multi_board_use_dynamic_true;
 mod road_signal_boards_static_board_use_correct_type;
 mod road_signal_boards_static_boards_no_single_signal;
 mod road_signal_controller_dynamic_only;
+mod road_signal_controller_in_junction;
 mod road_signal_controller_one_per_light;
 mod road_signal_controller_valid_for_signals;
 mod road_signal_gantry_all_variable_boards_same_gantry;
@@ -542,6 +543,7 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_roadside_clear_of_lanes::RULE,
     &road_signal_controller_dynamic_only::RULE,
     &road_signal_controller_one_per_light::RULE,
+    &road_signal_controller_in_junction::RULE,
     &road_signal_speed_value::RULE,
     &road_object_crosswalk_crosses_lanes::RULE,
     &road_object_positive_size::RULE,
