@@ -103,6 +103,8 @@ fn each_violation_is_found_at_its_place() {
         ("<a>\n <!wrong></a>", F::Syntax, 2, 2),
         ("<a>x\0y</a>", F::BadCharacter, 1, 5),
         ("<a>\u{FFFF}</a>", F::BadCharacter, 1, 4),
+        ("<a>x\0\0\0\0y</a>", F::BadCharacter, 1, 5),
+        ("<a/>\n\0\0\0\0", F::BadCharacter, 2, 1),
         ("<a>\n <p:b/></a>", F::UnboundPrefix, 2, 3),
         ("<a p:b=''/>", F::UnboundPrefix, 1, 4),
         ("<!DOCTYPE a [<!ENTITY x 'y'>]><a>&x;</a>", F::Doctype, 1, 1),

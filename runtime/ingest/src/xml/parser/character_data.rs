@@ -48,6 +48,10 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
         text: &str,
         after: bool,
     ) -> Result<(), Stop> {
+        // The characters are reported as such, and a file that was not cut off has nothing else there.
+        if text.bytes().all(|byte| byte == 0 || byte.is_ascii_whitespace()) {
+            return Ok(());
+        }
         let at = from + (text.len() - text.trim_ascii_start().len());
         let place = if after { "after" } else { "before" };
         let message = format!(
