@@ -6,6 +6,7 @@ use crate::families::lane_gaps::{LaneGap, lane_gaps};
 use crate::families::mouths;
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::refline::report_gaps;
+use crate::families::routes::is_route;
 use crate::families::touching::{Where, place_of};
 use crate::families::zero_width::ZERO_WIDTH;
 use crate::model::{Part, Roads};
@@ -109,6 +110,8 @@ fn report(map: &RoadMap<'_>, gap: &LaneGap<'_, '_>, found: &mut Sink<'_>) {
         Misfit::Slight if is_normative(found) && widest >= found.number(&LANE_ERROR_FROM) => {
             Misfit::Plain
         }
+        // Nobody gets thrown off a shoulder by following it.
+        Misfit::Broken if !(is_route(gap.from) && is_route(gap.to)) => Misfit::Plain,
         misfit => misfit,
     };
     let mut finding = misfit

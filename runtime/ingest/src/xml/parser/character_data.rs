@@ -49,7 +49,10 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
         after: bool,
     ) -> Result<(), Stop> {
         // The characters are reported as such, and a file that was not cut off has nothing else there.
-        if text.bytes().all(|byte| byte == 0 || byte.is_ascii_whitespace()) {
+        if text
+            .bytes()
+            .all(|byte| byte == 0 || byte.is_ascii_whitespace())
+        {
             return Ok(());
         }
         let at = from + (text.len() - text.trim_ascii_start().len());
