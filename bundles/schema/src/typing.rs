@@ -60,6 +60,16 @@ impl Typing {
         Some(ValueType { schema, simple })
     }
 
+    /// Whether an element must have the attribute.
+    pub fn demands(&self, node: Node<'_>, attribute: &str) -> bool {
+        let name = self.schema.names.find(attribute);
+        let declared = name.zip(self.complex(node));
+        declared.is_some_and(|(name, complex)| {
+            let mut attributes = complex.attributes.iter();
+            attributes.any(|one| one.name == name && one.required)
+        })
+    }
+
     /// The schema that gives the types.
     pub(crate) fn schema(&self) -> &'static Schema {
         self.schema

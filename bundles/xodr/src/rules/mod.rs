@@ -4,6 +4,7 @@
 
 use qcbus_sdk::AnyRule;
 
+mod attributes_are_given;
 mod default_regulations_only_speed_priority;
 mod geometry_length_not_negative;
 mod header_attributes;
@@ -228,6 +229,7 @@ mod road_object_repeating_no_widthstart_end_with_radius;
 mod road_object_repeating_outline_use_cornerlocal;
 mod road_object_repeating_valid_s_length;
 mod road_object_s_t_coords;
+mod road_object_sizes_plausible;
 mod road_object_skeleton_points_boundary_inside_box;
 mod road_object_skeleton_points_inside_box;
 mod road_object_skeleton_polyline_followed_by_vertex;
@@ -272,6 +274,7 @@ mod road_signal_controller_one_per_light;
 mod road_signal_controller_valid_for_signals;
 mod road_signal_gantry_all_variable_boards_same_gantry;
 mod road_signal_gantry_vmsgroup_at_least_one_reference;
+mod road_signal_no_self_reference;
 mod road_signal_reference_from_lower_equal_to;
 mod road_signal_reference_left_hand_traffic_lane_ids;
 mod road_signal_reference_right_hand_traffic_lane_ids;
@@ -288,6 +291,7 @@ mod road_superelevation_elem_asc_order;
 mod road_type_elem_asc_order;
 mod road_type_only_alpha_2_country_codes;
 mod road_validity_lanes_exist;
+mod words_are_known;
 mod xml_fileheader_is_present;
 mod xml_root_tag_is_opendrive;
 mod xml_valid_schema;
@@ -588,4 +592,8 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_shape_no_step::RULE,
     &road_slope_plausible::RULE,
     &road_speed_plausible::RULE,
+    &attributes_are_given::RULE,
+    &road_object_sizes_plausible::RULE,
+    &road_signal_no_self_reference::RULE,
+    &words_are_known::RULE,
 ];

@@ -1,0 +1,113 @@
+use qcbus_document::{Document, Node};
+use qcbus_opendrive::is_user_data;
+use qcbus_sdk::{Place, Rule, Sink};
+
+use crate::families::ids::{KINDS, Scope};
+use crate::families::object_parts::{listed, named};
+use crate::families::own_schema::OwnSchema;
+
+pub static RULE: Rule<Document> = Rule {
+    id: "check_qcbus_xodr_attributes_are_given",
+    uids: &["qcbus.dev:xodr:1.0.0:attributes.are_given"],
+    after: super::READABLE,
+    page: include_str!("attributes_are_given.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// Elements of a name within another, and what they say nothing without.
+struct Needs {
+    element: &'static str,
+    parents: &'static [&'static str],
+    attributes: &'static [&'static str],
+}
+
+const fn needs(
+    element: &'static str,
+    parents: &'static [&'static str],
+    attributes: &'static [&'static str],
+) -> Needs {
+    Needs {
+        element,
+        parents,
+        attributes,
+    }
+}
+
+const NEEDS: &[Needs] = &[
+    needs("type", &["road"], &["s", "type"]),
+    needs("laneSection", &["lanes"], &["s"]),
+    needs("object", &["objects"], &["s", "t"]),
+    needs("signal", &["signals"], &["s", "t", "orientation"]),
+    needs(
+        "signalReference",
+        &["signals"],
+        &["id", "s", "t", "orientation"],
+    ),
+    needs("objectReference", &["objects"], &["id", "s", "t"]),
+    needs("bridge", &["objects"], &["s", "length"]),
+    needs("tunnel", &["objects"], &["s", "length"]),
+    needs("cornerRoad", &["outline"], &["s", "t"]),
+    needs("cornerLocal", &["outline"], &["u", "v"]),
+    needs("vertexRoad", &["polyline"], &["s", "t"]),
+    needs("vertexLocal", &["polyline"], &["u", "v"]),
+    needs("repeat", &["object"], &["s", "length"]),
+    needs(
+        "validity",
+        &["object", "signal", "signalReference", "objectReference"],
+        &["fromLane", "toLane"],
+    ),
+    needs("laneLink", &["connection"], &["from", "to"]),
+    needs("control", &["controller"], &["signalId"]),
+    needs("dependency", &["signal"], &["id"]),
+    needs("speed", &["type", "lane"], &["max"]),
+];
+
+fn run(document: &Document<'_>, found: &mut Sink<'_>) {
+    let schema = OwnSchema::new(*document);
+    ids(document, &schema, found);
+    for needs in NEEDS {
+        for node in document.elements(needs.element) {
+            check(needs, node, &schema, found);
+        }
+    }
+}
+
+/// What others refer to by an id that is unique in the file, and may have no empty one in any version.
+fn ids(document: &Document<'_>, schema: &OwnSchema<'_>, found: &mut Sink<'_>) {
+    let referred = KINDS.iter().filter(|kind| kind.scope == Scope::File);
+    for kind in referred {
+        for node in kind.nodes(document) {
+            let (fault, place) = match node.attribute("id") {
+                Some(id) if id.value().trim().is_empty() => ("an empty `id`", Place::from(id)),
+                None if !schema.demands(node, "id") => ("no `id`", node.into()),
+                _ => continue,
+            };
+            let text = format!(
+                "this {} has {fault}; it must have one by which others can refer to it",
+                kind.name
+            );
+            found.issue(place, text);
+        }
+    }
+}
+
+fn check(needs: &Needs, node: Node<'_>, schema: &OwnSchema<'_>, found: &mut Sink<'_>) {
+    let lacks = |name: &&str| node.attribute(name).is_none();
+    let mut missing: Vec<&str> = needs.attributes.iter().copied().filter(lacks).collect();
+    let is_there = |parent: Node<'_>| needs.parents.iter().any(|name| parent.is(name));
+    if missing.is_empty() || !node.parent().is_some_and(is_there) || is_user_data(node) {
+        return;
+    }
+    missing.retain(|name| !schema.demands(node, name));
+    if missing.is_empty() {
+        return;
+    }
+    let text = format!(
+        "{} has no {}; it must have {}, without which it says nothing",
+        named(node),
+        listed(&missing),
+        listed(needs.attributes)
+    );
+    found.issue(node, text);
+}

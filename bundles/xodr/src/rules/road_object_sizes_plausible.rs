@@ -1,0 +1,111 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Param, Place, Rule, Sink};
+
+use crate::families::object_parts::{Stands, below, named, number, objects};
+use crate::model::Roads;
+
+const SLENDER: Param = Param::number(
+    "slender",
+    60.0,
+    "m",
+    "greatest size that is believed of a pole, a lamp, a tree, a barrier's height and the like",
+);
+const LARGE: Param = Param::number(
+    "large",
+    1000.0,
+    "m",
+    "greatest size that is believed of a building, and height of anything",
+);
+const SIGNAL: Param = Param::number(
+    "signal",
+    50.0,
+    "m",
+    "greatest width and height that is believed of a signal",
+);
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_object_sizes_plausible",
+    uids: &["qcbus.dev:xodr:1.1.0:road.object.sizes_plausible"],
+    level: Level::Warning,
+    after: super::READABLE,
+    params: &[SLENDER, LARGE, SIGNAL],
+    page: include_str!("road_object_sizes_plausible.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// What is slender in every direction that matters.
+const SLENDER_TYPES: [&str; 6] = [
+    "pole",
+    "tree",
+    "streetLamp",
+    "trafficLight",
+    "trafficSign",
+    "patch",
+];
+/// What stands beside roads and may be kilometres long, but is not high.
+const LOW_TYPES: [&str; 8] = [
+    "barrier",
+    "vegetation",
+    "obstacle",
+    "parkingSpace",
+    "trafficIsland",
+    "railing",
+    "soundBarrier",
+    "crosswalk",
+];
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let (slender, large) = (found.number(&SLENDER), found.number(&LARGE));
+    for object in objects(map) {
+        let kind = object.attr("type").unwrap_or_default();
+        let is = |kinds: &[&str]| kinds.iter().any(|known| known.eq_ignore_ascii_case(kind));
+        let [ground, height] = match kind {
+            _ if is(&SLENDER_TYPES) => [Some(slender), Some(slender)],
+            _ if is(&LOW_TYPES) => [None, Some(slender)],
+            "building" => [Some(large), Some(large)],
+            _ => [None, Some(large)],
+        };
+        // Roads on stilts, tunnels and the like are as long as they are.
+        let limits = [
+            ("height", height),
+            ("radius", ground),
+            ("length", ground),
+            ("width", ground),
+        ];
+        check(map, object, &limits, found);
+    }
+    let most = Some(found.number(&SIGNAL));
+    for signal in below(map, "signal", "signals") {
+        check(map, signal, &[("height", most), ("width", most)], found);
+    }
+}
+
+/// Reports the first size beyond what is believed: one slip of the unit is one fault.
+fn check<'a>(
+    map: &RoadMap<'a>,
+    node: Node<'a>,
+    limits: &[(&'static str, Option<f64>)],
+    found: &mut Sink<'_>,
+) {
+    let mut beyond = limits.iter().filter_map(|(name, limit)| {
+        let size = number(node, name)?;
+        (*limit)
+            .filter(|limit| size > *limit)
+            .map(|limit| (*name, size, limit))
+    });
+    let Some((name, size, limit)) = beyond.next() else {
+        return;
+    };
+    let of = match node.attr("type").filter(|_| node.is("object")) {
+        Some(kind) if !kind.is_empty() => format!("{} of type `{kind}`", named(node)),
+        _ => named(node),
+    };
+    let text = format!(
+        "`{name}` of {of} is {size} m; sizes are in metres, and more than {limit} m is hardly meant"
+    );
+    found
+        .issue(Place::attribute_or_node(node, name), text)
+        .stands(map, node);
+}

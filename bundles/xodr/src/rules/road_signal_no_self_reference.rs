@@ -1,0 +1,54 @@
+use qcbus_document::Node;
+use qcbus_opendrive::RoadMap;
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::families::object_parts::{Stands, below, named};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_signal_no_self_reference",
+    uids: &["qcbus.dev:xodr:1.2.0:road.signal.no_self_reference"],
+    level: Level::Warning,
+    after: super::READABLE,
+    page: include_str!("road_signal_no_self_reference.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for signal in below(map, "signal", "signals") {
+        // What is empty is no id.
+        let Some(id) = signal.attr("id").filter(|id| !id.trim().is_empty()) else {
+            continue;
+        };
+        for dependency in signal.children_named("dependency") {
+            if dependency.attr("id") == Some(id) {
+                say(map, signal, dependency, "id", "depends on", found);
+            }
+        }
+        for reference in signal.children_named("reference") {
+            let to_signal = reference.attr("elementType") == Some("signal");
+            if to_signal && reference.attr("elementId") == Some(id) {
+                say(map, signal, reference, "elementId", "refers to", found);
+            }
+        }
+    }
+}
+
+fn say<'a>(
+    map: &RoadMap<'a>,
+    signal: Node<'a>,
+    node: Node<'a>,
+    attribute: &'static str,
+    does: &str,
+    found: &mut Sink<'_>,
+) {
+    let text = format!(
+        "{} {does} itself; this says nothing, so another signal or object is meant",
+        named(signal)
+    );
+    found
+        .issue(Place::attribute_or_node(node, attribute), text)
+        .at(signal, "the signal")
+        .stands(map, signal);
+}
