@@ -84,6 +84,7 @@ fn date(header: Node<'_>, found: &mut Sink<'_>) {
         .version()
         .is_none_or(|version| version < ISO_DATES_SINCE)
     {
+        no_such_day(header, date, found);
         return;
     }
     let (level, fault) = match (is_iso_8601(date), is_iso_8601(&date.replacen(' ', "T", 1))) {
@@ -106,6 +107,27 @@ fn date(header: Node<'_>, found: &mut Sink<'_>) {
     found
         .issue(Place::attribute_or_node(header, "date"), text)
         .level(level);
+}
+
+/// Before ISO 8601 was asked for, a date has any form. One that looks like it, though, should name a day that
+/// there is.
+fn no_such_day(header: Node<'_>, date: &str, found: &mut Sink<'_>) {
+    let day = date.trim().get(..10).unwrap_or_default();
+    let mut parts = day.split('-');
+    let shape = [4, 2, 2].map(|count| {
+        parts
+            .next()
+            .is_some_and(|part| digits(part, count).is_some())
+    });
+    if shape == [true; 3] && !is_day(day) {
+        let text = format!(
+            "the date `{date}` names the day `{day}`, which there is not in any calendar; \
+             a date is written as year, month and day"
+        );
+        found
+            .issue(Place::attribute_or_node(header, "date"), text)
+            .level(Level::Warning);
+    }
 }
 
 /// `YYYY-MM-DD`, optionally with `Thh:mm`, seconds, a fraction, and `Z` or an offset.

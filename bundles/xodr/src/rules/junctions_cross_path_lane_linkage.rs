@@ -1,5 +1,5 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Param, Rule, Sink};
+use qcbus_opendrive::{Road, RoadMap, Side, Station};
+use qcbus_sdk::{Param, Place, Rule, Sink};
 
 use crate::families::cross_paths::{Crossing, Landing, crossings};
 use crate::families::on_road::OnRoad;
@@ -26,9 +26,64 @@ pub static RULE: Rule<Roads> = Rule {
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     for crossing in crossings(map) {
         for landing in crossing.landings(map) {
-            check(&crossing, &landing, found);
+            if !is_nowhere(&crossing, &landing, found) {
+                check(&crossing, &landing, found);
+            }
         }
     }
+}
+
+/// Says so when a link names a place or a lane that the road does not have.
+fn is_nowhere(
+    crossing: &Crossing<'_, '_>,
+    landing: &Landing<'_, '_>,
+    found: &mut Sink<'_>,
+) -> bool {
+    let (other, s) = (landing.other, landing.s);
+    let Some(length) = other.length().filter(|length| *length > 0.0) else {
+        return false;
+    };
+    let limit = found.number(&TOLERANCE);
+    let node = landing.link.node();
+    let (place, text) = if s < -limit || s > length + limit {
+        let text = format!(
+            "the {} of crossing road `{}` is linked at s = {s} of road `{}`, which goes from s = 0 to s = {length}; it \
+             must reach a lane of that road",
+            landing.end,
+            crossing.road.id(),
+            other.id()
+        );
+        (Place::attribute_or_node(node, "s"), text)
+    } else if !has_lane(other, s.clamp(0.0, length), landing.lane) {
+        let text = format!(
+            "the {} of crossing road `{}` is linked to lane `{}` of road `{}`, which has none of this number at s = {s}; \
+             it must reach a lane of that road",
+            landing.end,
+            crossing.road.id(),
+            landing.lane,
+            other.id()
+        );
+        (Place::attribute_or_node(node, "from"), text)
+    } else {
+        return false;
+    };
+    found
+        .issue(place, text)
+        .at(crossing.road.node(), "the crossing road");
+    true
+}
+
+/// Whether some layer of a road has the lane at s, on either side of a boundary.
+fn has_lane(road: &Road<'_>, s: f64, lane: i64) -> bool {
+    // The centre has no side, and is there everywhere.
+    let Some(side) = Side::of_lane_id(lane) else {
+        return true;
+    };
+    let mut sections = road.layers().iter().flat_map(|layer| {
+        let stations = [Station::at(s), Station::before(s)];
+        stations.map(|station| layer.section_at(road, side, station))
+    });
+    sections.any(|section| section.is_some_and(|section| section.lane(lane).is_some()))
 }
 
 fn check(crossing: &Crossing<'_, '_>, landing: &Landing<'_, '_>, found: &mut Sink<'_>) {

@@ -48,7 +48,10 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                      lie on it",
                     road.id()
                 );
-                found.issue(attribute, text).road(road.id(), s, 0.0);
+                found
+                    .issue(attribute, text)
+                    .in_every_version(Level::Error)
+                    .road(road.id(), s, 0.0);
             }
         }
         if let (Some(start), Some(end)) = (junction.s_start(), junction.s_end())
@@ -60,7 +63,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             );
             found
                 .issue(Place::attribute_or_node(node, "sEnd"), text)
-                .level(Level::Warning);
+                .in_every_version(Level::Error)
+                .at(Place::attribute_or_node(node, "sStart"), "where it starts");
         }
     }
 }

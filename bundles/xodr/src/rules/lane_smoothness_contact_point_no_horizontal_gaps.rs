@@ -1,4 +1,5 @@
-use qcbus_opendrive::{LaneEnd, RoadEnd, RoadMap};
+use qcbus_document::Node;
+use qcbus_opendrive::{LaneEnd, RoadEnd, RoadMap, Station};
 use qcbus_sdk::{Backport, Param, Rule, Sink, Version};
 
 use crate::families::gap_levels::{GAP_BROKEN_FROM, GAP_ERROR_FROM, Misfit};
@@ -82,6 +83,24 @@ fn is_of_roads(map: &RoadMap<'_>, gap: &LaneGap<'_, '_>, found: &Sink<'_>) -> bo
     mouths && apart() >= found.number(&GAP_BROKEN_FROM)
 }
 
+/// The `laneOffset` that jumps where two lane sections of one layer meet.
+fn stepping_offset<'a>(gap: &LaneGap<'_, 'a>, limit: f64) -> Option<Node<'a>> {
+    let [from, to] = [gap.from.at, gap.to.at];
+    if !std::ptr::eq(from.road, to.road) || !std::ptr::eq(from.layer, to.layer) {
+        return None;
+    }
+    let s = from.s()?.max(to.s()?);
+    let offset = from.layer.offset();
+    let step = offset.at(s)? - offset.at(Station::before(s))?;
+    let mut records = offset.records().iter().filter(|record| {
+        let start = record.start();
+        start.is_some_and(|start| (start - s).abs() < 1e-6)
+    });
+    records
+        .find(|_| step.abs() > limit)
+        .map(|record| record.node())
+}
+
 fn road_end(at: LaneEnd) -> RoadEnd {
     RoadEnd {
         road: at.lane.road as usize,
@@ -120,6 +139,9 @@ fn report(map: &RoadMap<'_>, gap: &LaneGap<'_, '_>, found: &mut Sink<'_>) {
         .at(gap.to.node(), "the linked lane");
     for (_, middle) in &gap.edges {
         finding = finding.point(middle.x, middle.y, middle.z);
+    }
+    if let Some(offset) = stepping_offset(gap, limit) {
+        finding = finding.at(offset, "the lane offset jumps here");
     }
     finding = finding.at(gap.joint.node, "the link");
     match place_of(map, &gap.joint, gap.from, gap.to) {

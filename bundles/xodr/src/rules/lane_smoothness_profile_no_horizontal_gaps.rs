@@ -5,6 +5,7 @@ use qcbus_opendrive::{LaneRef, LaneSpan, Profile, RoadMap, SectionRef, Side, Sta
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
 use crate::families::driving::is_drivable;
+use crate::families::gap_levels::GAP_BROKEN_FROM;
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::model::{Part, Roads};
 
@@ -21,7 +22,7 @@ pub static RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.1.0..",
     after: super::READABLE,
-    params: &[GAP],
+    params: &[GAP, GAP_BROKEN_FROM],
     page: include_str!("lane_smoothness_profile_no_horizontal_gaps.md"),
     each: Some(each),
     ..Rule::DEFAULTS
@@ -102,8 +103,14 @@ fn report(lane: LaneRef<'_, '_>, ds: f64, gap: f64, node: Node<'_>, found: &mut 
         node.name(),
         found.number(&GAP)
     );
+    // A step of centimetres is passed over; lanes that go on elsewhere are broken in every version.
+    let level = match gap.abs() >= found.number(&GAP_BROKEN_FROM) {
+        true => Level::Error,
+        false => Level::Warning,
+    };
     found
         .issue(node, text)
+        .level(level)
         .in_lane(lane, ds)
         .at(lane.node(), "the lane");
 }

@@ -42,14 +42,18 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
 }
 
 fn no_center_at_all(road: &Road<'_>, is_new: bool, found: &mut Sink<'_>) {
-    let Some(lanes) = road.layers().first() else {
+    // Where there is but one section, it is the one to be mended.
+    let mut sections = road.sections().map(|section| section.node());
+    let only = sections.next().filter(|_| sections.next().is_none());
+    let lanes = road.layers().first().map(|lanes| lanes.node());
+    let Some(place) = only.or(lanes) else {
         return;
     };
     let text = format!(
         "road `{}` has no center lane in any lane section; each must have one",
         road.id()
     );
-    let finding = found.issue(lanes.node(), text);
+    let finding = found.issue(place, text);
     if is_new {
         finding.uid(CENTER_LANE);
     }

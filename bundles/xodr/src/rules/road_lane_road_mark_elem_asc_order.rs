@@ -21,10 +21,23 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
 }
 
 /// Two lines at one place are solid or broken, unless the file says where beside each other they lie.
-const MARKS: Equal = |before, mark| match contradict(before, mark) {
+const MARKS: Equal = |before, mark| match contradict(before, mark) || is_copy(before, mark) {
     true => Some(Level::Warning),
     false => ascending::PARALLEL(before, mark),
 };
+
+/// A line that is there already, to the last attribute.
+fn is_copy(before: Node<'_>, mark: Node<'_>) -> bool {
+    let plain = |mark: Node<'_>| mark.children().next().is_none();
+    let said = |mark: Node<'_>| mark.attributes().count();
+    let is_line = mark.attr("type").is_some_and(|kind| kind != "none");
+    let mut attributes = mark.attributes();
+    is_line
+        && plain(before)
+        && plain(mark)
+        && said(before) == said(mark)
+        && attributes.all(|one| before.attr(one.name()) == Some(one.value()))
+}
 
 fn contradict(before: Node<'_>, mark: Node<'_>) -> bool {
     let line = |mark: Node<'_>| {

@@ -37,6 +37,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                     within(map, link, found);
                 } else if has(link, "contactPoint") && link.element_type() == Some("road") {
                     superfluous(link, found);
+                } else {
+                    beyond(map, link, found);
                 }
             } else if virtual_links::leads_to_main_road(map, road, link) {
                 at_an_end(map, road, link, found);
@@ -100,8 +102,10 @@ fn beyond(map: &RoadMap<'_>, link: RoadLink<'_>, found: &mut Sink<'_>) {
             "elementS is {s}, but road `{}` goes from s = 0 to s = {length}; the link must lead to a place on it",
             road.id()
         );
+        // A place that there is not, whatever the version.
         found
             .issue(Place::attribute_or_node(link.node(), "elementS"), text)
+            .in_every_version(Level::Error)
             .road(road.id(), s, 0.0);
     }
 }

@@ -2,7 +2,9 @@ use qcbus_document::Node;
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Level, Place, Rule, Sink};
 
-use crate::families::object_parts::{Stands, has_outline, is_by_schema, named, number, objects};
+use crate::families::object_parts::{
+    Stands, has_outline, is_before, is_by_schema, named, number, objects,
+};
 use crate::model::Roads;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -49,8 +51,26 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                 .issue(Place::attribute_or_node(object, name), text)
                 .stands(map, object);
         }
+        for repeat in object.children_named("repeat") {
+            backwards(map, object, repeat, found);
+        }
         flat(map, object, found);
     }
+}
+
+/// A distance between repeated things that is less than none. From 1.6 on the schema says so.
+fn backwards<'a>(map: &RoadMap<'a>, object: Node<'a>, repeat: Node<'a>, found: &mut Sink<'_>) {
+    let distance = number(repeat, "distance").filter(|distance| *distance < 0.0);
+    let Some(distance) = distance.filter(|_| is_before(found, (1, 6))) else {
+        return;
+    };
+    let text = format!(
+        "`distance` of a `repeat` of {} is {distance} m, but must not be negative; 0 stands for one continuous object",
+        named(object)
+    );
+    found
+        .issue(Place::attribute_or_node(repeat, "distance"), text)
+        .stands(map, object);
 }
 
 /// A thing that has an extent on the ground and none above it, or the other way round.

@@ -54,6 +54,14 @@ fn check(road: &Road<'_>, lateral: Node<'_>, found: &mut Sink<'_>) {
                 .road(road.id(), s, t)
                 .at(before, "the one listed before it");
         } else if s <= last_s + tolerance && (t - last_t).abs() <= tolerance {
+            // What says the same twice is wrong by form alone.
+            let level = match ["a", "b", "c", "d"]
+                .iter()
+                .all(|name| shape.f64(name).ok() == before.f64(name).ok())
+            {
+                true => Level::Warning,
+                false => Level::Error,
+            };
             let text = format!(
                 "this `shape` has s = {}, t = {} like the one listed before it, which therefore never \
                  applies; each must have a place of its own",
@@ -62,7 +70,7 @@ fn check(road: &Road<'_>, lateral: Node<'_>, found: &mut Sink<'_>) {
             );
             found
                 .issue(Place::attribute_or_node(shape, "t"), text)
-                .level(Level::Warning)
+                .level(level)
                 .road(road.id(), s, t)
                 .at(before, "the one that never applies");
         }

@@ -1,5 +1,5 @@
 use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Rule, Sink};
+use qcbus_sdk::{Backport, Level, Rule, Sink};
 
 use crate::families::object_parts::{Stands, below, is_blank, listed, named, owner};
 use crate::model::Roads;
@@ -33,6 +33,10 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                 both => format!("{} are", listed(both)),
             }
         );
-        found.issue(node, text).stands(map, owner(node));
+        let finding = found.issue(node, text).stands(map, owner(node));
+        // Without any type it is no sign at all; an empty one is what some tools write for objects of their own.
+        if node.is("signal") && node.attribute("type").is_none() {
+            finding.in_every_version(Level::Error);
+        }
     }
 }

@@ -1,3 +1,4 @@
+use foldhash::HashSet;
 use qcbus_document::Node;
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Level, Param, Place, Rule, Sink};
@@ -30,9 +31,16 @@ const UNITS: [(&str, f64); 3] = [("km/h", 1.0 / 3.6), ("mph", 0.44704), ("m/s", 
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let needs_unit = !is_before(found, (1, 5)) && found.version().is_some();
+    let kinds = if needs_unit {
+        HashSet::default()
+    } else {
+        kinds_with_unit(map)
+    };
     for signal in below(map, "signal", "signals") {
         if needs_unit {
             unit(map, signal, found);
+        } else {
+            unit_like_others(map, signal, &kinds, found);
         }
         value(map, signal, found);
         semantics(map, signal, found);
@@ -82,6 +90,44 @@ fn unit<'a>(map: &RoadMap<'a>, signal: Node<'a>, found: &mut Sink<'_>) {
     if is_limit(signal) {
         finding.level(Level::Error);
     }
+}
+
+/// What tells a sign's kind: country, type and subtype.
+type SignKind<'a> = [&'a str; 3];
+
+fn sign_kind(signal: Node<'_>) -> SignKind<'_> {
+    ["country", "type", "subtype"].map(|name| signal.attr(name).unwrap_or_default())
+}
+
+/// The kinds of signs that have a value with a unit somewhere in the file.
+fn kinds_with_unit<'a>(map: &RoadMap<'a>) -> HashSet<SignKind<'a>> {
+    below(map, "signal", "signals")
+        .filter(|signal| given(*signal).is_some() && !is_blank(*signal, "unit"))
+        .map(sign_kind)
+        .collect()
+}
+
+/// Where a version does not ask for units, a file that writes them for other signs of the kind has lost one.
+fn unit_like_others<'a>(
+    map: &RoadMap<'a>,
+    signal: Node<'a>,
+    kinds: &HashSet<SignKind<'_>>,
+    found: &mut Sink<'_>,
+) {
+    let value = given(signal).filter(|value| *value > 0.0);
+    let is_odd = is_blank(signal, "unit") && kinds.contains(&sign_kind(signal));
+    let Some(value) = value.filter(|_| is_odd) else {
+        return;
+    };
+    let text = format!(
+        "{} has the value {value}, but no `unit`; other signals of its kind in this file have one, and readers guess \
+         what is missing",
+        named(signal)
+    );
+    found
+        .issue(Place::attribute_or_node(signal, "unit"), text)
+        .uid(UNIT)
+        .stands(map, signal);
 }
 
 fn value<'a>(map: &RoadMap<'a>, signal: Node<'a>, found: &mut Sink<'_>) {

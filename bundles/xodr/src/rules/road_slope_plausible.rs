@@ -17,6 +17,12 @@ const BANKING: Param = Param::number(
     "rad",
     "greatest superelevation that is believed",
 );
+const CROSSFALL: Param = Param::number(
+    "crossfall",
+    0.5,
+    "",
+    "steepest crossfall of a strip of road surface that is believed, as rise over run",
+);
 const LENGTH: Param = Param::number(
     "length",
     2.0,
@@ -29,7 +35,7 @@ pub static RULE: Rule<Roads> = Rule {
     uids: &["qcbus.dev:xodr:1.4.0:road.slope_plausible"],
     level: Level::Warning,
     after: super::READABLE,
-    params: &[SLOPE, BANKING, LENGTH],
+    params: &[SLOPE, BANKING, CROSSFALL, LENGTH],
     page: include_str!("road_slope_plausible.md"),
     each: Some(each),
     ..Rule::DEFAULTS
@@ -67,6 +73,32 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             let s = stretch.from + ds;
             found.issue(stretch.record.node(), text).on(road, s, 0.0);
         }
+        crossfall(road, found);
+    }
+}
+
+/// Strips of road surface: how steep they fall to the side where they begin.
+fn crossfall(road: &Road<'_>, found: &mut Sink<'_>) {
+    let Some(surface) = &road.lateral().cross_section_surface else {
+        return;
+    };
+    let most = found.number(&CROSSFALL);
+    for strip in &surface.strips {
+        let [_, linear, ..] = &strip.coefficients;
+        let value = |stretch: &Stretch<'_, '_>, ds: f64| stretch.cubic.value(ds);
+        let Some((stretch, ds, value)) = worst(linear, road, value, most, found) else {
+            continue;
+        };
+        let text = format!(
+            "strip `{}` of road `{}` has a crossfall of {} %; it is written as rise over run (0.025 for 2.5 %), and more \
+             than {:.0} % is hardly meant",
+            strip.id.unwrap_or_default(),
+            road.id(),
+            brief(100.0 * value.abs(), 0),
+            100.0 * most
+        );
+        let s = stretch.from + ds;
+        found.issue(stretch.record.node(), text).on(road, s, 0.0);
     }
 }
 

@@ -1,5 +1,5 @@
 use qcbus_document::Node;
-use qcbus_opendrive::{Road, RoadMap};
+use qcbus_opendrive::{Road, RoadMap, RoadType};
 use qcbus_sdk::{Level, Param, Place, Rule, Sink};
 
 use crate::families::on_road::{OnRoad, lane_name};
@@ -61,7 +61,11 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         for speed in lane.elements("speed") {
             let ds = speed.f64("sOffset").unwrap_or(0.0);
             let kind = lane.at.s().and_then(|s| kind_at(lane.at.road, s + ds));
-            if let Some(text) = judge(speed, kind, found) {
+            let lost = lane
+                .at
+                .s()
+                .and_then(|s| unit_lost(lane.at.road, speed, s + ds));
+            if let Some(text) = judge(speed, kind, found).or(lost) {
                 let text = format!("{text} ({})", lane_name(lane));
                 found
                     .issue(Place::attribute_or_node(speed, "max"), text)
@@ -71,15 +75,35 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
+/// A limit without unit that is, as a number, the road's own limit in another unit: the unit was lost.
+fn unit_lost(road: &Road<'_>, speed: Node<'_>, s: f64) -> Option<String> {
+    let is_blank = speed.attr("unit").is_none_or(|unit| unit.trim().is_empty());
+    let max = speed.f64("max").ok().filter(|max| is_blank && *max > 0.0)?;
+    let mut of_road = record_at(road, s)?.node().children_named("speed");
+    let like = of_road.find(|one| {
+        one.f64("max").is_ok_and(|other| other == max)
+            && matches!(one.attr("unit"), Some("km/h" | "mph"))
+    })?;
+    let unit = like.attr("unit")?;
+    Some(format!(
+        "the speed limit is {max} without `unit`, which makes it m/s ({:.0} km/h); the road's own limit is \
+         {max} {unit}, so the unit was hardly meant to be left out",
+        3.6 * max
+    ))
+}
+
 /// The type of a road at s.
 fn kind_at<'a>(road: &Road<'a>, s: f64) -> Option<&'a str> {
+    record_at(road, s)?.kind()
+}
+
+/// The record of a road's type that holds at s.
+fn record_at<'a>(road: &Road<'a>, s: f64) -> Option<RoadType<'a>> {
     let before = road.types().filter(|record| {
         let start = record.s();
         start.is_some_and(|start| start <= s + 1e-9)
     });
-    before
-        .max_by(|one, other| one.s().unwrap_or(0.0).total_cmp(&other.s().unwrap_or(0.0)))?
-        .kind()
+    before.max_by(|one, other| one.s().unwrap_or(0.0).total_cmp(&other.s().unwrap_or(0.0)))
 }
 
 /// What is odd about a limit on a road of a type. Limits below zero are no limits at all, which is said by
