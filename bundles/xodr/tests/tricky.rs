@@ -31,6 +31,8 @@ mod slight;
 mod stands;
 #[path = "tricky/topology.rs"]
 mod topology;
+#[path = "tricky/words.rs"]
+mod words;
 
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -34,16 +34,11 @@ const fn needs(
     }
 }
 
+/// Places of objects and lane sections and the directions of references have rules of their own.
 const NEEDS: &[Needs] = &[
     needs("type", &["road"], &["s", "type"]),
-    needs("laneSection", &["lanes"], &["s"]),
-    needs("object", &["objects"], &["s", "t"]),
     needs("signal", &["signals"], &["s", "t", "orientation"]),
-    needs(
-        "signalReference",
-        &["signals"],
-        &["id", "s", "t", "orientation"],
-    ),
+    needs("signalReference", &["signals"], &["id", "s", "t"]),
     needs("objectReference", &["objects"], &["id", "s", "t"]),
     needs("bridge", &["objects"], &["s", "length"]),
     needs("tunnel", &["objects"], &["s", "length"]),

@@ -57,7 +57,8 @@ fn check(section: SectionRef<'_, '_>, side: Side, found: &mut Sink<'_>) {
         let [before, after] =
             [Station::before(ds), Station::at(ds)].map(|at| section.spans(side, at));
         if let Some((lane, gap)) = jump(&before, &after, limit) {
-            report(lane, ds, gap, node, found);
+            let whole = moved(&before, &after);
+            report(lane, ds, (gap, whole), node, found);
         }
     }
 }
@@ -93,7 +94,29 @@ fn jump<'m, 'a>(
     })
 }
 
-fn report(lane: LaneRef<'_, '_>, ds: f64, gap: f64, node: Node<'_>, found: &mut Sink<'_>) {
+/// By how much a drivable lane goes on beside itself: what both of its edges jump to the same side. A lane that
+/// only widens at once can be driven on.
+fn moved(before: &[LaneSpan<'_, '_>], after: &[LaneSpan<'_, '_>]) -> f64 {
+    let pairs = before.iter().zip(after);
+    let drivable = pairs.filter(|(one, _)| is_drivable(one.lane));
+    let moves = drivable.map(|(one, next)| {
+        let [inner, outer] = [next.inner - one.inner, next.outer - one.outer];
+        if inner * outer > 0.0 {
+            inner.abs().min(outer.abs())
+        } else {
+            0.0
+        }
+    });
+    moves.fold(0.0, f64::max)
+}
+
+fn report(
+    lane: LaneRef<'_, '_>,
+    ds: f64,
+    (gap, whole): (f64, f64),
+    node: Node<'_>,
+    found: &mut Sink<'_>,
+) {
     let s = lane.at.s().unwrap_or(0.0) + ds;
     let text = format!(
         "an edge of {} jumps sideways by {:.3} m at s = {s}, where this `{}` begins; within a lane section drivable \
@@ -103,8 +126,8 @@ fn report(lane: LaneRef<'_, '_>, ds: f64, gap: f64, node: Node<'_>, found: &mut 
         node.name(),
         found.number(&GAP)
     );
-    // A step of centimetres is passed over; lanes that go on elsewhere are broken in every version.
-    let level = match gap.abs() >= found.number(&GAP_BROKEN_FROM) {
+    // Lanes that widen at once are odd; those that go on elsewhere are broken in every version.
+    let level = match whole >= found.number(&GAP_BROKEN_FROM) {
         true => Level::Error,
         false => Level::Warning,
     };

@@ -17,6 +17,12 @@ const BANKING: Param = Param::number(
     "rad",
     "greatest superelevation that is believed",
 );
+const OVERTURNED: Param = Param::number(
+    "overturned",
+    1.6,
+    "rad",
+    "from this superelevation on a road is upside down, which is an error",
+);
 const CROSSFALL: Param = Param::number(
     "crossfall",
     0.5,
@@ -35,7 +41,7 @@ pub static RULE: Rule<Roads> = Rule {
     uids: &["qcbus.dev:xodr:1.4.0:road.slope_plausible"],
     level: Level::Warning,
     after: super::READABLE,
-    params: &[SLOPE, BANKING, CROSSFALL, LENGTH],
+    params: &[SLOPE, BANKING, OVERTURNED, CROSSFALL, LENGTH],
     page: include_str!("road_slope_plausible.md"),
     each: Some(each),
     ..Rule::DEFAULTS
@@ -70,8 +76,13 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                 brief(value.abs().to_degrees(), 0),
                 most.to_degrees()
             );
+            let level = match value.abs() >= found.number(&OVERTURNED) {
+                true => Level::Error,
+                false => Level::Warning,
+            };
             let s = stretch.from + ds;
-            found.issue(stretch.record.node(), text).on(road, s, 0.0);
+            let finding = found.issue(stretch.record.node(), text).level(level);
+            finding.on(road, s, 0.0);
         }
         crossfall(road, found);
     }

@@ -309,7 +309,7 @@ fn virtual_junctions() {
         (
             "from back to front",
             with(r#"mainRoad="1" sStart="60" sEnd="40" orientation="+""#),
-            &["warning junctions_virtual_only_one_start_end"],
+            &["error junctions_virtual_only_one_start_end"],
         ),
         (
             "beyond the main road",

@@ -173,7 +173,7 @@ fn widths_and_borders() {
         (
             "the lane offset steps",
             offset("1"),
-            &["warning lane_smoothness_profile_no_horizontal_gaps"],
+            &["error lane_smoothness_profile_no_horizontal_gaps"],
         ),
         (
             "the lane offset steps where lanes are renumbered",

@@ -151,7 +151,7 @@ fn marks_at_one_place() {
         (
             "the same twice",
             marks(WIDTH, &(mark("solid", "") + &mark("solid", ""))),
-            &[],
+            &["warning road_lane_road_mark_elem_asc_order"],
         ),
         (
             "none and one",
