@@ -7,6 +7,7 @@ use qcbus_sdk::{Level, Param, Rule, Sink};
 use crate::families::driving::is_drivable;
 use crate::families::gap_levels::GAP_BROKEN_FROM;
 use crate::families::on_road::{OnRoad, lane_name};
+use crate::families::traffic_lanes::is_for_traffic;
 use crate::model::{Part, Roads};
 
 const GAP: Param = Param::number(
@@ -94,12 +95,12 @@ fn jump<'m, 'a>(
     })
 }
 
-/// By how much a drivable lane goes on beside itself: what both of its edges jump to the same side. A lane that
+/// By how much a lane for traffic goes on beside itself: what both of its edges jump to the same side. A lane that
 /// only widens at once can be driven on.
 fn moved(before: &[LaneSpan<'_, '_>], after: &[LaneSpan<'_, '_>]) -> f64 {
     let pairs = before.iter().zip(after);
-    let drivable = pairs.filter(|(one, _)| is_drivable(one.lane));
-    let moves = drivable.map(|(one, next)| {
+    let travelled = pairs.filter(|(one, _)| is_for_traffic(one.lane));
+    let moves = travelled.map(|(one, next)| {
         let [inner, outer] = [next.inner - one.inner, next.outer - one.outer];
         if inner * outer > 0.0 {
             inner.abs().min(outer.abs())
