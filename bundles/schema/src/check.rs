@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use qcbus_document::{Document, FileKind};
 
-use crate::later::{Later, later};
+use crate::later::{Later, is_strange, later};
 use crate::model::Schema;
 use crate::validate::Overlay;
 use crate::versions::{SkipReason, Version, select, version_of};
-use crate::violation::{Code, Limits, Report, Rest, Violation};
+use crate::violation::{Limits, Report, Rest, Violation};
 
 /// A user schema: used instead of the shipped one.
 #[derive(Clone, Debug)]
@@ -198,7 +198,7 @@ fn checked<'a>(
     let is_own = sources.is_empty() && !newer && !report.is_valid();
     let later = version
         .filter(|_| is_own)
-        .and_then(|version| later(document, kind, version));
+        .and_then(|version| later(document, kind, version, &report));
     let Report { violations, rest } = match &later {
         None => report,
         Some(later) if kind == FileKind::Xodr => without(later, report),
@@ -244,12 +244,6 @@ fn without<'a>(later: &Later<'a>, mut report: Report<'a>) -> Report<'a> {
             None => thing.node.name().to_owned(),
         });
     }
-    let is_strange = |code| {
-        matches!(
-            code,
-            Code::UnexpectedElement | Code::UnexpectedAttribute | Code::InvalidValue
-        )
-    };
     report.violations.retain(|one| {
         let name = one.attribute.map(|attribute| attribute.name());
         !is_strange(one.code) || !places.contains(&(one.node.index(), name))

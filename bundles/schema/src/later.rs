@@ -1,13 +1,12 @@
 //! A header that names an older version than the file is written for: what the file uses of later ones.
 
-use std::collections::HashMap;
-
+use foldhash::{HashMap, HashSet};
 use qcbus_document::{Attribute, Document, FileKind, Node};
 
 use crate::defects;
-use crate::typing::{Member, Typing, came_with};
+use crate::typing::{FewTypes, Member, Typing, came_with};
 use crate::versions::{SHIPPED, Version};
-use crate::violation::Code;
+use crate::violation::{Code, Report};
 
 /// What a document uses of versions after the one that its header names.
 #[derive(Clone, Debug)]
@@ -40,24 +39,73 @@ pub struct Thing<'a> {
 /// By the number of the type and what it does not have: the place in the list, when a later version has it.
 type Known<'a> = HashMap<(u32, Member<'a>), Option<usize>>;
 
+/// Which elements may use something of later versions.
+enum Suspects<'a> {
+    All,
+    /// Those of these names.
+    Named(HashSet<&'a str>),
+}
+
+impl<'a> Suspects<'a> {
+    /// `None` when there are none. What a map has of later versions its own version finds fault with; a
+    /// scenario may have expressions where any text is allowed.
+    fn of(kind: FileKind, report: &'a Report<'_>) -> Option<Suspects<'a>> {
+        if kind != FileKind::Xodr {
+            return Some(Suspects::All);
+        }
+        let mut names = HashSet::default();
+        let listed = report.violations.iter();
+        names.extend(
+            listed
+                .filter(|one| is_strange(one.code))
+                .map(|one| one.node.name()),
+        );
+        for rest in report.rest.iter().filter(|rest| is_strange(rest.code)) {
+            let name = rest.subject.split_once("/@").map(|(name, _)| name);
+            names.insert(name.unwrap_or(&rest.subject));
+        }
+        if names.contains(Report::VARIOUS) {
+            return Some(Suspects::All);
+        }
+        (!names.is_empty()).then_some(Suspects::Named(names))
+    }
+
+    fn has(&self, node: Node<'_>) -> bool {
+        match self {
+            Suspects::All => true,
+            Suspects::Named(names) => names.contains(node.name()),
+        }
+    }
+}
+
+/// Whether a violation may be something that a later version has.
+pub(crate) fn is_strange(code: Code) -> bool {
+    matches!(
+        code,
+        Code::UnexpectedElement | Code::UnexpectedAttribute | Code::InvalidValue
+    )
+}
+
 struct Search<'a> {
     document: Document<'a>,
     kind: FileKind,
     version: Version,
     typing: Typing,
-    /// The same document as the later versions type it, once that has been asked for.
-    successors: Option<Vec<(Version, Typing)>>,
+    /// How the later versions type the same document, once that has been asked for.
+    successors: Option<Vec<(Version, FewTypes)>>,
     known: Known<'a>,
     things: Vec<Thing<'a>>,
     count: usize,
 }
 
-/// What a document uses of later versions; `None` when that is nothing.
+/// What a document uses of later versions; `None` when that is nothing. `report` is what its version finds.
 pub(crate) fn later<'a>(
     document: &Document<'a>,
     kind: FileKind,
     version: Version,
+    report: &Report<'a>,
 ) -> Option<Later<'a>> {
+    let suspects = Suspects::of(kind, report)?;
     let root = document.root()?;
     let name = match kind {
         FileKind::Xodr => "header",
@@ -70,11 +118,12 @@ pub(crate) fn later<'a>(
         version,
         typing: Typing::of(document, kind, version)?,
         successors: None,
-        known: Known::new(),
+        known: Known::default(),
         things: Vec::new(),
         count: 0,
     };
-    for node in std::iter::once(root).chain(root.descendants()) {
+    let all = std::iter::once(root).chain(root.descendants());
+    for node in all.filter(|node| suspects.has(*node)) {
         search.look(node);
     }
     let Search {
@@ -189,10 +238,10 @@ impl<'a> Search<'a> {
             let later = SHIPPED.iter().map(|one| (one.kind, one.version));
             let later = later.filter(|(of, later)| *of == kind && *later > version);
             later
-                .filter_map(|(_, later)| Some((later, Typing::of(&document, kind, later)?)))
+                .filter_map(|(_, later)| Some((later, FewTypes::of(&document, kind, later)?)))
                 .collect()
         });
-        let has = |typing: &Typing| match attribute {
+        let has = |typing: &FewTypes| match attribute {
             None => typing.declares(node),
             Some(attribute) => typing.value(attribute).is_some_and(|value| {
                 let word = attribute.value().trim();

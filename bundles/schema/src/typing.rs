@@ -1,8 +1,7 @@
 //! Which types a schema gives the elements and attributes of a document: for rules about values,
 //! which go by type and not by the place of an element.
 
-use std::collections::HashMap;
-
+use foldhash::HashMap;
 use qcbus_document::{Attribute, Document, FileKind, Node};
 
 use crate::model::{ComplexType, Content, Schema, TypeRef};
@@ -30,7 +29,7 @@ impl Typing {
         let declared = schema.root(root.name())?;
         set(&mut types, root, complex(declared.ty));
         // Which type a name stands for depends on the type around it, and files repeat few pairs.
-        let mut known: HashMap<(u32, u16), u32> = HashMap::new();
+        let mut known: HashMap<(u32, u16), u32> = HashMap::default();
         for node in root.descendants() {
             let around = node.parent().map_or(UNKNOWN, |parent| get(&types, parent));
             if around == UNKNOWN {
@@ -52,12 +51,7 @@ impl Typing {
 
     /// The type of an attribute's value; `None` where the schema declares no such attribute.
     pub fn value(&self, attribute: Attribute<'_>) -> Option<ValueType> {
-        let schema = self.schema;
-        let name = schema.names.find(attribute.name())?;
-        let complex = self.complex(attribute.node())?;
-        let declared = complex.attributes.iter().find(|one| one.name == name)?;
-        let simple = schema.simple.get(declared.value as usize)?;
-        Some(ValueType { schema, simple })
+        value_of(self.schema, self.complex(attribute.node())?, attribute)
     }
 
     /// Whether an element must have the attribute.
@@ -83,18 +77,69 @@ impl Typing {
     /// Whether the type of the element around it has this child, be it of a complex type or not.
     pub(crate) fn declares(&self, node: Node<'_>) -> bool {
         let around = node.parent().and_then(|parent| self.complex(parent));
-        let name = self.schema.names.find(node.name());
-        let declared = around.zip(name).map(|(around, name)| {
-            let mut children = around.content.children().iter();
-            children.any(|child| child.name == name)
-        });
-        declared.unwrap_or(false)
+        around.is_some_and(|around| has_child(self.schema, around, node.name()))
     }
 
     fn complex(&self, node: Node<'_>) -> Option<&'static ComplexType> {
         let number = get(&self.types, node);
         self.schema.complex.get(number as usize)
     }
+}
+
+/// The types that one schema gives to a few elements of a document, each found on the way down from the root.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FewTypes {
+    schema: &'static Schema,
+}
+
+impl FewTypes {
+    /// `None` where no schema describes such files, or it has another root.
+    pub(crate) fn of(
+        document: &Document<'_>,
+        kind: FileKind,
+        version: Version,
+    ) -> Option<FewTypes> {
+        let schema = select(kind, version).ok()?.schema;
+        schema.root(document.root()?.name())?;
+        Some(FewTypes { schema })
+    }
+
+    /// As [`Typing::value`].
+    pub(crate) fn value(self, attribute: Attribute<'_>) -> Option<ValueType> {
+        value_of(self.schema, self.complex(attribute.node())?, attribute)
+    }
+
+    /// As [`Typing::declares`].
+    pub(crate) fn declares(self, node: Node<'_>) -> bool {
+        let around = node.parent().and_then(|parent| self.complex(parent));
+        around.is_some_and(|around| has_child(self.schema, around, node.name()))
+    }
+
+    fn complex(self, node: Node<'_>) -> Option<&'static ComplexType> {
+        let mut way: Vec<Node<'_>> = std::iter::once(node).chain(node.ancestors()).collect();
+        let mut number = complex(self.schema.root(way.pop()?.name())?.ty);
+        while let Some(next) = way.pop().filter(|_| number != UNKNOWN) {
+            number = child(self.schema, number, next.name());
+        }
+        self.schema.complex.get(number as usize)
+    }
+}
+
+fn value_of(
+    schema: &'static Schema,
+    complex: &'static ComplexType,
+    attribute: Attribute<'_>,
+) -> Option<ValueType> {
+    let name = schema.names.find(attribute.name())?;
+    let declared = complex.attributes.iter().find(|one| one.name == name)?;
+    let simple = schema.simple.get(declared.value as usize)?;
+    Some(ValueType { schema, simple })
+}
+
+fn has_child(schema: &Schema, around: &ComplexType, name: &str) -> bool {
+    let name = schema.names.find(name);
+    let mut children = around.content.children().iter();
+    name.is_some_and(|name| children.any(|child| child.name == name))
 }
 
 fn get(types: &[u32], node: Node<'_>) -> u32 {

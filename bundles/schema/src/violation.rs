@@ -114,6 +114,9 @@ pub struct Report<'a> {
 }
 
 impl Report<'_> {
+    /// The subject of what is counted together because there are too many kinds of it.
+    pub(crate) const VARIOUS: &'static str = "various";
+
     /// Whether the document is valid.
     pub fn is_valid(&self) -> bool {
         self.violations.is_empty() && self.rest.is_empty()

@@ -89,7 +89,7 @@ impl<'a, 's> Reporter<'a, 's> {
         };
         let tally = self.kinds.entry(key).or_insert_with(|| Tally {
             subject: if crowded {
-                "various".to_owned()
+                Report::VARIOUS.to_owned()
             } else {
                 subject(node, attribute)
             },
