@@ -22,6 +22,8 @@ pub(crate) struct Caches<'a> {
     /// What each road's own links say about its start and its end.
     linked: OnceLock<Vec<[Option<RoadContact<'a>>; 2]>>,
     connections: OnceLock<Vec<(usize, Connection<'a>)>>,
+    /// What each of the connections brings together.
+    connected: OnceLock<Vec<Option<RoadContact<'a>>>>,
     contacts: OnceLock<Vec<RoadContact<'a>>>,
     /// Both ends of every contact, in order, with the contact's place.
     by_end: OnceLock<Vec<(RoadEnd, u32)>>,
@@ -94,14 +96,18 @@ impl<'a> RoadMap<'a> {
 
     /// All connections of all junctions with their junction's place, in document order.
     pub fn connections(&self) -> impl Iterator<Item = (&Junction<'a>, Connection<'a>)> {
-        let all = self.caches.connections.get_or_init(|| {
+        self.all_connections()
+            .iter()
+            .filter_map(|(at, connection)| Some((self.junctions().get(*at)?, *connection)))
+    }
+
+    fn all_connections(&self) -> &[(usize, Connection<'a>)] {
+        self.caches.connections.get_or_init(|| {
             let junctions = self.junctions().iter();
             junctions
                 .flat_map(|junction| junction.connections().map(|one| (junction.index(), one)))
                 .collect()
-        });
-        all.iter()
-            .filter_map(|(at, connection)| Some((self.junctions().get(*at)?, *connection)))
+        })
     }
 
     /// Every statement that two road ends touch: the links of roads to roads by `@contactPoint`,
@@ -155,6 +161,25 @@ impl<'a> RoadMap<'a> {
 
     /// The road ends that a connection of a common or direct junction brings together.
     pub fn connection_contact(
+        &self,
+        junction: &Junction<'a>,
+        connection: Connection<'a>,
+    ) -> Option<RoadContact<'a>> {
+        let all = self.all_connections();
+        let connected = self.caches.connected.get_or_init(|| {
+            let all = self.connections();
+            all.map(|(junction, connection)| self.read_contact(junction, connection))
+                .collect()
+        });
+        // They stand in document order.
+        let place = all.binary_search_by_key(&connection.node(), |(_, one)| one.node());
+        match place.ok().and_then(|place| connected.get(place)) {
+            Some(known) => *known,
+            None => self.read_contact(junction, connection),
+        }
+    }
+
+    fn read_contact(
         &self,
         junction: &Junction<'a>,
         connection: Connection<'a>,

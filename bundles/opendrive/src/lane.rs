@@ -55,6 +55,8 @@ pub struct Lane<'a> {
     id_text: Option<&'a str>,
     kind: Option<&'a str>,
     level: Option<bool>,
+    /// Whether it says anything about the direction of traffic: hardly any does.
+    has_direction: bool,
     link: Option<Node<'a>>,
     /// What it is linked to at its start and at its end.
     linked: [Linked<'a>; 2],
@@ -111,11 +113,16 @@ struct LaneRecords<'a> {
 impl<'a> Lane<'a> {
     pub(crate) fn read(node: Node<'a>, group: LaneGroup, names: &Names) -> Lane<'a> {
         let (mut id_text, mut kind, mut level) = (None, None, None);
+        let mut has_direction = false;
         for attribute in node.attributes() {
             let slot = match attribute.name() {
                 "id" => &mut id_text,
                 "type" => &mut kind,
                 "level" => &mut level,
+                "direction" | "dynamicLaneDirection" => {
+                    has_direction = true;
+                    continue;
+                }
                 _ => continue,
             };
             *slot = slot.or(Some(attribute.value()));
@@ -136,6 +143,7 @@ impl<'a> Lane<'a> {
             id_text,
             kind,
             level: level.map_or(Some(false), parse_flag),
+            has_direction,
             link,
             linked: link.map_or_else(Default::default, |link| Linked::read(link, names)),
             has,
@@ -182,12 +190,13 @@ impl<'a> Lane<'a> {
 
     /// `@direction`: `standard`, `reversed` or `both`.
     pub fn direction(&self) -> Option<&'a str> {
-        self.node.attr("direction")
+        self.has_direction.then(|| self.node.attr("direction"))?
     }
 
     /// `@dynamicLaneDirection`.
     pub fn dynamic_direction(&self) -> Option<bool> {
-        flag(self.node, "dynamicLaneDirection")
+        self.has_direction
+            .then(|| flag(self.node, "dynamicLaneDirection"))?
     }
 
     /// `@advisory`.

@@ -48,7 +48,7 @@ pub use lane::{Lane, LaneGroup, LaneHeight, LaneLink, LaneRecord};
 pub use lane_ref::{Edge, LaneKey, LaneRef};
 pub use lanes::{LaneLayer, LaneSection};
 pub use lateral::{LateralProfile, Shape, ShapeRow};
-pub use map::{RoadMap, Version};
+pub use map::{RoadMap, SignalKey, Version};
 pub use objects::{
     CornerReference, Marking, Object, ObjectBorder, ObjectMaterial, ObjectReference, Repeat,
     Structure, Validity,

@@ -43,6 +43,27 @@ impl std::fmt::Display for Version {
     }
 }
 
+/// A signal with its id and whether it changes.
+#[derive(Debug, Clone, Copy)]
+pub struct SignalKey<'a> {
+    /// The signal.
+    pub signal: Signal<'a>,
+    /// Its `@id`.
+    pub id: Option<&'a str>,
+    /// Its `@dynamic`.
+    pub dynamic: Option<bool>,
+}
+
+impl<'a> SignalKey<'a> {
+    fn of(signal: Signal<'a>) -> SignalKey<'a> {
+        SignalKey {
+            signal,
+            id: signal.id(),
+            dynamic: signal.dynamic(),
+        }
+    }
+}
+
 /// An OpenDRIVE file as roads and junctions, built once and shared by all rules.
 #[derive(Debug)]
 pub struct RoadMap<'a> {
@@ -56,6 +77,7 @@ pub struct RoadMap<'a> {
     object_ids: OnceLock<IdIndex<'a>>,
     signal_ids: OnceLock<IdIndex<'a>>,
     controller_ids: OnceLock<IdIndex<'a>>,
+    signals: OnceLock<Vec<SignalKey<'a>>>,
     pub(crate) caches: crate::joints::Caches<'a>,
 }
 
@@ -88,6 +110,7 @@ impl<'a> RoadMap<'a> {
             object_ids: OnceLock::new(),
             signal_ids: OnceLock::new(),
             controller_ids: OnceLock::new(),
+            signals: OnceLock::new(),
             caches: crate::joints::Caches::default(),
         }
     }
@@ -185,6 +208,14 @@ impl<'a> RoadMap<'a> {
         self.roads
             .iter()
             .flat_map(|road| road.signals().map(move |signal| (road, signal)))
+    }
+
+    /// The signals of all roads with what rules about their controllers ask, in document order; read once.
+    pub fn signal_keys(&self) -> &[SignalKey<'a>] {
+        self.signals.get_or_init(|| {
+            let signals = self.signals();
+            signals.map(|(_, signal)| SignalKey::of(signal)).collect()
+        })
     }
 
     /// The objects with this id, on roads and junctions, in document order.

@@ -29,10 +29,12 @@ impl Parts {
             above: (0..roads + junctions).collect(),
         };
         for road in map.roads() {
-            let links = ContactPoint::BOTH
-                .into_iter()
-                .filter_map(|end| road.link(end));
-            for link in links {
+            for end in ContactPoint::BOTH {
+                if let Some(contact) = map.linked_end(road, end) {
+                    parts.join(road.index(), Some(contact.to.road));
+                    continue;
+                }
+                let Some(link) = road.link(end) else { continue };
                 let linked = link.road_id().and_then(|id| map.road(id));
                 let junction = link.junction_id().and_then(|id| map.junction(id));
                 parts.join(road.index(), linked.map(Road::index));
@@ -41,17 +43,24 @@ impl Parts {
             let junction = road.junction().and_then(|id| map.junction(id));
             parts.join(road.index(), junction.map(|it| roads + it.index()));
         }
+        for (junction, connection) in map.connections() {
+            let at = roads + junction.index();
+            if let Some(contact) = map.connection_contact(junction, connection) {
+                parts.join(at, Some(contact.from.road));
+                parts.join(at, Some(contact.to.road));
+                continue;
+            }
+            for id in [connection.incoming_road(), connection.target_road()] {
+                let road = id.and_then(|id| map.road(id));
+                parts.join(at, road.map(Road::index));
+            }
+        }
         for junction in map.junctions() {
-            let connections = junction.connections();
-            let named = connections.flat_map(|one| [one.incoming_road(), one.target_road()]);
             let crossed = junction.cross_paths();
             let crossed = crossed
                 .flat_map(|one| [one.crossing_road(), one.road_at_start(), one.road_at_end()]);
             let sections = junction.road_sections().map(|one| one.road_id());
-            let named = named
-                .chain(crossed)
-                .chain(sections)
-                .chain([junction.main_road()]);
+            let named = crossed.chain(sections).chain([junction.main_road()]);
             for road in named.flatten().filter_map(|id| map.road(id)) {
                 parts.join(roads + junction.index(), Some(road.index()));
             }

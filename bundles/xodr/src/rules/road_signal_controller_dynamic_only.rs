@@ -1,5 +1,5 @@
-use foldhash::HashMap;
-use qcbus_opendrive::{RoadMap, Signal};
+use foldhash::{HashMap, HashSet};
+use qcbus_opendrive::{RoadMap, SignalKey};
 use qcbus_sdk::{Level, Place, Rule, Sink};
 
 use crate::families::object_parts::named;
@@ -19,12 +19,15 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     if map.controllers().next().is_none() {
         return;
     }
+    let controls = map.controllers().flat_map(|one| one.controls());
+    let switched: HashSet<&str> = controls.filter_map(|one| one.signal_id()).collect();
     // Where an id belongs to several signals, nobody can say which of them is switched.
-    let mut signals: HashMap<&str, Option<Signal<'_>>> = HashMap::default();
-    for (_, signal) in map.signals() {
-        let Some(id) = signal.id() else { continue };
-        let known = signals.entry(id).or_insert(Some(signal));
-        if known.is_some_and(|known| known.node() != signal.node()) {
+    let mut signals: HashMap<&str, Option<&SignalKey<'_>>> = HashMap::default();
+    for key in map.signal_keys() {
+        let id = key.id.filter(|id| switched.contains(id));
+        let Some(id) = id else { continue };
+        let known = signals.entry(id).or_insert(Some(key));
+        if known.is_some_and(|known| known.signal != key.signal) {
             *known = None;
         }
     }
@@ -33,9 +36,10 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             let signal = control
                 .signal_id()
                 .and_then(|id| signals.get(id).copied().flatten());
-            let Some(signal) = signal.filter(|signal| signal.dynamic() == Some(false)) else {
+            let Some(key) = signal.filter(|key| key.dynamic == Some(false)) else {
                 continue;
             };
+            let signal = key.signal;
             let text = format!(
                 "{} switches {} of type `{}`, whose `dynamic` is `no`; only signals that change should be switched",
                 named(controller.node()),

@@ -91,9 +91,10 @@ fn by_none(
     found: &mut Sink<'_>,
 ) {
     let lights: Vec<Signal<'_>> = map
-        .signals()
-        .map(|(_, signal)| signal)
-        .filter(|signal| signal.dynamic() == Some(true))
+        .signal_keys()
+        .iter()
+        .filter(|key| key.dynamic == Some(true))
+        .map(|key| key.signal)
         .collect();
     let is_switched = |signal: &Signal<'_>| signal.id().is_some_and(|id| switched.contains_key(id));
     let depends = dependents(&lights);
