@@ -21,8 +21,12 @@ pub(crate) fn below<'a>(
     let all = map.root().map(|root| root.document().elements(name));
     all.into_iter()
         .flatten()
-        .filter(move |node| node.parent().is_some_and(|above| above.is(parent)))
-        .filter(|node| !is_user_data(*node))
+        .filter(move |node| stands_below(*node, parent))
+}
+
+/// Whether an element lies directly within one of this name, outside of user data.
+pub(crate) fn stands_below(node: Node<'_>, parent: &str) -> bool {
+    node.parent().is_some_and(|above| above.is(parent)) && !is_user_data(node)
 }
 
 /// The outlines of an object: within `<outlines>`, or directly within it as before 1.5.

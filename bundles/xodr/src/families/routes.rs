@@ -53,8 +53,12 @@ pub(crate) fn routes_at<'m, 'a>(
     end: ContactPoint,
     narrow: f64,
 ) -> impl Iterator<Item = LaneRef<'m, 'a>> {
-    let wide = move |lane: &LaneRef<'_, '_>| lane.width_at(end).is_some_and(|it| it >= narrow);
     lanes_at(road, end)
         .filter(|lane| is_route(*lane))
-        .filter(wide)
+        .filter(move |lane| is_wide(*lane, end, narrow))
+}
+
+/// Whether a lane is that wide at an end of its section.
+pub(crate) fn is_wide(lane: LaneRef<'_, '_>, end: ContactPoint, narrow: f64) -> bool {
+    lane.width_at(end).is_some_and(|it| it >= narrow)
 }

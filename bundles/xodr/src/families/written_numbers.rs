@@ -113,6 +113,12 @@ pub(crate) enum Measure {
 }
 
 impl Measure {
+    /// Whether an attribute of this name is a number on any element.
+    pub(crate) fn is_of_some(attribute: &str) -> bool {
+        let mut measures = MEASURES.iter();
+        measures.any(|(_, names)| names.contains(&attribute))
+    }
+
     /// What an attribute of an element measures; `None` when it is no number to be looked at here.
     pub(crate) fn of(element: &str, attribute: &str) -> Option<Measure> {
         // Numbers of the header are looked at with its other attributes.
@@ -181,9 +187,20 @@ pub(crate) fn is_suspicious(text: &str) -> bool {
 /// ten, without reading it.
 fn is_large(bytes: &[u8]) -> bool {
     const DIGITS: usize = 8;
+    // A power of ten ends within as many bytes; most that are positive are `e+00`, as C prints them.
+    let tail = bytes.get(bytes.len().saturating_sub(DIGITS)..);
+    let has_power = |tail: &[u8]| {
+        let mut ends = tail.iter();
+        ends.any(|byte| matches!(byte, b'e' | b'E' | b' ' | b'\t' | b'\n' | b'\r'))
+    };
+    if bytes.len() < DIGITS && !has_power(bytes) {
+        return false;
+    }
+    let powerless = bytes.ends_with(b"e+00") || !tail.is_some_and(has_power);
     let digits = bytes.iter().take(DIGITS);
     let before = digits.take_while(|byte| byte.is_ascii_digit()).count();
-    before + power_of_ten(bytes) >= DIGITS
+    let power = if powerless { 0 } else { power_of_ten(bytes) };
+    before + power >= DIGITS
 }
 
 /// The power of ten that ends a number, if it is positive; most numbers end in `e+00`, `e-03` or in none.

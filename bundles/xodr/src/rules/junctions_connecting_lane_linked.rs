@@ -1,3 +1,5 @@
+use std::cell::LazyCell;
+
 use foldhash::HashSet;
 use qcbus_opendrive::{
     ContactPoint, JunctionType, LaneEnd, LaneRef, Road, RoadEnd, RoadMap, Traffic,
@@ -5,7 +7,7 @@ use qcbus_opendrive::{
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::families::routes::{NARROW, routes_at};
+use crate::families::routes::{NARROW, is_route, is_wide, lanes_at, routes_at};
 use crate::model::Roads;
 
 const NEAR: Param = Param::number(
@@ -28,8 +30,13 @@ pub static RULE: Rule<Roads> = Rule {
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let mut seen = HashSet::default();
-    let joints = map.junction_joints().iter();
-    let taken: HashSet<LaneEnd> = joints.flat_map(|joint| [joint.from, joint.to]).collect();
+    // Nearly all lanes say themselves where they lead.
+    let taken = LazyCell::new(|| {
+        let joints = map.junction_joints().iter();
+        joints
+            .flat_map(|joint| [joint.from, joint.to])
+            .collect::<HashSet<LaneEnd>>()
+    });
     for (junction, connection) in map.connections() {
         if junction.kind() != Some(JunctionType::Common) || connection.is_virtual() {
             continue;
@@ -46,9 +53,12 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
+/// The lane ends that lane links of junctions name.
+type Taken<F> = LazyCell<HashSet<LaneEnd>, F>;
+
 fn check(
     map: &RoadMap<'_>,
-    taken: &HashSet<LaneEnd>,
+    taken: &Taken<impl FnOnce() -> HashSet<LaneEnd>>,
     (road, end): (&Road<'_>, ContactPoint),
     there: RoadEnd,
     found: &mut Sink<'_>,
@@ -59,9 +69,10 @@ fn check(
             lane: lane.key(),
             end,
         };
-        lane.links(end).next().is_none() && !taken.contains(&at)
+        is_route(*lane) && is_wide(*lane, end, narrow) && !taken.contains(&at)
     };
-    let mut open = routes_at(road, end, narrow).filter(open).peekable();
+    let ending = lanes_at(road, end).filter(|lane| lane.links(end).next().is_none());
+    let mut open = ending.filter(open).peekable();
     let Some(other) = map.road_at(there.road).filter(|_| open.peek().is_some()) else {
         return;
     };

@@ -4,7 +4,7 @@ use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::connection_links::{Bundle, bundles};
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::families::routes::{NARROW, routes_at};
+use crate::families::routes::{NARROW, is_route, is_wide, lanes_at};
 use crate::model::Roads;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -38,15 +38,22 @@ fn contradicted(
     let lane = map
         .lane_at_road_end(bundle.to, to, LayerKind::Permanent)
         .and_then(|at| map.lane(at.lane));
+    let Some(lane) = lane.filter(|_| from != 0) else {
+        return;
+    };
+    let Some(first) = named(lane, end)
+        .next()
+        .filter(|_| named(lane, end).all(|own| own != from))
+    else {
+        return;
+    };
     // A lane that does not exist, or the center lane, is wrong anyway.
-    let other = map.lane_at_road_end(bundle.from, from, LayerKind::Permanent);
-    let Some(lane) = lane.filter(|_| from != 0 && other.is_some()) else {
+    if map
+        .lane_at_road_end(bundle.from, from, LayerKind::Permanent)
+        .is_none()
+    {
         return;
-    };
-    let own: Vec<i64> = named(lane, end).collect();
-    let (Some(first), false) = (own.first(), own.contains(&from)) else {
-        return;
-    };
+    }
     let incoming = map.road_at(bundle.from.road).map_or("", |road| road.id());
     let text = format!(
         "the lane link leads from lane `{from}` of road `{incoming}` to {}, but that lane names lane `{first}` as its \
@@ -72,22 +79,21 @@ fn left_out(map: &RoadMap<'_>, bundle: &Bundle<'_>, found: &mut Sink<'_>) {
         return;
     };
     // A lane link that leads to no lane is the one that is missing.
-    let exists = |id| {
-        map.lane_at_road_end(bundle.to, id, LayerKind::Permanent)
-            .is_some()
+    let exists = |(_, id, _): &(i64, i64, Node<'_>)| {
+        let lane = map.lane_at_road_end(bundle.to, *id, LayerKind::Permanent);
+        *id != 0 && lane.is_some()
     };
-    if !bundle
-        .links
-        .iter()
-        .all(|(_, to, _)| *to != 0 && exists(*to))
-    {
-        return;
-    }
-    for lane in routes_at(road, end, found.number(&NARROW)) {
+    for lane in lanes_at(road, end) {
         let id = lane.id().unwrap_or(0);
-        let enters = Traffic::of(lane) == Traffic::Towards(end.other());
-        if !enters || bundle.links.iter().any(|(_, to, _)| *to == id) {
+        if bundle.links.iter().any(|(_, to, _)| *to == id)
+            || !is_route(lane)
+            || Traffic::of(lane) != Traffic::Towards(end.other())
+            || !is_wide(lane, end, found.number(&NARROW))
+        {
             continue;
+        }
+        if !bundle.links.iter().all(exists) {
+            return;
         }
         // Without any lane links, lanes of the same number are linked.
         let by_number = bundle.links.is_empty();

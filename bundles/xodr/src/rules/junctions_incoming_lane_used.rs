@@ -43,8 +43,6 @@ struct Used<'a> {
     lanes: HashSet<LaneEnd>,
     /// Junctions and the incoming roads of which a connection takes up all lanes, because it has no lane links.
     whole: HashSet<(usize, &'a str)>,
-    /// Junctions and the roads that they lead from or to.
-    roads: HashSet<(usize, usize)>,
 }
 
 impl<'a> Used<'a> {
@@ -52,14 +50,20 @@ impl<'a> Used<'a> {
         let mut used = Used {
             lanes: HashSet::default(),
             whole: HashSet::default(),
-            roads: HashSet::default(),
         };
-        for joint in map.junction_joints() {
-            used.lanes.extend([joint.from, joint.to]);
-        }
+        // Of the roads of junctions nobody asks.
+        let roads = map.roads().iter();
+        let outside: Vec<bool> = roads.map(|road| road.junction().is_none()).collect();
+        let is_outside = |end: &LaneEnd| {
+            let road = outside.get(end.lane.road as usize);
+            road.copied().unwrap_or(false)
+        };
+        let joints = map.junction_joints().iter();
+        let ends = joints.flat_map(|joint| [joint.from, joint.to]);
+        used.lanes.extend(ends.filter(is_outside));
         for road in map.roads().iter().filter(|road| road.junction().is_some()) {
-            used.lanes
-                .extend(map.joints_of(road).iter().map(|one| one.to));
+            let ends = map.joints_of(road).iter().map(|one| one.to);
+            used.lanes.extend(ends.filter(is_outside));
         }
         for (junction, connection) in map.connections() {
             let Some(id) = connection.incoming_road() else {
@@ -68,8 +72,6 @@ impl<'a> Used<'a> {
             if connection.lane_links().next().is_none() {
                 used.whole.insert((junction.index(), id));
             }
-            let road = map.road(id).map(|road| (junction.index(), road.index()));
-            used.roads.extend(road);
         }
         used
     }

@@ -42,8 +42,9 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let attributes = std::iter::once(root)
         .chain(root.descendants())
         .flat_map(|node| node.attributes());
+    let mut measured = Measured::default();
     let mut odd: Vec<Odd<'_>> = attributes
-        .filter(|attribute| is_suspicious(attribute.value()))
+        .filter(|attribute| measured.has(*attribute) && is_suspicious(attribute.value()))
         .filter_map(|attribute| Odd::of(attribute, attribute.value(), found))
         .collect();
     odd.extend(of_grids(map, found));
@@ -60,6 +61,23 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         if !refused.contains(&one.attribute.offset()) {
             found.issue(one.attribute, one.text).level(one.level);
         }
+    }
+}
+
+/// Which names of attributes stand for numbers, by the number of the name: each is looked up once.
+#[derive(Default)]
+struct Measured(Vec<Option<bool>>);
+
+impl Measured {
+    fn has(&mut self, attribute: Attribute<'_>) -> bool {
+        let place = usize::from(attribute.name_number());
+        if self.0.len() <= place {
+            self.0.resize(place + 1, None);
+        }
+        let known = self.0.get_mut(place);
+        known.is_some_and(|known| {
+            *known.get_or_insert_with(|| Measure::is_of_some(attribute.name()))
+        })
     }
 }
 

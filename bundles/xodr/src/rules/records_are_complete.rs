@@ -73,6 +73,12 @@ fn of_profile(road: &Road<'_>, profile: &Profile<'_>, found: &mut Sink<'_>) {
 }
 
 fn check(road: &Road<'_>, node: Node<'_>, names: &[&str], found: &mut Sink<'_>) {
+    // Nearly all are written in the order of the standard.
+    let mut written = node.attributes();
+    let in_order = |name: &&str| written.next().is_some_and(|attribute| attribute.is(name));
+    if names.iter().all(in_order) {
+        return;
+    }
     let missing: Vec<String> = names
         .iter()
         .filter(|name| node.attribute(name).is_none())

@@ -177,7 +177,12 @@ fn fold_at<'m, 'a>(
     start: f64,
     ds: f64,
 ) -> Option<Fold<'m, 'a>> {
-    let curvature = placed.pose(ds)?.curvature;
+    let curvature = match placed.curve {
+        // Their places take longer than all the rest.
+        Curve::Arc { curvature } => curvature,
+        Curve::Spiral(spiral) => spiral.curvature(ds),
+        _ => placed.pose(ds)?.curvature,
+    };
     let radius = 1.0 / curvature.abs();
     if radius.is_nan() || radius > WIDE {
         return None;
@@ -197,7 +202,8 @@ fn fold_at<'m, 'a>(
     let span = outermost.last()?;
     let t = span.outer;
     let is_beyond = t * side.sign() > radius;
-    is_beyond.then_some(Fold {
+    let is_there = is_beyond && placed.pose(ds).is_some();
+    is_there.then_some(Fold {
         lane: span.lane,
         s,
         t,

@@ -28,7 +28,10 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let mut told = HashSet::default();
     for joint in map.roads().iter().flat_map(|road| map.joints_of(road)) {
         let lanes = map.lane(joint.from.lane).zip(map.lane(joint.to.lane));
-        let Some((from, to)) = lanes.filter(|(from, to)| is_route(*from) && is_route(*to)) else {
+        let are_routes = |(from, to): &(LaneRef<'_, '_>, LaneRef<'_, '_>)| {
+            is_route(*from) && (from.kind() == to.kind() || is_route(*to))
+        };
+        let Some((from, to)) = lanes.filter(are_routes) else {
             continue;
         };
         let Some(collide) = against(joint, from, to) else {

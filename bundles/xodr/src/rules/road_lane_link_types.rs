@@ -25,7 +25,9 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let mut told = HashSet::default();
     for joint in map.lane_joints() {
         let lanes = map.lane(joint.from.lane).zip(map.lane(joint.to.lane));
-        let Some((from, to)) = lanes else { continue };
+        let Some((from, to)) = lanes.filter(|(from, to)| from.kind() != to.kind()) else {
+            continue;
+        };
         let clash = (is_route(from) && is_for_others(to)) || (is_route(to) && is_for_others(from));
         if !clash || !is_wide(joint, from, to, found.number(&NARROW)) {
             continue;

@@ -49,12 +49,11 @@ const FIXED: [&str; 5] = ["pole", "tree", "vegetation", "streetLamp", "building"
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     for road in map.part(part).roads() {
-        for thing in things(road).filter(|thing| stands_itself(*thing)) {
-            if thing.attr("type") == Some("parkingSpace") {
+        for thing in things(road) {
+            let kind = thing.attr("type");
+            if kind == Some("parkingSpace") {
                 parking(road, thing, found);
-            } else if thing.is("object")
-                && thing.attr("type").is_some_and(|kind| FIXED.contains(&kind))
-            {
+            } else if thing.is("object") && kind.is_some_and(|kind| FIXED.contains(&kind)) {
                 object(road, thing, found);
             } else if thing.is("signal") {
                 sign(road, thing, found);
@@ -100,18 +99,18 @@ fn parking(road: &Road<'_>, node: Node<'_>, found: &mut Sink<'_>) {
 /// A sign on a post of its own, not one that hangs over the lane, is painted on it or shares the place of
 /// the reference line, where signs are put that stand nowhere.
 fn sign(road: &Road<'_>, node: Node<'_>, found: &mut Sink<'_>) {
-    let is_static = node.attr("dynamic") == Some("no");
+    let is_static = || node.attr("dynamic") == Some("no");
     let height = number(node, "zOffset").unwrap_or(0.0);
     let on_post = (1.0..=3.0).contains(&height);
-    let anywhere = number(node, "t").is_some_and(|t| t.abs() < 1e-6);
-    if is_static && on_post && !anywhere {
+    let anywhere = || number(node, "t").is_some_and(|t| t.abs() < 1e-6);
+    if on_post && is_static() && !anywhere() {
         report(road, node, "should stand beside it", found);
     }
 }
 
 fn report(road: &Road<'_>, node: Node<'_>, should: &str, found: &mut Sink<'_>) {
     let depth = found.number(&DEPTH);
-    let Some(origin) = place(node, road) else {
+    let Some(origin) = place(node, road).filter(|_| stands_itself(node)) else {
         return;
     };
     let on_road = |s: f64| {

@@ -62,7 +62,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let near_signals = NearRoads::new(found.number(&FAR_SIGNAL));
     let near_objects = NearRoads::new(found.number(&FAR_OBJECT));
     for road in map.roads() {
-        for thing in things(road).filter(|thing| stands_itself(*thing)) {
+        for thing in things(road) {
             if thing.is("signal") {
                 beside_all(map, road, thing, &near_signals, found);
             } else {
@@ -88,11 +88,14 @@ fn beside_all(
     } else {
         (found.number(&FAR_OBJECT), "an object")
     };
-    let Some((s, t)) = place(thing, road).filter(|(_, t)| t.abs() > far) else {
+    if number(thing, "t").is_none_or(|t| t.abs() <= far) {
+        return;
+    }
+    let Some((s, t)) = place(thing, road) else {
         return;
     };
     let distance = beside(road, s, t);
-    if distance <= far || near.any(map, road, s, t) != Some(false) {
+    if distance <= far || !stands_itself(thing) || near.any(map, road, s, t) != Some(false) {
         return;
     }
     let text = format!(
@@ -131,7 +134,7 @@ fn above_or_below(road: &Road<'_>, thing: Node<'_>, [up, across]: [&str; 2], fou
     } else {
         ("below", deep)
     };
-    if z.abs() <= limit + ground {
+    if z.abs() <= limit + ground || !(thing.is("repeat") || stands_itself(thing)) {
         return;
     }
     let name = if thing.is("repeat") {

@@ -1,6 +1,6 @@
 use foldhash::HashMap;
 use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
+use qcbus_opendrive::{Road, RoadMap};
 use qcbus_sdk::{Level, Param, Place, Rule, Sink};
 
 use crate::families::object_parts::{named, number};
@@ -28,7 +28,7 @@ const NEAR: Param = Param::number(
 
 /// What tells two signals or objects of one place apart.
 const WORDS: [&str; 6] = ["type", "subtype", "name", "orientation", "value", "text"];
-const NUMBERS: [&str; 5] = ["s", "t", "zOffset", "hOffset", "hdg"];
+const NUMBERS: [&str; 3] = ["zOffset", "hOffset", "hdg"];
 /// What an object or signal consists of or holds for; those that have one of these may share a place.
 const PARTS: [&str; 9] = [
     "repeat",
@@ -42,43 +42,60 @@ const PARTS: [&str; 9] = [
     "positionInertial",
 ];
 
-/// The element's name, its words, and its numbers as places in the grid.
-type Key<'a> = (&'a str, [Option<&'a str>; 6], [i64; 5]);
+/// The element's name, its words, and its numbers beside s and t as places in the grid.
+type Key<'a> = (&'a str, [Option<&'a str>; 6], [i64; 3]);
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let grid = found.number(&NEAR).max(1e-9);
     for road in map.part(part).roads() {
-        let mut seen: HashMap<Key<'_>, Node<'_>> = HashMap::default();
-        for thing in things(road) {
-            let Some((s, t)) = place(thing, road) else {
-                continue;
-            };
-            if PARTS.iter().any(|part| thing.child(part).is_some()) {
-                continue;
-            }
-            let cell = |name: &str| (number(thing, name).unwrap_or(0.0) / grid).round() as i64;
-            let key = (
-                thing.name(),
-                WORDS.map(|name| thing.attr(name).filter(|text| !text.is_empty())),
-                NUMBERS.map(cell),
-            );
-            let Some(first) = seen.get(&key).copied() else {
-                seen.insert(key, thing);
-                continue;
-            };
-            // Two of one id are a matter of their ids.
-            if first.attr("id") == thing.attr("id") {
-                continue;
-            }
-            let text = format!(
-                "{} stands where {} stands already, and is of the same kind; one of them should go",
-                named(thing),
-                named(first)
-            );
-            found
-                .issue(Place::attribute_or_node(thing, "id"), text)
-                .on(road, s, t)
-                .at(first, "the one before it");
+        let cell = |value: f64| (value / grid).round() as i64;
+        let mut stands: Vec<Stand<'_>> = things(road)
+            .filter_map(|thing| {
+                let (s, t) = place(thing, road)?;
+                Some((cell(s), cell(t), thing, s, t))
+            })
+            .collect();
+        stands.sort_unstable_by_key(|(s, t, thing, ..)| (*s, *t, thing.index()));
+        // Nearly everything stands alone, so that nobody needs to know what it is.
+        let together = stands.chunk_by(|one, other| (one.0, one.1) == (other.0, other.1));
+        for group in together.filter(|group| group.len() > 1) {
+            twins(road, group, grid, found);
         }
+    }
+}
+
+/// Where a thing stands in the grid, what it is, its s and t.
+type Stand<'a> = (i64, i64, Node<'a>, f64, f64);
+
+/// Reports what is twice among things of one place.
+fn twins(road: &Road<'_>, group: &[Stand<'_>], grid: f64, found: &mut Sink<'_>) {
+    let mut seen: HashMap<Key<'_>, Node<'_>> = HashMap::default();
+    for (_, _, thing, s, t) in group.iter().copied() {
+        if PARTS.iter().any(|part| thing.child(part).is_some()) {
+            continue;
+        }
+        let cell = |name: &str| (number(thing, name).unwrap_or(0.0) / grid).round() as i64;
+        let key = (
+            thing.name(),
+            WORDS.map(|name| thing.attr(name).filter(|text| !text.is_empty())),
+            NUMBERS.map(cell),
+        );
+        let Some(first) = seen.get(&key).copied() else {
+            seen.insert(key, thing);
+            continue;
+        };
+        // Two of one id are a matter of their ids.
+        if first.attr("id") == thing.attr("id") {
+            continue;
+        }
+        let text = format!(
+            "{} stands where {} stands already, and is of the same kind; one of them should go",
+            named(thing),
+            named(first)
+        );
+        found
+            .issue(Place::attribute_or_node(thing, "id"), text)
+            .on(road, s, t)
+            .at(first, "the one before it");
     }
 }

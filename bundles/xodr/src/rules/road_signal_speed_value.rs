@@ -3,7 +3,7 @@ use qcbus_document::Node;
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Level, Param, Place, Rule, Sink};
 
-use crate::families::object_parts::{Stands, below, is_before, is_blank, named, number};
+use crate::families::object_parts::{Stands, is_before, is_blank, named, number, stands_below};
 use crate::model::Roads;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -36,7 +36,12 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     } else {
         kinds_with_unit(map)
     };
-    for signal in below(map, "signal", "signals") {
+    let signals = map.root().map(|root| root.document().elements("signal"));
+    let speaking = signals
+        .into_iter()
+        .flatten()
+        .filter(|signal| speaks(*signal));
+    for signal in speaking.filter(|signal| stands_below(*signal, "signals")) {
         if needs_unit {
             unit(map, signal, found);
         } else {
@@ -47,6 +52,11 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
+/// Whether there is anything to say about a signal, which there is about few.
+fn speaks(signal: Node<'_>) -> bool {
+    given(signal).is_some() || is_limit(signal)
+}
+
 /// The value of a signal; -1 stands for none in most files.
 fn given(signal: Node<'_>) -> Option<f64> {
     number(signal, "value").filter(|value| *value != -1.0)
@@ -54,10 +64,12 @@ fn given(signal: Node<'_>) -> Option<f64> {
 
 /// The types of maximum speed whose value follows from nothing else.
 fn is_limit(signal: Node<'_>) -> bool {
-    let country = signal.attr("country").unwrap_or_default();
     let german = ["opendrive", "de", "deu", "germany"];
-    let is_german = german.iter().any(|name| country.eq_ignore_ascii_case(name));
-    (is_german && signal.attr("type") == Some("274")) || signal_speeds(signal).next().is_some()
+    let is_german = || {
+        let country = signal.attr("country").unwrap_or_default();
+        german.iter().any(|name| country.eq_ignore_ascii_case(name))
+    };
+    (signal.attr("type") == Some("274") && is_german()) || signal_speeds(signal).next().is_some()
 }
 
 fn signal_speeds(signal: Node<'_>) -> impl Iterator<Item = Node<'_>> {
