@@ -67,8 +67,19 @@ fn check<'a>(map: &RoadMap<'a>, road: &Road<'a>, end: ContactPoint, found: &mut 
         (false, _) => format!("{step:.3} m above or below"),
         (true, true) => format!("{gap:.3} m away from, and {step:.3} m above or below,"),
     };
+    let meant = place(linked, other.other()).map(|meant| here.plan().distance(meant.plan()));
+    let meant = match meant {
+        Some(meant) if meant <= limit => {
+            format!(
+                " (the {} of road `{}` lies there)",
+                other.other(),
+                linked.id()
+            )
+        }
+        _ => String::new(),
+    };
     let text = format!(
-        "the {end} of road `{}` lies {distance} the {other} of road `{}`, its {}; reference lines of \
+        "the {end} of road `{}` lies {distance} the {other} of road `{}`, its {}{meant}; reference lines of \
          linked roads must meet within {limit} m",
         road.id(),
         linked.id(),
@@ -83,7 +94,8 @@ fn check<'a>(map: &RoadMap<'a>, road: &Road<'a>, end: ContactPoint, found: &mut 
 }
 
 /// Reference lines that lie beside each other have lanes that may meet all the same: they do not where the
-/// mouths of the roads lie apart.
+/// mouths of the roads lie apart. Where the mouths lie apart but the reference lines hardly do, it is
+/// `road.linkage.ends_meet` that speaks of the mouths.
 fn misfit(
     (road, end): (&Road<'_>, ContactPoint),
     (linked, other): (&Road<'_>, ContactPoint),
@@ -92,7 +104,7 @@ fn misfit(
 ) -> Misfit {
     let mouths = Mouth::of(road, end).zip(Mouth::of(linked, other));
     let whole = mouths.map_or(gap, |(here, there)| here.distance(there));
-    Misfit::gap(gap, whole, found).max(Misfit::step(step, found))
+    Misfit::gap(gap, whole.min(gap), found).max(Misfit::step(step, found))
 }
 
 fn place(road: &Road<'_>, end: ContactPoint) -> Option<Point3> {

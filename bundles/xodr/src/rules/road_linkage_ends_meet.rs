@@ -47,7 +47,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         by_junction: OnceCell::new(),
     };
     let contradicted = found.version() >= Some(Version::new(1, 7));
-    for contact in contacts(map, contradicted) {
+    let broken = found.number(&GAP_BROKEN_FROM);
+    for contact in contacts(map, contradicted, broken) {
         let (one, other) = (contact.from, contact.to);
         if told.insert((one.min(other), one.max(other))) {
             check(map, &contact, &arms, found);
@@ -68,30 +69,43 @@ fn junction_of(map: &RoadMap<'_>, at: RoadEnd) -> Option<usize> {
     Some(map.junction(id)?.index())
 }
 
-/// What links of roads and connections of junctions say to meet, as far as a junction has a part in it. Of
-/// roads outside of junctions `road.geometry.contact_point` speaks; connections that the links contradict are
-/// left out if they are `contradicted` by a rule of their own.
-fn contacts<'a>(map: &RoadMap<'a>, contradicted: bool) -> impl Iterator<Item = RoadContact<'a>> {
+/// What links of roads and connections of junctions say to meet. Of reference lines outside of junctions that do
+/// not, by `broken` metres or more, `road.geometry.contact_point` speaks; connections that the links contradict
+/// are left out if they are `contradicted` by a rule of their own.
+fn contacts<'a>(
+    map: &RoadMap<'a>,
+    contradicted: bool,
+    broken: f64,
+) -> impl Iterator<Item = RoadContact<'a>> {
     let links = map.roads().iter().flat_map(move |road| {
         // The main road of a virtual junction is not cut, and met somewhere along it.
         let links = ContactPoint::BOTH.map(|end| Some((end, road.link(end)?)));
         let links = links.into_iter().flatten();
         let cut = links.filter(move |(_, link)| !leads_to_main_road(map, road, *link));
         let contacts = cut.filter_map(move |(end, _)| map.linked_end(road, end));
-        contacts.filter(move |contact| {
-            let linked = map.road_at(contact.to.road);
-            let roads = [Some(road), linked];
-            roads
-                .into_iter()
-                .flatten()
-                .any(|one| one.junction().is_some())
-        })
+        contacts.filter(move |contact| !is_of_lines(map, contact, broken))
     });
     let connections = map
         .connections()
         .filter_map(|(junction, connection)| map.connection_contact(junction, connection))
         .filter(move |contact| !contradicted || !is_contradicted(map, contact));
     links.chain(connections)
+}
+
+/// Whether reference lines of two roads outside of junctions lie apart: then little is known of the mouths.
+fn is_of_lines(map: &RoadMap<'_>, contact: &RoadContact<'_>, broken: f64) -> bool {
+    let ends = [contact.from, contact.to].map(|at| Some((map.road_at(at.road)?, at.end)));
+    let [Some((one, from)), Some((other, to))] = ends else {
+        return true;
+    };
+    if one.junction().is_some() || other.junction().is_some() {
+        return false;
+    }
+    let frames = one.end_frame(from).zip(other.end_frame(to));
+    frames.is_none_or(|(here, there)| {
+        let (x, y) = (here.pose.x - there.pose.x, here.pose.y - there.pose.y);
+        x.hypot(y) >= broken
+    })
 }
 
 /// Whether the connecting road says of that end that it meets another road than the incoming one.
@@ -107,10 +121,10 @@ fn is_contradicted(map: &RoadMap<'_>, contact: &RoadContact<'_>) -> bool {
     })
 }
 
-fn check<'a>(
-    map: &RoadMap<'a>,
+fn check<'m, 'a>(
+    map: &'m RoadMap<'a>,
     contact: &RoadContact<'_>,
-    arms: &Arms<'_, 'a>,
+    arms: &Arms<'m, 'a>,
     found: &mut Sink<'_>,
 ) {
     let limit = found.number(&GAP_BROKEN_FROM);
@@ -125,21 +139,17 @@ fn check<'a>(
         Some(_) => "the connection",
         None => "the link",
     };
-    let meant = contact
-        .junction
-        .is_none()
-        .then(|| arms.at(one, contact.from));
-    let meant = meant.flatten().map_or(String::new(), |(road, end)| {
+    let meant = meant(contact, other, arms).map_or(String::new(), |(road, end)| {
         format!(" (the {end} of road `{}` lies there)", road.id())
     });
     let text = format!(
         "{says} says that the {} of road `{}` meets the {} of road `{}`, but they lie {} m apart{meant}; ends that \
-         meet must lie at one place (at most {limit} m apart)",
+         meet must lie at one place (less than {limit} m apart)",
         contact.from.end,
         one.id(),
         contact.to.end,
         other.id(),
-        beside(apart, limit)
+        beside(in_micrometres(apart), limit)
     );
     found
         .issue(contact.node, text)
@@ -147,6 +157,31 @@ fn check<'a>(
         .at(one.node(), "the one road")
         .at(other.node(), "the other road")
         .at_end(other, contact.to.end);
+}
+
+/// The same without the digits that calculation leaves.
+fn in_micrometres(length: f64) -> f64 {
+    (length * 1e6).round() / 1e6
+}
+
+/// The road end that lies where another is said to be: the other end of the same road, or of connecting roads that
+/// of another arm of the junction.
+fn meant<'m, 'a>(
+    contact: &RoadContact<'_>,
+    other: &'m Road<'a>,
+    arms: &Arms<'m, 'a>,
+) -> Option<(&'m Road<'a>, ContactPoint)> {
+    let end = contact.to.end.other();
+    let road = contact.to.road;
+    let apart = mouths::apart(arms.map, contact.from, RoadEnd { road, end });
+    if apart.is_some_and(|apart| apart < THERE) {
+        return Some((other, end));
+    }
+    let one = arms.map.road_at(contact.from.road)?;
+    contact
+        .junction
+        .is_none()
+        .then(|| arms.at(one, contact.from))?
 }
 
 /// The road ends around the junctions.

@@ -245,3 +245,54 @@ fn a_road_that_follows_itself() {
     ];
     crate::run(&rows);
 }
+
+#[test]
+fn lanes_far_from_reference_lines_that_meet() {
+    const LANES: &[&str] = &["error lane_smoothness_contact_point_no_horizontal_gaps"];
+    const LINES: &[&str] = &["error road_geometry_contact_point"];
+    let row = |offset: &str, y: &str| {
+        let section =
+            |links: [&str; 2]| section("\"0\"", &lane("1", links[0]), &lane("-1", links[1]));
+        let second = format!(
+            "<laneOffset s=\"0\" a=\"{offset}\" b=\"0\" c=\"0\" d=\"0\"/>{}",
+            section(["p1", "p-1"])
+        );
+        let first = Road {
+            link: &link(&["s2 start"]),
+            lanes: &section(["s1", "s-1"]),
+            ..Road::default()
+        };
+        let second = Road {
+            id: "2",
+            pose: ["100", y, "0"],
+            link: &link(&["p1 end"]),
+            lanes: &second,
+            ..Road::default()
+        };
+        format!("{}{}", first.text(), second.text())
+    };
+    let rows: Vec<Row> = vec![
+        (
+            "to the left",
+            row("30", "0"),
+            &["error road_linkage_ends_meet"],
+        ),
+        (
+            "to the right",
+            row("-8", "0"),
+            &["error road_linkage_ends_meet"],
+        ),
+        ("mouths that touch", row("7", "0"), LANES),
+        ("an offset that makes up for a place", row("7", "-7"), LINES),
+        (
+            "half a metre between the lines as well",
+            row("30", "0.5"),
+            &[
+                "error road_geometry_contact_point",
+                "error road_linkage_ends_meet",
+            ],
+        ),
+        ("neither lines nor roads", row("30", "2"), LINES),
+    ];
+    crate::run(&rows);
+}
