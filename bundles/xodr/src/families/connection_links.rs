@@ -1,8 +1,8 @@
 //! What connections and the lanes of their connecting roads say about each other.
 
-use foldhash::HashMap;
+use foldhash::{HashMap, HashSet};
 use qcbus_document::Node;
-use qcbus_opendrive::{Connection, JunctionType, RoadEnd, RoadMap};
+use qcbus_opendrive::{Connection, ContactPoint, JunctionType, Road, RoadEnd, RoadMap};
 
 /// The connections of common junctions that lead from one road end to another, of which one says what another
 /// leaves out: some tools write one for each lane.
@@ -51,4 +51,65 @@ pub(crate) fn bundles<'a>(map: &RoadMap<'a>) -> Vec<Bundle<'a>> {
         }
     }
     bundles
+}
+
+/// What the connections say of connecting roads, to find the ends of which they say nothing.
+pub(crate) struct Entries<'a> {
+    /// Connecting roads, and at which of their ends a connection begins.
+    ends: HashSet<(&'a str, Option<ContactPoint>)>,
+    /// Incoming and connecting roads.
+    roads: HashSet<(&'a str, &'a str)>,
+    /// Connecting roads and their lanes to which a lane link leads.
+    lanes: HashSet<(&'a str, i64)>,
+}
+
+impl<'a> Entries<'a> {
+    pub fn of(map: &RoadMap<'a>) -> Entries<'a> {
+        let mut entries = Entries {
+            ends: HashSet::default(),
+            roads: HashSet::default(),
+            lanes: HashSet::default(),
+        };
+        for (_, connection) in map.connections() {
+            let Some(id) = connection.connecting_road() else {
+                continue;
+            };
+            entries.ends.insert((id, connection.contact_point()));
+            let incoming = connection.incoming_road();
+            entries
+                .roads
+                .extend(incoming.map(|incoming| (incoming, id)));
+            let lanes = connection.lane_links().filter_map(|link| link.to());
+            entries.lanes.extend(lanes.map(|lane| (id, lane)));
+        }
+        entries
+    }
+
+    /// The road around a junction from which a connecting road goes on at an end, while no connection leads from
+    /// there, but one along the connecting road the other way.
+    pub fn missing<'m>(
+        &self,
+        map: &'m RoadMap<'a>,
+        road: &Road<'a>,
+        end: ContactPoint,
+    ) -> Option<(&'m Road<'a>, ContactPoint)> {
+        let junction = map.junction(road.junction()?)?;
+        let at = |end| self.ends.contains(&(road.id(), end));
+        if junction.kind() != Some(JunctionType::Common)
+            || !at(Some(end.other()))
+            || at(Some(end))
+            || at(None)
+        {
+            return None;
+        }
+        let linked = map.linked_end(road, end)?.to;
+        let incoming = map.road_at(linked.road)?;
+        let named = self.roads.contains(&(incoming.id(), road.id()));
+        (incoming.junction().is_none() && !named).then_some((incoming, linked.end))
+    }
+
+    /// Whether a lane link leads to a lane of a connecting road.
+    pub fn leads_to(&self, road: &Road<'a>, lane: i64) -> bool {
+        self.lanes.contains(&(road.id(), lane))
+    }
 }

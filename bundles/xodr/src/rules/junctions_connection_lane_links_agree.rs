@@ -1,8 +1,8 @@
 use qcbus_document::Node;
-use qcbus_opendrive::{ContactPoint, LaneRef, LayerKind, RoadMap, Traffic};
+use qcbus_opendrive::{ContactPoint, LaneRef, LayerKind, Road, RoadEnd, RoadMap, Traffic};
 use qcbus_sdk::{Level, Rule, Sink};
 
-use crate::families::connection_links::{Bundle, bundles};
+use crate::families::connection_links::{Bundle, Entries, bundles};
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::routes::{NARROW, is_route, is_wide, lanes_at};
 use crate::model::Roads;
@@ -24,6 +24,12 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             contradicted(map, &bundle, *link, found);
         }
         left_out(map, &bundle, found);
+    }
+    let entries = Entries::of(map);
+    for road in map.roads().iter().filter(|road| road.junction().is_some()) {
+        for end in ContactPoint::BOTH {
+            unconnected(map, (road, end), &entries, found);
+        }
     }
 }
 
@@ -117,6 +123,49 @@ fn left_out(map: &RoadMap<'_>, bundle: &Bundle<'_>, found: &mut Sink<'_>) {
             .at_lane_end(lane, end)
             .at(lane.node(), "the lane");
     }
+}
+
+/// A connecting road along which a connection leads one way only, though its lanes lead the other way as well.
+fn unconnected<'a>(
+    map: &RoadMap<'a>,
+    (road, end): (&Road<'a>, ContactPoint),
+    entries: &Entries<'a>,
+    found: &mut Sink<'_>,
+) {
+    let Some((incoming, at)) = entries.missing(map, road, end) else {
+        return;
+    };
+    let from = RoadEnd {
+        road: incoming.index(),
+        end: at,
+    };
+    let comes_in = |id: &i64| {
+        let lane = map.lane_at_road_end(from, *id, LayerKind::Permanent);
+        let lane = lane.and_then(|at| map.lane(at.lane));
+        lane.is_some_and(|lane| Traffic::of(lane) == Traffic::Towards(at))
+    };
+    let mut lanes = routes_at(road, end, found.number(&NARROW)).filter_map(|lane| {
+        let along = Traffic::of(lane) == Traffic::Towards(end.other());
+        let linked = lane.id().is_none_or(|id| entries.leads_to(road, id));
+        let from = named(lane, end).find(comes_in);
+        Some((lane, from.filter(|_| along && !linked)?))
+    });
+    let Some((lane, from)) = lanes.next() else {
+        return;
+    };
+    let text = format!(
+        "{} goes on from lane `{from}` of road `{}`, but no connection leads from road `{}` onto road `{}` (its \
+         connections begin at the other end only); nobody can turn there without a connection",
+        lane_name(lane),
+        incoming.id(),
+        incoming.id(),
+        road.id()
+    );
+    found
+        .issue(lane.node(), text)
+        .level(Level::Warning)
+        .at_lane_end(lane, end)
+        .at(incoming.node(), "the road that it goes on from");
 }
 
 /// The lanes that a lane names at an end.
