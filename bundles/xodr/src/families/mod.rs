@@ -19,6 +19,7 @@ pub(crate) mod georeference;
 pub(crate) mod ids;
 pub(crate) mod junction_area;
 pub(crate) mod junction_ends;
+pub(crate) mod junction_lanes;
 pub(crate) mod lane_gaps;
 pub(crate) mod lane_numbers;
 pub(crate) mod lane_ranges;

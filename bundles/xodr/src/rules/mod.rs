@@ -63,6 +63,7 @@ mod junctions_geometry_ref_line_definition;
 mod junctions_incoming_lane_used;
 mod junctions_incoming_road_linked;
 mod junctions_no_overlap;
+mod junctions_outgoing_lane_reached;
 mod junctions_priority_acyclic;
 mod junctions_priority_high_and_low_attr;
 mod junctions_priority_no_signals;
@@ -575,6 +576,7 @@ pub static RULES: &[&dyn AnyRule] = &[
     &junctions_connection_lane_link_once::RULE,
     &junctions_connection_lane_links_agree::RULE,
     &junctions_incoming_lane_used::RULE,
+    &junctions_outgoing_lane_reached::RULE,
     &junctions_incoming_road_linked::RULE,
     &junctions_priority_acyclic::RULE,
     &road_lane_link_center_lane::RULE,

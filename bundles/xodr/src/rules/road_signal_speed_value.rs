@@ -3,7 +3,9 @@ use qcbus_document::Node;
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Level, Param, Place, Rule, Sink};
 
-use crate::families::object_parts::{Stands, is_before, is_blank, named, number, stands_below};
+use crate::families::object_parts::{
+    Stands, below, is_before, is_blank, named, number, stands_below,
+};
 use crate::model::Roads;
 
 pub static RULE: Rule<Roads> = Rule {

@@ -86,13 +86,18 @@ impl Common<'_> {
                 ..Road::default()
             }),
         ];
+        let onto = match self.rule {
+            "LHT" => lane("1", ""),
+            // Nothing leads onto it.
+            _ => lane("1", "").replace("driving", "restricted"),
+        };
         // A third road, without which no junction is needed.
         let third = Road {
             id: "5",
             length: "50",
             pose: ["110", "-65", "1.5707963267948966"],
             link: &link(&[&format!("sJ {}", self.id)]),
-            lanes: &both,
+            lanes: &section("\"0\"", &onto, &lane("-1", "")),
             rule: self.rule,
             ..Road::default()
         };

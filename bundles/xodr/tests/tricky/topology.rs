@@ -120,6 +120,85 @@ fn lanes_at_junctions() {
 }
 
 #[test]
+fn lanes_out_of_junctions() {
+    let right = |lanes: &[(&str, &str)]| {
+        let lanes: String = lanes.iter().map(|(id, links)| lane(id, links)).collect();
+        section("\"0\"", "", &lanes)
+    };
+    let both = |links: [&str; 2]| section("\"0\"", &lane("1", links[0]), &lane("-1", links[1]));
+    let through = || both(["p1 s1", "p-1 s-1"]);
+    let plain = || both(["", ""]);
+    let back = |contact: &str, link: &str| {
+        let from = format!(
+            r#"<connection id="1" incomingRoad="3" connectingRoad="2" contactPoint="{contact}">{link}</connection>"#
+        );
+        ONE.to_owned() + &from
+    };
+    let there_and_back = back("end", r#"<laneLink from="1" to="1"/>"#);
+    const UNREACHED: &[&str] = &[TWO, "warning junctions_outgoing_lane_reached"];
+    let rows: [Row; 5] = [
+        (
+            "a lane beside the one that is led to",
+            Way {
+                lanes: [
+                    right(&[("-1", "")]),
+                    right(&[("-1", "p-1 s-1")]),
+                    right(&[("-1", ""), ("-2", "")]),
+                ],
+                ..Way::new()
+            }
+            .text(),
+            UNREACHED,
+        ),
+        (
+            "left-hand traffic: the way out of the first road is on the right",
+            Way {
+                lanes: [
+                    both(["", ""]),
+                    section("\"0\"", &lane("1", "p1 s1"), ""),
+                    section("\"0\"", &lane("1", ""), ""),
+                ],
+                rule: "LHT",
+                connection: r#"<connection id="0" incomingRoad="1" connectingRoad="2" contactPoint="start"><laneLink from="1" to="1"/></connection>"#,
+                ..Way::new()
+            }
+            .text(),
+            UNREACHED,
+        ),
+        (
+            "both ways with a connection for each",
+            Way {
+                lanes: [plain(), through(), plain()],
+                connection: &there_and_back,
+                ..Way::new()
+            }
+            .text(),
+            &[TWO],
+        ),
+        (
+            "both ways with a connection for one",
+            Way {
+                lanes: [plain(), through(), plain()],
+                ..Way::new()
+            }
+            .text(),
+            &[TWO, "warning junctions_connection_lane_links_agree"],
+        ),
+        (
+            "both ways, and lanes that name no lanes",
+            Way {
+                lanes: [plain(), both(["", ""]), plain()],
+                connection: &there_and_back,
+                ..Way::new()
+            }
+            .text(),
+            &[TWO, "warning junctions_connecting_lane_linked"],
+        ),
+    ];
+    crate::run(&rows);
+}
+
+#[test]
 fn the_whole_map() {
     let road = |id: &str, x: &str, hdg: &str| {
         let pose = [x, "0", hdg];

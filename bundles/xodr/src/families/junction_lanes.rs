@@ -1,0 +1,91 @@
+//! What junctions do with the lanes around them.
+
+use foldhash::HashSet;
+use qcbus_opendrive::{
+    ContactPoint, Junction, JunctionType, LaneEnd, LaneRef, Road, RoadEnd, RoadMap, Traffic,
+};
+
+use super::routes::{is_route, lanes_at};
+
+/// Which lanes around junctions are taken up, or led to.
+pub(crate) struct Used<'a> {
+    /// The lane ends from or to which a lane of a junction leads.
+    lanes: HashSet<LaneEnd>,
+    /// Junctions and the roads of which a connection takes up all lanes, because it has no lane links.
+    whole: HashSet<(usize, &'a str)>,
+    /// The road ends to which lanes of connecting roads lead that do not say to which lane.
+    open: HashSet<RoadEnd>,
+}
+
+impl<'a> Used<'a> {
+    pub fn of(map: &RoadMap<'a>) -> Used<'a> {
+        let mut used = Used {
+            lanes: HashSet::default(),
+            whole: HashSet::default(),
+            open: HashSet::default(),
+        };
+        // Of the roads of junctions nobody asks.
+        let roads = map.roads().iter();
+        let outside: Vec<bool> = roads.map(|road| road.junction().is_none()).collect();
+        let is_outside = |end: &LaneEnd| {
+            let road = outside.get(end.lane.road as usize);
+            road.copied().unwrap_or(false)
+        };
+        let joints = map.junction_joints().iter();
+        let ends = joints.flat_map(|joint| [joint.from, joint.to]);
+        used.lanes.extend(ends.filter(is_outside));
+        for road in map.roads().iter().filter(|road| road.junction().is_some()) {
+            let ends = map.joints_of(road).iter().map(|one| one.to);
+            used.lanes.extend(ends.filter(is_outside));
+            let open = ContactPoint::BOTH
+                .into_iter()
+                .filter(|end| is_open(road, *end));
+            used.open
+                .extend(open.filter_map(|end| Some(map.linked_end(road, end)?.to)));
+        }
+        for (junction, connection) in map.connections() {
+            if connection.lane_links().next().is_none() {
+                let roads = [connection.incoming_road(), connection.linked_road()];
+                let roads = roads.into_iter().flatten();
+                used.whole.extend(roads.map(|id| (junction.index(), id)));
+            }
+        }
+        used
+    }
+
+    /// Whether a connection takes up all lanes of a road, or leads to all.
+    pub fn is_whole(&self, junction: &Junction<'a>, road: &Road<'a>) -> bool {
+        self.whole.contains(&(junction.index(), road.id()))
+    }
+
+    /// Whether nobody knows which lanes of a road end the junction leads to.
+    pub fn is_open(&self, end: RoadEnd) -> bool {
+        self.open.contains(&end)
+    }
+
+    pub fn contains(&self, lane: LaneRef<'_, '_>, end: ContactPoint) -> bool {
+        let lane = lane.key();
+        self.lanes.contains(&LaneEnd { lane, end })
+    }
+}
+
+/// Whether a lane leads out of a connecting road there and does not say where to.
+fn is_open(road: &Road<'_>, end: ContactPoint) -> bool {
+    let mut lanes = lanes_at(road, end).filter(|lane| is_route(*lane));
+    lanes.any(|lane| Traffic::of(lane).may_run_towards(end) && lane.links(end).next().is_none())
+}
+
+/// The ends of roads outside of junctions that are linked to a junction which cuts roads.
+pub(crate) fn arms<'m, 'a>(
+    map: &'m RoadMap<'a>,
+) -> impl Iterator<Item = (&'m Road<'a>, ContactPoint, &'m Junction<'a>)> {
+    let roads = map.roads().iter();
+    let roads = roads.filter(|road| road.junction().is_none());
+    let ends = roads.flat_map(|road| ContactPoint::BOTH.map(|end| (road, end)));
+    ends.filter_map(|(road, end)| {
+        let junction = map.junction(road.link(end)?.junction_id()?)?;
+        let kind = junction.kind();
+        let cuts = matches!(kind, Some(JunctionType::Common | JunctionType::Direct));
+        cuts.then_some((road, end, junction))
+    })
+}

@@ -1,0 +1,58 @@
+use qcbus_opendrive::{ContactPoint, Junction, LaneRef, Road, RoadEnd, RoadMap, Traffic};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::families::junction_lanes::{Used, arms};
+use crate::families::link_sides::Known;
+use crate::families::on_road::{OnRoad, lane_name};
+use crate::families::routes::{NARROW, routes_at};
+use crate::model::Roads;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_junctions_outgoing_lane_reached",
+    uids: &["qcbus.dev:xodr:1.4.0:junctions.outgoing_lane_reached"],
+    level: Level::Warning,
+    versions: "1.4.0..",
+    after: super::READABLE,
+    params: &[NARROW],
+    page: include_str!("junctions_outgoing_lane_reached.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let used = Used::of(map);
+    // Of roads of which the junction knows nothing `road.linkage.both_sides_consistency` speaks.
+    let known = Known::by(map);
+    for (road, end, junction) in arms(map) {
+        let at = RoadEnd {
+            road: road.index(),
+            end,
+        };
+        let all = used.is_whole(junction, road) || used.is_open(at);
+        if !all && known.contains(junction, road, end) {
+            check(&used, (road, end), junction, found);
+        }
+    }
+}
+
+fn check(
+    used: &Used<'_>,
+    (road, end): (&Road<'_>, ContactPoint),
+    junction: &Junction<'_>,
+    found: &mut Sink<'_>,
+) {
+    let leaves = |lane: &LaneRef<'_, '_>| Traffic::of(*lane) == Traffic::Towards(end.other());
+    let lanes = routes_at(road, end, found.number(&NARROW));
+    for lane in lanes.filter(|lane| leaves(lane) && !used.contains(*lane, end)) {
+        let text = format!(
+            "{} leads out of junction `{}`, but no lane of the junction leads onto it, so that nobody gets there; a \
+             lane that leads out of a junction should be the one that a connecting lane goes on as",
+            lane_name(lane),
+            junction.id()
+        );
+        found
+            .issue(lane.node(), text)
+            .at_lane_end(lane, end)
+            .at(junction.node(), "the junction");
+    }
+}
