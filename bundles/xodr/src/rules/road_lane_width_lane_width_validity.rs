@@ -19,15 +19,19 @@ const SMALL: Param = Param::number(
     "how far below zero a width may come of a fitted curve, which is a warning",
 );
 
-/// Below zero by less than this, in metres, a width is zero.
-const NOTHING: f64 = 1e-9;
+const NOTHING: Param = Param::number(
+    "nothing",
+    1e-6,
+    "m",
+    "how far below zero a width counts as zero, as coefficients of some digits give it",
+);
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_width_lane_width_validity",
     uids: &["asam.net:xodr:1.4.0:road.lane.width.lane_width_validity"],
     versions: "1.1.0..",
     after: super::READABLE,
-    params: &[TOLERANCE, SMALL],
+    params: &[NOTHING, TOLERANCE, SMALL],
     page: include_str!("road_lane_width_lane_width_validity.md"),
     each: Some(each),
     ..Rule::DEFAULTS
@@ -48,7 +52,7 @@ fn check(lane: LaneRef<'_, '_>, stretch: &Stretch<'_, '_>, found: &mut Sink<'_>)
     let Some(lowest) = stretch.cubic.minimum(0.0, stretch.length()) else {
         return;
     };
-    if lowest.value >= -NOTHING {
+    if lowest.value >= -found.number(&NOTHING) {
         return;
     }
     let ds = stretch.from + lowest.at;
