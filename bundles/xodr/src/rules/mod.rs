@@ -172,6 +172,7 @@ mod road_lane_link_zero_width_at_end;
 mod road_lane_link_zero_width_at_start;
 mod road_lane_material_center_lane_no_material;
 mod road_lane_material_elem_asc_order;
+mod road_lane_offset_plausible;
 mod road_lane_road_mark_elem_asc_order;
 mod road_lane_road_mark_only_outer;
 mod road_lane_rule_elem_asc_order;
@@ -598,4 +599,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &road_object_sizes_plausible::RULE,
     &road_signal_no_self_reference::RULE,
     &words_are_known::RULE,
+    &road_lane_offset_plausible::RULE,
 ];

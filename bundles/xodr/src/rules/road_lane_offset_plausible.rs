@@ -1,0 +1,129 @@
+use qcbus_opendrive::{LaneLayer, Road, RoadMap, Stretch};
+use qcbus_sdk::{Level, Param, Rule, Sink};
+
+use crate::families::on_road::OnRoad;
+use crate::families::written_numbers::brief;
+use crate::model::{Part, Roads};
+
+const MOST: Param = Param::number(
+    "most",
+    50.0,
+    "m",
+    "how far beside the reference line lanes may be shifted",
+);
+const SLOPE: Param = Param::number(
+    "slope",
+    1.0,
+    "",
+    "how steeply lanes may be shifted, as metres aside per metre along the road",
+);
+const LENGTH: Param = Param::number(
+    "length",
+    5.0,
+    "m",
+    "over how many metres lanes must be shifted too steeply to be told",
+);
+
+/// A shift of more than this, in metres, comes of a number that is reported as none.
+const ABSURD: f64 = 1e9;
+/// Into how many pieces a stretch is cut to see how much of it is steep.
+const PIECES: u32 = 64;
+
+pub static RULE: Rule<Roads> = Rule {
+    id: "check_qcbus_xodr_road_lane_offset_plausible",
+    uids: &["qcbus.dev:xodr:1.4.0:road.lane.offset_plausible"],
+    level: Level::Warning,
+    after: super::READABLE,
+    params: &[MOST, SLOPE, LENGTH],
+    page: include_str!("road_lane_offset_plausible.md"),
+    each: Some(each),
+    ..Rule::DEFAULTS
+};
+
+fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    for road in map.part(part).roads() {
+        for layer in road.layers() {
+            one(road, layer, found);
+        }
+    }
+}
+
+/// Reports the worst of a road, for what follows a record that is too steep is too far aside as well.
+fn one(road: &Road<'_>, layer: &LaneLayer<'_>, found: &mut Sink<'_>) {
+    let Some(length) = road.length() else {
+        return;
+    };
+    let mut steep = None;
+    for stretch in layer.offset().stretches(length) {
+        if let Some((ds, offset)) = far(&stretch, found) {
+            let text = format!(
+                "the lanes of road `{}` are shifted by {} m beside the reference line at s = {:.1}; more than {} m \
+                 is hardly meant",
+                road.id(),
+                brief(offset, 1),
+                stretch.from + ds,
+                found.number(&MOST)
+            );
+            let place = stretch.from + ds;
+            found
+                .issue(stretch.record.node(), text)
+                .on(road, place, offset);
+            return;
+        }
+        if steep.is_none() {
+            steep = steepest(&stretch, found).map(|worst| (stretch, worst));
+        }
+    }
+    if let Some((stretch, (ds, slope, over))) = steep {
+        let text = format!(
+            "the lanes of road `{}` are shifted by up to {} m per metre along the road; more than {} m per metre, \
+             here over {over:.1} m, is hardly meant",
+            road.id(),
+            brief(slope.abs(), 2),
+            brief(found.number(&SLOPE), 2)
+        );
+        let place = stretch.from + ds;
+        let t = stretch.cubic.value(ds);
+        found.issue(stretch.record.node(), text).on(road, place, t);
+    }
+}
+
+/// Where the lanes are shifted farthest, and how far, when that is too far.
+fn far(stretch: &Stretch<'_, '_>, found: &Sink<'_>) -> Option<(f64, f64)> {
+    let length = stretch.length();
+    let lowest = stretch.cubic.minimum(0.0, length)?;
+    let highest = stretch.cubic.maximum(0.0, length)?;
+    let farthest = if -lowest.value > highest.value {
+        lowest
+    } else {
+        highest
+    };
+    let offset = farthest.value;
+    let is_far = offset.abs() > found.number(&MOST) && offset.abs() < ABSURD;
+    is_far.then_some((farthest.at, offset))
+}
+
+/// Where the lanes are shifted most steeply, how steeply, and over how many metres it is too much, when that
+/// is more than a few.
+fn steepest(stretch: &Stretch<'_, '_>, found: &Sink<'_>) -> Option<(f64, f64, f64)> {
+    let length = stretch.length();
+    let (most, least) = (found.number(&SLOPE), found.number(&LENGTH));
+    let cubic = &stretch.cubic;
+    let is_constant = [cubic.b, cubic.c, cubic.d] == [0.0; 3];
+    if length < least || is_constant {
+        return None;
+    }
+    let piece = length / f64::from(PIECES);
+    let (mut worst, mut over) = ((0.0, 0.0_f64), 0.0);
+    for index in 0..PIECES {
+        let ds = (f64::from(index) + 0.5) * piece;
+        let slope = cubic.slope(ds);
+        if slope.abs() > most {
+            over += piece;
+        }
+        if slope.abs() > worst.1.abs() {
+            worst = (ds, slope);
+        }
+    }
+    (over >= least && worst.1.abs() < ABSURD).then_some((worst.0, worst.1, over))
+}
