@@ -125,3 +125,70 @@ pub(crate) fn place(node: Node<'_>, road: &Road<'_>) -> Option<(f64, f64)> {
     let length = road.length()?;
     (0.0..=length).contains(&s).then_some((s, t))
 }
+
+/// How an object is repeated along a road.
+pub(crate) struct Row {
+    /// Where the row begins, and where it ends.
+    pub ends: [(f64, f64); 2],
+    /// The distance of single copies; none for what goes on without gaps.
+    pub distance: Option<f64>,
+    /// Whether it goes straight from end to end rather than along the road.
+    pub is_straight: bool,
+}
+
+/// Copies of a row that are looked at.
+const MOST_COPIES: f64 = 100.0;
+
+impl Row {
+    /// The row of a `<repeat>` as far as it lies on the road.
+    pub fn of(repeat: Node<'_>, road: &Road<'_>) -> Option<Row> {
+        let object = repeat.parent()?;
+        let (s, length) = number(repeat, "s").zip(number(repeat, "length"))?;
+        let from = number(repeat, "tStart").or_else(|| number(object, "t"))?;
+        let to = number(repeat, "tEnd").unwrap_or(from);
+        let range = 0.0..=road.length()?;
+        let is_on_road = length >= 0.0 && range.contains(&s) && range.contains(&(s + length));
+        is_on_road.then_some(Row {
+            ends: [(s, from), (s + length, to)],
+            distance: number(repeat, "distance").filter(|distance| *distance > 0.0),
+            is_straight: repeat.attr("detachFromReferenceLine") == Some("true"),
+        })
+    }
+
+    /// Where copies stand; of very many, some.
+    pub fn copies(&self) -> impl Iterator<Item = (f64, f64)> + use<> {
+        let [(s, from), (end, to)] = self.ends;
+        let length = end - s;
+        let step = self.distance.filter(|_| !self.is_straight);
+        let step = step.unwrap_or(length).max(length / MOST_COPIES);
+        let most = if step > 0.0 { length / step } else { 0.0 };
+        (0..=(most + 1e-6) as u64).map(move |index| {
+            let share = if length > 0.0 {
+                (index as f64 * step / length).min(1.0)
+            } else {
+                0.0
+            };
+            (s + share * length, from + share * (to - from))
+        })
+    }
+}
+
+/// t of the rightmost and the leftmost border of the lanes of a road that are of some kinds.
+pub(crate) fn lanes_at(road: &Road<'_>, s: f64, kinds: &[&str]) -> Option<[f64; 2]> {
+    let layer = road.permanent()?;
+    let mut range: Option<[f64; 2]> = None;
+    for side in [Side::Right, Side::Left] {
+        let Some(section) = layer.section_at(road, side, s) else {
+            continue;
+        };
+        for span in section.each_span(side, s - section.s()?) {
+            if !span.lane.kind().is_some_and(|kind| kinds.contains(&kind)) {
+                continue;
+            }
+            let (low, high) = (span.inner.min(span.outer), span.inner.max(span.outer));
+            let [right, left] = range.unwrap_or([low, high]);
+            range = Some([right.min(low), left.max(high)]);
+        }
+    }
+    range
+}

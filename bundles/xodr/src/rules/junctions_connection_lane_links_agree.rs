@@ -4,7 +4,7 @@ use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::families::connection_links::{Bundle, Entries, bundles};
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::families::routes::{NARROW, is_route, is_wide, lanes_at};
+use crate::families::routes::{NARROW, is_route, is_wide, lanes_at, routes_at};
 use crate::model::Roads;
 
 pub static RULE: Rule<Roads> = Rule {

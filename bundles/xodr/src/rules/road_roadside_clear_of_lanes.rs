@@ -4,7 +4,7 @@ use qcbus_sdk::{Level, Param, Place, Rule, Sink};
 
 use crate::families::object_parts::{has_outline, named, number};
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::families::roadside::{Spot, lane_at, place, stands_itself, things};
+use crate::families::roadside::{Row, Spot, lane_at, lanes_at, place, stands_itself, things};
 use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
@@ -59,8 +59,105 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                 sign(road, thing, found);
             }
         }
+        for object in road.objects() {
+            for repeat in object.repeats() {
+                row(road, object.node(), repeat.node(), found);
+            }
+        }
     }
 }
+
+/// What is repeated: copies that stand in a lane, or a row that goes from one side of the lanes to the other.
+fn row(road: &Road<'_>, object: Node<'_>, repeat: Node<'_>, found: &mut Sink<'_>) {
+    let kind = object.attr("type").unwrap_or_default();
+    let fixed = FIXED.contains(&kind);
+    let Some(row) = Row::of(repeat, road).filter(|_| fixed || kind == "barrier") else {
+        return;
+    };
+    if has_outline(object)
+        || object.child("skeleton").is_some()
+        || !is_in_the_way(repeat, ["zOffsetStart", "heightStart"], object, found)
+        || !is_in_the_way(repeat, ["zOffsetEnd", "heightEnd"], object, found)
+    {
+        return;
+    }
+    if row.distance.is_some() {
+        if fixed {
+            copies(road, object, repeat, &row, found);
+        }
+    } else if !row.is_straight {
+        crossing(road, object, repeat, &row, found);
+    }
+}
+
+fn copies(road: &Road<'_>, object: Node<'_>, repeat: Node<'_>, row: &Row, found: &mut Sink<'_>) {
+    let depth = found.number(&DEPTH);
+    let mut hits = row
+        .copies()
+        .filter_map(|(s, t)| Some((s, t, blocked(road, s, t, depth)?)));
+    let Some((s, t, spot)) = hits.next() else {
+        return;
+    };
+    let text = format!(
+        "a copy of {} of type `{}` stands in the middle of {} at s = {s:.1}, {:.2} m from its border; copies \
+         stand at `tStart` to `tEnd` of `repeat`, which should be beside it",
+        named(object),
+        object.attr("type").unwrap_or_default(),
+        lane_name(spot.lane),
+        spot.depth
+    );
+    found
+        .issue(Place::attribute_or_node(repeat, "tStart"), text)
+        .on(road, s, t)
+        .at(spot.lane.node(), "the lane");
+}
+
+/// What goes on without gaps from one side of all driving lanes to the other, along the road rather than across.
+fn crossing(road: &Road<'_>, object: Node<'_>, repeat: Node<'_>, row: &Row, found: &mut Sink<'_>) {
+    let [(s, from), (end, to)] = row.ends;
+    if end - s < (to - from).abs() {
+        return;
+    }
+    let lanes = lanes_at(road, s, &LANES).zip(lanes_at(road, end, &LANES));
+    let Some(([right, left], [end_right, end_left])) = lanes else {
+        return;
+    };
+    let is_one = |[right, left]: [f64; 2]| left - right > 2.0 * found.number(&DEPTH);
+    if !is_one([right, left]) || !is_one([end_right, end_left]) {
+        return;
+    }
+    let to_right = from >= left && to <= end_right;
+    let to_left = from <= right && to >= end_left;
+    if !(to_right || to_left) {
+        return;
+    }
+    let text = format!(
+        "{} of type `{}` goes from t = {from} at s = {s:.1} to t = {to} at s = {end:.1}, across all driving lanes \
+         of road `{}`; what goes along a road should stay on one side of them",
+        named(object),
+        object.attr("type").unwrap_or_default(),
+        road.id()
+    );
+    found
+        .issue(Place::attribute_or_node(repeat, "tEnd"), text)
+        .on(road, end, to);
+}
+
+/// Whether what is repeated is neither flat nor above the vehicles at one of its ends.
+fn is_in_the_way(
+    repeat: Node<'_>,
+    [up, high]: [&str; 2],
+    object: Node<'_>,
+    found: &Sink<'_>,
+) -> bool {
+    let low = number(repeat, up).or_else(|| number(object, "zOffset"));
+    let low = low.unwrap_or(0.0);
+    let height = number(repeat, high).or_else(|| number(object, "height"));
+    low <= found.number(&CLEARANCE) && !height.is_some_and(|height| low + height < FLAT)
+}
+
+/// What ends lower than this above the road, in metres, is flat.
+const FLAT: f64 = 0.3;
 
 /// The lane in whose way something is.
 fn blocked<'m, 'a>(road: &'m Road<'a>, s: f64, t: f64, depth: f64) -> Option<Spot<'m, 'a>> {
@@ -74,7 +171,7 @@ fn blocked<'m, 'a>(road: &'m Road<'a>, s: f64, t: f64, depth: f64) -> Option<Spo
 fn object(road: &Road<'_>, node: Node<'_>, found: &mut Sink<'_>) {
     let low = number(node, "zOffset").unwrap_or(0.0);
     let height = number(node, "height");
-    let is_flat = height.is_some_and(|height| low + height < 0.3);
+    let is_flat = height.is_some_and(|height| low + height < FLAT);
     if low > found.number(&CLEARANCE)
         || is_flat
         || has_outline(node)
@@ -97,13 +194,16 @@ fn parking(road: &Road<'_>, node: Node<'_>, found: &mut Sink<'_>) {
 }
 
 /// A sign on a post of its own, not one that hangs over the lane, is painted on it or shares the place of
-/// the reference line, where signs are put that stand nowhere.
+/// the reference line, where signs are put that stand nowhere. Lights are never painted.
 fn sign(road: &Road<'_>, node: Node<'_>, found: &mut Sink<'_>) {
-    let is_static = || node.attr("dynamic") == Some("no");
     let height = number(node, "zOffset").unwrap_or(0.0);
-    let on_post = (1.0..=3.0).contains(&height);
+    let in_the_way = match node.attr("dynamic") {
+        Some("no") => (1.0..=3.0).contains(&height),
+        Some("yes") => height <= 3.0,
+        _ => false,
+    };
     let anywhere = || number(node, "t").is_some_and(|t| t.abs() < 1e-6);
-    if on_post && is_static() && !anywhere() {
+    if in_the_way && !anywhere() {
         report(road, node, "should stand beside it", found);
     }
 }

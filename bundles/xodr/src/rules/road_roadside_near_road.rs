@@ -4,7 +4,7 @@ use qcbus_sdk::{Level, Param, Place, Rule, Sink};
 
 use crate::families::object_parts::{named, number};
 use crate::families::on_road::OnRoad;
-use crate::families::roadside::{NearRoads, beside, place, stands_itself, things};
+use crate::families::roadside::{NearRoads, Row, beside, place, stands_itself, things};
 use crate::model::Roads;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -62,51 +62,66 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let near_signals = NearRoads::new(found.number(&FAR_SIGNAL));
     let near_objects = NearRoads::new(found.number(&FAR_OBJECT));
     for road in map.roads() {
-        for thing in things(road) {
-            if thing.is("signal") {
-                beside_all(map, road, thing, &near_signals, found);
+        for thing in things(road).filter(|thing| stands_itself(*thing)) {
+            let near = if thing.is("signal") {
+                &near_signals
             } else {
-                beside_all(map, road, thing, &near_objects, found);
+                &near_objects
+            };
+            if let Some(at) = place(thing, road) {
+                beside_all(map, road, (thing, "t"), at, near, found);
             }
             above_or_below(road, thing, ["zOffset", "t"], found);
         }
         for repeat in road.objects().flat_map(|object| object.repeats()) {
-            above_or_below(road, repeat.node(), ["zOffsetStart", "tStart"], found);
+            let repeat = repeat.node();
+            if let Some(row) = Row::of(repeat, road) {
+                let ends = ["tStart", "tEnd"].into_iter().zip(row.ends);
+                let mut ends = ends.map(|(name, at)| {
+                    beside_all(map, road, (repeat, name), at, &near_objects, found)
+                });
+                let _ = ends.any(|is_told| is_told);
+            }
+            above_or_below(road, repeat, ["zOffsetStart", "tStart"], found);
         }
     }
 }
 
+/// Reports what is far beside all roads. Whether it has.
 fn beside_all(
     map: &RoadMap<'_>,
     road: &Road<'_>,
-    thing: Node<'_>,
+    (thing, across): (Node<'_>, &str),
+    (s, t): (f64, f64),
     near: &NearRoads,
     found: &mut Sink<'_>,
-) {
+) -> bool {
     let (far, whose) = if thing.is("signal") {
         (found.number(&FAR_SIGNAL), "a signal")
     } else {
         (found.number(&FAR_OBJECT), "an object")
     };
-    if number(thing, "t").is_none_or(|t| t.abs() <= far) {
-        return;
+    if t.abs() <= far {
+        return false;
     }
-    let Some((s, t)) = place(thing, road) else {
-        return;
-    };
     let distance = beside(road, s, t);
-    if distance <= far || !stands_itself(thing) || near.any(map, road, s, t) != Some(false) {
-        return;
+    if distance <= far || near.any(map, road, s, t) != Some(false) {
+        return false;
     }
+    let what = match (thing.is("repeat"), across) {
+        (false, _) => format!("{} stands", named(thing)),
+        (true, "tStart") => "the repetition begins".to_owned(),
+        (true, _) => "the repetition ends".to_owned(),
+    };
     let text = format!(
-        "{} stands {distance:.0} m beside the lanes of road `{}`, and no other road is near; {whose} should stand \
+        "{what} {distance:.0} m beside the lanes of road `{}`, and no other road is near; {whose} should stand \
          within {far} m of a road",
-        named(thing),
         road.id()
     );
     found
-        .issue(Place::attribute_or_node(thing, "t"), text)
+        .issue(Place::attribute_or_node(thing, across), text)
         .on(road, s, t);
+    true
 }
 
 /// What is above the road or below it by metres that only a mistaken unit or sign explains, or a height

@@ -419,3 +419,77 @@ fn lanes_of_validities() {
     ];
     crate::run(&rows);
 }
+
+#[test]
+fn repeated() {
+    let row = |kind: &str, more: &str| {
+        objects(&[&object(
+            kind,
+            "1",
+            r#"s="0" t="9" zOffset="0" hdg="0""#,
+            &format!(r#"<repeat s="0" length="50" {more}/>"#),
+        )])
+    };
+    let clear: &[&str] = &["warning road_roadside_clear_of_lanes"];
+    let poles = |t: &str| {
+        let more = format!(r#"distance="10" {t} zOffsetStart="0" zOffsetEnd="0""#);
+        row("pole", &more)
+    };
+    let rail = |t: &str| {
+        let more = format!(r#"distance="0" {t} zOffsetStart="0" zOffsetEnd="0""#);
+        row("barrier", &more)
+    };
+    let rows: Vec<Row> = vec![
+        ("beside the lanes", poles(r#"tStart="9" tEnd="10""#), &[]),
+        ("into the lanes", poles(r#"tStart="9" tEnd="-5""#), clear),
+        (
+            "lamps above the lanes",
+            poles(r#"tStart="2" tEnd="2""#).replace(
+                r#"zOffsetStart="0" zOffsetEnd="0""#,
+                r#"zOffsetStart="6" zOffsetEnd="6""#,
+            ),
+            &[],
+        ),
+        (
+            "one copy at either end, beside the lanes",
+            poles(r#"tStart="9" tEnd="-9""#).replace(r#"distance="10""#, r#"distance="50""#),
+            &[],
+        ),
+        (
+            "straight from end to end, who knows along what",
+            poles(r#"tStart="9" tEnd="-9" detachFromReferenceLine="true""#),
+            &[],
+        ),
+        (
+            "a rail along the lanes",
+            rail(r#"tStart="9" tEnd="8""#),
+            &[],
+        ),
+        (
+            "a rail between them",
+            rail(r#"tStart="0.2" tEnd="-0.2""#),
+            &[],
+        ),
+        (
+            "a rail that closes a side",
+            rail(r#"tStart="9" tEnd="0""#),
+            &[],
+        ),
+        (
+            "a rail across all of them",
+            rail(r#"tStart="9" tEnd="-9""#),
+            clear,
+        ),
+        (
+            "a barrier across the road",
+            rail(r#"tStart="9" tEnd="-9""#).replace(r#"length="50""#, r#"length="1""#),
+            &[],
+        ),
+        (
+            "far away at its end",
+            poles(r#"tStart="9" tEnd="900""#),
+            &["warning road_roadside_near_road"],
+        ),
+    ];
+    crate::run(&rows);
+}
