@@ -1,14 +1,17 @@
 use foldhash::HashSet;
-use qcbus_opendrive::{ContactPoint, Junction, JunctionType, Road, RoadLink, RoadMap};
+use qcbus_opendrive::{
+    ContactPoint, Junction, JunctionType, Road, RoadContact, RoadEnd, RoadLink, RoadMap,
+};
 use qcbus_sdk::{Rule, Sink};
 
-use crate::families::on_road::OnRoad;
+use crate::families::on_road::{MAX_PLACES, OnRoad};
+use crate::families::unlinked_arms::UnlinkedArms;
 use crate::model::Roads;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_junctions_incoming_road_linked",
     uids: &["qcbus.dev:xodr:1.4.0:junctions.incoming_road_linked"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("junctions_incoming_road_linked.md"),
     run,
@@ -16,6 +19,45 @@ pub static RULE: Rule<Roads> = Rule {
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    for (arm, links) in UnlinkedArms::of(map).iter() {
+        unlinked(map, arm, links, found);
+    }
+    one_of_several(map, found);
+}
+
+/// A road that leads into a junction, and is linked to nothing or to another junction.
+fn unlinked(map: &RoadMap<'_>, arm: RoadEnd, links: &[RoadContact<'_>], found: &mut Sink<'_>) {
+    let first = links.first().and_then(|link| map.road_at(link.from.road));
+    let (Some(road), Some(connecting)) = (map.road_at(arm.road), first) else {
+        return;
+    };
+    let name = arm.end.link_name();
+    let id = road.id();
+    let (place, says) = match road.link(arm.end) {
+        None => (road.node(), format!("road `{id}` has no {name}")),
+        Some(link) => {
+            let other = link.junction_id().unwrap_or_default();
+            let says = format!("the {name} of road `{id}` is junction `{other}`");
+            (link.node(), says)
+        }
+    };
+    let junction = connecting.junction().unwrap_or_default();
+    let text = format!(
+        "{says}, but it is an incoming road of junction `{junction}`, whose road `{}` meets its {}; an incoming road \
+         must be linked to the junction, else the ways on from there cannot be found",
+        connecting.id(),
+        arm.end
+    );
+    let mut finding = found.issue(place, text).at_end(road, arm.end);
+    for link in links.iter().take(MAX_PLACES) {
+        let from = map.road_at(link.from.road).map_or("", |road| road.id());
+        finding = finding.at(link.node, format!("the link of road `{from}`"));
+    }
+    finding.also_violates("asam.net:xodr:1.9.0:road.linkage.both_sides_consistency");
+}
+
+/// A road that is linked to one of several roads of a junction.
+fn one_of_several(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     // The first connecting road that is seen from each incoming road, and who is told about.
     let mut first = foldhash::HashMap::default();
     let mut told = HashSet::default();

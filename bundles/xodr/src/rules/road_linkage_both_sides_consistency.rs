@@ -1,9 +1,10 @@
 use std::collections::BTreeSet;
 
-use qcbus_opendrive::{ContactPoint, Junction, JunctionType, Road, RoadLink, RoadMap};
+use qcbus_opendrive::{ContactPoint, Junction, JunctionType, Road, RoadEnd, RoadLink, RoadMap};
 use qcbus_sdk::{Backport, Place, Rule, Sink};
 
 use crate::families::link_sides::{Known, agrees, in_virtual_junction};
+use crate::families::unlinked_arms::UnlinkedArms;
 use crate::model::Roads;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -20,10 +21,20 @@ pub static RULE: Rule<Roads> = Rule {
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     direct_junctions(map, found);
     let known = Known::by(map);
+    // `junctions.incoming_road_linked` speaks of them.
+    let unlinked = UnlinkedArms::of(map);
     let mut told = BTreeSet::new();
     for road in map.roads() {
         for end in ContactPoint::BOTH {
             let Some(link) = road.link(end) else { continue };
+            let at = RoadEnd {
+                road: road.index(),
+                end,
+            };
+            let linked = map.linked_end(road, end).map(|contact| contact.to);
+            if unlinked.contains(at) || linked.is_some_and(|to| unlinked.contains(to)) {
+                continue;
+            }
             if let Some(id) = link.junction_id() {
                 to_junction(map, (road, end), link, (id, &known), found);
             } else if let Some(id) = link.road_id() {

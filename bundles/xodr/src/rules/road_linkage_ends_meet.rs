@@ -8,6 +8,7 @@ use crate::families::gap_levels::GAP_BROKEN_FROM;
 use crate::families::mouths;
 use crate::families::on_road::OnRoad;
 use crate::families::shown::beside;
+use crate::families::unlinked_arms::UnlinkedArms;
 use crate::families::virtual_links::leads_to_main_road;
 use crate::model::Roads;
 
@@ -56,9 +57,17 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let junction = contact.junction.or_else(|| junction_of(map, one));
         joined.extend(junction.into_iter().flat_map(|at| [(at, one), (at, other)]));
     }
+    // `junctions.incoming_road_linked` speaks of them.
+    let unlinked = UnlinkedArms::of(map);
     for road in map.roads() {
         for end in ContactPoint::BOTH {
-            junction(map, (road, end), &joined, found);
+            let at = RoadEnd {
+                road: road.index(),
+                end,
+            };
+            if !unlinked.contains(at) {
+                junction(map, (road, end), &joined, found);
+            }
         }
     }
 }

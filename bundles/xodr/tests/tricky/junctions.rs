@@ -212,7 +212,7 @@ fn common() {
                 ..Common::new()
             }
             .text(),
-            &["error road_linkage_both_sides_consistency"],
+            &["error junctions_incoming_road_linked"],
         ),
         (
             "left-hand traffic, linked as if it were right-hand",
