@@ -57,28 +57,36 @@ impl Schema {
         self.roots.iter().find(|root| root.name == id)
     }
 
+    /// Whether elements of this name may contain children of that name.
+    pub(crate) fn knows_child(&self, parent: &str, child: &str) -> bool {
+        let (Some(parent), Some(child)) = (self.names.find(parent), self.names.find(child)) else {
+            return false;
+        };
+        let mut homes = self.declared().filter(|element| element.name == parent);
+        homes.any(|element| self.is_home(element, child))
+    }
+
+    /// All declarations of elements.
+    fn declared(&self) -> impl Iterator<Item = &ElementDecl> {
+        let within = self.complex.iter().flat_map(|ty| ty.content.children());
+        self.roots.iter().chain(within)
+    }
+
+    /// Whether an element may contain children of this name.
+    fn is_home(&self, element: &ElementDecl, child: NameId) -> bool {
+        let holds = |ty: &ComplexType| ty.content.children().iter().any(|one| one.name == child);
+        let others = element.alternatives.iter().map(|other| other.ty);
+        others.chain([element.ty]).any(|ty| match ty {
+            TypeRef::Complex(id) => self.complex.get(id as usize).is_some_and(holds),
+            _ => false,
+        })
+    }
+
     /// Names of elements that may contain a child of this name, at most four, for messages.
     pub(crate) fn parents_of(&self, child: NameId) -> Vec<&str> {
-        let holds = |ty: &ComplexType| ty.content.children().iter().any(|one| one.name == child);
-        let is_home = |element: &ElementDecl| {
-            let types = element
-                .alternatives
-                .iter()
-                .map(|other| other.ty)
-                .chain([element.ty]);
-            types.into_iter().any(|ty| match ty {
-                TypeRef::Complex(id) => self.complex.get(id as usize).is_some_and(holds),
-                _ => false,
-            })
-        };
         let mut homes = Vec::new();
-        let declared = self.complex.iter().flat_map(|ty| ty.content.children());
-        for element in self
-            .roots
-            .iter()
-            .chain(declared)
-            .filter(|element| is_home(element))
-        {
+        let declared = self.declared();
+        for element in declared.filter(|element| self.is_home(element, child)) {
             let name = self.names.text(element.name);
             if !homes.contains(&name) && homes.len() < 4 {
                 homes.push(name);

@@ -92,6 +92,24 @@ pub fn version_of(document: &Document<'_>, kind: FileKind) -> Option<Version> {
     })
 }
 
+/// Whether another version than that of this schema knows such a child: then it is no slip of the pen.
+pub(crate) fn is_known_elsewhere(schema: &Schema, parent: &str, child: &str) -> bool {
+    let is_own = |one: &&Shipped| {
+        let loaded = one.loaded.get().and_then(|loaded| loaded.as_ref().ok());
+        loaded.is_some_and(|loaded| std::ptr::eq(loaded, schema))
+    };
+    // To the user's own schemas there are no others.
+    let Some(own) = SHIPPED.iter().find(is_own) else {
+        return false;
+    };
+    let of_kind = SHIPPED.iter().filter(|one| one.kind == own.kind);
+    let mut others = of_kind.filter(|one| one.version != own.version);
+    others.any(|one| {
+        let other = one.schema();
+        other.is_ok_and(|other| other.knows_child(parent, child))
+    })
+}
+
 /// Why no schema applies.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SkipReason {

@@ -332,6 +332,36 @@ fn what_a_later_version_of_opendrive_has_is_said_once() {
 }
 
 #[test]
+fn what_came_later_is_no_slip_of_the_pen() {
+    let outlines = "<outlines><outline id=\"0\"><cornerLocal u=\"0\" v=\"0\" z=\"0\" height=\"1\"/></outline></outlines>";
+    let text = map("revMajor=\"1\" revMinor=\"4\"", "").replace(
+        "</road>",
+        &format!("<objects><object id=\"1\" s=\"0\" t=\"0\" zOffset=\"0\">{outlines}</object></objects></road>"),
+    );
+    let bytes = image("t.xodr", &text);
+    let Outcome::Checked(checked) = check(&open(&bytes), FileKind::Xodr, &Options::default())
+    else {
+        panic!("a version with a schema");
+    };
+    assert!(checked.later.is_some_and(|later| later.version.minor == 5));
+    let texts = checked.violations.iter().map(|one| &one.text);
+    let texts: Vec<_> = texts.filter(|text| text.contains("outline")).collect();
+    assert!(texts.is_empty(), "{texts:?}");
+    // What no version knows may be one.
+    let slip = text.replace("outlines>", "outlin>");
+    let bytes = image("t.xodr", &slip);
+    let Outcome::Checked(checked) = check(&open(&bytes), FileKind::Xodr, &Options::default())
+    else {
+        panic!("a version with a schema");
+    };
+    let mut meant = checked
+        .violations
+        .iter()
+        .map(|one| one.suggestion.as_deref());
+    assert!(meant.any(|meant| meant == Some("outline")));
+}
+
+#[test]
 fn lights_of_openscenario_1_2_are_alternatives() {
     let schema = support::table("xosc-1.2");
     let scenario = |light: &str| {

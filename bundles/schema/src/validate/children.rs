@@ -173,11 +173,10 @@ impl<'a, 's> Walk<'a, 's> {
         }
         let here = model.edges(state);
         let schema = self.schema;
-        let written = (node.name(), node.name_number());
         let Meant {
             here: meant,
             anywhere: suggestion,
-        } = self.memo.child(written, (model, state), &schema.names);
+        } = self.memo.child((node, parent), (model, state), schema);
         steps(here.len());
         let key = (
             std::ptr::from_ref(model) as usize,
@@ -222,8 +221,7 @@ impl<'a, 's> Walk<'a, 's> {
             return None;
         }
         let schema = self.schema;
-        let written = (node.name(), node.name_number());
-        let meant = self.memo.member(written, model, &schema.names);
+        let meant = self.memo.member((node, parent), model, schema);
         // One that is there already was not meant.
         let open = |name: &&str| {
             let index = model

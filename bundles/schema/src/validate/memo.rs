@@ -3,11 +3,14 @@
 use std::collections::HashMap;
 use std::rc::Rc;
 
+use qcbus_document::Node;
+
 use super::children::{Way, way_to};
 use super::limit;
-use crate::model::{AllModel, Model};
-use crate::names::{NameId, Names};
+use crate::model::{AllModel, Model, Schema};
+use crate::names::NameId;
 use crate::similar::closest;
+use crate::versions::is_known_elsewhere;
 use crate::work::steps;
 
 /// Answers kept; a schema and a document together seldom have more than a few dozen.
@@ -65,14 +68,16 @@ impl<'s> Memo<'s> {
             .or_insert_with(|| limit::most(model, name))
     }
 
-    /// What a child unknown to a model was probably meant to be; `number` is the document's for
-    /// its name. Once too many were asked for, nothing.
+    /// What a child unknown to a model was probably meant to be: nothing but itself where another
+    /// version knows it. Once too many were asked for, nothing.
     pub(super) fn child(
         &mut self,
-        (name, number): (&str, u16),
+        (node, parent): (Node<'_>, Node<'_>),
         (model, state): (&'s Model, u16),
-        names: &'s Names,
+        schema: &'s Schema,
     ) -> Meant<'s> {
+        let (name, number) = (node.name(), node.name_number());
+        let names = &schema.names;
         let key = (std::ptr::from_ref(model) as usize, state, number);
         self.known(key, || {
             let edges = model.edges(state);
@@ -80,6 +85,9 @@ impl<'s> Memo<'s> {
             let here = closest(name, edges.iter().map(|edge| names.text(edge.name)));
             let all = model.children.iter().map(|child| names.text(child.name));
             let anywhere = here.or_else(|| closest(name, all));
+            if anywhere.is_some() && is_known_elsewhere(schema, parent.name(), name) {
+                return Meant::default();
+            }
             Meant { here, anywhere }
         })
     }
@@ -87,16 +95,20 @@ impl<'s> Memo<'s> {
     /// The same for a member of an `all` group.
     pub(super) fn member(
         &mut self,
-        (name, number): (&str, u16),
+        (node, parent): (Node<'_>, Node<'_>),
         model: &'s AllModel,
-        names: &'s Names,
+        schema: &'s Schema,
     ) -> Option<&'s str> {
+        let (name, number) = (node.name(), node.name_number());
+        let names = &schema.names;
         let key = (std::ptr::from_ref(model) as usize, 0, number);
         let meant = self.known(key, || {
             steps(model.members.len());
             let all = model.members.iter().map(|member| names.text(member.name));
+            let here =
+                closest(name, all).filter(|_| !is_known_elsewhere(schema, parent.name(), name));
             Meant {
-                here: closest(name, all),
+                here,
                 anywhere: None,
             }
         });
