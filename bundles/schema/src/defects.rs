@@ -166,6 +166,15 @@ pub(crate) fn attribute(code: Code, attribute: Attribute<'_>, title: &str) -> Op
                 "it knows level at the lanes on both sides, but not at the center lane, where files have it as well",
             )
         }
+        (Code::UnexpectedAttribute, "OpenDRIVE 1.2")
+            if attribute.name() == "laneChange"
+                && attribute.node().is("roadMark")
+                && attribute.node().parent().is_some_and(is_in_center) =>
+        {
+            Some(
+                "it knows laneChange at the lanes on both sides, but not at the center lane, where it means the same",
+            )
+        }
         (Code::UnexpectedAttribute, "OpenDRIVE 1.1" | "OpenDRIVE 1.2")
             if attribute.name() == "signalId" && attribute.node().is("control") =>
         {
@@ -215,6 +224,14 @@ fn value(attribute: Attribute<'_>, title: &str) -> Option<&'static str> {
         ("OpenDRIVE 1.1", "type") if node.is("object") && is_word(word) => Some(
             "it has numbers for the types of objects, where files and the later versions have words",
         ),
+        ("OpenDRIVE 1.1", "type") if node.is("signal") && is_word(word) => Some(
+            "it has numbers for the types of signals, where files and the later versions have words",
+        ),
+        ("OpenDRIVE 1.1", "id") if (node.is("object") || node.is("signal")) && is_word(word) => {
+            Some(
+                "it has numbers for the ids of objects and signals, where files and the later versions have any text",
+            )
+        }
         ("OpenDRIVE 1.1", "level") if node.is("lane") && matches!(word, "true" | "false") => {
             Some("it has numbers for level, where the standard and all files have true and false")
         }
