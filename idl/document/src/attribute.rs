@@ -61,6 +61,20 @@ impl<'a> Attribute<'a> {
         value.unwrap_or("")
     }
 
+    /// The bytes of the value, without the price of looking whether they are UTF-8: for a first glance.
+    #[inline]
+    pub fn value_bytes(&self) -> &'a [u8] {
+        let record = self.record;
+        let delta = record.value_delta.get();
+        if delta == 0 {
+            return self.value().as_bytes();
+        }
+        let offset = record.offset.get().checked_add(u32::from(delta));
+        let text = offset.and_then(|offset| self.node.document().text_from(offset));
+        text.and_then(|text| text.get(..record.value_len.get() as usize))
+            .unwrap_or(&[])
+    }
+
     /// Offset of the name in the image's text.
     pub fn offset(&self) -> u32 {
         self.record.offset.get()

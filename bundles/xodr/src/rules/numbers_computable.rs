@@ -44,7 +44,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         .flat_map(|node| node.attributes());
     let mut measured = Measured::default();
     let mut odd: Vec<Odd<'_>> = attributes
-        .filter(|attribute| measured.has(*attribute) && is_suspicious(attribute.value()))
+        .filter(|attribute| measured.has(*attribute) && is_suspicious(attribute.value_bytes()))
         .filter_map(|attribute| Odd::of(attribute, attribute.value(), found))
         .collect();
     odd.extend(of_grids(map, found));
