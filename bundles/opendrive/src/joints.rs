@@ -294,8 +294,14 @@ impl<'a> RoadMap<'a> {
     /// The statements of the lanes of one road; see [`RoadMap::lane_joints`].
     pub fn joints_of<'m>(&'m self, road: &'m Road<'a>) -> &'m [LaneJoint<'a>] {
         road.joints.get_or_init(|| {
-            let mut joints = Vec::new();
-            for lane in road.sections().flat_map(SectionRef::lanes) {
+            let lanes = || road.sections().flat_map(SectionRef::lanes);
+            // Memory that is taken and not needed costs more than to count.
+            let links = |lane: LaneRef<'_, 'a>| {
+                let ends = ContactPoint::BOTH.map(|end| lane.links(end).count());
+                ends.into_iter().sum::<usize>()
+            };
+            let mut joints = Vec::with_capacity(lanes().map(links).sum());
+            for lane in lanes() {
                 for end in ContactPoint::BOTH {
                     self.collect_links(lane, end, &mut joints);
                 }
