@@ -1,6 +1,6 @@
 use qcbus_document::{Document, Node};
 use qcbus_opendrive::is_user_data;
-use qcbus_sdk::{Rule, Sink};
+use qcbus_sdk::{Rule, Sink, Version};
 
 use crate::families::object_parts::listed;
 use crate::families::own_schema::OwnSchema;
@@ -9,6 +9,7 @@ use crate::families::vocabularies::{VOCABULARIES, Vocabulary};
 pub static RULE: Rule<Document> = Rule {
     id: "check_qcbus_xodr_words_are_known",
     uids: &["qcbus.dev:xodr:1.0.0:words.are_known"],
+    versions: "..1.7.0",
     after: super::READABLE,
     page: include_str!("words_are_known.md"),
     run,
@@ -16,6 +17,14 @@ pub static RULE: Rule<Document> = Rule {
 };
 
 fn run(document: &Document<'_>, found: &mut Sink<'_>) {
+    // Their schemas list all of these words, as those from 1.7 on do.
+    let lists_all = [(1, 4), (1, 5)].map(|(major, minor)| Version::new(major, minor));
+    if found
+        .version()
+        .is_some_and(|version| lists_all.contains(&version))
+    {
+        return;
+    }
     let schema = OwnSchema::new(*document);
     for vocabulary in VOCABULARIES {
         for name in vocabulary.elements {
