@@ -44,3 +44,12 @@ fn faults_of_another_hand_are_found_as_well() {
     ];
     run("bundles/xodr/tests/held-out", lists, "held-out-maps.md", 90);
 }
+
+#[test]
+fn faults_that_nobody_had_seen_are_found() {
+    let lists = [
+        include_str!("fresh/faults.txt"),
+        include_str!("fresh/harmless.txt"),
+    ];
+    run("bundles/xodr/tests/fresh", lists, "fresh-maps.md", 80);
+}

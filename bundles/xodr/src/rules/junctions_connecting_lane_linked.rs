@@ -20,7 +20,7 @@ const NEAR: Param = Param::number(
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_junctions_connecting_lane_linked",
     uids: &["qcbus.dev:xodr:1.4.0:junctions.connecting_lane_linked"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     params: &[NARROW, NEAR],
     page: include_str!("junctions_connecting_lane_linked.md"),

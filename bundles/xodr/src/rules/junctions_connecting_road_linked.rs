@@ -9,7 +9,7 @@ use crate::model::Roads;
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_junctions_connecting_road_linked",
     uids: &["qcbus.dev:xodr:1.4.0:junctions.connecting_road_linked"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     params: &[NARROW],
     page: include_str!("junctions_connecting_road_linked.md"),

@@ -10,7 +10,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_junctions_connecting_road_used",
     uids: &["qcbus.dev:xodr:1.4.0:junctions.connecting_road_used"],
     level: Level::Warning,
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("junctions_connecting_road_used.md"),
     run,

@@ -9,7 +9,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_junctions_connection_lane_link_once",
     uids: &["qcbus.dev:xodr:1.4.0:junctions.connection.lane_link_once"],
     level: Level::Warning,
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("junctions_connection_lane_link_once.md"),
     run,

@@ -10,7 +10,7 @@ use crate::model::Roads;
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_junctions_connection_lane_links_agree",
     uids: &["qcbus.dev:xodr:1.4.0:junctions.connection.lane_links_agree"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     params: &[NARROW],
     page: include_str!("junctions_connection_lane_links_agree.md"),

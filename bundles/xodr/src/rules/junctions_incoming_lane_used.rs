@@ -10,7 +10,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_junctions_incoming_lane_used",
     uids: &["qcbus.dev:xodr:1.4.0:junctions.incoming_lane_used"],
     level: Level::Warning,
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     params: &[NARROW],
     page: include_str!("junctions_incoming_lane_used.md"),

@@ -11,7 +11,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_junctions_outgoing_lane_reached",
     uids: &["qcbus.dev:xodr:1.4.0:junctions.outgoing_lane_reached"],
     level: Level::Warning,
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     params: &[NARROW],
     page: include_str!("junctions_outgoing_lane_reached.md"),

@@ -8,7 +8,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_junctions_priority_acyclic",
     uids: &["qcbus.dev:xodr:1.4.0:junctions.priority.acyclic"],
     level: Level::Warning,
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("junctions_priority_acyclic.md"),
     run,

@@ -7,7 +7,7 @@ use crate::model::{Part, Roads};
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_lane_link_center_lane",
     uids: &["qcbus.dev:xodr:1.4.0:road.lane.link.center_lane"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("road_lane_link_center_lane.md"),
     each: Some(each),

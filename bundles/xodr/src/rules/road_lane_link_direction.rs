@@ -16,7 +16,7 @@ const FAR: Param = Param::number(
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_lane_link_direction",
     uids: &["qcbus.dev:xodr:1.4.0:road.lane.link.direction"],
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     params: &[FAR],
     page: include_str!("road_lane_link_direction.md"),

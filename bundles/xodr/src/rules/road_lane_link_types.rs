@@ -10,7 +10,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_lane_link_types",
     uids: &["qcbus.dev:xodr:1.4.0:road.lane.link.types"],
     level: Level::Warning,
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     params: &[NARROW],
     page: include_str!("road_lane_link_types.md"),

@@ -24,7 +24,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_linkage_touching_ends",
     uids: &["qcbus.dev:xodr:1.4.0:road.linkage.touching_ends"],
     level: Level::Warning,
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     params: &[NEAR, TURN, NARROW],
     page: include_str!("road_linkage_touching_ends.md"),

@@ -16,7 +16,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_network_connected",
     uids: &["qcbus.dev:xodr:1.4.0:road.network.connected"],
     level: Level::Warning,
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     params: &[SHARE],
     page: include_str!("road_network_connected.md"),

@@ -8,7 +8,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_network_drivable",
     uids: &["qcbus.dev:xodr:1.4.0:road.network.drivable"],
     level: Level::Warning,
-    versions: "1.4.0..",
+    versions: "1.1.0..",
     after: super::READABLE,
     page: include_str!("road_network_drivable.md"),
     run,
