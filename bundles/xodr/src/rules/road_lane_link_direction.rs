@@ -1,6 +1,6 @@
 use foldhash::HashSet;
-use qcbus_opendrive::{LaneJoint, LaneRef, RoadMap, Traffic};
-use qcbus_sdk::{Param, Rule, Sink};
+use qcbus_opendrive::{LaneJoint, LaneRef, RoadMap, Traffic, TrafficRule};
+use qcbus_sdk::{Param, Place, Rule, Sink};
 
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::routes::is_route;
@@ -26,6 +26,7 @@ pub static RULE: Rule<Roads> = Rule {
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let mut told = HashSet::default();
+    let mut told_roads = HashSet::default();
     for joint in map.roads().iter().flat_map(|road| map.joints_of(road)) {
         let lanes = map.lane(joint.from.lane).zip(map.lane(joint.to.lane));
         let are_routes = |(from, to): &(LaneRef<'_, '_>, LaneRef<'_, '_>)| {
@@ -37,11 +38,18 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let Some(collide) = against(joint, from, to) else {
             continue;
         };
-        let far = found.number(&FAR);
-        if !is_elsewhere(joint, from, to, far)
-            && told.insert((joint.from.min(joint.to), joint.from.max(joint.to)))
-        {
-            report(joint, from, to, collide, found);
+        if is_elsewhere(joint, from, to, found.number(&FAR)) {
+            continue;
+        }
+        // Roads of different rules are the fault, not each of their lanes.
+        let rules = rules(from, to);
+        let (one, other) = (from.at.road.index(), to.at.road.index());
+        let is_new = match rules {
+            Some(_) => told_roads.insert((one.min(other), one.max(other))),
+            None => told.insert((joint.from.min(joint.to), joint.from.max(joint.to))),
+        };
+        if is_new {
+            report(joint, from, to, (collide, rules), found);
         }
     }
 }
@@ -76,21 +84,44 @@ fn is_elsewhere(
     edges.is_some_and(|([one, _], [other, _])| one.point.plan().distance(other.point.plan()) > far)
 }
 
+/// The sides on which traffic keeps on two roads, if they differ.
+fn rules(from: LaneRef<'_, '_>, to: LaneRef<'_, '_>) -> Option<[&'static str; 2]> {
+    let (one, other) = (from.at.road.traffic_rule()?, to.at.road.traffic_rule()?);
+    let name = |rule| match rule {
+        TrafficRule::RightHand => "right-hand traffic",
+        TrafficRule::LeftHand => "left-hand traffic",
+    };
+    (one != other).then(|| [name(one), name(other)])
+}
+
 fn report(
     joint: &LaneJoint<'_>,
     from: LaneRef<'_, '_>,
     to: LaneRef<'_, '_>,
-    collide: &str,
+    (collide, rules): (&str, Option<[&str; 2]>),
     found: &mut Sink<'_>,
 ) {
+    let [one, other] = [from.at.road.id(), to.at.road.id()];
+    let because = match rules {
+        Some([here, there]) => {
+            format!(", because road `{one}` has {here} and road `{other}` {there} (`rule`)")
+        }
+        None => String::new(),
+    };
     let text = format!(
-        "the {} of {} is {}, but {collide}; lanes that are linked must have the same direction of travel",
+        "the {} of {} is {}, but {collide}{because}; lanes that are linked must have the same direction of travel",
         joint.from.end.link_name(),
         lane_name(from),
         lane_name(to)
     );
-    found
+    let mut finding = found
         .issue(joint.node, text)
         .at_lane_end(from, joint.from.end)
         .at(to.node(), "the linked lane");
+    if let Some([here, there]) = rules {
+        for (road, rule) in [(from.at.road.node(), here), (to.at.road.node(), there)] {
+            let place = Place::attribute_or_node(road, "rule");
+            finding = finding.at(place, format!("the road with {rule}"));
+        }
+    }
 }
