@@ -1,5 +1,6 @@
 use std::collections::BTreeMap;
 
+use foldhash::HashSet;
 use qcbus_document::Node;
 use qcbus_opendrive::{ContactPoint, RoadEnd, RoadMap};
 use qcbus_sdk::{Backport, Rule, Sink};
@@ -39,15 +40,9 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let Some(road) = map.road_at(end.road).filter(|_| !rest.is_empty()) else {
             continue;
         };
-        let named = links.iter().take(MAX_PLACES);
-        let mut ids: Vec<String> = named.map(|(id, _)| format!("`{id}`")).collect();
-        if links.len() > MAX_PLACES {
-            ids.push(format!("and {} more", links.len() - MAX_PLACES));
-        }
         let text = format!(
-            "the roads {} are all linked to the {} of road `{}`; only one may be linked to an end \
-             directly, more than one need a junction",
-            ids.join(", "),
+            "{} to the {} of road `{}`; only one may be linked to an end directly, more than one need a junction",
+            who(&links),
             end.end,
             road.id()
         );
@@ -56,4 +51,20 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             finding = finding.at(*link, format!("the link of road `{id}`"));
         }
     }
+}
+
+/// Who is linked there, each id once.
+fn who(links: &[(&str, Node<'_>)]) -> String {
+    let mut seen = HashSet::default();
+    let ids = links.iter().filter(|(id, _)| seen.insert(*id));
+    let mut ids: Vec<String> = ids.map(|(id, _)| format!("`{id}`")).collect();
+    if let [id] = ids.as_slice() {
+        return format!("{} links of roads with the id {id} lead", links.len());
+    }
+    if ids.len() > MAX_PLACES {
+        let more = ids.len() - MAX_PLACES;
+        ids.truncate(MAX_PLACES);
+        ids.push(format!("and {more} more"));
+    }
+    format!("the roads {} are all linked", ids.join(", "))
 }
