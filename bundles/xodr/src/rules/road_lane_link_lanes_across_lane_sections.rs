@@ -109,12 +109,30 @@ fn not_returned(part: MapPart<'_, '_>, found: &mut Sink<'_>) {
         );
         found
             .issue(to.node(), text)
-            .here(&format!(
-                "has no `{back}` with the id `{}`",
-                from.id_text().unwrap_or_default()
-            ))
+            .here(&what_it_says(map, joint, from, to))
             .at_lane_end(to, joint.to.end)
             .at(joint.node, "the link that is not returned");
+    }
+}
+
+/// What a lane that does not link back has there: a link of the right number may lead to the wrong end.
+fn what_it_says<'a>(
+    map: &RoadMap<'a>,
+    joint: &LaneJoint<'a>,
+    from: LaneRef<'_, 'a>,
+    to: LaneRef<'_, 'a>,
+) -> String {
+    let end = joint.to.end;
+    let (back, id) = (end.link_name(), from.id_text().unwrap_or_default());
+    let mut links = to.links(end);
+    let leads = links.any(|link| link.id().is_some() && link.id() == from.id());
+    let target = map.linked_end(to.at.road, end).map(|contact| contact.to);
+    match target.and_then(|target| Some((target.end, map.road_at(target.road)?))) {
+        Some((other, road)) if leads && !joint.is_within_road() => format!(
+            "its {back} `{id}` leads to the {other} of road `{}` (`contactPoint`), not back here",
+            road.id()
+        ),
+        _ => format!("has no `{back}` with the id `{id}`"),
     }
 }
 
