@@ -195,13 +195,27 @@ fn check(reference: &Reference, node: Node<'_>, defined: &Defined<'_>, found: &m
     };
     if !exists {
         let text = format!(
-            "`{}=\"{id}\"` of `{}` refers to an undefined {}{within}; a reference must name one that exists",
+            "`{}=\"{id}\"` of `{}` refers to an undefined {}{within}; a reference must name one that exists{}",
             reference.attribute,
             reference.element,
-            Kind::of(class).name
+            Kind::of(class).name,
+            of_another_type(reference, id, defined)
         );
         found.issue(Place::attribute_or_node(node, reference.attribute), text);
     }
+}
+
+/// What the id belongs to when only the type of what is named is mistaken.
+fn of_another_type(reference: &Reference, id: &str, defined: &Defined<'_>) -> String {
+    let Target::By(attribute, classes) = reference.target else {
+        return String::new();
+    };
+    let mut others = classes.iter();
+    let meant = others.find(|(_, class)| defined.anywhere(*class, id));
+    meant.map_or_else(String::new, |(word, class)| {
+        let name = Kind::of(*class).name;
+        format!("; there is a {name} `{id}`: `{attribute}=\"{word}\"` may be meant")
+    })
 }
 
 /// The outline that the border around a corner reference names.
