@@ -127,7 +127,7 @@ impl Checked<'_> {
     pub fn severity_of_rest(&self, rest: &Rest) -> Severity {
         match rest.known_schema_defect {
             _ if self.newer => Severity::Information,
-            true => Severity::Warning,
+            true => Severity::Information,
             false => Severity::Error,
         }
     }
@@ -136,7 +136,7 @@ impl Checked<'_> {
     pub fn severity(&self, violation: &Violation<'_>) -> Severity {
         match violation.known_schema_defect {
             _ if self.newer => Severity::Information,
-            Some(_) => Severity::Warning,
+            Some(_) => Severity::Information,
             None => Severity::Error,
         }
     }

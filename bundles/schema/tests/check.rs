@@ -295,7 +295,7 @@ fn words_for_the_numbers_of_the_first_schema_weigh_less_and_slips_do_not() {
     let said = weighed("1", &map("driving", "sidewalk"));
     assert!(
         said.iter()
-            .all(|(severity, ..)| *severity == Severity::Warning),
+            .all(|(severity, ..)| *severity == Severity::Information),
         "{said:?}"
     );
     // Of each kind one stands for all.
@@ -323,7 +323,11 @@ fn what_a_later_version_of_opendrive_has_is_said_once() {
     let levels: Vec<Severity> = said.iter().map(|(severity, ..)| *severity).collect();
     assert_eq!(
         levels,
-        [Severity::Warning, Severity::Warning, Severity::Error],
+        [
+            Severity::Information,
+            Severity::Information,
+            Severity::Error
+        ],
         "{said:?}"
     );
     assert_eq!(said[2].2, "`rule` of `road` 1.5");
