@@ -186,7 +186,6 @@ fn is_unreadable(violation: &Violation<'_>) -> bool {
 fn level(severity: Severity) -> Level {
     match severity {
         Severity::Error => Level::Error,
-        Severity::Warning => Level::Warning,
         Severity::Information => Level::Information,
     }
 }

@@ -47,9 +47,8 @@ pub struct Options {
 pub enum Severity {
     /// The file breaks its schema.
     Error,
-    /// The file breaks its schema in a point where the schema is known to be wrong.
-    Warning,
-    /// The file claims a version that no known schema describes.
+    /// The file breaks its schema in a point where the schema is known to be wrong, or claims a version that
+    /// no known schema describes.
     Information,
 }
 
