@@ -199,19 +199,28 @@ fn check(reference: &Reference, node: Node<'_>, defined: &Defined<'_>, found: &m
             reference.attribute,
             reference.element,
             Kind::of(class).name,
-            of_another_type(reference, id, defined)
+            of_another_type(reference, node, id, defined)
         );
         found.issue(Place::attribute_or_node(node, reference.attribute), text);
     }
 }
 
-/// What the id belongs to when only the type of what is named is mistaken.
-fn of_another_type(reference: &Reference, id: &str, defined: &Defined<'_>) -> String {
+/// What the id belongs to when only the type of what is named is mistaken: nothing refers to what it is in.
+fn of_another_type(
+    reference: &Reference,
+    node: Node<'_>,
+    id: &str,
+    defined: &Defined<'_>,
+) -> String {
     let Target::By(attribute, classes) = reference.target else {
         return String::new();
     };
     let mut others = classes.iter();
-    let meant = others.find(|(_, class)| defined.anywhere(*class, id));
+    let is_itself = |word: &str| {
+        let mut around = node.ancestors();
+        around.any(|one| one.is(word) && one.attr("id") == Some(id))
+    };
+    let meant = others.find(|(word, class)| defined.anywhere(*class, id) && !is_itself(word));
     meant.map_or_else(String::new, |(word, class)| {
         let name = Kind::of(*class).name;
         format!("; there is a {name} `{id}`: `{attribute}=\"{word}\"` may be meant")
