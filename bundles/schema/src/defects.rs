@@ -36,12 +36,37 @@ pub(crate) fn explanation(node: Node<'_>, condition: &str) -> Option<String> {
         }
         CONNECTION_IDS => "two <connection> of this junction have the same id",
         BORDER_AND_OFFSET => "lanes may be described by <laneOffset> or by <border>, not by both",
-        RADIUS => "an object has either radius, or both width and length, or none of them",
+        RADIUS => return Some(radius(node)),
         CROSS_SECTION => "<crossSectionSurface> excludes <superelevation> and <shape>",
         _ => return by_type(node, condition),
     };
     Some(fixed.to_owned())
 }
+
+/// What an object has of the attributes that exclude each other.
+fn radius(object: Node<'_>) -> String {
+    let there: Vec<&str> = ["radius", "width", "length"]
+        .into_iter()
+        .filter(|name| object.attribute(name).is_some())
+        .collect();
+    format!(
+        "it has {}, but an object has either radius, or both width and length, or none of them",
+        there.join(" and ")
+    )
+}
+
+/// What conditions demand of the distance of repeated objects, in words.
+const DISTANCES: [(&str, &str); 3] = [
+    ("(= repeat/@distance 0)", "0, for it goes on without gaps"),
+    (
+        "(> repeat/@distance 0)",
+        "greater than 0, for there are single copies",
+    ),
+    (
+        "(!= repeat/@distance 0)",
+        "other than 0, for there are single copies",
+    ),
+];
 
 /// The bans of children by the type of an object.
 fn by_type(node: Node<'_>, condition: &str) -> Option<String> {
@@ -63,8 +88,12 @@ fn by_type(node: Node<'_>, condition: &str) -> Option<String> {
         let distance = node
             .child("repeat")
             .and_then(|repeat| repeat.attr("distance"))?;
+        let allowed = DISTANCES
+            .iter()
+            .find(|(test, _)| condition.contains(test))
+            .map_or("another", |(_, allowed)| allowed);
         return Some(format!(
-            "the distance \"{distance}\" of <repeat> does not suit an object of type {ty}"
+            "the distance \"{distance}\" of <repeat> does not suit an object of type {ty}; it must be {allowed}"
         ));
     }
     Some(format!(

@@ -4,8 +4,10 @@
 use foldhash::HashMap;
 use qcbus_document::{Attribute, Document, FileKind, Node};
 
-use crate::model::{ComplexType, Content, Schema, TypeRef};
+use crate::assertion::Scope;
+use crate::model::{ComplexType, Content, ElementDecl, Schema, TypeRef};
 use crate::simple::{SimpleType, Variety};
+use crate::validate::NameMap;
 use crate::versions::{SHIPPED, Version, select};
 
 /// The complex type of every element of one document.
@@ -29,7 +31,12 @@ impl Typing {
         let declared = schema.root(root.name())?;
         set(&mut types, root, complex(declared.ty));
         // Which type a name stands for depends on the type around it, and files repeat few pairs.
-        let mut known: HashMap<(u32, u16), u32> = HashMap::default();
+        let mut known: HashMap<(u32, u16), Option<&ElementDecl>> = HashMap::default();
+        let names = NameMap::new(document, schema);
+        let scope = Scope {
+            document: *document,
+            names: names.ids(),
+        };
         for node in root.descendants() {
             let around = node.parent().map_or(UNKNOWN, |parent| get(&types, parent));
             if around == UNKNOWN {
@@ -38,6 +45,7 @@ impl Typing {
             let found = *known
                 .entry((around, node.name_number()))
                 .or_insert_with(|| child(schema, around, node.name()));
+            let found = found.map_or(UNKNOWN, |declared| complex(declared.chosen(node, &scope)));
             set(&mut types, node, found);
         }
         Some(Typing { schema, types })
@@ -87,9 +95,9 @@ impl Typing {
 }
 
 /// The types that one schema gives to a few elements of a document, each found on the way down from the root.
-#[derive(Debug, Clone, Copy)]
 pub(crate) struct FewTypes {
     schema: &'static Schema,
+    names: NameMap,
 }
 
 impl FewTypes {
@@ -101,25 +109,31 @@ impl FewTypes {
     ) -> Option<FewTypes> {
         let schema = select(kind, version).ok()?.schema;
         schema.root(document.root()?.name())?;
-        Some(FewTypes { schema })
+        let names = NameMap::new(document, schema);
+        Some(FewTypes { schema, names })
     }
 
     /// As [`Typing::value`].
-    pub(crate) fn value(self, attribute: Attribute<'_>) -> Option<ValueType> {
+    pub(crate) fn value(&self, attribute: Attribute<'_>) -> Option<ValueType> {
         value_of(self.schema, self.complex(attribute.node())?, attribute)
     }
 
     /// As [`Typing::declares`].
-    pub(crate) fn declares(self, node: Node<'_>) -> bool {
+    pub(crate) fn declares(&self, node: Node<'_>) -> bool {
         let around = node.parent().and_then(|parent| self.complex(parent));
         around.is_some_and(|around| has_child(self.schema, around, node.name()))
     }
 
-    fn complex(self, node: Node<'_>) -> Option<&'static ComplexType> {
+    fn complex(&self, node: Node<'_>) -> Option<&'static ComplexType> {
         let mut way: Vec<Node<'_>> = std::iter::once(node).chain(node.ancestors()).collect();
         let mut number = complex(self.schema.root(way.pop()?.name())?.ty);
+        let scope = Scope {
+            document: node.document(),
+            names: self.names.ids(),
+        };
         while let Some(next) = way.pop().filter(|_| number != UNKNOWN) {
-            number = child(self.schema, number, next.name());
+            let declared = child(self.schema, number, next.name());
+            number = declared.map_or(UNKNOWN, |declared| complex(declared.chosen(next, &scope)));
         }
         self.schema.complex.get(number as usize)
     }
@@ -159,14 +173,23 @@ fn complex(ty: TypeRef) -> u32 {
     }
 }
 
-/// The type of a child of this name within a type.
-fn child(schema: &Schema, around: u32, name: &str) -> u32 {
-    let declared = || {
-        let name = schema.names.find(name)?;
-        let content: &Content = &schema.complex.get(around as usize)?.content;
-        content.children().iter().find(|child| child.name == name)
-    };
-    declared().map_or(UNKNOWN, |declared| complex(declared.ty))
+/// What a type says of a child of this name.
+fn child<'s>(schema: &'s Schema, around: u32, name: &str) -> Option<&'s ElementDecl> {
+    let name = schema.names.find(name)?;
+    let content: &Content = &schema.complex.get(around as usize)?.content;
+    content.children().iter().find(|child| child.name == name)
+}
+
+impl ElementDecl {
+    /// The type of an element: the alternative that its attributes choose, the declared one where none does.
+    fn chosen(&self, node: Node<'_>, scope: &Scope<'_, '_>) -> TypeRef {
+        let mut alternatives = self.alternatives.iter();
+        let chosen = alternatives.find(|one| {
+            let test = one.test.as_ref();
+            test.is_none_or(|test| test.holds(node, scope))
+        });
+        chosen.map_or(self.ty, |one| one.ty)
+    }
 }
 
 /// Something that a type may have.

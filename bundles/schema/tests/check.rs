@@ -393,3 +393,66 @@ fn lights_of_openscenario_1_2_are_alternatives() {
     let faults = faults.filter(|one| one.known_schema_defect.is_none());
     assert_eq!(faults.count(), 1, "{:?}", report.violations);
 }
+
+#[test]
+fn words_that_a_later_version_has_are_of_that_version() {
+    let junction = |kind: &str| {
+        format!("<junction name=\"\" id=\"1\" type=\"{kind}\"><connection id=\"0\"/></junction>")
+    };
+    // In 1.8 the type of the element depends on the word.
+    let told = |version: &str, kind: &str| {
+        let said = weighed(version, &junction(kind));
+        let texts = said.into_iter().map(|(_, _, text)| text);
+        texts.filter(|text| text.contains(kind)).collect::<Vec<_>>()
+    };
+    assert_eq!(
+        told("6", "direct"),
+        ["`direct` as `type` of `junction` 1.7"]
+    );
+    assert_eq!(
+        told("7", "crossing"),
+        ["`crossing` as `type` of `junction` 1.8"]
+    );
+    assert!(told("7", "direct").is_empty());
+    assert_eq!(told("6", "dirext").len(), 1);
+}
+
+#[test]
+fn what_is_said_can_be_understood() {
+    let object = |attributes: &str, repeat: &str| {
+        let said = weighed(
+            "8",
+            &format!(
+                "<road length=\"9\" id=\"1\" junction=\"-1\"><planView>\
+                 <geometry s=\"0\" x=\"0\" y=\"0\" hdg=\"0\" length=\"9\"><line/></geometry></planView>\
+                 <lanes><laneSection s=\"0\"><center><lane id=\"0\" type=\"none\"/></center></laneSection></lanes>\
+                 <objects><object id=\"1\" s=\"1\" t=\"1\" zOffset=\"0\" {attributes}>{repeat}</object></objects></road>"
+            ),
+        );
+        let texts: Vec<String> = said.into_iter().map(|(_, _, text)| text).collect();
+        texts.join("\n")
+    };
+    let both = object("radius=\"1\" width=\"2\"", "");
+    assert!(
+        both.contains("it has radius and width, but an object has either radius"),
+        "{both}"
+    );
+    let repeat = "<repeat s=\"0\" length=\"9\" distance=\"0\" tStart=\"1\" tEnd=\"1\" heightStart=\"1\" \
+                  heightEnd=\"1\" zOffsetStart=\"0\" zOffsetEnd=\"0\"/>";
+    let dense = object("type=\"pole\"", repeat);
+    assert!(dense.contains("it must be greater than 0"), "{dense}");
+    let long = object("heading=\"1\"", "");
+    assert!(
+        long.contains("no attribute heading; did you mean \"hdg\"?"),
+        "{long}"
+    );
+    let dangling = weighed(
+        "8",
+        "<junction id=\"1\"><connection id=\"0\" incomingRoad=\"7\" connectingRoad=\"8\" contactPoint=\"start\"/></junction>",
+    );
+    let mut texts = dangling.iter().map(|(_, _, text)| text);
+    assert!(
+        texts.any(|text| text.contains("refers to nothing: no <road> has it as its id")),
+        "{dangling:?}"
+    );
+}

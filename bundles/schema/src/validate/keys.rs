@@ -119,7 +119,7 @@ impl<'a, 's> Keys<'a, 's> {
         mark
     }
 
-    pub(super) fn leave(&mut self, mark: Mark, reporter: &mut Reporter<'a, 's>) {
+    pub(super) fn leave(&mut self, mark: Mark, schema: &Schema, reporter: &mut Reporter<'a, 's>) {
         self.active.truncate(mark.from);
         self.from = mark.before;
         if !mark.scope {
@@ -144,12 +144,8 @@ impl<'a, 's> Keys<'a, 's> {
                     attribute.node(),
                     Some(attribute),
                     || {
-                        let key = scope
-                            .constraints
-                            .list
-                            .get(usize::from(to))
-                            .map_or("", |key| &key.name);
-                        wording::dangling(attribute, key)
+                        let key = scope.constraints.list.get(usize::from(to));
+                        wording::dangling(attribute, key, schema)
                     },
                 );
             }

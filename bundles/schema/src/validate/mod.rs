@@ -29,7 +29,7 @@ use crate::work::steps;
 use frame::{Body, Frame};
 use keys::{Keys, Opening};
 use memo::Memo;
-use names::NameMap;
+pub(crate) use names::NameMap;
 use reporter::Reporter;
 use types::Bindings;
 
@@ -179,7 +179,7 @@ impl<'a, 's> Walk<'a, 's> {
                 return;
             };
             self.complete(&frame);
-            self.keys.leave(frame.keys, &mut self.reporter);
+            self.keys.leave(frame.keys, self.schema, &mut self.reporter);
         }
     }
 

@@ -17,7 +17,7 @@ pub(super) enum AttributeName {
 }
 
 /// Looked up once per distinct name of the document.
-pub(super) struct NameMap {
+pub(crate) struct NameMap {
     ids: Vec<NameId>,
     marks: Vec<u8>,
     /// Whether any attribute of the document has a prefix.
@@ -29,7 +29,7 @@ const NAMESPACE: u8 = 1;
 const PREFIXED: u8 = 2;
 
 impl NameMap {
-    pub(super) fn new(document: &Document<'_>, schema: &Schema) -> Self {
+    pub(crate) fn new(document: &Document<'_>, schema: &Schema) -> Self {
         let mut map = Self {
             ids: Vec::new(),
             marks: Vec::new(),
@@ -72,7 +72,7 @@ impl NameMap {
             .unwrap_or(NameId::UNKNOWN)
     }
 
-    pub(super) fn ids(&self) -> &[NameId] {
+    pub(crate) fn ids(&self) -> &[NameId] {
         &self.ids
     }
 }

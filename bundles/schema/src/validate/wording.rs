@@ -5,6 +5,7 @@ use qcbus_document::{Attribute, Node};
 use super::memo::Memo;
 use super::types::XSI;
 use crate::assertion::Assertion;
+use crate::constraint::{Constraint, Step};
 use crate::defects;
 use crate::model::{AttributeUse, ElementDecl, Model, Schema};
 use crate::names::NameId;
@@ -414,6 +415,15 @@ pub(super) fn is_short_for(written: &str, name: &str) -> bool {
     written.len() >= 2 && name.starts_with(written)
 }
 
+/// Whether a name is another one with letters left out: `hdg` of `heading`, `curvStart` of `curvatureStart`.
+pub(super) fn is_abbreviation(name: &str, written: &str) -> bool {
+    let mut letters = written.chars();
+    let mut wanted = name.chars();
+    name.len() >= 3
+        && wanted.next() == letters.next()
+        && wanted.all(|one| letters.any(|letter| letter == one))
+}
+
 /// Attributes of an element that are looked at to name those it does not use.
 pub(super) const MAX_ATTRIBUTES: usize = 64;
 
@@ -443,7 +453,12 @@ pub(super) fn unexpected_attribute(
             .find(|name| is_short_for(attribute.name(), name))
             .cloned()
     };
-    let suggestion = suggestion.or_else(longer);
+    let shorter = || {
+        free.iter()
+            .find(|name| is_abbreviation(name, attribute.name()))
+            .cloned()
+    };
+    let suggestion = suggestion.or_else(longer).or_else(shorter);
     let list = match (&suggestion, free.as_slice()) {
         (Some(_), _) => String::new(),
         (None, []) if declared.is_empty() => ": it takes none".to_owned(),
@@ -557,7 +572,7 @@ pub(super) fn condition_failed(node: Node<'_>, assertion: &Assertion, schema: &S
     let condition = assertion.notation(&schema.names);
     let known = defects::condition(node, &condition);
     let text = match defects::explanation(node, &condition) {
-        Some(words) => format!("<{}> breaks a condition of its type: {words}", node.name()),
+        Some(words) => format!("<{}> is not as it must be: {words}", node.name()),
         None => format!(
             "<{}> breaks a condition of its type: {condition}",
             node.name()
@@ -586,9 +601,28 @@ pub(super) fn missing_key(node: Node<'_>, field: &str, key: &str) -> Wording {
     Wording::new("", text).expecting(vec![field.to_owned()])
 }
 
-pub(super) fn dangling(attribute: Attribute<'_>, key: &str) -> Wording {
+pub(super) fn dangling(
+    attribute: Attribute<'_>,
+    key: Option<&Constraint>,
+    schema: &Schema,
+) -> Wording {
+    let targets = key.iter().flat_map(|key| &key.paths);
+    let targets = targets.filter_map(|path| match path.last()? {
+        Step::Child(name) => Some(*name),
+        Step::Any => None,
+    });
+    let targets: Vec<String> = texts(targets, schema)
+        .iter()
+        .map(|name| format!("<{name}>"))
+        .collect();
+    let what = if targets.is_empty() {
+        "element".to_owned()
+    } else {
+        targets.join(" or ")
+    };
+    let field = key.map_or("key", |key| schema.names.text(key.field));
     let text = format!(
-        "{} {} of <{}> refers to nothing: no element has this value as its key ({key})",
+        "{} {} of <{}> refers to nothing: no {what} has it as its {field}",
         attribute.name(),
         quote(attribute.value()),
         attribute.node().name()
