@@ -38,11 +38,13 @@ fn check(road: &Road<'_>, object: &Object<'_>, outline: &Outline<'_>, found: &mu
     if !(4..=MOST).contains(&count) {
         return;
     }
-    // Without the last side if the outline is open.
-    let sides = if outline.closed() == Some(false) {
-        count - 1
-    } else {
-        count
+    if is_upright(&corners) {
+        return;
+    }
+    // Without the last side if the outline is open, as lines painted by old versions are without a word.
+    let sides = match outline.closed() {
+        Some(true) => count,
+        Some(false) | None => count - 1,
     };
     let side = |index: usize| Some((corners.get(index)?, corners.get((index + 1) % count)?));
     for one in 0..sides {
@@ -103,6 +105,31 @@ fn corners<'a>(outline: &Outline<'a>) -> Option<Vec<(Node<'a>, Point)>> {
         points.pop();
     }
     Some(points)
+}
+
+/// Whether the corners stand above each other: in the plan view a frame over the road is a line there and
+/// back, whose sides cross by what its legs lean.
+fn is_upright(corners: &[(Node<'_>, Point)]) -> bool {
+    let height = |node: &Node<'_>| {
+        let name = if node.is("cornerRoad") { "dz" } else { "z" };
+        node.f64(name).unwrap_or(0.0)
+    };
+    let heights = || corners.iter().map(|(node, _)| height(node));
+    let least = heights().fold(f64::INFINITY, f64::min);
+    let most = heights().fold(f64::NEG_INFINITY, f64::max);
+    // What stands reaches higher than it is wide, across its longest side.
+    let next = corners.iter().cycle().skip(1);
+    let sides = corners.iter().zip(next).map(|(one, next)| (one.1, next.1));
+    let lengths = sides.map(|(from, to)| (from.distance(to), from, to));
+    let Some((longest, from, to)) = lengths.max_by(|one, other| one.0.total_cmp(&other.0)) else {
+        return false;
+    };
+    let off = |point: Point| {
+        ((to.x - from.x) * (point.y - from.y) - (to.y - from.y) * (point.x - from.x)) / longest
+    };
+    let off = || corners.iter().map(|one| off(one.1));
+    let width = off().fold(f64::NEG_INFINITY, f64::max) - off().fold(f64::INFINITY, f64::min);
+    most - least > width
 }
 
 /// Whether two sides cross, each reaching to both sides of the other by more than rounding. Marks that
