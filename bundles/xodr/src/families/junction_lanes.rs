@@ -2,7 +2,8 @@
 
 use foldhash::HashSet;
 use qcbus_opendrive::{
-    ContactPoint, Junction, JunctionType, LaneEnd, LaneRef, Road, RoadEnd, RoadMap, Traffic,
+    Connection, ContactPoint, Junction, JunctionType, LaneEnd, LaneRef, Road, RoadEnd, RoadMap,
+    Traffic,
 };
 
 use super::routes::{is_route, lanes_at};
@@ -49,8 +50,37 @@ impl<'a> Used<'a> {
                 let roads = roads.into_iter().flatten();
                 used.whole.extend(roads.map(|id| (junction.index(), id)));
             }
+            if let Some(road) = connection.incoming_road().and_then(|id| map.road(id)) {
+                used.take_up(map, (junction, road), connection);
+            }
         }
         used
+    }
+
+    /// Takes up the lanes that lane links name as `from`. Where they lead may not exist, which is said elsewhere.
+    fn take_up(
+        &mut self,
+        map: &RoadMap<'a>,
+        (junction, road): (&Junction<'a>, &Road<'a>),
+        connection: Connection<'a>,
+    ) {
+        let target = connection.target_road().and_then(|id| map.road(id));
+        let touches = map.ends_at(junction, road);
+        // With both ends at the junction, the road that follows tells which is meant.
+        if touches == [true, true] && target.is_some() {
+            return;
+        }
+        let ends = ContactPoint::BOTH.into_iter().zip(touches);
+        for (end, _) in ends.filter(|(_, touches)| *touches) {
+            let at = RoadEnd {
+                road: road.index(),
+                end,
+            };
+            let named = connection.lane_links();
+            self.lanes.extend(
+                named.filter_map(|link| map.lane_at_road_end(at, link.from()?, link.from_layer())),
+            );
+        }
     }
 
     /// Whether a connection takes up all lanes of a road, or leads to all.
