@@ -14,6 +14,8 @@ pub(crate) struct Steps<T> {
     items: Vec<T>,
     /// Places in `items` in ascending order of start; empty when they are written so.
     order: Vec<u32>,
+    /// Where the items start, but for rounding; empty when `order` is.
+    starts: Vec<f64>,
     /// An item has no start: nobody can say where which item is valid.
     unplaced: bool,
 }
@@ -23,23 +25,43 @@ impl<T> Default for Steps<T> {
         Steps {
             items: Vec::new(),
             order: Vec::new(),
+            starts: Vec::new(),
             unplaced: false,
         }
     }
 }
 
+/// How far before its forerunner, in metres, an item may start and still count as one that starts at the
+/// same place: who rounds differently at two places means one, and of those the item listed later counts.
+const ROUNDING: f64 = 1e-6;
+
+/// Starts in ascending order, those as equal that are no farther than rounding before the one listed ahead.
+fn rounded<T: Starts>(items: &[T]) -> Vec<f64> {
+    let mut starts: Vec<f64> = items.iter().map(Starts::start).collect();
+    let mut last = f64::NEG_INFINITY;
+    for start in &mut starts {
+        if *start < last && last - *start <= ROUNDING {
+            *start = last;
+        }
+        last = *start;
+    }
+    starts
+}
+
 impl<T: Starts> Steps<T> {
     pub(crate) fn new(items: Vec<T>) -> Steps<T> {
         let unplaced = items.iter().any(|item| item.start().is_nan());
-        let mut order = Vec::new();
+        let (mut order, mut starts) = (Vec::new(), Vec::new());
         if !unplaced && !items.is_sorted_by(|one, next| one.start() <= next.start()) {
             order.extend(0..u32::try_from(items.len()).unwrap_or(u32::MAX));
-            let start = |at: &u32| items[*at as usize].start();
+            starts = rounded(&items);
+            let start = |at: &u32| starts[*at as usize];
             order.sort_by(|one, next| start(one).total_cmp(&start(next)));
         }
         Steps {
             items,
             order,
+            starts,
             unplaced,
         }
     }
@@ -96,7 +118,7 @@ impl<T: Starts> Steps<T> {
             self.items
                 .partition_point(|item| station.is_after(item.start()))
         } else {
-            let start = |at: &u32| self.items[*at as usize].start();
+            let start = |at: &u32| self.starts[*at as usize];
             self.order.partition_point(|at| station.is_after(start(at)))
         };
         started.checked_sub(1)
