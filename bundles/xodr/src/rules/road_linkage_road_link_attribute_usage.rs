@@ -1,3 +1,5 @@
+use std::cell::OnceCell;
+
 use qcbus_opendrive::{ContactPoint, Road, RoadLink, RoadMap};
 use qcbus_sdk::{Rule, Sink};
 
@@ -15,10 +17,16 @@ pub static RULE: Rule<Roads> = Rule {
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
+    // Needed for few maps.
+    let named = OnceCell::new();
+    let is_virtual = |road: &Road<'_>| {
+        let named = named.get_or_init(|| virtual_links::connecting_roads(map));
+        virtual_links::may_be_within(map, road) || named.contains(road.id())
+    };
     for road in map.part(part).roads() {
         for end in ContactPoint::BOTH {
             let Some(link) = road.link(end) else { continue };
-            let missing = missing(map, road, link);
+            let missing = missing(road, link, is_virtual);
             if missing.is_empty() || virtual_links::leads_to_main_road(map, road, link) {
                 continue;
             }
@@ -35,14 +43,16 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
 }
 
 /// The attributes that a link to a road lacks; without a type, it may lead to a junction.
-fn missing(map: &RoadMap<'_>, road: &Road<'_>, link: RoadLink<'_>) -> Vec<&'static str> {
+fn missing(
+    road: &Road<'_>,
+    link: RoadLink<'_>,
+    is_virtual: impl Fn(&Road<'_>) -> bool,
+) -> Vec<&'static str> {
     let has = |name: &str| link.node().attribute(name).is_some();
     let is_within = has("elementS") || has("elementDir");
     let wanted: &[(&str, &'static str)] = match link.element_type() {
         // The main road is touched somewhere within.
-        Some("road") if is_within && virtual_links::may_be_within(map, road) => {
-            &[("elementId", "`elementId`")]
-        }
+        Some("road") if is_within && is_virtual(road) => &[("elementId", "`elementId`")],
         Some("road") => &[
             ("elementId", "`elementId`"),
             ("contactPoint", "`contactPoint`"),

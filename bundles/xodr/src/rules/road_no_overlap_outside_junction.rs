@@ -114,6 +114,19 @@ fn friends(map: &RoadMap<'_>) -> HashSet<(usize, usize)> {
                 }
             }
         }
+        if junction.kind() == Some(JunctionType::Virtual) {
+            // Whatever these roads say about their junction.
+            let named = junction.connections();
+            let named = named.filter_map(|one| one.connecting_road());
+            let named: BTreeSet<&str> = named.take(MOST).collect();
+            let named: Vec<&str> = named.into_iter().collect();
+            for (at, one) in named.iter().enumerate() {
+                add(Some(one), junction.main_road());
+                for other in &named[at + 1..] {
+                    add(Some(one), Some(other));
+                }
+            }
+        }
     }
     for road in map.roads() {
         let junction = road.junction().and_then(|id| map.junction(id));
