@@ -1,6 +1,8 @@
 use qcbus_document::{Document, Node, ValueError};
 use qcbus_sdk::{Level, Place, Rule, Sink, Version};
 
+use crate::families::shown::{beside, number};
+
 pub static RULE: Rule<Document> = Rule {
     id: "check_qcbus_xodr_header_attributes",
     uids: &["qcbus.dev:xodr:1.0.0:header.attributes"],
@@ -9,6 +11,9 @@ pub static RULE: Rule<Document> = Rule {
     run,
     ..Rule::DEFAULTS
 };
+
+/// Up to this much less, in metres, a bound is the same as the other.
+const ROUNDING: f64 = 1e-9;
 
 /// The first version whose header table asks for ISO 8601.
 const ISO_DATES_SINCE: Version = Version::new(1, 6);
@@ -49,10 +54,12 @@ fn extent(header: Node<'_>, found: &mut Sink<'_>) {
     );
     for (greater, smaller) in [("north", "south"), ("east", "west")] {
         if let (Ok(most), Ok(least)) = (header.f64(greater), header.f64(smaller))
-            && most < least
+            && most < least - ROUNDING
         {
             let text = format!(
-                "`{greater}` is {most} m and less than `{smaller}`, which is {least} m; it must be the greater bound"
+                "`{greater}` is {} m and less than `{smaller}`, which is {} m; it must be the greater bound",
+                beside(most, least),
+                number(least)
             );
             found.issue(Place::attribute_or_node(header, greater), text);
         }
@@ -87,26 +94,19 @@ fn date(header: Node<'_>, found: &mut Sink<'_>) {
         no_such_day(header, date, found);
         return;
     }
-    let (level, fault) = match (is_iso_8601(date), is_iso_8601(&date.replacen(' ', "T", 1))) {
-        (true, _) => return,
-        // The standard prefers one form and allows all of ISO 8601.
-        (false, _) if is_other_iso_8601(date) => (
-            Level::Information,
-            "is written in a form of ISO 8601 that readers may not know; preferred is",
-        ),
-        (false, true) => (
-            Level::Information,
-            "is not written as ISO 8601 demands, such as",
-        ),
-        (false, false) => (
-            Level::Warning,
-            "is not written as ISO 8601 demands, such as",
-        ),
+    if is_iso_8601(date) {
+        return;
+    }
+    // The standard prefers one form and allows all of ISO 8601.
+    let fault = if is_other_iso_8601(date) {
+        "is written in a form of ISO 8601 that readers may not know; preferred is"
+    } else {
+        "is not written as ISO 8601 demands, such as"
     };
     let text = format!("the date `{date}` {fault} `2026-01-31T12:30:00`");
     found
         .issue(Place::attribute_or_node(header, "date"), text)
-        .level(level);
+        .level(Level::Information);
 }
 
 /// Before ISO 8601 was asked for, a date has any form. One that looks like it, though, should name a day that
