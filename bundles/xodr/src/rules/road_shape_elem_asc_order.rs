@@ -27,6 +27,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
 
 fn check(road: &Road<'_>, lateral: Node<'_>, found: &mut Sink<'_>) {
     let tolerance = found.number(&TOLERANCE);
+    let flat = is_flat(lateral);
     let mut last: Option<(Node<'_>, f64, f64)> = None;
     for shape in lateral.children_named("shape") {
         let (Ok(s), Ok(t)) = (shape.f64("s"), shape.f64("t")) else {
@@ -49,10 +50,14 @@ fn check(road: &Road<'_>, lateral: Node<'_>, found: &mut Sink<'_>) {
                 number(s),
                 number(t)
             );
-            found
+            let finding = found
                 .issue(Place::attribute_or_node(shape, by), text)
                 .road(road.id(), s, t)
                 .at(before, "the one listed before it");
+            if flat {
+                finding.level(Level::Warning);
+                return;
+            }
         } else if s <= last_s + tolerance && (t - last_t).abs() <= tolerance {
             // What says the same twice is wrong by form alone.
             let level = match ["a", "b", "c", "d"]
@@ -75,4 +80,11 @@ fn check(road: &Road<'_>, lateral: Node<'_>, found: &mut Sink<'_>) {
                 .at(before, "the one that never applies");
         }
     }
+}
+
+/// Whether the shape is 0 everywhere, in whatever order one reads it.
+fn is_flat(lateral: Node<'_>) -> bool {
+    let zero = |shape: &Node<'_>, name: &str| shape.f64(name).is_ok_and(|value| value == 0.0);
+    let mut shapes = lateral.children_named("shape");
+    shapes.all(|shape| ["a", "b", "c", "d"].iter().all(|name| zero(&shape, name)))
 }
