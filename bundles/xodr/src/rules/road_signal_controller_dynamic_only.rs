@@ -8,7 +8,7 @@ use crate::model::Roads;
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_signal_controller_dynamic_only",
     uids: &["qcbus.dev:xodr:1.1.0:road.signal.controller.dynamic_only"],
-    level: Level::Warning,
+    level: Level::Information,
     after: super::READABLE,
     page: include_str!("road_signal_controller_dynamic_only.md"),
     run,
