@@ -8,7 +8,7 @@ use crate::model::Roads;
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_profile_carla_ids",
     uids: &["qcbus.dev:xodr:1.4.0:profile.carla_ids"],
-    level: Level::Warning,
+    level: Level::Information,
     after: super::READABLE,
     default_on: false,
     page: include_str!("profile_carla_ids.md"),
