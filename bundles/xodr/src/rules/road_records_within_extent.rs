@@ -11,7 +11,7 @@ pub static RULE: Rule<Roads> = Rule {
     uids: &["qcbus.dev:xodr:1.0.0:road.records_within_extent"],
     level: Level::Warning,
     after: super::READABLE,
-    params: &[TOLERANCE, CLEAR],
+    params: &[TOLERANCE, ROADSIDE, CLEAR],
     page: include_str!("road_records_within_extent.md"),
     each: Some(each),
     ..Rule::DEFAULTS
@@ -19,6 +19,13 @@ pub static RULE: Rule<Roads> = Rule {
 
 const TOLERANCE: Param =
     Param::number("tolerance", 1e-3, "m", "how far beyond the end is accepted");
+
+const ROADSIDE: Param = Param::number(
+    "roadside",
+    0.05,
+    "m",
+    "how far beyond the end signals, references, tunnels and bridges are accepted",
+);
 
 const CLEAR: Param = Param::number(
     "clear",
@@ -126,7 +133,7 @@ struct Extent<'m> {
 impl Extent<'_> {
     /// Reports each element of this name that stands beyond the end.
     fn stands(&self, parent: Option<Node<'_>>, name: &'static str, found: &mut Sink<'_>) {
-        let limit = self.length + found.number(&TOLERANCE);
+        let limit = self.length + found.number(&ROADSIDE);
         for node in ascending::children(parent, name) {
             if self.begins_before(node, found) {
                 continue;
@@ -150,7 +157,7 @@ impl Extent<'_> {
 
     /// Reports each element of this name that reaches beyond the end.
     fn ends(&self, parent: Option<Node<'_>>, name: &'static str, found: &mut Sink<'_>) {
-        let limit = self.length + found.number(&TOLERANCE);
+        let limit = self.length + found.number(&ROADSIDE);
         for node in ascending::children(parent, name) {
             if self.begins_before(node, found) {
                 continue;
