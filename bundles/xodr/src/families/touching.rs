@@ -110,6 +110,13 @@ pub(crate) struct EdgeFault {
 }
 
 impl Pair<'_, '_> {
+    /// Whether one of the lanes is a kerb, which is lowered and bent where people and vehicles cross it.
+    pub fn is_kerb(&self) -> bool {
+        [self.from, self.to]
+            .iter()
+            .any(|lane| lane.kind() == Some("border"))
+    }
+
     fn worst(&self, fault: impl Fn([BorderPoint; 2]) -> Option<f64>) -> Option<EdgeFault> {
         let sides = ["left", "right"].into_iter().zip(self.touching.edges());
         let faults = sides.filter_map(|(side, edge)| {

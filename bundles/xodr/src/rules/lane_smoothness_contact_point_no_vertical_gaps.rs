@@ -35,7 +35,7 @@ pub static RULE: Rule<Roads> = Rule {
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     // In junctions it is a rule of its own: `junctions.connection.smooth_fit` and the like.
-    for pair in pairs(map.part(part)).filter(|pair| pair.at == Where::Roads) {
+    for pair in pairs(map.part(part)).filter(|pair| pair.at == Where::Roads && !pair.is_kerb()) {
         if !report_step(&pair, found) {
             report_roll(&pair, found);
         }

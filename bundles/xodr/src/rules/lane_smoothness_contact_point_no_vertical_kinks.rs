@@ -2,6 +2,7 @@ use qcbus_opendrive::{Road, RoadMap, Station};
 use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
 
 use crate::families::on_road::OnRoad;
+use crate::families::shown::number;
 use crate::families::touching::{GAP, STEP, Where, pairs};
 use crate::model::{Part, Roads};
 
@@ -28,11 +29,11 @@ pub static RULE: Rule<Roads> = Rule {
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let limit = found.number(&PITCH);
     for pair in pairs(map.part(part)) {
-        if pair.at
-            == (Where::Connection {
+        let has_grid = pair.at
+            == Where::Connection {
                 elevation_grid: true,
-            })
-        {
+            };
+        if has_grid || pair.is_kerb() {
             continue;
         }
         let edge = pair.pitch(found.number(&GAP), found.number(&STEP));
@@ -72,11 +73,12 @@ fn within(road: &Road<'_>, found: &mut Sink<'_>) {
         let is_step = (high - low).abs() > found.number(&STEP);
         if (after - before).abs() > limit && !is_step {
             let text = format!(
-                "the slope of road `{}` changes from {:.2} % to {:.2} % at s = {s}; it should not change by more \
+                "the slope of road `{}` changes from {:.2} % to {:.2} % at s = {}; it should not change by more \
                  than {:.2} % at once",
                 road.id(),
                 100.0 * before,
                 100.0 * after,
+                number(s),
                 100.0 * limit
             );
             found.issue(record.node(), text).on(road, s, 0.0);
