@@ -4,6 +4,8 @@ use qcbus_document::Node;
 use qcbus_opendrive::MapPart;
 use qcbus_sdk::{Level, Param, Place, Sink};
 
+use super::shown::{beside, number};
+
 /// What still counts as the same place.
 pub(crate) const TOLERANCE: Param = Param::number(
     "tolerance",
@@ -89,8 +91,10 @@ impl List<'_> {
     ) {
         let (name, by) = (node.name(), self.start);
         let text = format!(
-            "this `{name}` has {by} = {start}, but the one listed before it has {by} = {ahead}; \
-             `{name}` elements must be listed in ascending order of `{by}`"
+            "this `{name}` has {by} = {}, but the one listed before it has {by} = {}; `{name}` elements must be listed in \
+             ascending order of `{by}`",
+            beside(start, ahead),
+            number(ahead)
         );
         let finding = found.issue(Place::attribute_or_node(node, by), text);
         let finding = match self.from {
@@ -112,8 +116,9 @@ impl List<'_> {
     ) {
         let (name, by) = (node.name(), self.start);
         let text = format!(
-            "this `{name}` has {by} = {start} like the one listed before it, which therefore never \
-             applies; each must start after the one before"
+            "this `{name}` has {by} = {} like the one listed before it, which therefore never \
+             applies; each must start after the one before",
+            number(start)
         );
         let finding = found
             .issue(Place::attribute_or_node(node, by), text)

@@ -90,7 +90,7 @@ fn check<'a>(
     );
     let text = format!(
         "the validity spans the lanes {from} to {to}, but `orientation=\"{orientation}\"` of {} on a road \
-         with {hand} traffic allows {sign} lane ids only; for lanes of both sides it must be `none`",
+         with {hand} traffic allows {sign} lane ids only; for lanes of both sides `orientation` must be `none`",
         named(holder)
     );
     let mut finding = found.issue(validity, text).stands(map, place);

@@ -8,6 +8,7 @@ use qcbus_sdk::Sink;
 
 use super::gap_levels::Misfit;
 use super::on_road::OnRoad;
+use super::shown::number;
 use super::touching::STEP;
 
 /// The starts of all records but the first, with their elements.
@@ -27,9 +28,10 @@ pub(crate) fn elevation(road: &Road<'_>, found: &mut Sink<'_>) {
         let step = (after - before).abs();
         if step > limit {
             let text = format!(
-                "the elevation of road `{}` jumps from {before:.3} m to {after:.3} m at s = {s}; at most \
+                "the elevation of road `{}` jumps from {before:.3} m to {after:.3} m at s = {}; at most \
                  {limit} m is allowed",
-                road.id()
+                road.id(),
+                number(s)
             );
             let misfit = Misfit::step(step, found);
             misfit.put(found.issue(node, text)).on(road, s, 0.0);
@@ -88,9 +90,10 @@ fn report(
     let worst = steps.max_by(|one, other| one.1.total_cmp(&other.1));
     if let Some((t, step)) = worst.filter(|(_, step)| *step > limit) {
         let text = format!(
-            "the {what} of road `{}` jumps at s = {s}: the surface at t = {t:.2} by {step:.3} m; at most {limit} \
+            "the {what} of road `{}` jumps at s = {}: the surface at t = {t:.2} by {step:.3} m; at most {limit} \
              m is allowed",
-            road.id()
+            road.id(),
+            number(s)
         );
         let misfit = Misfit::step(step, found);
         misfit.put(found.issue(node, text)).on(road, s, t);

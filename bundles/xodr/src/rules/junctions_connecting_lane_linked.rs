@@ -84,9 +84,10 @@ fn check(
             continue;
         };
         let text = format!(
-            "{} of a connecting road goes on as {}, but has no {}, so that routes end there; lanes of connecting roads \
+            "lane `{}` of the connecting road `{}` goes on as {}, but has no {}, so that routes end there; lanes of connecting roads \
              must be linked at both ends",
-            lane_name(lane),
+            lane.id_text().unwrap_or_default(),
+            road.id(),
             lane_name(next),
             end.link_name()
         );

@@ -42,10 +42,10 @@ fn against_traffic(map: &RoadMap<'_>, joint: &LaneJoint<'_>, found: &mut Sink<'_
     };
     let leaves = |lane, end| !Traffic::of(lane).may_run_towards(end);
     let (lane, end, fault) = if leaves(from, joint.from.end) {
-        let fault = "traffic on the former leads out of the junction";
+        let fault = "traffic there leads out of the junction".to_owned();
         (from, joint.from.end, fault)
     } else if leaves(to, joint.to.end.other()) {
-        let fault = "traffic on the latter leads back to where it came from";
+        let fault = format!("{} runs towards the junction as well", lane_name(to));
         (to, joint.to.end, fault)
     } else {
         return;

@@ -7,6 +7,7 @@ use qcbus_sdk::{Level, Param, Rule, Sink};
 use crate::families::driving::is_drivable;
 use crate::families::gap_levels::GAP_BROKEN_FROM;
 use crate::families::on_road::{OnRoad, lane_name};
+use crate::families::shown::number;
 use crate::families::traffic_lanes::is_for_traffic;
 use crate::model::{Part, Roads};
 
@@ -120,10 +121,11 @@ fn report(
 ) {
     let s = lane.at.s().unwrap_or(0.0) + ds;
     let text = format!(
-        "an edge of {} jumps sideways by {:.3} m at s = {s}, where this `{}` begins; within a lane section drivable \
+        "an edge of {} jumps sideways by {:.3} m at s = {}, where this `{}` begins; within a lane section drivable \
          lanes should have no gaps (at most {} m)",
         lane_name(lane),
         gap.abs(),
+        number(s),
         node.name(),
         found.number(&GAP)
     );

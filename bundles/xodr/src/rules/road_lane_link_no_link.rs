@@ -79,17 +79,18 @@ fn check<'a>(
         .iter()
         .filter_map(|(lane, _)| lane.id_text())
         .collect();
-    let what = if is_temporary {
-        "temporary lanes"
-    } else {
-        "lanes"
+    let what = match (is_temporary, lanes.len()) {
+        (true, 1) => "the temporary lane",
+        (true, _) => "the temporary lanes",
+        (false, 1) => "lane",
+        (false, _) => "the lanes",
     };
     let text = format!(
-        "{what} of road `{}` have a {} at the {end} of the road ({}), but {why}; such links must be \
-         omitted",
+        "{what} {} of road `{}` {} a {} at its {end}, but {why}; such links must be omitted",
+        lanes.join(", "),
         road.id(),
-        end.link_name(),
-        lanes.join(", ")
+        if lanes.len() == 1 { "has" } else { "have" },
+        end.link_name()
     );
     let finding = found.issue(first.node(), text);
     if let Some(s) = road.end_s(end) {

@@ -193,7 +193,7 @@ fn plausible<'a>(map: &RoadMap<'a>, signal: Node<'a>, node: Node<'a>, found: &mu
         )
     } else if let Some(meant) = meant(value, unit) {
         format!(
-            "{} limits the speed to {value:.3} {unit}; in m/s this would be {meant}, so the value or the unit is wrong",
+            "{} limits the speed to {value:.3} {unit}, which is {meant} if it was meant in m/s; the value or the unit is wrong",
             named(signal)
         )
     } else {
