@@ -209,7 +209,7 @@ fn violations_teach() {
         ),
         (
             "version='1.7'",
-            Some("<OpenDRIVE> has no attribute version: it takes none"),
+            Some("OpenDRIVE 1.7 knows no attribute `version` of `OpenDRIVE`, which has none"),
         ),
     ] {
         let text = road("").replacen("<OpenDRIVE", &format!("<OpenDRIVE {attributes}"), 1);

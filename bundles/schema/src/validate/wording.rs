@@ -446,7 +446,12 @@ pub(super) fn unexpected_attribute(
         .map(|one| schema.names.text(one.name))
         .filter(|name| !used(name));
     let free: Vec<String> = free.map(str::to_owned).collect();
-    let text = format!("<{}> has no attribute {}", node.name(), attribute.name());
+    let text = format!(
+        "{} knows no attribute `{}` of `{}`",
+        schema.title,
+        attribute.name(),
+        node.name()
+    );
     let suggestion = closest(attribute.name(), free.iter().map(String::as_str)).map(str::to_owned);
     let longer = || {
         free.iter()
@@ -461,13 +466,12 @@ pub(super) fn unexpected_attribute(
     let suggestion = suggestion.or_else(longer).or_else(shorter);
     let list = match (&suggestion, free.as_slice()) {
         (Some(_), _) => String::new(),
-        (None, []) if declared.is_empty() => ": it takes none".to_owned(),
-        (None, []) => format!(
-            ": {} knows {} for it, and no more",
-            schema.title,
-            names_of(declared, schema)
-        ),
-        (None, free) => format!(", attributes not used yet: {}", free.join(", ")),
+        (None, []) if declared.is_empty() => ", which has none".to_owned(),
+        (None, []) => format!("; it has {}, and no more", names_of(declared, schema)),
+        (None, free) => {
+            let free: Vec<String> = free.iter().map(|name| format!("`{name}`")).collect();
+            format!("; it could have {}", free.join(", "))
+        }
     };
     Wording::new(attribute.name(), text + &list)
         .expecting(free)
