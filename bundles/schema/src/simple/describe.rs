@@ -49,6 +49,10 @@ const PARAMETER: &str = "a parameter";
 /// How the words for an expression begin.
 pub(crate) const EXPRESSION: &str = "an expression";
 
+/// Codes of countries, whose form everybody knows by its letters.
+const LETTERS_2: &str = "[A-Z]{2}";
+const LETTERS_3: &str = "[A-Z]{3}";
+
 impl SimpleType {
     /// What a value of this type looks like.
     pub fn expectation(&self, schema: &Schema) -> Expectation {
@@ -102,7 +106,11 @@ impl Facets {
         };
         words += &range(self.lowest.as_ref(), self.highest.as_ref());
         for pattern in &self.patterns {
-            words += &format!(" of the form {}", pattern.source());
+            match pattern.source() {
+                LETTERS_2 => words += " of two capital letters",
+                LETTERS_3 => words += " of three capital letters",
+                source => words += &format!(" of the form {source}"),
+            }
         }
         match (self.min_length, self.max_length) {
             (None, None) => {}
