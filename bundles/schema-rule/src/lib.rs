@@ -49,10 +49,9 @@ fn run(checked: &Checked<'_>, found: &mut Sink<'_>) {
             return;
         };
         let text = format!(
-            "{} further findings like these are not listed: {} of `{}`",
+            "{} further findings like these are not listed: {}",
             rest.count,
-            rest.code.as_str(),
-            rest.subject
+            rest.code.about(&rest.subject)
         );
         found
             .issue(root, text)

@@ -38,6 +38,27 @@ pub enum Code {
 }
 
 impl Code {
+    /// What is so with an element or, after its name and `/@`, an attribute, in words.
+    pub fn about(self, subject: &str) -> String {
+        match self {
+            Code::UnknownRoot => format!("`{subject}` as the root element"),
+            Code::UnexpectedElement => format!("`{subject}` where it is not known"),
+            Code::MisplacedElement => format!("`{subject}` in the wrong place"),
+            Code::RepeatedElement => format!("`{subject}` more often than allowed"),
+            Code::MissingElement => format!("what is missing in or before `{subject}`"),
+            Code::UnexpectedAttribute => format!("the unknown attribute `{subject}`"),
+            Code::MissingAttribute => format!("missing attributes of `{subject}`"),
+            Code::InvalidValue => format!("values of `{subject}` that do not fit"),
+            Code::InvalidText => format!("text of `{subject}` that does not fit"),
+            Code::UnexpectedText => format!("text in `{subject}`"),
+            Code::UnknownType => format!("`{subject}` of no known type"),
+            Code::ConditionFailed => format!("conditions that `{subject}` breaks"),
+            Code::DuplicateKey => format!("`{subject}` with a key that occurs twice"),
+            Code::MissingKey => format!("`{subject}` without its key"),
+            Code::DanglingReference => format!("`{subject}` that refers to nothing"),
+        }
+    }
+
     /// The name used in results and in the recorded verdicts.
     pub fn as_str(self) -> &'static str {
         match self {
