@@ -34,7 +34,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         if let Some(layer) = road.permanent() {
             // Before the first one the offset is 0: nothing is unclear where it goes on from there.
             let first = layer.offset().in_order().next();
-            let from_zero = first.is_some_and(|first| first.at(0.0) == Some(0.0));
+            let from_zero =
+                first.is_some_and(|first| first.start().and_then(|s| first.at(s)) == Some(0.0));
             if !from_zero {
                 check(road, "lane offset", layer.offset(), found);
             }

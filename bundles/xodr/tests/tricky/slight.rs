@@ -98,6 +98,15 @@ fn lengths_and_widths() {
 fn shapes_in_order_and_flat() {
     let rows: Vec<Row> = vec![
         (
+            "zeros in any order",
+            shapes(&[
+                shape("0", "-4", "0"),
+                shape("0", "2", "0"),
+                shape("0", "0", "0"),
+            ]),
+            &["warning road_shape_elem_asc_order"],
+        ),
+        (
             "a step ahead of less than the tolerance begins a cross section",
             shapes(&[
                 shape("0", "-4", "0.02"),
@@ -222,9 +231,10 @@ fn what_begins_late() {
             &["error road_elevation_elem_asc_order"],
         ),
         ("an offset at 0", lanes(&offset("0")), &[]),
+        ("an offset later, from 0 on", lanes(&offset("30")), &[]),
         (
-            "an offset later",
-            lanes(&offset("30")),
+            "an offset later, with a step",
+            lanes(&offset("30").replacen("a=\"0\"", "a=\"0.005\"", 1)),
             &["warning profiles_begin_with_road"],
         ),
         (
@@ -264,5 +274,21 @@ fn lengths_of_geometries() {
             &["error road_length_sum_geometries"],
         ),
     ];
+    crate::run(&rows);
+}
+
+#[test]
+fn lane_offsets_that_step_back_by_rounding() {
+    let offsets = |second: &str| {
+        lanes(&format!(
+            "<laneOffset s=\"0\" a=\"0\" b=\"0\" c=\"0\" d=\"0\"/>\
+             <laneOffset s=\"20.0000000001\" a=\"0\" b=\"0.01\" c=\"0\" d=\"0\"/>\
+             <laneOffset s=\"{second}\" a=\"0\" b=\"0.02\" c=\"0\" d=\"0\"/>\
+             <laneOffset s=\"70\" a=\"1\" b=\"0\" c=\"0\" d=\"0\"/>{}",
+            section("\"0\"", "", &lane("-1", ""))
+        ))
+    };
+    let equal: &[&str] = &["warning road_lanes_lane_offset_elem_asc_order"];
+    let rows: Vec<Row> = vec![("the one listed later counts", offsets("20"), equal)];
     crate::run(&rows);
 }

@@ -493,3 +493,48 @@ fn repeated() {
     ];
     crate::run(&rows);
 }
+
+#[test]
+fn outlines_that_are_lines() {
+    let outline = |more: &str, corners: [[&str; 3]; 4]| {
+        let corners = corners
+            .map(|[u, v, z]| format!(r#"<cornerLocal u="{u}" v="{v}" z="{z}" height="0"/>"#));
+        let outline = format!(
+            r#"<outlines><outline id="0" {more}>{}</outline></outlines>"#,
+            corners.concat()
+        );
+        let place = r#"s="50" t="12" zOffset="0" hdg="0" name="""#;
+        let object = object("none", "1", place, &outline);
+        let sized = object.replace(
+            r#"radius="0.2" height="4""#,
+            r#"length="10" width="10" height="6""#,
+        );
+        objects(&[&sized])
+    };
+    // The side that closes it crosses the second one.
+    let bent = [
+        ["0", "0", "0"],
+        ["4", "0", "0"],
+        ["0", "2", "0"],
+        ["4", "2", "0"],
+    ];
+    // Legs that lean by centimetres.
+    let frame = [
+        ["0", "0", "0"],
+        ["4", "0.02", "5"],
+        ["0.1", "0.02", "5"],
+        ["4", "0", "0"],
+    ];
+    let crossed: &[&str] = &["warning road_object_outline_not_crossed"];
+    let rows: Vec<Row> = vec![
+        ("an area", outline(r#"closed="true""#, bent), crossed),
+        ("an open line", outline(r#"closed="false""#, bent), &[]),
+        ("nobody says whether it is open", outline("", bent), &[]),
+        (
+            "a frame over the road",
+            outline(r#"closed="true""#, frame),
+            &[],
+        ),
+    ];
+    crate::run(&rows);
+}
