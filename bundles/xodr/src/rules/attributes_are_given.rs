@@ -36,6 +36,7 @@ const fn needs(
 
 /// Places of objects and lane sections and the directions of references have rules of their own.
 const NEEDS: &[Needs] = &[
+    needs("road", &["OpenDRIVE"], &["length"]),
     needs("type", &["road"], &["s", "type"]),
     needs("signal", &["signals"], &["s", "t", "orientation"]),
     needs("signalReference", &["signals"], &["id", "s", "t"]),

@@ -1,7 +1,7 @@
 use foldhash::HashSet;
-use qcbus_document::Attribute;
+use qcbus_document::{Attribute, Node};
 use qcbus_opendrive::{RoadMap, is_user_data};
-use qcbus_sdk::{Level, Param, Rule, Sink};
+use qcbus_sdk::{Level, Param, Rule, Sink, Version};
 
 use crate::families::written_numbers::{Measure, Written, is_suspicious, shown};
 use crate::model::Roads;
@@ -48,6 +48,9 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         .filter_map(|attribute| Odd::of(attribute, attribute.value(), found))
         .collect();
     odd.extend(of_grids(map, found));
+    if found.version() == Some(Version::new(1, 6)) {
+        odd.extend(of_texts(root));
+    }
     if odd.is_empty() {
         return;
     }
@@ -120,6 +123,39 @@ impl<'a> Odd<'a> {
             text,
         })
     }
+}
+
+/// Lengths and widths that the schema of 1.6 takes for texts.
+const TEXTS: [(&str, &[&str]); 4] = [
+    ("road", &["length"]),
+    ("geometry", &["length"]),
+    ("line", &["length", "width"]),
+    ("marking", &["width", "lineLength"]),
+];
+
+/// What is no number in one of these; every other schema refuses it.
+fn of_texts<'a>(root: Node<'a>) -> impl Iterator<Item = Odd<'a>> {
+    let elements = TEXTS.into_iter().flat_map(move |(element, names)| {
+        let nodes = root.descendants_named(element);
+        nodes.flat_map(move |node| names.iter().filter_map(move |name| node.attribute(name)))
+    });
+    elements.filter_map(|attribute| {
+        let text = attribute.value().trim();
+        let is_number = text.parse::<f64>().is_ok() || Written::read(text).is_some();
+        if is_number || is_user_data(attribute.node()) {
+            return None;
+        }
+        Some(Odd {
+            attribute,
+            level: Level::Error,
+            text: format!(
+                "`{}` of `<{}>` is `{}`, which is no number; it must be one, in metres and with a point before decimals",
+                attribute.name(),
+                attribute.node().name(),
+                shown(text)
+            ),
+        })
+    })
 }
 
 /// The heights of elevation grids, of which one attribute has many.

@@ -50,7 +50,7 @@ const DEEP: Param = Param::number(
 );
 const DEEP_SIGNAL: Param = Param::number(
     "deep_signal",
-    5.0,
+    2.0,
     "m",
     "how deep below its road a signal may begin",
 );
