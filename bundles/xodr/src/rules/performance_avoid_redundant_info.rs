@@ -3,6 +3,7 @@ use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
 
 use crate::families::on_road::OnRoad;
 use crate::families::redundancy::{Repeated, in_lines, in_profile};
+use crate::families::shown;
 use crate::model::{Part, Roads};
 
 const TOLERANCE: Param = Param::number(
@@ -99,7 +100,7 @@ fn text(repeated: &Repeated<'_, '_>) -> String {
     format!(
         "this `{}` says the same as the one before it, from {} to {} m; it should be left out",
         repeated.second.node().name(),
-        repeated.from,
-        repeated.to
+        shown::number(repeated.from),
+        shown::number(repeated.to)
     )
 }

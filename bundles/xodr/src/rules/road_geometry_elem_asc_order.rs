@@ -2,6 +2,7 @@ use qcbus_opendrive::{Road, RoadMap};
 use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink};
 
 use crate::families::on_road::OnRoad;
+use crate::families::shown;
 use crate::model::{Part, Roads};
 
 const TOLERANCE: Param = Param::number(
@@ -40,14 +41,17 @@ fn check(road: &Road<'_>, found: &mut Sink<'_>) {
         };
         let (level, text) = if s < most - tolerance {
             let text = format!(
-                "this geometry starts at s = {s} m and comes after one that starts at s = {most} m; \
-                 geometries must be listed in ascending order of s"
+                "this geometry starts at s = {} m and comes after one that starts at s = {} m; geometries must be \
+                 listed in ascending order of s",
+                shown::number(s),
+                shown::number(most)
             );
             (Level::Error, text)
         } else if s <= most + tolerance {
             let text = format!(
-                "this geometry starts at s = {s} m like one before it, which therefore never \
-                 applies; each should start further along the road"
+                "this geometry starts at s = {} m like one before it, which therefore never applies; each should start \
+                 further along the road",
+                shown::number(s)
             );
             (Level::Warning, text)
         } else {

@@ -59,7 +59,9 @@ fn report(
         )
     };
     let text = format!(
-        "the lane section starts at s = {s} and {what} at s = {end}, which makes it {} m long; {allowed}",
+        "the lane section starts at s = {} and {what} at s = {}, which makes it {} m long; {allowed}",
+        number(s),
+        number(end),
         number(length)
     );
     let finding = found

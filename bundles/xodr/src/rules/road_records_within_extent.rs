@@ -4,6 +4,7 @@ use qcbus_sdk::{Level, Param, Place, Rule, Sink};
 
 use crate::families::ascending;
 use crate::families::object_parts::{is_by_schema, named, number};
+use crate::families::shown;
 use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
@@ -142,10 +143,11 @@ impl Extent<'_> {
                 continue;
             };
             let text = format!(
-                "{} stands at s = {s}, but {} is {} m long; it must stand on the road",
+                "{} stands at s = {}, but {} is {} m long; it must stand on the road",
                 named(node),
+                shown::number(s),
                 self.what,
-                self.length
+                shown::number(self.length)
             );
             let level = self.severity(s, found);
             found
@@ -167,11 +169,12 @@ impl Extent<'_> {
             };
             if s + length > limit {
                 let text = format!(
-                    "{} reaches from s = {s} to s = {}, but {} is {} m long; it must end on the road",
+                    "{} reaches from s = {} to s = {}, but {} is {} m long; it must end on the road",
                     named(node),
-                    s + length,
+                    shown::number(s),
+                    shown::number(s + length),
                     self.what,
-                    self.length
+                    shown::number(self.length)
                 );
                 let level = self.severity(s + length, found);
                 found
@@ -228,8 +231,10 @@ impl Extent<'_> {
             return;
         };
         let text = format!(
-            "this `{name}` starts at {by} = {start}, but {what} is {length} m long; it should start before the \
-             end, as it never applies otherwise"
+            "this `{name}` starts at {by} = {}, but {what} is {} m long; it should start before the end, as it never \
+             applies otherwise",
+            shown::number(start),
+            shown::number(length)
         );
         found.issue(Place::attribute_or_node(node, by), text).road(
             self.road,
