@@ -443,7 +443,7 @@ fn what_is_said_can_be_understood() {
     assert!(dense.contains("it must be greater than 0"), "{dense}");
     let long = object("heading=\"1\"", "");
     assert!(
-        long.contains("no attribute heading; did you mean \"hdg\"?"),
+        long.contains("no attribute `heading` of `object`; did you mean \"hdg\"?"),
         "{long}"
     );
     let dangling = weighed(

@@ -117,11 +117,13 @@ impl Plan {
         self.seen.iter().any(Seen::is_outdated)
     }
 
-    /// How many checkers are demanded, and of how many.
+    /// How many checkers are demanded, and of how many; what is off by default is left out by nobody.
     pub fn asked(&self) -> Asked {
+        let all = self.checkers.iter().zip(&self.entries);
+        let in_question = all.filter(|(checker, it)| checker.facts.default_on || it.demanded);
         Asked {
             asked: self.entries.iter().filter(|entry| entry.demanded).count(),
-            offered: self.entries.len(),
+            offered: in_question.count(),
         }
     }
 

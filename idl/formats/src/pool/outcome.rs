@@ -97,7 +97,7 @@ pub struct BundleOutcome {
 pub struct Asked {
     /// Demanded.
     pub asked: usize,
-    /// In the bundle's catalogue.
+    /// In the bundle's catalogue, without those that are off by default and that nobody demands.
     pub offered: usize,
 }
 

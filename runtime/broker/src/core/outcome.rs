@@ -43,7 +43,7 @@ pub(super) fn outcome(name: &str, share: &Share) -> ShareOutcome {
     }
     let mut kept = in_the_answer(&checkers, |id| asked.contains(id)).into_iter();
     checkers.retain(|_| kept.next().unwrap_or(true));
-    let mut said = bundle(name, &share.version, catalogue, demanded.len(), checkers);
+    let mut said = bundle(name, &share.version, catalogue, &demanded, checkers);
     if catalogue.is_none() {
         let why = failure.clone();
         said.absent = Some(why.unwrap_or_else(|| format!("{name} has never been seen")));
@@ -74,8 +74,9 @@ pub(super) fn not_applicable(
         ..described(offered)
     });
     let checkers = checkers.collect();
+    let demanded = demanded.iter().copied().collect();
     ShareOutcome {
-        said: bundle(name, version, Some(catalogue), demanded.len(), checkers),
+        said: bundle(name, version, Some(catalogue), &demanded, checkers),
         catalogue: Some(catalogue.clone()),
         failure: None,
         micros: 0,
@@ -99,7 +100,7 @@ fn bundle(
     name: &str,
     version: &str,
     catalogue: Option<&Catalogue>,
-    asked: usize,
+    demanded: &BTreeSet<u32>,
     checkers: Vec<CheckerOutcome>,
 ) -> BundleOutcome {
     BundleOutcome {
@@ -112,10 +113,17 @@ fn bundle(
         checkers,
         absent: None,
         asked: catalogue.map(|it| Asked {
-            asked,
-            offered: it.checkers.len(),
+            asked: demanded.len(),
+            offered: in_question(it, demanded),
         }),
     }
+}
+
+/// How many checkers there are to be asked: what is off by default is left out by nobody.
+fn in_question(catalogue: &Catalogue, demanded: &BTreeSet<u32>) -> usize {
+    let checkers = (0..).zip(&catalogue.checkers);
+    let counted = checkers.filter(|(index, it)| it.default_on || demanded.contains(index));
+    counted.count()
 }
 
 /// What one checker said, or why it said nothing.
