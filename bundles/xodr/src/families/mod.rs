@@ -49,7 +49,6 @@ pub(crate) mod strips;
 pub(crate) mod surface_boxes;
 pub(crate) mod switches;
 pub(crate) mod touching;
-pub(crate) mod traffic_lanes;
 pub(crate) mod unlinked_arms;
 pub(crate) mod vertices;
 pub(crate) mod virtual_junctions;

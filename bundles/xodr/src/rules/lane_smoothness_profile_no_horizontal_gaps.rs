@@ -7,8 +7,8 @@ use qcbus_sdk::{Level, Param, Rule, Sink};
 use crate::families::driving::is_drivable;
 use crate::families::gap_levels::GAP_BROKEN_FROM;
 use crate::families::on_road::{OnRoad, lane_name};
+use crate::families::routes::is_route;
 use crate::families::shown::number;
-use crate::families::traffic_lanes::is_for_traffic;
 use crate::model::{Part, Roads};
 
 const GAP: Param = Param::number(
@@ -100,7 +100,7 @@ fn jump<'m, 'a>(
 /// only widens at once can be driven on.
 fn moved(before: &[LaneSpan<'_, '_>], after: &[LaneSpan<'_, '_>]) -> f64 {
     let pairs = before.iter().zip(after);
-    let travelled = pairs.filter(|(one, _)| is_for_traffic(one.lane));
+    let travelled = pairs.filter(|(one, _)| is_route(one.lane));
     let moves = travelled.map(|(one, next)| {
         let [inner, outer] = [next.inner - one.inner, next.outer - one.outer];
         if inner * outer > 0.0 {

@@ -5,7 +5,7 @@ use qcbus_opendrive::{Geometry, LaneRef, Road, RoadMap, Side};
 use qcbus_sdk::{Level, Param, Place, Rule, Sink};
 
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::families::traffic_lanes::is_for_traffic;
+use crate::families::routes::is_route;
 use crate::model::{Part, Roads};
 
 const BACKWARDS: Param = Param::number(
@@ -197,7 +197,7 @@ fn fold_at<'m, 'a>(
     let station = s - section.s()?;
     let outermost = section.each_span(side, station).filter(|span| {
         let width = (span.outer - span.inner).abs();
-        width > 0.1 && is_for_traffic(span.lane)
+        width > 0.1 && is_route(span.lane)
     });
     let span = outermost.last()?;
     let t = span.outer;

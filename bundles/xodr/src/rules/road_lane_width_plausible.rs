@@ -2,7 +2,7 @@ use qcbus_opendrive::{LaneRef, RoadMap, Stretch};
 use qcbus_sdk::{Level, Param, Rule, Sink};
 
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::families::traffic_lanes::is_for_traffic;
+use crate::families::routes::is_route;
 use crate::families::written_numbers::brief;
 use crate::model::{Part, Roads};
 
@@ -55,7 +55,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         let Some(length) = lane.length() else {
             continue;
         };
-        let traffic = is_for_traffic(lane);
+        let traffic = is_route(lane);
         let wide = lane
             .widths()
             .stretches(length)

@@ -3,7 +3,7 @@ use qcbus_opendrive::{Road, RoadMap, RoadType};
 use qcbus_sdk::{Level, Param, Place, Rule, Sink};
 
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::families::traffic_lanes::is_for_traffic;
+use crate::families::routes::is_route;
 use crate::model::{Part, Roads};
 
 const SLOW: Param = Param::number(
@@ -57,7 +57,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             }
         }
     }
-    for lane in part.lanes().filter(|lane| is_for_traffic(*lane)) {
+    for lane in part.lanes().filter(|lane| is_route(*lane)) {
         for speed in lane.elements("speed") {
             let ds = speed.f64("sOffset").unwrap_or(0.0);
             let kind = lane.at.s().and_then(|s| kind_at(lane.at.road, s + ds));
