@@ -94,6 +94,19 @@ impl<'a> Attribute<'a> {
         offset.unwrap_or(0)
     }
 
+    /// Bytes of the value as written at [`Attribute::value_offset`], entities unresolved.
+    pub fn raw_len(&self) -> u32 {
+        let record = self.record;
+        match record.value_delta.get() {
+            0 => self
+                .node
+                .document()
+                .heap_value(record.value_len.get())
+                .map_or(0, |(_, _, raw_len)| raw_len),
+            _ => record.value_len.get(),
+        }
+    }
+
     /// Where its name is.
     pub fn position(&self) -> Position<'a> {
         self.node.document().position(self.offset())

@@ -59,6 +59,23 @@ impl<'a> Node<'a> {
             .map_or("", |record| self.document.character_data(record))
     }
 
+    /// Where a run of character data is written in the image's text, entities unresolved; empty for
+    /// an element.
+    pub fn character_range(&self) -> std::ops::Range<u32> {
+        let written = self.record().and_then(|record| {
+            let start = record.start.get();
+            match record.kind.get() {
+                TEXT => Some(start..record.stop.get()),
+                ELEMENT => None,
+                _ => {
+                    let (_, _, raw_len) = self.document.heap_value(record.stop.get())?;
+                    Some(start..start.saturating_add(raw_len))
+                }
+            }
+        });
+        written.unwrap_or(0..0)
+    }
+
     /// The namespace prefix as written, empty when there is none.
     pub fn prefix(&self) -> &'a str {
         let name = self.name();
