@@ -64,8 +64,20 @@ pub struct JobDocument {
     pub path: String,
     /// Digest of the bytes on disk; for an image of several files, see the image's sources.
     pub digest: Digest,
-    /// Byte offset of the referring element in the root's image; 0 for the root.
+    /// Byte offset of the element in the root's image that leads here, perhaps through other
+    /// documents; 0 for the root.
     pub referred_at: u32,
+    /// Where its own references to maps and scenarios lead.
+    pub links: Vec<Link>,
+}
+
+/// A reference that was followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Link {
+    /// Byte offset of the referring element in the image of the document that refers.
+    pub at: u32,
+    /// The document that is meant, by its place among the job's documents.
+    pub to: u32,
 }
 
 /// A finished job, for reporters.

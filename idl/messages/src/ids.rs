@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// Version of the messages in this crate. Peers of another version are refused by name. Raised with
 /// every change of a message: one from before is read as something else, not as nothing.
-pub const PROTOCOL_VERSION: u32 = 3;
+pub const PROTOCOL_VERSION: u32 = 4;
 
 /// One check of one file's bytes under one configuration; unique within a broker generation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -61,7 +61,11 @@ pub enum DocumentRole {
     Catalog,
     /// A scenario that the root refers to, or `main.xosc` of a modular scenario's archive.
     Scenario,
-    /// The root after modular expansion.
+    /// The members of an archive that a scenario of the job lies in: an element `Archive` with a
+    /// `Member` for each, which has `name`, `size` in bytes and `crc32`.
+    Listing,
+    /// The root after modular expansion: its text is that of the files it was made from, so that
+    /// every place in it is one in a file.
     Expanded,
 }
 

@@ -18,11 +18,11 @@ pub mod services;
 /// same results. See `build.rs`.
 pub const BUILD_DATE: &str = env!("QCBUS_BUILD_DATE");
 
-pub use broker_to_peer::{Job, JobDocument, PeerReport, ResultMessage, ToPeer, Withdrawn};
+pub use broker_to_peer::{Job, JobDocument, Link, PeerReport, ResultMessage, ToPeer, Withdrawn};
 pub use catalogue::{Catalogue, CheckerInfo, Hello, ParamInfo, Role};
 pub use exit::Exit;
 pub use ids::{Digest, DocId, DocumentRole, JobId, PROTOCOL_VERSION};
-pub use missing::{Absence, MissingDocument};
+pub use missing::{Absence, MissingDocument, Within};
 pub use peer_to_broker::FromPeer;
 pub use qcbus_formats::Verdict;
 

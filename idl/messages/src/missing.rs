@@ -21,8 +21,22 @@ pub struct MissingDocument {
     /// How much it weighs: an error leads certainly nowhere, a warning leaves open what it leads to,
     /// an information is no business of the file.
     pub level: Level,
-    /// Byte offset of the referring element in the root's image.
+    /// Byte offset of the element in the root's image that leads here, perhaps through other
+    /// documents.
     pub referred_at: u32,
+    /// The reference itself, where another document than the root has it.
+    pub within: Option<Within>,
+}
+
+/// A place in another document than the root.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Within {
+    /// The document's path.
+    pub path: String,
+    /// Line, from 1.
+    pub row: u32,
+    /// Column in characters, from 1.
+    pub column: u32,
 }
 
 /// Why a file that is referred to could not be had.
@@ -62,6 +76,20 @@ pub enum Absence {
     },
     /// No file is meant, but a map that the simulator knows by this name.
     SimulatorMap,
+    /// It leads out of the archive that refers to it.
+    Escapes,
+    /// What it is called is neither a scenario nor an archive of one.
+    NotAScenario,
+    /// Scenarios refer to scenarios more deeply than is followed.
+    TooDeep {
+        /// How deeply they are followed.
+        most: u32,
+    },
+    /// A modular scenario of which no plain one could be made.
+    NotExpanded {
+        /// What is in the way.
+        why: String,
+    },
     /// It is there and read, and cannot be relied on: not well-formed, or without a part of it.
     Broken {
         /// The file with the first fault: itself, or one that it includes.
@@ -104,6 +132,16 @@ impl fmt::Display for Absence {
             Absence::SimulatorMap => {
                 f.write_str("is the name of a map that the simulator knows, not of a file")
             }
+            Absence::Escapes => f.write_str(
+                "leads out of the archive; what an archive refers to lies in it or in a directory of the search path",
+            ),
+            Absence::NotAScenario => f.write_str(
+                "is not looked for: the name of a scenario ends in `.xosc`, that of an archive in `.mosc`",
+            ),
+            Absence::TooDeep { most } => {
+                write!(f, "is not read: scenarios refer to scenarios more than {most} deep")
+            }
+            Absence::NotExpanded { why } => write!(f, "cannot be expanded: {why}"),
             Absence::Broken {
                 path,
                 row,
