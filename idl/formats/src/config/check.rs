@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use super::lookup::{canonical_bundle, reporter_names};
 use super::{
     BundleConfig, CheckerConfig, Config, ConfigParam, INPUT_PARAMS, LEVEL_PARAM, Oddity, Parsed,
-    ReportConfig, TextPosition, reporter_for, same_bundle,
+    ReportConfig, SCENARIO_PATH_PARAM, TextPosition, reporter_for, same_bundle,
 };
 use crate::distance::{DID_YOU_MEAN, did_you_mean};
 
@@ -87,6 +87,7 @@ impl Config {
             .into_iter()
             .chain(INPUT_PARAMS)
             .chain(REPORT_PARAMS)
+            .chain([SCENARIO_PATH_PARAM])
             .collect();
         names.extend(known.bundles.iter().flat_map(KnownBundle::param_names));
         names.remove(LEVEL_PARAM);

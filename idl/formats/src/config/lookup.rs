@@ -2,6 +2,7 @@
 
 use super::{
     BundleConfig, CheckerConfig, Config, ConfigParam, INPUT_PARAMS, Levels, Oddity, ReportConfig,
+    SCENARIO_PATH_PARAM,
 };
 use crate::xqar::{Level, Param};
 
@@ -167,6 +168,11 @@ impl Config {
         let mut params = merged(bundle.map_or(&[], |bundle| &bundle.params), &self.params);
         params.retain(|param| !INPUT_PARAMS.contains(&param.name.as_str()));
         params
+    }
+
+    /// The directories in which referenced scenarios are looked for, as they are written.
+    pub fn scenario_path(&self) -> Option<&str> {
+        value(&self.params, SCENARIO_PATH_PARAM)
     }
 
     /// The parameters of a report: its own, then the global ones that it does not set itself.

@@ -24,6 +24,9 @@ pub const LEVEL_PARAM: &str = "qcbus.level";
 /// The names under which a configuration gives the file to check, the current one first.
 pub const INPUT_PARAMS: [&str; 3] = ["InputFile", "XodrFile", "XoscFile"];
 
+/// The global parameter that names the directories in which referenced scenarios are looked for.
+pub const SCENARIO_PATH_PARAM: &str = "qcbus.scenarioPath";
+
 /// A configuration. Serialises, so that it can be published in its parsed form.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Config {
