@@ -1,6 +1,7 @@
 //! `.mosc`: a zip archive around a modular scenario, read in memory and never unpacked to disk.
 
 use std::io::{Cursor, Read};
+use std::sync::Arc;
 
 use zip::ZipArchive;
 use zip::result::ZipError;
@@ -26,49 +27,104 @@ pub(crate) fn is_zip(bytes: &[u8]) -> bool {
     bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"PK\x05\x06")
 }
 
-/// Reads one member. Names that lead out of the archive are refused whichever member is asked
-/// for; the caps count over all members, so that no order of reading slips past them.
-pub(crate) fn read_member(packed: &[u8], name: &str, limits: &Limits) -> Member {
-    let mut member = Member {
-        bytes: Vec::new(),
-        present: false,
-        faults: Vec::new(),
-    };
-    let mut archive = match ZipArchive::new(Cursor::new(packed)) {
-        Ok(archive) => archive,
-        Err(error) => {
-            member.faults.push(damaged(packed, &error));
-            return member;
-        }
-    };
-    if let Err(fault) = check_directory(&mut archive, limits, &mut member.faults) {
-        member.faults.push(fault);
-        return member;
-    }
-    match read_checked(&mut archive, name, limits) {
-        Ok(Some(bytes)) => (member.bytes, member.present) = (bytes, true),
-        Ok(None) => member.faults.push(TextFault::new(
-            Code::ArchiveMemberMissing,
-            0,
-            format!(
-                "the archive has no member {name}{}",
-                similar(&archive, name)
-            ),
-        )),
-        Err(fault) => {
-            member.present = true;
-            member.faults.push(fault);
-        }
-    }
-    member
+type Archive = ZipArchive<Cursor<Arc<[u8]>>>;
+
+/// An archive whose directory has been read and looked at once, however many members are asked for.
+pub(crate) struct OpenArchive {
+    /// `None` when nothing may be read from it.
+    zip: Option<Archive>,
+    faults: Vec<TextFault>,
 }
 
-type Archive<'b> = ZipArchive<Cursor<&'b [u8]>>;
+/// What the directory of an archive says of a member.
+pub(crate) struct Entry {
+    pub name: String,
+    /// Unpacked, in bytes.
+    pub size: u64,
+    pub crc32: u32,
+}
+
+impl OpenArchive {
+    /// Reads the directory. Names that lead out of the archive are refused whichever member is asked
+    /// for; the caps count over all members, so that no order of reading slips past them.
+    pub fn new(packed: Arc<[u8]>, limits: &Limits) -> OpenArchive {
+        let mut faults = Vec::new();
+        let mut zip = match ZipArchive::new(Cursor::new(packed.clone())) {
+            Ok(zip) => zip,
+            Err(error) => {
+                faults.push(damaged(&packed, &error));
+                return OpenArchive { zip: None, faults };
+            }
+        };
+        match check_directory(&mut zip, limits, &mut faults) {
+            Ok(()) => OpenArchive {
+                zip: Some(zip),
+                faults,
+            },
+            Err(fault) => {
+                faults.push(fault);
+                OpenArchive { zip: None, faults }
+            }
+        }
+    }
+
+    /// Reads one member. `left` is how many unpacked bytes may still be had, from this archive and
+    /// from those around it and within it.
+    pub fn member(&mut self, name: &str, limits: &Limits, left: &mut u64) -> Member {
+        let mut member = Member {
+            bytes: Vec::new(),
+            present: false,
+            faults: self.faults.clone(),
+        };
+        let Some(zip) = &mut self.zip else {
+            return member;
+        };
+        match read_checked(zip, name, limits, *left) {
+            Ok(Some(bytes)) => {
+                *left = left.saturating_sub(bytes.len() as u64);
+                (member.bytes, member.present) = (bytes, true);
+            }
+            Ok(None) => member.faults.push(TextFault::new(
+                Code::ArchiveMemberMissing,
+                0,
+                format!("the archive has no member {name}{}", similar(zip, name)),
+            )),
+            Err(fault) => {
+                member.present = true;
+                member.faults.push(fault);
+            }
+        }
+        member
+    }
+
+    /// Whether there is nothing to be read in it.
+    pub fn is_refused(&self) -> bool {
+        self.zip.is_none()
+    }
+
+    /// The files in it, in the order of its directory, as far as their names can be read.
+    pub fn entries(&mut self) -> Vec<Entry> {
+        let Some(zip) = &mut self.zip else {
+            return Vec::new();
+        };
+        let count = zip.len();
+        let entry = |index| {
+            let entry = zip.by_index_raw(index).ok()?;
+            entry.is_file().then_some(())?;
+            Some(Entry {
+                name: entry.name().ok()?.into_owned(),
+                size: entry.size(),
+                crc32: entry.crc32(),
+            })
+        };
+        (0..count).filter_map(entry).collect()
+    }
+}
 
 /// Names, number, declared sizes. What an archive declares is believed only where it accuses the
 /// archive; reading counts again.
 fn check_directory(
-    archive: &mut Archive<'_>,
+    archive: &mut Archive,
     limits: &Limits,
     faults: &mut Vec<TextFault>,
 ) -> Result<(), TextFault> {
@@ -122,9 +178,10 @@ pub(crate) fn stays_inside(name: &str) -> bool {
 }
 
 fn read_checked(
-    archive: &mut Archive<'_>,
+    archive: &mut Archive,
     name: &str,
     limits: &Limits,
+    left: u64,
 ) -> Result<Option<Vec<u8>>, TextFault> {
     if !stays_inside(name) {
         return Ok(None);
@@ -139,7 +196,7 @@ fn read_checked(
     }
     let cap = inflated_cap(
         entry.compressed_size(),
-        limits.max_archive,
+        limits.max_archive.min(left),
         limits.max_ratio,
     );
     let mut bytes = Vec::new();
@@ -157,9 +214,15 @@ fn read_checked(
         } else {
             "max_archive"
         };
+        // Of the whole cap, where what was read before has used some of it.
+        let used = match limit {
+            "max_archive" => limits.max_archive.saturating_sub(cap.allowed),
+            _ => 0,
+        };
         let exceeded = Exceeded {
             limit,
-            found: cap.allowed + 1,
+            found: cap.allowed.saturating_add(used).saturating_add(1),
+            allowed: cap.allowed.saturating_add(used),
             ..cap
         };
         return Err(TextFault::new(
@@ -191,7 +254,7 @@ fn damaged(packed: &[u8], error: &ZipError) -> TextFault {
 }
 
 /// A hint for the commonest mistake: the folder was packed instead of its content.
-fn similar(archive: &Archive<'_>, name: &str) -> String {
+fn similar(archive: &Archive, name: &str) -> String {
     let base = name.rsplit('/').next().unwrap_or(name);
     let ends = |other: &str| {
         other
@@ -227,7 +290,9 @@ mod tests {
     }
 
     fn read(packed: &[u8], limits: Limits) -> (Vec<u8>, Vec<Code>, String) {
-        let member = read_member(packed, MAIN_MEMBER, &limits);
+        let mut left = limits.max_archive;
+        let member =
+            OpenArchive::new(packed.into(), &limits).member(MAIN_MEMBER, &limits, &mut left);
         let texts: Vec<&str> = member.faults.iter().map(|fault| &*fault.text).collect();
         let codes = member.faults.iter().map(|fault| fault.code).collect();
         (member.bytes, codes, texts.join("; "))

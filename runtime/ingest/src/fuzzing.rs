@@ -4,6 +4,7 @@ use std::path::Path;
 
 use qcbus_document::Document;
 
+use crate::modular::SearchPath;
 use crate::{Limits, prepare_bytes, references};
 
 /// Whatever the bytes are and whatever the name promises: there is an image, it is valid, its
@@ -37,6 +38,6 @@ pub fn ingest(bytes: &[u8]) {
                 "{name}: no root and no fault"
             );
         }
-        references(&document);
+        references(&document, &SearchPath::default());
     }
 }

@@ -1,13 +1,16 @@
 //! The set of documents that belong to a file: one walk for everybody who checks files, however the
 //! documents are fetched.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 use qcbus_document::{Document, FaultGroup, FileKind};
 use qcbus_formats::xqar::Level;
-use qcbus_messages::{Absence, DocumentRole, MissingDocument};
+use qcbus_messages::path_text::{from_text, to_text};
+use qcbus_messages::{Absence, DocumentRole, Link, MissingDocument, Within};
 
+use crate::archive::MAIN_MEMBER;
+use crate::modular::{ExpandedImage, MAX_DEPTH, Part, SearchPath, expand, modules};
 use crate::references::{Parameters, Reference, references};
 
 /// Where documents come from and go to.
@@ -26,8 +29,23 @@ pub trait Source {
     /// The image of a document.
     fn image(document: &Self::Document) -> &[u8];
 
-    /// Keeps a document. `referred_at` is the referring element's offset in the root.
+    /// What lies in an archive of which a member was fetched; see [`DocumentRole::Listing`].
+    ///
+    /// # Errors
+    /// As [`Source::fetch`].
+    fn listing(&mut self, archive: &Path) -> Result<Option<Self::Document>, Self::Halt>;
+
+    /// Keeps a document. `referred_at` is the offset of the element in the root that leads to it.
     fn keep(&mut self, path: &Path, role: DocumentRole, referred_at: u32, document: Self::Document);
+
+    /// An image of what a modular scenario was expanded to.
+    ///
+    /// # Errors
+    /// As [`Source::fetch`].
+    fn expanded(&self, expanded: &ExpandedImage<'_, '_>) -> Result<Self::Document, Self::Halt>;
+
+    /// The image of a document that was kept, by how many were kept before it.
+    fn kept(&self, index: usize) -> &[u8];
 
     /// Hears what was looked at besides, for those who watch it.
     fn looked(&mut self, look: Look<'_>) {
@@ -46,43 +64,111 @@ pub enum Look<'p> {
     Listed(&'p Path),
 }
 
-/// Follows the references of a root and fetches what they lead to, at most `max_documents` with the
-/// root. Gives what could not be had or is of no use, in the order of the references.
+/// What bounds a walk, and where it looks.
+#[derive(Debug, Clone)]
+pub struct Walking<'w> {
+    /// Most documents of a set, the root among them.
+    pub max_documents: usize,
+    /// Most bytes that are copied into an expanded scenario.
+    pub max_text: u64,
+    /// Most bytes of its image.
+    pub max_image: u64,
+    /// Where scenarios are looked for besides.
+    pub search: &'w SearchPath,
+}
+
+/// A document and all that it refers to.
+#[derive(Debug)]
+pub struct Found {
+    /// What could not be had or is of no use, in the order of the references.
+    pub missing: Vec<MissingDocument>,
+    /// Of each document, the root first: where its references to maps and scenarios lead.
+    pub links: Vec<Vec<Link>>,
+}
+
+/// Follows the references of a root and fetches what they lead to; those of scenarios that a modular
+/// scenario is made of likewise.
 ///
 /// # Errors
 /// What the source gives up with.
 pub fn gather<S: Source>(
     root: &Document<'_>,
-    max_documents: usize,
+    walking: &Walking<'_>,
     source: &mut S,
-) -> Result<Vec<MissingDocument>, S::Halt> {
+) -> Result<Found, S::Halt> {
+    let own = from_text(root.path());
     let mut walk = Walk {
         root,
         source,
-        max_documents,
-        had: BTreeSet::from([PathBuf::from(root.path())]),
+        walking,
+        had: HashMap::from([(own, 0)]),
+        documents: vec![Had::default()],
         catalogs: BTreeSet::new(),
+        listed: BTreeSet::new(),
         missing: Vec::new(),
     };
-    for reference in references(root) {
-        walk.follow(&reference)?;
+    let of_root = references(root, walking.search);
+    let is_modular = of_root.iter().any(|reference| reference.is_module);
+    walk.list_archive(root.path())?;
+    for reference in &of_root {
+        walk.follow(0, reference)?;
     }
-    Ok(walk.weighed())
+    let mut next = 1;
+    while next < walk.documents.len() {
+        if walk.documents[next].is_module {
+            for reference in walk.modules_of(next) {
+                walk.follow(next, &reference)?;
+            }
+        }
+        next += 1;
+    }
+    if is_modular {
+        walk.expand()?;
+    }
+    let links = walk.documents.iter().map(|had| had.links.clone()).collect();
+    Ok(Found {
+        missing: walk.weighed(),
+        links,
+    })
 }
 
 struct Walk<'w, S> {
     root: &'w Document<'w>,
     source: &'w mut S,
-    max_documents: usize,
-    had: BTreeSet<PathBuf>,
+    walking: &'w Walking<'w>,
+    /// By path, where it is among the documents.
+    had: HashMap<PathBuf, usize>,
+    documents: Vec<Had>,
     /// Names of the catalogs that were found.
     catalogs: BTreeSet<String>,
+    /// The archives whose members were listed.
+    listed: BTreeSet<PathBuf>,
     /// With the kind of catalogs that a missing directory was to have.
     missing: Vec<(MissingDocument, Option<String>)>,
 }
 
+/// A document that was fetched.
+#[derive(Debug, Default)]
+struct Had {
+    links: Vec<Link>,
+    is_module: bool,
+    /// How many references lead from the root to it, at least.
+    depth: u32,
+    /// The element of the root that leads to it.
+    referred_at: u32,
+}
+
 impl<S: Source> Walk<'_, S> {
-    fn follow(&mut self, reference: &Reference) -> Result<(), S::Halt> {
+    /// The references of a module to further ones.
+    fn modules_of(&self, from: usize) -> Vec<Reference> {
+        let image = self.source.kept(from - 1);
+        Document::open(image).map_or_else(
+            |_| Vec::new(),
+            |document| modules(&document, self.walking.search),
+        )
+    }
+
+    fn follow(&mut self, from: usize, reference: &Reference) -> Result<(), S::Halt> {
         if let Some(directory) = &reference.directory {
             self.source.looked(Look::Listed(directory));
         }
@@ -90,18 +176,18 @@ impl<S: Source> Walk<'_, S> {
             let path = reference.directory.as_deref().unwrap_or(Path::new(""));
             let whole = reference.candidates.is_empty();
             let catalogs = reference.catalogs.clone().filter(|_| whole);
-            self.miss(reference, path, why.clone(), catalogs);
+            self.miss(from, reference, path, why.clone(), catalogs);
         }
         let mut first: Option<(&Path, Absence)> = None;
         for path in &reference.candidates {
-            let Err(why) = self.candidate(reference, path)? else {
+            let Err(why) = self.candidate(from, reference, path)? else {
                 if reference.means_all() {
                     continue;
                 }
                 return Ok(());
             };
             if reference.means_all() {
-                self.miss(reference, path, why, None);
+                self.miss(from, reference, path, why, None);
             } else if first
                 .as_ref()
                 .is_none_or(|(_, other)| *other == Absence::NotThere && why != Absence::NotThere)
@@ -111,7 +197,7 @@ impl<S: Source> Walk<'_, S> {
             }
         }
         if let Some((path, why)) = first {
-            self.miss(reference, path, why, None);
+            self.miss(from, reference, path, why, None);
         }
         Ok(())
     }
@@ -119,15 +205,21 @@ impl<S: Source> Walk<'_, S> {
     /// Fetches one referenced file, unless that was done.
     fn candidate(
         &mut self,
+        from: usize,
         reference: &Reference,
         path: &Path,
     ) -> Result<Result<(), Absence>, S::Halt> {
-        if self.had.contains(path) {
+        if let Some(&to) = self.had.get(path) {
+            self.link(from, reference, to);
             return Ok(Ok(()));
         }
-        if self.had.len() >= self.max_documents {
+        let depth = self.documents[from].depth + 1;
+        if depth > MAX_DEPTH {
+            return Ok(Err(Absence::TooDeep { most: MAX_DEPTH }));
+        }
+        if self.documents.len() >= self.walking.max_documents {
             self.source.looked(Look::NotRead(path));
-            let most = self.max_documents as u64;
+            let most = self.walking.max_documents as u64;
             return Ok(Err(Absence::TooMany { most }));
         }
         let document = match self.source.fetch(path)? {
@@ -137,14 +229,127 @@ impl<S: Source> Walk<'_, S> {
                 return Ok(Err(why));
             }
         };
+        let to = self.documents.len();
+        // What lies in an archive has a name besides that of the archive.
+        let own = Document::open(S::image(&document))
+            .map_or_else(|_| path.to_path_buf(), |it| from_text(it.path()));
+        if let Some(&to) = self.had.get(&own) {
+            self.had.insert(path.to_path_buf(), to);
+            self.link(from, reference, to);
+            return Ok(Ok(()));
+        }
         let broken = self.examine(reference, S::image(&document));
-        self.had.insert(path.to_path_buf());
+        self.had.insert(path.to_path_buf(), to);
+        self.had.insert(own.clone(), to);
+        let referred_at = match from {
+            0 => reference.offset,
+            _ => self.documents[from].referred_at,
+        };
+        self.documents.push(Had {
+            links: Vec::new(),
+            is_module: reference.is_module,
+            depth,
+            referred_at,
+        });
         self.source
-            .keep(path, reference.role, reference.offset, document);
+            .keep(path, reference.role, referred_at, document);
+        self.link(from, reference, to);
         if let Some(why) = broken {
-            self.miss(reference, path, why, None);
+            self.miss(from, reference, path, why, None);
+        }
+        if reference.is_module {
+            self.list_archive(&to_text(&own))?;
         }
         Ok(Ok(()))
+    }
+
+    /// What lies in the archive that a main scenario is from belongs to the set.
+    fn list_archive(&mut self, main: &str) -> Result<(), S::Halt> {
+        let Some(archive) = main.strip_suffix(&format!("!{MAIN_MEMBER}")) else {
+            return Ok(());
+        };
+        let path = from_text(archive);
+        if self.documents.len() < self.walking.max_documents
+            && self.listed.insert(path.clone())
+            && let Some(listing) = self.source.listing(&path)?
+        {
+            let referred_at = self.documents.last().map_or(0, |had| had.referred_at);
+            self.documents.push(Had::default());
+            self.source
+                .keep(&path, DocumentRole::Listing, referred_at, listing);
+        }
+        Ok(())
+    }
+
+    /// Makes a plain scenario of a modular one; what is in the way of it is missing.
+    fn expand(&mut self) -> Result<(), S::Halt> {
+        match self.expanded()? {
+            Ok(document) => {
+                let path = from_text(self.root.path());
+                self.documents.push(Had::default());
+                self.source.keep(&path, DocumentRole::Expanded, 0, document);
+            }
+            Err((why, referred_at)) => {
+                let missing = MissingDocument {
+                    role: DocumentRole::Expanded,
+                    reference: self.root.path().to_owned(),
+                    path: String::new(),
+                    why: Absence::NotExpanded { why },
+                    level: Level::Error,
+                    referred_at,
+                    within: None,
+                };
+                self.missing.push((missing, None));
+            }
+        }
+        Ok(())
+    }
+
+    /// The expanded scenario, or what is in its way and the element of the root that leads there.
+    fn expanded(&self) -> Result<Result<S::Document, (String, u32)>, S::Halt> {
+        let expansion = expand(self.parts(), self.walking.max_text);
+        if let Some(obstacle) = expansion.obstacles().next() {
+            let node = obstacle.at.node();
+            let path = node.document().path();
+            let from = self.had.get(&from_text(path)).copied().unwrap_or(0);
+            let at = match from {
+                0 => node.offset(),
+                from => self.documents[from].referred_at,
+            };
+            return Ok(Err((obstacle.text.clone(), at)));
+        }
+        match expansion.image(self.walking.max_image) {
+            Some(image) => self.source.expanded(&image).map(Ok),
+            None => {
+                let why = "its image would be larger than the limit max_image allows";
+                Ok(Err((why.to_owned(), 0)))
+            }
+        }
+    }
+
+    /// The documents with their links. One that cannot be opened was said to be missing: the root stands
+    /// in its place, to which no scenario may refer.
+    fn parts(&self) -> Vec<Part<'_>> {
+        let images =
+            (1..self.documents.len()).map(|index| Document::open(self.source.kept(index - 1)));
+        let documents =
+            std::iter::once(*self.root).chain(images.map(|it| it.unwrap_or(*self.root)));
+        let part = |(document, had): (_, &Had)| Part {
+            document,
+            links: had.links.clone(),
+        };
+        documents.zip(&self.documents).map(part).collect()
+    }
+
+    fn link(&mut self, from: usize, reference: &Reference, to: usize) {
+        if reference.role == DocumentRole::Catalog {
+            return;
+        }
+        let link = Link {
+            at: reference.offset,
+            to: u32::try_from(to).unwrap_or(u32::MAX),
+        };
+        self.documents[from].links.push(link);
     }
 
     /// What keeps a document that is there from being relied on.
@@ -177,16 +382,42 @@ impl<S: Source> Walk<'_, S> {
         })
     }
 
-    fn miss(&mut self, reference: &Reference, path: &Path, why: Absence, catalogs: Option<String>) {
+    fn miss(
+        &mut self,
+        from: usize,
+        reference: &Reference,
+        path: &Path,
+        why: Absence,
+        catalogs: Option<String>,
+    ) {
+        let (referred_at, within) = match from {
+            0 => (reference.offset, None),
+            _ => (
+                self.documents[from].referred_at,
+                self.within(from, reference.offset),
+            ),
+        };
         let missing = MissingDocument {
             role: reference.role,
             reference: reference.text.clone(),
-            path: qcbus_messages::path_text::to_text(path),
+            path: to_text(path),
             level: level(reference.role, path, &why),
             why,
-            referred_at: reference.offset,
+            referred_at,
+            within,
         };
         self.missing.push((missing, catalogs));
+    }
+
+    /// Where a document other than the root refers to something.
+    fn within(&self, from: usize, offset: u32) -> Option<Within> {
+        let document = Document::open(self.source.kept(from - 1)).ok()?;
+        let position = document.position(offset);
+        Some(Within {
+            path: position.path.to_owned(),
+            row: position.row,
+            column: position.column,
+        })
     }
 
     /// A catalog directory that is not there weighs more when the scenario needs a catalog of it,
@@ -212,7 +443,15 @@ fn level(role: DocumentRole, path: &Path, why: &Absence) -> Level {
     let needed = role != DocumentRole::Catalog;
     match why {
         Absence::SimulatorMap => Level::Information,
-        Absence::NotThere | Absence::Directory if needed => Level::Error,
+        Absence::NotThere
+        | Absence::Directory
+        | Absence::Escapes
+        | Absence::NotAScenario
+        | Absence::TooDeep { .. }
+            if needed =>
+        {
+            Level::Error
+        }
         // Maps may be of a kind that is no XML.
         Absence::Broken { .. } if needed && FileKind::of_path(path).is_some() => Level::Error,
         _ => Level::Warning,

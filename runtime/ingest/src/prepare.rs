@@ -7,7 +7,7 @@ use std::path::{Component, Path, PathBuf};
 
 use qcbus_document::{FaultCode, FileKind, Suffix};
 
-use crate::archive::{MAIN_MEMBER, is_zip, read_member};
+use crate::archive::{Entry, MAIN_MEMBER, OpenArchive, is_zip};
 use crate::decode::decode;
 use crate::error::IngestError;
 use crate::limits::Limits;
@@ -15,19 +15,17 @@ use crate::prepared::{NamedText, Prepared};
 use crate::read::{FileStamp, RawFile, read_file, stamp_of_bytes};
 use crate::text_fault::TextFault;
 use crate::unpack::{InflateError, gunzip, is_gzip};
+use crate::xml::escape_into;
 use crate::xml::{Include, Splice, SpliceKey, first_element, includes_of};
 
 /// Reads a file and everything that belongs to its image. Includes must lie below `boundary`.
 /// `path` may name a member of an archive as `archive.mosc!member`.
 ///
 /// # Errors
-/// When no bytes could be had from the file itself. Whatever is wrong inside them, or with an
-/// included file, is a fault of the image.
+/// When no bytes could be had from the file itself, or an archive has no such member. Whatever is
+/// wrong inside them, or with an included file, is a fault of the image.
 pub fn prepare(path: &Path, boundary: &Path, limits: &Limits) -> Result<Prepared, IngestError> {
-    let (file, members) = split_members(path);
-    let RawFile { bytes, stamp } = read_file(&file, limits)?;
-    let boundary = std::path::absolute(boundary).unwrap_or_else(|_| boundary.to_path_buf());
-    Ok(assemble(stamp, bytes, &members, Some(&boundary), limits))
+    Reader::new(*limits).prepare(path, boundary)
 }
 
 /// Prepares bytes that are in memory already. Nothing is read from disk, so that every include is
@@ -35,7 +33,154 @@ pub fn prepare(path: &Path, boundary: &Path, limits: &Limits) -> Result<Prepared
 pub fn prepare_bytes(path: &Path, bytes: Vec<u8>, limits: &Limits) -> Prepared {
     let (file, members) = split_members(path);
     let stamp = stamp_of_bytes(&file, &bytes);
-    assemble(stamp, bytes, &members, None, limits)
+    let mut reader = Reader::new(*limits);
+    let root = reader.open(&stamp, bytes, &members);
+    assemble(stamp, root, None, limits)
+}
+
+/// Reads files for one set of documents: an archive is read and looked through once, however many
+/// of its members belong to the set.
+pub struct Reader {
+    limits: Limits,
+    /// By path; of an archive within another, `archive!member`.
+    archives: HashMap<PathBuf, (FileStamp, OpenArchive)>,
+    /// Unpacked bytes of archives that may still be had.
+    left: u64,
+}
+
+impl Reader {
+    /// A reader that has read nothing.
+    pub fn new(limits: Limits) -> Reader {
+        Reader {
+            limits,
+            archives: HashMap::new(),
+            left: limits.max_archive,
+        }
+    }
+
+    /// See [`prepare`].
+    ///
+    /// # Errors
+    /// As [`prepare`].
+    pub fn prepare(&mut self, path: &Path, boundary: &Path) -> Result<Prepared, IngestError> {
+        let (file, members) = split_members(path);
+        let (stamp, root) = match self.archives.get(&file) {
+            Some((stamp, _)) => {
+                let stamp = stamp.clone();
+                let root = self.open_archive(&stamp.path, &members);
+                (stamp, root)
+            }
+            None => {
+                let RawFile { bytes, stamp } = read_file(&file, &self.limits)?;
+                let root = self.open(&stamp, bytes, &members);
+                (stamp, root)
+            }
+        };
+        let asked = members.iter().any(|member| !member.is_empty());
+        // An archive that is there and has no main scenario is there all the same.
+        let is_there = root.path.as_os_str().len() > path.as_os_str().len();
+        let is_member_missing = |fault: &TextFault| fault.code == FaultCode::ArchiveMemberMissing;
+        if asked && !is_there && root.faults.iter().any(is_member_missing) {
+            return Err(IngestError::Missing {
+                path: path.to_path_buf(),
+            });
+        }
+        let boundary = std::path::absolute(boundary).unwrap_or_else(|_| boundary.to_path_buf());
+        Ok(assemble(stamp, root, Some(&boundary), &self.limits))
+    }
+
+    /// What lies in an archive, as a document: see [`qcbus_messages::DocumentRole::Listing`]. `None`
+    /// where nothing can be read in it.
+    ///
+    /// # Errors
+    /// As [`prepare`].
+    pub fn listing(
+        &mut self,
+        archive: &Path,
+        boundary: &Path,
+    ) -> Result<Option<Prepared>, IngestError> {
+        if !self.archives.contains_key(archive) {
+            self.prepare(archive, boundary)?;
+        }
+        let Some((stamp, open)) = self.archives.get_mut(archive) else {
+            return Ok(None);
+        };
+        if open.is_refused() {
+            return Ok(None);
+        }
+        let text = listing(&open.entries());
+        let root = NamedText {
+            path: archive.to_path_buf(),
+            text,
+            faults: Vec::new(),
+        };
+        Ok(Some(assemble(stamp.clone(), root, None, &self.limits)))
+    }
+
+    /// Unpacks and decodes one file.
+    fn open(&mut self, stamp: &FileStamp, bytes: Vec<u8>, members: &[String]) -> NamedText {
+        let path = &stamp.path;
+        if FileKind::of_path(path) != Some(FileKind::Mosc) {
+            return open(path, bytes, &self.limits);
+        }
+        let archive = OpenArchive::new(bytes.into(), &self.limits);
+        self.archives.insert(path.clone(), (stamp.clone(), archive));
+        self.open_archive(path, members)
+    }
+
+    /// Opens `main.xosc` of an archive that is open, or the member that the path leads to, through
+    /// archives within archives.
+    fn open_archive(&mut self, archive: &Path, members: &[String]) -> NamedText {
+        let (name, rest) = match members.split_first() {
+            Some((name, rest)) if !name.is_empty() => (name.as_str(), rest),
+            _ => (MAIN_MEMBER, &[][..]),
+        };
+        let path = member_of(archive, name);
+        let known = self.archives.contains_key(&path);
+        let (stamp, open) = match self.archives.get_mut(archive) {
+            Some((stamp, open)) => (stamp.clone(), open),
+            None => return empty(path, Vec::new()),
+        };
+        if ends_in_mosc(Path::new(name)) {
+            if !known {
+                let member = open.member(name, &self.limits, &mut self.left);
+                if !member.present {
+                    return empty(path, member.faults);
+                }
+                let inner = OpenArchive::new(member.bytes.into(), &self.limits);
+                self.archives.insert(path.clone(), (stamp, inner));
+            }
+            return self.open_archive(&path, rest);
+        }
+        let member = open.member(name, &self.limits, &mut self.left);
+        if !member.present {
+            return empty(path, member.faults);
+        }
+        decoded(path, member.bytes, member.faults, &self.limits)
+    }
+}
+
+fn empty(path: PathBuf, faults: Vec<TextFault>) -> NamedText {
+    NamedText {
+        path,
+        text: String::new(),
+        faults,
+    }
+}
+
+/// The members of an archive as an XML document.
+fn listing(entries: &[Entry]) -> String {
+    let mut text = String::from("<Archive>\n");
+    for entry in entries {
+        let mut name = String::new();
+        escape_into(&mut name, &entry.name, '"');
+        let (size, crc32) = (entry.size, entry.crc32);
+        text.push_str(&format!(
+            "<Member name=\"{name}\" size=\"{size}\" crc32=\"{crc32:08x}\"/>\n"
+        ));
+    }
+    text.push_str("</Archive>\n");
+    text
 }
 
 /// Parts `archive.mosc!member!member` into the file on disk and the members. A `!` that follows
@@ -69,8 +214,7 @@ fn member_of(archive: &Path, name: &str) -> PathBuf {
 
 fn assemble(
     stamp: FileStamp,
-    bytes: Vec<u8>,
-    members: &[String],
+    root: NamedText,
     boundary: Option<&Path>,
     limits: &Limits,
 ) -> Prepared {
@@ -78,7 +222,6 @@ fn assemble(
         .content
         .as_ref()
         .map_or([0; 32], |content| content.digest);
-    let root = open(&stamp.path, bytes, members, limits);
     let mut reader = Includes {
         limits,
         boundary,
@@ -90,12 +233,8 @@ fn assemble(
     Prepared::new(limits, digest, reader.files, reader.texts, splices)
 }
 
-/// Unpacks and decodes one file.
-fn open(path: &Path, bytes: Vec<u8>, members: &[String], limits: &Limits) -> NamedText {
-    let kind = FileKind::of_path(path);
-    if kind == Some(FileKind::Mosc) {
-        return open_archive(path, &bytes, members, limits);
-    }
+/// Unpacks and decodes one file that is no archive of several.
+fn open(path: &Path, bytes: Vec<u8>, limits: &Limits) -> NamedText {
     let mut faults = Vec::new();
     let packed = is_gzip(&bytes);
     let bytes = if packed {
@@ -106,11 +245,7 @@ fn open(path: &Path, bytes: Vec<u8>, members: &[String], limits: &Limits) -> Nam
     if is_zip(&bytes) {
         let text = "the file is a zip archive although its name promises XML; modular scenarios end in .mosc";
         faults.push(TextFault::new(FaultCode::ArchiveMalformed, 0, text));
-        return NamedText {
-            path: path.to_path_buf(),
-            text: String::new(),
-            faults,
-        };
+        return empty(path.to_path_buf(), faults);
     }
     if promises_gzip(path) && !packed && !bytes.is_empty() {
         let text = "the name promises a gzip file, but the bytes are none";
@@ -182,30 +317,6 @@ fn inflate(path: &Path, packed: &[u8], limits: &Limits, faults: &mut Vec<TextFau
         faults.push(TextFault::new(FaultCode::EncodingTranscoded, 0, text));
     }
     inflated.bytes
-}
-
-/// Opens `main.xosc` of an archive, or the member that the path leads to, through archives within
-/// archives.
-fn open_archive(path: &Path, packed: &[u8], members: &[String], limits: &Limits) -> NamedText {
-    let (name, rest) = match members.split_first() {
-        Some((name, rest)) if !name.is_empty() => (name.as_str(), rest),
-        _ => (MAIN_MEMBER, &[][..]),
-    };
-    let member = read_member(packed, name, limits);
-    let path = member_of(path, name);
-    if ends_in_mosc(Path::new(name)) && member.present {
-        let mut inner = open_archive(&path, &member.bytes, rest, limits);
-        inner.faults.splice(0..0, member.faults);
-        return inner;
-    }
-    if !member.present {
-        return NamedText {
-            path,
-            text: String::new(),
-            faults: member.faults,
-        };
-    }
-    decoded(path, member.bytes, member.faults, limits)
 }
 
 /// Reads the files that `<include>` elements name, each of them once.
@@ -299,7 +410,7 @@ impl Includes<'_> {
         }
         match read_file(&path, self.limits) {
             Ok(RawFile { bytes, stamp }) => {
-                let text = open(&stamp.path, bytes, &[], self.limits);
+                let text = open(&stamp.path, bytes, self.limits);
                 self.files.push(stamp);
                 self.texts.push(text);
                 self.known.insert(canonical, self.texts.len() - 1);

@@ -8,6 +8,7 @@ use qcbus_document::{Document, Node};
 use qcbus_messages::path_text::from_text;
 use qcbus_messages::{Absence, DocumentRole};
 
+use crate::modular::{SearchPath, modules};
 use crate::prepare::{normal, split_members};
 
 /// A reference from a document to another file.
@@ -30,6 +31,8 @@ pub struct Reference {
     pub directory: Option<PathBuf>,
     /// Why there is no candidate, or not every one.
     pub unresolved: Option<Absence>,
+    /// Whether a modular scenario takes maneuver groups from it.
+    pub is_module: bool,
 }
 
 impl Reference {
@@ -44,12 +47,13 @@ const MAX_CATALOGS: usize = 1000;
 
 /// The references of a document in document order. Of the file system only the entries of catalog
 /// directories are looked at.
-pub fn references(document: &Document<'_>) -> Vec<Reference> {
+pub fn references(document: &Document<'_>, search: &SearchPath) -> Vec<Reference> {
     let parameters = Parameters::of(document);
     let mut found: Vec<Reference> = targets(document)
         .into_iter()
         .map(|(role, node, text)| resolve(role, node, text, &parameters))
         .collect();
+    found.extend(modules(document, search));
     found.sort_by_key(|reference| reference.offset);
     found
 }
@@ -80,12 +84,6 @@ fn targets<'d>(document: &Document<'d>) -> Vec<(DocumentRole, Node<'d>, &'d str)
     gather(DocumentRole::Catalog, "Directory", "path", &in_catalogs);
     gather(
         DocumentRole::Scenario,
-        "ScenarioReference",
-        "scenarioFileName",
-        &|_| true,
-    );
-    gather(
-        DocumentRole::Scenario,
         "ScenarioFile",
         "filepath",
         &|parent| parent.is("ParameterValueDistribution"),
@@ -109,6 +107,7 @@ fn resolve(
         candidates: Vec::new(),
         directory: None,
         unresolved: None,
+        is_module: false,
     };
     let outcome = parameters
         .fill(text)
@@ -142,7 +141,7 @@ fn check(role: DocumentRole, text: &str) -> Result<(), Absence> {
 fn locate(reference: &mut Reference, from: &Path, text: &str) {
     let mut candidates: Vec<PathBuf> = Vec::new();
     for spelling in spellings(text.trim()) {
-        for candidate in places(reference.role, from, &spelling) {
+        for candidate in places(from, &spelling) {
             if !candidates.contains(&candidate) {
                 candidates.push(candidate);
             }
@@ -206,26 +205,13 @@ fn percent_decoded(text: &str) -> String {
     String::from_utf8(bytes).unwrap_or_else(|_| text.to_string())
 }
 
-/// Relative to the referring file. What a member of an archive refers to is looked for in the
-/// archive first, then beside it.
-fn places(role: DocumentRole, from: &Path, text: &str) -> Vec<PathBuf> {
-    let mut places = Vec::new();
+/// Relative to the referring file. Maps and catalogs of a scenario in an archive lie beside it.
+fn places(from: &Path, text: &str) -> Vec<PathBuf> {
     // A `!` that follows no archive is an ordinary character of a name.
-    let (file, members) = split_members(from);
-    if let Some((_, around)) = members.split_last()
-        && role == DocumentRole::Scenario
-    {
-        let mut place = file.as_os_str().to_owned();
-        for member in around.iter().map(String::as_str).chain([text]) {
-            place.push("!");
-            place.push(member);
-        }
-        places.push(PathBuf::from(place));
-    }
+    let (file, _) = split_members(from);
     let folder = file.parent().unwrap_or(Path::new(""));
     let joined = folder.join(text);
-    places.push(normal(&std::path::absolute(&joined).unwrap_or(joined)));
-    places
+    vec![normal(&std::path::absolute(&joined).unwrap_or(joined))]
 }
 
 /// The `.xosc` files of a folder by name, and what is said of those that are too many.

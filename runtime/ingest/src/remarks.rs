@@ -1,9 +1,10 @@
 //! What qcbus itself finds in a set of documents: faults and missing references, whoever demanded what.
 
 use qcbus_document::{Attribute, Document, FaultCode, FaultGroup, Node};
+use qcbus_formats::location::OtherPlace;
 use qcbus_formats::pool::{BundleOutcome, Remark};
 use qcbus_formats::xqar::{Issue, Level, Location, Locations};
-use qcbus_messages::{Absence, DocumentRole, MissingDocument};
+use qcbus_messages::{Absence, DocumentRole, MissingDocument, Within};
 
 /// Rule: what the file refers to is there and can be read.
 const REFERENCES: &str = "qcbus.dev:qcbus:1.0.0:file.references_resolved";
@@ -22,12 +23,24 @@ pub fn remarks(
 ) -> Vec<Remark> {
     let mut checkers = bundles.iter().flat_map(|bundle| &bundle.checkers);
     let is_error = |issue: &Issue| issue.level == Level::Error;
-    let mut remarks = if checkers.any(|checker| checker.issues.iter().any(is_error)) {
-        Vec::new()
-    } else {
-        faults_of_root(root)
+    let is_said = checkers.any(|checker| checker.issues.iter().any(is_error));
+    let mut remarks = match is_said {
+        true => Vec::new(),
+        false => faults_of_root(root),
     };
-    remarks.extend(missing_references(root, missing));
+    // Why a scenario cannot be expanded is an error of some bundle, or of a reference that is missing.
+    let references = missing
+        .iter()
+        .filter(|it| it.role != DocumentRole::Expanded);
+    let references: Vec<MissingDocument> = references.cloned().collect();
+    let is_said = is_said || references.iter().any(|it| it.level == Level::Error);
+    remarks.extend(missing_references(
+        root,
+        match is_said {
+            true => &references,
+            false => missing,
+        },
+    ));
     remarks
 }
 
@@ -55,14 +68,17 @@ fn missing_reference(root: &Document<'_>, missing: &MissingDocument) -> Remark {
         reference,
         path,
         why,
+        within,
         ..
     } = missing;
     let looked = match path.as_str() {
         "" => String::new(),
         path if *why == Absence::NotThere && !reference.trim_start().starts_with('/') => {
-            format!(
-                "; it was looked for at `{path}`, because paths start at the directory of the file"
-            )
+            let because = match missing.role {
+                DocumentRole::Scenario => "",
+                _ => ", because paths start at the directory of the file",
+            };
+            format!("; it was looked for at `{path}`{because}")
         }
         path => format!("; it was looked for at `{path}`"),
     };
@@ -70,9 +86,19 @@ fn missing_reference(root: &Document<'_>, missing: &MissingDocument) -> Remark {
         (DocumentRole::Catalog, Level::Information) => "; nothing of it is referred to",
         _ => "",
     };
-    let text = format!("{what} `{reference}` {why}{looked}{unused}");
+    let behind = within.as_ref().map_or_else(String::new, |within| {
+        let Within { path, row, column } = within;
+        format!("; {path}:{row}:{column} refers to it")
+    });
+    let text = format!("{what} `{reference}` {why}{looked}{unused}{behind}");
     let open = format!("where {what} `{reference}` leads is not known");
-    let place = place_of(root, missing);
+    let mut place = place_of(root, missing);
+    place.elsewhere = within.as_ref().map(|within| OtherPlace {
+        path: within.path.clone(),
+        row: within.row.into(),
+        column: within.column.into(),
+        xpath: None,
+    });
     reference_remark(text, open, missing.level, vec![place])
 }
 

@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 
 use qcbus_document::Document;
 use qcbus_formats::xqar::{Level, Location};
+use qcbus_ingest::modular::{ExpandedImage, SearchPath};
 use qcbus_ingest::{
-    Limits, Look, Source, faults_of_root, gather, missing_references, prepare_bytes,
+    Limits, Look, Source, Walking, faults_of_root, gather, missing_references, prepare_bytes,
 };
 use qcbus_messages::{Absence, DocumentRole, MissingDocument};
 
@@ -18,6 +19,7 @@ use qcbus_messages::{Absence, DocumentRole, MissingDocument};
 struct Shelf {
     files: HashMap<PathBuf, &'static str>,
     kept: Vec<(PathBuf, DocumentRole)>,
+    images: Vec<Vec<u8>>,
     looked: Vec<PathBuf>,
 }
 
@@ -35,8 +37,21 @@ impl Source for Shelf {
         document
     }
 
-    fn keep(&mut self, path: &Path, role: DocumentRole, _: u32, _: Vec<u8>) {
+    fn listing(&mut self, _: &Path) -> Result<Option<Vec<u8>>, Infallible> {
+        Ok(None)
+    }
+
+    fn expanded(&self, expanded: &ExpandedImage<'_, '_>) -> Result<Vec<u8>, Infallible> {
+        Ok(expanded.build())
+    }
+
+    fn kept(&self, index: usize) -> &[u8] {
+        &self.images[index]
+    }
+
+    fn keep(&mut self, path: &Path, role: DocumentRole, _: u32, image: Vec<u8>) {
         self.kept.push((path.to_owned(), role));
+        self.images.push(image);
     }
 
     fn looked(&mut self, look: Look<'_>) {
@@ -58,8 +73,14 @@ fn gathered(
             .iter()
             .map(|(path, text)| (PathBuf::from(path), *text)),
     );
-    let Ok(missing) = gather(&Document::open(&image).unwrap(), most, &mut shelf);
-    (shelf, missing)
+    let walking = Walking {
+        max_documents: most,
+        max_text: 1 << 20,
+        max_image: 1 << 24,
+        search: &SearchPath::default(),
+    };
+    let Ok(found) = gather(&Document::open(&image).unwrap(), &walking, &mut shelf);
+    (shelf, found.missing)
 }
 
 const TWO_MAPS: &str = "<OpenSCENARIO><RoadNetwork><LogicFile filepath='a%20b.xodr'/>\

@@ -2,6 +2,7 @@
 //! are made here.
 
 pub(crate) mod chars;
+mod escape;
 mod includes;
 mod namespaces;
 mod parser;
@@ -9,6 +10,7 @@ mod sink;
 mod tag;
 mod value;
 
+pub(crate) use escape::escape_into;
 pub(crate) use includes::{Include, first_element, includes_of};
 pub(crate) use parser::{Input, SourceText, Splice, SpliceKey, parse};
-pub(crate) use sink::{Counter, Halt};
+pub(crate) use sink::{Counter, Halt, Sink};

@@ -1,0 +1,220 @@
+//! Keys and the attributes that they fit.
+
+use std::cell::Cell;
+use std::collections::HashMap;
+
+use qcbus_document::{Attribute, Node};
+
+use super::OFFERS;
+use super::copy::{Copy, Value};
+use super::problem::{Problem, Problems, Spot, What};
+
+/// A `ParameterReference` of a use.
+#[derive(Debug, Clone)]
+pub struct Key<'d> {
+    /// The element.
+    pub node: Node<'d>,
+    /// Its `key`: an attribute, before it the element that bears it, before that the elements around.
+    pub key: &'d str,
+    /// Its `value`.
+    pub value: Attribute<'d>,
+    /// How many attributes it fits.
+    pub fits: Cell<u32>,
+    /// How many attributes have its value now.
+    pub wins: Cell<u32>,
+}
+
+/// Reads the `ParameterReference` elements of a use.
+pub(super) fn read<'d>(within: Node<'d>, problems: &mut Problems<'d>) -> Vec<Key<'d>> {
+    let mut keys: Vec<Key<'d>> = Vec::new();
+    let mut first: HashMap<&str, Node<'d>> = HashMap::new();
+    for node in within.children_named("ParameterReference") {
+        let (Some(key), Some(value)) = (node.attr("key"), node.attribute("value")) else {
+            problems.push(Problem {
+                what: What::KeyMalformed,
+                at: Spot::Node(node),
+                target: None,
+                text: "`ParameterReference` needs the attributes `key` and `value`".to_owned(),
+            });
+            continue;
+        };
+        if let Some(&before) = first.get(key) {
+            let text = match before.attr("value") == Some(value.value()) {
+                true => format!("the key `{key}` is given twice with the same value"),
+                false => format!(
+                    "the key `{key}` is given twice with different values, `{}` and `{}`",
+                    before.attr("value").unwrap_or(""),
+                    value.value()
+                ),
+            };
+            problems.push(Problem {
+                what: What::KeyTwice,
+                at: Spot::of(node, "key"),
+                target: Some(Spot::of(before, "key")),
+                text,
+            });
+        } else {
+            first.insert(key, node);
+        }
+        keys.push(Key {
+            node,
+            key,
+            value,
+            fits: Cell::new(0),
+            wins: Cell::new(0),
+        });
+    }
+    keys
+}
+
+/// The attributes that an element offers for replacement and has.
+pub(super) fn offered<'d>(element: Node<'d>) -> impl Iterator<Item = Attribute<'d>> {
+    let listed = element.attr(OFFERS).unwrap_or("");
+    let names = listed.split(',').map(str::trim);
+    names.filter_map(move |name| element.attribute(name).filter(|_| name != OFFERS))
+}
+
+/// Puts the values of keys into a copy. Of the keys that fit an attribute the most specific wins: the
+/// one that names most elements around it.
+pub(super) fn apply<'d>(
+    copy: &mut Copy<'d>,
+    part: usize,
+    keys: &[Key<'d>],
+    problems: &mut Problems<'d>,
+) {
+    let table = Table::of(keys);
+    if keys.is_empty() {
+        return;
+    }
+    let group = copy.group;
+    for element in group.descendants() {
+        for attribute in offered(element) {
+            let fitting = table.fitting(attribute);
+            let Some((&best, others)) = fitting.split_last() else {
+                continue;
+            };
+            for &other in others {
+                overlap(&keys[best[0]], &keys[other[0]], attribute, problems);
+            }
+            for &index in fitting.iter().copied().flatten() {
+                keys[index].fits.set(keys[index].fits.get() + 1);
+            }
+            // Of equal keys the last one, where they agree.
+            let Some(&winner) = best.last() else { continue };
+            let winner = &keys[winner];
+            let different = |&&index: &&usize| keys[index].value.value() != winner.value.value();
+            if let Some(&other) = best.iter().find(different) {
+                tie(winner, &keys[other], attribute, problems);
+                continue;
+            }
+            winner.wins.set(winner.wins.get() + 1);
+            copy.edits
+                .insert(attribute.offset(), Value::of(part, winner.value));
+        }
+    }
+}
+
+/// Says which keys fit nothing in any of the copies of a use, of which `group` is the first.
+pub(super) fn say_unmatched<'d>(keys: &[Key<'d>], group: Node<'d>, problems: &mut Problems<'d>) {
+    let lost = keys.iter().filter(|key| key.fits.get() == 0);
+    lost.for_each(|key| problems.push(unmatched(key, group)));
+}
+
+/// Keys by what they say.
+struct Table<'k> {
+    by_text: HashMap<&'k str, Vec<usize>>,
+    /// Most parts that a key has.
+    longest: usize,
+}
+
+impl<'k> Table<'k> {
+    fn of(keys: &[Key<'k>]) -> Table<'k> {
+        let mut by_text: HashMap<&str, Vec<usize>> = HashMap::new();
+        for (index, key) in keys.iter().enumerate() {
+            by_text.entry(key.key).or_default().push(index);
+        }
+        let longest = by_text.keys().map(|key| key.split('.').count()).max();
+        Table {
+            by_text,
+            longest: longest.unwrap_or(0),
+        }
+    }
+
+    /// The keys that fit an attribute, the most specific last; equal ones together.
+    fn fitting(&self, attribute: Attribute<'_>) -> Vec<&[usize]> {
+        let element = attribute.node();
+        let mut path = attribute.name().to_owned();
+        let mut found: Vec<&[usize]> = Vec::new();
+        found.extend(self.by_text.get(path.as_str()).map(Vec::as_slice));
+        let around = std::iter::once(element).chain(element.ancestors());
+        for element in around.take(self.longest.saturating_sub(1)) {
+            path.insert(0, '.');
+            path.insert_str(0, element.name());
+            found.extend(self.by_text.get(path.as_str()).map(Vec::as_slice));
+        }
+        found
+    }
+}
+
+fn overlap<'d>(
+    best: &Key<'d>,
+    other: &Key<'d>,
+    attribute: Attribute<'d>,
+    problems: &mut Problems<'d>,
+) {
+    let text = format!(
+        "the keys `{}` and `{}` both fit `{}` of `{}`; the one that says more wins",
+        best.key,
+        other.key,
+        attribute.name(),
+        attribute.node().name()
+    );
+    // Once for two keys, however many attributes they share.
+    let is_said = |problem: &Problem<'d>| {
+        problem.what == What::KeyOverlap
+            && problem.at.node() == other.node
+            && problem
+                .text
+                .starts_with(&format!("the keys `{}`", best.key))
+    };
+    if !problems.lately(is_said) {
+        problems.push(Problem {
+            what: What::KeyOverlap,
+            at: Spot::of(other.node, "key"),
+            target: Some(Spot::Attribute(attribute)),
+            text,
+        });
+    }
+}
+
+fn tie<'d>(one: &Key<'d>, other: &Key<'d>, attribute: Attribute<'d>, problems: &mut Problems<'d>) {
+    let text = format!(
+        "which value `{}` of `{}` is to have is open: the key `{}` says `{}` and `{}`",
+        attribute.name(),
+        attribute.node().name(),
+        one.key,
+        other.value.value(),
+        one.value.value()
+    );
+    problems.push(Problem {
+        what: What::KeyTie,
+        at: Spot::of(one.node, "key"),
+        target: Some(Spot::Attribute(attribute)),
+        text,
+    });
+}
+
+fn unmatched<'d>(key: &Key<'d>, group: Node<'d>) -> Problem<'d> {
+    let name = group.attr("name").unwrap_or("");
+    let text = format!(
+        "the key `{}` fits no attribute that the group `{name}` offers by `{OFFERS}`, so its value `{}` goes nowhere",
+        key.key,
+        key.value.value()
+    );
+    Problem {
+        what: What::KeyUnmatched,
+        at: Spot::of(key.node, "key"),
+        target: Some(Spot::Node(group)),
+        text,
+    }
+}

@@ -1,0 +1,44 @@
+//! Modular scenarios: an OpenSCENARIO file whose maneuver groups are taken from other files by
+//! `ScenarioReference`, with some of their attributes replaced.
+//!
+//! [`expand`] makes one plain scenario of the documents of a set, in memory and without looking
+//! anywhere else. What it makes is written as text ([`Expansion::text`]), with the formatting of the
+//! files, or as a document image ([`Expansion::image`]), whose text *is* that of the files: so each
+//! element and each value of it knows where it comes from.
+
+mod actor;
+mod copy;
+mod image;
+mod keys;
+mod pack;
+mod plan;
+mod problem;
+mod search;
+mod text;
+
+pub use copy::{Copy, Value};
+pub use image::ExpandedImage;
+pub use keys::Key;
+pub use pack::{PackError, pack};
+pub use plan::{Expansion, Form, Reference, Use, expand};
+pub use problem::{Problem, Spot, What};
+pub(crate) use search::modules;
+pub use search::{SEARCH_PATH_VARIABLE, SearchPath};
+
+use qcbus_document::Document;
+use qcbus_messages::Link;
+
+/// How deeply scenarios may refer to scenarios.
+pub const MAX_DEPTH: u32 = 32;
+
+/// The attribute that lists the attributes of its element for which a reference may give values.
+pub const OFFERS: &str = "parameterAttributes";
+
+/// A document of a set, with where its references lead within the set.
+#[derive(Debug, Clone)]
+pub struct Part<'d> {
+    /// The document.
+    pub document: Document<'d>,
+    /// Its references that were followed; [`Link::to`] counts the parts.
+    pub links: Vec<Link>,
+}

@@ -1,0 +1,559 @@
+//! Which groups take the place of which references.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::rc::Rc;
+
+use qcbus_document::{Document, FaultCode, Node};
+use qcbus_formats::distance::did_you_mean;
+
+use super::copy::{Copy, Value};
+use super::keys::{self, Key};
+use super::problem::{Problem, Problems, Spot, What};
+use super::{MAX_DEPTH, Part, actor};
+use crate::archive::MAIN_MEMBER;
+
+/// What becomes of a modular scenario.
+#[derive(Debug)]
+pub struct Expansion<'d> {
+    /// The documents, the root first.
+    pub parts: Vec<Part<'d>>,
+    /// The references that were followed, those of inner scenarios before those that lead there.
+    pub references: Vec<Reference<'d>>,
+    /// What is wrong.
+    pub problems: Vec<Problem<'d>>,
+    /// What takes the place of groups of the root, by the index of their node.
+    pub(super) replaced: BTreeMap<u32, Vec<Rc<Copy<'d>>>>,
+    /// The parts whose text is in the expanded scenario, the root first.
+    pub(super) used: BTreeSet<usize>,
+}
+
+/// A `ScenarioReference` that was followed.
+#[derive(Debug)]
+pub struct Reference<'d> {
+    /// The part that has it.
+    pub part: usize,
+    /// The element.
+    pub node: Node<'d>,
+    /// The group that it is in.
+    pub group: Node<'d>,
+    /// The part that it leads to.
+    pub target: Option<usize>,
+    /// How it says what it takes.
+    pub form: Form,
+    /// How many references lead here from the root, itself included.
+    pub depth: u32,
+    /// What it takes, as far as it is there.
+    pub uses: Vec<Use<'d>>,
+}
+
+/// How a `ScenarioReference` says what it takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// `ManeuverGroupReference` elements name groups, each with keys of its own.
+    Named,
+    /// `ParameterReference` elements directly in it: all groups of the file are taken. The documented
+    /// form, which later versions of the reference tool do not know.
+    Direct,
+}
+
+/// What a reference takes from another file.
+#[derive(Debug)]
+pub struct Use<'d> {
+    /// The `ManeuverGroupReference`, or the `ScenarioReference` of the direct form.
+    pub node: Node<'d>,
+    /// The keys that it gives.
+    pub keys: Vec<Key<'d>>,
+    /// The copies that take the place of the referring group.
+    pub copies: Vec<Rc<Copy<'d>>>,
+}
+
+impl<'d> Expansion<'d> {
+    /// Whether the expanded scenario is whole: each reference leads somewhere, and each value is known.
+    pub fn is_complete(&self) -> bool {
+        self.obstacles().next().is_none()
+    }
+
+    /// The problems that are in the way of an expanded scenario.
+    pub fn obstacles(&self) -> impl Iterator<Item = &Problem<'d>> {
+        self.problems.iter().filter(|problem| problem.what.stops())
+    }
+}
+
+/// Most groups that are copied, those of inner scenarios counted each time.
+const MOST_COPIES: usize = 1 << 16;
+
+/// Puts the groups that a modular scenario refers to in the place of the references. `parts` has the
+/// root first; `max_text` bounds the bytes of what is copied.
+///
+/// # Panics
+/// When there is no part at all.
+pub fn expand(parts: Vec<Part<'_>>, max_text: u64) -> Expansion<'_> {
+    let mut expander = Expander {
+        states: (0..parts.len()).map(|_| State::Unknown).collect(),
+        chain: Vec::new(),
+        left: max_text,
+        copies: 0,
+        problems: Problems::default(),
+        out: Expansion {
+            parts,
+            references: Vec::new(),
+            problems: Vec::new(),
+            replaced: BTreeMap::new(),
+            used: BTreeSet::from([0]),
+        },
+    };
+    expander.root();
+    expander.out.problems = expander.problems.0;
+    expander.out
+}
+
+struct Expander<'d> {
+    states: Vec<State<'d>>,
+    /// The parts that are being expanded, the root first.
+    chain: Vec<usize>,
+    /// Bytes and groups that may still be copied.
+    left: u64,
+    copies: usize,
+    problems: Problems<'d>,
+    out: Expansion<'d>,
+}
+
+enum State<'d> {
+    Unknown,
+    /// Its groups, with what takes the place of references.
+    Done(Rc<Vec<Rc<Copy<'d>>>>),
+}
+
+impl<'d> Expander<'d> {
+    fn document(&self, part: usize) -> Document<'d> {
+        self.out.parts[part].document
+    }
+
+    fn say(&mut self, what: What, at: Spot<'d>, target: Option<Spot<'d>>, text: String) {
+        self.problems.push(Problem {
+            what,
+            at,
+            target,
+            text,
+        });
+    }
+
+    fn root(&mut self) {
+        self.chain.push(0);
+        let document = self.document(0);
+        if let (Some(why), Some(root)) = (trouble(document), document.root()) {
+            self.say(What::Unreadable, root.into(), None, why);
+        }
+        self.say_misplaced(document);
+        for group in document.elements("ManeuverGroup") {
+            if let Some(copies) = self.group(0, group) {
+                let used = copies.iter().flat_map(|copy| {
+                    let values = copy.name.iter().chain(copy.edits.values());
+                    values.map(|value| value.part).chain([copy.part])
+                });
+                self.out.used.extend(used);
+                self.out.replaced.insert(group.index(), copies);
+            }
+        }
+    }
+
+    fn say_misplaced(&mut self, document: Document<'d>) {
+        for node in document.elements("ScenarioReference") {
+            let parent = node.parent();
+            if parent.is_some_and(|parent| parent.is("ManeuverGroup")) {
+                continue;
+            }
+            let text = format!(
+                "`ScenarioReference` belongs in a `ManeuverGroup`, whose place the groups that it refers to take; \
+                 here it is in `{}`",
+                parent.map_or("", |parent| parent.name())
+            );
+            self.say(What::Placement, node.into(), None, text);
+        }
+    }
+
+    /// What takes the place of a group; `None` for one without references.
+    fn group(&mut self, part: usize, group: Node<'d>) -> Option<Vec<Rc<Copy<'d>>>> {
+        let references: Vec<Node<'d>> = group.children_named("ScenarioReference").collect();
+        let first = *references.first()?;
+        let mut copies = Vec::new();
+        for &reference in &references {
+            if reference != first {
+                let text = "a `ManeuverGroup` has one `ScenarioReference`; the reference tool passes over further ones \
+                            and gives their values to the first"
+                    .to_owned();
+                self.say(
+                    What::SecondReference,
+                    reference.into(),
+                    Some(first.into()),
+                    text,
+                );
+            }
+            copies.extend(self.reference(part, group, reference));
+        }
+        Some(copies)
+    }
+
+    fn reference(&mut self, part: usize, group: Node<'d>, node: Node<'d>) -> Vec<Rc<Copy<'d>>> {
+        let named: Vec<Node<'d>> = node.children_named("ManeuverGroupReference").collect();
+        let form = match named.is_empty() {
+            true => Form::Direct,
+            false => Form::Named,
+        };
+        self.say_form(node, form);
+        let depth = self.chain.len() as u32;
+        let target = self.target(part, node);
+        let mut uses = Vec::new();
+        if let Some(target) = target {
+            let referring = Referring { part, group };
+            uses = match form {
+                Form::Named => named
+                    .iter()
+                    .filter_map(|&named| self.named(referring, named, target))
+                    .collect(),
+                Form::Direct => vec![self.direct(referring, node, target)],
+            };
+            self.say_twice(&named);
+        }
+        let copies = uses.iter().flat_map(|one| one.copies.clone()).collect();
+        self.out.references.push(Reference {
+            part,
+            node,
+            group,
+            target,
+            form,
+            depth,
+            uses,
+        });
+        copies
+    }
+
+    fn say_form(&mut self, node: Node<'d>, form: Form) {
+        let direct = node.child("ParameterReference");
+        match (form, direct) {
+            (Form::Direct, _) => {
+                let text = "without `ManeuverGroupReference` all groups of the file are taken; this is the documented \
+                            form, but later versions of the reference tool delete the group without a word"
+                    .to_owned();
+                self.say(What::DirectForm, node.into(), None, text);
+            }
+            (Form::Named, Some(direct)) => {
+                let text = "`ParameterReference` beside `ManeuverGroupReference` is for no group, and its value goes \
+                            nowhere; it belongs in one of the `ManeuverGroupReference` elements"
+                    .to_owned();
+                self.say(What::MixedForm, direct.into(), Some(node.into()), text);
+            }
+            (Form::Named, None) => {}
+        }
+    }
+
+    /// The part that a reference leads to, when its groups can be had.
+    fn target(&mut self, part: usize, node: Node<'d>) -> Option<usize> {
+        let at = Spot::of(node, "scenarioFileName");
+        let links = &self.out.parts[part].links;
+        let link = links.iter().find(|link| link.at == node.offset());
+        let Some(target) = link.map(|link| link.to as usize) else {
+            let (what, text) = not_found(node);
+            self.say(what, at, None, text);
+            return None;
+        };
+        if target >= self.out.parts.len() {
+            let text = "the scenario that is referred to is not at hand".to_owned();
+            self.say(What::FileNotFound, at, None, text);
+            return None;
+        }
+        if let Some(from) = self.chain.iter().position(|&it| it == target) {
+            let chain = self.chain[from..].iter().chain([&target]);
+            let names: Vec<String> = chain.map(|&part| self.short_name(part)).collect();
+            let text = format!("the scenario refers to itself: {}", names.join(" → "));
+            self.say(What::Cycle, at, None, text);
+            return None;
+        }
+        if self.chain.len() > MAX_DEPTH as usize {
+            let text = format!("scenarios refer to scenarios more than {MAX_DEPTH} deep");
+            self.say(What::Depth, at, None, text);
+            return None;
+        }
+        let document = self.document(target);
+        if let Some(why) = trouble(document) {
+            let root = document.root().map(Spot::from);
+            self.say(What::Unreadable, at, root, why);
+            return None;
+        }
+        Some(target)
+    }
+
+    /// The groups of a part after its own expansion.
+    fn expanded(&mut self, part: usize) -> Rc<Vec<Rc<Copy<'d>>>> {
+        if let State::Done(groups) = &self.states[part] {
+            return groups.clone();
+        }
+        self.chain.push(part);
+        let document = self.document(part);
+        self.say_misplaced(document);
+        let mut groups = Vec::new();
+        for group in document.elements("ManeuverGroup") {
+            match self.group(part, group) {
+                Some(copies) => groups.extend(copies),
+                None => groups.push(Rc::new(Copy::as_is(part, group))),
+            }
+        }
+        self.chain.pop();
+        let groups = Rc::new(groups);
+        self.states[part] = State::Done(groups.clone());
+        groups
+    }
+
+    /// The group of a name; the first, as the reference tool takes it. Other groups of a plain file are
+    /// not looked into: what is wrong with them does not matter here.
+    fn find(&mut self, target: usize, name: &str) -> Vec<Rc<Copy<'d>>> {
+        let document = self.document(target);
+        if !document.path().ends_with(&format!(".mosc!{MAIN_MEMBER}")) {
+            let plain = document.elements("ManeuverGroup").filter(|group| {
+                group.attr("name") == Some(name) && group.child("ScenarioReference").is_none()
+            });
+            let plain: Vec<_> = plain
+                .map(|group| Rc::new(Copy::as_is(target, group)))
+                .collect();
+            if !plain.is_empty() {
+                return plain;
+            }
+        }
+        let groups = self.expanded(target);
+        groups
+            .iter()
+            .filter(|copy| copy.name() == name)
+            .cloned()
+            .collect()
+    }
+
+    fn named(
+        &mut self,
+        referring: Referring<'d>,
+        node: Node<'d>,
+        target: usize,
+    ) -> Option<Use<'d>> {
+        let Some(wanted) = node.attribute("maneuverGroupName") else {
+            let text =
+                "`ManeuverGroupReference` needs the attribute `maneuverGroupName`".to_owned();
+            self.say(What::GroupUnknown, node.into(), None, text);
+            return None;
+        };
+        let found = self.find(target, wanted.value());
+        let Some(first) = found.first() else {
+            let text = self.unknown_group(target, wanted.value());
+            let root = self.document(target).root().map(Spot::from);
+            self.say(What::GroupUnknown, wanted.into(), root, text);
+            return None;
+        };
+        if let Some(second) = found.get(1) {
+            let text = format!(
+                "`{}` has {} groups called `{}`; the first is taken",
+                self.short_name(target),
+                found.len(),
+                wanted.value()
+            );
+            self.say(
+                What::GroupAmbiguous,
+                wanted.into(),
+                Some(second.group.into()),
+                text,
+            );
+        }
+        let keys = keys::read(node, &mut self.problems);
+        let prefix = referring.group.attr("name").unwrap_or("");
+        let name = match prefix {
+            "" => first.name().to_owned(),
+            prefix => format!("{prefix}.{}", first.name()),
+        };
+        let name = Value::of(referring.part, wanted).saying(&name);
+        let first = first.clone();
+        let copy = self.copy(referring, &first, name, &keys)?;
+        keys::say_unmatched(&keys, first.group, &mut self.problems);
+        Some(Use {
+            node,
+            keys,
+            copies: vec![copy],
+        })
+    }
+
+    /// All groups: the first is called as the referring group, the next `name_2` and so on.
+    fn direct(&mut self, referring: Referring<'d>, node: Node<'d>, target: usize) -> Use<'d> {
+        let keys = keys::read(node, &mut self.problems);
+        let groups = self.expanded(target);
+        let own = referring.group.attr("name").unwrap_or("");
+        let mut copies = Vec::new();
+        for (index, group) in groups.iter().enumerate() {
+            let name = match index {
+                0 => own.to_owned(),
+                _ => format!("{own}_{}", index + 1),
+            };
+            let Some(file) = node.attribute("scenarioFileName") else {
+                break;
+            };
+            let name = Value::of(referring.part, file).saying(&name);
+            copies.extend(self.copy(referring, group, name, &keys));
+        }
+        match groups.first() {
+            Some(first) => {
+                keys::say_unmatched(&keys, first.group, &mut self.problems);
+            }
+            None => {
+                let text = format!("`{}` has no maneuver group", self.short_name(target));
+                let root = self.document(target).root().map(Spot::from);
+                self.say(
+                    What::GroupUnknown,
+                    Spot::of(node, "scenarioFileName"),
+                    root,
+                    text,
+                );
+            }
+        }
+        Use { node, keys, copies }
+    }
+
+    /// Copies a group; `None` when that is too much.
+    fn copy(
+        &mut self,
+        referring: Referring<'d>,
+        group: &Copy<'d>,
+        name: Value,
+        keys: &[Key<'d>],
+    ) -> Option<Rc<Copy<'d>>> {
+        let bytes = group
+            .group
+            .end_offset()
+            .saturating_sub(group.group.offset());
+        let bytes = u64::from(bytes) + name.text.len() as u64;
+        self.copies += 1;
+        if bytes > self.left || self.copies > MOST_COPIES {
+            let text = format!(
+                "the expanded scenario becomes too large: more than {MOST_COPIES} groups, or more bytes than the \
+                 limit max_archive allows"
+            );
+            if !self.problems.0.iter().any(|it| it.what == What::Size) {
+                self.say(What::Size, referring.group.into(), None, text);
+            }
+            return None;
+        }
+        self.left -= bytes;
+        let mut copy = Copy {
+            name: Some(name),
+            ..group.clone()
+        };
+        actor::replace(
+            &mut copy,
+            referring.part,
+            referring.group,
+            &mut self.problems,
+        );
+        keys::apply(&mut copy, referring.part, keys, &mut self.problems);
+        Some(Rc::new(copy))
+    }
+
+    fn say_twice(&mut self, named: &[Node<'d>]) {
+        let mut first: HashMap<&str, Node<'d>> = HashMap::new();
+        for &node in named {
+            let Some(name) = node.attr("maneuverGroupName") else {
+                continue;
+            };
+            if let Some(&before) = first.get(name) {
+                let text = format!(
+                    "the group `{name}` is referred to twice here, so that two groups get one name; the reference tool \
+                     gives both the values of the last"
+                );
+                let at = Spot::of(node, "maneuverGroupName");
+                self.say(What::GroupTwice, at, Some(before.into()), text);
+            } else {
+                first.insert(name, node);
+            }
+        }
+    }
+
+    fn unknown_group(&mut self, target: usize, name: &str) -> String {
+        const MOST: usize = 5;
+        let groups = self.expanded(target);
+        let mut names: Vec<&str> = groups.iter().map(|copy| copy.name()).collect();
+        names.dedup();
+        let file = self.short_name(target);
+        let meant = did_you_mean(name, names.iter().copied());
+        let listed: Vec<String> = names
+            .iter()
+            .take(MOST)
+            .map(|it| format!("`{it}`"))
+            .collect();
+        let known = match names.len() {
+            _ if !meant.is_empty() => meant,
+            0 => "; it has none".to_owned(),
+            1..=MOST => format!("; it has {}", listed.join(", ")),
+            _ => format!("; it has {}, …", listed.join(", ")),
+        };
+        format!("`{file}` has no maneuver group `{name}`{known}")
+    }
+
+    /// What people call a part: the name of the file, or of the member after its archive.
+    fn short_name(&self, part: usize) -> String {
+        let path = self.document(part).path();
+        let file = path.rsplit('/').next().unwrap_or(path);
+        file.to_owned()
+    }
+}
+
+/// The group that a reference is in.
+#[derive(Clone, Copy)]
+struct Referring<'d> {
+    part: usize,
+    group: Node<'d>,
+}
+
+/// Why a reference leads nowhere.
+fn not_found(node: Node<'_>) -> (What, String) {
+    let Some(name) = node.attr("scenarioFileName") else {
+        let text = "`ScenarioReference` needs the attribute `scenarioFileName`".to_owned();
+        return (What::FileNotFound, text);
+    };
+    if !name.ends_with(".xosc") && !name.ends_with(".mosc") {
+        let text = format!(
+            "`{name}` is not looked for: the name of a scenario ends in `.xosc`, that of an archive in `.mosc`, in \
+             small letters"
+        );
+        return (What::Extension, text);
+    }
+    let in_archive = node.document().path().contains(".mosc!");
+    if in_archive && !crate::archive::stays_inside(name) {
+        let text = format!(
+            "`{name}` leads out of the archive; what an archive refers to lies in it or in a directory of the search \
+             path"
+        );
+        return (What::Escapes, text);
+    }
+    let around = match in_archive {
+        true => "in the archive, those around it",
+        false => "beside the scenario",
+    };
+    let text = format!(
+        "`{name}` is neither {around} nor in a directory of the search path ({})",
+        super::SEARCH_PATH_VARIABLE
+    );
+    (What::FileNotFound, text)
+}
+
+/// What keeps a scenario from being taken as it is.
+fn trouble(document: Document<'_>) -> Option<String> {
+    // Of an archive with other faults the scenario itself is whole.
+    let whole = |code: FaultCode| {
+        !code.makes_partial()
+            || matches!(
+                code,
+                FaultCode::ArchiveEscapes | FaultCode::ArchiveDuplicate
+            )
+    };
+    if let Some(fault) = document.faults().find(|fault| !whole(fault.code)) {
+        let position = document.position(fault.offset);
+        return Some(format!("{position} cannot be read: {}", fault.text));
+    }
+    let root = document.root()?;
+    let found = root.name();
+    (found != "OpenSCENARIO")
+        .then(|| format!("{} is no scenario: its root is `{found}`", document.path()))
+}

@@ -1,0 +1,206 @@
+//! The expanded scenario as a file.
+
+use std::ops::Range;
+
+use qcbus_document::{Attribute, Document};
+
+use super::OFFERS;
+use super::copy::Copy;
+use super::plan::Expansion;
+use crate::xml::escape_into;
+
+impl Expansion<'_> {
+    /// The expanded scenario as a file of UTF-8. What is not replaced is, byte by byte, as it is in the
+    /// files: order of attributes, white space, comments, CDATA. Only `parameterAttributes`, which
+    /// belongs to no plain scenario, is left out.
+    ///
+    /// Of an expansion that is not complete this is of no use.
+    pub fn text(&self) -> String {
+        let root = self.parts[0].document;
+        let text = text_of(root);
+        let mut edits = vec![encoding(text)];
+        let mut next = 0;
+        while let Some(node) = root.node(next) {
+            if let Some(copies) = self.replaced.get(&next) {
+                let place = range(node.offset(), node.end_offset());
+                let between = indentation(text, place.start);
+                let copies: Vec<String> = copies.iter().map(|copy| self.written(copy)).collect();
+                edits.push(Some((place, copies.join(&between))));
+                next = node.subtree_end();
+                continue;
+            }
+            edits.push(
+                node.attribute(OFFERS)
+                    .and_then(|offers| left_out(text, offers)),
+            );
+            next += 1;
+        }
+        applied(text, 0..text.len(), edits.into_iter().flatten())
+    }
+
+    /// A copy as it is written in the expanded file.
+    fn written(&self, copy: &Copy<'_>) -> String {
+        let document = self.parts[copy.part].document;
+        let text = text_of(document);
+        let place = range(copy.group.offset(), copy.group.end_offset());
+        let mut edits = vec![self.namespaces(copy, text.get(place.clone()).unwrap_or(""))];
+        for node in std::iter::once(copy.group).chain(copy.group.descendants()) {
+            for attribute in node.attributes() {
+                edits.push(match copy.edit(attribute) {
+                    _ if attribute.is(OFFERS) => left_out(text, attribute),
+                    Some(value) => Some(rewritten(text, attribute, &value.text)),
+                    None => None,
+                });
+            }
+        }
+        applied(text, place, edits.into_iter().flatten())
+    }
+
+    /// Declarations of the prefixes that a copy needs and would lack in its new place.
+    fn namespaces(&self, copy: &Copy<'_>, written: &str) -> Option<(Range<usize>, String)> {
+        const PREFIX: &str = "xmlns:";
+        let root = self.parts[0].document.root();
+        let mut declarations = String::new();
+        let mut seen: Vec<&str> = Vec::new();
+        let around = std::iter::once(copy.group).chain(copy.group.ancestors());
+        for (depth, element) in around.enumerate() {
+            for attribute in element.attributes() {
+                let Some(prefix) = attribute.name().strip_prefix(PREFIX) else {
+                    continue;
+                };
+                if seen.contains(&prefix) {
+                    continue;
+                }
+                seen.push(prefix);
+                let is_there =
+                    root.and_then(|root| root.attr(attribute.name())) == Some(attribute.value());
+                if depth > 0 && !is_there && written.contains(&format!("{prefix}:")) {
+                    declarations.push_str(&format!(" {PREFIX}{prefix}=\""));
+                    escape_into(&mut declarations, attribute.value(), '"');
+                    declarations.push('"');
+                }
+            }
+        }
+        let after_name = copy.group.offset() as usize + 1 + tag_name(written).len();
+        (!declarations.is_empty()).then_some((after_name..after_name, declarations))
+    }
+}
+
+/// The name in a start tag, with its prefix.
+fn tag_name(written: &str) -> &str {
+    let name = written.get(1..).unwrap_or("");
+    let end = name.find(|c: char| c.is_ascii_whitespace() || c == '/' || c == '>');
+    &name[..end.unwrap_or(name.len())]
+}
+
+/// The text of a document that has one source, as scenarios do.
+pub(super) fn text_of<'d>(document: Document<'d>) -> &'d str {
+    let mut sources = document.sources();
+    sources
+        .next()
+        .map_or("", |source| document.source_text(&source))
+}
+
+fn range(start: u32, stop: u32) -> Range<usize> {
+    start as usize..stop as usize
+}
+
+/// A value in the place of another one, between the quotes that are there.
+fn rewritten(text: &str, attribute: Attribute<'_>, value: &str) -> (Range<usize>, String) {
+    let start = attribute.value_offset() as usize;
+    let quote = match start.checked_sub(1).and_then(|at| text.as_bytes().get(at)) {
+        Some(b'\'') => '\'',
+        _ => '"',
+    };
+    let mut written = String::with_capacity(value.len());
+    escape_into(&mut written, value, quote);
+    (start..start + attribute.raw_len() as usize, written)
+}
+
+/// An attribute with the white space before it.
+fn left_out(text: &str, attribute: Attribute<'_>) -> Option<(Range<usize>, String)> {
+    let before = text.get(..attribute.offset() as usize)?;
+    let start = before.trim_end_matches([' ', '\t', '\r', '\n']).len();
+    let stop = attribute.value_offset() as usize + attribute.raw_len() as usize + 1;
+    Some((start..stop, String::new()))
+}
+
+/// What an XML declaration says of the encoding, where the file had another one than it gets.
+fn encoding(text: &str) -> Option<(Range<usize>, String)> {
+    let start = text
+        .find("<?xml")
+        .filter(|&at| at <= '\u{FEFF}'.len_utf8())?;
+    let declaration = text.get(start..start + text.get(start..)?.find("?>")?)?;
+    let after = declaration.find("encoding")? + "encoding".len();
+    let quote_at = after + declaration.get(after..)?.find(['"', '\''])?;
+    let quote = char::from(*declaration.as_bytes().get(quote_at)?);
+    let name = declaration.get(quote_at + 1..)?;
+    let name = &name[..name.find(quote)?];
+    let at = start + quote_at + 1;
+    (!name.eq_ignore_ascii_case("utf-8")).then(|| (at..at + name.len(), "UTF-8".to_owned()))
+}
+
+/// What stands between two groups in one place: a line break and what the first is indented by.
+fn indentation(text: &str, at: usize) -> String {
+    let before = text.get(..at).unwrap_or("");
+    let line = before.rsplit_once('\n').map_or("", |(_, line)| line);
+    let blank = line.chars().all(|c| c == ' ' || c == '\t');
+    match before.contains('\n') && blank {
+        true => format!("\n{line}"),
+        false => String::new(),
+    }
+}
+
+/// A part of a text with edits in it.
+fn applied(
+    text: &str,
+    within: Range<usize>,
+    edits: impl Iterator<Item = (Range<usize>, String)>,
+) -> String {
+    let mut edits: Vec<_> = edits.collect();
+    edits.sort_by_key(|(range, _)| (range.start, range.end));
+    let mut out = String::with_capacity(within.len());
+    let mut at = within.start;
+    for (range, new) in edits {
+        // Edits lie in order and apart; in a damaged image they may not.
+        out.push_str(text.get(at..range.start).unwrap_or(""));
+        out.push_str(&new);
+        at = range.end.max(at);
+    }
+    out.push_str(text.get(at..within.end).unwrap_or(""));
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_declared_encoding_is_the_one_that_is_written() {
+        let edited = |text: &str| applied(text, 0..text.len(), encoding(text).into_iter());
+        assert_eq!(
+            edited("<?xml version='1.0' encoding='UTF-16' standalone='yes'?><a/>"),
+            "<?xml version='1.0' encoding='UTF-8' standalone='yes'?><a/>"
+        );
+        for same in [
+            "<?xml version=\"1.0\"?><a/>",
+            "<?xml encoding=\"utf-8\"?><a/>",
+            "<a/>",
+        ] {
+            assert_eq!(edited(same), same);
+        }
+    }
+
+    #[test]
+    fn groups_in_one_place_are_indented_alike() {
+        assert_eq!(indentation("<a>\n  <b/>", 6), "\n  ");
+        assert_eq!(indentation("<a>\n <c/> <b/>", 10), "");
+        assert_eq!(indentation("<b/>", 0), "");
+    }
+
+    #[test]
+    fn a_tag_name_ends_where_the_tag_goes_on() {
+        assert_eq!(tag_name("<a:Group name='x'>"), "a:Group");
+        assert_eq!(tag_name("<Group/>"), "Group");
+    }
+}

@@ -1,0 +1,43 @@
+//! From a value to its spelling in XML.
+
+use std::fmt::Write as _;
+
+use super::chars::is_char;
+
+/// Appends a value as it is written between two quotes of this kind, so that every reader gets the
+/// same value back. What XML cannot hold becomes U+FFFD.
+pub(crate) fn escape_into(out: &mut String, value: &str, quote: char) {
+    for c in value.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '"' if quote == '"' => out.push_str("&quot;"),
+            '\'' if quote == '\'' => out.push_str("&apos;"),
+            // Written out, white space would be read as blanks.
+            '\t' | '\n' | '\r' => {
+                let _ = write!(out, "&#{};", u32::from(c));
+            }
+            c if is_char(c) => out.push(c),
+            _ => out.push('\u{FFFD}'),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_is_read_back_as_it_was() {
+        for quote in ['"', '\''] {
+            let mut out = String::new();
+            escape_into(&mut out, "a<b> & \"c\" 'd'\t\n\u{1}ü", quote);
+            let other = if quote == '"' {
+                "&quot;c&quot; 'd'"
+            } else {
+                "\"c\" &apos;d&apos;"
+            };
+            assert_eq!(out, format!("a&lt;b> &amp; {other}&#9;&#10;\u{FFFD}ü"));
+        }
+    }
+}
