@@ -26,12 +26,24 @@ pub struct Bundle {
     pub kinds: &'static [FileKind],
     /// Published versions of the standard, ascending.
     pub versions: &'static [Version],
+    /// What it looks at where the root is a modular scenario.
+    pub reads: Reads,
     /// Reads the version that a document names; `None` when it names none.
     pub version_of: fn(&Document<'_>) -> Option<Version>,
     /// The rules in the order of the result. A rule comes after those it depends on.
     pub rules: &'static [&'static dyn AnyRule],
     /// What the short examples of the pages are put into.
     pub templates: &'static [Template],
+}
+
+/// What a bundle looks at where the root is a modular scenario.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reads {
+    /// The file as it is written.
+    Written,
+    /// What it is expanded to, where that can be had: the root of the subject is the expanded scenario
+    /// then, and what is found in it is shown in the files that it was made of.
+    Expanded,
 }
 
 /// One checker as results list it. A rule with a separate backport makes two.

@@ -25,7 +25,7 @@ mod sink;
 mod subject;
 mod version;
 
-pub use bundle::{BACKPORT_SUFFIX, Bundle, Checker};
+pub use bundle::{BACKPORT_SUFFIX, Bundle, Checker, Reads};
 pub use check::{Listener, Outcome, check};
 pub use kept::LinkedModel;
 pub use load::{LoadError, Loaded};
@@ -33,6 +33,7 @@ pub use param::{Default, MAX_ISSUES, Param, ParamError, Values};
 pub use place::Place;
 pub use plan::Plan;
 pub use qcbus_formats::xqar::{Issue, Level, Status};
+pub use qcbus_ingest::modular;
 pub use qcbus_messages::BUILD_DATE;
 pub use resource::{Resource, ResourceError, ResourceFile, ResourceValue, UserFiles};
 pub use rule::{AnyRule, Backport, Each, Facts, Model, Rule, Unbuilt};

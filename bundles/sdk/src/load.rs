@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use qcbus_document::{Document, FileKind, Image, ImageError, Suffix};
 use qcbus_formats::pool::{BundleOutcome, Remark};
-use qcbus_ingest::{IngestError, Limits, Prepared, Source};
-use qcbus_messages::{Absence, Digest, DocumentRole, MissingDocument};
+use qcbus_ingest::modular::{ExpandedImage, SearchPath};
+use qcbus_ingest::{IngestError, Limits, Prepared, Reader, Source, Walking};
+use qcbus_messages::{Absence, Digest, DocumentRole, Link, MissingDocument};
 
 use crate::kept::KeptModels;
 use crate::subject::LinkedImage;
@@ -18,6 +19,7 @@ pub struct Loaded {
     path: PathBuf,
     digest: Digest,
     root: Vec<u8>,
+    links: Vec<Link>,
     linked: Vec<LinkedImage>,
     missing: Vec<MissingDocument>,
 }
@@ -49,9 +51,16 @@ impl Loaded {
     /// in the image.
     pub fn from_path(path: &Path, boundary: &Path) -> Result<Loaded, LoadError> {
         let kind = kind_of(path)?;
-        let prepared = prepare(path, boundary)?;
+        let mut reader = Reader::new(Limits::default());
+        let prepared = reader.prepare(path, boundary).map_err(|error| {
+            let error = error.to_string();
+            LoadError::Unreadable {
+                path: path.to_owned(),
+                error,
+            }
+        })?;
         let mut loaded = Loaded::of(kind, path, &prepared);
-        loaded.follow(boundary)?;
+        loaded.follow(reader, boundary)?;
         Ok(loaded)
     }
 
@@ -76,7 +85,8 @@ impl Loaded {
         let linked = self.linked.iter().map(|linked| linked.open(&models));
         let linked = linked.collect::<Result<_, ImageError>>()?;
         let subject = Subject::new(root, self.kind, (bundle.version_of)(&root));
-        Ok(subject.with(linked, self.missing.clone()))
+        let subject = subject.with(linked, self.missing.clone());
+        Ok(subject.with_links(self.links.clone()).read(bundle.reads))
     }
 
     /// What qcbus itself has to say about the file: references that lead nowhere, and what is wrong
@@ -113,19 +123,32 @@ impl Loaded {
             path: path.to_owned(),
             digest: Digest(prepared.digest()),
             root: prepared.build(),
+            links: Vec::new(),
             linked: Vec::new(),
             missing: Vec::new(),
         }
     }
 
-    fn follow(&mut self, boundary: &Path) -> Result<(), LoadError> {
+    fn follow(&mut self, reader: Reader, boundary: &Path) -> Result<(), LoadError> {
         let mut shelf = Shelf {
+            reader,
             boundary,
             linked: Vec::new(),
         };
         let root = Document::open(&self.root)?;
-        let Ok(missing) = qcbus_ingest::gather(&root, MAX_DOCUMENTS, &mut shelf);
-        self.missing = missing;
+        let walking = Walking {
+            max_documents: MAX_DOCUMENTS,
+            max_text: Limits::default().max_archive,
+            max_image: Limits::default().max_image,
+            search: &SearchPath::of_environment(),
+        };
+        let Ok(found) = qcbus_ingest::gather(&root, &walking, &mut shelf);
+        self.missing = found.missing;
+        let mut links = found.links.into_iter();
+        self.links = links.next().unwrap_or_default();
+        for (linked, links) in shelf.linked.iter_mut().zip(links) {
+            linked.links = links;
+        }
         self.linked = shelf.linked;
         Ok(())
     }
@@ -136,6 +159,7 @@ const MAX_DOCUMENTS: usize = 2048;
 
 /// Fetches documents from disk into memory.
 struct Shelf<'b> {
+    reader: Reader,
     boundary: &'b Path,
     linked: Vec<LinkedImage>,
 }
@@ -147,7 +171,7 @@ impl Source for Shelf<'_> {
     fn fetch(&mut self, path: &Path) -> Result<Result<Vec<u8>, Absence>, Infallible> {
         // Maps and catalogs may lie anywhere; what they include stays around them.
         let boundary = path.parent().unwrap_or(self.boundary);
-        let prepared = qcbus_ingest::prepare(path, boundary, &Limits::default());
+        let prepared = self.reader.prepare(path, boundary);
         Ok(prepared
             .map(|prepared| prepared.build())
             .map_err(|error: IngestError| error.to_absence()))
@@ -157,8 +181,22 @@ impl Source for Shelf<'_> {
         document
     }
 
+    fn listing(&mut self, archive: &Path) -> Result<Option<Vec<u8>>, Infallible> {
+        let listing = self.reader.listing(archive, self.boundary);
+        Ok(listing.ok().flatten().map(|prepared| prepared.build()))
+    }
+
+    fn expanded(&self, expanded: &ExpandedImage<'_, '_>) -> Result<Vec<u8>, Infallible> {
+        Ok(expanded.build())
+    }
+
+    fn kept(&self, index: usize) -> &[u8] {
+        self.linked.get(index).map_or(&[], |linked| &linked.image)
+    }
+
     fn keep(&mut self, path: &Path, role: DocumentRole, referred_at: u32, image: Vec<u8>) {
         self.linked.push(LinkedImage {
+            links: Vec::new(),
             role,
             path: qcbus_messages::path_text::to_text(path),
             referred_at,
@@ -170,13 +208,4 @@ impl Source for Shelf<'_> {
 
 fn kind_of(path: &Path) -> Result<FileKind, LoadError> {
     FileKind::of_path(path).ok_or_else(|| LoadError::UnknownKind(path.to_owned()))
-}
-
-fn prepare(path: &Path, boundary: &Path) -> Result<Prepared, LoadError> {
-    qcbus_ingest::prepare(path, boundary, &Limits::default()).map_err(|error| {
-        LoadError::Unreadable {
-            path: path.to_owned(),
-            error: error.to_string(),
-        }
-    })
 }

@@ -6,6 +6,8 @@ use qcbus_formats::xqar::{Location, Locations};
 
 use crate::Subject;
 
+mod expanded;
+
 /// Something that an issue can point at.
 #[derive(Clone, Copy)]
 pub enum Place<'p> {
@@ -106,7 +108,7 @@ pub(crate) fn locate(subject: &Subject<'_>, place: &Place<'_>, description: Opti
     let linked = linked_index(subject, &document);
     let order = (linked.map_or(0, |index| index + 1), place.offset());
     if linked.is_none() && position.is_root_file {
-        let places = places_of(subject, &position, place.xpath(subject));
+        let places = places_of(subject, &position, xpath_there(subject, place));
         return Spot {
             locations: Locations {
                 description,
@@ -122,13 +124,13 @@ pub(crate) fn locate(subject: &Subject<'_>, place: &Place<'_>, description: Opti
     let path = path
         .filter(|_| position.is_root_file)
         .unwrap_or(position.path);
-    let reference = match linked.and_then(|index| subject.linked().get(index)) {
-        Some(linked) => reference_at(subject, linked.referred_at),
-        None => including_element(place.node()).or(subject.root().root()),
-    };
-    let places = match reference {
-        Some(node) => places_of(subject, &node.position(), Some(subject.xpath(node))),
-        None => places_of(subject, &subject.root().position(0), None),
+    let places = match linked.and_then(|index| subject.linked().get(index)) {
+        Some(linked) => shown_at(subject, reference_at(subject, linked.referred_at)),
+        None if subject.is_expanded() => expanded::referring(subject, place),
+        None => {
+            let around = including_element(place.node()).or(subject.root().root());
+            shown_at(subject, around)
+        }
     };
     Spot {
         locations: Locations {
@@ -137,11 +139,26 @@ pub(crate) fn locate(subject: &Subject<'_>, place: &Place<'_>, description: Opti
                 path: path.to_owned(),
                 row: position.row.into(),
                 column: position.column.into(),
-                xpath: place.xpath(subject),
+                xpath: xpath_there(subject, place),
             }),
             places,
         },
         order,
+    }
+}
+
+fn shown_at(subject: &Subject<'_>, node: Option<Node<'_>>) -> Vec<Location> {
+    match node {
+        Some(node) => places_of(subject, &node.position(), Some(subject.xpath(node))),
+        None => places_of(subject, &subject.written().position(0), None),
+    }
+}
+
+/// The XPath in the file that a place is written in.
+fn xpath_there(subject: &Subject<'_>, place: &Place<'_>) -> Option<String> {
+    match subject.is_expanded() {
+        true => expanded::xpath(subject, place),
+        false => place.xpath(subject),
     }
 }
 
@@ -152,7 +169,7 @@ fn places_of(
 ) -> Vec<Location> {
     // Results count bytes on disk; those of a transcoded file are others than the image's.
     let transcoded = subject
-        .root()
+        .written()
         .faults()
         .any(|fault| fault.code == FaultCode::EncodingTranscoded);
     let file = Location::File {
@@ -177,7 +194,7 @@ fn linked_index(subject: &Subject<'_>, document: &Document<'_>) -> Option<usize>
 }
 
 fn reference_at<'d>(subject: &Subject<'d>, offset: u32) -> Option<Node<'d>> {
-    let root = subject.root().root()?;
+    let root = subject.written().root()?;
     // Only for issues in other files, whose number is capped: a walk is cheap enough.
     root.descendants()
         .find(|node| node.offset() == offset)

@@ -4,15 +4,19 @@ use std::cell::RefCell;
 use std::sync::Arc;
 
 use qcbus_document::{Document, FileKind, Image, ImageError, Node, XPaths};
-use qcbus_messages::{DocumentRole, MissingDocument};
+use qcbus_ingest::Limits;
+use qcbus_ingest::modular::{Expansion, Part};
+use qcbus_messages::{DocumentRole, Link, MissingDocument};
 
 use crate::kept::{ImageId, KeptModels};
-use crate::{LinkedModel, ResourceValue, Version};
+use crate::{LinkedModel, Reads, ResourceValue, Version};
 
 /// The documents of one check.
 #[derive(Debug, Clone)]
 pub struct Subject<'d> {
     root: Document<'d>,
+    written: Document<'d>,
+    links: Vec<Link>,
     kind: FileKind,
     version: Option<Version>,
     linked: Vec<Linked<'d>>,
@@ -30,8 +34,10 @@ pub struct Linked<'d> {
     pub role: DocumentRole,
     /// Absolute path; for a member of an archive, the archive's path, `!` and the member's name.
     pub path: String,
-    /// Byte offset of the referring element in the root's image.
+    /// Byte offset of the element in the root's image that leads here.
     pub referred_at: u32,
+    /// Where its own references to maps and scenarios lead; the root counts as the first document.
+    pub links: &'d [Link],
     image: &'d LinkedImage,
     models: KeptModels,
 }
@@ -42,6 +48,7 @@ pub(crate) struct LinkedImage {
     pub role: DocumentRole,
     pub path: String,
     pub referred_at: u32,
+    pub links: Vec<Link>,
     pub id: ImageId,
     pub image: Image,
 }
@@ -54,6 +61,7 @@ impl LinkedImage {
             role: self.role,
             path: self.path.clone(),
             referred_at: self.referred_at,
+            links: &self.links,
             image: self,
             models: models.clone(),
         })
@@ -77,6 +85,8 @@ impl<'d> Subject<'d> {
     pub fn new(root: Document<'d>, kind: FileKind, version: Option<Version>) -> Subject<'d> {
         Subject {
             root,
+            written: root,
+            links: Vec::new(),
             kind,
             version,
             linked: Vec::new(),
@@ -94,6 +104,25 @@ impl<'d> Subject<'d> {
         self
     }
 
+    /// Says where the root's references to maps and scenarios lead; the root counts as the first
+    /// document, the linked ones follow.
+    #[must_use]
+    pub fn with_links(mut self, links: Vec<Link>) -> Subject<'d> {
+        self.links = links;
+        self
+    }
+
+    /// The same subject as a bundle looks at it that reads modular scenarios in this way.
+    #[must_use]
+    pub fn read(mut self, reads: Reads) -> Subject<'d> {
+        if reads == Reads::Expanded {
+            let expanded = self.with_role(DocumentRole::Expanded).next();
+            self.root = expanded.map_or(self.written, |expanded| expanded.document);
+            self.paths = RefCell::new(XPaths::new(self.root));
+        }
+        self
+    }
+
     /// The same subject with what was made of the user's files; see [`crate::Resource`].
     #[must_use]
     pub fn with_resources(mut self, resources: Vec<ResourceValue>) -> Subject<'d> {
@@ -104,6 +133,36 @@ impl<'d> Subject<'d> {
     /// What was made of the user's files, if the user gave any to this bundle.
     pub fn resource<T: 'static>(&self) -> Option<&T> {
         self.resources.iter().find_map(|one| one.downcast_ref())
+    }
+
+    /// The root file as it is written, also where the root is what it was expanded to.
+    pub fn written(&self) -> Document<'d> {
+        self.written
+    }
+
+    /// Whether the root is what a modular scenario was expanded to.
+    pub fn is_expanded(&self) -> bool {
+        self.with_role(DocumentRole::Expanded)
+            .any(|expanded| expanded.document.content_hash() == self.root.content_hash())
+    }
+
+    /// Where the written root's references to maps and scenarios lead.
+    pub fn links(&self) -> &[Link] {
+        &self.links
+    }
+
+    /// What becomes of the written root when it is expanded, with all that is wrong on the way.
+    pub fn expansion(&self) -> Expansion<'d> {
+        let root = Part {
+            document: self.written,
+            links: self.links.clone(),
+        };
+        let linked = self.linked.iter().map(|linked| Part {
+            document: linked.document,
+            links: linked.links.to_vec(),
+        });
+        let parts = std::iter::once(root).chain(linked).collect();
+        qcbus_ingest::modular::expand(parts, Limits::default().max_archive)
     }
 
     /// The document that is checked.

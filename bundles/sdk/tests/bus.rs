@@ -134,6 +134,7 @@ fn job() -> Job {
         path: "/a.xodr".to_owned(),
         digest: Digest([1; 32]),
         referred_at: 0,
+        links: Vec::new(),
     };
     Job {
         job: JOB,

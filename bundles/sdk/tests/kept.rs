@@ -158,6 +158,7 @@ impl Broker {
             path: "/a".to_owned(),
             digest: Digest([1; 32]),
             referred_at: 0,
+            links: Vec::new(),
         };
         let root = self.publish(FileKind::Xosc, root);
         let job = Job {

@@ -27,6 +27,7 @@ pub static BUNDLE: Bundle = Bundle {
         Version::new(1, 8),
         Version::new(1, 9),
     ],
+    reads: qcbus_sdk::Reads::Written,
     version_of: |document| basic::version_of(document, "header"),
     rules: rules::RULES,
     templates: examples::TEMPLATES,

@@ -27,6 +27,7 @@ pub static BUNDLE: Bundle = Bundle {
         Version::new(1, 3),
         Version::new(1, 4),
     ],
+    reads: qcbus_sdk::Reads::Expanded,
     version_of: |document| basic::version_of(document, "FileHeader"),
     rules: rules::RULES,
     templates: examples::TEMPLATES,

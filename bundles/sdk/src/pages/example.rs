@@ -82,7 +82,7 @@ impl Staged {
     /// Puts an example into its template. A text that begins with `<?xml` or the first template's
     /// root element is a whole document and goes as it is; other files always do.
     pub fn new(bundle: &Bundle, example: &Example, version: Version) -> Result<Staged, String> {
-        let Some((ExampleFile { name, text }, others)) = example.files.split_first() else {
+        let Some((ExampleFile { name, text, .. }, others)) = example.files.split_first() else {
             return Err("an example needs a document".to_owned());
         };
         let extension = bundle.kinds.first().map_or("xml", |kind| kind.as_str());
@@ -95,12 +95,17 @@ impl Staged {
         } else {
             fill(bundle, example.template.as_deref(), version, text)?
         };
-        let others = others
-            .iter()
-            .map(|file| (file.name.clone().unwrap_or_default(), file.text.clone()));
-        let files: Vec<_> = std::iter::once((name, text)).chain(others).collect();
+        let mut files = vec![(name, text)];
+        for file in others {
+            let name = file.name.clone().unwrap_or_default();
+            let text = match &file.template {
+                Some(template) => fill(bundle, Some(template), version, &file.text)?.0,
+                None => file.text.clone(),
+            };
+            files.push((name, text));
+        }
         let folder = match files.len() {
-            1 => None,
+            1 if !files[0].0.contains(MEMBER) => None,
             _ => Some(written(&files).map_err(|error| format!("cannot write the files: {error}"))?),
         };
         Ok(Staged {
@@ -119,7 +124,14 @@ impl Staged {
             .map_or(("", ""), |(name, text)| (name, text));
         match &self.folder {
             None => Loaded::from_bytes(Path::new(name), text.as_bytes().to_vec()),
-            Some(folder) => Loaded::from_path(&folder.path().join(name), folder.path()),
+            Some(folder) => {
+                let file = name.split_once(MEMBER).map_or(name, |(archive, _)| archive);
+                let file = match name.contains(MEMBER) {
+                    true => format!("{file}.mosc"),
+                    false => file.to_owned(),
+                };
+                Loaded::from_path(&folder.path().join(file), folder.path())
+            }
         }
     }
 
@@ -132,15 +144,62 @@ impl Staged {
     }
 }
 
+/// `archive.mosc!member` is a file in an archive; an archive may lie in another one.
+const MEMBER: &str = ".mosc!";
+
 /// Several files need a folder of their own.
 fn written(files: &[(String, String)]) -> std::io::Result<tempfile::TempDir> {
     let folder = tempfile::tempdir()?;
-    for (name, text) in files {
+    let files: Vec<(String, Vec<u8>)> = files
+        .iter()
+        .flat_map(|(name, text)| many(name).map(|name| (name, text.clone().into_bytes())))
+        .collect();
+    for (name, bytes) in packed(&files)? {
         let path = folder.path().join(name);
         path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
-        std::fs::write(path, text)?;
+        std::fs::write(path, bytes)?;
     }
     Ok(folder)
+}
+
+/// `part{1..1200}.xosc` stands for as many files: for examples of what is too much.
+fn many(name: &str) -> impl Iterator<Item = String> {
+    let range = name.split_once('{').and_then(|(before, rest)| {
+        let (range, after) = rest.split_once('}')?;
+        let (first, last) = range.split_once("..")?;
+        let numbers = first.parse::<u32>().ok()?..=last.parse::<u32>().ok()?;
+        Some((before, numbers, after))
+    });
+    let names: Vec<String> = match range {
+        Some((before, numbers, after)) => numbers
+            .map(|number| format!("{before}{number}{after}"))
+            .collect(),
+        None => vec![name.to_owned()],
+    };
+    names.into_iter()
+}
+
+/// The files of a folder: those of archives are packed.
+fn packed(files: &[(String, Vec<u8>)]) -> std::io::Result<Vec<(String, Vec<u8>)>> {
+    let mut whole: Vec<(String, Vec<u8>)> = Vec::new();
+    let mut archives: Vec<(String, Vec<(String, Vec<u8>)>)> = Vec::new();
+    for (name, bytes) in files {
+        let Some((archive, member)) = name.split_once(MEMBER) else {
+            whole.push((name.clone(), bytes.clone()));
+            continue;
+        };
+        let archive = format!("{archive}.mosc");
+        let member = (member.to_owned(), bytes.clone());
+        match archives.iter_mut().find(|(other, _)| *other == archive) {
+            Some((_, members)) => members.push(member),
+            None => archives.push((archive, vec![member])),
+        }
+    }
+    for (archive, members) in archives {
+        let bytes = qcbus_ingest::modular::pack(&packed(&members)?);
+        whole.push((archive, bytes.map_err(std::io::Error::other)?));
+    }
+    Ok(whole)
 }
 
 fn is_whole(bundle: &Bundle, text: &str) -> bool {

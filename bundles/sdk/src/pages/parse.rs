@@ -39,6 +39,8 @@ pub struct Example {
 pub struct ExampleFile {
     /// `file=NAME`, if given.
     pub name: Option<String>,
+    /// `in=NAME` of a further file.
+    pub template: Option<String>,
     /// What is in it.
     pub text: String,
 }
@@ -129,13 +131,22 @@ impl Page {
                 let Some(example) = self.examples.last_mut() else {
                     return wrong("`xml also` must follow an example".to_owned());
                 };
-                let name = words
-                    .find_map(|word| word.strip_prefix("file="))
-                    .map(str::to_owned);
+                let (mut name, mut template) = (None, None);
+                for word in words {
+                    match word.split_once('=') {
+                        Some(("file", value)) => name = Some(value.to_owned()),
+                        Some(("in", value)) => template = Some(value.to_owned()),
+                        _ => return wrong(format!("`{word}` is none of `file=` and `in=`")),
+                    }
+                }
                 if name.is_none() {
                     return wrong("`xml also` needs `file=NAME`".to_owned());
                 }
-                example.files.push(ExampleFile { name, text });
+                example.files.push(ExampleFile {
+                    name,
+                    template,
+                    text,
+                });
                 example.expected_lines = close + 1..close + 1;
                 Ok(())
             }
@@ -167,7 +178,11 @@ impl Example {
             template: None,
             version: None,
             params: Vec::new(),
-            files: vec![ExampleFile { name: None, text }],
+            files: vec![ExampleFile {
+                name: None,
+                template: None,
+                text,
+            }],
             expected: None,
             expected_lines: close + 1..close + 1,
             line: open + 1,

@@ -367,6 +367,7 @@ impl Daemon {
     fn prepare(&mut self, job: &Job) -> Option<(Arc<Plan>, Work)> {
         let held = |doc| self.peer.document(doc);
         let (root, linked) = job.documents.split_first()?;
+        let links = root.links.clone();
         let root = held(root.doc)?;
         let linked = linked.iter().map(|document| {
             let held = held(document.doc)?;
@@ -375,6 +376,7 @@ impl Daemon {
                 role: document.role,
                 path: document.path.clone(),
                 referred_at: document.referred_at,
+                links: document.links.clone(),
                 id: (generation, doc.0),
                 image: Image::new(held),
             })
@@ -387,6 +389,7 @@ impl Daemon {
             kind: job.kind,
             plan: plan.clone(),
             root,
+            links,
             linked,
             missing: job.missing.clone(),
             cancelled: Arc::default(),

@@ -8,7 +8,7 @@ use qcbus_bus::Held;
 use qcbus_document::{Document, FileKind};
 use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::Issue;
-use qcbus_messages::{JobId, MissingDocument};
+use qcbus_messages::{JobId, Link, MissingDocument};
 use tokio::sync::mpsc;
 
 use crate::kept::KeptModels;
@@ -29,6 +29,7 @@ pub(super) struct Work {
     pub kind: FileKind,
     pub plan: Arc<Plan>,
     pub root: Held,
+    pub links: Vec<Link>,
     pub linked: Vec<LinkedImage>,
     pub missing: Vec<MissingDocument>,
     pub cancelled: Arc<AtomicBool>,
@@ -135,8 +136,11 @@ fn one(
         opened.map_err(|error| unopened(&linked.path, error))
     });
     let linked = linked.collect::<Result<Vec<_>, String>>()?;
-    let subject = Subject::new(root, work.kind, (work.plan.bundle().version_of)(&root))
-        .with(linked, work.missing.clone());
+    let bundle = work.plan.bundle();
+    let subject = Subject::new(root, work.kind, (bundle.version_of)(&root))
+        .with(linked, work.missing.clone())
+        .with_links(work.links.clone())
+        .read(bundle.reads);
     let mut reporter = Reporter {
         work,
         progress,

@@ -12,6 +12,7 @@ pub const BUNDLE: Bundle = Bundle {
     standard: "OpenDRIVE",
     kinds: &[FileKind::Xodr],
     versions: &[Version::new(1, 4)],
+    reads: qcbus_sdk::Reads::Written,
     version_of: |document| basic::version_of(document, "header"),
     rules: &[],
     templates: &[],

@@ -26,6 +26,7 @@ pub static BUNDLE: Bundle = Bundle {
     standard: "OpenDRIVE",
     kinds: &[FileKind::Xodr, FileKind::Xosc],
     versions: &[Version::new(1, 8)],
+    reads: qcbus_sdk::Reads::Written,
     version_of: |document| basic::version_of(document, "header"),
     rules: RULES,
     templates: &[],
