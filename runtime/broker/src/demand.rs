@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use qcbus_document::FileKind;
 use qcbus_formats::config::Config;
+use qcbus_ingest::modular::SearchPath;
 use qcbus_messages::codec;
 use qcbus_messages::{Catalogue, Digest};
 use sha2::{Digest as _, Sha256};
@@ -17,8 +18,10 @@ pub struct InForce {
     pub config: Option<Arc<Config>>,
     /// As it travels on the bus.
     pub encoded: Vec<u8>,
-    /// SHA-256 of the encoded form.
+    /// SHA-256 of the encoded form and of the search path.
     pub digest: Digest,
+    /// Where the scenarios are looked for that modular scenarios refer to.
+    pub search: Arc<SearchPath>,
 }
 
 impl InForce {
@@ -26,13 +29,20 @@ impl InForce {
     ///
     /// # Errors
     /// When it is too large for the bus.
-    pub fn new(config: Option<Config>) -> Result<InForce, codec::CodecError> {
+    pub fn new(config: Option<Config>, search: SearchPath) -> Result<InForce, codec::CodecError> {
         let encoded = codec::encode(&config)?;
-        let digest = Digest(Sha256::digest(&encoded).into());
+        let mut hash = Sha256::new_with_prefix(&encoded);
+        for directory in search.directories() {
+            // With another search path a verdict may be another, too.
+            hash.update([0]);
+            hash.update(directory.as_os_str().as_encoded_bytes());
+        }
+        let digest = Digest(hash.finalize().into());
         Ok(InForce {
             config: config.map(Arc::new),
             encoded,
             digest,
+            search: Arc::new(search),
         })
     }
 

@@ -133,6 +133,7 @@ impl Broker {
                 path: "/farm/maps/town.xodr".to_owned(),
                 digest: Digest::default(),
                 referred_at: 0,
+                links: Vec::new(),
             }],
             missing: Vec::new(),
         });

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
+use qcbus_ingest::modular::SearchPath;
 use qcbus_messages::{
     Digest, FromPeer, Hello, JobId, PROTOCOL_VERSION, PeerReport, Role, ToPeer, Verdict,
 };
@@ -23,7 +24,7 @@ struct Desk {
 impl Desk {
     /// `delivered`: the journal says that the reporter has it.
     fn new(delivered: bool) -> Desk {
-        let in_force = InForce::new(None).unwrap();
+        let in_force = InForce::new(None, SearchPath::default()).unwrap();
         let mut state = State::new(Settings::default(), in_force.digest, in_force.demand());
         let path: Arc<Path> = Path::new("/x/a.xodr").into();
         let judged = Judged {

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use proptest::prelude::*;
+use qcbus_ingest::modular::SearchPath;
 use qcbus_messages::{FromPeer, JobId, ToPeer, Verdict};
 
 use super::*;
@@ -143,7 +144,7 @@ impl World {
             Step::RestartAfter(file, unsettled) => self.restart_after(file, unsettled),
             Step::Reconfigure(n) => {
                 self.reconfigured = n;
-                let in_force = InForce::new(None).unwrap();
+                let in_force = InForce::new(None, SearchPath::default()).unwrap();
                 let event = Event::Configured {
                     digest: digest(n.into()),
                     demand: in_force.demand(),

@@ -141,7 +141,7 @@ impl Broker {
         let loaded = self.sources.load()?;
         self.sources.still_has(&self.loaded, &loaded)?;
         let changes = differences(&self.loaded, &loaded);
-        let in_force = Arc::new(in_force(&loaded)?);
+        let in_force = Arc::new(in_force(&self.sources, &loaded)?);
         let children = (loaded.children != self.loaded.children).then(|| loaded.children.clone());
         for notice in loaded
             .notices
@@ -156,6 +156,7 @@ impl Broker {
         if in_force.digest != self.in_force.digest {
             self.host.set_config(in_force.digest, &in_force.encoded);
             self.in_force = in_force.clone();
+            self.intake.search_in(in_force.search.clone());
             self.handle(Event::Configured {
                 digest: in_force.digest,
                 demand: in_force.demand(),

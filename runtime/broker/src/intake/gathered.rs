@@ -1,24 +1,26 @@
 //! What one job depends on: the documents it brings to the bus, and every file that was looked at.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use qcbus_bus::Held;
-use qcbus_ingest::{Limits, Look, Prepared, Source};
+use qcbus_ingest::modular::ExpandedImage;
+use qcbus_ingest::{Found, Limits, Look, Prepared, Reader, Source};
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Absence, Digest, DocId, DocumentRole, JobDocument, MissingDocument};
 use sha2::{Digest as _, Sha256};
 
-use super::{Intake, Published};
+use super::{Intake, Published, explained};
 use crate::core::{Input, PrepareFailure, PreparedJob, Reading, Stamp};
 use crate::stamp::{from_content, is_racy, stamp_through_links};
 
 /// What has been found for one job so far.
 pub(super) struct Gathered {
     documents: Vec<JobDocument>,
-    pub missing: Vec<MissingDocument>,
+    missing: Vec<MissingDocument>,
     inputs: BTreeMap<PathBuf, Input>,
     root: Vec<Input>,
     pub held: Vec<(DocId, Held)>,
@@ -49,6 +51,7 @@ impl Gathered {
             path: to_text(path),
             digest: published.digest,
             referred_at,
+            links: Vec::new(),
         });
         for input in &published.inputs {
             self.inputs.insert(input.path.to_path_buf(), input.clone());
@@ -56,6 +59,14 @@ impl Gathered {
         self.held.push((published.doc, published.held.clone()));
         self.racy |= published.racy;
         self.bytes += published.bytes;
+    }
+
+    /// What the walk came to.
+    pub fn found(&mut self, found: Found) {
+        self.missing = found.missing;
+        for (document, links) in self.documents.iter_mut().zip(found.links) {
+            document.links = links;
+        }
     }
 
     /// Something that is there and could not be had: when it changes, the verdict is void.
@@ -139,6 +150,7 @@ fn basis(inputs: &[Input]) -> Digest {
 /// root's verdict that is at stake: none of them can make the root vanish or unreadable.
 pub(super) struct Links<'i> {
     pub intake: &'i Intake,
+    pub reader: RefCell<Reader>,
     /// Nothing may be older.
     pub asked: Instant,
     pub gathered: &'i mut Gathered,
@@ -151,7 +163,12 @@ impl Source for Links<'_> {
     fn fetch(&mut self, path: &Path) -> Result<Result<Published, Absence>, PrepareFailure> {
         // Looked at before: when it changes while it is tried, this stamp fits no more.
         let before = stamp_through_links(path);
-        let absence = match self.intake.publish_shared(path, self.asked) {
+        let published = match is_member(path) {
+            // Read from an archive that belongs to this job alone, or was just read for it.
+            true => self.intake.publish_fresh(&self.reader, path),
+            false => self.intake.publish_shared(&self.reader, path, self.asked),
+        };
+        let absence = match published {
             Ok(published) => return Ok(Ok(published)),
             Err(failure) => failure.of_linked(path)?,
         };
@@ -163,6 +180,25 @@ impl Source for Links<'_> {
 
     fn image(document: &Published) -> &[u8] {
         &document.held
+    }
+
+    fn listing(&mut self, archive: &Path) -> Result<Option<Published>, PrepareFailure> {
+        match self.intake.publish_listing(&self.reader, archive) {
+            Ok(published) => Ok(published),
+            // Without it the set is checked as far as it is known.
+            Err(failure) => failure.of_linked(archive).map(|_| None),
+        }
+    }
+
+    fn expanded(&self, expanded: &ExpandedImage<'_, '_>) -> Result<Published, PrepareFailure> {
+        let path = Path::new("what a modular scenario is expanded to");
+        let published = self.intake.publish_expanded(expanded);
+        published.map_err(|failure| explained(failure, path))
+    }
+
+    fn kept(&self, index: usize) -> &[u8] {
+        let held = self.gathered.held.get(index + 1);
+        held.map_or(&[], |(_, held)| held)
     }
 
     fn keep(&mut self, path: &Path, role: DocumentRole, referred_at: u32, document: Published) {
@@ -179,6 +215,15 @@ impl Source for Links<'_> {
             Look::Listed(directory) => self.gathered.listing(directory),
         }
     }
+}
+
+/// Whether a path leads into an archive.
+fn is_member(path: &Path) -> bool {
+    let mut around = path
+        .as_os_str()
+        .as_encoded_bytes()
+        .split(|&byte| byte == b'!');
+    around.next().is_some_and(|file| file.ends_with(b".mosc")) && around.next().is_some()
 }
 
 /// The files that one image was built of.

@@ -1,14 +1,16 @@
 //! From a path to published document images: the only place where the broker reads what it checks.
 
+use std::cell::RefCell;
 use std::collections::{HashMap, HashSet, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use qcbus_bus::{Documents, Held, Loan, LoanError};
 use qcbus_document::{Document, FileKind};
-use qcbus_ingest::{BuildError, Limits, Prepared};
+use qcbus_ingest::modular::{ExpandedImage, SearchPath};
+use qcbus_ingest::{BuildError, Limits, Prepared, Reader, Walking};
 use qcbus_messages::{Digest, DocId, JobId};
 
 use crate::core::{Input, PrepareFailure, PreparedJob};
@@ -28,6 +30,7 @@ pub struct Intake {
     limits: Limits,
     roots: Vec<PathBuf>,
     max_documents: usize,
+    search: Mutex<Arc<SearchPath>>,
     next_doc: AtomicU64,
     shared: Shared,
     held: Mutex<HashMap<JobId, Vec<(DocId, Held)>>>,
@@ -71,11 +74,17 @@ impl Intake {
             limits,
             roots,
             max_documents,
+            search: Mutex::default(),
             next_doc: AtomicU64::new(1),
             shared: Shared::default(),
             held: Mutex::default(),
             recent: Mutex::default(),
         }
+    }
+
+    /// From now on scenarios that others refer to are looked for here, too.
+    pub fn search_in(&self, search: Arc<SearchPath>) {
+        *lock(&self.search) = search;
     }
 
     /// Reads a file with everything it refers to and publishes the images. Nothing in them is older
@@ -89,11 +98,12 @@ impl Intake {
         path: &Path,
         asked: Instant,
     ) -> Result<Box<PreparedJob>, PrepareFailure> {
+        let reader = RefCell::new(Reader::new(self.limits));
         let root = self
-            .publish_fresh(path)
+            .publish_fresh(&reader, path)
             .map_err(|failure| explained(failure, path))?;
         let mut gathered = Gathered::new(path, &root);
-        self.gather(&root.held, asked, &mut gathered)?;
+        self.gather(&root.held, reader, asked, &mut gathered)?;
         let prepared = gathered.finish();
         reached("gathered", path);
         self.hold(job, gathered.held);
@@ -156,6 +166,7 @@ impl Intake {
     fn gather(
         &self,
         root: &Held,
+        reader: RefCell<Reader>,
         asked: Instant,
         gathered: &mut Gathered,
     ) -> Result<(), PrepareFailure> {
@@ -164,18 +175,31 @@ impl Intake {
         };
         let mut links = Links {
             intake: self,
+            reader,
             asked,
             gathered,
         };
-        let missing = qcbus_ingest::gather(&document, self.max_documents, &mut links)?;
-        gathered.missing = missing;
+        let search = lock(&self.search).clone();
+        let walking = Walking {
+            max_documents: self.max_documents,
+            max_text: self.limits.max_archive,
+            max_image: self.limits.max_image,
+            search: &search,
+        };
+        let found = qcbus_ingest::gather(&document, &walking, &mut links)?;
+        gathered.found(found);
         Ok(())
     }
 
     /// A map or catalog: as it is on the bus, as long as its bytes are what they were.
-    fn publish_shared(&self, path: &Path, asked: Instant) -> Result<Published, Failure> {
+    fn publish_shared(
+        &self,
+        reader: &RefCell<Reader>,
+        path: &Path,
+        asked: Instant,
+    ) -> Result<Published, Failure> {
         self.shared.get(path, asked, |before| {
-            let prepared = self.read(path)?;
+            let prepared = self.read(reader, path)?;
             let inputs = inputs_of(&prepared, &self.limits);
             match before.filter(|before| same_bytes(&before.inputs, &inputs)) {
                 Some(before) => Ok(Published {
@@ -188,14 +212,38 @@ impl Intake {
         })
     }
 
-    fn publish_fresh(&self, path: &Path) -> Result<Published, Failure> {
-        let prepared = self.read(path)?;
+    fn publish_fresh(&self, reader: &RefCell<Reader>, path: &Path) -> Result<Published, Failure> {
+        let prepared = self.read(reader, path)?;
         let inputs = inputs_of(&prepared, &self.limits);
         self.publish(path, &prepared, inputs)
     }
 
-    fn read(&self, path: &Path) -> Result<Prepared, Failure> {
-        let prepared = qcbus_ingest::prepare(path, self.boundary(path), &self.limits)?;
+    /// What lies in an archive of a job.
+    fn publish_listing(
+        &self,
+        reader: &RefCell<Reader>,
+        archive: &Path,
+    ) -> Result<Option<Published>, Failure> {
+        let listing = reader.borrow_mut().listing(archive, &archive.join(".."))?;
+        let Some(prepared) = listing else {
+            return Ok(None);
+        };
+        let inputs = inputs_of(&prepared, &self.limits);
+        self.publish(archive, &prepared, inputs).map(Some)
+    }
+
+    /// What a modular scenario was expanded to. It depends on nothing that its documents do not.
+    fn publish_expanded(&self, expanded: &ExpandedImage<'_, '_>) -> Result<Published, Failure> {
+        let mut loan = self.loan(expanded.upper_bound())?;
+        let used = expanded
+            .build_into(&mut loan)
+            .map_err(|error| Failure::Build(error.to_string()))?;
+        let digest = Digest(expanded.digest());
+        self.give_out(loan, used, digest, FileKind::Xosc, Vec::new())
+    }
+
+    fn read(&self, reader: &RefCell<Reader>, path: &Path) -> Result<Prepared, Failure> {
+        let prepared = reader.borrow_mut().prepare(path, self.boundary(path))?;
         reached("read", path);
         Ok(prepared)
     }
@@ -206,16 +254,27 @@ impl Intake {
         prepared: &Prepared,
         inputs: Vec<Input>,
     ) -> Result<Published, Failure> {
-        let digest = Digest(prepared.digest());
-        let racy = inputs.iter().any(was_racy);
         let kind = FileKind::of_path(path).unwrap_or(FileKind::Xosc);
         let (loan, used) = self.build(prepared)?;
         reached("built", path);
+        let published = self.give_out(loan, used, Digest(prepared.digest()), kind, inputs)?;
+        reached("published", path);
+        Ok(published)
+    }
+
+    fn give_out(
+        &self,
+        loan: Loan,
+        used: usize,
+        digest: Digest,
+        kind: FileKind,
+        inputs: Vec<Input>,
+    ) -> Result<Published, Failure> {
+        let racy = inputs.iter().any(was_racy);
         let doc = DocId(self.next_doc.fetch_add(1, Ordering::Relaxed));
         let held = loan
             .publish(doc, used, digest, kind)
             .map_err(|error| Failure::Publish(error.to_string()))?;
-        reached("published", path);
         let bytes = inputs
             .iter()
             .filter_map(|it| it.content.read())

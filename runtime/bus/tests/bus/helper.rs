@@ -350,6 +350,7 @@ pub fn job_with(number: u64, doc: DocId) -> ToPeer {
             path: "/farm/map.xodr".to_owned(),
             digest: Digest::default(),
             referred_at: 0,
+            links: Vec::new(),
         }],
         missing: Vec::new(),
     })

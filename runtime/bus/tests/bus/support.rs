@@ -150,6 +150,7 @@ pub fn numbered_job(number: u64, len: usize) -> ToPeer {
             path: String::new(),
             why: Absence::NotThere,
             level: Level::Error,
+            within: None,
             referred_at: 0,
         }],
     })

@@ -32,6 +32,7 @@ impl World {
                     path: to_text(&input.path),
                     digest,
                     referred_at: 0,
+                    links: Vec::new(),
                 };
                 let root = document(DocumentRole::Root, &inputs[0], digest);
                 let maps = inputs[1..].iter().filter_map(|input| {

@@ -8,6 +8,7 @@ use super::super::*;
 use crate::InForce;
 use qcbus_document::FileKind;
 use qcbus_formats::xqar::{Issue, Level};
+use qcbus_ingest::modular::SearchPath;
 use qcbus_messages::{Catalogue, CheckerInfo, Digest, Hello, PROTOCOL_VERSION, Role};
 
 pub const CAPACITY: usize = 2;
@@ -40,7 +41,7 @@ pub fn child(version: u8) -> ChildSpec {
 }
 
 pub fn fresh_state(generation: u64, configuration: u8) -> State {
-    let in_force = InForce::new(None).unwrap();
+    let in_force = InForce::new(None, SearchPath::default()).unwrap();
     let settings = Settings {
         generation,
         collect: Duration::ZERO,
