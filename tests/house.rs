@@ -40,6 +40,7 @@ const MAY_KNOW: &[(&str, Option<&[&str]>)] = &[
     ("qcbus-schema-rule", Some(&["qcbus-sdk", "qcbus-schema"])),
     ("qcbus-xodr", Some(BUNDLE)),
     ("qcbus-xosc", Some(BUNDLE)),
+    ("qcbus-modular", Some(BUNDLE)),
     ("qcbus-reporter-sdk", Some(PROCESS)),
     ("qcbus-report-text", Some(&["qcbus-reporter-sdk"])),
     ("qcbus-report-json", Some(&["qcbus-reporter-sdk"])),

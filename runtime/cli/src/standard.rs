@@ -11,7 +11,11 @@ use qcbus_reporter_sdk::Reporter;
 use qcbus_sdk::{Bundle, Checker, UserFiles};
 
 /// The standard bundles.
-pub static BUNDLES: [&Bundle; 2] = [&qcbus_xodr::BUNDLE, &qcbus_xosc::BUNDLE];
+pub static BUNDLES: [&Bundle; 3] = [
+    &qcbus_xodr::BUNDLE,
+    &qcbus_xosc::BUNDLE,
+    &qcbus_modular::BUNDLE,
+];
 
 /// The standard bundle of this name or alias.
 pub fn bundle(name: &str) -> Option<&'static Bundle> {

@@ -1,0 +1,136 @@
+//! What rules about modular scenarios look at: `Rule<Modular>` gets an `&Assembly<'_>`.
+
+use qcbus_document::{Document, FileKind, Node};
+use qcbus_messages::DocumentRole;
+use qcbus_sdk::modular::{Expansion, OFFERS, Problem, Spot, What};
+use qcbus_sdk::{Finding, Model, Place, Sink, Subject, Unbuilt};
+
+/// A modular scenario with the documents that it is made of, expanded once for all rules.
+pub enum Modular {}
+
+/// A modular scenario, or a library file for one.
+pub struct Assembly<'d> {
+    /// The file with its linked documents.
+    pub subject: &'d Subject<'d>,
+    /// What becomes of it.
+    pub expansion: Expansion<'d>,
+}
+
+impl Model for Modular {
+    type Of<'d> = Assembly<'d>;
+    type Part = ();
+
+    fn build<'d>(subject: &'d Subject<'d>) -> Result<Assembly<'d>, Unbuilt> {
+        let root = subject.written();
+        let refers = root.elements("ScenarioReference").next().is_some();
+        let offers = root.names().any(|name| name == OFFERS);
+        if subject.kind() != FileKind::Mosc && !refers && !offers {
+            let why =
+                "the file is a plain scenario: it refers to no other and offers no attributes";
+            return Err(Unbuilt::NotApplicable(why.to_owned()));
+        }
+        Ok(Assembly {
+            subject,
+            expansion: subject.expansion(),
+        })
+    }
+
+    fn parts(_: &Assembly<'_>) -> Vec<()> {
+        vec![()]
+    }
+}
+
+/// An archive of a scenario's documents.
+#[derive(Clone, Copy)]
+pub struct Archive<'d> {
+    /// Its path; of one within another, `archive!member`.
+    pub path: &'d str,
+    listing: Document<'d>,
+}
+
+/// A file in an archive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Member<'d> {
+    /// Its name in the archive.
+    pub name: &'d str,
+    /// Checksum of its content, as the archive has it.
+    pub crc32: &'d str,
+    /// Unpacked, in bytes.
+    pub size: u64,
+}
+
+impl<'d> Archive<'d> {
+    /// The files in it.
+    pub fn members(&self) -> impl Iterator<Item = Member<'d>> + use<'d> {
+        self.listing.elements("Member").map(|node| Member {
+            name: node.attr("name").unwrap_or(""),
+            crc32: node.attr("crc32").unwrap_or(""),
+            size: node
+                .attr("size")
+                .and_then(|size| size.parse().ok())
+                .unwrap_or(0),
+        })
+    }
+}
+
+impl<'d> Assembly<'d> {
+    /// The file as it is written.
+    pub fn root(&self) -> Document<'d> {
+        self.subject.written()
+    }
+
+    /// The archives of the documents, the one that is checked first.
+    pub fn archives(&self) -> impl Iterator<Item = Archive<'d>> {
+        let listings = self.subject.with_role(DocumentRole::Listing);
+        listings.map(|linked| Archive {
+            path: linked.document.path(),
+            listing: linked.document,
+        })
+    }
+
+    /// The scenarios that it is made of, itself first.
+    pub fn scenarios(&self) -> impl Iterator<Item = Document<'d>> {
+        let linked = self.subject.with_role(DocumentRole::Scenario);
+        std::iter::once(self.root()).chain(linked.map(|linked| linked.document))
+    }
+
+    /// The problems of some sorts, in the order in which the expansion came upon them.
+    pub fn problems(&self, sorts: &'static [What]) -> impl Iterator<Item = &Problem<'d>> {
+        let all = self.expansion.problems.iter();
+        all.filter(move |problem| sorts.contains(&problem.what))
+    }
+
+    /// The groups that are taken from other files, each once.
+    pub fn library_groups(&self) -> Vec<Node<'d>> {
+        let mut groups: Vec<Node<'d>> = Vec::new();
+        for reference in &self.expansion.references {
+            for copy in reference.uses.iter().flat_map(|one| &one.copies) {
+                if !groups.contains(&copy.group) {
+                    groups.push(copy.group);
+                }
+            }
+        }
+        groups
+    }
+}
+
+/// The place of a spot.
+pub fn place(spot: Spot<'_>) -> Place<'_> {
+    match spot {
+        Spot::Node(node) => Place::Node(node),
+        Spot::Attribute(attribute) => Place::Attribute(attribute),
+    }
+}
+
+/// Says a problem of the expansion, with what it is about in the other file.
+pub fn say<'s, 'd, 'p>(
+    found: &'s mut Sink<'d>,
+    problem: &Problem<'p>,
+    there: &str,
+) -> Finding<'s, 'd> {
+    let finding = found.issue(place(problem.at), problem.text.clone());
+    match problem.target {
+        Some(target) => finding.at(place(target), there),
+        None => finding,
+    }
+}

@@ -1,0 +1,36 @@
+//! The checker bundle for modular scenarios: OpenSCENARIO files that take maneuver groups from other
+//! files by `ScenarioReference`, and the archives (`.mosc`) that they travel in.
+//!
+//! It looks at how a scenario is put together. What it is put together to is looked at by the bundle
+//! for OpenSCENARIO, which reads the expanded scenario.
+//!
+//! One rule is one file in `rules/` with its page beside it; `rules/mod.rs` is the list.
+
+mod assembly;
+mod examples;
+mod families;
+mod rules;
+
+use qcbus_document::FileKind;
+use qcbus_sdk::{Bundle, Reads, Version, basic};
+
+/// The bundle.
+pub static BUNDLE: Bundle = Bundle {
+    name: "modularBundle",
+    alias: "modular",
+    version: env!("CARGO_PKG_VERSION"),
+    description: "Modular scenarios: references, keys and archives, before they are expanded",
+    standard: "OpenSCENARIO",
+    kinds: &[FileKind::Xosc, FileKind::Mosc],
+    reads: Reads::Written,
+    versions: &[
+        Version::new(1, 0),
+        Version::new(1, 1),
+        Version::new(1, 2),
+        Version::new(1, 3),
+        Version::new(1, 4),
+    ],
+    version_of: |document| basic::version_of(document, "FileHeader"),
+    rules: rules::RULES,
+    templates: examples::TEMPLATES,
+};

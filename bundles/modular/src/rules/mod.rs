@@ -1,0 +1,11 @@
+//! The rules, one per file, in the order of the result.
+//!
+//! A new rule takes one line in each of the two lists below.
+
+use qcbus_sdk::AnyRule;
+
+mod key_matches;
+mod reference_file_found;
+
+/// The rules of the bundle.
+pub static RULES: &[&dyn AnyRule] = &[&reference_file_found::RULE, &key_matches::RULE];

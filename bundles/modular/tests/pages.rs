@@ -1,0 +1,9 @@
+//! Rules, files and pages agree, and every example does what its page says.
+
+#[test]
+fn pages_keep_their_word() {
+    qcbus_sdk::pages::assert_pages(
+        &qcbus_modular::BUNDLE,
+        concat!(env!("CARGO_MANIFEST_DIR"), "/src/rules"),
+    );
+}
