@@ -37,7 +37,7 @@ pub use qcbus_ingest::modular;
 pub use qcbus_messages::BUILD_DATE;
 pub use resource::{Resource, ResourceError, ResourceFile, ResourceValue, UserFiles};
 pub use rule::{AnyRule, Backport, Each, Facts, Model, Rule, Unbuilt};
-pub use run::{Exit, Mode, Timings, examine, examine_timed, main, run};
+pub use run::{Exit, Mode, Timings, examine, examine_timed, findings, main, run};
 pub use sink::{Finding, Sink};
 pub use subject::{Linked, Subject};
 pub use version::{Version, VersionError, VersionRange};

@@ -51,6 +51,10 @@ pub enum Command {
     /// Compile XML schemas to tables
     #[command(subcommand)]
     Schema(SchemaCommand),
+    /// Make a plain scenario of a modular one
+    Expand(ExpandArgs),
+    /// Pack a modular scenario and what it refers to into an archive
+    Pack(PackArgs),
     /// Look for what may keep a broker from working, and say what to do
     Doctor(DoctorArgs),
 }
@@ -364,6 +368,36 @@ pub struct RuleArgs {
     /// How to print it
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
+}
+
+/// `qcbus expand`.
+#[derive(Debug, ClapArgs)]
+#[command(
+    after_help = "Scenarios that are referred to are looked for beside the scenario or in its archive, then in the\n\
+directories of SCENARIO_PATH. What is found on the way is said on stderr. Exit code 1, and no file: a\n\
+reference leads nowhere, which value is meant is open, or a limit is exceeded."
+)]
+pub struct ExpandArgs {
+    /// A modular scenario (.xosc) or an archive of one (.mosc)
+    pub file: PathBuf,
+    /// Where the plain scenario goes (default: stdout)
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+}
+
+/// `qcbus pack`.
+#[derive(Debug, ClapArgs)]
+#[command(
+    after_help = "Files that lie below the directory of the main scenario keep their path from there, others go by \
+their\nname alone. What the archive refers to and does not have is said on stderr."
+)]
+pub struct PackArgs {
+    /// The main scenario, then what it refers to; in the archive the first is called main.xosc
+    #[arg(required = true)]
+    pub files: Vec<PathBuf>,
+    /// The archive (.mosc)
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
 }
 
 /// `qcbus config …`.

@@ -74,9 +74,10 @@ impl OpenArchive {
         let mut member = Member {
             bytes: Vec::new(),
             present: false,
-            faults: self.faults.clone(),
+            faults: Vec::new(),
         };
         let Some(zip) = &mut self.zip else {
+            member.faults.clone_from(&self.faults);
             return member;
         };
         match read_checked(zip, name, limits, *left) {
@@ -95,6 +96,11 @@ impl OpenArchive {
             }
         }
         member
+    }
+
+    /// What is wrong with the archive itself, of which members may be whole.
+    pub fn faults(&self) -> &[TextFault] {
+        &self.faults
     }
 
     /// Whether there is nothing to be read in it.
@@ -291,8 +297,11 @@ mod tests {
 
     fn read(packed: &[u8], limits: Limits) -> (Vec<u8>, Vec<Code>, String) {
         let mut left = limits.max_archive;
-        let member =
-            OpenArchive::new(packed.into(), &limits).member(MAIN_MEMBER, &limits, &mut left);
+        let mut archive = OpenArchive::new(packed.into(), &limits);
+        let mut member = archive.member(MAIN_MEMBER, &limits, &mut left);
+        if !archive.is_refused() {
+            member.faults.splice(0..0, archive.faults().iter().cloned());
+        }
         let texts: Vec<&str> = member.faults.iter().map(|fault| &*fault.text).collect();
         let codes = member.faults.iter().map(|fault| fault.code).collect();
         (member.bytes, codes, texts.join("; "))

@@ -152,7 +152,11 @@ impl Reader {
             }
             return self.open_archive(&path, rest);
         }
-        let member = open.member(name, &self.limits, &mut self.left);
+        let mut member = open.member(name, &self.limits, &mut self.left);
+        // The main scenario stands for the archive; other members are no worse for what is wrong with it.
+        if members.iter().all(String::is_empty) && !open.is_refused() {
+            member.faults.splice(0..0, open.faults().iter().cloned());
+        }
         if !member.present {
             return empty(path, member.faults);
         }

@@ -15,7 +15,7 @@ pub use args::{USAGE, UsageError};
 pub use bus::BusOptions;
 pub use exit::Exit;
 pub(crate) use file::complain;
-pub use file::{Format, examine, examine_timed};
+pub use file::{Format, examine, examine_timed, findings};
 pub use timings::Timings;
 
 use crate::{Bundle, UserFiles};

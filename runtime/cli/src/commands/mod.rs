@@ -4,7 +4,9 @@ mod bundle;
 mod check;
 mod config;
 mod doctor;
+mod expand;
 mod manifests;
+mod pack;
 mod remote;
 mod reporter;
 mod rule;
@@ -37,6 +39,8 @@ pub fn run(args: Args) -> Exit {
             config::check(&file, bundles_d.as_deref())
         }
         Command::Schema(SchemaCommand::Compile { path, output }) => schema::compile(&path, &output),
+        Command::Expand(args) => expand::run(&args),
+        Command::Pack(args) => pack::run(&args),
         Command::Doctor(args) => doctor::run(&args),
     }
 }

@@ -120,8 +120,13 @@ struct Expander<'d> {
 
 enum State<'d> {
     Unknown,
-    /// Its groups, with what takes the place of references.
-    Done(Rc<Vec<Rc<Copy<'d>>>>),
+    Done(Rc<Vec<Expanded<'d>>>),
+}
+
+/// A group of a part with what takes its place: itself, where it refers to nothing.
+struct Expanded<'d> {
+    group: Node<'d>,
+    copies: Vec<Rc<Copy<'d>>>,
 }
 
 impl<'d> Expander<'d> {
@@ -284,7 +289,7 @@ impl<'d> Expander<'d> {
     }
 
     /// The groups of a part after its own expansion.
-    fn expanded(&mut self, part: usize) -> Rc<Vec<Rc<Copy<'d>>>> {
+    fn expanded(&mut self, part: usize) -> Rc<Vec<Expanded<'d>>> {
         if let State::Done(groups) = &self.states[part] {
             return groups.clone();
         }
@@ -293,10 +298,10 @@ impl<'d> Expander<'d> {
         self.say_misplaced(document);
         let mut groups = Vec::new();
         for group in document.elements("ManeuverGroup") {
-            match self.group(part, group) {
-                Some(copies) => groups.extend(copies),
-                None => groups.push(Rc::new(Copy::as_is(part, group))),
-            }
+            let copies = self
+                .group(part, group)
+                .unwrap_or_else(|| vec![Rc::new(Copy::as_is(part, group))]);
+            groups.push(Expanded { group, copies });
         }
         self.chain.pop();
         let groups = Rc::new(groups);
@@ -304,27 +309,34 @@ impl<'d> Expander<'d> {
         groups
     }
 
-    /// The group of a name; the first, as the reference tool takes it. Other groups of a plain file are
-    /// not looked into: what is wrong with them does not matter here.
-    fn find(&mut self, target: usize, name: &str) -> Vec<Rc<Copy<'d>>> {
+    /// All groups of a part.
+    fn all_copies(&mut self, part: usize) -> Vec<Rc<Copy<'d>>> {
+        let groups = self.expanded(part);
+        groups.iter().flat_map(|it| it.copies.clone()).collect()
+    }
+
+    /// The group of a name, the first one as the reference tool takes it, and another of that name if
+    /// there is one. An archive offers the groups that it is expanded to. A plain file offers those that
+    /// are written in it, and what is wrong with others of its groups does not matter here.
+    fn find(&mut self, target: usize, name: &str) -> (Vec<Rc<Copy<'d>>>, Option<Node<'d>>) {
         let document = self.document(target);
-        if !document.path().ends_with(&format!(".mosc!{MAIN_MEMBER}")) {
-            let plain = document.elements("ManeuverGroup").filter(|group| {
-                group.attr("name") == Some(name) && group.child("ScenarioReference").is_none()
-            });
-            let plain: Vec<_> = plain
-                .map(|group| Rc::new(Copy::as_is(target, group)))
-                .collect();
-            if !plain.is_empty() {
-                return plain;
+        let mut written = document
+            .elements("ManeuverGroup")
+            .filter(|group| group.attr("name") == Some(name));
+        let is_archive = document.path().ends_with(&format!(".mosc!{MAIN_MEMBER}"));
+        if let Some(first) = written.next().filter(|_| !is_archive) {
+            let second = written.next();
+            if first.child("ScenarioReference").is_none() {
+                return (vec![Rc::new(Copy::as_is(target, first))], second);
             }
+            let groups = self.expanded(target);
+            let own = groups.iter().find(|it| it.group == first);
+            return (own.map_or_else(Vec::new, |it| it.copies.clone()), second);
         }
-        let groups = self.expanded(target);
-        groups
-            .iter()
-            .filter(|copy| copy.name() == name)
-            .cloned()
-            .collect()
+        let copies = self.all_copies(target);
+        let mut called = copies.into_iter().filter(|copy| copy.name() == name);
+        let first: Vec<_> = called.next().into_iter().collect();
+        (first, called.next().map(|copy| copy.group))
     }
 
     fn named(
@@ -339,48 +351,45 @@ impl<'d> Expander<'d> {
             self.say(What::GroupUnknown, node.into(), None, text);
             return None;
         };
-        let found = self.find(target, wanted.value());
+        let (found, second) = self.find(target, wanted.value());
         let Some(first) = found.first() else {
             let text = self.unknown_group(target, wanted.value());
             let root = self.document(target).root().map(Spot::from);
             self.say(What::GroupUnknown, wanted.into(), root, text);
             return None;
         };
-        if let Some(second) = found.get(1) {
+        if let Some(second) = second {
             let text = format!(
-                "`{}` has {} groups called `{}`; the first is taken",
+                "`{}` has several groups called `{}`; the first is taken",
                 self.short_name(target),
-                found.len(),
                 wanted.value()
             );
             self.say(
                 What::GroupAmbiguous,
                 wanted.into(),
-                Some(second.group.into()),
+                Some(second.into()),
                 text,
             );
         }
         let keys = keys::read(node, &mut self.problems);
         let prefix = referring.group.attr("name").unwrap_or("");
-        let name = match prefix {
-            "" => first.name().to_owned(),
-            prefix => format!("{prefix}.{}", first.name()),
-        };
-        let name = Value::of(referring.part, wanted).saying(&name);
-        let first = first.clone();
-        let copy = self.copy(referring, &first, name, &keys)?;
+        let mut copies = Vec::new();
+        for group in &found {
+            let name = match prefix {
+                "" => group.name().to_owned(),
+                prefix => format!("{prefix}.{}", group.name()),
+            };
+            let name = Value::of(referring.part, wanted).saying(&name);
+            copies.extend(self.copy(referring, group, name, &keys));
+        }
         keys::say_unmatched(&keys, first.group, &mut self.problems);
-        Some(Use {
-            node,
-            keys,
-            copies: vec![copy],
-        })
+        Some(Use { node, keys, copies })
     }
 
     /// All groups: the first is called as the referring group, the next `name_2` and so on.
     fn direct(&mut self, referring: Referring<'d>, node: Node<'d>, target: usize) -> Use<'d> {
         let keys = keys::read(node, &mut self.problems);
-        let groups = self.expanded(target);
+        let groups = self.all_copies(target);
         let own = referring.group.attr("name").unwrap_or("");
         let mut copies = Vec::new();
         for (index, group) in groups.iter().enumerate() {
@@ -472,7 +481,7 @@ impl<'d> Expander<'d> {
 
     fn unknown_group(&mut self, target: usize, name: &str) -> String {
         const MOST: usize = 5;
-        let groups = self.expanded(target);
+        let groups = self.all_copies(target);
         let mut names: Vec<&str> = groups.iter().map(|copy| copy.name()).collect();
         names.dedup();
         let file = self.short_name(target);

@@ -1,0 +1,104 @@
+//! `qcbus pack`.
+
+use std::path::{Path, PathBuf};
+
+use qcbus_document::FileKind;
+use qcbus_messages::Exit;
+use qcbus_sdk::Loaded;
+use qcbus_sdk::modular::pack;
+
+use super::expand::say_findings;
+use crate::args::PackArgs;
+use crate::talk;
+
+/// What the scenario is called that an archive starts from.
+const MAIN: &str = "main.xosc";
+
+/// Runs the command.
+pub fn run(args: &PackArgs) -> Exit {
+    let (exit, why) = match packed(args) {
+        Ok(()) => return Exit::Accepted,
+        Err(failed) => failed,
+    };
+    talk::fail(&why);
+    exit
+}
+
+fn packed(args: &PackArgs) -> Result<(), (Exit, String)> {
+    let usage = |text: String| (Exit::Usage, text);
+    let output = &args.output;
+    if FileKind::of_path(output) != Some(FileKind::Mosc) {
+        let text = format!("{}: the name of an archive ends in .mosc", output.display());
+        return Err(usage(text));
+    }
+    let members = members(&args.files).map_err(usage)?;
+    let mut files = Vec::new();
+    for (name, path) in members {
+        let is_output = path
+            .canonicalize()
+            .ok()
+            .is_some_and(|path| Some(path) == output.canonicalize().ok());
+        if is_output {
+            return Err(usage(format!(
+                "{} cannot be packed into itself",
+                path.display()
+            )));
+        }
+        let bytes = std::fs::read(&path)
+            .map_err(|error| usage(format!("cannot read {}: {error}", path.display())))?;
+        files.push((name, bytes));
+    }
+    let archive = pack(&files).map_err(|error| usage(format!("failed to {error}")))?;
+    qcbus_disk::write_whole(output, &archive, false).map_err(|error| {
+        (
+            Exit::Internal,
+            format!("cannot write {}: {error}", output.display()),
+        )
+    })?;
+    let folder = output.parent().filter(|it| !it.as_os_str().is_empty());
+    match Loaded::from_path(output, folder.unwrap_or(Path::new("."))) {
+        Ok(loaded) => say_findings(&loaded),
+        Err(error) => return Err((Exit::Internal, format!("failed to {error}"))),
+    }
+    Ok(())
+}
+
+/// What the files are called in the archive.
+fn members(files: &[PathBuf]) -> Result<Vec<(String, PathBuf)>, String> {
+    let Some((main, others)) = files.split_first() else {
+        return Err("there is nothing to pack".to_owned());
+    };
+    if FileKind::of_path(main) != Some(FileKind::Xosc) {
+        return Err(format!(
+            "{}: the main scenario comes first, and its name ends in .xosc",
+            main.display()
+        ));
+    }
+    let folder = absolute(main).parent().map(Path::to_path_buf);
+    let mut members = vec![(MAIN.to_owned(), main.clone())];
+    for path in others {
+        let whole = absolute(path);
+        let below = folder
+            .as_deref()
+            .and_then(|folder| whole.strip_prefix(folder).ok());
+        let name = below.or_else(|| whole.file_name().map(Path::new));
+        let name = name
+            .and_then(Path::to_str)
+            .ok_or_else(|| format!("{}: names in archives are UTF-8", path.display()))?;
+        if let Some((_, other)) = members.iter().find(|(other, _)| other == name) {
+            return Err(format!(
+                "{} and {} would both be called {name} in the archive",
+                other.display(),
+                path.display()
+            ));
+        }
+        members.push((name.to_owned(), path.clone()));
+    }
+    Ok(members)
+}
+
+/// Links are followed, so that one file has one name.
+fn absolute(path: &Path) -> PathBuf {
+    let whole = path.canonicalize().or_else(|_| std::path::absolute(path));
+    whole.unwrap_or_else(|_| path.to_path_buf())
+}
