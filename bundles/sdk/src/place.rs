@@ -8,6 +8,8 @@ use crate::Subject;
 
 mod expanded;
 
+pub(crate) use expanded::{copied_by, put_there};
+
 /// Something that an issue can point at.
 #[derive(Clone, Copy)]
 pub enum Place<'p> {

@@ -6,7 +6,7 @@ use qcbus_document::Node;
 use qcbus_formats::xqar::{DomainInfo, InfoElement, Issue, Level, Location, Metadata};
 
 use crate::param::MAX_ISSUES;
-use crate::place::{Place, Spot, locate};
+use crate::place::{Place, Spot, copied_by, locate, put_there};
 use crate::rule::Facts;
 use crate::{Param, Subject, Values, Version};
 
@@ -87,7 +87,16 @@ impl<'d> Sink<'d> {
         at: impl Into<Place<'p>>,
         text: impl Into<String>,
     ) -> Finding<'_, 'd> {
-        let place = at.into();
+        let (place, text) = (at.into(), text.into());
+        // What is wrong in a library is wrong in every copy that a modular scenario takes of it.
+        let reference = copied_by(self.subject, &place);
+        if reference.is_some_and(|reference| self.is_said(reference, &place, &text)) {
+            return self.unheard();
+        }
+        self.list(&place, text)
+    }
+
+    fn list(&mut self, place: &Place<'_>, text: String) -> Finding<'_, 'd> {
         let level = if self.not_normative.is_some() {
             lower(self.facts.level)
         } else {
@@ -95,10 +104,10 @@ impl<'d> Sink<'d> {
         };
         let full = self.kept.len() >= self.limit();
         let issue = if full {
-            self.suppress(&place, level);
+            self.suppress(place, level);
             scratch(&mut self.scratch)
         } else {
-            let issue = self.complete(&place, text.into(), level);
+            let issue = self.complete(place, text, level);
             self.kept.push(issue);
             match self.kept.last_mut() {
                 Some((_, issue)) => issue,
@@ -129,8 +138,18 @@ impl<'d> Sink<'d> {
         text: impl Into<String>,
     ) -> Finding<'_, 'd> {
         let (place, text) = (at.into(), text.into());
+        if self.is_said(reference, &place, &text) {
+            return self.unheard();
+        }
+        self.list(&Place::Node(reference), text)
+            .at(place, "the place in the catalog")
+    }
+
+    /// Whether the same was said of the same place for another reference; then this one is added. Else
+    /// it counts as said from now on.
+    fn is_said(&mut self, reference: Node<'_>, place: &Place<'_>, text: &str) -> bool {
         let document = place.document().path().as_ptr() as usize;
-        let key = (text, document, place.offset());
+        let key = (text.to_owned(), document, place.offset());
         if let Some(known) = self.behind.get_mut(&key) {
             let is_other = known.last != reference.offset();
             known.last = reference.offset();
@@ -143,7 +162,7 @@ impl<'d> Sink<'d> {
                 let spot = locate(self.subject, &Place::Node(reference), Some(what));
                 issue.locations.push(spot.locations);
             }
-            return self.unheard();
+            return true;
         }
         let kept = self.kept.len();
         let behind = Behind {
@@ -151,10 +170,8 @@ impl<'d> Sink<'d> {
             last: reference.offset(),
             more: 0,
         };
-        let text = key.0.clone();
         self.behind.insert(key, behind);
-        self.issue(reference, text)
-            .at(place, "the place in the catalog")
+        false
     }
 
     /// A finding that is said already.
@@ -284,6 +301,8 @@ impl<'d> Sink<'d> {
         }
         let spot = locate(self.subject, place, None);
         let mut issue = issue(text, level, first(self.facts.uids));
+        // In a modular scenario the value is mended where it is given, not in the library.
+        issue.locations.extend(put_there(self.subject, place));
         issue.locations.push(spot.locations);
         (spot.order, issue)
     }

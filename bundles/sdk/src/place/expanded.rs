@@ -1,7 +1,7 @@
 //! From places in an expanded scenario to the files that it was made of.
 
 use qcbus_document::{Attribute, Document, Node};
-use qcbus_formats::xqar::Location;
+use qcbus_formats::xqar::{Location, Locations};
 
 use super::{Place, places_of, shown_at};
 use crate::Subject;
@@ -9,30 +9,52 @@ use crate::Subject;
 /// What of the root file brought a place of a library into the expanded scenario: the value that was
 /// put there, else the reference to the group.
 pub(super) fn referring(subject: &Subject<'_>, place: &Place<'_>) -> Vec<Location> {
-    let value = match place {
-        Place::Attribute(attribute) => value_in_root(*attribute),
-        _ => None,
-    };
-    let node = place.node();
-    let around = node
-        .into_iter()
-        .flat_map(|node| std::iter::once(node).chain(node.ancestors()));
-    // The name of a copied group is written where it is referred to.
-    let mut names = around.filter_map(|node| value_in_root(node.attribute("name")?));
-    let Some(offset) = value.or_else(|| names.next()) else {
-        return shown_at(subject, subject.written().root());
-    };
-    let Some(node) = innermost(subject.written(), offset) else {
-        return shown_at(subject, subject.written().root());
-    };
-    let holds = |attribute: &Attribute<'_>| attribute.value_offset() == offset;
-    match node.attributes().find(holds) {
-        Some(attribute) if value.is_some() => {
-            let xpath = format!("{}/@{}", node.xpath(), attribute.name());
-            places_of(subject, &attribute.position(), Some(xpath))
-        }
-        _ => places_of(subject, &node.position(), Some(node.xpath())),
+    if let Some(places) = value_given(subject, place) {
+        return places;
     }
+    let reference = place.node().and_then(|node| reference_to(subject, node));
+    shown_at(subject, reference.or(subject.written().root()))
+}
+
+/// The element of the root file that brought the group around a node into the expanded scenario.
+fn reference_to<'d>(subject: &Subject<'d>, node: Node<'_>) -> Option<Node<'d>> {
+    let mut around = std::iter::once(node).chain(node.ancestors());
+    // The name of a copied group is written where it is referred to.
+    let name = around.find_map(|node| value_in_root(node.attribute("name")?))?;
+    innermost(subject.written(), name)
+}
+
+/// The reference that a place in a library was copied for, unless the root file itself gives what is
+/// there.
+pub(crate) fn copied_by<'d>(subject: &Subject<'d>, place: &Place<'_>) -> Option<Node<'d>> {
+    let node = place.node().filter(|_| subject.is_expanded())?;
+    if put_there(subject, place).is_some() || node.position().is_root_file {
+        return None;
+    }
+    reference_to(subject, node)
+}
+
+/// Where the root file gives the value that an attribute of a library has in the expanded scenario.
+pub(crate) fn put_there(subject: &Subject<'_>, place: &Place<'_>) -> Option<Locations> {
+    let is_other = subject.is_expanded() && !matches!(place, Place::Attribute(it) if it.is("name"));
+    let places = value_given(subject, place).filter(|_| is_other)?;
+    Some(Locations {
+        description: "the value that is put there".to_owned(),
+        elsewhere: None,
+        places,
+    })
+}
+
+fn value_given(subject: &Subject<'_>, place: &Place<'_>) -> Option<Vec<Location>> {
+    let Place::Attribute(attribute) = place else {
+        return None;
+    };
+    let offset = value_in_root(*attribute)?;
+    let node = innermost(subject.written(), offset)?;
+    let holds = |attribute: &Attribute<'_>| attribute.value_offset() == offset;
+    let attribute = node.attributes().find(holds)?;
+    let xpath = format!("{}/@{}", node.xpath(), attribute.name());
+    Some(places_of(subject, &attribute.position(), Some(xpath)))
 }
 
 /// The XPath of a place in the file that it is written in: in the expanded scenario groups have other

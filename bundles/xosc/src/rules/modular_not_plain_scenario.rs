@@ -1,4 +1,5 @@
 use qcbus_document::FileKind;
+use qcbus_messages::DocumentRole;
 use qcbus_openscenario::Scenario;
 use qcbus_sdk::{Level, Rule, Sink};
 
@@ -15,6 +16,14 @@ pub static RULE: Rule<Scene> = Rule {
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     if found.subject().kind() == FileKind::Mosc {
+        return;
+    }
+    if found.subject().is_expanded() {
+        return must_be_expanded(found);
+    }
+    // Why no plain scenario can be made of it is said by who tried.
+    let missing = found.subject().missing();
+    if missing.iter().any(|it| it.role == DocumentRole::Expanded) {
         return;
     }
     let references: Vec<_> = scenario.elements("ScenarioReference").collect();
@@ -47,5 +56,16 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             offers().count()
         );
         found.issue(first, text).level(Level::Information);
+    }
+}
+
+/// What was checked is not the file but what it is expanded to.
+fn must_be_expanded(found: &mut Sink<'_>) {
+    let written = found.subject().written();
+    let mut references = written.elements("ScenarioReference");
+    if let Some(first) = references.next() {
+        let text = "simulators know no `ScenarioReference` and leave out what it stands for without a word; what was \
+                    checked is the plain scenario that `qcbus expand` makes of this file, and that is to be run";
+        found.issue(first, text).level(Level::Warning);
     }
 }
