@@ -1,11 +1,13 @@
 //! Bodies of the fuzz targets, run as seeded tests on stable.
 
+use std::convert::Infallible;
 use std::path::Path;
 
-use qcbus_document::Document;
+use qcbus_document::{Document, Node};
+use qcbus_messages::{Absence, DocumentRole};
 
-use crate::modular::SearchPath;
-use crate::{Limits, prepare_bytes, references};
+use crate::modular::{ExpandedImage, Expansion, Part, SearchPath, expand, pack};
+use crate::{Limits, Reader, Source, Walking, gather, prepare_bytes, references};
 
 /// Whatever the bytes are and whatever the name promises: there is an image, it is valid, its
 /// places can be found, and it does not outgrow its bound.
@@ -40,4 +42,171 @@ pub fn ingest(bytes: &[u8]) {
         }
         references(&document, &SearchPath::default());
     }
+}
+
+/// Documents of an archive in memory. Nothing else is read.
+struct Shelf {
+    reader: Reader,
+    images: Vec<Vec<u8>>,
+}
+
+impl Source for Shelf {
+    type Document = Vec<u8>;
+    type Halt = Infallible;
+
+    fn fetch(&mut self, path: &Path) -> Result<Result<Vec<u8>, Absence>, Infallible> {
+        if !path.to_string_lossy().starts_with("/fuzz.mosc!") {
+            return Ok(Err(Absence::NotThere));
+        }
+        let prepared = self.reader.prepare(path, Path::new("/"));
+        Ok(prepared
+            .map(|prepared| prepared.build())
+            .map_err(|error| error.to_absence()))
+    }
+
+    fn image(document: &Vec<u8>) -> &[u8] {
+        document
+    }
+
+    fn listing(&mut self, archive: &Path) -> Result<Option<Vec<u8>>, Infallible> {
+        let listing = self.reader.listing(archive, Path::new("/"));
+        Ok(listing.ok().flatten().map(|prepared| prepared.build()))
+    }
+
+    fn expanded(&self, expanded: &ExpandedImage<'_, '_>) -> Result<Vec<u8>, Infallible> {
+        Ok(expanded.build())
+    }
+
+    fn kept(&self, index: usize) -> &[u8] {
+        &self.images[index]
+    }
+
+    fn keep(&mut self, _: &Path, _: DocumentRole, _: u32, image: Vec<u8>) {
+        self.images.push(image);
+    }
+}
+
+/// What became of an archive.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Outcome {
+    /// The expanded scenario.
+    Expanded(String),
+    /// What was in the way, at least.
+    Stopped(String),
+}
+
+/// Whatever lies in an archive: it is expanded or the reason is said; what it is expanded to is
+/// well-formed, the image of it is valid and is the same tree, and expanding it again changes nothing.
+///
+/// # Panics
+/// When one of these does not hold.
+pub fn archive(bytes: &[u8]) -> Outcome {
+    let limits = Limits {
+        max_archive: 1 << 22,
+        max_image: 1 << 26,
+        ..Limits::default()
+    };
+    let mut reader = Reader::new(limits);
+    let root = reader
+        .prepare_bytes(Path::new("/fuzz.mosc"), bytes.to_vec())
+        .build();
+    let mut shelf = Shelf {
+        reader,
+        images: Vec::new(),
+    };
+    let Ok(root) = Document::open(&root) else {
+        return Outcome::Stopped("the root is no image".to_owned());
+    };
+    let search = SearchPath::default();
+    let walking = Walking {
+        max_documents: 64,
+        max_text: limits.max_archive,
+        max_image: limits.max_image,
+        search: &search,
+    };
+    let Ok(found) = gather(&root, &walking, &mut shelf);
+    let images = shelf.images.iter().map(|image| Document::open(image));
+    let documents = std::iter::once(root).chain(images.filter_map(Result::ok));
+    let parts: Vec<Part<'_>> = documents
+        .zip(found.links)
+        .map(|(document, links)| Part { document, links })
+        .collect();
+    let expansion = expand(parts, limits.max_archive);
+    if let Some(obstacle) = expansion.obstacles().next() {
+        return Outcome::Stopped(obstacle.text.clone());
+    }
+    match expansion.image(limits.max_image) {
+        Some(image) => Outcome::Expanded(sound(&expansion, &image.build())),
+        None => Outcome::Stopped("the image is too large".to_owned()),
+    }
+}
+
+/// An archive of these files, expanded as [`archive`] does.
+///
+/// # Panics
+/// As [`archive`].
+pub fn assembled(files: &[(String, Vec<u8>)]) -> Outcome {
+    match pack(files) {
+        Ok(bytes) => archive(&bytes),
+        Err(error) => Outcome::Stopped(error.to_string()),
+    }
+}
+
+#[expect(clippy::panic, reason = "a fuzz body reports by panicking")]
+fn sound(expansion: &Expansion<'_>, image: &[u8]) -> String {
+    let text = expansion.text();
+    let whole = expansion.parts[0].document.root().is_some();
+    let document = match Document::open(image) {
+        Ok(document) => document,
+        Err(error) => panic!("the expanded image: {error}"),
+    };
+    if let Err(error) = document.validate() {
+        panic!("the expanded image: {error}");
+    }
+    let again = prepare_bytes(
+        Path::new("/again.xosc"),
+        text.clone().into_bytes(),
+        &Limits::default(),
+    );
+    let again = again.build();
+    let again = match Document::open(&again) {
+        Ok(again) => again,
+        Err(error) => panic!("the expanded text: {error}"),
+    };
+    if let Some(fault) = again
+        .faults()
+        .find(|fault| fault.code.makes_partial() && whole)
+    {
+        panic!("the expanded text: {}\n{text}", fault.text);
+    }
+    assert_eq!(tree(document), tree(again), "{text}");
+    let same = expand(
+        vec![Part {
+            document: again,
+            links: Vec::new(),
+        }],
+        u64::MAX,
+    );
+    assert_eq!(same.text(), text, "expanded twice");
+    text
+}
+
+/// What a document says: names, attributes, characters, and how deep.
+fn tree(document: Document<'_>) -> Vec<String> {
+    let depth = |node: Node<'_>| node.ancestors().count();
+    let nodes = (0..document.len()).filter_map(|index| document.node(index));
+    let mut said: Vec<String> = Vec::new();
+    for node in nodes {
+        if node.is_element() {
+            let attributes: Vec<String> = node
+                .attributes()
+                .filter(|attribute| !attribute.name().starts_with("xmlns"))
+                .map(|attribute| format!("{}={:?}", attribute.name(), attribute.value()))
+                .collect();
+            said.push(format!("{} {} {attributes:?}", depth(node), node.name()));
+        } else {
+            said.push(format!("{} {:?}", depth(node), node.character_run()));
+        }
+    }
+    said
 }

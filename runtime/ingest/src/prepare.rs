@@ -31,11 +31,7 @@ pub fn prepare(path: &Path, boundary: &Path, limits: &Limits) -> Result<Prepared
 /// Prepares bytes that are in memory already. Nothing is read from disk, so that every include is
 /// a fault.
 pub fn prepare_bytes(path: &Path, bytes: Vec<u8>, limits: &Limits) -> Prepared {
-    let (file, members) = split_members(path);
-    let stamp = stamp_of_bytes(&file, &bytes);
-    let mut reader = Reader::new(*limits);
-    let root = reader.open(&stamp, bytes, &members);
-    assemble(stamp, root, None, limits)
+    Reader::new(*limits).prepare_bytes(path, bytes)
 }
 
 /// Reads files for one set of documents: an archive is read and looked through once, however many
@@ -87,6 +83,14 @@ impl Reader {
         }
         let boundary = std::path::absolute(boundary).unwrap_or_else(|_| boundary.to_path_buf());
         Ok(assemble(stamp, root, Some(&boundary), &self.limits))
+    }
+
+    /// See [`prepare_bytes`]; members of an archive can be prepared after it.
+    pub fn prepare_bytes(&mut self, path: &Path, bytes: Vec<u8>) -> Prepared {
+        let (file, members) = split_members(path);
+        let stamp = stamp_of_bytes(&file, &bytes);
+        let root = self.open(&stamp, bytes, &members);
+        assemble(stamp, root, None, &self.limits)
     }
 
     /// What lies in an archive, as a document: see [`qcbus_messages::DocumentRole::Listing`]. `None`
