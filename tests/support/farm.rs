@@ -128,7 +128,7 @@ impl Farm {
         let ready = standard
             .filter(|it| it.state == "ready" || it.state == "busy")
             .count();
-        (ready >= 2).then_some(())
+        (ready >= 3).then_some(())
     }
 
     /// Runs a qcbus command on this instance.

@@ -1,0 +1,353 @@
+//! Modular scenarios from end to end: expanded and packed on the command line, judged by a broker,
+//! judged again when a library changes.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use qcbus_formats::Verdict;
+use support::desk::{Desk, files_below, issues, sample_farm};
+use support::farm::{Farm, tail};
+use support::watchdog::until_or;
+
+const MAIN: &str = "modular/convoy.xosc";
+const LIBRARY: &str = "modular/moves.xosc";
+const PACKED: &str = "modular/convoy_packed.mosc";
+const MAP: &str = "maps/quay_straight.xodr";
+
+fn sample(name: &str) -> Vec<u8> {
+    std::fs::read(sample_farm().join(name)).unwrap()
+}
+
+fn text(name: &str) -> String {
+    String::from_utf8(sample(name)).unwrap()
+}
+
+/// The sample's modular scenario, its library and its map.
+fn desk() -> Desk {
+    let desk = Desk::new();
+    for name in [MAIN, LIBRARY, MAP] {
+        desk.write(name, sample(name));
+    }
+    desk
+}
+
+fn files(desk: &Desk) -> Vec<PathBuf> {
+    let mut files = files_below(desk.path());
+    files.sort();
+    files
+}
+
+#[test]
+fn what_is_packed_expands_to_the_same() {
+    let desk = desk();
+    let said = desk.qcbus(&["expand", MAIN]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    assert_eq!(said.stderr, "");
+    let plain = said.stdout;
+    assert!(
+        plain.contains("<ManeuverGroup name=\"lead.brake\""),
+        "{plain}"
+    );
+    assert!(!plain.contains("ScenarioReference") && !plain.contains("parameterAttributes"));
+
+    let said = desk.qcbus(&["pack", MAIN, LIBRARY, "-o", "modular/x.mosc"]);
+    assert_eq!((said.code, &*said.stderr), (Some(0), ""));
+    let first = std::fs::read(desk.path().join("modular/x.mosc")).unwrap();
+    assert_eq!(desk.qcbus(&["expand", "modular/x.mosc"]).stdout, plain);
+    desk.qcbus(&["pack", MAIN, LIBRARY, "-o", "modular/x.mosc"]);
+    let again = std::fs::read(desk.path().join("modular/x.mosc")).unwrap();
+    assert!(first == again, "the same files make the same archive");
+    assert!(
+        first == sample(PACKED),
+        "the sample's archive is up to date"
+    );
+
+    // What it is expanded to is a plain scenario, and expanding that changes nothing.
+    desk.write("modular/plain.xosc", &plain);
+    assert_eq!(desk.qcbus(&["expand", "modular/plain.xosc"]).stdout, plain);
+    let said = desk.qcbus(&["check", "modular/plain.xosc"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+}
+
+#[test]
+fn nothing_is_written_but_what_was_asked_for() {
+    let desk = desk();
+    let before = files(&desk);
+    let said = desk.qcbus(&["expand", MAIN, "-o", "plain.xosc"]);
+    assert_eq!((said.code, &*said.stdout), (Some(0), ""));
+    let mut after = before.clone();
+    after.push("plain.xosc".into());
+    after.sort();
+    assert_eq!(files(&desk), after);
+
+    // A reference that leads nowhere: no output, and an older one stays as it is.
+    desk.write(
+        "modular/lost.xosc",
+        text(MAIN).replace("moves.xosc", "mooves.xosc"),
+    );
+    desk.write("old.xosc", "as it was");
+    let said = desk.qcbus(&["expand", "modular/lost.xosc", "-o", "old.xosc"]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    assert!(
+        said.stderr.contains("modular/lost.xosc:88:"),
+        "{}",
+        said.stderr
+    );
+    let said = desk.qcbus(&["expand", "modular/lost.xosc", "-o", "new.xosc"]);
+    assert_eq!(said.code, Some(1));
+    assert_eq!(
+        std::fs::read(desk.path().join("old.xosc")).unwrap(),
+        b"as it was"
+    );
+    assert!(!desk.path().join("new.xosc").exists());
+}
+
+#[test]
+fn what_a_scenario_is_made_of_is_not_overwritten() {
+    let desk = desk();
+    desk.write(PACKED, sample(PACKED));
+    for (file, output) in [(MAIN, MAIN), (MAIN, LIBRARY), (PACKED, PACKED)] {
+        let said = desk.qcbus(&["expand", file, "-o", output]);
+        assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
+        assert!(said.stderr.contains("made of it"), "{}", said.stderr);
+        let now = std::fs::read(desk.path().join(output)).unwrap();
+        assert!(now == sample(output), "{output}");
+    }
+    let said = desk.qcbus(&["pack", MAIN, PACKED, "-o", PACKED]);
+    assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
+    assert!(std::fs::read(desk.path().join(PACKED)).unwrap() == sample(PACKED));
+}
+
+#[test]
+fn what_cannot_be_packed_leaves_nothing_behind() {
+    let desk = desk();
+    desk.write("other/moves.xosc", sample(LIBRARY));
+    let before = files(&desk);
+    let cases: [(&[&str], &str); 5] = [
+        (
+            &["pack", MAIN, LIBRARY, "other/moves.xosc", "-o", "x.mosc"],
+            "would both be called moves.xosc",
+        ),
+        (
+            &["pack", MAIN, "gone.xosc", "-o", "x.mosc"],
+            "cannot read gone.xosc",
+        ),
+        (&["pack", MAIN, "-o", "x.zip"], "ends in .mosc"),
+        (&["pack", MAP, "-o", "x.mosc"], "ends in .xosc"),
+        (&["expand", "gone.mosc", "-o", "x.xosc"], "no such file"),
+    ];
+    for (arguments, part) in cases {
+        let said = desk.qcbus(arguments);
+        assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
+        assert!(said.stderr.contains(part), "{}", said.whole(&desk));
+        assert_eq!(files(&desk), before);
+    }
+}
+
+#[test]
+fn many_at_once_do_not_disturb_each_other() {
+    let desk = desk();
+    desk.write(PACKED, sample(PACKED));
+    let start = |number: usize| {
+        let output = format!("out{number}.xosc");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+        command.current_dir(desk.path());
+        command
+            .args(["expand", PACKED, "-o", &output])
+            .spawn()
+            .unwrap()
+    };
+    let children: Vec<_> = (0..8).map(start).collect();
+    for mut child in children {
+        assert!(child.wait().unwrap().success());
+    }
+    let read =
+        |number: usize| std::fs::read(desk.path().join(format!("out{number}.xosc"))).unwrap();
+    assert!((1..8).all(|number| read(number) == read(0)));
+}
+
+/// A farm with the sample's modular scenario, its library and its map.
+fn farm() -> Farm {
+    let farm = Farm::new();
+    for name in ["maps", "modular"] {
+        std::fs::create_dir(farm.root().join(name)).unwrap();
+    }
+    farm.write(MAP, &sample(MAP));
+    farm
+}
+
+/// Waits until a file has this verdict, and this text among its issues.
+fn becomes(farm: &Farm, name: &str, verdict: &str, part: &str) {
+    let is_so = || {
+        let told = farm.verdict_file(name);
+        let results = farm.result(name);
+        let says = part.is_empty() || issues(&results).any(|(_, it)| it.description.contains(part));
+        (told["verdict"] == verdict && says).then_some(())
+    };
+    until_or(&format!("{name} is {verdict}: {part}"), is_so, || {
+        let results = farm.result(name);
+        let all: Vec<_> = issues(&results).map(|(_, it)| &it.description).collect();
+        format!(
+            "{all:#?}\n{:#}\n{}",
+            farm.verdict_file(name),
+            tail(&farm.log())
+        )
+    });
+}
+
+#[test]
+fn a_library_that_changes_has_its_users_judged_again() {
+    let farm = farm();
+    let _broker = farm.serve_ready();
+    farm.write(LIBRARY, &sample(LIBRARY));
+    farm.write(MAIN, &sample(MAIN));
+    farm.write("modular/second.xosc", &sample(MAIN));
+    for name in [MAIN, "modular/second.xosc"] {
+        assert_eq!(farm.verdict(name).verdict, Verdict::Accepted);
+    }
+    let both = |verdict: &str, part: &str| {
+        becomes(&farm, MAIN, verdict, part);
+        becomes(&farm, "modular/second.xosc", verdict, part);
+    };
+    // A fault that only the expanded scenario has: the library's own scenario runs for a minute.
+    let faulty = text(LIBRARY).replace(
+        "dynamicsDimension=\"time\" value=\"3\"",
+        "dynamicsDimension=\"tiem\" value=\"3\"",
+    );
+    farm.write(LIBRARY, faulty.as_bytes());
+    both("rejected", "tiem");
+    farm.write(LIBRARY, &sample(LIBRARY));
+    both("accepted", "");
+    std::fs::remove_file(farm.root().join(LIBRARY)).unwrap();
+    both("rejected", "moves.xosc");
+    farm.write(LIBRARY, &sample(LIBRARY));
+    both("accepted", "");
+    let renamed = text(LIBRARY).replace("name=\"brake\" maximum", "name=\"halt\" maximum");
+    farm.write(LIBRARY, renamed.as_bytes());
+    both("rejected", "has no maneuver group `brake`");
+}
+
+#[test]
+fn findings_name_the_file_that_has_the_fault() {
+    let farm = farm();
+    let _broker = farm.serve_ready();
+    let faulty = text(LIBRARY).replace(
+        "\"linear\" dynamicsDimension=\"time\"",
+        "\"linear\" dynamicsDimension=\"tiem\"",
+    );
+    farm.write(LIBRARY, faulty.as_bytes());
+    farm.write(MAIN, &sample(MAIN));
+    farm.verdict(MAIN);
+    let results = farm.result(MAIN);
+    let of_library = format!("{}:61:", farm.root().join(LIBRARY).display());
+    let said: Vec<_> = issues(&results)
+        .filter(|(_, it)| it.description.contains("tiem"))
+        .flat_map(|(_, it)| {
+            it.locations
+                .iter()
+                .map(|place| place.written().into_owned())
+        })
+        .collect();
+    assert!(said.iter().any(|it| it.contains(&of_library)), "{said:#?}");
+    // Both groups take it: one finding, and both references.
+    let found = issues(&results).filter(|(_, it)| it.description.contains("tiem"));
+    let places: Vec<Vec<(u64, u64)>> = found.map(|(_, it)| support::desk::places(it)).collect();
+    assert_eq!(places.len(), 1, "{places:?}");
+    assert_eq!(places[0].len(), 2, "{places:?}");
+
+    let desk = Desk::new();
+    desk.write("main.xosc", sample(MAIN));
+    desk.write("moves.xosc", &faulty);
+    desk.qcbus(&["pack", "main.xosc", "moves.xosc", "-o", "x.mosc"]);
+    farm.write(
+        "modular/x.mosc",
+        &std::fs::read(desk.path().join("x.mosc")).unwrap(),
+    );
+    farm.verdict("modular/x.mosc");
+    becomes(&farm, "modular/x.mosc", "rejected", "tiem");
+    let results = farm.result("modular/x.mosc");
+    let mut said = issues(&results).flat_map(|(_, it)| &it.locations);
+    assert!(said.any(|it| it.written().contains("x.mosc!moves.xosc:61:")));
+}
+
+fn serve_with(farm: &Farm, search: &Path) -> support::broker::Broker {
+    let mut command = farm.serve_command();
+    command.env("SCENARIO_PATH", format!("/nowhere;{}", search.display()));
+    support::broker::Broker::start(&mut command, &farm.log_path())
+}
+
+#[test]
+fn a_library_on_the_search_path_counts_wherever_it_lies() {
+    let farm = farm();
+    let library = farm.base().join("library");
+    std::fs::create_dir(&library).unwrap();
+    std::fs::write(library.join("moves.xosc"), sample(LIBRARY)).unwrap();
+    farm.write(MAIN, &sample(MAIN));
+    let _broker = serve_with(&farm, &library);
+    until_or(
+        "the broker answers",
+        || farm.status().map(drop),
+        || farm.log(),
+    );
+    assert_eq!(farm.verdict(MAIN).verdict, Verdict::Accepted);
+    let renamed = text(LIBRARY).replace("name=\"brake\" maximum", "name=\"halt\" maximum");
+    std::fs::write(library.join("moves.xosc"), renamed).unwrap();
+    becomes(&farm, MAIN, "rejected", "has no maneuver group `brake`");
+    // One that comes to lie nearer is the one that is meant.
+    farm.write(LIBRARY, &sample(LIBRARY));
+    becomes(&farm, MAIN, "accepted", "");
+}
+
+#[test]
+fn the_search_path_of_the_configuration_is_taken_up_by_a_reload() {
+    let mut farm = farm();
+    let library = farm.base().join("library");
+    std::fs::create_dir(&library).unwrap();
+    std::fs::write(library.join("moves.xosc"), sample(LIBRARY)).unwrap();
+    farm.write(MAIN, &sample(MAIN));
+    let config = farm.base().join("config.xml");
+    let write = |path: &str| {
+        let bundles = "<CheckerBundle application=\"xoscBundle\"/><CheckerBundle application=\"modularBundle\"/>\
+                       <CheckerBundle application=\"xodrBundle\"/>";
+        let param = format!("<Param name=\"qcbus.scenarioPath\" value=\"{path}\"/>");
+        std::fs::write(&config, format!("<Config>{param}{bundles}</Config>")).unwrap();
+    };
+    write("elsewhere");
+    farm.arguments
+        .extend(["-c".to_owned(), config.to_string_lossy().into_owned()]);
+    let _broker = farm.serve_ready();
+    assert_eq!(farm.verdict(MAIN).verdict, Verdict::Rejected);
+    write("library");
+    let said = farm.qcbus(&["reload"]);
+    assert!(said.status.success(), "{said:?}");
+    becomes(&farm, MAIN, "accepted", "");
+    let log = farm.log();
+    assert!(
+        !log.contains("scenarioPath"),
+        "the parameter is known: {log}"
+    );
+}
+
+#[test]
+fn a_scenario_that_cannot_be_expanded_is_not_accepted_whoever_is_asked() {
+    let desk = desk();
+    let tied = "<ParameterReference key=\"AbsoluteTargetSpeed.value\" value=\"8\"/>";
+    let two = format!("{tied}{}", tied.replace("\"8\"", "\"9\""));
+    desk.write("modular/tied.xosc", text(MAIN).replace(tied, &two));
+    let config = "<Config><CheckerBundle application=\"xoscBundle\">\
+                  <Checker checkerId=\"check_asam_xosc_xml_valid_schema\"/></CheckerBundle></Config>";
+    desk.write("config.xml", config);
+    let said = desk.qcbus(&["check", "-c", "config.xml", "modular/tied.xosc"]);
+    let whole = said.whole(&desk);
+    assert_eq!(said.code, Some(1), "{whole}");
+    assert!(said.stdout.contains("cannot be expanded"), "{whole}");
+    assert!(said.stdout.contains("says `8` and `9`"), "{whole}");
+}
