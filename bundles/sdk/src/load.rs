@@ -50,6 +50,19 @@ impl Loaded {
     /// [`LoadError`] when nothing can be checked. An ill-formed file is no error: its faults are
     /// in the image.
     pub fn from_path(path: &Path, boundary: &Path) -> Result<Loaded, LoadError> {
+        Loaded::searching(path, boundary, &SearchPath::of_environment())
+    }
+
+    /// The same as [`Loaded::from_path`], with another search path for scenarios than that of the
+    /// environment.
+    ///
+    /// # Errors
+    /// As [`Loaded::from_path`].
+    pub fn searching(
+        path: &Path,
+        boundary: &Path,
+        search: &SearchPath,
+    ) -> Result<Loaded, LoadError> {
         let kind = kind_of(path)?;
         let mut reader = Reader::new(Limits::default());
         let prepared = reader.prepare(path, boundary).map_err(|error| {
@@ -60,7 +73,7 @@ impl Loaded {
             }
         })?;
         let mut loaded = Loaded::of(kind, path, &prepared);
-        loaded.follow(reader, boundary)?;
+        loaded.follow(reader, boundary, search)?;
         Ok(loaded)
     }
 
@@ -129,7 +142,12 @@ impl Loaded {
         }
     }
 
-    fn follow(&mut self, reader: Reader, boundary: &Path) -> Result<(), LoadError> {
+    fn follow(
+        &mut self,
+        reader: Reader,
+        boundary: &Path,
+        search: &SearchPath,
+    ) -> Result<(), LoadError> {
         let mut shelf = Shelf {
             reader,
             boundary,
@@ -140,7 +158,7 @@ impl Loaded {
             max_documents: MAX_DOCUMENTS,
             max_text: Limits::default().max_archive,
             max_image: Limits::default().max_image,
-            search: &SearchPath::of_environment(),
+            search,
         };
         let Ok(found) = qcbus_ingest::gather(&root, &walking, &mut shelf);
         self.missing = found.missing;
