@@ -40,9 +40,11 @@ pub(super) fn read<'d>(within: Node<'d>, problems: &mut Problems<'d>) -> Vec<Key
         };
         if let Some(&before) = first.get(key) {
             let text = match before.attr("value") == Some(value.value()) {
-                true => format!("the key `{key}` is given twice with the same value"),
+                true => {
+                    format!("the key `{key}` is given twice with the same value; once is enough")
+                }
                 false => format!(
-                    "the key `{key}` is given twice with different values, `{}` and `{}`",
+                    "the key `{key}` is given twice with different values, `{}` and `{}`; only one of them is meant",
                     before.attr("value").unwrap_or(""),
                     value.value()
                 ),
@@ -162,12 +164,22 @@ fn overlap<'d>(
     attribute: Attribute<'d>,
     problems: &mut Problems<'d>,
 ) {
+    if best.value.value() == other.value.value() {
+        return;
+    }
+    let of_the_tool = match other.key.contains('.') {
+        true => "one or the other, by chance",
+        false => "the one without an element",
+    };
     let text = format!(
-        "the keys `{}` and `{}` both fit `{}` of `{}`; the one that says more wins",
+        "the keys `{}` and `{}` both fit `{}` of `{}` and give it different values, `{}` and `{}`: here the one that \
+         names more elements wins, while the reference tool takes {of_the_tool}",
         best.key,
         other.key,
         attribute.name(),
-        attribute.node().name()
+        attribute.node().name(),
+        best.value.value(),
+        other.value.value()
     );
     // Once for two keys, however many attributes they share.
     let is_said = |problem: &Problem<'d>| {
@@ -188,8 +200,14 @@ fn overlap<'d>(
 }
 
 fn tie<'d>(one: &Key<'d>, other: &Key<'d>, attribute: Attribute<'d>, problems: &mut Problems<'d>) {
+    // Once for two keys, however many attributes they fit.
+    let is_said =
+        |problem: &Problem<'d>| problem.what == What::KeyTie && problem.at.node() == one.node;
+    if problems.lately(is_said) {
+        return;
+    }
     let text = format!(
-        "which value `{}` of `{}` is to have is open: the key `{}` says `{}` and `{}`",
+        "which value `{}` of `{}` is to have is open: the key `{}` says `{}` and `{}`; give it once",
         attribute.name(),
         attribute.node().name(),
         one.key,
