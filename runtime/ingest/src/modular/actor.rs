@@ -23,24 +23,31 @@ pub(super) fn replace<'d>(
     referring: Node<'d>,
     problems: &mut Problems<'d>,
 ) {
-    let quoted = |group: Node<'_>| group.attr("name").unwrap_or("").to_owned();
-    let mut lacks = |group: Node<'d>, other: Node<'d>, what: &str| {
-        let text = format!(
-            "the {what} `{}` names no actor (`Actors/EntityRef`), so nobody knows for whom the maneuvers are",
-            quoted(group)
-        );
+    let library = copy.group;
+    let mut lacks = |group: Node<'_>, what: &str, then: &str| {
+        let name = group.attr("name").unwrap_or("");
         problems.push(Problem {
             what: What::Actor,
             at: Spot::Node(referring),
-            target: Some(Spot::Node(if group == referring { other } else { group })),
-            text,
+            target: Some(Spot::Node(library)),
+            text: format!(
+                "the group `{name}`{what} names no actor (`Actors/EntityRef`), so {then}"
+            ),
         });
     };
     match (entity(referring), entity(copy.group)) {
         (Some(new), Some(old)) => {
             copy.edits.insert(old.offset(), Value::of(part, new));
         }
-        (None, _) => lacks(referring, copy.group, "referring group"),
-        (_, None) => lacks(copy.group, referring, "group that is referred to,"),
+        (None, _) => lacks(
+            referring,
+            "",
+            "it is open for whom the maneuvers are that it refers to",
+        ),
+        (_, None) => lacks(
+            library,
+            ", which is referred to,",
+            "there is none in whose place the actor of the referring group could be put",
+        ),
     }
 }
