@@ -184,8 +184,8 @@ impl<'d> Expander<'d> {
         let mut copies = Vec::new();
         for &reference in &references {
             if reference != first {
-                let text = "a `ManeuverGroup` has one `ScenarioReference`; the reference tool passes over further ones \
-                            and gives their values to the first"
+                let text = "a `ManeuverGroup` has one `ScenarioReference`, this is a further one: the reference tool passes \
+                            over it and gives its values to the first; put it into a group of its own"
                     .to_owned();
                 self.say(
                     What::SecondReference,
@@ -237,8 +237,9 @@ impl<'d> Expander<'d> {
         let direct = node.child("ParameterReference");
         match (form, direct) {
             (Form::Direct, _) => {
-                let text = "without `ManeuverGroupReference` all groups of the file are taken; this is the documented \
-                            form, but later versions of the reference tool delete the group without a word"
+                let text = "without a `ManeuverGroupReference` all groups of the file are taken; this form is documented, \
+                            but later versions of the reference tool delete the referring group without a word: name \
+                            the groups in `ManeuverGroupReference`"
                     .to_owned();
                 self.say(What::DirectForm, node.into(), None, text);
             }
@@ -270,7 +271,10 @@ impl<'d> Expander<'d> {
         if let Some(from) = self.chain.iter().position(|&it| it == target) {
             let chain = self.chain[from..].iter().chain([&target]);
             let names: Vec<String> = chain.map(|&part| self.short_name(part)).collect();
-            let text = format!("the scenario refers to itself: {}", names.join(" → "));
+            let text = format!(
+                "the scenario refers to itself, so that it has no end: {}",
+                names.join(" → ")
+            );
             self.say(What::Cycle, at, None, text);
             return None;
         }
@@ -347,7 +351,7 @@ impl<'d> Expander<'d> {
     ) -> Option<Use<'d>> {
         let Some(wanted) = node.attribute("maneuverGroupName") else {
             let text =
-                "`ManeuverGroupReference` needs the attribute `maneuverGroupName`".to_owned();
+                "`ManeuverGroupReference` needs the attribute `maneuverGroupName`: which group is taken is open".to_owned();
             self.say(What::GroupUnknown, node.into(), None, text);
             return None;
         };
@@ -360,7 +364,7 @@ impl<'d> Expander<'d> {
         };
         if let Some(second) = second {
             let text = format!(
-                "`{}` has several groups called `{}`; the first is taken",
+                "`{}` has several maneuver groups called `{}`; the first is taken, the others cannot be referred to",
                 self.short_name(target),
                 wanted.value()
             );
@@ -468,8 +472,8 @@ impl<'d> Expander<'d> {
             };
             if let Some(&before) = first.get(name) {
                 let text = format!(
-                    "the group `{name}` is referred to twice here, so that two groups get one name; the reference tool \
-                     gives both the values of the last"
+                    "the group `{name}` is referred to twice here, so that two groups get one name, and the reference \
+                     tool gives both the values of the last; refer to it from a `ManeuverGroup` of its own"
                 );
                 let at = Spot::of(node, "maneuverGroupName");
                 self.say(What::GroupTwice, at, Some(before.into()), text);
@@ -485,6 +489,22 @@ impl<'d> Expander<'d> {
         let mut names: Vec<&str> = groups.iter().map(|copy| copy.name()).collect();
         names.dedup();
         let file = self.short_name(target);
+        // There as written, but another name by the time it could be taken.
+        let inner = |copy: &&Rc<Copy<'d>>| {
+            let rest = copy.name().strip_prefix(name);
+            rest.is_some_and(|rest| rest.starts_with('.'))
+        };
+        let mut written = self.document(target).elements("ManeuverGroup");
+        let refers = written.any(|group| {
+            group.attr("name") == Some(name) && group.child("ScenarioReference").is_some()
+        });
+        if let Some(inner) = groups.iter().find(inner).filter(|_| refers) {
+            return format!(
+                "the maneuver group `{name}` of `{file}` refers to others itself; what takes its place is called \
+                 `{}`",
+                inner.name()
+            );
+        }
         let meant = did_you_mean(name, names.iter().copied());
         let listed: Vec<String> = names
             .iter()
