@@ -1,1 +1,3 @@
 //! What several rules have in common.
+
+pub mod offers;

@@ -1,0 +1,93 @@
+//! What groups offer for replacement, and which of it a key means.
+
+use std::collections::HashMap;
+
+use qcbus_document::{Attribute, Node};
+use qcbus_sdk::modular::{OFFERS, Use};
+
+/// Most attributes of one name that a key is compared with; more than that no group offers.
+const MOST_ALIKE: usize = 256;
+
+/// The attributes that the groups of a use offer.
+pub struct Offers<'d> {
+    /// In document order, group by group.
+    pub all: Vec<Attribute<'d>>,
+    /// The first of each name.
+    pub named: HashMap<&'d str, Attribute<'d>>,
+    by_element: HashMap<(&'d str, &'d str), Vec<Attribute<'d>>>,
+}
+
+impl<'d> Offers<'d> {
+    /// What the groups that a reference takes offer.
+    pub fn of(one: &Use<'d>) -> Offers<'d> {
+        let groups = one.copies.iter().map(|copy| copy.group);
+        let all: Vec<_> = groups.flat_map(offered_in).collect();
+        let mut named = HashMap::new();
+        let mut by_element: HashMap<_, Vec<_>> = HashMap::new();
+        for &attribute in &all {
+            named.entry(attribute.name()).or_insert(attribute);
+            let pair = (attribute.node().name(), attribute.name());
+            let alike = by_element.entry(pair).or_default();
+            if alike.len() < MOST_ALIKE {
+                alike.push(attribute);
+            }
+        }
+        Offers {
+            all,
+            named,
+            by_element,
+        }
+    }
+
+    /// The attributes whose element and name the last two parts of a key are.
+    pub fn ending(&self, key: &'d str) -> &[Attribute<'d>] {
+        let mut parts = key.rsplit('.');
+        let (Some(name), Some(element)) = (parts.next(), parts.next()) else {
+            return &[];
+        };
+        self.by_element
+            .get(&(element, name))
+            .map_or(&[], Vec::as_slice)
+    }
+
+    /// The attributes that the reference tool takes a key for although it is not their path: of the
+    /// elements around an attribute it compares the outermost that the key names, and none in between.
+    pub fn taken_loosely(&self, key: &'d str) -> impl Iterator<Item = Attribute<'d>> {
+        let count = key.split('.').count();
+        let outermost = key.split('.').next().unwrap_or("");
+        let candidates = self.ending(key).iter().copied();
+        candidates.filter(move |attribute| {
+            let around = count.checked_sub(3);
+            let ancestor = around.and_then(|around| attribute.node().ancestors().nth(around));
+            ancestor.is_some_and(|ancestor| ancestor.is(outermost))
+                && path(*attribute, count) != key
+        })
+    }
+}
+
+/// The attributes that the elements of a group offer and have. What the group itself offers is not
+/// replaced.
+pub fn offered_in<'d>(group: Node<'d>) -> impl Iterator<Item = Attribute<'d>> {
+    group.descendants().flat_map(|element| {
+        let names = element.attr(OFFERS).unwrap_or("").split(',').map(str::trim);
+        names.filter_map(move |name| element.attribute(name).filter(|_| name != OFFERS))
+    })
+}
+
+/// Whether one name may stand where another was meant: of very short ones, like `x` and `y`, none is a
+/// slip of the pen for another.
+pub fn may_be_meant(written: &str, other: &str) -> bool {
+    const SHORT: usize = 3;
+    written.eq_ignore_ascii_case(other) || (written.len() >= SHORT && other.len() >= SHORT)
+}
+
+/// The path of an attribute in as many parts as are asked for: its name, its element, those around.
+pub fn path(attribute: Attribute<'_>, parts: usize) -> String {
+    let element = attribute.node();
+    let around = std::iter::once(element).chain(element.ancestors());
+    let elements = around.take(parts.saturating_sub(1));
+    let mut names: Vec<&str> = elements.map(|element| element.name()).collect();
+    names.reverse();
+    names.push(attribute.name());
+    names.join(".")
+}
