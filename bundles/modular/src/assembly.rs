@@ -134,3 +134,10 @@ pub fn say<'s, 'd, 'p>(
         None => finding,
     }
 }
+
+/// Says all problems of some sorts.
+pub fn say_all(assembly: &Assembly<'_>, found: &mut Sink<'_>, sorts: &'static [What], there: &str) {
+    for problem in assembly.problems(sorts) {
+        say(found, problem, there);
+    }
+}
