@@ -5,7 +5,12 @@
 use qcbus_sdk::AnyRule;
 
 mod key_matches;
+mod reference_extension;
 mod reference_file_found;
 
 /// The rules of the bundle.
-pub static RULES: &[&dyn AnyRule] = &[&reference_file_found::RULE, &key_matches::RULE];
+pub static RULES: &[&dyn AnyRule] = &[
+    &key_matches::RULE,
+    &reference_extension::RULE,
+    &reference_file_found::RULE,
+];
