@@ -7,10 +7,12 @@ use qcbus_sdk::AnyRule;
 mod key_matches;
 mod reference_extension;
 mod reference_file_found;
+mod reference_form;
 
 /// The rules of the bundle.
 pub static RULES: &[&dyn AnyRule] = &[
     &key_matches::RULE,
     &reference_extension::RULE,
     &reference_file_found::RULE,
+    &reference_form::RULE,
 ];

@@ -1,0 +1,33 @@
+use qcbus_sdk::modular::What;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::assembly::{Assembly, Modular, say, say_all};
+
+pub static RULE: Rule<Modular> = Rule {
+    id: "check_qcbus_mosc_reference_form",
+    uids: &["qcbus.dev:mosc:1.0.0:reference.form"],
+    page: include_str!("reference_form.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    for problem in assembly.problems(&[What::DirectForm]) {
+        let node = problem.at.node();
+        let mut references = assembly.expansion.references.iter();
+        let target = references
+            .find(|it| it.node == node)
+            .and_then(|it| it.target);
+        let file = target.and_then(|target| assembly.expansion.parts.get(target)?.document.root());
+        let finding = say(found, problem, "").level(Level::Warning);
+        if let Some(file) = file {
+            finding.at(file, "the file whose groups are taken");
+        }
+    }
+    say_all(
+        assembly,
+        found,
+        &[What::MixedForm],
+        "the reference that names groups",
+    );
+}
