@@ -8,6 +8,7 @@ mod key_matches;
 mod reference_extension;
 mod reference_file_found;
 mod reference_form;
+mod reference_maneuver_group_known;
 
 /// The rules of the bundle.
 pub static RULES: &[&dyn AnyRule] = &[
@@ -15,4 +16,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &reference_extension::RULE,
     &reference_file_found::RULE,
     &reference_form::RULE,
+    &reference_maneuver_group_known::RULE,
 ];
