@@ -5,6 +5,7 @@
 use qcbus_sdk::AnyRule;
 
 mod key_matches;
+mod reference_cycle;
 mod reference_extension;
 mod reference_file_found;
 mod reference_form;
@@ -13,6 +14,7 @@ mod reference_maneuver_group_known;
 /// The rules of the bundle.
 pub static RULES: &[&dyn AnyRule] = &[
     &key_matches::RULE,
+    &reference_cycle::RULE,
     &reference_extension::RULE,
     &reference_file_found::RULE,
     &reference_form::RULE,
