@@ -10,6 +10,7 @@ mod reference_extension;
 mod reference_file_found;
 mod reference_form;
 mod reference_maneuver_group_known;
+mod reference_unexpanded;
 
 /// The rules of the bundle.
 pub static RULES: &[&dyn AnyRule] = &[
@@ -19,4 +20,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &reference_file_found::RULE,
     &reference_form::RULE,
     &reference_maneuver_group_known::RULE,
+    &reference_unexpanded::RULE,
 ];

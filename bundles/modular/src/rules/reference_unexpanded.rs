@@ -1,0 +1,83 @@
+use std::collections::HashSet;
+
+use qcbus_document::{Document, Node};
+use qcbus_sdk::modular::{Form, Reference, Spot};
+use qcbus_sdk::{Rule, Sink};
+
+use crate::assembly::{Assembly, Modular, place};
+
+pub static RULE: Rule<Modular> = Rule {
+    id: "check_qcbus_mosc_reference_unexpanded",
+    uids: &["qcbus.dev:mosc:1.0.0:reference.unexpanded"],
+    page: include_str!("reference_unexpanded.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    for reference in &assembly.expansion.references {
+        let Some(target) = reference.target else {
+            continue;
+        };
+        let document = assembly
+            .expansion
+            .parts
+            .get(target)
+            .map(|part| part.document);
+        let Some(document) = document.filter(|document| !is_archive(*document)) else {
+            continue;
+        };
+        let taken = taken(assembly, reference, target);
+        let refers = |group: &Node<'_>| group.child("ScenarioReference").is_some();
+        for group in document.elements("ManeuverGroup").filter(refers) {
+            let is_taken = match reference.form {
+                Form::Direct => true,
+                Form::Named => taken.contains(&group),
+            };
+            if is_taken {
+                say(reference, document, group, found);
+            }
+        }
+    }
+}
+
+fn is_archive(document: Document<'_>) -> bool {
+    document.path().ends_with(".mosc!main.xosc")
+}
+
+/// The groups of the target that are named as they are written, or whose place the groups take that
+/// are named.
+fn taken<'d>(
+    assembly: &Assembly<'d>,
+    reference: &Reference<'d>,
+    target: usize,
+) -> HashSet<Node<'d>> {
+    let named = reference.node.children_named("ManeuverGroupReference");
+    let names: HashSet<&str> = named
+        .filter_map(|node| node.attr("maneuverGroupName"))
+        .collect();
+    let inner = assembly.expansion.references.iter();
+    let inner = inner.filter(|inner| inner.part == target);
+    let is_named = |inner: &&Reference<'d>| {
+        let mut copies = inner.uses.iter().flat_map(|one| &one.copies);
+        inner
+            .group
+            .attr("name")
+            .is_some_and(|name| names.contains(name))
+            || copies.any(|copy| names.contains(copy.name()))
+    };
+    inner.filter(is_named).map(|inner| inner.group).collect()
+}
+
+fn say(reference: &Reference<'_>, document: Document<'_>, group: Node<'_>, found: &mut Sink<'_>) {
+    let path = document.path();
+    let file = path.rsplit(['/', '!']).next().unwrap_or(path);
+    let text = format!(
+        "the group `{}` of `{file}` refers to others itself, which is followed here, but left as it is by the reference \
+         tool: it expands archives only; pack `{file}` as `.mosc` and refer to that",
+        group.attr("name").unwrap_or("")
+    );
+    let inner = group.child("ScenarioReference").unwrap_or(group);
+    let at = place(Spot::of(reference.node, "scenarioFileName"));
+    found.issue(at, text).at(inner, "the reference in it");
+}
