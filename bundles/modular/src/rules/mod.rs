@@ -11,6 +11,7 @@ mod reference_file_found;
 mod reference_form;
 mod reference_maneuver_group_known;
 mod reference_unexpanded;
+mod scenario_reference_placement;
 mod scenario_reference_single;
 
 /// The rules of the bundle.
@@ -22,5 +23,6 @@ pub static RULES: &[&dyn AnyRule] = &[
     &reference_form::RULE,
     &reference_maneuver_group_known::RULE,
     &reference_unexpanded::RULE,
+    &scenario_reference_placement::RULE,
     &scenario_reference_single::RULE,
 ];

@@ -1,0 +1,21 @@
+use qcbus_sdk::modular::What;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::assembly::{Assembly, Modular, say_all};
+
+pub static RULE: Rule<Modular> = Rule {
+    id: "check_qcbus_mosc_scenario_reference_placement",
+    uids: &["qcbus.dev:mosc:1.0.0:scenario_reference.placement"],
+    page: include_str!("scenario_reference_placement.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    say_all(
+        assembly,
+        found,
+        &[What::Placement],
+        "the element that it is in",
+    );
+}
