@@ -4,6 +4,7 @@
 
 use qcbus_sdk::AnyRule;
 
+mod group_reference_duplicate;
 mod key_matches;
 mod reference_cycle;
 mod reference_extension;
@@ -16,6 +17,7 @@ mod scenario_reference_single;
 
 /// The rules of the bundle.
 pub static RULES: &[&dyn AnyRule] = &[
+    &group_reference_duplicate::RULE,
     &key_matches::RULE,
     &reference_cycle::RULE,
     &reference_extension::RULE,

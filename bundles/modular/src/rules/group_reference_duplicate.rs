@@ -1,0 +1,16 @@
+use qcbus_sdk::modular::What;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::assembly::{Assembly, Modular, say_all};
+
+pub static RULE: Rule<Modular> = Rule {
+    id: "check_qcbus_mosc_group_reference_duplicate",
+    uids: &["qcbus.dev:mosc:1.0.0:group_reference.duplicate"],
+    page: include_str!("group_reference_duplicate.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    say_all(assembly, found, &[What::GroupTwice], "the reference before");
+}
