@@ -6,6 +6,7 @@ use qcbus_sdk::AnyRule;
 
 mod group_reference_duplicate;
 mod key_matches;
+mod parameter_reference_attributes;
 mod reference_cycle;
 mod reference_extension;
 mod reference_file_found;
@@ -19,6 +20,7 @@ mod scenario_reference_single;
 pub static RULES: &[&dyn AnyRule] = &[
     &group_reference_duplicate::RULE,
     &key_matches::RULE,
+    &parameter_reference_attributes::RULE,
     &reference_cycle::RULE,
     &reference_extension::RULE,
     &reference_file_found::RULE,

@@ -1,0 +1,63 @@
+use qcbus_document::{Attribute, Node};
+use qcbus_sdk::{Place, Rule, Sink};
+
+use crate::assembly::{Assembly, Modular};
+
+pub static RULE: Rule<Modular> = Rule {
+    id: "check_qcbus_mosc_parameter_reference_attributes",
+    uids: &["qcbus.dev:mosc:1.0.0:parameter_reference.attributes"],
+    page: include_str!("parameter_reference_attributes.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    for document in assembly.scenarios() {
+        let all = document.elements("ParameterReference");
+        for node in all.filter(|node| is_of_reference(*node)) {
+            missing(node, found);
+            for attribute in node.attributes() {
+                further(attribute, found);
+            }
+        }
+    }
+}
+
+fn is_of_reference(node: Node<'_>) -> bool {
+    let parent = node.parent();
+    parent.is_some_and(|it| it.is("ManeuverGroupReference") || it.is("ScenarioReference"))
+}
+
+fn missing(node: Node<'_>, found: &mut Sink<'_>) {
+    let text = match (node.attr("key"), node.attr("value")) {
+        (Some(_), Some(_)) => return,
+        (Some(key), None) => format!(
+            "`ParameterReference` has no `value`, so the attribute that its key `{key}` fits keeps the one it has"
+        ),
+        (None, Some(value)) => {
+            format!("`ParameterReference` has no `key`, so its value `{value}` is for no attribute")
+        }
+        (None, None) => {
+            "`ParameterReference` has neither `key` nor `value`, and says nothing".to_owned()
+        }
+    };
+    found.issue(node, text);
+}
+
+fn further(attribute: Attribute<'_>, found: &mut Sink<'_>) {
+    let name = attribute.name();
+    if matches!(name, "key" | "value") || name.starts_with("xmlns") {
+        return;
+    }
+    // The reference tool has the attributes in the order of their names.
+    let effect = match name < "value" {
+        true => {
+            ": the reference tool reads the first two in the order of the alphabet as key and value, and loses this value"
+        }
+        false => " and nothing reads it",
+    };
+    let text = format!(
+        "`ParameterReference` has the attributes `key` and `value`, but `{name}` is neither{effect}"
+    );
+    found.issue(Place::Attribute(attribute), text);
+}
