@@ -5,6 +5,7 @@
 use qcbus_sdk::AnyRule;
 
 mod group_reference_duplicate;
+mod key_duplicate;
 mod key_matches;
 mod parameter_reference_attributes;
 mod reference_cycle;
@@ -19,6 +20,7 @@ mod scenario_reference_single;
 /// The rules of the bundle.
 pub static RULES: &[&dyn AnyRule] = &[
     &group_reference_duplicate::RULE,
+    &key_duplicate::RULE,
     &key_matches::RULE,
     &parameter_reference_attributes::RULE,
     &reference_cycle::RULE,
