@@ -5,6 +5,7 @@
 use qcbus_sdk::AnyRule;
 
 mod group_reference_duplicate;
+mod key_ambiguous;
 mod key_duplicate;
 mod key_matches;
 mod parameter_reference_attributes;
@@ -20,6 +21,7 @@ mod scenario_reference_single;
 /// The rules of the bundle.
 pub static RULES: &[&dyn AnyRule] = &[
     &group_reference_duplicate::RULE,
+    &key_ambiguous::RULE,
     &key_duplicate::RULE,
     &key_matches::RULE,
     &parameter_reference_attributes::RULE,

@@ -1,0 +1,91 @@
+use std::collections::HashMap;
+
+use qcbus_document::Attribute;
+use qcbus_sdk::modular::{Key, Spot, Use, What};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::assembly::{Assembly, Modular, place, say, say_all};
+use crate::families::offers::{offered_in, path};
+
+pub static RULE: Rule<Modular> = Rule {
+    id: "check_qcbus_mosc_key_ambiguous",
+    uids: &["qcbus.dev:mosc:1.0.0:key.ambiguous"],
+    page: include_str!("key_ambiguous.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    say_all(assembly, found, &[What::KeyTie], "the attribute");
+    for problem in assembly.problems(&[What::KeyOverlap]) {
+        let key = problem.at.node().attr("key").unwrap_or("");
+        let level = match key.contains('.') {
+            true => Level::Error,
+            false => Level::Warning,
+        };
+        say(found, problem, "the attribute that both fit").level(level);
+    }
+    for reference in &assembly.expansion.references {
+        for one in &reference.uses {
+            spread(one, reference.part, found);
+        }
+    }
+}
+
+/// Says which keys without an element give their value to different sorts of elements.
+fn spread(one: &Use<'_>, part: usize, found: &mut Sink<'_>) {
+    let is_spread = |key: &&Key<'_>| !key.key.contains('.') && key.wins.get() > 1;
+    let mut keys = one.keys.iter().filter(is_spread).peekable();
+    if keys.peek().is_none() {
+        return;
+    }
+    let winners = winners(one, part);
+    for key in keys {
+        if let Some(attributes) = winners.get(&key.value.value_offset()) {
+            say_spread(key, attributes, found);
+        }
+    }
+}
+
+/// The attributes that get a value of a use, one of each sort of element, by where the value is written.
+fn winners<'d>(one: &Use<'d>, part: usize) -> HashMap<u32, Vec<Attribute<'d>>> {
+    let mut winners: HashMap<u32, Vec<Attribute<'d>>> = HashMap::new();
+    for copy in &one.copies {
+        for attribute in offered_in(copy.group) {
+            let new = copy.edit(attribute).filter(|new| new.part == part);
+            let Some(new) = new else { continue };
+            let sorts = winners.entry(new.offset).or_default();
+            let is_known = |other: &Attribute<'_>| other.node().is(attribute.node().name());
+            if sorts.len() < MOST_SHOWN && !sorts.iter().any(is_known) {
+                sorts.push(attribute);
+            }
+        }
+    }
+    winners
+}
+
+/// Most sorts of elements that are shown.
+const MOST_SHOWN: usize = 3;
+
+fn say_spread(key: &Key<'_>, spread: &[Attribute<'_>], found: &mut Sink<'_>) {
+    let [first, _, ..] = spread else {
+        return;
+    };
+    let elements: Vec<String> = spread
+        .iter()
+        .map(|attribute| format!("`{}`", attribute.node().name()))
+        .collect();
+    let text = format!(
+        "the key `{}` gives `{}` to attributes of different elements, {}; write it with the element that is meant, as \
+         in `{}`",
+        key.key,
+        key.value.value(),
+        elements.join(" and "),
+        path(*first, 2)
+    );
+    let at = place(Spot::of(key.node, "key"));
+    let mut finding = found.issue(at, text).level(Level::Warning);
+    for &attribute in spread {
+        finding = finding.at(attribute, "an attribute that gets the value");
+    }
+}
