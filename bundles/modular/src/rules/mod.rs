@@ -6,6 +6,7 @@ use qcbus_sdk::AnyRule;
 
 mod group_reference_duplicate;
 mod key_ambiguous;
+mod key_crashes_reference_tool;
 mod key_duplicate;
 mod key_matches;
 mod parameter_reference_attributes;
@@ -22,6 +23,7 @@ mod scenario_reference_single;
 pub static RULES: &[&dyn AnyRule] = &[
     &group_reference_duplicate::RULE,
     &key_ambiguous::RULE,
+    &key_crashes_reference_tool::RULE,
     &key_duplicate::RULE,
     &key_matches::RULE,
     &parameter_reference_attributes::RULE,

@@ -1,0 +1,87 @@
+use std::collections::HashSet;
+
+use qcbus_document::Attribute;
+use qcbus_sdk::modular::{Key, Spot, Use};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::assembly::{Assembly, Modular, place};
+use crate::families::offers::{Offers, path};
+
+pub static RULE: Rule<Modular> = Rule {
+    id: "check_qcbus_mosc_key_crashes_reference_tool",
+    uids: &["qcbus.dev:mosc:1.0.0:key.crashes_reference_tool"],
+    level: Level::Warning,
+    page: include_str!("key_crashes_reference_tool.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    let references = assembly.expansion.references.iter();
+    let uses = references.flat_map(|reference| &reference.uses);
+    for one in uses.filter(|one| !one.keys.is_empty()) {
+        let offers = Offers::of(one);
+        let bare = bare(one);
+        for key in &one.keys {
+            let why = ending(key, &bare, &offers).or_else(|| too_deep(key, &offers));
+            let Some((attribute, text)) = why else {
+                continue;
+            };
+            let at = place(Spot::of(key.node, "key"));
+            let there = "the attribute at which the reference tool breaks off";
+            found.issue(at, text).at(attribute, there);
+        }
+    }
+}
+
+fn bare<'d>(one: &Use<'d>) -> HashSet<&'d str> {
+    let keys = one.keys.iter().map(|key| key.key);
+    keys.filter(|key| !key.contains('.')).collect()
+}
+
+/// An attribute whose name a bare key ends with without being it. One whose name is a key as well is
+/// served before the reference tool looks at the ends.
+fn ending<'d>(
+    key: &Key<'d>,
+    bare: &HashSet<&str>,
+    offers: &Offers<'d>,
+) -> Option<(Attribute<'d>, String)> {
+    if key.key.contains('.') {
+        return None;
+    }
+    let ends = key.key.char_indices().skip(1).map(|(at, _)| &key.key[at..]);
+    let mut free = ends.filter(|end| !bare.contains(end));
+    let attribute = free.find_map(|end| offers.named.get(end).copied())?;
+    let instead = match offers.named.get(key.key) {
+        Some(&meant) => format!(
+            "; write it with the element before it, `{}`",
+            path(meant, 2)
+        ),
+        None => "; write it with the element before it".to_owned(),
+    };
+    let text = format!(
+        "the key `{}` ends with `{}`, an attribute that `{}` offers: the reference tool takes it for a path there, looks \
+         for an element in it and breaks off{instead}",
+        key.key,
+        attribute.name(),
+        attribute.node().name()
+    );
+    Some((attribute, text))
+}
+
+/// An attribute with fewer elements around it than a key of its name has.
+fn too_deep<'d>(key: &Key<'d>, offers: &Offers<'d>) -> Option<(Attribute<'d>, String)> {
+    let named = key.key.split('.').count().saturating_sub(1);
+    let depth = |attribute: Attribute<'_>| 1 + attribute.node().ancestors().count();
+    let mut candidates = offers.ending(key.key).iter().copied();
+    let attribute = candidates.find(|&attribute| named > depth(attribute))?;
+    let text = format!(
+        "the key `{}` names {named} elements, but `{}` of `{}` lies in only {}: the reference tool climbs out of the \
+         document and breaks off",
+        key.key,
+        attribute.name(),
+        attribute.node().name(),
+        depth(attribute)
+    );
+    Some((attribute, text))
+}
