@@ -9,6 +9,7 @@ mod key_ambiguous;
 mod key_crashes_reference_tool;
 mod key_duplicate;
 mod key_matches;
+mod key_path_exact;
 mod parameter_reference_attributes;
 mod reference_cycle;
 mod reference_extension;
@@ -26,6 +27,7 @@ pub static RULES: &[&dyn AnyRule] = &[
     &key_crashes_reference_tool::RULE,
     &key_duplicate::RULE,
     &key_matches::RULE,
+    &key_path_exact::RULE,
     &parameter_reference_attributes::RULE,
     &reference_cycle::RULE,
     &reference_extension::RULE,
