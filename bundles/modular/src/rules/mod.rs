@@ -4,6 +4,7 @@
 
 use qcbus_sdk::AnyRule;
 
+mod actor_entity_ref;
 mod group_reference_duplicate;
 mod key_ambiguous;
 mod key_crashes_reference_tool;
@@ -22,6 +23,7 @@ mod scenario_reference_single;
 
 /// The rules of the bundle.
 pub static RULES: &[&dyn AnyRule] = &[
+    &actor_entity_ref::RULE,
     &group_reference_duplicate::RULE,
     &key_ambiguous::RULE,
     &key_crashes_reference_tool::RULE,
