@@ -139,7 +139,7 @@ fn doctor_and_bundle_list_work_without_a_broker() {
         .lines()
         .filter_map(|it| it.split_whitespace().next())
         .collect();
-    assert_eq!(names, ["xodrBundle", "xoscBundle"]);
+    assert_eq!(names, ["xodrBundle", "xoscBundle", "modularBundle"]);
 }
 
 #[test]

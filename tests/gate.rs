@@ -101,7 +101,7 @@ fn all_that_is_accepted_is_published_with_what_it_needs() {
     publishes(&farm, &sound);
     is_sound(&farm);
     let gate = farm.status().unwrap().gate.unwrap();
-    assert_eq!((gate.published, gate.held_back), (12, 0), "{gate:?}");
+    assert_eq!((gate.published, gate.held_back), (15, 0), "{gate:?}");
 }
 
 #[test]

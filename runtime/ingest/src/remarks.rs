@@ -31,7 +31,7 @@ pub fn remarks(
     // Why a scenario cannot be expanded is an error of some bundle, or of a reference that is missing.
     let references = missing
         .iter()
-        .filter(|it| it.role != DocumentRole::Expanded);
+        .filter(|it| it.role != DocumentRole::Expanded && !is_blamed(root, it, bundles));
     let references: Vec<MissingDocument> = references.cloned().collect();
     let is_said = is_said || references.iter().any(|it| it.level == Level::Error);
     remarks.extend(missing_references(
@@ -42,6 +42,28 @@ pub fn remarks(
         },
     ));
     remarks
+}
+
+/// Whether a bundle reports an error at the very reference to a scenario that is missing: those that
+/// know modular scenarios say more about it.
+fn is_blamed(root: &Document<'_>, missing: &MissingDocument, bundles: &[BundleOutcome]) -> bool {
+    if missing.role != DocumentRole::Scenario || missing.level != Level::Error {
+        return false;
+    }
+    let own = missing_reference(root, missing).issue;
+    let own = own.and_then(|issue| issue.locations.into_iter().next());
+    let Some(own) = own else { return false };
+    let is_there = |other: &Locations| match (&own.elsewhere, &other.elsewhere) {
+        (None, None) => own.places.first() == other.places.first(),
+        // Where the element is known here, the attribute may be there.
+        (Some(own), Some(other)) => (&own.path, own.row) == (&other.path, other.row),
+        _ => false,
+    };
+    let checkers = bundles.iter().flat_map(|bundle| &bundle.checkers);
+    let errors = checkers
+        .flat_map(|checker| &checker.issues)
+        .filter(|issue| issue.level == Level::Error);
+    errors.flat_map(|issue| &issue.locations).any(is_there)
 }
 
 /// What the root refers to and could not be had, each at its reference. What is not known to lead
