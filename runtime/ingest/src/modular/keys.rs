@@ -70,7 +70,7 @@ pub(super) fn read<'d>(within: Node<'d>, problems: &mut Problems<'d>) -> Vec<Key
 }
 
 /// The attributes that an element offers for replacement and has.
-pub(super) fn offered<'d>(element: Node<'d>) -> impl Iterator<Item = Attribute<'d>> {
+pub fn offered<'d>(element: Node<'d>) -> impl Iterator<Item = Attribute<'d>> {
     let listed = element.attr(OFFERS).unwrap_or("");
     let names = listed.split(',').map(str::trim);
     names.filter_map(move |name| element.attribute(name).filter(|_| name != OFFERS))

@@ -18,7 +18,7 @@ mod text;
 
 pub use copy::{Copy, Value};
 pub use image::ExpandedImage;
-pub use keys::Key;
+pub use keys::{Key, offered};
 pub use pack::{PackError, pack};
 pub use plan::{Expansion, Form, Reference, Use, expand};
 pub use problem::{Problem, Spot, What};
