@@ -9,6 +9,7 @@ mod group_reference_duplicate;
 mod key_ambiguous;
 mod key_crashes_reference_tool;
 mod key_duplicate;
+mod group_content_dropped;
 mod key_matches;
 mod key_path_exact;
 mod parameter_reference_attributes;
@@ -39,4 +40,7 @@ pub static RULES: &[&dyn AnyRule] = &[
     &reference_unexpanded::RULE,
     &scenario_reference_placement::RULE,
     &scenario_reference_single::RULE,
+    &group_content_dropped::RULE,
+    &key_matches::RULE,
+    &reference_file_found::RULE,
 ];

@@ -1,0 +1,84 @@
+use std::collections::HashSet;
+
+use qcbus_document::{Attribute, Node};
+use qcbus_sdk::modular::{OFFERS, Reference};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::assembly::{Assembly, Modular};
+
+pub static RULE: Rule<Modular> = Rule {
+    id: "check_qcbus_mosc_group_content_dropped",
+    uids: &["qcbus.dev:mosc:1.0.0:group.content_dropped"],
+    level: Level::Information,
+    page: include_str!("group_content_dropped.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    let mut seen = HashSet::new();
+    for reference in &assembly.expansion.references {
+        // A group with nothing in its place is another problem.
+        let groups: Vec<Node<'_>> = groups(reference).collect();
+        if groups.is_empty() || !seen.insert((reference.part, reference.group.index())) {
+            continue;
+        }
+        let referring = reference.group;
+        say_attributes("the referring group", referring, &groups, found);
+        if let Some(actors) = referring.child("Actors") {
+            let theirs: Vec<Node<'_>> = groups.iter().filter_map(|it| it.child("Actors")).collect();
+            say_attributes("`Actors` of the referring group", actors, &theirs, found);
+        }
+        say_children(referring, found);
+    }
+}
+
+/// The groups that take the place of the referring one.
+fn groups<'a, 'd>(reference: &'a Reference<'d>) -> impl Iterator<Item = Node<'d>> + use<'a, 'd> {
+    let copies = reference.uses.iter().flat_map(|one| &one.copies);
+    copies.map(|copy| copy.group)
+}
+
+fn say_attributes(what: &str, own: Node<'_>, theirs: &[Node<'_>], found: &mut Sink<'_>) {
+    let travels = |attribute: &Attribute<'_>| {
+        attribute.is("name") || attribute.is(OFFERS) || attribute.name().starts_with("xmlns")
+    };
+    for attribute in own.attributes().filter(|attribute| !travels(attribute)) {
+        let (name, value) = (attribute.name(), attribute.value().trim());
+        let differs = |other: &&Node<'_>| other.attr(name).map(str::trim) != Some(value);
+        let Some(other) = theirs.iter().find(differs) else {
+            continue;
+        };
+        let kept = match other.attr(name) {
+            Some(kept) => format!("keeps its own, `{kept}`"),
+            None => "has none".to_owned(),
+        };
+        let text = format!(
+            "`{name}` of {what} is `{value}` and is dropped: the group that takes its place {kept}; what is to hold \
+             belongs in the library file"
+        );
+        let there = "what holds instead";
+        match other.attribute(name) {
+            Some(kept) => found.issue(attribute, text).at(kept, there),
+            None => found.issue(attribute, text).at(*other, there),
+        };
+    }
+}
+
+fn say_children(referring: Node<'_>, found: &mut Sink<'_>) {
+    for child in referring.children() {
+        if child.is("Actors") || child.is("ScenarioReference") {
+            continue;
+        }
+        let name = ["name", "entryName"]
+            .into_iter()
+            .find_map(|it| child.attr(it));
+        let name = name.map_or_else(String::new, |name| format!(" `{name}`"));
+        let text = format!(
+            "`{}`{name} of the referring group is dropped: other groups take the place of the whole group, and \
+             nothing of it but its name and its first actor stays; put it in a group of its own",
+            child.name()
+        );
+        found.issue(child, text).level(Level::Warning);
+    }
+}
