@@ -15,6 +15,7 @@ mod key_path_exact;
 mod parameter_reference_attributes;
 mod reference_cycle;
 mod reference_extension;
+mod library_context_mismatch;
 mod reference_file_found;
 mod reference_form;
 mod reference_maneuver_group_known;
@@ -42,5 +43,6 @@ pub static RULES: &[&dyn AnyRule] = &[
     &scenario_reference_single::RULE,
     &group_content_dropped::RULE,
     &key_matches::RULE,
+    &library_context_mismatch::RULE,
     &reference_file_found::RULE,
 ];

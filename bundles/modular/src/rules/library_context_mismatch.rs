@@ -1,0 +1,144 @@
+use std::collections::HashSet;
+
+use qcbus_document::{Attribute, Document, Node};
+use qcbus_sdk::modular::{Reference, Spot};
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::assembly::{Assembly, Modular, place};
+use crate::families::copies::{Taken, short_name};
+
+pub static RULE: Rule<Modular> = Rule {
+    id: "check_qcbus_mosc_library_context_mismatch",
+    uids: &["qcbus.dev:mosc:1.0.0:library.context_mismatch"],
+    level: Level::Warning,
+    page: include_str!("library_context_mismatch.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    let mut seen = HashSet::new();
+    for reference in &assembly.expansion.references {
+        let Some(target) = reference.target.filter(|target| seen.insert(*target)) else {
+            continue;
+        };
+        say_version(assembly, reference, assembly.part(target), found);
+    }
+    // By the part and its map: what the first group that lies on another map is.
+    let mut seen = HashSet::new();
+    for taken in assembly.taken() {
+        let part = taken.copy.part;
+        if !seen.contains(&part) && say_map(assembly, &taken, found) {
+            seen.insert(part);
+        }
+    }
+}
+
+fn say_version<'d>(
+    assembly: &Assembly<'d>,
+    reference: &Reference<'d>,
+    library: Document<'d>,
+    found: &mut Sink<'_>,
+) {
+    let root = assembly.root();
+    let (Some(own), Some(theirs)) = (assembly.version_of(root), assembly.version_of(library))
+    else {
+        return;
+    };
+    let header = library.root().and_then(|root| root.child("FileHeader"));
+    let Some(header) = header.filter(|_| own != theirs) else {
+        return;
+    };
+    let text = format!(
+        "`{}` is written for version {theirs} of the standard and this scenario for {own}, by which its groups are \
+         read; let both name one version",
+        short_name(library)
+    );
+    let minor = match own.major == theirs.major {
+        true => "revMinor",
+        false => "revMajor",
+    };
+    found
+        .issue(place(Spot::of(reference.node, "scenarioFileName")), text)
+        .at(
+            Place::attribute_or_node(header, minor),
+            "the version of the library file",
+        );
+}
+
+/// Says that a group keeps places of another map; false when there is nothing to say.
+fn say_map(assembly: &Assembly<'_>, taken: &Taken<'_, '_>, found: &mut Sink<'_>) -> bool {
+    let library = taken.copy.group.document();
+    let (Some(own), Some(theirs)) = (map_of(assembly.root()), map_of(library)) else {
+        return false;
+    };
+    let path = |map: Node<'_>| map.attr("filepath").unwrap_or("").to_owned();
+    let (own_path, their_path) = (path(own), path(theirs));
+    // The directory may well be another one, and a parameter anything.
+    let differ = !own_path.contains('$')
+        && !their_path.contains('$')
+        && file_name(&own_path) != file_name(&their_path);
+    if !differ {
+        return false;
+    }
+    let Some(bound) = bound(taken) else {
+        return false;
+    };
+    let text = format!(
+        "the group `{}` of `{}` was written for the map `{their_path}` and this scenario has `{own_path}`: `{}` in it \
+         means a place of that map, unless keys give it others",
+        taken.own_name(),
+        short_name(library),
+        bound.name()
+    );
+    found
+        .issue(place(taken.at()), text)
+        .at(
+            Place::attribute_or_node(theirs, "filepath"),
+            "the map of the library file",
+        )
+        .at(bound, "what means a place of it");
+    true
+}
+
+fn map_of(document: Document<'_>) -> Option<Node<'_>> {
+    let map = document.root()?.child("RoadNetwork")?.child("LogicFile")?;
+    map.attr("filepath")
+        .is_some_and(|path| !path.trim().is_empty())
+        .then_some(map)
+}
+
+fn file_name(path: &str) -> &str {
+    path.trim().rsplit(['/', '\\']).next().unwrap_or(path)
+}
+
+/// Elements that mean something of the map, and the attributes by which they do.
+const OF_THE_MAP: &[(&str, &[&str])] = &[
+    ("AbsoluteTargetLane", &["value"]),
+    (
+        "GeoPosition",
+        &["latitude", "longitude", "latitudeDeg", "longitudeDeg"],
+    ),
+    ("LanePosition", &["roadId", "laneId", "s"]),
+    ("RoadPosition", &["roadId", "s", "t"]),
+    ("TrafficSignalCondition", &["name"]),
+    ("TrafficSignalStateAction", &["name"]),
+    ("WorldPosition", &["x", "y"]),
+];
+
+/// An element of a group that means something of its own map: none of the attributes that say what is
+/// given by a key. Whoever gives one has thought of the others.
+fn bound<'d>(taken: &Taken<'_, 'd>) -> Option<Node<'d>> {
+    taken.elements().find(|element| {
+        let row = OF_THE_MAP.iter().find(|(name, _)| element.is(name));
+        let attributes = row.map_or(&[][..], |(_, attributes)| attributes);
+        let mut attributes = attributes
+            .iter()
+            .filter_map(|name| element.attribute(name))
+            .peekable();
+        let is_kept = |attribute: Attribute<'_>| {
+            taken.copy.edit(attribute).is_none() && !attribute.value().contains('$')
+        };
+        attributes.peek().is_some() && attributes.all(is_kept)
+    })
+}
