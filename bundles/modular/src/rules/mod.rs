@@ -16,6 +16,7 @@ mod parameter_reference_attributes;
 mod reference_cycle;
 mod reference_extension;
 mod library_context_mismatch;
+mod library_default_kept;
 mod reference_file_found;
 mod reference_form;
 mod reference_maneuver_group_known;
@@ -44,5 +45,6 @@ pub static RULES: &[&dyn AnyRule] = &[
     &group_content_dropped::RULE,
     &key_matches::RULE,
     &library_context_mismatch::RULE,
+    &library_default_kept::RULE,
     &reference_file_found::RULE,
 ];
