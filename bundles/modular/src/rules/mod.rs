@@ -17,6 +17,7 @@ mod reference_cycle;
 mod reference_extension;
 mod library_context_mismatch;
 mod library_default_kept;
+mod library_name_with_dot;
 mod reference_file_found;
 mod reference_form;
 mod reference_maneuver_group_known;
@@ -46,5 +47,6 @@ pub static RULES: &[&dyn AnyRule] = &[
     &key_matches::RULE,
     &library_context_mismatch::RULE,
     &library_default_kept::RULE,
+    &library_name_with_dot::RULE,
     &reference_file_found::RULE,
 ];

@@ -1,0 +1,48 @@
+use std::collections::HashSet;
+
+use qcbus_sdk::modular::Spot;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::assembly::{Assembly, Modular, place};
+use crate::families::copies::taken_at;
+use crate::families::finds::Finds;
+
+pub static RULE: Rule<Modular> = Rule {
+    id: "check_qcbus_mosc_library_name_with_dot",
+    uids: &["qcbus.dev:mosc:1.0.0:library.name_with_dot"],
+    level: Level::Warning,
+    page: include_str!("library_name_with_dot.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    let mut finds = Finds::default();
+    let mut seen = HashSet::new();
+    for reference in &assembly.expansion.references {
+        let group = reference.group;
+        let name = group.attr("name").filter(|name| name.contains('.'));
+        if let Some(name) = name.filter(|_| seen.insert((reference.part, group.index()))) {
+            let text = format!(
+                "the referring group is called `{name}`; expansion puts a dot between its name and that of the group \
+                 that it takes, so a dot within a name leaves open where one ends and the next begins"
+            );
+            found.issue(place(Spot::of(group, "name")), text);
+        }
+        for one in &reference.uses {
+            for copy in &one.copies {
+                let spot = Spot::of(copy.group, "name");
+                let Some(name) = copy.group.attr("name").filter(|name| name.contains('.')) else {
+                    continue;
+                };
+                let text = format!(
+                    "the group is called `{name}` in its file; expansion puts a dot between the name of the referring \
+                     group and this one, so a dot within a name leaves open where one ends and the next begins"
+                );
+                let at = taken_at(reference, one);
+                finds.brought(at, spot, "its name in the library file", text);
+            }
+        }
+    }
+    finds.say(found);
+}
