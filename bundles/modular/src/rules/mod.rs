@@ -18,6 +18,7 @@ mod reference_extension;
 mod library_context_mismatch;
 mod library_default_kept;
 mod library_name_with_dot;
+mod library_parameter_attributes_missing;
 mod reference_file_found;
 mod reference_form;
 mod reference_maneuver_group_known;
@@ -48,5 +49,6 @@ pub static RULES: &[&dyn AnyRule] = &[
     &library_context_mismatch::RULE,
     &library_default_kept::RULE,
     &library_name_with_dot::RULE,
+    &library_parameter_attributes_missing::RULE,
     &reference_file_found::RULE,
 ];
