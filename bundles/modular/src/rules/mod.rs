@@ -25,6 +25,7 @@ mod reference_maneuver_group_known;
 mod reference_unexpanded;
 mod scenario_reference_placement;
 mod scenario_reference_single;
+mod result_catalogs_resolve;
 
 /// The rules of the bundle.
 pub static RULES: &[&dyn AnyRule] = &[
@@ -51,4 +52,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &library_name_with_dot::RULE,
     &library_parameter_attributes_missing::RULE,
     &reference_file_found::RULE,
+    &result_catalogs_resolve::RULE,
 ];

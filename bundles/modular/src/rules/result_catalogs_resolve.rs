@@ -1,0 +1,118 @@
+use std::collections::BTreeSet;
+
+use qcbus_document::{Attribute, Node};
+use qcbus_messages::DocumentRole;
+use qcbus_openscenario::closest;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::assembly::{Assembly, Modular};
+use crate::families::copies::{Origins, Taken, short_name};
+use crate::families::finds::Finds;
+
+pub static RULE: Rule<Modular> = Rule {
+    id: "check_qcbus_mosc_result_catalogs_resolve",
+    uids: &["qcbus.dev:mosc:1.0.0:result.catalogs_resolve"],
+    page: include_str!("result_catalogs_resolve.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    let missing = assembly.subject.missing().iter();
+    // What could not be read may have been the catalog in question.
+    if missing
+        .into_iter()
+        .any(|missing| missing.role == DocumentRole::Catalog)
+    {
+        return;
+    }
+    let catalogs: Vec<Node<'_>> = assembly
+        .subject
+        .with_role(DocumentRole::Catalog)
+        .filter_map(|linked| linked.document.root()?.child("Catalog"))
+        .collect();
+    let origins = Origins::of(assembly);
+    let mut finds = Finds::default();
+    for taken in assembly.taken() {
+        for reference in taken.copy.group.descendants_named("CatalogReference") {
+            let Some((attribute, wrong)) = wrong(&taken, reference, &catalogs) else {
+                continue;
+            };
+            let edit = taken.copy.edit(attribute);
+            match edit.and_then(|edit| origins.get(edit)) {
+                Some(origin) => {
+                    let text = format!("{} leads to no catalog entry: {wrong}", origin.what());
+                    let at = origin.attribute().into();
+                    finds.given(at, attribute.into(), "the reference that gets it", text);
+                }
+                None => {
+                    let text = format!(
+                        "the group `{}` refers to a catalog entry that is not found in this scenario: {wrong}; the \
+                         `CatalogLocations` of `{}` do not come along",
+                        taken.own_name(),
+                        short_name(reference.document())
+                    );
+                    finds.brought(taken.at(), attribute.into(), "the reference", text);
+                }
+            }
+        }
+    }
+    finds.say(found);
+}
+
+/// The attribute of a reference that leads nowhere, and why it does so.
+fn wrong<'d>(
+    taken: &Taken<'_, 'd>,
+    reference: Node<'d>,
+    catalogs: &[Node<'_>],
+) -> Option<(Attribute<'d>, String)> {
+    let attribute = reference.attribute("catalogName")?;
+    let name = taken.value(attribute);
+    if name.contains('$') {
+        return None;
+    }
+    let mut meant = catalogs
+        .iter()
+        .filter(|catalog| catalog.attr("name") == Some(name))
+        .peekable();
+    if meant.peek().is_none() {
+        return Some((
+            attribute,
+            format!(
+                "the `CatalogLocations` here lead to no catalog `{name}`{}",
+                known(name, catalogs)
+            ),
+        ));
+    }
+    let entry = reference.attribute("entryName")?;
+    let wanted = taken.value(entry);
+    let mut entries = meant.flat_map(|catalog| catalog.children());
+    let is_there = entries.any(|entry| entry.attr("name") == Some(wanted));
+    (!is_there && !wanted.contains('$')).then(|| {
+        (
+            entry,
+            format!("the catalog `{name}` has no entry `{wanted}`"),
+        )
+    })
+}
+
+fn known(name: &str, catalogs: &[Node<'_>]) -> String {
+    const MOST: usize = 5;
+    let names: BTreeSet<&str> = catalogs
+        .iter()
+        .filter_map(|catalog| catalog.attr("name"))
+        .collect();
+    if let Some(near) = closest(name, names.iter().copied()) {
+        return format!("; perhaps `{near}` is meant");
+    }
+    let listed: Vec<String> = names
+        .iter()
+        .take(MOST)
+        .map(|name| format!("`{name}`"))
+        .collect();
+    match names.len() {
+        0 => " (they lead to none)".to_owned(),
+        1..=MOST => format!(", only to {}", listed.join(", ")),
+        _ => format!(", only to {}, …", listed.join(", ")),
+    }
+}
