@@ -26,6 +26,7 @@ mod reference_unexpanded;
 mod scenario_reference_placement;
 mod scenario_reference_single;
 mod result_catalogs_resolve;
+mod result_entities_declared;
 
 /// The rules of the bundle.
 pub static RULES: &[&dyn AnyRule] = &[
@@ -53,4 +54,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &library_parameter_attributes_missing::RULE,
     &reference_file_found::RULE,
     &result_catalogs_resolve::RULE,
+    &result_entities_declared::RULE,
 ];
