@@ -27,6 +27,7 @@ mod scenario_reference_placement;
 mod scenario_reference_single;
 mod result_catalogs_resolve;
 mod result_entities_declared;
+mod result_names_unique;
 
 /// The rules of the bundle.
 pub static RULES: &[&dyn AnyRule] = &[
@@ -55,4 +56,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &reference_file_found::RULE,
     &result_catalogs_resolve::RULE,
     &result_entities_declared::RULE,
+    &result_names_unique::RULE,
 ];
