@@ -28,6 +28,7 @@ mod scenario_reference_single;
 mod result_catalogs_resolve;
 mod result_entities_declared;
 mod result_names_unique;
+mod result_parameters_resolved;
 
 /// The rules of the bundle.
 pub static RULES: &[&dyn AnyRule] = &[
@@ -57,4 +58,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &result_catalogs_resolve::RULE,
     &result_entities_declared::RULE,
     &result_names_unique::RULE,
+    &result_parameters_resolved::RULE,
 ];

@@ -1,0 +1,149 @@
+use std::collections::HashMap;
+
+use qcbus_document::{Attribute, Node};
+use qcbus_openscenario::{Scenario, closest, expr};
+use qcbus_sdk::modular::Spot;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::assembly::{Assembly, Modular};
+use crate::families::copies::{Origin, Origins, Taken, parameter_of, short_name};
+use crate::families::finds::Finds;
+
+pub static RULE: Rule<Modular> = Rule {
+    id: "check_qcbus_mosc_result_parameters_resolved",
+    uids: &["qcbus.dev:mosc:1.0.0:result.parameters_resolved"],
+    page: include_str!("result_parameters_resolved.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    let Some(scenario) = assembly.declaring() else {
+        return;
+    };
+    let origins = Origins::of(assembly);
+    let mut finds = Finds::default();
+    // A parameter is declared once, however many values need it.
+    let mut first: HashMap<(usize, &str), (Spot<'_>, String)> = HashMap::new();
+    for taken in assembly.taken() {
+        for (attribute, value) in taken.values().filter(|(_, value)| value.contains('$')) {
+            if is_name(attribute) {
+                continue;
+            }
+            let missing = names(value);
+            let missing = missing
+                .into_iter()
+                .filter(|name| !is_declared(name, attribute, &taken, &scenario));
+            for name in missing {
+                let edit = taken.copy.edit(attribute);
+                if let Some(origin) = edit.and_then(|edit| origins.get(edit)) {
+                    let text = given(origin, name, attribute, &scenario);
+                    let at = origin.attribute().into();
+                    finds.given(at, attribute.into(), "the attribute that gets it", text);
+                    continue;
+                }
+                let part = taken.copy.part;
+                // Names in the document live longer than the copy's.
+                let own = names(attribute.value())
+                    .into_iter()
+                    .find(|own| *own == name);
+                let Some(own) = own else { continue };
+                let (target, text) = first
+                    .entry((part, own))
+                    .or_insert_with(|| (attribute.into(), brought(&taken, attribute, own)))
+                    .clone();
+                finds.brought(taken.at(), target, "the value that needs it", text);
+            }
+        }
+    }
+    finds.say(found);
+}
+
+/// The parameters that a value needs. One within a longer text is replaced by nobody, and another rule's.
+fn names(value: &str) -> Vec<&str> {
+    match value.trim_start().starts_with("${") {
+        true => expr::names(value)
+            .into_iter()
+            .map(|(name, _)| name)
+            .collect(),
+        false => parameter_of(value).into_iter().collect(),
+    }
+}
+
+/// Names of what is declared or assigned are names, also where old files write a `$` before them.
+fn is_name(attribute: Attribute<'_>) -> bool {
+    let declares = matches!(
+        attribute.node().name(),
+        "ParameterDeclaration" | "VariableDeclaration" | "MonitorDeclaration"
+    );
+    (attribute.is("name") && declares) || attribute.is("parameterRef")
+}
+
+/// Whether a parameter is declared in the group around the value, or around the group in the scenario.
+fn is_declared<'d>(
+    name: &str,
+    attribute: Attribute<'d>,
+    taken: &Taken<'_, 'd>,
+    scenario: &Scenario<'d>,
+) -> bool {
+    let node = attribute.node();
+    let around = std::iter::once(node).chain(node.ancestors());
+    let group = taken.copy.group;
+    let within = around.take_while(|node| group.parent() != Some(*node));
+    within
+        .into_iter()
+        .any(|holder| declaration(holder, name).is_some())
+        || scenario
+            .element(taken.reference.group)
+            .parameter(name)
+            .is_some()
+}
+
+/// The declaration of a parameter in an element.
+fn declaration<'d>(holder: Node<'d>, name: &str) -> Option<Node<'d>> {
+    let block = holder.child("ParameterDeclarations")?;
+    let mut all = block.children_named("ParameterDeclaration");
+    all.find(|one| {
+        let own = one.attr("name").unwrap_or("");
+        own.strip_prefix('$').unwrap_or(own) == name
+    })
+}
+
+fn brought(taken: &Taken<'_, '_>, attribute: Attribute<'_>, name: &str) -> String {
+    let group = taken.copy.group;
+    let declared = group
+        .ancestors()
+        .find_map(|holder| declaration(holder, name));
+    let file = short_name(group.document());
+    let start = format!(
+        "the group `{}` needs the parameter `{name}` (`{}` of `{}`), which this scenario does not declare",
+        taken.own_name(),
+        attribute.name(),
+        attribute.node().name()
+    );
+    match declared {
+        Some(declared) => format!(
+            "{start}; the declaration in `{file}` ({} `{}`) does not come along: declare `{name}` here, or do without \
+             it there",
+            declared.attr("parameterType").unwrap_or("of no type"),
+            declared.attr("value").unwrap_or("")
+        ),
+        None => format!(
+            "{start}, and neither does `{file}`: declare `{name}` here, or do without it there"
+        ),
+    }
+}
+
+fn given(origin: Origin<'_>, name: &str, target: Attribute<'_>, scenario: &Scenario<'_>) -> String {
+    let who = match origin {
+        Origin::Key(key, _) => format!("the value of the key `{key}`"),
+        Origin::Actor(_) => "the actor".to_owned(),
+    };
+    let names = scenario.root().parameter_names().take(500);
+    let near = closest(name, names).map_or_else(String::new, |near| format!("; `${near}` is"));
+    format!(
+        "{who} needs the parameter `{name}`, which is not declared where `{}` of `{}` gets it{near}",
+        target.name(),
+        target.node().name()
+    )
+}
