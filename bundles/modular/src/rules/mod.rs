@@ -29,6 +29,7 @@ mod result_catalogs_resolve;
 mod result_entities_declared;
 mod result_names_unique;
 mod result_parameters_resolved;
+mod result_valid_schema;
 
 /// The rules of the bundle.
 pub static RULES: &[&dyn AnyRule] = &[
@@ -59,4 +60,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &result_entities_declared::RULE,
     &result_names_unique::RULE,
     &result_parameters_resolved::RULE,
+    &result_valid_schema::RULE,
 ];

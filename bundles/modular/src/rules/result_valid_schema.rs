@@ -1,0 +1,223 @@
+use std::collections::{HashMap, HashSet};
+
+use qcbus_document::{Attribute, Document, FileKind, Node};
+use qcbus_messages::DocumentRole;
+use qcbus_schema::{Checked, Code, Options, Outcome, Severity, Version, Violation};
+use qcbus_sdk::modular::Spot;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::assembly::{Assembly, Modular};
+use crate::families::copies::{Taken, short_name};
+use crate::families::finds::Finds;
+
+pub static RULE: Rule<Modular> = Rule {
+    id: "check_qcbus_mosc_result_valid_schema",
+    uids: &["qcbus.dev:mosc:1.0.0:result.valid_schema"],
+    page: include_str!("result_valid_schema.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    let Some(own) = assembly.version_of(assembly.root()) else {
+        return;
+    };
+    // Where all are of one version, a group is as valid here as there.
+    let is_other = |taken: Taken<'_, '_>| {
+        let theirs = assembly.version_of(taken.copy.group.document());
+        theirs.is_some_and(|theirs| theirs != own)
+    };
+    if !assembly.taken().any(is_other) {
+        return;
+    }
+    let expanded = assembly.subject.with_role(DocumentRole::Expanded).next();
+    let Some(expanded) = expanded.map(|expanded| expanded.document) else {
+        return;
+    };
+    let Some(checked) = checked(&expanded) else {
+        return;
+    };
+    let mut judge = Judge {
+        own,
+        groups: groups(assembly, expanded),
+        libraries: HashMap::new(),
+        first: HashMap::new(),
+        finds: Finds::default(),
+    };
+    judge.later(&checked);
+    judge.violations(&checked);
+    judge.finds.say(found);
+}
+
+fn checked<'d>(document: &Document<'d>) -> Option<Checked<'d>> {
+    match qcbus_schema::check(document, FileKind::Xosc, &Options::default()) {
+        Outcome::Checked(checked) => Some(checked),
+        Outcome::Skipped(_) => None,
+    }
+}
+
+/// The copied groups in the expanded scenario, in document order, and what they are copies of.
+fn groups<'a, 'd>(
+    assembly: &'a Assembly<'d>,
+    expanded: Document<'d>,
+) -> Vec<(Node<'d>, Taken<'a, 'd>)> {
+    let mut taken: HashMap<u32, Vec<Taken<'_, '_>>> = HashMap::new();
+    for one in assembly.taken() {
+        taken
+            .entry(one.reference.group.index())
+            .or_default()
+            .push(one);
+    }
+    let mut found = Vec::new();
+    let mut groups = expanded.elements("ManeuverGroup");
+    for group in assembly.root().elements("ManeuverGroup") {
+        if group.child("ScenarioReference").is_none() {
+            groups.next();
+            continue;
+        }
+        for taken in taken.remove(&group.index()).unwrap_or_default() {
+            match groups.next() {
+                Some(copy) if copy.attr("name") == Some(taken.copy.name()) => {
+                    found.push((copy, taken));
+                }
+                // Groups within groups: nobody knows which is which.
+                _ => return Vec::new(),
+            }
+        }
+    }
+    found
+}
+
+struct Judge<'a, 'd> {
+    own: Version,
+    groups: Vec<(Node<'d>, Taken<'a, 'd>)>,
+    /// What the files of parts violate by themselves.
+    libraries: HashMap<usize, Option<HashSet<(u32, Code)>>>,
+    /// By the part and what is said of it: where that is first.
+    first: HashMap<(usize, String), Spot<'d>>,
+    finds: Finds<'d>,
+}
+
+impl<'a, 'd> Judge<'a, 'd> {
+    /// What the version of the library has and that of the scenario has not.
+    fn later(&mut self, checked: &Checked<'d>) {
+        for thing in checked.later.iter().flat_map(|later| &later.things) {
+            let name = thing.attribute.map(|attribute| attribute.name());
+            for node in &thing.nodes {
+                let attribute = name.and_then(|name| node.attribute(name));
+                let Some((taken, spot)) = self.origin(*node, attribute) else {
+                    continue;
+                };
+                let library = taken.copy.group.document();
+                let theirs = qcbus_schema::version_of(&library, FileKind::Xosc);
+                if theirs.is_none_or(|theirs| theirs < thing.since) {
+                    continue;
+                }
+                let text = format!(
+                    "{} in the group `{}` of `{}` came with version {}, but this scenario is of version {}; name \
+                     version {} here, or take a group that does without",
+                    thing.what,
+                    taken.own_name(),
+                    short_name(library),
+                    thing.since,
+                    self.own,
+                    thing.since
+                );
+                self.note(taken, spot, text);
+            }
+        }
+    }
+
+    /// What the version of the scenario finds fault with and that of the library does not.
+    fn violations(&mut self, checked: &Checked<'d>) {
+        for violation in &checked.violations {
+            let is_new = !matches!(
+                violation.code,
+                // Of names and keys other rules know more.
+                Code::DuplicateKey | Code::MissingKey | Code::DanglingReference
+            );
+            if checked.severity(violation) != Severity::Error || !is_new {
+                continue;
+            }
+            let Some((taken, spot)) = self.origin(violation.node, violation.attribute) else {
+                continue;
+            };
+            let library = taken.copy.group.document();
+            let theirs = qcbus_schema::version_of(&library, FileKind::Xosc);
+            let Some(theirs) = theirs.filter(|theirs| *theirs != self.own) else {
+                continue;
+            };
+            if self.is_own_fault(taken.copy.part, library, spot, violation) {
+                continue;
+            }
+            let text = format!(
+                "the group `{}` of `{}` is written for version {theirs}, and in this scenario of version {} it is not \
+                 valid: {}",
+                taken.own_name(),
+                short_name(library),
+                self.own,
+                violation.text
+            );
+            self.note(taken, spot, text);
+        }
+    }
+
+    /// Notes a fault at the first place of its part.
+    fn note(&mut self, taken: Taken<'_, 'd>, spot: Spot<'d>, text: String) {
+        let key = (taken.copy.part, text.clone());
+        let first = *self.first.entry(key).or_insert(spot);
+        let there = "where the library file has it";
+        self.finds.brought(taken.at(), first, there, text);
+    }
+
+    /// Where the library has what is in a copied group, unless a key put it there.
+    fn origin(
+        &self,
+        node: Node<'d>,
+        attribute: Option<Attribute<'d>>,
+    ) -> Option<(Taken<'a, 'd>, Spot<'d>)> {
+        let index = node.index();
+        let after = self
+            .groups
+            .partition_point(|(copy, _)| copy.index() <= index);
+        let (copy, taken) = self.groups.get(after.checked_sub(1)?)?;
+        if index >= copy.subtree_end() {
+            return None;
+        }
+        let group = taken.copy.group;
+        let own = group
+            .document()
+            .node(index - copy.index() + group.index())?;
+        if own.name() != node.name() {
+            return None;
+        }
+        let Some(attribute) = attribute else {
+            return Some((*taken, own.into()));
+        };
+        let attribute = own.attribute(attribute.name())?;
+        let is_given = taken.copy.edit(attribute).is_some();
+        (!is_given).then(|| (*taken, attribute.into()))
+    }
+
+    /// Whether the library file has the fault in its own version, too.
+    fn is_own_fault(
+        &mut self,
+        part: usize,
+        library: Document<'d>,
+        spot: Spot<'d>,
+        violation: &Violation<'_>,
+    ) -> bool {
+        let own = self.libraries.entry(part).or_insert_with(|| {
+            let checked = checked(&library)?;
+            // Of faults that are not listed nobody knows where they are.
+            let all = checked
+                .violations
+                .iter()
+                .filter(|_| checked.rest.is_empty());
+            let all: HashSet<(u32, Code)> = all.map(|one| (one.node.index(), one.code)).collect();
+            (checked.rest.is_empty()).then_some(all)
+        });
+        own.as_ref()
+            .is_none_or(|own| own.contains(&(spot.node().index(), violation.code)))
+    }
+}
