@@ -30,6 +30,7 @@ mod result_entities_declared;
 mod result_names_unique;
 mod result_parameters_resolved;
 mod result_valid_schema;
+mod text_lt_in_values;
 
 /// The rules of the bundle.
 pub static RULES: &[&dyn AnyRule] = &[
@@ -61,4 +62,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &result_names_unique::RULE,
     &result_parameters_resolved::RULE,
     &result_valid_schema::RULE,
+    &text_lt_in_values::RULE,
 ];
