@@ -31,6 +31,7 @@ mod result_names_unique;
 mod result_parameters_resolved;
 mod result_valid_schema;
 mod text_lt_in_values;
+mod value_range;
 
 /// The rules of the bundle.
 pub static RULES: &[&dyn AnyRule] = &[
@@ -63,4 +64,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &result_parameters_resolved::RULE,
     &result_valid_schema::RULE,
     &text_lt_in_values::RULE,
+    &value_range::RULE,
 ];

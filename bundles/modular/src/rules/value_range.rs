@@ -1,0 +1,148 @@
+use std::f64::consts::TAU;
+
+use qcbus_document::Attribute;
+use qcbus_openscenario::parse_double;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::assembly::{Assembly, Modular};
+use crate::families::copies::Origins;
+use crate::families::finds::Finds;
+use crate::families::typings::Typings;
+
+pub static RULE: Rule<Modular> = Rule {
+    id: "check_qcbus_mosc_value_range",
+    uids: &["qcbus.dev:mosc:1.0.0:value.range"],
+    level: Level::Warning,
+    page: include_str!("value_range.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// Attributes of a type and the numbers that they may be.
+struct Range {
+    class: &'static str,
+    attributes: &'static [&'static str],
+    low: f64,
+    high: f64,
+    /// Why no others.
+    why: &'static str,
+}
+
+const fn range(
+    class: &'static str,
+    attributes: &'static [&'static str],
+    (low, high): (f64, f64),
+    why: &'static str,
+) -> Range {
+    Range {
+        class,
+        attributes,
+        low,
+        high,
+        why,
+    }
+}
+
+const POSITIVE: (f64, f64) = (0.0, f64::INFINITY);
+const COUNT: (f64, f64) = (1.0, f64::INFINITY);
+const SHARE: (f64, f64) = (0.0, 1.0);
+/// Two turns: rounded, added up or counted on, an angle in radians may be more than one.
+const ANGLE: (f64, f64) = (-2.0 * TAU, 2.0 * TAU);
+
+const BACKWARDS: &str = "a speed below zero drives backwards, which not every simulator does";
+const DISTANCE: &str = "a distance has no sign";
+const DURATION: &str = "a duration has no sign";
+const MAGNITUDE: &str = "a limit is a magnitude";
+const RADIANS: &str = "angles are in radians";
+const SHARES: &str = "it is a share";
+
+// After the ranges in the class descriptions of the standard; of what groups can have in them, what is
+// commonly replaced. The bundle for OpenSCENARIO has them all.
+#[rustfmt::skip]
+const RANGES: &[Range] = &[
+    range("AbsoluteSpeed", &["value"], POSITIVE, BACKWARDS),
+    range("AbsoluteTargetSpeed", &["value"], POSITIVE, BACKWARDS),
+    range("Condition", &["delay"], POSITIVE, "a condition cannot hold before it is met"),
+    range("DistanceCondition", &["value"], POSITIVE, DISTANCE),
+    range("DynamicConstraints", &["maxAcceleration", "maxDeceleration", "maxSpeed"], POSITIVE, MAGNITUDE),
+    range("EndOfRoadCondition", &["duration"], POSITIVE, DURATION),
+    range("Event", &["maximumExecutionCount"], COUNT, "what never runs could be left out"),
+    range("Fog", &["visualRange"], POSITIVE, DISTANCE),
+    range("LateralDistanceAction", &["distance"], POSITIVE, DISTANCE),
+    range("LongitudinalDistanceAction", &["distance", "timeGap"], POSITIVE, DISTANCE),
+    range("OffroadCondition", &["duration"], POSITIVE, DURATION),
+    range("Orientation", &["h", "p", "r"], ANGLE, RADIANS),
+    range("OverrideBrakeAction", &["value"], SHARE, SHARES),
+    range("OverrideClutchAction", &["value"], SHARE, SHARES),
+    range("OverrideParkingBrakeAction", &["value"], SHARE, SHARES),
+    range("OverrideThrottleAction", &["value"], SHARE, SHARES),
+    range("Precipitation", &["intensity"], SHARE, SHARES),
+    range("ReachPositionCondition", &["tolerance"], POSITIVE, DISTANCE),
+    range("RelativeDistanceCondition", &["value"], POSITIVE, DISTANCE),
+    range("RoadCondition", &["frictionScaleFactor"], POSITIVE, "friction has no sign"),
+    range("SpeedProfileEntry", &["time"], POSITIVE, DURATION),
+    range("StandStillCondition", &["duration"], POSITIVE, DURATION),
+    range("TimeHeadwayCondition", &["value"], POSITIVE, DURATION),
+    range("TimeToCollisionCondition", &["value"], POSITIVE, DURATION),
+    range("TransitionDynamics", &["value"], POSITIVE, "a time, distance or rate has no sign here"),
+    range("TraveledDistanceCondition", &["value"], POSITIVE, DISTANCE),
+    range("WorldPosition", &["h", "p", "r"], ANGLE, RADIANS),
+];
+
+fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    let origins = Origins::of(assembly);
+    let mut typings = Typings::default();
+    let mut finds = Finds::default();
+    for taken in assembly.taken() {
+        for (attribute, value) in taken.edited() {
+            let Some(number) = parse_double(&value.text) else {
+                continue;
+            };
+            let typing = typings.of(assembly, taken.copy.part);
+            let class = typing.and_then(|typing| typing.class(attribute.node()));
+            let range = class.and_then(|class| range_of(class, attribute));
+            let Some(range) = range.filter(|range| number < range.low || number > range.high)
+            else {
+                continue;
+            };
+            let Some(origin) = origins.get(value) else {
+                continue;
+            };
+            let text = format!(
+                "{} gives `{}` of `{}` the value `{}`, {}",
+                origin.what(),
+                attribute.name(),
+                attribute.node().name(),
+                value.text,
+                range.instead(number)
+            );
+            let at = origin.attribute().into();
+            finds.given(at, attribute.into(), "the attribute that gets it", text);
+        }
+    }
+    finds.say(found);
+}
+
+fn range_of(class: &str, attribute: Attribute<'_>) -> Option<&'static Range> {
+    let fits =
+        |range: &&Range| range.class == class && range.attributes.contains(&attribute.name());
+    RANGES.iter().find(fits)
+}
+
+impl Range {
+    /// What would do instead of a number that does not.
+    fn instead(&self, number: f64) -> String {
+        if (self.low, self.high) == ANGLE {
+            let radians = (number.to_radians() * 1e4).round() / 1e4;
+            return format!(
+                "which is more than two turns: {}; if degrees are meant, write {radians}",
+                self.why
+            );
+        }
+        let allowed = match self.high == f64::INFINITY {
+            true => format!("{} or more", self.low),
+            false => format!("between {} and {}", self.low, self.high),
+        };
+        format!("but it should be {allowed}: {}", self.why)
+    }
+}
