@@ -32,6 +32,7 @@ mod result_parameters_resolved;
 mod result_valid_schema;
 mod text_lt_in_values;
 mod value_range;
+mod value_type;
 
 /// The rules of the bundle.
 pub static RULES: &[&dyn AnyRule] = &[
@@ -65,4 +66,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &result_valid_schema::RULE,
     &text_lt_in_values::RULE,
     &value_range::RULE,
+    &value_type::RULE,
 ];

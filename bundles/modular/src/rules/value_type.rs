@@ -1,0 +1,78 @@
+use qcbus_openscenario::{DataType, closest};
+use qcbus_schema::ValueType;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::assembly::{Assembly, Modular};
+use crate::families::copies::Origins;
+use crate::families::finds::Finds;
+use crate::families::typings::Typings;
+
+pub static RULE: Rule<Modular> = Rule {
+    id: "check_qcbus_mosc_value_type",
+    uids: &["qcbus.dev:mosc:1.0.0:value.type"],
+    page: include_str!("value_type.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    let origins = Origins::of(assembly);
+    let mut typings = Typings::default();
+    let mut finds = Finds::default();
+    for taken in assembly.taken() {
+        for (attribute, value) in taken
+            .edited()
+            .filter(|(_, value)| !value.text.contains('$'))
+        {
+            let typing = typings.of(assembly, taken.copy.part);
+            let Some(value_type) = typing.and_then(|typing| typing.value(attribute)) else {
+                continue;
+            };
+            let (Some(wrong), Some(origin)) = (wrong(&value.text, value_type), origins.get(value))
+            else {
+                continue;
+            };
+            let text = format!(
+                "{} gives `{}` of `{}` {wrong}",
+                origin.what(),
+                attribute.name(),
+                attribute.node().name()
+            );
+            let at = origin.attribute().into();
+            finds.given(at, attribute.into(), "the attribute that gets it", text);
+        }
+    }
+    finds.say(found);
+}
+
+/// What is wrong with a value of a type.
+fn wrong(value: &str, value_type: ValueType) -> Option<String> {
+    const MOST: usize = 12;
+    let shown = match value {
+        "" => "an empty value".to_owned(),
+        value => format!("the value `{value}`"),
+    };
+    if let Some(words) = value_type.words() {
+        if words.iter().any(|word| **word == *value.trim()) {
+            return None;
+        }
+        if let Some(near) = closest(value, words.iter().map(|word| &**word)) {
+            return Some(format!(
+                "{shown}, which is none of its words; perhaps `{near}` is meant"
+            ));
+        }
+        let all: Vec<String> = words
+            .iter()
+            .take(MOST)
+            .map(|word| format!("`{word}`"))
+            .collect();
+        let more = if words.len() > MOST { ", …" } else { "" };
+        return Some(format!(
+            "{shown}, where one of {}{more} is due",
+            all.join(", ")
+        ));
+    }
+    let data_type = DataType::of_schema(value_type.name()?)?;
+    let is_one = data_type.parse(value).is_some();
+    (!is_one).then(|| format!("{shown}, where {} is due", data_type.allowed()))
+}
