@@ -1,0 +1,219 @@
+//! What comes of putting scenarios and library files together, beyond what pages show.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
+
+use std::path::PathBuf;
+
+use qcbus_sdk::{Loaded, Plan, examine};
+
+/// What a rule finds in `main.xosc` among some files: its texts, each with its number of places.
+fn found(test: &str, files: &[(&str, String)], rule: &str) -> Vec<(String, usize)> {
+    let directory = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(test);
+    let _ = std::fs::remove_dir_all(&directory);
+    std::fs::create_dir_all(&directory).unwrap();
+    for (name, text) in files {
+        std::fs::write(directory.join(name), text).unwrap();
+    }
+    let loaded = Loaded::from_path(&directory.join("main.xosc"), &directory).unwrap();
+    let outcome = examine(&Plan::by_default(&qcbus_modular::BUNDLE), &loaded).unwrap();
+    let id = format!("check_qcbus_mosc_{rule}");
+    let checker = outcome.checkers.iter().find(|checker| checker.id == id);
+    let issues = &checker.unwrap().issues;
+    let said = issues
+        .iter()
+        .map(|issue| (issue.description.clone(), issue.locations.len()));
+    said.collect()
+}
+
+fn file(declared: &str, groups: &str) -> String {
+    format!(
+        r#"<OpenSCENARIO><FileHeader revMajor="1" revMinor="3" date="2026-01-01T00:00:00" description="" author=""/>
+        {declared}<Storyboard><Init><Actions/></Init><Story name="S"><Act name="A">{groups}</Act></Story></Storyboard>
+        </OpenSCENARIO>"#
+    )
+}
+
+const ENTITIES: &str = r#"<Entities><ScenarioObject name="Ego"/></Entities>"#;
+
+/// A group that takes one of another file.
+fn taking(name: &str, from: &str, group: &str, keys: &[(&str, &str)]) -> String {
+    let keys: String = keys
+        .iter()
+        .map(|(key, value)| format!(r#"<ParameterReference key="{key}" value="{value}"/>"#))
+        .collect();
+    format!(
+        r#"<ManeuverGroup name="{name}" maximumExecutionCount="1">
+        <Actors selectTriggeringEntities="false"><EntityRef entityRef="Ego"/></Actors>
+        <ScenarioReference scenarioFileName="{from}"><ManeuverGroupReference maneuverGroupName="{group}">{keys}
+        </ManeuverGroupReference></ScenarioReference></ManeuverGroup>"#
+    )
+}
+
+/// A group that others take, with what its only action does.
+fn offering(name: &str, action: &str) -> String {
+    format!(
+        r#"<ManeuverGroup name="{name}" maximumExecutionCount="1">
+        <Actors selectTriggeringEntities="false"><EntityRef entityRef="Veh"/></Actors>
+        <Maneuver name="M"><Event name="E" priority="overwrite"><Action name="D"><PrivateAction>{action}</PrivateAction>
+        </Action></Event></Maneuver></ManeuverGroup>"#
+    )
+}
+
+fn speed(attributes: &str) -> String {
+    format!(
+        r#"<LongitudinalAction><SpeedAction>
+        <SpeedActionDynamics dynamicsShape="step" dynamicsDimension="time" {attributes}/>
+        <SpeedActionTarget><AbsoluteTargetSpeed {attributes}/></SpeedActionTarget></SpeedAction></LongitudinalAction>"#
+    )
+}
+
+#[test]
+fn a_parameter_that_many_values_need_is_said_once() {
+    let library = file("", &offering("Drive", &speed(r#"value="$v""#)));
+    let groups = taking("A", "lib.xosc", "Drive", &[]) + &taking("B", "lib.xosc", "Drive", &[]);
+    let files = [
+        ("main.xosc", file(ENTITIES, &groups)),
+        ("lib.xosc", library),
+    ];
+    let said = found("parameters", &files, "result_parameters_resolved");
+    // The first group that needs it, the value in the library file, and the second group.
+    assert_eq!(said.len(), 1, "{said:?}");
+    assert_eq!(said[0].1, 3, "{said:?}");
+}
+
+#[test]
+fn a_story_may_declare_what_a_group_needs() {
+    let library = file("", &offering("Drive", &speed(r#"value="$v""#)));
+    let main = file(ENTITIES, &taking("A", "lib.xosc", "Drive", &[])).replace(
+        r#"<Story name="S">"#,
+        r#"<Story name="S"><ParameterDeclarations><ParameterDeclaration name="v" parameterType="double" value="1"/>
+        </ParameterDeclarations>"#,
+    );
+    let files = [("main.xosc", main), ("lib.xosc", library)];
+    assert_eq!(found("story", &files, "result_parameters_resolved"), []);
+}
+
+#[test]
+fn text_that_is_no_parameter_needs_none() {
+    for value in ["$$", "$(find-pkg-share x)", "5$", "$"] {
+        let library = file(
+            "",
+            &offering("Drive", &speed(&format!(r#"value="{value}""#))),
+        );
+        let main = file(ENTITIES, &taking("A", "lib.xosc", "Drive", &[]));
+        let files = [("main.xosc", main), ("lib.xosc", library)];
+        assert_eq!(found("dollar", &files, "result_parameters_resolved"), []);
+    }
+}
+
+#[test]
+fn entities_may_be_named_by_parameters() {
+    let action = |name: &str| {
+        format!(
+            r#"<SynchronizeAction masterEntityRef="{name}" parameterAttributes="masterEntityRef"/>"#
+        )
+    };
+    let declared = |value: &str| {
+        format!(
+            r#"<ParameterDeclarations><ParameterDeclaration name="who" parameterType="string" value="{value}"/>
+            </ParameterDeclarations>{ENTITIES}"#
+        )
+    };
+    let library = || file("", &offering("Drive", &action("$who")));
+    let group = taking("A", "lib.xosc", "Drive", &[]);
+    for (value, count) in [("Ego", 0), ("Nobody", 1)] {
+        let main = file(&declared(value), &group);
+        let files = [("main.xosc", main), ("lib.xosc", library())];
+        let said = found("entities", &files, "result_entities_declared");
+        assert_eq!(said.len(), count, "{said:?}");
+    }
+    let undeclared = [
+        ("main.xosc", file(ENTITIES, &group)),
+        ("lib.xosc", library()),
+    ];
+    assert_eq!(found("nobody", &undeclared, "result_entities_declared"), []);
+}
+
+#[test]
+fn values_of_inner_scenarios_are_judged_where_they_are_written() {
+    let library = || {
+        let offers = speed(r#"value="0" parameterAttributes="value""#);
+        file("", &offering("Drive", &offers))
+    };
+    let inner = file(
+        "",
+        &taking("Inner", "lib.xosc", "Drive", &[("value", "-1")]),
+    );
+    let outer = |keys: &[(&str, &str)]| {
+        let group = taking("Outer", "inner.xosc", "Inner.Drive", keys);
+        file(ENTITIES, &group)
+    };
+    let files = |main: String| {
+        [
+            ("main.xosc", main),
+            ("inner.xosc", inner.clone()),
+            ("lib.xosc", library()),
+        ]
+    };
+    let said = found("inner", &files(outer(&[])), "value_range");
+    assert_eq!(said.len(), 2, "{said:?}");
+    // What an outer scenario replaces does no harm.
+    let said = found("outer", &files(outer(&[("value", "1")])), "value_range");
+    assert_eq!(said, []);
+    // Dots that nesting makes are as they must be.
+    let said = found("dots", &files(outer(&[])), "library_name_with_dot");
+    assert_eq!(said, []);
+}
+
+#[test]
+fn catalogs_that_cannot_be_read_may_be_the_ones() {
+    let route = r#"<RoutingAction><AssignRouteAction><CatalogReference catalogName="r" entryName="e"/>
+        </AssignRouteAction></RoutingAction>"#;
+    let library = || file("", &offering("Drive", route));
+    let group = taking("A", "lib.xosc", "Drive", &[]);
+    let located = r#"<CatalogLocations><RouteCatalog><Directory path="gone"/></RouteCatalog></CatalogLocations>"#;
+    for (declared, count) in [("", 1), (located, 0)] {
+        let main = file(&format!("{declared}{ENTITIES}"), &group);
+        let files = [("main.xosc", main), ("lib.xosc", library())];
+        let said = found("catalogs", &files, "result_catalogs_resolve");
+        assert_eq!(said.len(), count, "{said:?}");
+    }
+}
+
+#[test]
+fn a_group_that_is_not_found_hides_no_other() {
+    let offers = speed(r#"value="0" parameterAttributes="value""#);
+    let library = file("", &offering("Drive", &offers));
+    let groups = taking("A", "gone.xosc", "Drive", &[])
+        + &taking(
+            "B",
+            "lib.xosc",
+            "Drive",
+            &[("AbsoluteTargetSpeed.value", "x")],
+        );
+    let files = [
+        ("main.xosc", file(ENTITIES, &groups)),
+        ("lib.xosc", library),
+    ];
+    assert_eq!(found("other", &files, "value_type").len(), 1);
+}
+#[test]
+fn what_cdata_has_stays() {
+    let script = |text: &str| {
+        let action = format!(
+            "<UserDefinedAction><CustomCommandAction type='t'>{text}</CustomCommandAction></UserDefinedAction>"
+        );
+        file("", &offering("Drive", &action))
+    };
+    for (text, count) in [
+        ("<![CDATA[a < b]]>", 0),
+        ("<![CDATA[a < b]]> and b &#x3C; c", 1),
+        ("a &lt; b", 1),
+        ("a &gt; b &amp;lt; c", 0),
+    ] {
+        let main = file(ENTITIES, &taking("A", "lib.xosc", "Drive", &[]));
+        let files = [("main.xosc", main), ("lib.xosc", script(text))];
+        let said = found("cdata", &files, "text_lt_in_values");
+        assert_eq!(said.len(), count, "{text}: {said:?}");
+    }
+}
