@@ -258,8 +258,13 @@ impl<'d> Expander<'d> {
         let at = Spot::of(node, "scenarioFileName");
         let links = &self.out.parts[part].links;
         let link = links.iter().find(|link| link.at == node.offset());
+        // Whoever gathers the documents follows references no deeper either.
+        let is_too_deep = self.chain.len() > MAX_DEPTH as usize;
         let Some(target) = link.map(|link| link.to as usize) else {
-            let (what, text) = not_found(node);
+            let (what, text) = match is_too_deep {
+                true => (What::Depth, self.too_deep()),
+                false => not_found(node),
+            };
             self.say(what, at, None, text);
             return None;
         };
@@ -278,8 +283,8 @@ impl<'d> Expander<'d> {
             self.say(What::Cycle, at, None, text);
             return None;
         }
-        if self.chain.len() > MAX_DEPTH as usize {
-            let text = format!("scenarios refer to scenarios more than {MAX_DEPTH} deep");
+        if is_too_deep {
+            let text = self.too_deep();
             self.say(What::Depth, at, None, text);
             return None;
         }
@@ -290,6 +295,14 @@ impl<'d> Expander<'d> {
             return None;
         }
         Some(target)
+    }
+
+    fn too_deep(&self) -> String {
+        let last = self.chain.last();
+        let last = last.map_or_else(String::new, |&part| self.short_name(part));
+        format!(
+            "scenarios refer to scenarios more than {MAX_DEPTH} deep; that of `{last}` is not followed any more"
+        )
     }
 
     /// The groups of a part after its own expansion.
@@ -552,12 +565,12 @@ fn not_found(node: Node<'_>) -> (What, String) {
     if in_archive && !crate::archive::stays_inside(name) {
         let text = format!(
             "`{name}` leads out of the archive; what an archive refers to lies in it or in a directory of the search \
-             path"
+             path, by a relative name with `/` and without `..`"
         );
         return (What::Escapes, text);
     }
     let around = match in_archive {
-        true => "in the archive, those around it",
+        true => "in the archive nor in those around it",
         false => "beside the scenario",
     };
     let text = format!(
