@@ -1,5 +1,6 @@
 //! `.mosc`: a zip archive around a modular scenario, read in memory and never unpacked to disk.
 
+use std::collections::HashSet;
 use std::io::{Cursor, Read};
 use std::sync::Arc;
 
@@ -56,7 +57,7 @@ impl OpenArchive {
                 return OpenArchive { zip: None, faults };
             }
         };
-        match check_directory(&mut zip, limits, &mut faults) {
+        match check_directory(&mut zip, &packed, limits, &mut faults) {
             Ok(()) => OpenArchive {
                 zip: Some(zip),
                 faults,
@@ -131,6 +132,7 @@ impl OpenArchive {
 /// archive; reading counts again.
 fn check_directory(
     archive: &mut Archive,
+    packed: &[u8],
     limits: &Limits,
     faults: &mut Vec<TextFault>,
 ) -> Result<(), TextFault> {
@@ -157,26 +159,66 @@ fn check_directory(
         )?;
     }
     if archive.has_duplicate_names() {
-        let text = "the archive has several members of one name; the last one is read";
+        let twice = twice(packed, archive.central_directory_start());
+        let named = match twice.is_empty() {
+            true => String::new(),
+            false => format!(", `{}`", twice.join("`, `")),
+        };
+        let text = format!("the archive has several members of one name{named}; the last is read");
         faults.push(TextFault::new(Code::ArchiveDuplicate, 0, text));
     }
     let escaping: Vec<String> = (0..archive.len())
         .filter_map(|index| {
             let entry = archive.by_index_raw(index).ok()?;
             let name = entry.name().ok()?.into_owned();
-            (entry.is_symlink() || !stays_inside(&name)).then_some(name)
+            match entry.is_symlink() {
+                true => Some(format!("the member {name:?} is a symbolic link")),
+                false => (!stays_inside(&name))
+                    .then(|| format!("the member {name:?} leads out of the archive")),
+            }
         })
-        .take(4)
+        .take(MOST_NAMED)
         .collect();
-    for name in escaping {
-        let text = format!("the member {name:?} leads out of the archive; it is never read");
+    for what in escaping {
+        let text = format!("{what}; it is never read");
         faults.push(TextFault::new(Code::ArchiveEscapes, 0, text));
     }
     Ok(())
 }
 
+/// Most members that are named for one fault of an archive.
+const MOST_NAMED: usize = 4;
+
+/// Names that the directory has more than once; the library keeps one member of each.
+fn twice(packed: &[u8], directory: u64) -> Vec<String> {
+    const ENTRY: &[u8] = b"PK\x01\x02";
+    const HEAD: usize = 46;
+    let mut rest = usize::try_from(directory)
+        .ok()
+        .and_then(|start| packed.get(start..))
+        .unwrap_or(&[]);
+    let mut seen = HashSet::new();
+    let mut twice = Vec::new();
+    while rest.starts_with(ENTRY) && twice.len() < MOST_NAMED {
+        let len = |at: usize| {
+            let bytes = rest.get(at..at + 2).and_then(|it| it.try_into().ok());
+            usize::from(u16::from_le_bytes(bytes.unwrap_or([0; 2])))
+        };
+        let (name, more) = (len(28), len(30) + len(32));
+        let Some(raw) = rest.get(HEAD..HEAD + name) else {
+            break;
+        };
+        let text = String::from_utf8_lossy(raw).into_owned();
+        if !seen.insert(raw) && !twice.contains(&text) {
+            twice.push(text);
+        }
+        rest = rest.get(HEAD + name + more..).unwrap_or(&[]);
+    }
+    twice
+}
+
 /// Whether a member's name is a plain relative path: no root, drive, backslash, `..` or NUL.
-pub(crate) fn stays_inside(name: &str) -> bool {
+pub fn stays_inside(name: &str) -> bool {
     !name.is_empty()
         && !name.starts_with('/')
         && !name.contains(['\\', '\0', ':'])
@@ -251,12 +293,16 @@ fn malformed(name: &str, reason: &str) -> TextFault {
 
 fn damaged(packed: &[u8], error: &ZipError) -> TextFault {
     // A local header without the directory at the end: the archive began well and was cut.
-    let code = if is_zip(packed) {
-        Code::ArchiveTruncated
-    } else {
-        Code::ArchiveMalformed
-    };
-    TextFault::new(code, 0, format!("the archive cannot be read: {error}"))
+    match is_zip(packed) {
+        true => {
+            let text = format!("the archive cannot be read: {error}");
+            TextFault::new(Code::ArchiveTruncated, 0, text)
+        }
+        false => {
+            let text = "the file is no zip archive, although its name says so";
+            TextFault::new(Code::ArchiveMalformed, 0, text)
+        }
+    }
 }
 
 /// A hint for the commonest mistake: the folder was packed instead of its content.
@@ -374,6 +420,23 @@ mod tests {
             assert_eq!(codes, [code], "{text}");
             assert!(text.contains(part), "{text}");
         }
+    }
+
+    #[test]
+    fn members_of_one_name_are_named() {
+        let mut packed = zip(&[("main.xosc", b"<a/>"), ("a.xosc", b"1"), ("b.xosc", b"2")]);
+        // The writer refuses to do so itself.
+        for at in 0..packed.len() - 6 {
+            if packed[at..].starts_with(b"b.xosc") {
+                packed[at] = b'a';
+            }
+        }
+        let (bytes, codes, text) = read(&packed, Limits::default());
+        assert_eq!(
+            (&bytes[..], &codes[..]),
+            (&b"<a/>"[..], &[Code::ArchiveDuplicate][..])
+        );
+        assert!(text.contains("one name, `a.xosc`; the last"), "{text}");
     }
 
     #[test]
