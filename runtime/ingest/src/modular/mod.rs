@@ -25,6 +25,8 @@ pub use problem::{Problem, Spot, What};
 pub(crate) use search::modules;
 pub use search::{SEARCH_PATH_VARIABLE, SearchPath};
 
+pub use crate::archive::stays_inside;
+
 use qcbus_document::Document;
 use qcbus_messages::Link;
 
