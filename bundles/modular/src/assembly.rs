@@ -1,8 +1,10 @@
 //! What rules about modular scenarios look at: `Rule<Modular>` gets an `&Assembly<'_>`.
 
+use std::path::Path;
+
 use qcbus_document::{Document, FileKind, Node};
 use qcbus_messages::DocumentRole;
-use qcbus_sdk::modular::{Expansion, OFFERS, Problem, Spot, What};
+use qcbus_sdk::modular::{Expansion, OFFERS, Part, Problem, Spot, What};
 use qcbus_sdk::{Finding, Model, Place, Sink, Subject, Unbuilt};
 
 /// A modular scenario with the documents that it is made of, expanded once for all rules.
@@ -94,6 +96,46 @@ impl<'d> Assembly<'d> {
         std::iter::once(self.root()).chain(linked.map(|linked| linked.document))
     }
 
+    /// What a reference leads to, whether or not it can be taken; `None` when nothing was found.
+    pub fn target(&self, reference: Node<'_>) -> Option<Document<'d>> {
+        let parts = &self.expansion.parts;
+        let path = reference.document().path();
+        let from = parts.iter().find(|part| part.document.path() == path)?;
+        let mut links = from.links.iter();
+        let link = links.find(|link| link.at == reference.offset())?;
+        parts.get(link.to as usize).map(|part| part.document)
+    }
+
+    /// The first reference that leads to a document; `None` for the file that is checked.
+    pub fn reference_to(&self, document: Document<'_>) -> Option<Node<'d>> {
+        let parts = &self.expansion.parts;
+        let of = |part: &Part<'_>| part.document.path() == document.path();
+        let to = parts.iter().position(of).filter(|&to| to > 0)?;
+        parts.iter().find_map(|part| {
+            let link = part.links.iter().find(|link| link.to as usize == to)?;
+            let mut references = part.document.elements("ScenarioReference");
+            references.find(|node| node.offset() == link.at)
+        })
+    }
+
+    /// Says something of a document: of the file that is checked where it is, of another one at the
+    /// reference that leads there, with its place as the second.
+    pub fn say_of<'s, 'f>(
+        &self,
+        found: &'s mut Sink<'f>,
+        at: (Document<'_>, u32),
+        text: String,
+        here: &str,
+    ) -> Finding<'s, 'f> {
+        match self.reference_to(at.0) {
+            None => found.issue(at, text).here(here),
+            Some(reference) => {
+                let place = Place::attribute_or_node(reference, "scenarioFileName");
+                found.issue(place, text).at(at, here)
+            }
+        }
+    }
+
     /// The problems of some sorts, in the order in which the expansion came upon them.
     pub fn problems(&self, sorts: &'static [What]) -> impl Iterator<Item = &Problem<'d>> {
         let all = self.expansion.problems.iter();
@@ -112,6 +154,19 @@ impl<'d> Assembly<'d> {
         }
         groups
     }
+}
+
+/// The archive that a document lies in; of one within another, `archive!member`.
+pub fn archive_of(path: &str) -> Option<&str> {
+    let (archive, _) = path.rsplit_once('!')?;
+    (FileKind::of_path(Path::new(archive)) == Some(FileKind::Mosc)).then_some(archive)
+}
+
+/// What people call a file: its name, and for a member of an archive that of the archive before it.
+pub fn name_of(path: &str) -> &str {
+    let outermost = path.find(".mosc!").unwrap_or(path.len());
+    let folder = path.get(..outermost).and_then(|file| file.rfind('/'));
+    folder.map_or(path, |at| &path[at + 1..])
 }
 
 /// The place of a spot.

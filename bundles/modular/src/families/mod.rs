@@ -6,3 +6,4 @@ pub mod offers;
 pub mod copies;
 pub mod finds;
 pub mod typings;
+pub mod file_faults;
