@@ -1,0 +1,28 @@
+use qcbus_document::FaultCode;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::assembly::{Assembly, Modular, name_of};
+use crate::families::file_faults::{ARCHIVE, of_archives};
+
+pub static RULE: Rule<Modular> = Rule {
+    id: "check_qcbus_mosc_archive_main_present",
+    uids: &["qcbus.dev:mosc:1.0.0:archive.main_present"],
+    page: include_str!("archive_main_present.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    for (document, fault) in of_archives(assembly, ARCHIVE) {
+        let path = document.path();
+        let archive = path.rsplit_once('!').map_or(path, |(archive, _)| archive);
+        let remedy = match fault.code {
+            FaultCode::ArchiveMemberMissing => {
+                "a modular scenario starts from `main.xosc`, spelt like that and in no folder of the archive"
+            }
+            _ => "pack the scenario again",
+        };
+        let text = format!("`{}`: {}; {remedy}", name_of(archive), fault.text);
+        assembly.say_of(found, (document, 0), text, "the archive");
+    }
+}
