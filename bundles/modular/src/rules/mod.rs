@@ -10,6 +10,7 @@ mod key_ambiguous;
 mod key_crashes_reference_tool;
 mod key_duplicate;
 mod group_content_dropped;
+mod archive_limits;
 mod archive_main_present;
 mod key_matches;
 mod key_path_exact;
@@ -68,6 +69,7 @@ pub static RULES: &[&dyn AnyRule] = &[
     &text_lt_in_values::RULE,
     &value_range::RULE,
     &value_type::RULE,
+    &archive_limits::RULE,
     &archive_main_present::RULE,
     &key_matches::RULE,
     &reference_file_found::RULE,

@@ -1,0 +1,24 @@
+use qcbus_sdk::modular::What;
+use qcbus_sdk::{Rule, Sink};
+
+use crate::assembly::{Assembly, Modular, archive_of, name_of, say};
+use crate::families::file_faults::{LIMITS, of_archives};
+
+pub static RULE: Rule<Modular> = Rule {
+    id: "check_qcbus_mosc_archive_limits",
+    uids: &["qcbus.dev:mosc:1.0.0:archive.limits"],
+    page: include_str!("archive_limits.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    for (document, fault) in of_archives(assembly, LIMITS) {
+        let archive = archive_of(document.path()).unwrap_or("");
+        let text = format!("`{}`: {}", name_of(archive), fault.text);
+        assembly.say_of(found, (document, 0), text, "the archive");
+    }
+    for problem in assembly.problems(&[What::Size]) {
+        say(found, problem, "the group that is referred to");
+    }
+}
