@@ -1,0 +1,57 @@
+use qcbus_document::{Document, FaultCode};
+use qcbus_sdk::modular::{What, stays_inside};
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::assembly::{Assembly, Modular, archive_of, name_of, say};
+use crate::families::file_faults::{NAMES, of_archives};
+
+pub static RULE: Rule<Modular> = Rule {
+    id: "check_qcbus_mosc_archive_path_safety",
+    uids: &["qcbus.dev:mosc:1.0.0:archive.path_safety"],
+    page: include_str!("archive_path_safety.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    for (document, fault) in of_archives(assembly, NAMES) {
+        let archive = archive_of(document.path()).unwrap_or("");
+        let why = match fault.code {
+            FaultCode::ArchiveDuplicate => "which one another tool reads is open; keep one of them",
+            _ => {
+                "a tool that unpacks the archive, as the reference tool does, may write over files beside its own by it; \
+                 members are files with relative names, with `/` and without `..`"
+            }
+        };
+        let text = format!("`{}`: {}; {why}", name_of(archive), fault.text);
+        assembly.say_of(found, (document, 0), text, "the archive");
+    }
+    for problem in assembly.problems(&[What::Escapes]) {
+        say(found, problem, "the file that is referred to");
+    }
+    for document in assembly.scenarios() {
+        if archive_of(document.path()).is_none() {
+            say_unpackable(assembly, document, found);
+        }
+    }
+}
+
+/// Says which references of a scenario that lies in no archive could not be in one.
+fn say_unpackable(assembly: &Assembly<'_>, document: Document<'_>, found: &mut Sink<'_>) {
+    for reference in document.elements("ScenarioReference") {
+        let name = reference.attr("scenarioFileName").unwrap_or("");
+        // What lies on another machine is not found at all, which another rule says.
+        if name.trim().is_empty() || name.contains("://") || stays_inside(name) {
+            continue;
+        }
+        let text = format!(
+            "`{name}` cannot be packed into an archive: there, what is referred to lies in the archive or in a directory of \
+             the search path; name the file without `..`, root, drive and backslash"
+        );
+        let place = Place::attribute_or_node(reference, "scenarioFileName");
+        let finding = found.issue(place, text).level(Level::Warning);
+        if let Some(target) = assembly.target(reference) {
+            finding.at((target, 0), "the file that is referred to");
+        }
+    }
+}
