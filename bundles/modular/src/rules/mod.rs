@@ -12,6 +12,7 @@ mod key_duplicate;
 mod group_content_dropped;
 mod archive_limits;
 mod archive_main_present;
+mod archive_member_collision;
 mod archive_path_safety;
 mod key_matches;
 mod key_path_exact;
@@ -72,6 +73,7 @@ pub static RULES: &[&dyn AnyRule] = &[
     &value_type::RULE,
     &archive_limits::RULE,
     &archive_main_present::RULE,
+    &archive_member_collision::RULE,
     &archive_path_safety::RULE,
     &key_matches::RULE,
     &reference_file_found::RULE,
