@@ -14,6 +14,7 @@ mod archive_limits;
 mod archive_main_present;
 mod archive_member_collision;
 mod archive_path_safety;
+mod archive_unused_member;
 mod key_matches;
 mod key_path_exact;
 mod parameter_reference_attributes;
@@ -75,6 +76,7 @@ pub static RULES: &[&dyn AnyRule] = &[
     &archive_main_present::RULE,
     &archive_member_collision::RULE,
     &archive_path_safety::RULE,
+    &archive_unused_member::RULE,
     &key_matches::RULE,
     &reference_file_found::RULE,
 ];

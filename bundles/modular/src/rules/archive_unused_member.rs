@@ -1,0 +1,75 @@
+use std::collections::BTreeSet;
+
+use qcbus_document::FaultCode;
+use qcbus_messages::Absence;
+use qcbus_sdk::modular::stays_inside;
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::assembly::{Assembly, Modular, name_of};
+use crate::families::file_faults::NAMES;
+
+pub static RULE: Rule<Modular> = Rule {
+    id: "check_qcbus_mosc_archive_unused_member",
+    uids: &["qcbus.dev:mosc:1.0.0:archive.unused_member"],
+    level: Level::Information,
+    page: include_str!("archive_unused_member.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    if !is_known(assembly) {
+        return;
+    }
+    let used = used(assembly);
+    for archive in assembly.archives() {
+        let path = format!("{}!main.xosc", archive.path);
+        let mut scenarios = assembly.scenarios();
+        let Some(main) = scenarios.find(|document| document.path() == path) else {
+            continue;
+        };
+        // Members whose names lead out of the archive are said to do so.
+        for member in archive.members().filter(|member| stays_inside(member.name)) {
+            if used.contains(format!("{}!{}", archive.path, member.name).as_str()) {
+                continue;
+            }
+            let name = member.name;
+            let advice = match name {
+                _ if name.ends_with(".mosc") => "refer to it, or leave it out",
+                _ if name.ends_with(".xosc") => {
+                    "refer to it, or leave it out; catalogs are looked for beside the archive, not in it"
+                }
+                _ => {
+                    "only scenarios are read from archives, and maps are looked for beside them; leave it out"
+                }
+            };
+            let archive = name_of(archive.path);
+            let text =
+                format!("no reference leads to the member `{name}` of `{archive}`; {advice}");
+            assembly.say_of(found, (main, 0), text, "the archive");
+        }
+    }
+}
+
+/// The scenarios and, around them, the archives that they lie in.
+fn used<'d>(assembly: &Assembly<'d>) -> BTreeSet<&'d str> {
+    let mut used = BTreeSet::new();
+    for document in assembly.scenarios() {
+        let mut path = document.path();
+        while used.insert(path)
+            && let Some((around, _)) = path.rsplit_once('!')
+        {
+            path = around;
+        }
+    }
+    used
+}
+
+/// Whether all references were read and followed: else nobody knows what is used.
+fn is_known(assembly: &Assembly<'_>) -> bool {
+    let mut missing = assembly.subject.missing().iter();
+    let mut faults = assembly.scenarios().flat_map(|document| document.faults());
+    let is_cut = |why: &Absence| matches!(why, Absence::TooMany { .. } | Absence::TooDeep { .. });
+    let hides = |code: FaultCode| code.makes_partial() && !NAMES.contains(&code);
+    !missing.any(|missing| is_cut(&missing.why)) && !faults.any(|fault| hides(fault.code))
+}
