@@ -38,6 +38,7 @@ mod result_valid_schema;
 mod text_lt_in_values;
 mod value_range;
 mod value_type;
+mod reference_order_dependence;
 
 /// The rules of the bundle.
 pub static RULES: &[&dyn AnyRule] = &[
@@ -79,4 +80,5 @@ pub static RULES: &[&dyn AnyRule] = &[
     &archive_unused_member::RULE,
     &key_matches::RULE,
     &reference_file_found::RULE,
+    &reference_order_dependence::RULE,
 ];

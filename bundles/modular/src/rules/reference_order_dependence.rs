@@ -1,0 +1,80 @@
+use std::collections::BTreeMap;
+
+use qcbus_document::{Document, Node};
+use qcbus_sdk::{Level, Place, Rule, Sink};
+
+use crate::assembly::{Assembly, Modular};
+
+pub static RULE: Rule<Modular> = Rule {
+    id: "check_qcbus_mosc_reference_order_dependence",
+    uids: &["qcbus.dev:mosc:1.0.0:reference.order_dependence"],
+    level: Level::Warning,
+    page: include_str!("reference_order_dependence.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    for document in assembly.scenarios() {
+        let references: Vec<(Node<'_>, &str)> = document
+            .elements("ScenarioReference")
+            .filter_map(|node| Some((node, node.attr("scenarioFileName")?)))
+            .collect();
+        let mut first: BTreeMap<&str, Node<'_>> = BTreeMap::new();
+        for &(node, name) in &references {
+            first.entry(name).or_insert(node);
+        }
+        for (node, name) in references {
+            let Some(stem) = name.strip_suffix(".xosc") else {
+                continue;
+            };
+            let archive = format!("{stem}.mosc");
+            if let Some(&other) = first.get(archive.as_str())
+                && let Some(target) = assembly.target(node)
+                && let is_later = other.offset() < node.offset()
+                && let Some((level, text)) = trouble(target, name, &archive, is_later)
+            {
+                let place = Place::attribute_or_node(node, "scenarioFileName");
+                let there = Place::attribute_or_node(other, "scenarioFileName");
+                let finding = found.issue(place, text).level(level);
+                finding.at(there, "the reference to the archive");
+            }
+        }
+    }
+}
+
+/// What becomes of a reference to `name.xosc` beside one to `name.mosc`.
+fn trouble(
+    target: Document<'_>,
+    name: &str,
+    archive: &str,
+    is_later: bool,
+) -> Option<(Level, String)> {
+    let file = archive.rsplit(['/', '\\']).next().unwrap_or(archive);
+    let is_archive = target.path().ends_with(&format!("{file}!main.xosc"));
+    let (level, text) = match (is_archive, is_later) {
+        (true, true) => (
+            Level::Warning,
+            format!(
+                "there is no `{name}`: the reference tool leaves a file of this name when it has expanded `{archive}` for \
+                 an earlier reference; refer to `{archive}`, which does not depend on the order"
+            ),
+        ),
+        (true, false) => (
+            Level::Error,
+            format!(
+                "there is no `{name}`, and only a later reference names `{archive}`, of which the reference tool would \
+                 make it, so that it stops here; refer to `{archive}`"
+            ),
+        ),
+        (false, true) => (
+            Level::Warning,
+            format!(
+                "`{name}` is there, but an earlier reference names `{archive}`, and what the reference tool makes of that \
+                 it writes over `{name}`; give one of the two another name"
+            ),
+        ),
+        (false, false) => return None,
+    };
+    Some((level, text))
+}
