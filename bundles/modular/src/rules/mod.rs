@@ -24,6 +24,7 @@ mod library_context_mismatch;
 mod library_default_kept;
 mod library_name_with_dot;
 mod library_parameter_attributes_missing;
+mod reference_depth;
 mod reference_file_found;
 mod reference_form;
 mod reference_maneuver_group_known;
@@ -79,6 +80,7 @@ pub static RULES: &[&dyn AnyRule] = &[
     &archive_path_safety::RULE,
     &archive_unused_member::RULE,
     &key_matches::RULE,
+    &reference_depth::RULE,
     &reference_file_found::RULE,
     &reference_order_dependence::RULE,
 ];
