@@ -40,6 +40,7 @@ mod text_lt_in_values;
 mod value_range;
 mod value_type;
 mod reference_order_dependence;
+mod xml_encoding;
 mod xml_no_doctype;
 
 /// The rules of the bundle.
@@ -84,5 +85,6 @@ pub static RULES: &[&dyn AnyRule] = &[
     &reference_depth::RULE,
     &reference_file_found::RULE,
     &reference_order_dependence::RULE,
+    &xml_encoding::RULE,
     &xml_no_doctype::RULE,
 ];

@@ -1,0 +1,46 @@
+use qcbus_document::{Document, FaultCode};
+use qcbus_sdk::{Level, Rule, Sink};
+
+use crate::assembly::{Assembly, Modular, name_of};
+use crate::families::file_faults::of;
+
+pub static RULE: Rule<Modular> = Rule {
+    id: "check_qcbus_mosc_xml_encoding",
+    uids: &["qcbus.dev:mosc:1.0.0:xml.encoding"],
+    level: Level::Warning,
+    page: include_str!("xml_encoding.md"),
+    run,
+    ..Rule::DEFAULTS
+};
+
+/// What is read without loss. Bytes that cannot be read are what is wrong with the file as such.
+const READ_NEVERTHELESS: &[FaultCode] =
+    &[FaultCode::EncodingTranscoded, FaultCode::EncodingMismatch];
+
+fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    for document in assembly.scenarios().filter(has_mark) {
+        let text = format!(
+            "`{}` begins with a byte order mark (U+FEFF), which the reference tool takes for content and stops; store it \
+             without one",
+            name_of(document.path())
+        );
+        assembly.say_of(found, (document, 0), text, "the byte order mark");
+    }
+    for (document, fault) in of(assembly, READ_NEVERTHELESS) {
+        let text = format!(
+            "`{}`: {}; the reference tool refuses or damages such a file: store it as plain UTF-8 and say so in its XML \
+             declaration",
+            name_of(document.path()),
+            fault.text
+        );
+        assembly.say_of(found, (document, fault.offset), text, "here");
+    }
+}
+
+fn has_mark(document: &Document<'_>) -> bool {
+    let source = document.sources().next();
+    source.is_some_and(|source| {
+        let bytes = document.source_bytes(&source);
+        bytes.starts_with("\u{FEFF}".as_bytes())
+    })
+}
