@@ -1,7 +1,10 @@
-use qcbus_sdk::modular::What;
+use qcbus_document::Node;
+use qcbus_messages::{Absence, DocumentRole, MissingDocument};
+use qcbus_sdk::modular::{Problem, What};
 use qcbus_sdk::{Rule, Sink};
 
-use crate::assembly::{Assembly, Modular, say};
+use crate::assembly::{Assembly, Modular, place, say};
+use crate::families::file_faults::has_own_rule;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_reference_file_found",
@@ -12,7 +15,53 @@ pub static RULE: Rule<Modular> = Rule {
 };
 
 fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
-    for problem in assembly.problems(&[What::FileNotFound, What::Unreadable]) {
-        say(found, problem, "the file that is referred to");
+    for problem in assembly.problems(&[What::FileNotFound]) {
+        match other_reason(assembly, problem.at.node()) {
+            Some(text) => {
+                found.issue(place(problem.at), text);
+            }
+            None => {
+                say(found, problem, "the file that is referred to");
+            }
+        }
+    }
+    for problem in assembly.problems(&[What::Unreadable]) {
+        if is_mine(assembly, problem) {
+            say(found, problem, "the file that is referred to");
+        }
+    }
+}
+
+/// What is wrong with the file that is checked, other rules say, those of the bundle for OpenSCENARIO
+/// among them.
+fn is_mine(assembly: &Assembly<'_>, problem: &Problem<'_>) -> bool {
+    let target = assembly.target(problem.at.node());
+    target.is_some_and(|target| !has_own_rule(target))
+}
+
+/// Why a file could not be had that is there, or was not looked for.
+fn other_reason(assembly: &Assembly<'_>, reference: Node<'_>) -> Option<String> {
+    let name = reference.attr("scenarioFileName")?;
+    let mut missing = assembly.subject.missing().iter();
+    let missing = missing.find(|missing| {
+        missing.role == DocumentRole::Scenario
+            && missing.reference == name
+            && is_at(assembly, missing, reference)
+    })?;
+    let is_found_nowhere = matches!(missing.why, Absence::NotThere);
+    (!is_found_nowhere).then(|| format!("`{name}` {}", missing.why))
+}
+
+fn is_at(assembly: &Assembly<'_>, missing: &MissingDocument, reference: Node<'_>) -> bool {
+    let position = reference.position();
+    match &missing.within {
+        Some(within) => {
+            (within.path.as_str(), within.row, within.column)
+                == (position.path, position.row, position.column)
+        }
+        None => {
+            reference.document().path() == assembly.root().path()
+                && missing.referred_at == reference.offset()
+        }
     }
 }
