@@ -4,7 +4,7 @@ use std::path::Path;
 
 use qcbus_document::{Document, FileKind, Node};
 use qcbus_messages::DocumentRole;
-use qcbus_sdk::modular::{Expansion, OFFERS, Part, Problem, Spot, What};
+use qcbus_sdk::modular::{Expansion, OFFERS, Piece, Problem, Spot, What};
 use qcbus_sdk::{Finding, Model, Place, Sink, Subject, Unbuilt};
 
 /// A modular scenario with the documents that it is made of, expanded once for all rules.
@@ -98,22 +98,22 @@ impl<'d> Assembly<'d> {
 
     /// What a reference leads to, whether or not it can be taken; `None` when nothing was found.
     pub fn target(&self, reference: Node<'_>) -> Option<Document<'d>> {
-        let parts = &self.expansion.parts;
+        let pieces = &self.expansion.pieces;
         let path = reference.document().path();
-        let from = parts.iter().find(|part| part.document.path() == path)?;
+        let from = pieces.iter().find(|piece| piece.document.path() == path)?;
         let mut links = from.links.iter();
         let link = links.find(|link| link.at == reference.offset())?;
-        parts.get(link.to as usize).map(|part| part.document)
+        pieces.get(link.to as usize).map(|piece| piece.document)
     }
 
     /// The first reference that leads to a document; `None` for the file that is checked.
     pub fn reference_to(&self, document: Document<'_>) -> Option<Node<'d>> {
-        let parts = &self.expansion.parts;
-        let of = |part: &Part<'_>| part.document.path() == document.path();
-        let to = parts.iter().position(of).filter(|&to| to > 0)?;
-        parts.iter().find_map(|part| {
-            let link = part.links.iter().find(|link| link.to as usize == to)?;
-            let mut references = part.document.elements("ScenarioReference");
+        let pieces = &self.expansion.pieces;
+        let of = |piece: &Piece<'_>| piece.document.path() == document.path();
+        let to = pieces.iter().position(of).filter(|&to| to > 0)?;
+        pieces.iter().find_map(|piece| {
+            let link = piece.links.iter().find(|link| link.to as usize == to)?;
+            let mut references = piece.document.elements("ScenarioReference");
             references.find(|node| node.offset() == link.at)
         })
     }
@@ -140,19 +140,6 @@ impl<'d> Assembly<'d> {
     pub fn problems(&self, sorts: &'static [What]) -> impl Iterator<Item = &Problem<'d>> {
         let all = self.expansion.problems.iter();
         all.filter(move |problem| sorts.contains(&problem.what))
-    }
-
-    /// The groups that are taken from other files, each once.
-    pub fn library_groups(&self) -> Vec<Node<'d>> {
-        let mut groups: Vec<Node<'d>> = Vec::new();
-        for reference in &self.expansion.references {
-            for copy in reference.uses.iter().flat_map(|one| &one.copies) {
-                if !groups.contains(&copy.group) {
-                    groups.push(copy.group);
-                }
-            }
-        }
-        groups
     }
 }
 

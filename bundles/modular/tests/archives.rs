@@ -1,7 +1,11 @@
 //! Archives and files as bytes, which pages cannot show: byte order marks, damage, names that a packer refuses,
 //! and what must not be said twice.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::needless_pass_by_value,
+    reason = "helpers of tests, which are given what is made on the spot"
+)]
 
 use std::path::{Path, PathBuf};
 
@@ -91,8 +95,8 @@ fn said(path: &Path) -> Vec<String> {
 #[track_caller]
 fn expect(found: &[String], expected: &[(&str, &str)]) {
     let fits = found.len() == expected.len()
-        && found.iter().zip(expected).all(|(said, (rule, part))| {
-            said.starts_with(&format!("{rule}: ")) && said.contains(part)
+        && found.iter().zip(expected).all(|(said, (rule, piece))| {
+            said.starts_with(&format!("{rule}: ")) && said.contains(piece)
         });
     assert!(fits, "found {found:#?}\nexpected {expected:#?}");
 }

@@ -6,6 +6,7 @@
     clippy::panic,
     reason = "a test that cannot go on fails where it stands"
 )]
+#![expect(clippy::print_stdout, reason = "a skipped test says so")]
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
@@ -152,7 +153,7 @@ fn load(case: &Case) -> Loaded {
 fn expanded(loaded: &Loaded) -> Option<String> {
     let subject = loaded.subject(&BUNDLE).unwrap();
     let expansion = subject.expansion();
-    let whole = expansion.is_complete() && expansion.parts[0].document.root().is_some();
+    let whole = expansion.is_complete() && expansion.pieces[0].document.root().is_some();
     whole.then(|| expansion.text())
 }
 

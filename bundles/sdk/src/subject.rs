@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use qcbus_document::{Document, FileKind, Image, ImageError, Node, XPaths};
 use qcbus_ingest::Limits;
-use qcbus_ingest::modular::{Expansion, Part};
+use qcbus_ingest::modular::{Expansion, Piece};
 use qcbus_messages::{DocumentRole, Link, MissingDocument};
 
 use crate::kept::{ImageId, KeptModels};
@@ -153,16 +153,16 @@ impl<'d> Subject<'d> {
 
     /// What becomes of the written root when it is expanded, with all that is wrong on the way.
     pub fn expansion(&self) -> Expansion<'d> {
-        let root = Part {
+        let root = Piece {
             document: self.written,
             links: self.links.clone(),
         };
-        let linked = self.linked.iter().map(|linked| Part {
+        let linked = self.linked.iter().map(|linked| Piece {
             document: linked.document,
             links: linked.links.to_vec(),
         });
-        let parts = std::iter::once(root).chain(linked).collect();
-        qcbus_ingest::modular::expand(parts, Limits::default().max_archive)
+        let pieces = std::iter::once(root).chain(linked).collect();
+        qcbus_ingest::modular::expand(pieces, Limits::default().max_archive)
     }
 
     /// The document that is checked.

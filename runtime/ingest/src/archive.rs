@@ -48,16 +48,16 @@ pub(crate) struct Entry {
 impl OpenArchive {
     /// Reads the directory. Names that lead out of the archive are refused whichever member is asked
     /// for; the caps count over all members, so that no order of reading slips past them.
-    pub fn new(packed: Arc<[u8]>, limits: &Limits) -> OpenArchive {
+    pub fn new(packed: &Arc<[u8]>, limits: &Limits) -> OpenArchive {
         let mut faults = Vec::new();
         let mut zip = match ZipArchive::new(Cursor::new(packed.clone())) {
             Ok(zip) => zip,
             Err(error) => {
-                faults.push(damaged(&packed, &error));
+                faults.push(damaged(packed, &error));
                 return OpenArchive { zip: None, faults };
             }
         };
-        match check_directory(&mut zip, &packed, limits, &mut faults) {
+        match check_directory(&mut zip, packed, limits, &mut faults) {
             Ok(()) => OpenArchive {
                 zip: Some(zip),
                 faults,
@@ -343,7 +343,7 @@ mod tests {
 
     fn read(packed: &[u8], limits: Limits) -> (Vec<u8>, Vec<Code>, String) {
         let mut left = limits.max_archive;
-        let mut archive = OpenArchive::new(packed.into(), &limits);
+        let mut archive = OpenArchive::new(&packed.into(), &limits);
         let mut member = archive.member(MAIN_MEMBER, &limits, &mut left);
         if !archive.is_refused() {
             member.faults.splice(0..0, archive.faults().iter().cloned());

@@ -6,7 +6,7 @@ use std::path::Path;
 use qcbus_document::{Document, Node};
 use qcbus_messages::{Absence, DocumentRole};
 
-use crate::modular::{ExpandedImage, Expansion, Part, SearchPath, expand, pack};
+use crate::modular::{ExpandedImage, Expansion, Piece, SearchPath, expand, pack};
 use crate::{Limits, Reader, Source, Walking, gather, prepare_bytes, references};
 
 /// Whatever the bytes are and whatever the name promises: there is an image, it is valid, its
@@ -127,11 +127,11 @@ pub fn archive(bytes: &[u8]) -> Outcome {
     let Ok(found) = gather(&root, &walking, &mut shelf);
     let images = shelf.images.iter().map(|image| Document::open(image));
     let documents = std::iter::once(root).chain(images.filter_map(Result::ok));
-    let parts: Vec<Part<'_>> = documents
+    let pieces: Vec<Piece<'_>> = documents
         .zip(found.links)
-        .map(|(document, links)| Part { document, links })
+        .map(|(document, links)| Piece { document, links })
         .collect();
-    let expansion = expand(parts, limits.max_archive);
+    let expansion = expand(pieces, limits.max_archive);
     if let Some(obstacle) = expansion.obstacles().next() {
         return Outcome::Stopped(obstacle.text.clone());
     }
@@ -155,7 +155,7 @@ pub fn assembled(files: &[(String, Vec<u8>)]) -> Outcome {
 #[expect(clippy::panic, reason = "a fuzz body reports by panicking")]
 fn sound(expansion: &Expansion<'_>, image: &[u8]) -> String {
     let text = expansion.text();
-    let whole = expansion.parts[0].document.root().is_some();
+    let whole = expansion.pieces[0].document.root().is_some();
     let document = match Document::open(image) {
         Ok(document) => document,
         Err(error) => panic!("the expanded image: {error}"),
@@ -181,7 +181,7 @@ fn sound(expansion: &Expansion<'_>, image: &[u8]) -> String {
     }
     assert_eq!(tree(document), tree(again), "{text}");
     let same = expand(
-        vec![Part {
+        vec![Piece {
             document: again,
             links: Vec::new(),
         }],

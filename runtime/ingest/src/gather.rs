@@ -10,7 +10,7 @@ use qcbus_messages::path_text::{from_text, to_text};
 use qcbus_messages::{Absence, DocumentRole, Link, MissingDocument, Within};
 
 use crate::archive::MAIN_MEMBER;
-use crate::modular::{ExpandedImage, MAX_DEPTH, Part, SearchPath, expand, modules};
+use crate::modular::{ExpandedImage, MAX_DEPTH, Piece, SearchPath, expand, modules};
 use crate::references::{Parameters, Reference, references};
 
 /// Where documents come from and go to.
@@ -146,6 +146,9 @@ struct Walk<'w, S> {
     /// With the kind of catalogs that a missing directory was to have.
     missing: Vec<(MissingDocument, Option<String>)>,
 }
+
+/// What is in the way of an expanded scenario, and the element of the root that leads there.
+type Obstacle = (String, u32);
 
 /// A document that was fetched.
 #[derive(Debug, Default)]
@@ -305,9 +308,9 @@ impl<S: Source> Walk<'_, S> {
         Ok(())
     }
 
-    /// The expanded scenario, or what is in its way and the element of the root that leads there.
-    fn expanded(&self) -> Result<Result<S::Document, (String, u32)>, S::Halt> {
-        let expansion = expand(self.parts(), self.walking.max_text);
+    /// The expanded scenario, or what is in its way.
+    fn expanded(&self) -> Result<Result<S::Document, Obstacle>, S::Halt> {
+        let expansion = expand(self.pieces(), self.walking.max_text);
         if let Some(obstacle) = expansion.obstacles().next() {
             let node = obstacle.at.node();
             let path = node.document().path();
@@ -329,16 +332,16 @@ impl<S: Source> Walk<'_, S> {
 
     /// The documents with their links. One that cannot be opened was said to be missing: the root stands
     /// in its place, to which no scenario may refer.
-    fn parts(&self) -> Vec<Part<'_>> {
+    fn pieces(&self) -> Vec<Piece<'_>> {
         let images =
             (1..self.documents.len()).map(|index| Document::open(self.source.kept(index - 1)));
         let documents =
             std::iter::once(*self.root).chain(images.map(|it| it.unwrap_or(*self.root)));
-        let part = |(document, had): (_, &Had)| Part {
+        let piece = |(document, had): (_, &Had)| Piece {
             document,
             links: had.links.clone(),
         };
-        documents.zip(&self.documents).map(part).collect()
+        documents.zip(&self.documents).map(piece).collect()
     }
 
     fn link(&mut self, from: usize, reference: &Reference, to: usize) {

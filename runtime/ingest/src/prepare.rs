@@ -127,7 +127,7 @@ impl Reader {
         if FileKind::of_path(path) != Some(FileKind::Mosc) {
             return open(path, bytes, &self.limits);
         }
-        let archive = OpenArchive::new(bytes.into(), &self.limits);
+        let archive = OpenArchive::new(&bytes.into(), &self.limits);
         self.archives.insert(path.clone(), (stamp.clone(), archive));
         self.open_archive(path, members)
     }
@@ -151,7 +151,7 @@ impl Reader {
                 if !member.present {
                     return empty(path, member.faults);
                 }
-                let inner = OpenArchive::new(member.bytes.into(), &self.limits);
+                let inner = OpenArchive::new(&member.bytes.into(), &self.limits);
                 self.archives.insert(path.clone(), (stamp, inner));
             }
             return self.open_archive(&path, rest);

@@ -143,7 +143,7 @@ fn what_an_archive_is_made_of_lies_in_it() {
     assert_eq!(found[0].candidates, [PathBuf::from("/farm/m.xodr")]);
     let member = PathBuf::from("/farm/x.mosc!lib.xosc");
     assert_eq!(found[1].role, DocumentRole::Scenario);
-    assert_eq!(found[1].candidates, [member.clone()]);
+    assert_eq!(found[1].candidates, std::slice::from_ref(&member));
 
     let image = prepare_bytes(&member, archive, &Limits::default()).build();
     let document = Document::open(&image).unwrap();

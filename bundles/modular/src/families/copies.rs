@@ -6,7 +6,7 @@ use qcbus_document::{Attribute, Document, FileKind, Node};
 use qcbus_messages::DocumentRole;
 use qcbus_openscenario::{Inputs, LinkedCatalog, LinkedMap, Scenario};
 use qcbus_schema::Version;
-use qcbus_sdk::modular::{Copy, OFFERS, Reference, Spot, Use, Value, offered};
+use qcbus_sdk::modular::{Copy, Followed, OFFERS, Spot, Use, Value, offered};
 
 use crate::assembly::Assembly;
 
@@ -14,7 +14,7 @@ use crate::assembly::Assembly;
 #[derive(Clone, Copy)]
 pub struct Taken<'a, 'd> {
     /// The reference of the root that takes it.
-    pub reference: &'a Reference<'d>,
+    pub reference: &'a Followed<'d>,
     /// Which of the things that the reference takes.
     pub one: &'a Use<'d>,
     /// The group with what is replaced in it.
@@ -66,7 +66,7 @@ impl<'d> Taken<'_, 'd> {
 }
 
 /// Where a referring file says what it takes.
-pub fn taken_at<'d>(reference: &Reference<'d>, one: &Use<'d>) -> Spot<'d> {
+pub fn taken_at<'d>(reference: &Followed<'d>, one: &Use<'d>) -> Spot<'d> {
     match one.node == reference.node {
         true => Spot::of(reference.node, "scenarioFileName"),
         false => Spot::of(one.node, "maneuverGroupName"),
@@ -78,7 +78,7 @@ impl<'d> Assembly<'d> {
     /// referred to.
     pub fn taken(&self) -> impl Iterator<Item = Taken<'_, 'd>> {
         let of_root = self.expansion.references.iter();
-        let of_root = of_root.filter(|reference| reference.part == 0);
+        let of_root = of_root.filter(|reference| reference.piece == 0);
         of_root.flat_map(|reference| {
             reference.uses.iter().flat_map(move |one| {
                 let copies = one.copies.iter();
@@ -91,10 +91,12 @@ impl<'d> Assembly<'d> {
         })
     }
 
-    /// The document of a part.
-    pub fn part(&self, part: usize) -> Document<'d> {
-        let parts = &self.expansion.parts;
-        parts.get(part).map_or(self.root(), |part| part.document)
+    /// The document of a piece.
+    pub fn piece(&self, piece: usize) -> Document<'d> {
+        let pieces = &self.expansion.pieces;
+        pieces
+            .get(piece)
+            .map_or(self.root(), |piece| piece.document)
     }
 
     /// The scenario that refers to the others, as it is written, with its catalogs: what it declares.
@@ -167,11 +169,11 @@ impl<'d> Origins<'d> {
             let actors = reference.group.children_named("Actors");
             let actors = actors.flat_map(|actors| actors.children());
             for actor in actors.filter_map(|actor| actor.attribute("entityRef")) {
-                let at = (reference.part, actor.value_offset());
+                let at = (reference.piece, actor.value_offset());
                 origins.insert(at, Origin::Actor(actor));
             }
             for key in reference.uses.iter().flat_map(|one| &one.keys) {
-                let at = (reference.part, key.value.value_offset());
+                let at = (reference.piece, key.value.value_offset());
                 origins.insert(at, Origin::Key(key.key, key.value));
             }
         }
@@ -180,7 +182,7 @@ impl<'d> Origins<'d> {
 
     /// Where a value comes from.
     pub fn get(&self, value: &Value) -> Option<Origin<'d>> {
-        self.0.get(&(value.part, value.offset)).copied()
+        self.0.get(&(value.piece, value.offset)).copied()
     }
 }
 

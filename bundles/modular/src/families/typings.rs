@@ -12,10 +12,10 @@ use crate::assembly::Assembly;
 pub struct Typings(HashMap<usize, Option<Typing>>);
 
 impl Typings {
-    /// The types of a part. Where the root names no version, those of the part's own.
-    pub fn of(&mut self, assembly: &Assembly<'_>, part: usize) -> Option<&Typing> {
-        let typing = self.0.entry(part).or_insert_with(|| {
-            let document = assembly.part(part);
+    /// The types of a piece. Where the root names no version, those of the piece's own.
+    pub fn of(&mut self, assembly: &Assembly<'_>, piece: usize) -> Option<&Typing> {
+        let typing = self.0.entry(piece).or_insert_with(|| {
+            let document = assembly.piece(piece);
             let version = assembly
                 .version_of(assembly.root())
                 .or_else(|| assembly.version_of(document))?;

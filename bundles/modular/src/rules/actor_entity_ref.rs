@@ -1,7 +1,7 @@
 use std::collections::HashSet;
 
 use qcbus_document::Node;
-use qcbus_sdk::modular::{Problem, Reference, What};
+use qcbus_sdk::modular::{Followed, Problem, What};
 use qcbus_sdk::{Place, Rule, Sink};
 
 use crate::assembly::{Assembly, Modular, say};
@@ -26,7 +26,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
         }
         // What comes from further away is said where it is referred to.
         let mut seen = HashSet::new();
-        let near = copies().filter(|copy| Some(copy.part) == reference.target);
+        let near = copies().filter(|copy| Some(copy.piece) == reference.target);
         for copy in near.filter(|copy| seen.insert(copy.group)) {
             kept(reference, copy.group, found);
             before(reference, copy.group, found);
@@ -68,7 +68,7 @@ fn none(problem: &Problem<'_>, found: &mut Sink<'_>) {
 }
 
 /// Actors of the referring group for whom nothing is left.
-fn lost(reference: &Reference<'_>, group: Node<'_>, found: &mut Sink<'_>) {
+fn lost(reference: &Followed<'_>, group: Node<'_>, found: &mut Sink<'_>) {
     let all = actors(reference.group);
     let Some((first, others)) = all.split_first() else {
         return;
@@ -91,7 +91,7 @@ fn lost(reference: &Reference<'_>, group: Node<'_>, found: &mut Sink<'_>) {
 }
 
 /// Actors of the other group that stay as they are.
-fn kept(reference: &Reference<'_>, group: Node<'_>, found: &mut Sink<'_>) {
+fn kept(reference: &Followed<'_>, group: Node<'_>, found: &mut Sink<'_>) {
     let all = actors(group);
     let Some((_, others)) = all.split_first() else {
         return;
@@ -118,7 +118,7 @@ fn kept(reference: &Reference<'_>, group: Node<'_>, found: &mut Sink<'_>) {
 }
 
 /// An entity that comes before the actors, and is taken for one by the reference tool.
-fn before(reference: &Reference<'_>, group: Node<'_>, found: &mut Sink<'_>) {
+fn before(reference: &Followed<'_>, group: Node<'_>, found: &mut Sink<'_>) {
     let (Some(actor), Some(first)) = (actors(group).first().copied(), first_entity(group)) else {
         return;
     };

@@ -80,13 +80,13 @@ fn document<'d>(assembly: &Assembly<'d>, path: &str) -> Option<Document<'d>> {
 fn below(assembly: &Assembly<'_>, archives: &[Archive<'_>]) -> BTreeSet<(usize, usize)> {
     let index: BTreeMap<&str, usize> = archives.iter().map(|it| it.path).zip(0..).collect();
     let mut next: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); archives.len()];
-    let parts = &assembly.expansion.parts;
-    for part in parts {
-        let from = archive_of(part.document.path()).and_then(|path| index.get(path));
-        let targets = part
+    let pieces = &assembly.expansion.pieces;
+    for piece in pieces {
+        let from = archive_of(piece.document.path()).and_then(|path| index.get(path));
+        let targets = piece
             .links
             .iter()
-            .filter_map(|link| parts.get(link.to as usize));
+            .filter_map(|link| pieces.get(link.to as usize));
         for target in targets.map(|target| target.document.path()) {
             let to = target
                 .strip_suffix(MAIN)

@@ -1,7 +1,7 @@
 use std::collections::HashSet;
 
 use qcbus_document::{Attribute, Node};
-use qcbus_sdk::modular::{OFFERS, Reference};
+use qcbus_sdk::modular::{Followed, OFFERS};
 use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::assembly::{Assembly, Modular};
@@ -20,7 +20,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     for reference in &assembly.expansion.references {
         // A group with nothing in its place is another problem.
         let groups: Vec<Node<'_>> = groups(reference).collect();
-        if groups.is_empty() || !seen.insert((reference.part, reference.group.index())) {
+        if groups.is_empty() || !seen.insert((reference.piece, reference.group.index())) {
             continue;
         }
         let referring = reference.group;
@@ -34,7 +34,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
 }
 
 /// The groups that take the place of the referring one.
-fn groups<'a, 'd>(reference: &'a Reference<'d>) -> impl Iterator<Item = Node<'d>> + use<'a, 'd> {
+fn groups<'a, 'd>(reference: &'a Followed<'d>) -> impl Iterator<Item = Node<'d>> + use<'a, 'd> {
     let copies = reference.uses.iter().flat_map(|one| &one.copies);
     copies.map(|copy| copy.group)
 }

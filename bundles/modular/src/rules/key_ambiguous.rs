@@ -27,19 +27,19 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     }
     for reference in &assembly.expansion.references {
         for one in &reference.uses {
-            spread(one, reference.part, found);
+            spread(one, reference.piece, found);
         }
     }
 }
 
 /// Says which keys without an element give their value to different sorts of elements.
-fn spread(one: &Use<'_>, part: usize, found: &mut Sink<'_>) {
+fn spread(one: &Use<'_>, piece: usize, found: &mut Sink<'_>) {
     let is_spread = |key: &&Key<'_>| !key.key.contains('.') && key.wins.get() > 1;
     let mut keys = one.keys.iter().filter(is_spread).peekable();
     if keys.peek().is_none() {
         return;
     }
-    let winners = winners(one, part);
+    let winners = winners(one, piece);
     for key in keys {
         if let Some(attributes) = winners.get(&key.value.value_offset()) {
             say_spread(key, attributes, found);
@@ -48,11 +48,11 @@ fn spread(one: &Use<'_>, part: usize, found: &mut Sink<'_>) {
 }
 
 /// The attributes that get a value of a use, one of each sort of element, by where the value is written.
-fn winners<'d>(one: &Use<'d>, part: usize) -> HashMap<u32, Vec<Attribute<'d>>> {
+fn winners<'d>(one: &Use<'d>, piece: usize) -> HashMap<u32, Vec<Attribute<'d>>> {
     let mut winners: HashMap<u32, Vec<Attribute<'d>>> = HashMap::new();
     for copy in &one.copies {
         for attribute in offered_in(copy.group) {
-            let new = copy.edit(attribute).filter(|new| new.part == part);
+            let new = copy.edit(attribute).filter(|new| new.piece == piece);
             let Some(new) = new else { continue };
             let sorts = winners.entry(new.offset).or_default();
             let is_known = |other: &Attribute<'_>| other.node().is(attribute.node().name());

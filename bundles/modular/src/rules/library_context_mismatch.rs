@@ -1,7 +1,7 @@
 use std::collections::HashSet;
 
 use qcbus_document::{Attribute, Document, Node};
-use qcbus_sdk::modular::{Reference, Spot};
+use qcbus_sdk::modular::{Followed, Spot};
 use qcbus_sdk::{Level, Place, Rule, Sink};
 
 use crate::assembly::{Assembly, Modular, place};
@@ -22,21 +22,21 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
         let Some(target) = reference.target.filter(|target| seen.insert(*target)) else {
             continue;
         };
-        say_version(assembly, reference, assembly.part(target), found);
+        say_version(assembly, reference, assembly.piece(target), found);
     }
-    // By the part and its map: what the first group that lies on another map is.
+    // By the piece and its map: what the first group that lies on another map is.
     let mut seen = HashSet::new();
     for taken in assembly.taken() {
-        let part = taken.copy.part;
-        if !seen.contains(&part) && say_map(assembly, &taken, found) {
-            seen.insert(part);
+        let piece = taken.copy.piece;
+        if !seen.contains(&piece) && say_map(assembly, &taken, found) {
+            seen.insert(piece);
         }
     }
 }
 
 fn say_version<'d>(
     assembly: &Assembly<'d>,
-    reference: &Reference<'d>,
+    reference: &Followed<'d>,
     library: Document<'d>,
     found: &mut Sink<'_>,
 ) {

@@ -1,5 +1,5 @@
 use qcbus_document::Attribute;
-use qcbus_sdk::modular::{Reference, Use, offered};
+use qcbus_sdk::modular::{Followed, Use, offered};
 use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::assembly::{Assembly, Modular, place};
@@ -20,14 +20,14 @@ const MOST: usize = 8;
 fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     // What an inner scenario leaves an outer one may still replace.
     let of_root = assembly.expansion.references.iter();
-    for reference in of_root.filter(|reference| reference.part == 0) {
+    for reference in of_root.filter(|reference| reference.piece == 0) {
         for one in &reference.uses {
             say(reference, one, found);
         }
     }
 }
 
-fn say(reference: &Reference<'_>, one: &Use<'_>, found: &mut Sink<'_>) {
+fn say(reference: &Followed<'_>, one: &Use<'_>, found: &mut Sink<'_>) {
     let mut kept: Vec<Attribute<'_>> = Vec::new();
     let mut all = 0;
     for copy in &one.copies {

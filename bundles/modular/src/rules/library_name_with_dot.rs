@@ -22,7 +22,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     for reference in &assembly.expansion.references {
         let group = reference.group;
         let name = group.attr("name").filter(|name| name.contains('.'));
-        if let Some(name) = name.filter(|_| seen.insert((reference.part, group.index()))) {
+        if let Some(name) = name.filter(|_| seen.insert((reference.piece, group.index()))) {
             let text = format!(
                 "the referring group is called `{name}`; expansion puts a dot between its name and that of the group \
                  that it takes, so a dot within a name leaves open where one ends and the next begins"

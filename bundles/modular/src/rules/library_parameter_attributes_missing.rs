@@ -1,5 +1,5 @@
 use qcbus_document::{Attribute, Node};
-use qcbus_sdk::modular::{Key, OFFERS, Reference, Spot, Use};
+use qcbus_sdk::modular::{Followed, Key, OFFERS, Spot, Use};
 use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::assembly::{Assembly, Modular, place};
@@ -38,7 +38,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
 
 /// Of a group that offers nothing, where the keys would fit.
 fn say_nothing_offered(
-    reference: &Reference<'_>,
+    reference: &Followed<'_>,
     one: &Use<'_>,
     (group, groups): (Node<'_>, &[Node<'_>]),
     found: &mut Sink<'_>,

@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use qcbus_document::Node;
-use qcbus_sdk::modular::{Reference, What};
+use qcbus_sdk::modular::{Followed, What};
 use qcbus_sdk::{Level, Place, Rule, Sink};
 
 use crate::assembly::{Assembly, Modular, say};
@@ -29,11 +29,11 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     let references = &assembly.expansion.references;
     let nexts = nexts(references);
     for (index, reference) in references.iter().enumerate() {
-        if reference.part != 0 {
+        if reference.piece != 0 {
             continue;
         }
         let next = |&index: &usize| nexts.get(index).copied().flatten();
-        let chain: Vec<&Reference<'_>> = std::iter::successors(Some(index), next)
+        let chain: Vec<&Followed<'_>> = std::iter::successors(Some(index), next)
             .filter_map(|index| references.get(index))
             .collect();
         let Some(&deep) = chain.get(MODEST) else {
@@ -56,24 +56,24 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
 
 /// For each reference, which one in the file that it leads to leads deepest. References in a file come
 /// before those that lead to it.
-fn nexts(references: &[Reference<'_>]) -> Vec<Option<usize>> {
+fn nexts(references: &[Followed<'_>]) -> Vec<Option<usize>> {
     let mut heights: Vec<usize> = Vec::new();
     let mut nexts = Vec::new();
     let mut deepest: BTreeMap<usize, usize> = BTreeMap::new();
     for (index, reference) in references.iter().enumerate() {
         let next = reference
             .target
-            .and_then(|part| deepest.get(&part))
+            .and_then(|piece| deepest.get(&piece))
             .copied();
         let below = next.and_then(|next| heights.get(next)).copied();
         let height = below.unwrap_or(0) + 1;
         heights.push(height);
         nexts.push(next);
         let best = deepest
-            .get(&reference.part)
+            .get(&reference.piece)
             .and_then(|&best| heights.get(best));
         if best.is_none_or(|&best| best < height) {
-            deepest.insert(reference.part, index);
+            deepest.insert(reference.piece, index);
         }
     }
     nexts

@@ -18,7 +18,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
         let target = references
             .find(|it| it.node == node)
             .and_then(|it| it.target);
-        let file = target.and_then(|target| assembly.expansion.parts.get(target)?.document.root());
+        let file = target.and_then(|target| assembly.expansion.pieces.get(target)?.document.root());
         let finding = say(found, problem, "").level(Level::Warning);
         if let Some(file) = file {
             finding.at(file, "the file whose groups are taken");

@@ -1,7 +1,7 @@
 use std::collections::HashSet;
 
 use qcbus_document::{Document, Node};
-use qcbus_sdk::modular::{Form, Reference, Spot, What};
+use qcbus_sdk::modular::{Followed, Form, Spot, What};
 use qcbus_sdk::{Rule, Sink};
 
 use crate::assembly::{Assembly, Modular, place, say};
@@ -36,11 +36,11 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
 /// Whether a reference in a document takes less than it asks for.
 fn is_incomplete(assembly: &Assembly<'_>, document: Document<'_>) -> bool {
     let expansion = &assembly.expansion;
-    let of_it = |reference: &&Reference<'_>| {
-        let part = expansion.parts.get(reference.part);
-        part.is_some_and(|part| part.document.path() == document.path())
+    let of_it = |reference: &&Followed<'_>| {
+        let piece = expansion.pieces.get(reference.piece);
+        piece.is_some_and(|piece| piece.document.path() == document.path())
     };
-    let is_short = |reference: &Reference<'_>| {
+    let is_short = |reference: &Followed<'_>| {
         let named = reference.node.children_named("ManeuverGroupReference");
         reference.target.is_none() || reference.uses.len() < named.count()
     };
@@ -48,14 +48,14 @@ fn is_incomplete(assembly: &Assembly<'_>, document: Document<'_>) -> bool {
 }
 
 /// The first group without a name of the file that a reference takes groups from by their names.
-fn nameless<'d>(assembly: &Assembly<'d>, reference: &Reference<'d>) -> Option<Node<'d>> {
+fn nameless<'d>(assembly: &Assembly<'d>, reference: &Followed<'d>) -> Option<Node<'d>> {
     let target = reference.target.filter(|_| reference.form == Form::Named)?;
-    let document = assembly.expansion.parts.get(target)?.document;
+    let document = assembly.expansion.pieces.get(target)?.document;
     let mut groups = document.elements("ManeuverGroup");
     groups.find(|group| group.attr("name").is_none())
 }
 
-fn say_nameless(reference: &Reference<'_>, nameless: Node<'_>, found: &mut Sink<'_>) {
+fn say_nameless(reference: &Followed<'_>, nameless: Node<'_>, found: &mut Sink<'_>) {
     let path = nameless.document().path();
     let file = path.rsplit('/').next().unwrap_or(path);
     // The reference tool reads the names of groups up to the one that it looks for.

@@ -1,7 +1,7 @@
 use std::collections::HashSet;
 
 use qcbus_document::{Document, Node};
-use qcbus_sdk::modular::{Form, Reference, Spot};
+use qcbus_sdk::modular::{Followed, Form, Spot};
 use qcbus_sdk::{Rule, Sink};
 
 use crate::assembly::{Assembly, Modular, place};
@@ -21,9 +21,9 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
         };
         let document = assembly
             .expansion
-            .parts
+            .pieces
             .get(target)
-            .map(|part| part.document);
+            .map(|piece| piece.document);
         let Some(document) = document.filter(|document| !is_archive(*document)) else {
             continue;
         };
@@ -49,7 +49,7 @@ fn is_archive(document: Document<'_>) -> bool {
 /// are named.
 fn taken<'d>(
     assembly: &Assembly<'d>,
-    reference: &Reference<'d>,
+    reference: &Followed<'d>,
     target: usize,
 ) -> HashSet<Node<'d>> {
     let named = reference.node.children_named("ManeuverGroupReference");
@@ -57,8 +57,8 @@ fn taken<'d>(
         .filter_map(|node| node.attr("maneuverGroupName"))
         .collect();
     let inner = assembly.expansion.references.iter();
-    let inner = inner.filter(|inner| inner.part == target);
-    let is_named = |inner: &&Reference<'d>| {
+    let inner = inner.filter(|inner| inner.piece == target);
+    let is_named = |inner: &&Followed<'d>| {
         let mut copies = inner.uses.iter().flat_map(|one| &one.copies);
         inner
             .group
@@ -69,7 +69,7 @@ fn taken<'d>(
     inner.filter(is_named).map(|inner| inner.group).collect()
 }
 
-fn say(reference: &Reference<'_>, document: Document<'_>, group: Node<'_>, found: &mut Sink<'_>) {
+fn say(reference: &Followed<'_>, document: Document<'_>, group: Node<'_>, found: &mut Sink<'_>) {
     let path = document.path();
     let file = path.rsplit(['/', '!']).next().unwrap_or(path);
     let text = format!(

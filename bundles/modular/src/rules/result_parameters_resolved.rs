@@ -42,14 +42,14 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
                     finds.given(at, attribute.into(), "the attribute that gets it", text);
                     continue;
                 }
-                let part = taken.copy.part;
+                let piece = taken.copy.piece;
                 // Names in the document live longer than the copy's.
                 let own = names(attribute.value())
                     .into_iter()
                     .find(|own| *own == name);
                 let Some(own) = own else { continue };
                 let (target, text) = first
-                    .entry((part, own))
+                    .entry((piece, own))
                     .or_insert_with(|| (attribute.into(), brought(&taken, attribute, own)))
                     .clone();
                 finds.brought(taken.at(), target, "the value that needs it", text);

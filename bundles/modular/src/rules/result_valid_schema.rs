@@ -91,9 +91,9 @@ fn groups<'a, 'd>(
 struct Judge<'a, 'd> {
     own: Version,
     groups: Vec<(Node<'d>, Taken<'a, 'd>)>,
-    /// What the files of parts violate by themselves.
+    /// What the files of pieces violate by themselves.
     libraries: HashMap<usize, Option<HashSet<(u32, Code)>>>,
-    /// By the part and what is said of it: where that is first.
+    /// By the piece and what is said of it: where that is first.
     first: HashMap<(usize, String), Spot<'d>>,
     finds: Finds<'d>,
 }
@@ -147,7 +147,7 @@ impl<'a, 'd> Judge<'a, 'd> {
             let Some(theirs) = theirs.filter(|theirs| *theirs != self.own) else {
                 continue;
             };
-            if self.is_own_fault(taken.copy.part, library, spot, violation) {
+            if self.is_own_fault(taken.copy.piece, library, spot, violation) {
                 continue;
             }
             let text = format!(
@@ -162,9 +162,9 @@ impl<'a, 'd> Judge<'a, 'd> {
         }
     }
 
-    /// Notes a fault at the first place of its part.
+    /// Notes a fault at the first place of its piece.
     fn note(&mut self, taken: Taken<'_, 'd>, spot: Spot<'d>, text: String) {
-        let key = (taken.copy.part, text.clone());
+        let key = (taken.copy.piece, text.clone());
         let first = *self.first.entry(key).or_insert(spot);
         let there = "where the library file has it";
         self.finds.brought(taken.at(), first, there, text);
@@ -202,12 +202,12 @@ impl<'a, 'd> Judge<'a, 'd> {
     /// Whether the library file has the fault in its own version, too.
     fn is_own_fault(
         &mut self,
-        part: usize,
+        piece: usize,
         library: Document<'d>,
         spot: Spot<'d>,
         violation: &Violation<'_>,
     ) -> bool {
-        let own = self.libraries.entry(part).or_insert_with(|| {
+        let own = self.libraries.entry(piece).or_insert_with(|| {
             let checked = checked(&library)?;
             // Of faults that are not listed nobody knows where they are.
             let all = checked

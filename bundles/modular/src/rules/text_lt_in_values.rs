@@ -33,19 +33,23 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
         });
     }
     // What refers itself is written as a whole, of others a group.
-    let whole: HashSet<usize> = references.iter().map(|reference| reference.part).collect();
+    let whole: HashSet<usize> = references.iter().map(|reference| reference.piece).collect();
     let mut finds = Finds::default();
     let mut looked: HashSet<(usize, u32)> = HashSet::new();
     for reference in references {
         let at = Spot::of(reference.node, "scenarioFileName");
         if let Some(target) = reference.target.filter(|target| whole.contains(target)) {
-            let all = assembly.part(target).root().filter(|_| target != 0);
+            let all = assembly.piece(target).root().filter(|_| target != 0);
             let all = all.filter(|all| looked.insert((target, all.index())));
             all.into_iter().for_each(|all| bring(all, at, &mut finds));
         }
         for one in &reference.uses {
-            for copy in one.copies.iter().filter(|copy| !whole.contains(&copy.part)) {
-                let key = (copy.part, copy.group.index());
+            for copy in one
+                .copies
+                .iter()
+                .filter(|copy| !whole.contains(&copy.piece))
+            {
+                let key = (copy.piece, copy.group.index());
                 if looked.insert(key) {
                     bring(copy.group, taken_at(reference, one), &mut finds);
                 }

@@ -98,7 +98,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
             let Some(number) = parse_double(&value.text) else {
                 continue;
             };
-            let typing = typings.of(assembly, taken.copy.part);
+            let typing = typings.of(assembly, taken.copy.piece);
             let class = typing.and_then(|typing| typing.class(attribute.node()));
             let range = class.and_then(|class| range_of(class, attribute));
             let Some(range) = range.filter(|range| number < range.low || number > range.high)

@@ -24,7 +24,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
             .edited()
             .filter(|(_, value)| !value.text.contains('$'))
         {
-            let typing = typings.of(assembly, taken.copy.part);
+            let typing = typings.of(assembly, taken.copy.piece);
             let Some(value_type) = typing.and_then(|typing| typing.value(attribute)) else {
                 continue;
             };

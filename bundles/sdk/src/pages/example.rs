@@ -150,7 +150,7 @@ const MEMBER: &str = ".mosc!";
 /// Several files need a folder of their own.
 fn written(files: &[(String, String)]) -> std::io::Result<tempfile::TempDir> {
     let folder = tempfile::tempdir()?;
-    let files: Vec<(String, Vec<u8>)> = files
+    let files: Vec<NamedBytes> = files
         .iter()
         .flat_map(|(name, text)| many(name).map(|name| (name, text.clone().into_bytes())))
         .collect();
@@ -179,10 +179,13 @@ fn many(name: &str) -> impl Iterator<Item = String> {
     names.into_iter()
 }
 
+/// A file: its name and what is in it.
+type NamedBytes = (String, Vec<u8>);
+
 /// The files of a folder: those of archives are packed.
-fn packed(files: &[(String, Vec<u8>)]) -> std::io::Result<Vec<(String, Vec<u8>)>> {
-    let mut whole: Vec<(String, Vec<u8>)> = Vec::new();
-    let mut archives: Vec<(String, Vec<(String, Vec<u8>)>)> = Vec::new();
+fn packed(files: &[NamedBytes]) -> std::io::Result<Vec<NamedBytes>> {
+    let mut whole: Vec<NamedBytes> = Vec::new();
+    let mut archives: Vec<(String, Vec<NamedBytes>)> = Vec::new();
     for (name, bytes) in files {
         let Some((archive, member)) = name.split_once(MEMBER) else {
             whole.push((name.clone(), bytes.clone()));

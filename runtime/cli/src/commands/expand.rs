@@ -78,7 +78,7 @@ pub(super) fn say_findings(loaded: &Loaded) {
 
 /// Why no plain scenario can be made.
 fn in_the_way(expansion: &Expansion<'_>) -> Option<String> {
-    let root = expansion.parts.first()?.document;
+    let root = expansion.pieces.first()?.document;
     if root.root().is_none() {
         let fault = root.faults().next();
         return Some(
@@ -95,7 +95,7 @@ fn in_the_way(expansion: &Expansion<'_>) -> Option<String> {
 /// The file that the scenario is made of and that would be overwritten.
 fn source_at(expansion: &Expansion<'_>, output: &Path) -> Option<String> {
     let output = output.canonicalize().ok()?;
-    let files = expansion.parts.iter().map(|part| part.document.path());
+    let files = expansion.pieces.iter().map(|piece| piece.document.path());
     // Of a member the archive counts.
     let mut files = files.map(|path| match path.split_once(".mosc!") {
         Some((archive, _)) => format!("{archive}.mosc"),

@@ -19,7 +19,7 @@ fn entity<'d>(group: Node<'d>) -> Option<Attribute<'d>> {
 /// Puts the first actor of the referring group in the place of the first actor of the copied one.
 pub(super) fn replace<'d>(
     copy: &mut Copy<'d>,
-    part: usize,
+    piece: usize,
     referring: Node<'d>,
     problems: &mut Problems<'d>,
 ) {
@@ -37,7 +37,7 @@ pub(super) fn replace<'d>(
     };
     match (entity(referring), entity(copy.group)) {
         (Some(new), Some(old)) => {
-            copy.edits.insert(old.offset(), Value::of(part, new));
+            copy.edits.insert(old.offset(), Value::of(piece, new));
         }
         (None, _) => lacks(
             referring,

@@ -10,20 +10,20 @@ use qcbus_document::{Attribute, Node};
 pub struct Value {
     /// The value, entities resolved.
     pub text: Rc<str>,
-    /// The part whose text has it.
-    pub part: usize,
-    /// Where it is written in the text of the part.
+    /// The piece whose text has it.
+    pub piece: usize,
+    /// Where it is written in the text of the piece.
     pub offset: u32,
     /// Bytes of it there.
     pub raw_len: u32,
 }
 
 impl Value {
-    /// The value of an attribute of a part.
-    pub(super) fn of(part: usize, attribute: Attribute<'_>) -> Value {
+    /// The value of an attribute of a piece.
+    pub(super) fn of(piece: usize, attribute: Attribute<'_>) -> Value {
         Value {
             text: attribute.value().into(),
-            part,
+            piece,
             offset: attribute.value_offset(),
             raw_len: attribute.raw_len(),
         }
@@ -38,11 +38,11 @@ impl Value {
     }
 }
 
-/// A maneuver group of a part, with what is replaced in it.
+/// A maneuver group of a piece, with what is replaced in it.
 #[derive(Debug, Clone)]
 pub struct Copy<'d> {
-    /// The part that it is from.
-    pub part: usize,
+    /// The piece that it is from.
+    pub piece: usize,
     /// The group there.
     pub group: Node<'d>,
     /// Its new name; `None` where it keeps its own.
@@ -53,9 +53,9 @@ pub struct Copy<'d> {
 
 impl<'d> Copy<'d> {
     /// A group as it is.
-    pub(super) fn as_is(part: usize, group: Node<'d>) -> Copy<'d> {
+    pub(super) fn as_is(piece: usize, group: Node<'d>) -> Copy<'d> {
         Copy {
-            part,
+            piece,
             group,
             name: None,
             edits: BTreeMap::new(),

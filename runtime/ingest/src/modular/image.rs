@@ -17,7 +17,7 @@ use crate::xml::{Counter, Halt, Sink};
 pub struct ExpandedImage<'e, 'd> {
     expansion: &'e Expansion<'d>,
     texts: Vec<&'d str>,
-    /// Where the text of each part begins in the image's.
+    /// Where the text of each piece begins in the image's.
     starts: Vec<u32>,
     capacities: Capacities,
 }
@@ -30,12 +30,12 @@ impl<'d> Expansion<'d> {
             return None;
         }
         let mut next = 0usize;
-        let mut starts = vec![0; self.parts.len()];
-        let mut texts = vec![""; self.parts.len()];
-        for &part in &self.used {
-            texts[part] = text_of(self.parts[part].document);
-            starts[part] = u32::try_from(next).ok()?;
-            next += texts[part].len() + 1;
+        let mut starts = vec![0; self.pieces.len()];
+        let mut texts = vec![""; self.pieces.len()];
+        for &piece in &self.used {
+            texts[piece] = text_of(self.pieces[piece].document);
+            starts[piece] = u32::try_from(next).ok()?;
+            next += texts[piece].len() + 1;
         }
         let mut image = ExpandedImage {
             expansion: self,
@@ -62,10 +62,10 @@ impl ExpandedImage<'_, '_> {
     /// Digest over the files that the scenario is made of.
     pub fn digest(&self) -> [u8; 32] {
         let mut hash = Sha256::new();
-        for part in &self.expansion.parts {
-            hash.update(part.document.path());
+        for piece in &self.expansion.pieces {
+            hash.update(piece.document.path());
             hash.update([0]);
-            hash.update(part.document.content_hash());
+            hash.update(piece.document.content_hash());
         }
         hash.finalize().into()
     }
@@ -76,9 +76,9 @@ impl ExpandedImage<'_, '_> {
     /// [`BuildError::SmallBuffer`] when `out` is shorter than [`ExpandedImage::upper_bound`].
     pub fn build_into(&self, out: &mut [u8]) -> Result<usize, BuildError> {
         let mut builder = ImageBuilder::new(out, &self.capacities)?;
-        for &part in &self.expansion.used {
-            let path = self.expansion.parts[part].document.path();
-            builder.source(path, self.texts[part])?;
+        for &piece in &self.expansion.used {
+            let path = self.expansion.pieces[piece].document.path();
+            builder.source(path, self.texts[piece])?;
         }
         match self.tree(&mut builder) {
             Ok(()) => {}
@@ -88,9 +88,9 @@ impl ExpandedImage<'_, '_> {
                 return Err(BuildError::SmallBuffer { found: 0, needed });
             }
         }
-        for &part in &self.expansion.used {
-            for fault in self.expansion.parts[part].document.faults() {
-                let offset = self.starts[part].saturating_add(fault.offset);
+        for &piece in &self.expansion.used {
+            for fault in self.expansion.pieces[piece].document.faults() {
+                let offset = self.starts[piece].saturating_add(fault.offset);
                 builder.fault(fault.code, offset, fault.text)?;
             }
         }
@@ -107,11 +107,11 @@ impl ExpandedImage<'_, '_> {
 
     fn known(&self) -> Capacities {
         let used = || self.expansion.used.iter().copied();
-        let document = |part: usize| self.expansion.parts[part].document;
-        let faults = || used().flat_map(|part| document(part).faults());
-        let paths: usize = used().map(|part| document(part).path().len()).sum();
+        let document = |piece: usize| self.expansion.pieces[piece].document;
+        let faults = || used().flat_map(|piece| document(piece).faults());
+        let paths: usize = used().map(|piece| document(piece).path().len()).sum();
         Capacities {
-            text: used().map(|part| self.texts[part].len() + 1).sum(),
+            text: used().map(|piece| self.texts[piece].len() + 1).sum(),
             sources: self.expansion.used.len(),
             faults: faults().count(),
             heap: paths + faults().map(|fault| fault.text.len()).sum::<usize>(),
@@ -120,7 +120,7 @@ impl ExpandedImage<'_, '_> {
     }
 
     fn tree(&self, sink: &mut impl Sink) -> Result<(), Halt> {
-        match self.expansion.parts[0].document.root() {
+        match self.expansion.pieces[0].document.root() {
             Some(root) => self.subtree(sink, 0, root, None),
             None => Ok(()),
         }
@@ -129,7 +129,7 @@ impl ExpandedImage<'_, '_> {
     fn subtree(
         &self,
         sink: &mut impl Sink,
-        part: usize,
+        piece: usize,
         top: Node<'_>,
         copy: Option<&Copy<'_>>,
     ) -> Result<(), Halt> {
@@ -142,19 +142,19 @@ impl ExpandedImage<'_, '_> {
                 break;
             };
             let replaced = self.expansion.replaced.get(&next);
-            if let Some(copies) = replaced.filter(|_| part == 0 && copy.is_none()) {
+            if let Some(copies) = replaced.filter(|_| piece == 0 && copy.is_none()) {
                 for copy in copies {
-                    self.subtree(sink, copy.part, copy.group, Some(copy))?;
+                    self.subtree(sink, copy.piece, copy.group, Some(copy))?;
                 }
                 next = node.subtree_end();
                 continue;
             }
             if node.is_element() {
-                self.element(sink, part, node, copy)?;
-                let stop = self.starts[part].saturating_add(node.end_offset());
+                self.element(sink, piece, node, copy)?;
+                let stop = self.starts[piece].saturating_add(node.end_offset());
                 open.push((node.subtree_end(), stop));
             } else {
-                self.characters(sink, part, node)?;
+                self.characters(sink, piece, node)?;
             }
             next += 1;
         }
@@ -164,11 +164,11 @@ impl ExpandedImage<'_, '_> {
     fn element(
         &self,
         sink: &mut impl Sink,
-        part: usize,
+        piece: usize,
         node: Node<'_>,
         copy: Option<&Copy<'_>>,
     ) -> Result<(), Halt> {
-        let start = self.starts[part];
+        let start = self.starts[piece];
         let prefix = node.prefix();
         let at = start.saturating_add(node.offset());
         if prefix.is_empty() {
@@ -182,7 +182,7 @@ impl ExpandedImage<'_, '_> {
                 Some(new) => sink.attribute(
                     attribute.name(),
                     name_at,
-                    self.starts[new.part].saturating_add(new.offset),
+                    self.starts[new.piece].saturating_add(new.offset),
                     new.raw_len,
                     Some(&new.text),
                 )?,
@@ -191,7 +191,7 @@ impl ExpandedImage<'_, '_> {
                     name_at,
                     start.saturating_add(attribute.value_offset()),
                     attribute.raw_len(),
-                    self.resolved(part, attribute),
+                    self.resolved(piece, attribute),
                 )?,
             }
         }
@@ -199,18 +199,18 @@ impl ExpandedImage<'_, '_> {
     }
 
     /// The value of an attribute where it differs from what is written.
-    fn resolved<'a>(&self, part: usize, attribute: Attribute<'a>) -> Option<&'a str> {
+    fn resolved<'a>(&self, piece: usize, attribute: Attribute<'a>) -> Option<&'a str> {
         let at = attribute.value_offset() as usize;
-        let written = self.texts[part].get(at..at + attribute.raw_len() as usize);
+        let written = self.texts[piece].get(at..at + attribute.raw_len() as usize);
         let value = attribute.value();
         (written != Some(value)).then_some(value)
     }
 
-    fn characters(&self, sink: &mut impl Sink, part: usize, run: Node<'_>) -> Result<(), Halt> {
+    fn characters(&self, sink: &mut impl Sink, piece: usize, run: Node<'_>) -> Result<(), Halt> {
         let written = run.character_range();
         let value = run.character_run();
-        let raw = self.texts[part].get(written.start as usize..written.end as usize);
-        let start = self.starts[part];
+        let raw = self.texts[piece].get(written.start as usize..written.end as usize);
+        let start = self.starts[piece];
         sink.text(
             start.saturating_add(written.start),
             start.saturating_add(written.end),

@@ -80,7 +80,7 @@ pub fn offered<'d>(element: Node<'d>) -> impl Iterator<Item = Attribute<'d>> {
 /// one that names most elements around it.
 pub(super) fn apply<'d>(
     copy: &mut Copy<'d>,
-    part: usize,
+    piece: usize,
     keys: &[Key<'d>],
     problems: &mut Problems<'d>,
 ) {
@@ -111,7 +111,7 @@ pub(super) fn apply<'d>(
             }
             winner.wins.set(winner.wins.get() + 1);
             copy.edits
-                .insert(attribute.offset(), Value::of(part, winner.value));
+                .insert(attribute.offset(), Value::of(piece, winner.value));
         }
     }
 }

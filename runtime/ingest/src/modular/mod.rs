@@ -20,7 +20,7 @@ pub use copy::{Copy, Value};
 pub use image::ExpandedImage;
 pub use keys::{Key, offered};
 pub use pack::{PackError, pack};
-pub use plan::{Expansion, Form, Reference, Use, expand};
+pub use plan::{Expansion, Followed, Form, Use, expand};
 pub use problem::{Problem, Spot, What};
 pub(crate) use search::modules;
 pub use search::{SEARCH_PATH_VARIABLE, SearchPath};
@@ -38,9 +38,9 @@ pub const OFFERS: &str = "parameterAttributes";
 
 /// A document of a set, with where its references lead within the set.
 #[derive(Debug, Clone)]
-pub struct Part<'d> {
+pub struct Piece<'d> {
     /// The document.
     pub document: Document<'d>,
-    /// Its references that were followed; [`Link::to`] counts the parts.
+    /// Its references that were followed; [`Link::to`] counts the pieces.
     pub links: Vec<Link>,
 }

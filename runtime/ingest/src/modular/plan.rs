@@ -9,34 +9,34 @@ use qcbus_formats::distance::did_you_mean;
 use super::copy::{Copy, Value};
 use super::keys::{self, Key};
 use super::problem::{Problem, Problems, Spot, What};
-use super::{MAX_DEPTH, Part, actor};
+use super::{MAX_DEPTH, Piece, actor};
 use crate::archive::MAIN_MEMBER;
 
 /// What becomes of a modular scenario.
 #[derive(Debug)]
 pub struct Expansion<'d> {
     /// The documents, the root first.
-    pub parts: Vec<Part<'d>>,
+    pub pieces: Vec<Piece<'d>>,
     /// The references that were followed, those of inner scenarios before those that lead there.
-    pub references: Vec<Reference<'d>>,
+    pub references: Vec<Followed<'d>>,
     /// What is wrong.
     pub problems: Vec<Problem<'d>>,
     /// What takes the place of groups of the root, by the index of their node.
     pub(super) replaced: BTreeMap<u32, Vec<Rc<Copy<'d>>>>,
-    /// The parts whose text is in the expanded scenario, the root first.
+    /// The pieces whose text is in the expanded scenario, the root first.
     pub(super) used: BTreeSet<usize>,
 }
 
 /// A `ScenarioReference` that was followed.
 #[derive(Debug)]
-pub struct Reference<'d> {
-    /// The part that has it.
-    pub part: usize,
+pub struct Followed<'d> {
+    /// The piece that has it.
+    pub piece: usize,
     /// The element.
     pub node: Node<'d>,
     /// The group that it is in.
     pub group: Node<'d>,
-    /// The part that it leads to.
+    /// The piece that it leads to.
     pub target: Option<usize>,
     /// How it says what it takes.
     pub form: Form,
@@ -82,20 +82,20 @@ impl<'d> Expansion<'d> {
 /// Most groups that are copied, those of inner scenarios counted each time.
 const MOST_COPIES: usize = 1 << 16;
 
-/// Puts the groups that a modular scenario refers to in the place of the references. `parts` has the
+/// Puts the groups that a modular scenario refers to in the place of the references. `pieces` has the
 /// root first; `max_text` bounds the bytes of what is copied.
 ///
 /// # Panics
-/// When there is no part at all.
-pub fn expand(parts: Vec<Part<'_>>, max_text: u64) -> Expansion<'_> {
+/// When there is no piece at all.
+pub fn expand(pieces: Vec<Piece<'_>>, max_text: u64) -> Expansion<'_> {
     let mut expander = Expander {
-        states: (0..parts.len()).map(|_| State::Unknown).collect(),
+        states: (0..pieces.len()).map(|_| State::Unknown).collect(),
         chain: Vec::new(),
         left: max_text,
         copies: 0,
         problems: Problems::default(),
         out: Expansion {
-            parts,
+            pieces,
             references: Vec::new(),
             problems: Vec::new(),
             replaced: BTreeMap::new(),
@@ -109,7 +109,7 @@ pub fn expand(parts: Vec<Part<'_>>, max_text: u64) -> Expansion<'_> {
 
 struct Expander<'d> {
     states: Vec<State<'d>>,
-    /// The parts that are being expanded, the root first.
+    /// The pieces that are being expanded, the root first.
     chain: Vec<usize>,
     /// Bytes and groups that may still be copied.
     left: u64,
@@ -123,15 +123,15 @@ enum State<'d> {
     Done(Rc<Vec<Expanded<'d>>>),
 }
 
-/// A group of a part with what takes its place: itself, where it refers to nothing.
+/// A group of a piece with what takes its place: itself, where it refers to nothing.
 struct Expanded<'d> {
     group: Node<'d>,
     copies: Vec<Rc<Copy<'d>>>,
 }
 
 impl<'d> Expander<'d> {
-    fn document(&self, part: usize) -> Document<'d> {
-        self.out.parts[part].document
+    fn document(&self, piece: usize) -> Document<'d> {
+        self.out.pieces[piece].document
     }
 
     fn say(&mut self, what: What, at: Spot<'d>, target: Option<Spot<'d>>, text: String) {
@@ -154,7 +154,7 @@ impl<'d> Expander<'d> {
             if let Some(copies) = self.group(0, group) {
                 let used = copies.iter().flat_map(|copy| {
                     let values = copy.name.iter().chain(copy.edits.values());
-                    values.map(|value| value.part).chain([copy.part])
+                    values.map(|value| value.piece).chain([copy.piece])
                 });
                 self.out.used.extend(used);
                 self.out.replaced.insert(group.index(), copies);
@@ -178,7 +178,7 @@ impl<'d> Expander<'d> {
     }
 
     /// What takes the place of a group; `None` for one without references.
-    fn group(&mut self, part: usize, group: Node<'d>) -> Option<Vec<Rc<Copy<'d>>>> {
+    fn group(&mut self, piece: usize, group: Node<'d>) -> Option<Vec<Rc<Copy<'d>>>> {
         let references: Vec<Node<'d>> = group.children_named("ScenarioReference").collect();
         let first = *references.first()?;
         let mut copies = Vec::new();
@@ -194,12 +194,12 @@ impl<'d> Expander<'d> {
                     text,
                 );
             }
-            copies.extend(self.reference(part, group, reference));
+            copies.extend(self.reference(piece, group, reference));
         }
         Some(copies)
     }
 
-    fn reference(&mut self, part: usize, group: Node<'d>, node: Node<'d>) -> Vec<Rc<Copy<'d>>> {
+    fn reference(&mut self, piece: usize, group: Node<'d>, node: Node<'d>) -> Vec<Rc<Copy<'d>>> {
         let named: Vec<Node<'d>> = node.children_named("ManeuverGroupReference").collect();
         let form = match named.is_empty() {
             true => Form::Direct,
@@ -207,10 +207,10 @@ impl<'d> Expander<'d> {
         };
         self.say_form(node, form);
         let depth = self.chain.len() as u32;
-        let target = self.target(part, node);
+        let target = self.target(piece, node);
         let mut uses = Vec::new();
         if let Some(target) = target {
-            let referring = Referring { part, group };
+            let referring = Referring { piece, group };
             uses = match form {
                 Form::Named => named
                     .iter()
@@ -221,8 +221,8 @@ impl<'d> Expander<'d> {
             self.say_twice(&named);
         }
         let copies = uses.iter().flat_map(|one| one.copies.clone()).collect();
-        self.out.references.push(Reference {
-            part,
+        self.out.references.push(Followed {
+            piece,
             node,
             group,
             target,
@@ -253,10 +253,10 @@ impl<'d> Expander<'d> {
         }
     }
 
-    /// The part that a reference leads to, when its groups can be had.
-    fn target(&mut self, part: usize, node: Node<'d>) -> Option<usize> {
+    /// The piece that a reference leads to, when its groups can be had.
+    fn target(&mut self, piece: usize, node: Node<'d>) -> Option<usize> {
         let at = Spot::of(node, "scenarioFileName");
-        let links = &self.out.parts[part].links;
+        let links = &self.out.pieces[piece].links;
         let link = links.iter().find(|link| link.at == node.offset());
         // Whoever gathers the documents follows references no deeper either.
         let is_too_deep = self.chain.len() > MAX_DEPTH as usize;
@@ -268,14 +268,14 @@ impl<'d> Expander<'d> {
             self.say(what, at, None, text);
             return None;
         };
-        if target >= self.out.parts.len() {
+        if target >= self.out.pieces.len() {
             let text = "the scenario that is referred to is not at hand".to_owned();
             self.say(What::FileNotFound, at, None, text);
             return None;
         }
         if let Some(from) = self.chain.iter().position(|&it| it == target) {
             let chain = self.chain[from..].iter().chain([&target]);
-            let names: Vec<String> = chain.map(|&part| self.short_name(part)).collect();
+            let names: Vec<String> = chain.map(|&piece| self.short_name(piece)).collect();
             let text = format!(
                 "the scenario refers to itself, so that it has no end: {}",
                 names.join(" → ")
@@ -299,36 +299,36 @@ impl<'d> Expander<'d> {
 
     fn too_deep(&self) -> String {
         let last = self.chain.last();
-        let last = last.map_or_else(String::new, |&part| self.short_name(part));
+        let last = last.map_or_else(String::new, |&piece| self.short_name(piece));
         format!(
             "scenarios refer to scenarios more than {MAX_DEPTH} deep; that of `{last}` is not followed any more"
         )
     }
 
-    /// The groups of a part after its own expansion.
-    fn expanded(&mut self, part: usize) -> Rc<Vec<Expanded<'d>>> {
-        if let State::Done(groups) = &self.states[part] {
+    /// The groups of a piece after its own expansion.
+    fn expanded(&mut self, piece: usize) -> Rc<Vec<Expanded<'d>>> {
+        if let State::Done(groups) = &self.states[piece] {
             return groups.clone();
         }
-        self.chain.push(part);
-        let document = self.document(part);
+        self.chain.push(piece);
+        let document = self.document(piece);
         self.say_misplaced(document);
         let mut groups = Vec::new();
         for group in document.elements("ManeuverGroup") {
             let copies = self
-                .group(part, group)
-                .unwrap_or_else(|| vec![Rc::new(Copy::as_is(part, group))]);
+                .group(piece, group)
+                .unwrap_or_else(|| vec![Rc::new(Copy::as_is(piece, group))]);
             groups.push(Expanded { group, copies });
         }
         self.chain.pop();
         let groups = Rc::new(groups);
-        self.states[part] = State::Done(groups.clone());
+        self.states[piece] = State::Done(groups.clone());
         groups
     }
 
-    /// All groups of a part.
-    fn all_copies(&mut self, part: usize) -> Vec<Rc<Copy<'d>>> {
-        let groups = self.expanded(part);
+    /// All groups of a piece.
+    fn all_copies(&mut self, piece: usize) -> Vec<Rc<Copy<'d>>> {
+        let groups = self.expanded(piece);
         groups.iter().flat_map(|it| it.copies.clone()).collect()
     }
 
@@ -396,7 +396,7 @@ impl<'d> Expander<'d> {
                 "" => group.name().to_owned(),
                 prefix => format!("{prefix}.{}", group.name()),
             };
-            let name = Value::of(referring.part, wanted).saying(&name);
+            let name = Value::of(referring.piece, wanted).saying(&name);
             copies.extend(self.copy(referring, group, name, &keys));
         }
         keys::say_unmatched(&keys, first.group, &mut self.problems);
@@ -417,7 +417,7 @@ impl<'d> Expander<'d> {
             let Some(file) = node.attribute("scenarioFileName") else {
                 break;
             };
-            let name = Value::of(referring.part, file).saying(&name);
+            let name = Value::of(referring.piece, file).saying(&name);
             copies.extend(self.copy(referring, group, name, &keys));
         }
         match groups.first() {
@@ -469,11 +469,11 @@ impl<'d> Expander<'d> {
         };
         actor::replace(
             &mut copy,
-            referring.part,
+            referring.piece,
             referring.group,
             &mut self.problems,
         );
-        keys::apply(&mut copy, referring.part, keys, &mut self.problems);
+        keys::apply(&mut copy, referring.piece, keys, &mut self.problems);
         Some(Rc::new(copy))
     }
 
@@ -533,9 +533,9 @@ impl<'d> Expander<'d> {
         format!("`{file}` has no maneuver group `{name}`{known}")
     }
 
-    /// What people call a part: the name of the file, or of the member after its archive.
-    fn short_name(&self, part: usize) -> String {
-        let path = self.document(part).path();
+    /// What people call a piece: the name of the file, or of the member after its archive.
+    fn short_name(&self, piece: usize) -> String {
+        let path = self.document(piece).path();
         let file = path.rsplit('/').next().unwrap_or(path);
         file.to_owned()
     }
@@ -544,7 +544,7 @@ impl<'d> Expander<'d> {
 /// The group that a reference is in.
 #[derive(Clone, Copy)]
 struct Referring<'d> {
-    part: usize,
+    piece: usize,
     group: Node<'d>,
 }
 

@@ -16,7 +16,7 @@ impl Expansion<'_> {
     ///
     /// Of an expansion that is not complete this is of no use.
     pub fn text(&self) -> String {
-        let root = self.parts[0].document;
+        let root = self.pieces[0].document;
         let text = text_of(root);
         let mut edits = vec![encoding(text)];
         let mut next = 0;
@@ -40,7 +40,7 @@ impl Expansion<'_> {
 
     /// A copy as it is written in the expanded file.
     fn written(&self, copy: &Copy<'_>) -> String {
-        let document = self.parts[copy.part].document;
+        let document = self.pieces[copy.piece].document;
         let text = text_of(document);
         let place = range(copy.group.offset(), copy.group.end_offset());
         let mut edits = vec![self.namespaces(copy, text.get(place.clone()).unwrap_or(""))];
@@ -59,7 +59,7 @@ impl Expansion<'_> {
     /// Declarations of the prefixes that a copy needs and would lack in its new place.
     fn namespaces(&self, copy: &Copy<'_>, written: &str) -> Option<(Range<usize>, String)> {
         const PREFIX: &str = "xmlns:";
-        let root = self.parts[0].document.root();
+        let root = self.pieces[0].document.root();
         let mut declarations = String::new();
         let mut seen: Vec<&str> = Vec::new();
         let around = std::iter::once(copy.group).chain(copy.group.ancestors());
@@ -151,7 +151,7 @@ fn indentation(text: &str, at: usize) -> String {
     }
 }
 
-/// A part of a text with edits in it.
+/// A stretch of a text with edits in it.
 fn applied(
     text: &str,
     within: Range<usize>,
