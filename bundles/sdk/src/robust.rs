@@ -71,6 +71,51 @@ impl Robust {
         }
     }
 
+    /// Mutates the files of a set, such as a modular scenario with its libraries, of which the first is
+    /// checked. `twists` are texts to be put where another stands, for faults of a set that a file alone
+    /// has not.
+    ///
+    /// # Panics
+    /// With the first checker that did not come to its end, and the files.
+    pub fn assert_mutated_set(&self, files: &[(&str, &str)], twists: &[(&str, &str)]) {
+        let plan = Plan::by_default(self.bundle);
+        let folder = tempfile::tempdir().unwrap();
+        let mut dice = dice();
+        // Ten times as dear as one file in memory.
+        for _ in 0..setting("QCBUS_FUZZ_ROUNDS", 3_000) / 10 {
+            let mut mutated: Vec<Vec<u8>> = Vec::new();
+            let victim = dice.below(files.len());
+            for (index, (_, text)) in files.iter().enumerate() {
+                let mut text = (*text).to_owned();
+                for (what, other) in twists {
+                    if dice.below(8) == 0 {
+                        text = text.replacen(what, other, 1 + dice.below(3));
+                    }
+                }
+                let mut bytes = text.into_bytes();
+                if index == victim && dice.below(2) == 0 {
+                    self.mutate(&mut bytes, &mut dice);
+                }
+                mutated.push(bytes);
+            }
+            for ((name, _), bytes) in files.iter().zip(&mutated) {
+                std::fs::write(folder.path().join(name), bytes).unwrap();
+            }
+            let first = folder.path().join(files[0].0);
+            let loaded = Loaded::from_path(&first, folder.path()).unwrap();
+            let mut broken = Broken::default();
+            check(&plan, &loaded.subject(self.bundle).unwrap(), &mut broken);
+            if let Some((checker, reason)) = broken.0.first() {
+                let texts: Vec<_> = mutated
+                    .iter()
+                    .map(|it| String::from_utf8_lossy(it))
+                    .collect();
+                let id = &plan.checkers()[*checker].id;
+                panic!("{id}: {reason}\n{}", texts.join("\n----\n"));
+            }
+        }
+    }
+
     /// Checks whole files, cut files and mutated files below a directory; none, when it is not there.
     ///
     /// # Panics

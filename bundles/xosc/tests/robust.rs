@@ -58,3 +58,33 @@ fn real_scenarios_broken_in_any_way_break_no_rule() {
     let cases = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/cases");
     ROBUST.assert_files_below(Path::new(cases));
 }
+
+/// What a modular scenario expands to has its elements from several files, in another order than they
+/// are written.
+#[test]
+fn an_expanded_scenario_broken_in_any_way_breaks_no_rule() {
+    const MAIN: &str = include_str!("../../../tests/farm/modular/convoy.xosc");
+    const LIBRARY: &str = include_str!("../../../tests/farm/modular/moves.xosc");
+    let twists = [
+        ("value=\"8\"", "value=\"-8\""),
+        ("value=\"8\"", "value=\"${$p}\""),
+        ("value=\"4\"", "value=\"INF\""),
+        ("entityRef=\"second\"", "entityRef=\"nobody\""),
+        ("name=\"tail\"", "name=\"lead\""),
+        ("greaterThan", "equalTo"),
+        ("dimension=\"time\"", "dimension=\"rate\""),
+        (
+            "<SimulationTimeCondition ",
+            "<ParameterCondition parameterRef=\"p\" ",
+        ),
+        (
+            "<LanePosition roadId=\"1\" laneId=\"-1\" s=\"20\"/>",
+            "<WorldPosition x=\"1e9\" y=\"NaN\"/>",
+        ),
+        (
+            "<Maneuver name=\"speed\">",
+            "<CatalogReference catalogName=\"c\" entryName=\"e\"/><Maneuver name=\"speed\">",
+        ),
+    ];
+    ROBUST.assert_mutated_set(&[("convoy.xosc", MAIN), ("moves.xosc", LIBRARY)], &twists);
+}
