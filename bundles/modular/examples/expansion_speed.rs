@@ -1,0 +1,45 @@
+//! Times the expansion of a modular scenario in this process.
+//!
+//!     cargo run --release -p qcbus-modular --example expansion_speed FILE…
+//!
+//! Prints, for each file, the median of 201 runs in microseconds: reading it with everything that belongs
+//! to it (its expanded image among that), expanding its documents, and writing the expanded text.
+
+#![expect(clippy::print_stdout, reason = "it prints what it measured")]
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use qcbus_modular::BUNDLE;
+use qcbus_sdk::{LoadError, Loaded};
+
+const RUNS: usize = 201;
+
+fn median(mut run: impl FnMut()) -> u128 {
+    let mut times: Vec<Duration> = (0..RUNS)
+        .map(|_| {
+            let start = Instant::now();
+            run();
+            start.elapsed()
+        })
+        .collect();
+    times.sort_unstable();
+    times.get(RUNS / 2).map_or(0, Duration::as_micros)
+}
+
+fn main() -> Result<(), LoadError> {
+    println!("| file | references | load | expand | write |\n|---|--:|--:|--:|--:|");
+    for argument in std::env::args().skip(1) {
+        let path = Path::new(&argument);
+        let folder = path.parent().unwrap_or(Path::new("."));
+        let loaded = Loaded::from_path(path, folder)?;
+        let load = median(|| drop(Loaded::from_path(path, folder)));
+        let subject = loaded.subject(&BUNDLE)?;
+        let expand = median(|| drop(subject.expansion()));
+        let expansion = subject.expansion();
+        let write = median(|| drop(expansion.text()));
+        let references = expansion.references.len();
+        println!("| {argument} | {references} | {load} µs | {expand} µs | {write} µs |");
+    }
+    Ok(())
+}
