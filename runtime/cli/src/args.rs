@@ -282,7 +282,7 @@ pub enum BundleCommand {
 -c CONFIG                               run as a module of ASAM's framework\n  \
 [--schema-dir DIR]                      with each of them: schemas to use instead of the known ones")]
 pub struct BundleRunArgs {
-    /// A standard bundle (xodr, xosc) or a program that is a bundle
+    /// A standard bundle (xodr, xosc, modular) or a program that is a bundle
     pub name: String,
     /// Arguments for the bundle; without any it joins the bus of the default instance
     #[arg(
