@@ -134,54 +134,54 @@ pub fn short_name<'d>(document: Document<'d>) -> &'d str {
 
 /// A value that replaces another, where it is written.
 #[derive(Clone, Copy)]
-pub enum Origin<'d> {
+pub enum WrittenAt<'d> {
     /// The value of a `ParameterReference`: its key, and the attribute.
     Key(&'d str, Attribute<'d>),
     /// The actor of a referring group.
     Actor(Attribute<'d>),
 }
 
-impl<'d> Origin<'d> {
+impl<'d> WrittenAt<'d> {
     /// The attribute that has the value.
     pub fn attribute(self) -> Attribute<'d> {
         match self {
-            Origin::Key(_, attribute) | Origin::Actor(attribute) => attribute,
+            WrittenAt::Key(_, attribute) | WrittenAt::Actor(attribute) => attribute,
         }
     }
 
     /// What messages call it.
     pub fn what(self) -> String {
         match self {
-            Origin::Key(key, _) => format!("the key `{key}`"),
-            Origin::Actor(_) => "the actor of the referring group".to_owned(),
+            WrittenAt::Key(key, _) => format!("the key `{key}`"),
+            WrittenAt::Actor(_) => "the actor of the referring group".to_owned(),
         }
     }
 }
 
 /// Where the values are written that referring files give.
-pub struct Origins<'d>(HashMap<(usize, u32), Origin<'d>>);
+pub struct WrittenIn<'d>(HashMap<(usize, u32), WrittenAt<'d>>);
 
-impl<'d> Origins<'d> {
+impl<'d> WrittenIn<'d> {
     /// Those of all referring files.
-    pub fn of(assembly: &Assembly<'d>) -> Origins<'d> {
+    pub fn of(assembly: &Assembly<'d>) -> WrittenIn<'d> {
         let mut origins = HashMap::new();
         for reference in &assembly.expansion.references {
             let actors = reference.group.children_named("Actors");
             let actors = actors.flat_map(|actors| actors.children());
             for actor in actors.filter_map(|actor| actor.attribute("entityRef")) {
                 let at = (reference.piece, actor.value_offset());
-                origins.insert(at, Origin::Actor(actor));
+                origins.insert(at, WrittenAt::Actor(actor));
             }
             for key in reference.uses.iter().flat_map(|one| &one.keys) {
                 let at = (reference.piece, key.value.value_offset());
-                origins.insert(at, Origin::Key(key.key, key.value));
+                origins.insert(at, WrittenAt::Key(key.key, key.value));
             }
         }
-        Origins(origins)
+        WrittenIn(origins)
     }
 
     /// Where a value comes from.
-    pub fn get(&self, value: &Value) -> Option<Origin<'d>> {
+    pub fn get(&self, value: &Value) -> Option<WrittenAt<'d>> {
         self.0.get(&(value.piece, value.offset)).copied()
     }
 }

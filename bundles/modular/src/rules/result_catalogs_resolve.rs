@@ -6,7 +6,7 @@ use qcbus_openscenario::closest;
 use qcbus_sdk::{Rule, Sink};
 
 use crate::assembly::{Assembly, Modular};
-use crate::families::copies::{Origins, Taken, short_name};
+use crate::families::copies::{Taken, WrittenIn, short_name};
 use crate::families::finds::Finds;
 
 pub static RULE: Rule<Modular> = Rule {
@@ -31,7 +31,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
         .with_role(DocumentRole::Catalog)
         .filter_map(|linked| linked.document.root()?.child("Catalog"))
         .collect();
-    let origins = Origins::of(assembly);
+    let origins = WrittenIn::of(assembly);
     let mut finds = Finds::default();
     for taken in assembly.taken() {
         for reference in taken.copy.group.descendants_named("CatalogReference") {

@@ -5,7 +5,7 @@ use qcbus_openscenario::{Declared, Scenario, closest};
 use qcbus_sdk::{Rule, Sink};
 
 use crate::assembly::{Assembly, Modular};
-use crate::families::copies::{Origin, Origins, Taken, is_offered, parameter_of, short_name};
+use crate::families::copies::{Taken, WrittenAt, WrittenIn, is_offered, parameter_of, short_name};
 use crate::families::finds::Finds;
 
 pub static RULE: Rule<Modular> = Rule {
@@ -23,7 +23,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     let Some(scenario) = assembly.declaring() else {
         return;
     };
-    let origins = Origins::of(assembly);
+    let origins = WrittenIn::of(assembly);
     let mut finds = Finds::default();
     for taken in assembly.taken() {
         let refers = |attribute: &Attribute<'_>| REFERENCES.contains(&attribute.name());
@@ -109,10 +109,10 @@ fn brought(
     )
 }
 
-fn given(origin: Origin<'_>, name: &str, scenario: &Scenario<'_>) -> String {
+fn given(origin: WrittenAt<'_>, name: &str, scenario: &Scenario<'_>) -> String {
     let who = match origin {
-        Origin::Key(key, _) => format!("the key `{key}` names the entity `{name}`"),
-        Origin::Actor(_) => format!("the actor of the referring group is `{name}`"),
+        WrittenAt::Key(key, _) => format!("the key `{key}` names the entity `{name}`"),
+        WrittenAt::Actor(_) => format!("the actor of the referring group is `{name}`"),
     };
     let near = closest(name, scenario.entities().names());
     let hint = near.map_or_else(

@@ -6,7 +6,7 @@ use qcbus_sdk::modular::Spot;
 use qcbus_sdk::{Rule, Sink};
 
 use crate::assembly::{Assembly, Modular};
-use crate::families::copies::{Origin, Origins, Taken, parameter_of, short_name};
+use crate::families::copies::{Taken, WrittenAt, WrittenIn, parameter_of, short_name};
 use crate::families::finds::Finds;
 
 pub static RULE: Rule<Modular> = Rule {
@@ -21,7 +21,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     let Some(scenario) = assembly.declaring() else {
         return;
     };
-    let origins = Origins::of(assembly);
+    let origins = WrittenIn::of(assembly);
     let mut finds = Finds::default();
     // A parameter is declared once, however many values need it.
     let mut first: HashMap<(usize, &str), (Spot<'_>, String)> = HashMap::new();
@@ -134,10 +134,15 @@ fn brought(taken: &Taken<'_, '_>, attribute: Attribute<'_>, name: &str) -> Strin
     }
 }
 
-fn given(origin: Origin<'_>, name: &str, target: Attribute<'_>, scenario: &Scenario<'_>) -> String {
+fn given(
+    origin: WrittenAt<'_>,
+    name: &str,
+    target: Attribute<'_>,
+    scenario: &Scenario<'_>,
+) -> String {
     let who = match origin {
-        Origin::Key(key, _) => format!("the value of the key `{key}`"),
-        Origin::Actor(_) => "the actor".to_owned(),
+        WrittenAt::Key(key, _) => format!("the value of the key `{key}`"),
+        WrittenAt::Actor(_) => "the actor".to_owned(),
     };
     let names = scenario.root().parameter_names().take(500);
     let near = closest(name, names).map_or_else(String::new, |near| format!("; `${near}` is"));

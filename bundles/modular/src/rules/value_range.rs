@@ -5,7 +5,7 @@ use qcbus_openscenario::parse_double;
 use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::assembly::{Assembly, Modular};
-use crate::families::copies::Origins;
+use crate::families::copies::WrittenIn;
 use crate::families::finds::Finds;
 use crate::families::typings::Typings;
 
@@ -90,7 +90,7 @@ const RANGES: &[Range] = &[
 ];
 
 fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
-    let origins = Origins::of(assembly);
+    let origins = WrittenIn::of(assembly);
     let mut typings = Typings::default();
     let mut finds = Finds::default();
     for taken in assembly.taken() {

@@ -3,7 +3,7 @@ use qcbus_schema::ValueType;
 use qcbus_sdk::{Rule, Sink};
 
 use crate::assembly::{Assembly, Modular};
-use crate::families::copies::Origins;
+use crate::families::copies::WrittenIn;
 use crate::families::finds::Finds;
 use crate::families::typings::Typings;
 
@@ -16,7 +16,7 @@ pub static RULE: Rule<Modular> = Rule {
 };
 
 fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
-    let origins = Origins::of(assembly);
+    let origins = WrittenIn::of(assembly);
     let mut typings = Typings::default();
     let mut finds = Finds::default();
     for taken in assembly.taken() {
