@@ -44,6 +44,7 @@ fn run(checked: &Checked<'_>, found: &mut Sink<'_>) {
             .issue(place, violation.text.as_str())
             .level(level(checked.severity(violation)));
     }
+    say_replaced(found);
     for rest in &checked.rest {
         let Some(root) = found.subject().root().root() else {
             return;
@@ -56,6 +57,29 @@ fn run(checked: &Checked<'_>, found: &mut Sink<'_>) {
         found
             .issue(root, text)
             .level(level(checked.severity_of_rest(rest)));
+    }
+}
+
+/// The groups of a modular scenario that are not in what it is expanded to, because others take their
+/// place: they are looked at as they are written.
+fn say_replaced(found: &mut Sink<'_>) {
+    let subject = found.subject();
+    if !subject.is_expanded() {
+        return;
+    }
+    let written = subject.written();
+    let is_replaced = |node: Node<'_>| {
+        let mut around = std::iter::once(node).chain(node.ancestors());
+        around.any(|it| it.is("ManeuverGroup") && it.child("ScenarioReference").is_some())
+    };
+    for breach in breaches(subject, &written) {
+        if is_replaced(breach.node) {
+            let place = match breach.attribute {
+                Some(attribute) => Place::from(attribute),
+                None => Place::from(breach.node),
+            };
+            found.issue(place, breach.text);
+        }
     }
 }
 

@@ -104,6 +104,17 @@ pub(crate) struct Spot {
 /// Works out rows, columns and XPaths. A place in another file is shown at the element of the
 /// root file that leads there.
 pub(crate) fn locate(subject: &Subject<'_>, place: &Place<'_>, description: Option<&str>) -> Spot {
+    locate_from(subject, place, description, None)
+}
+
+/// The same as [`locate`] for a place that goes with one in the root file: of several references to
+/// another file the one around that place, if there is one, is what leads there.
+pub(crate) fn locate_from(
+    subject: &Subject<'_>,
+    place: &Place<'_>,
+    description: Option<&str>,
+    beside: Option<u32>,
+) -> Spot {
     let document = place.document();
     let position = document.position(place.offset());
     let description = description.map_or_else(|| place.label(), str::to_owned);
@@ -126,8 +137,13 @@ pub(crate) fn locate(subject: &Subject<'_>, place: &Place<'_>, description: Opti
     let path = path
         .filter(|_| position.is_root_file)
         .unwrap_or(position.path);
-    let places = match linked.and_then(|index| subject.linked().get(index)) {
-        Some(linked) => shown_at(subject, reference_at(subject, linked.referred_at)),
+    let found = linked.and_then(|index| Some((index, subject.linked().get(index)?)));
+    let places = match found {
+        Some((index, linked)) => {
+            let around = beside.and_then(|offset| reference_around(subject, offset, index + 1));
+            let reference = around.unwrap_or(linked.referred_at);
+            shown_at(subject, reference_at(subject, reference))
+        }
         None if subject.is_expanded() => expanded::referring(subject, place),
         None => {
             let around = including_element(place.node()).or(subject.root().root());
@@ -193,6 +209,37 @@ fn linked_index(subject: &Subject<'_>, document: &Document<'_>) -> Option<usize>
         .linked()
         .iter()
         .position(|linked| linked.document.path() == path)
+}
+
+/// The reference of the root file in which an offset lies, if it leads to a document of the set.
+fn reference_around(subject: &Subject<'_>, offset: u32, document: usize) -> Option<u32> {
+    let before = subject.links().iter().filter(|link| link.at <= offset);
+    let nearest = before.max_by_key(|link| link.at)?;
+    let node = reference_at(subject, nearest.at)?;
+    let is_around = node.offset() == nearest.at && offset < node.end_offset();
+    (is_around && leads_to(subject, nearest.to as usize, document)).then_some(nearest.at)
+}
+
+/// Whether a document leads to another one, the root counted as the first.
+fn leads_to(subject: &Subject<'_>, from: usize, to: usize) -> bool {
+    let mut seen = vec![from];
+    let mut next = 0;
+    while let Some(&document) = seen.get(next) {
+        if document == to {
+            return true;
+        }
+        let linked = document
+            .checked_sub(1)
+            .and_then(|it| subject.linked().get(it));
+        for link in linked.map_or(&[][..], |linked| linked.links) {
+            let to = link.to as usize;
+            if !seen.contains(&to) {
+                seen.push(to);
+            }
+        }
+        next += 1;
+    }
+    false
 }
 
 fn reference_at<'d>(subject: &Subject<'d>, offset: u32) -> Option<Node<'d>> {

@@ -6,7 +6,7 @@ use qcbus_document::Node;
 use qcbus_formats::xqar::{DomainInfo, InfoElement, Issue, Level, Location, Metadata};
 
 use crate::param::MAX_ISSUES;
-use crate::place::{Place, Spot, copied_by, locate, put_there};
+use crate::place::{Place, Spot, copied_by, locate, locate_from, put_there};
 use crate::rule::Facts;
 use crate::{Param, Subject, Values, Version};
 
@@ -119,10 +119,13 @@ impl<'d> Sink<'d> {
             .as_mut()
             .filter(|_| full)
             .map(|suppressed| &mut suppressed.last);
+        let document = place.document();
+        let is_root = document.content_hash() == self.subject.written().content_hash();
         Finding {
             issue,
             subject: self.subject,
             facts: self.facts,
+            beside: is_root.then(|| place.offset()),
             note: self.not_normative.as_deref(),
             unlisted,
         }
@@ -183,6 +186,7 @@ impl<'d> Sink<'d> {
             issue,
             subject: self.subject,
             facts: self.facts,
+            beside: None,
             note: self.not_normative.as_deref(),
             unlisted: Some(&mut self.unheard),
         }
@@ -313,6 +317,8 @@ pub struct Finding<'s, 'd> {
     issue: &'s mut Issue,
     subject: &'d Subject<'d>,
     facts: &'s Facts,
+    /// Where the finding is, if that is in the root file as it is written.
+    beside: Option<u32>,
     /// What is said where the rule is not normative, and levels are lowered.
     note: Option<&'s str>,
     /// Set when the finding is only counted: where its level is kept.
@@ -333,7 +339,8 @@ impl Finding<'_, '_> {
         if !self.is_listed() {
             return self;
         }
-        let spot = locate(self.subject, &place.into(), Some(description.as_ref()));
+        let description = Some(description.as_ref());
+        let spot = locate_from(self.subject, &place.into(), description, self.beside);
         self.issue.locations.push(spot.locations);
         self
     }

@@ -389,7 +389,8 @@ pub struct ExpandArgs {
 #[derive(Debug, ClapArgs)]
 #[command(
     after_help = "Files that lie below the directory of the main scenario keep their path from there, others go by \
-their\nname alone. What the archive refers to and does not have is said on stderr."
+their\nname alone. What is wrong with the archive is said on stderr; it is written all the same, and errors\n\
+end in exit code 1."
 )]
 pub struct PackArgs {
     /// The main scenario, then what it refers to; in the archive the first is called main.xosc

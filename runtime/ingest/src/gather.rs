@@ -104,6 +104,7 @@ pub fn gather<S: Source>(
         had: HashMap::from([(own, 0)]),
         documents: vec![Had::default()],
         catalogs: BTreeSet::new(),
+        is_expanded: false,
         listed: BTreeSet::new(),
         missing: Vec::new(),
     };
@@ -141,6 +142,8 @@ struct Walk<'w, S> {
     documents: Vec<Had>,
     /// Names of the catalogs that were found.
     catalogs: BTreeSet<String>,
+    /// Whether the last document is what a modular scenario was expanded to.
+    is_expanded: bool,
     /// The archives whose members were listed.
     listed: BTreeSet<PathBuf>,
     /// With the kind of catalogs that a missing directory was to have.
@@ -291,6 +294,7 @@ impl<S: Source> Walk<'_, S> {
                 let path = from_text(self.root.path());
                 self.documents.push(Had::default());
                 self.source.keep(&path, DocumentRole::Expanded, 0, document);
+                self.is_expanded = true;
             }
             Err((why, referred_at)) => {
                 let missing = MissingDocument {
@@ -426,10 +430,17 @@ impl<S: Source> Walk<'_, S> {
     /// A catalog directory that is not there weighs more when the scenario needs a catalog of it,
     /// which is known only when all other catalogs are.
     fn weighed(self) -> Vec<MissingDocument> {
+        // What a modular scenario takes from others may need catalogs that its own file does not.
+        let expanded = match self.documents.len() {
+            0 | 1 => None,
+            count => Document::open(self.source.kept(count - 2)).ok(),
+        };
+        let expanded = expanded.filter(|_| self.is_expanded);
+        let root = expanded.as_ref().unwrap_or(self.root);
         let weigh = |(mut missing, catalogs): (MissingDocument, Option<String>)| {
             let gone = matches!(missing.why, Absence::NotThere | Absence::NotAFile);
             if let Some(kind) = catalogs.filter(|_| gone) {
-                missing.level = match need_of(self.root, &kind, &self.catalogs) {
+                missing.level = match need_of(root, &kind, &self.catalogs) {
                     Need::Used => Level::Error,
                     Need::Unknown => Level::Warning,
                     Need::Unused => Level::Information,

@@ -218,7 +218,12 @@ impl Prepared {
         let mut faults = self.faults.clone();
         if !self.refused {
             match parse(&input, &mut builder) {
-                Ok(found) => faults.extend(found),
+                Ok(found) => {
+                    // Where nothing could be had of the bytes, the file is not empty.
+                    let said = faults.iter().any(|fault| fault.code.makes_partial());
+                    let found = found.into_iter();
+                    faults.extend(found.filter(|it| !said || it.code != FaultCode::Empty));
+                }
                 Err(Halt::Build(error)) => return Err(error),
                 Err(Halt::TooLarge(_)) => {}
             }

@@ -27,6 +27,12 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     say_all(
         assembly,
         found,
+        &[What::ForeignElement, What::ForeignAttribute],
+        "",
+    );
+    say_all(
+        assembly,
+        found,
         &[What::MixedForm],
         "the reference that names groups",
     );

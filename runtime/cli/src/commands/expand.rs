@@ -25,14 +25,29 @@ type Failed = (Exit, String);
 
 fn expanded(args: &ExpandArgs) -> Result<Exit, Failed> {
     let internal = |error: qcbus_sdk::LoadError| (Exit::Internal, format!("failed to {error}"));
+    if let Some(output) = args.output.as_deref().filter(|output| output.is_dir()) {
+        let text = format!("{} is a directory; name a file", output.display());
+        return Err((Exit::Usage, text));
+    }
     let loaded = load(&args.file)?;
-    say_findings(&loaded);
+    let said = say_findings(&loaded);
     let subject = loaded.subject(&qcbus_modular::BUNDLE).map_err(internal)?;
     let expansion = subject.expansion();
+    let name = args.file.display();
     if let Some(why) = in_the_way(&expansion) {
-        let text = format!("{} is not expanded: {why}", args.file.display());
-        return Err((Exit::Rejected, text));
+        // What has just been said with its place is not said again.
+        let why = match said.contains(&why.text) {
+            true => String::new(),
+            false => format!(": {}: {}", why.place, why.text),
+        };
+        return Err((Exit::Rejected, format!("{name} is not expanded{why}")));
     }
+    if expansion.references.is_empty() {
+        talk::say(&format!(
+            "{name} refers to no other scenario: there is nothing to expand"
+        ));
+    }
+    say_moved(&expansion, args);
     let text = expansion.text();
     let Some(output) = &args.output else {
         talk::print(&text);
@@ -67,29 +82,76 @@ fn load(path: &Path) -> Result<Loaded, Failed> {
 }
 
 /// What the rules about modular scenarios find, as errors and warnings on stderr.
-pub(super) fn say_findings(loaded: &Loaded) {
+pub(super) fn say_findings(loaded: &Loaded) -> String {
     let plan = Plan::by_default(&qcbus_modular::BUNDLE);
     match qcbus_sdk::findings(&plan, loaded, Level::Warning) {
-        Ok(text) if text.is_empty() => {}
-        Ok(text) => talk::say(text.trim_end()),
-        Err(error) => talk::fail(&format!("failed to {error}")),
+        Ok(text) => {
+            if !text.is_empty() {
+                talk::say(text.trim_end());
+            }
+            text
+        }
+        Err(error) => {
+            talk::fail(&format!("failed to {error}"));
+            String::new()
+        }
+    }
+}
+
+/// Paths in a scenario start where it lies: in another directory they lead elsewhere.
+fn say_moved(expansion: &Expansion<'_>, args: &ExpandArgs) {
+    let Some(output) = &args.output else { return };
+    let directory = |path: &Path| {
+        let whole = std::path::absolute(path).ok()?;
+        whole.parent()?.canonicalize().ok()
+    };
+    if directory(output) == directory(&args.file) {
+        return;
+    }
+    let Some(piece) = expansion.pieces.first() else {
+        return;
+    };
+    let named = [("LogicFile", "filepath"), ("Directory", "path")];
+    let paths = named.into_iter().flat_map(|(element, attribute)| {
+        let nodes = piece.document.elements(element);
+        nodes.filter_map(move |node| node.attr(attribute))
+    });
+    let is_relative = |path: &&str| {
+        let is_file = path.contains(['/', '\\', '.']);
+        is_file && !path.starts_with(['/', '$']) && !path.contains("://")
+    };
+    for path in paths.filter(is_relative) {
+        talk::say(&format!(
+            "warning: `{path}` starts where a scenario lies, and {} is in another directory than {}",
+            output.display(),
+            args.file.display()
+        ));
     }
 }
 
 /// Why no plain scenario can be made.
-fn in_the_way(expansion: &Expansion<'_>) -> Option<String> {
+struct InTheWay {
+    place: String,
+    text: String,
+}
+
+fn in_the_way(expansion: &Expansion<'_>) -> Option<InTheWay> {
     let root = expansion.pieces.first()?.document;
     if root.root().is_none() {
         let fault = root.faults().next();
-        return Some(
-            fault
+        return Some(InTheWay {
+            place: root.path().to_owned(),
+            text: fault
                 .map_or("there is nothing in it", |fault| fault.text)
                 .to_owned(),
-        );
+        });
     }
     let obstacle = expansion.obstacles().next()?;
-    let place = obstacle.at.node().document().position(obstacle.at.offset());
-    Some(format!("{place}: {}", obstacle.text))
+    let document = obstacle.at.node().document();
+    Some(InTheWay {
+        place: document.position(obstacle.at.offset()).to_string(),
+        text: obstacle.text.clone(),
+    })
 }
 
 /// The file that the scenario is made of and that would be overwritten.

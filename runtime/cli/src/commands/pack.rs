@@ -17,14 +17,14 @@ const MAIN: &str = "main.xosc";
 /// Runs the command.
 pub fn run(args: &PackArgs) -> Exit {
     let (exit, why) = match packed(args) {
-        Ok(()) => return Exit::Accepted,
+        Ok(exit) => return exit,
         Err(failed) => failed,
     };
     talk::fail(&why);
     exit
 }
 
-fn packed(args: &PackArgs) -> Result<(), (Exit, String)> {
+fn packed(args: &PackArgs) -> Result<Exit, (Exit, String)> {
     let usage = |text: String| (Exit::Usage, text);
     let output = &args.output;
     if FileKind::of_path(output) != Some(FileKind::Mosc) {
@@ -56,11 +56,13 @@ fn packed(args: &PackArgs) -> Result<(), (Exit, String)> {
         )
     })?;
     let folder = output.parent().filter(|it| !it.as_os_str().is_empty());
-    match Loaded::from_path(output, folder.unwrap_or(Path::new("."))) {
-        Ok(loaded) => say_findings(&loaded),
-        Err(error) => return Err((Exit::Internal, format!("failed to {error}"))),
-    }
-    Ok(())
+    let loaded = Loaded::from_path(output, folder.unwrap_or(Path::new(".")))
+        .map_err(|error| (Exit::Internal, format!("failed to {error}")))?;
+    let said = say_findings(&loaded);
+    Ok(match said.contains(": error: ") {
+        true => Exit::Rejected,
+        false => Exit::Accepted,
+    })
 }
 
 /// What the files are called in the archive.

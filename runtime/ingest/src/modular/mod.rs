@@ -8,6 +8,7 @@
 
 mod actor;
 mod copy;
+mod foreign;
 mod image;
 mod keys;
 mod pack;

@@ -9,7 +9,7 @@ use qcbus_formats::distance::did_you_mean;
 use super::copy::{Copy, Value};
 use super::keys::{self, Key};
 use super::problem::{Problem, Problems, Spot, What};
-use super::{MAX_DEPTH, Piece, actor};
+use super::{MAX_DEPTH, Piece, actor, foreign};
 use crate::archive::MAIN_MEMBER;
 
 /// What becomes of a modular scenario.
@@ -234,8 +234,11 @@ impl<'d> Expander<'d> {
     }
 
     fn say_form(&mut self, node: Node<'d>, form: Form) {
+        let is_open = foreign::say(node, &mut self.problems);
         let direct = node.child("ParameterReference");
         match (form, direct) {
+            // Which form was meant is not known.
+            (Form::Direct, _) if is_open => {}
             (Form::Direct, _) => {
                 let text = "without a `ManeuverGroupReference` all groups of the file are taken; this form is documented, \
                             but later versions of the reference tool delete the referring group without a word: name \

@@ -107,6 +107,10 @@ pub enum What {
     DirectForm,
     /// Both forms in one `ScenarioReference`.
     MixedForm,
+    /// An element in a reference that nobody knows.
+    ForeignElement,
+    /// An attribute or a text in a reference that nobody knows.
+    ForeignAttribute,
     /// A `ManeuverGroupReference` without a name, or with one that the file does not have.
     GroupUnknown,
     /// The file has several groups of the name.
@@ -140,6 +144,7 @@ impl What {
                 | What::Depth
                 | What::Size
                 | What::Placement
+                | What::ForeignElement
                 | What::GroupUnknown
                 | What::KeyTie
         )

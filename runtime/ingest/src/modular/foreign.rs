@@ -1,0 +1,88 @@
+//! What lies in a reference and does not belong there: mostly a name that is misspelt.
+
+use qcbus_document::Node;
+use qcbus_formats::distance::did_you_mean;
+
+use super::OFFERS;
+use super::problem::{Problem, Problems, Spot, What};
+
+/// What may be in the elements of a reference: its name, its attributes, its children.
+const KNOWN: [(&str, &[&str], &[&str]); 2] = [
+    (
+        "ScenarioReference",
+        &["scenarioFileName"],
+        &["ManeuverGroupReference", "ParameterReference"],
+    ),
+    (
+        "ManeuverGroupReference",
+        &["maneuverGroupName"],
+        &["ParameterReference"],
+    ),
+];
+
+/// Says what nobody reads in a reference. What an unknown element was to say is not known, so there is
+/// no expansion with one, and `true` is returned.
+pub(super) fn say<'d>(reference: Node<'d>, problems: &mut Problems<'d>) -> bool {
+    let before = problems.0.len();
+    for element in std::iter::once(reference).chain(reference.descendants()) {
+        let known = KNOWN.iter().find(|(name, ..)| element.is(name));
+        let Some((_, attributes, children)) = known else {
+            // What is in an unknown element is as unknown; a `ParameterReference` has its own rule.
+            if element.is("ParameterReference") {
+                say_children(element, &[], problems);
+            }
+            continue;
+        };
+        say_children(element, children, problems);
+        for attribute in element.attributes() {
+            let name = attribute.name();
+            let is_known =
+                attributes.contains(&name) || name == OFFERS || name.starts_with("xmlns");
+            if !is_known {
+                let text = format!(
+                    "`{}` has no attribute `{name}`, and nobody reads it{}",
+                    element.name(),
+                    did_you_mean(name, attributes.iter().copied())
+                );
+                push(
+                    What::ForeignAttribute,
+                    Spot::Attribute(attribute),
+                    text,
+                    problems,
+                );
+            }
+        }
+        if !element.text().trim().is_empty() {
+            let text = format!("`{}` has no text, and nobody reads it", element.name());
+            push(What::ForeignAttribute, Spot::Node(element), text, problems);
+        }
+    }
+    let said = problems.0.get(before..).unwrap_or(&[]);
+    said.iter().any(|it| it.what == What::ForeignElement)
+}
+
+fn say_children<'d>(element: Node<'d>, children: &[&str], problems: &mut Problems<'d>) {
+    for child in element
+        .children()
+        .filter(|child| !children.contains(&child.name()))
+    {
+        let (own, name) = (element.name(), child.name());
+        let text = match children {
+            [] => format!("`{own}` has nothing in it, and nobody reads `{name}`"),
+            _ => format!(
+                "`{own}` has no `{name}` in it, so what that was to say is lost{}",
+                did_you_mean(name, children.iter().copied())
+            ),
+        };
+        push(What::ForeignElement, Spot::Node(child), text, problems);
+    }
+}
+
+fn push<'d>(what: What, at: Spot<'d>, text: String, problems: &mut Problems<'d>) {
+    problems.push(Problem {
+        what,
+        at,
+        target: None,
+        text,
+    });
+}
