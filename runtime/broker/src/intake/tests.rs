@@ -2,7 +2,7 @@ use std::fs;
 use std::time::{Duration, SystemTime};
 
 use qcbus_bus::{Host, HostOptions, Instance};
-use qcbus_messages::JobDocument;
+use qcbus_messages::{DocumentRole, JobDocument};
 use tempfile::TempDir;
 
 use super::*;
@@ -224,4 +224,72 @@ async fn what_is_only_kept_makes_room_for_what_is_needed() {
     }
     let last = farm.map_of("39.xosc").doc;
     assert_eq!(farm.map_of("39.xosc").doc, last, "the newest is kept");
+}
+
+const LIBRARY: &[u8] = b"<OpenSCENARIO><ManeuverGroup name=\"G\"/></OpenSCENARIO>";
+
+fn modular(file: &str) -> Vec<u8> {
+    format!(
+        "<OpenSCENARIO><ManeuverGroup name=\"P\"><ScenarioReference scenarioFileName=\"{file}\">\
+         <ManeuverGroupReference maneuverGroupName=\"G\"/></ScenarioReference></ManeuverGroup></OpenSCENARIO>"
+    )
+    .into_bytes()
+}
+
+fn roles(prepared: &PreparedJob) -> Vec<DocumentRole> {
+    prepared.documents.iter().map(|it| it.role).collect()
+}
+
+fn depends_on(prepared: &PreparedJob, path: &Path) -> bool {
+    prepared.inputs.iter().any(|input| &*input.path == path)
+}
+
+#[tokio::test]
+async fn a_modular_scenario_brings_its_library_and_what_it_expands_to() {
+    use DocumentRole::{Expanded, Listing, Root, Scenario};
+    let farm = Farm::new();
+    farm.put("main.xosc", &modular("library.xosc"));
+    let prepared = farm.prepare("main.xosc", Instant::now());
+    assert_eq!(roles(&prepared), [Root]);
+    let whys = prepared.missing.iter().map(|it| it.role);
+    assert_eq!(whys.collect::<Vec<_>>(), [Scenario, Expanded]);
+    assert!(
+        depends_on(&prepared, &farm.path("library.xosc")),
+        "it is awaited"
+    );
+
+    farm.put("library.xosc", LIBRARY);
+    let prepared = farm.prepare("main.xosc", Instant::now());
+    assert_eq!(roles(&prepared), [Root, Scenario, Expanded]);
+    assert_eq!(prepared.missing, []);
+    let to: Vec<u32> = prepared.documents[0].links.iter().map(|it| it.to).collect();
+    assert_eq!(to, [1]);
+    let basis = prepared.basis;
+    farm.put("library.xosc", &[LIBRARY, b" "].concat());
+    assert_ne!(farm.prepare("main.xosc", Instant::now()).basis, basis);
+
+    let files = [
+        ("main.xosc".to_owned(), modular("library.xosc")),
+        ("library.xosc".to_owned(), LIBRARY.to_vec()),
+    ];
+    let archive = qcbus_ingest::modular::pack(&files).unwrap();
+    farm.put("main.mosc", &archive);
+    let prepared = farm.prepare("main.mosc", Instant::now());
+    assert_eq!(roles(&prepared), [Root, Listing, Scenario, Expanded]);
+    assert_eq!(prepared.inputs.len(), 1, "all of it lies in the archive");
+}
+
+#[tokio::test]
+async fn the_search_path_is_looked_through_and_awaited() {
+    let farm = Farm::new();
+    farm.put("main.xosc", &modular("library.xosc"));
+    let search = SearchPath::parse("far;near".as_ref(), farm.dir.path());
+    farm.intake.search_in(Arc::new(search));
+    fs::create_dir(farm.path("near")).unwrap();
+    farm.put("near/library.xosc", LIBRARY);
+    let prepared = farm.prepare("main.xosc", Instant::now());
+    assert_eq!(prepared.missing, []);
+    for name in ["library.xosc", "far/library.xosc", "near/library.xosc"] {
+        assert!(depends_on(&prepared, &farm.path(name)), "{name}");
+    }
 }
