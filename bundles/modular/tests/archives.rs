@@ -240,16 +240,26 @@ fn members_of_one_name_are_said_once_for_the_archive() {
 
 #[test]
 fn names_that_lead_out_are_no_unused_members_besides() {
-    for (test, name) in [
-        ("up", "../x.xosc"),
-        ("root", "/x.xosc"),
-        ("drive", "C:x.xosc"),
-        ("back", "a\\x.xosc"),
+    for (test, name, what) in [
+        ("up", "../x.xosc", "leads out of the archive"),
+        (
+            "up_back",
+            "..\\x.xosc",
+            "`..\\x.xosc` leads out of the archive",
+        ),
+        ("root", "/x.xosc", "leads out of the archive"),
+        ("drive", "C:x.xosc", "leads out of the archive"),
+        (
+            "back",
+            "a\\x.xosc",
+            "`a\\x.xosc` has a backslash in its name",
+        ),
+        ("control", "../\tx", "`../\\tx` leads out of the archive"),
     ] {
         let members = vec![file("main.xosc", library()), file(name, library())];
         expect(
             &found(test, vec![archive("a.mosc", members)]),
-            &[("error archive_path_safety", "leads out of the archive")],
+            &[("error archive_path_safety", what)],
         );
     }
 }

@@ -172,9 +172,8 @@ fn check_directory(
             let entry = archive.by_index_raw(index).ok()?;
             let name = entry.name().ok()?.into_owned();
             match entry.is_symlink() {
-                true => Some(format!("the member {name:?} is a symbolic link")),
-                false => (!stays_inside(&name))
-                    .then(|| format!("the member {name:?} leads out of the archive")),
+                true => Some(format!("the member `{}` is a symbolic link", shown(&name))),
+                false => (!stays_inside(&name)).then(|| refused(&name)),
             }
         })
         .take(MOST_NAMED)
@@ -184,6 +183,28 @@ fn check_directory(
         faults.push(TextFault::new(Code::ArchiveEscapes, 0, text));
     }
     Ok(())
+}
+
+/// What is wrong with the name of a member.
+fn refused(name: &str) -> String {
+    let name_shown = shown(name);
+    match has_only_backslashes(name) {
+        true => {
+            format!(
+                "the member `{name_shown}` has a backslash in its name, and names in archives are parted by `/`"
+            )
+        }
+        false => format!("the member `{name_shown}` leads out of the archive"),
+    }
+}
+
+/// A name as people read it: control characters cannot be shown as they are.
+fn shown(name: &str) -> String {
+    let shown = |c: char| match c.is_control() {
+        true => c.escape_default().to_string(),
+        false => c.to_string(),
+    };
+    name.chars().map(shown).collect()
 }
 
 /// Most members that are named for one fault of an archive.
@@ -223,6 +244,11 @@ pub fn stays_inside(name: &str) -> bool {
         && !name.starts_with('/')
         && !name.contains(['\\', '\0', ':'])
         && name.split('/').all(|part| part != "..")
+}
+
+/// Whether a name would be a plain relative path but for the backslashes that part it.
+pub fn has_only_backslashes(name: &str) -> bool {
+    name.contains('\\') && stays_inside(&name.replace('\\', "/"))
 }
 
 fn read_checked(

@@ -1,5 +1,5 @@
 use qcbus_document::{Document, FaultCode};
-use qcbus_sdk::modular::{What, stays_inside};
+use qcbus_sdk::modular::{What, has_only_backslashes, stays_inside};
 use qcbus_sdk::{Level, Place, Rule, Sink};
 
 use crate::assembly::{Assembly, Modular, archive_of, name_of, say};
@@ -18,6 +18,9 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
         let archive = archive_of(document.path()).unwrap_or("");
         let why = match fault.code {
             FaultCode::ArchiveDuplicate => "which one another tool reads is open; keep one of them",
+            _ if fault.text.contains("has a backslash") => {
+                "some tools take it for a path and others for a name; pack the archive with `/`"
+            }
             _ => {
                 "a tool that unpacks the archive, as the reference tool does, may write over files beside its own by it; \
                  members are files with relative names, with `/` and without `..`"
@@ -44,10 +47,16 @@ fn say_unpackable(assembly: &Assembly<'_>, document: Document<'_>, found: &mut S
         if name.trim().is_empty() || name.contains("://") || stays_inside(name) {
             continue;
         }
-        let text = format!(
-            "`{name}` cannot be packed into an archive: there, what is referred to lies in the archive or in a directory of \
-             the search path; name the file without `..`, root, drive and backslash"
-        );
+        let text = match has_only_backslashes(name) {
+            true => format!(
+                "`{name}` cannot be packed into an archive as it is: names in archives are parted by `/`; write `{}`",
+                name.replace('\\', "/")
+            ),
+            false => format!(
+                "`{name}` cannot be packed into an archive: there, what is referred to lies in the archive or in a \
+                 directory of the search path; name the file without `..`, root, drive and backslash"
+            ),
+        };
         let place = Place::attribute_or_node(reference, "scenarioFileName");
         let finding = found.issue(place, text).level(Level::Warning);
         if let Some(target) = assembly.target(reference) {

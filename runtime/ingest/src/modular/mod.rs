@@ -26,7 +26,7 @@ pub use problem::{Problem, Spot, What};
 pub(crate) use search::modules;
 pub use search::{SEARCH_PATH_VARIABLE, SearchPath};
 
-pub use crate::archive::stays_inside;
+pub use crate::archive::{has_only_backslashes, stays_inside};
 
 use qcbus_document::Document;
 use qcbus_messages::Link;

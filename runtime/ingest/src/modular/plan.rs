@@ -297,6 +297,12 @@ impl<'d> Expander<'d> {
             self.say(What::Unreadable, at, root, why);
             return None;
         }
+        if let Some(catalog) = catalog_of(document) {
+            let file = self.short_name(target);
+            let text = format!("`{file}` is a catalog; groups are taken from scenarios");
+            self.say(What::Unreadable, at, Some(catalog.into()), text);
+            return None;
+        }
         Some(target)
     }
 
@@ -557,6 +563,11 @@ fn not_found(node: Node<'_>) -> (What, String) {
         let text = "`ScenarioReference` needs the attribute `scenarioFileName`".to_owned();
         return (What::FileNotFound, text);
     };
+    if name.trim().is_empty() {
+        let text =
+            "`scenarioFileName` is empty; it names the file from which groups are taken".to_owned();
+        return (What::FileNotFound, text);
+    }
     if !name.ends_with(".xosc") && !name.ends_with(".mosc") {
         let text = format!(
             "`{name}` is not looked for: the name of a scenario ends in `.xosc`, that of an archive in `.mosc`, in \
@@ -565,6 +576,13 @@ fn not_found(node: Node<'_>) -> (What, String) {
         return (What::Extension, text);
     }
     let in_archive = node.document().path().contains(".mosc!");
+    if in_archive && crate::archive::has_only_backslashes(name) {
+        let text = format!(
+            "`{name}` is not looked for: names in archives are parted by `/`; write `{}`",
+            name.replace('\\', "/")
+        );
+        return (What::Escapes, text);
+    }
     if in_archive && !crate::archive::stays_inside(name) {
         let text = format!(
             "`{name}` leads out of the archive; what an archive refers to lies in it or in a directory of the search \
@@ -581,6 +599,13 @@ fn not_found(node: Node<'_>) -> (What, String) {
         super::SEARCH_PATH_VARIABLE
     );
     (What::FileNotFound, text)
+}
+
+/// The catalog that a document is instead of a scenario.
+fn catalog_of(document: Document<'_>) -> Option<Node<'_>> {
+    let root = document.root()?;
+    let catalog = root.child("Catalog")?;
+    root.child("Storyboard").is_none().then_some(catalog)
 }
 
 /// What keeps a scenario from being taken as it is.
