@@ -38,15 +38,18 @@ pub(super) fn read<'d>(within: Node<'d>, problems: &mut Problems<'d>) -> Vec<Key
             });
             continue;
         };
-        if let Some(&before) = first.get(key) {
+        // That empty ones are for nothing is said of each.
+        let before = first.get(key).filter(|_| !key.trim().is_empty());
+        if let Some(&before) = before {
             let text = match before.attr("value") == Some(value.value()) {
                 true => {
                     format!("the key `{key}` is given twice with the same value; once is enough")
                 }
                 false => format!(
-                    "the key `{key}` is given twice with different values, `{}` and `{}`; only one of them is meant",
-                    before.attr("value").unwrap_or(""),
-                    value.value()
+                    "the key `{key}` has been given before; the reference tool takes the later value, `{}`, instead of \
+                     `{}`: remove the one that is not meant",
+                    value.value(),
+                    before.attr("value").unwrap_or("")
                 ),
             };
             problems.push(Problem {
@@ -207,7 +210,7 @@ fn tie<'d>(one: &Key<'d>, other: &Key<'d>, attribute: Attribute<'d>, problems: &
         return;
     }
     let text = format!(
-        "which value `{}` of `{}` is to have is open: the key `{}` says `{}` and `{}`; give it once",
+        "`{}` of `{}` can have one value only, but the key `{}` says `{}` and `{}`",
         attribute.name(),
         attribute.node().name(),
         one.key,
@@ -224,11 +227,17 @@ fn tie<'d>(one: &Key<'d>, other: &Key<'d>, attribute: Attribute<'d>, problems: &
 
 fn unmatched<'d>(key: &Key<'d>, group: Node<'d>) -> Problem<'d> {
     let name = group.attr("name").unwrap_or("");
-    let text = format!(
-        "the key `{}` fits no attribute that the group `{name}` offers by `{OFFERS}`, so its value `{}` goes nowhere",
-        key.key,
-        key.value.value()
-    );
+    let text = match key.key.trim().is_empty() {
+        true => format!(
+            "`key` is empty, so its value `{}` goes nowhere",
+            key.value.value()
+        ),
+        false => format!(
+            "the key `{}` fits no attribute that the group `{name}` offers by `{OFFERS}`, so its value `{}` goes nowhere",
+            key.key,
+            key.value.value()
+        ),
+    };
     Problem {
         what: What::KeyUnmatched,
         at: Spot::of(key.node, "key"),
