@@ -1,13 +1,14 @@
 //! What comes with groups that are taken often is said once.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
-use qcbus_sdk::Sink;
+use qcbus_document::Document;
 use qcbus_sdk::modular::Spot;
+use qcbus_sdk::{Place, Sink};
 
 use crate::assembly::place;
 
-/// Most further places that a finding lists.
+/// Most further places that a finding lists; what is beyond is counted.
 const MOST: usize = 5;
 
 /// Findings about groups that are taken, each said once: one that is to be mended in a library file
@@ -15,64 +16,102 @@ const MOST: usize = 5;
 #[derive(Default)]
 pub struct Finds<'d> {
     all: Vec<Find<'d>>,
-    known: HashMap<(usize, u32, String), usize>,
+    known: HashMap<(Key, String), usize>,
+    /// The places of each finding.
+    places: HashSet<(usize, Key)>,
 }
 
-struct Find<'d> {
+/// The document of a place, by where its path lies in memory, and the offset.
+type Key = (usize, u32);
+
+/// A finding, with all places where it applies.
+pub struct Find<'d> {
     at: Spot<'d>,
-    target: Spot<'d>,
+    target: Place<'d>,
     there: &'static str,
     text: String,
-    more: Vec<(Spot<'d>, &'static str)>,
+    besides: Vec<(Place<'d>, String)>,
+    more: Vec<Place<'d>>,
+    /// What each of those is.
+    too: &'static str,
+    /// Further places that are not listed.
+    left: usize,
+}
+
+impl<'d> Find<'d> {
+    /// Adds a place that is the same wherever the finding applies.
+    pub fn besides(&mut self, at: impl Into<Place<'d>>, there: impl Into<String>) {
+        self.besides.push((at.into(), there.into()));
+    }
 }
 
 impl<'d> Finds<'d> {
     /// Something that `target` in a library file brings along; `at` takes its group. Of what was noted
-    /// with the same text before only the place that takes it is new.
-    pub fn brought(&mut self, at: Spot<'d>, target: Spot<'d>, there: &'static str, text: String) {
-        let find = Find {
-            at,
-            target,
-            there,
-            text,
-            more: Vec::new(),
-        };
-        self.note(target, (at, "it is taken here, too"), find);
+    /// with the same text before only the place that takes it is new, and nothing is given back.
+    pub fn brought(
+        &mut self,
+        at: Spot<'d>,
+        target: Spot<'d>,
+        there: &'static str,
+        text: String,
+    ) -> Option<&mut Find<'d>> {
+        let find = Find::of(at, place(target), there, text, "it is taken here, too");
+        self.note(place(target), place(at), find)
+    }
+
+    /// Something about a file as a whole, to which `at` refers.
+    pub fn of_file(
+        &mut self,
+        at: Spot<'d>,
+        document: Document<'d>,
+        there: &'static str,
+        text: String,
+    ) -> Option<&mut Find<'d>> {
+        let start = document.root().map_or(0, |root| root.offset());
+        let target = Place::Text(document, start);
+        let target = document.root().map_or(target, Place::Node);
+        let find = Find::of(at, target, there, text, "it is referred to here, too");
+        self.note(target, place(at), find)
     }
 
     /// Something about a value that is written at `at` and put to `target` in a library file. Of what
     /// was noted with the same text before only the place that gets it is new.
-    pub fn given(&mut self, at: Spot<'d>, target: Spot<'d>, there: &'static str, text: String) {
-        let find = Find {
-            at,
-            target,
-            there,
-            text,
-            more: Vec::new(),
-        };
-        self.note(at, (target, "it is put here, too"), find);
+    pub fn given(
+        &mut self,
+        at: Spot<'d>,
+        target: Spot<'d>,
+        there: &'static str,
+        text: String,
+    ) -> Option<&mut Find<'d>> {
+        let find = Find::of(at, place(target), there, text, "it is put here, too");
+        self.note(place(at), place(target), find)
     }
 
-    fn note(&mut self, anchor: Spot<'d>, other: (Spot<'d>, &'static str), find: Find<'d>) {
-        let key = (
-            anchor.node().document().path().as_ptr() as usize,
-            anchor.offset(),
-            find.text.clone(),
-        );
-        let Some(&known) = self.known.get(&key) else {
-            self.known.insert(key, self.all.len());
+    fn note(
+        &mut self,
+        anchor: Place<'d>,
+        other: Place<'d>,
+        find: Find<'d>,
+    ) -> Option<&mut Find<'d>> {
+        let anchor = key_of(anchor);
+        let index = self.all.len();
+        let known = self.known.entry((anchor, find.text.clone()));
+        let known = *known.or_insert(index);
+        if known == index {
+            self.places
+                .extend([(index, anchor), (index, key_of(other))]);
             self.all.push(find);
-            return;
-        };
-        if let Some(known) = self.all.get_mut(known) {
-            let mut spots = known.more.iter().map(|(spot, _)| *spot);
-            let is_same =
-                |spot: Spot<'_>| spot.offset() == other.0.offset() && spot.node() == other.0.node();
-            let is_known = is_same(known.at) || is_same(known.target) || spots.any(is_same);
-            if !is_known && known.more.len() < MOST {
-                known.more.push(other);
+            return self.all.last_mut();
+        }
+        if self.places.insert((known, key_of(other)))
+            && let Some(find) = self.all.get_mut(known)
+        {
+            match find.more.len() < MOST {
+                true => find.more.push(other),
+                false => find.left += 1,
             }
         }
+        None
     }
 
     /// Says them.
@@ -80,10 +119,56 @@ impl<'d> Finds<'d> {
         for find in self.all {
             let mut finding = found
                 .issue(place(find.at), find.text)
-                .at(place(find.target), find.there);
-            for (spot, what) in find.more {
-                finding = finding.at(place(spot), what);
+                .at(find.target, find.there);
+            for (at, there) in find.besides {
+                finding = finding.at(at, there);
+            }
+            let last = find.more.len().wrapping_sub(1);
+            for (index, at) in find.more.into_iter().enumerate() {
+                finding = match find.left {
+                    left if left > 0 && index == last => {
+                        finding.at(at, format!("{}, and at {}", find.too, further(left)))
+                    }
+                    _ => finding.at(at, find.too),
+                };
             }
         }
     }
+}
+
+impl<'d> Find<'d> {
+    fn of(
+        at: Spot<'d>,
+        target: Place<'d>,
+        there: &'static str,
+        text: String,
+        too: &'static str,
+    ) -> Find<'d> {
+        Find {
+            at,
+            target,
+            there,
+            text,
+            besides: Vec::new(),
+            more: Vec::new(),
+            too,
+            left: 0,
+        }
+    }
+}
+
+fn further(places: usize) -> String {
+    match places {
+        1 => "1 further place".to_owned(),
+        many => format!("{many} further places"),
+    }
+}
+
+fn key_of(place: Place<'_>) -> Key {
+    let (document, offset) = match place {
+        Place::Node(node) => (node.document(), node.offset()),
+        Place::Attribute(attribute) => (attribute.node().document(), attribute.offset()),
+        Place::Text(document, offset) => (document, offset),
+    };
+    (document.path().as_ptr() as usize, offset)
 }

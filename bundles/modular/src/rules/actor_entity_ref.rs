@@ -1,10 +1,11 @@
 use std::collections::HashSet;
 
 use qcbus_document::Node;
-use qcbus_sdk::modular::{Followed, Problem, What};
+use qcbus_sdk::modular::{Followed, Problem, Spot, What};
 use qcbus_sdk::{Place, Rule, Sink};
 
-use crate::assembly::{Assembly, Modular, say};
+use crate::assembly::{Assembly, Modular};
+use crate::families::finds::Finds;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_actor_entity_ref",
@@ -15,23 +16,25 @@ pub static RULE: Rule<Modular> = Rule {
 };
 
 fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    let mut finds = Finds::default();
     for problem in assembly.problems(&[What::Actor]) {
-        none(problem, found);
+        none(problem, &mut finds);
     }
     for reference in &assembly.expansion.references {
         let copies = || reference.uses.iter().flat_map(|one| &one.copies);
         if let Some(copy) = copies().next() {
             lost(reference, copy.group, found);
-            before(reference, reference.group, found);
+            before(reference, reference.group, &mut finds);
         }
         // What comes from further away is said where it is referred to.
         let mut seen = HashSet::new();
         let near = copies().filter(|copy| Some(copy.piece) == reference.target);
         for copy in near.filter(|copy| seen.insert(copy.group)) {
-            kept(reference, copy.group, found);
-            before(reference, copy.group, found);
+            kept(reference, copy.group, &mut finds);
+            before(reference, copy.group, &mut finds);
         }
     }
+    finds.say(found);
 }
 
 fn actors<'d>(group: Node<'d>) -> Vec<Node<'d>> {
@@ -55,15 +58,25 @@ fn name<'d>(group: Node<'d>) -> &'d str {
 }
 
 /// A group on one side has no actor.
-fn none(problem: &Problem<'_>, found: &mut Sink<'_>) {
-    let finding = say(found, problem, "the group that is referred to");
+fn none<'d>(problem: &Problem<'d>, finds: &mut Finds<'d>) {
     let referring = problem.at.node();
-    let lacking = match actors(referring).is_empty() {
-        true => referring,
-        false => problem.target.map_or(referring, |target| target.node()),
+    let library = problem.target.map_or(referring, |target| target.node());
+    let first = actors(referring).first().copied();
+    let names_one = first.is_some_and(|actor| actor.attribute("entityRef").is_some());
+    let there = "the group that is referred to";
+    let text = problem.text.clone();
+    let (lacking, find) = match names_one {
+        true => {
+            let find = finds.brought(problem.at, library.into(), there, text);
+            (library, find)
+        }
+        false => {
+            let find = finds.given(problem.at, library.into(), there, text);
+            (referring, find)
+        }
     };
-    if let Some(other) = first_entity(lacking) {
-        finding.at(other, "what the reference tool takes for the actor instead");
+    if let (Some(find), Some(other)) = (find, first_entity(lacking)) {
+        find.besides(other, "what the reference tool takes for the actor instead");
     }
 }
 
@@ -91,34 +104,31 @@ fn lost(reference: &Followed<'_>, group: Node<'_>, found: &mut Sink<'_>) {
 }
 
 /// Actors of the other group that stay as they are.
-fn kept(reference: &Followed<'_>, group: Node<'_>, found: &mut Sink<'_>) {
+fn kept<'d>(reference: &Followed<'d>, group: Node<'d>, finds: &mut Finds<'d>) {
     let all = actors(group);
-    let Some((_, others)) = all.split_first() else {
+    let Some((first, others)) = all.split_first() else {
         return;
     };
-    let (Some(&second), Some(new)) = (others.first(), actors(reference.group).first().copied())
-    else {
+    let (Some(&second), false) = (others.first(), actors(reference.group).is_empty()) else {
         return;
     };
     let text = format!(
-        "the group `{}`, which is referred to, has {} actors, but only the first is replaced by `{}`: {} as in the \
-         library; split it into groups of one actor",
+        "the group `{}`, which is referred to, has {} actors, but the actor of the referring group takes the place of \
+         the first, `{}`, only: {} as in the library; split it into groups of one actor",
         name(group),
         all.len(),
-        entity(new),
+        entity(*first),
         match others.len() {
             1 => format!("{} stays", listed(others)),
             _ => format!("{} stay", listed(others)),
         }
     );
-    let second = Place::attribute_or_node(second, "entityRef");
-    found
-        .issue(reference.node, text)
-        .at(second, "the actor that stays");
+    let second = Spot::of(second, "entityRef");
+    finds.brought(reference.node.into(), second, "the actor that stays", text);
 }
 
 /// An entity that comes before the actors, and is taken for one by the reference tool.
-fn before(reference: &Followed<'_>, group: Node<'_>, found: &mut Sink<'_>) {
+fn before<'d>(reference: &Followed<'d>, group: Node<'d>, finds: &mut Finds<'d>) {
     let (Some(actor), Some(first)) = (actors(group).first().copied(), first_entity(group)) else {
         return;
     };
@@ -133,10 +143,8 @@ fn before(reference: &Followed<'_>, group: Node<'_>, found: &mut Sink<'_>) {
         entity(first),
         first.parent().map_or("", |parent| parent.name())
     );
-    let first = Place::attribute_or_node(first, "entityRef");
-    found
-        .issue(reference.node, text)
-        .at(first, "the first `EntityRef`");
+    let first = Spot::of(first, "entityRef");
+    finds.brought(reference.node.into(), first, "the first `EntityRef`", text);
 }
 
 /// Most actors that are listed.

@@ -1,4 +1,4 @@
-use std::collections::HashSet;
+use std::collections::HashMap;
 
 use qcbus_document::{Attribute, Node};
 use qcbus_formats::distance::did_you_mean;
@@ -6,6 +6,7 @@ use qcbus_sdk::modular::{Key, OFFERS, Spot, Use};
 use qcbus_sdk::{Level, Rule, Sink};
 
 use crate::assembly::{Assembly, Modular, place};
+use crate::families::finds::Finds;
 use crate::families::offers::{Offers, may_be_meant, path};
 
 pub static RULE: Rule<Modular> = Rule {
@@ -18,19 +19,22 @@ pub static RULE: Rule<Modular> = Rule {
 };
 
 fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
-    let mut seen = HashSet::new();
+    let mut wrong: HashMap<Node<'_>, Vec<(Attribute<'_>, String)>> = HashMap::new();
+    let mut finds = Finds::default();
     for reference in &assembly.expansion.references {
         for one in &reference.uses {
             loose_keys(one, found);
-            let groups = one.copies.iter().map(|copy| copy.group);
-            for group in groups.filter(|&group| seen.insert(group)) {
-                for (list, text) in wrong_offers(group) {
+            for group in one.copies.iter().map(|copy| copy.group) {
+                let wrong = wrong.entry(group);
+                for (list, text) in wrong.or_insert_with(|| wrong_offers(group).collect()) {
                     let there = "where the library lists what it offers";
-                    found.issue(reference.node, text).at(list, there);
+                    let at = reference.node.into();
+                    finds.brought(at, (*list).into(), there, text.clone());
                 }
             }
         }
     }
+    finds.say(found);
     // A library file that is checked on its own.
     for group in assembly.root().elements("ManeuverGroup") {
         for (list, text) in wrong_offers(group) {
@@ -80,37 +84,68 @@ fn wrong_offers<'d>(group: Node<'d>) -> impl Iterator<Item = (Attribute<'d>, Str
     let lists = group
         .descendants()
         .filter_map(|element| element.attribute(OFFERS));
-    lists.flat_map(|list| {
-        let names = list.value().split(',').map(str::trim);
-        let wrong =
-            names.filter(move |name| !name.is_empty() && list.node().attribute(name).is_none());
-        wrong.map(move |name| (list, wrong_offer(list.node(), name)))
-    })
+    lists.filter_map(|list| wrong_offer(list).map(|text| (list, text)))
 }
 
-fn wrong_offer(element: Node<'_>, name: &str) -> String {
+fn wrong_offer(list: Attribute<'_>) -> Option<String> {
+    let element = list.node();
+    let names = list.value().split(',').map(str::trim);
+    let wrong = names.filter(|name| !name.is_empty() && element.attribute(name).is_none());
+    let (mut misspelt, mut absent) = (Vec::new(), Vec::new());
+    for name in wrong {
+        match misspelt_offer(element, name) {
+            Some(text) => misspelt.push(text),
+            None => absent.push(absent_offer(element, name)),
+        }
+    }
+    let left = absent.len().saturating_sub(MOST_NAMED);
+    absent.truncate(MOST_NAMED);
+    misspelt.truncate(MOST_NAMED);
+    if left > 0 {
+        absent.push(format!("{left} more"));
+    }
+    if !absent.is_empty() {
+        misspelt.push(format!(
+            "`{OFFERS}` lists {}, which this `{}` does not have, so no value can be put there: none is added where \
+             none is",
+            absent.join(", "),
+            element.name()
+        ));
+    }
+    (!misspelt.is_empty()).then(|| misspelt.join("; "))
+}
+
+/// Most faults of one list that are named.
+const MOST_NAMED: usize = 5;
+
+/// What is wrong with how a list names attributes that are there.
+fn misspelt_offer(element: Node<'_>, name: &str) -> Option<String> {
     let between = |c: char| c.is_whitespace() || matches!(c, ';' | '|' | '/' | ':');
     let parts = || name.split(between).filter(|part| !part.is_empty());
     let is_list = parts().count() > 1 && parts().all(|part| element.attribute(part).is_some());
     if is_list {
         let list: Vec<&str> = parts().collect();
-        return format!(
+        return Some(format!(
             "`{OFFERS}` lists `{name}`, which is taken for one name: only a comma parts names, `{}`",
             list.join(",")
-        );
+        ));
     }
     let last = name.rsplit('.').next().unwrap_or(name);
-    if last != name && element.attribute(last).is_some() {
-        return format!(
+    let is_path = last != name && element.attribute(last).is_some();
+    is_path.then(|| {
+        format!(
             "`{OFFERS}` lists `{name}`, but only attributes of the element itself are offered, by their names: `{last}`"
-        );
-    }
+        )
+    })
+}
+
+/// A name that is listed for nothing, with what may have been meant.
+fn absent_offer(element: Node<'_>, name: &str) -> String {
     let others = element.attributes().map(|attribute| attribute.name());
     let others = others.filter(|other| *other != OFFERS && may_be_meant(name, other));
     let hint = did_you_mean(name, others);
-    format!(
-        "`{OFFERS}` lists `{name}`, which this `{}` does not have, so no value can be put there: none is added where \
-         none is{hint}",
-        element.name()
-    )
+    match hint.strip_prefix("; ") {
+        Some(hint) => format!("`{name}` ({hint})"),
+        None => format!("`{name}`"),
+    }
 }

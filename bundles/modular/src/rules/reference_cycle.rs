@@ -1,7 +1,8 @@
 use qcbus_sdk::modular::What;
 use qcbus_sdk::{Rule, Sink};
 
-use crate::assembly::{Assembly, Modular, say_all};
+use crate::assembly::{Assembly, Modular, place};
+use crate::families::finds::Finds;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_reference_cycle",
@@ -12,10 +13,17 @@ pub static RULE: Rule<Modular> = Rule {
 };
 
 fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
-    say_all(
-        assembly,
-        found,
-        &[What::Cycle],
-        "the scenario that is referred to",
-    );
+    let mut finds = Finds::default();
+    for problem in assembly.problems(&[What::Cycle]) {
+        match assembly.target(problem.at.node()) {
+            Some(back) => {
+                let there = "the scenario that it leads back to";
+                finds.of_file(problem.at, back, there, problem.text.clone());
+            }
+            None => {
+                found.issue(place(problem.at), problem.text.clone());
+            }
+        }
+    }
+    finds.say(found);
 }

@@ -1,10 +1,11 @@
 use qcbus_document::Node;
 use qcbus_messages::{Absence, DocumentRole, MissingDocument};
-use qcbus_sdk::modular::{Problem, What};
+use qcbus_sdk::modular::What;
 use qcbus_sdk::{Rule, Sink};
 
 use crate::assembly::{Assembly, Modular, place, say};
 use crate::families::file_faults::has_own_rule;
+use crate::families::finds::Finds;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_reference_file_found",
@@ -25,23 +26,25 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
             }
         }
     }
+    let mut finds = Finds::default();
     for problem in assembly.problems(&[What::Unreadable]) {
-        if is_mine(assembly, problem) {
-            say(found, problem, "the file that is referred to");
+        // What is wrong with the file that is checked, other rules say, those of the bundle for
+        // OpenSCENARIO among them.
+        let target = assembly.target(problem.at.node());
+        if let Some(target) = target.filter(|target| !has_own_rule(*target)) {
+            let there = "the file that is referred to";
+            finds.of_file(problem.at, target, there, problem.text.clone());
         }
     }
-}
-
-/// What is wrong with the file that is checked, other rules say, those of the bundle for OpenSCENARIO
-/// among them.
-fn is_mine(assembly: &Assembly<'_>, problem: &Problem<'_>) -> bool {
-    let target = assembly.target(problem.at.node());
-    target.is_some_and(|target| !has_own_rule(target))
+    finds.say(found);
 }
 
 /// Why a file could not be had that is there, or was not looked for.
 fn other_reason(assembly: &Assembly<'_>, reference: Node<'_>) -> Option<String> {
     let name = reference.attr("scenarioFileName")?;
+    if name.trim().is_empty() {
+        return None;
+    }
     let mut missing = assembly.subject.missing().iter();
     let missing = missing.find(|missing| {
         missing.role == DocumentRole::Scenario

@@ -1,10 +1,12 @@
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use qcbus_document::{Document, Node};
 use qcbus_sdk::modular::{Followed, Form, Spot, What};
 use qcbus_sdk::{Rule, Sink};
 
 use crate::assembly::{Assembly, Modular, place, say};
+use crate::families::copies::short_name;
+use crate::families::finds::Finds;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_reference_maneuver_group_known",
@@ -22,13 +24,20 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
             say(found, problem, "the file that is referred to");
         }
     }
+    let mut finds = Finds::default();
     for problem in assembly.problems(&[What::GroupAmbiguous]) {
-        say(found, problem, "another group of this name");
+        if let Some(second) = problem.target {
+            let there = "another group of this name";
+            finds.brought(problem.at, second, there, problem.text.clone());
+        }
     }
+    note_nameless(assembly, &mut finds);
+    finds.say(found);
     let mut said = HashSet::new();
     for reference in &assembly.expansion.references {
-        if let Some(nameless) = nameless(assembly, reference).filter(|&group| said.insert(group)) {
-            say_nameless(reference, nameless, found);
+        let is_nameless = reference.group.attr("name").unwrap_or("").is_empty();
+        if is_nameless && said.insert(reference.group) {
+            say_unnamed(reference, found);
         }
     }
 }
@@ -55,25 +64,64 @@ fn nameless<'d>(assembly: &Assembly<'d>, reference: &Followed<'d>) -> Option<Nod
     groups.find(|group| group.attr("name").is_none())
 }
 
-fn say_nameless(reference: &Followed<'_>, nameless: Node<'_>, found: &mut Sink<'_>) {
-    let path = nameless.document().path();
-    let file = path.rsplit('/').next().unwrap_or(path);
+/// Notes which library files have groups without a name, and where they are referred to.
+fn note_nameless<'d>(assembly: &Assembly<'d>, finds: &mut Finds<'d>) {
+    let mut texts: HashMap<Node<'d>, String> = HashMap::new();
+    let references = || {
+        let all = assembly.expansion.references.iter();
+        all.filter_map(|reference| Some((reference, nameless(assembly, reference)?)))
+    };
     // The reference tool reads the names of groups up to the one that it looks for.
+    for (reference, nameless) in references() {
+        if let Some(name) = taken_after(reference, nameless) {
+            texts.entry(nameless).or_insert_with(|| {
+                format!(", and the reference tool breaks off at it before it finds `{name}`")
+            });
+        }
+    }
+    for (reference, nameless) in references() {
+        let file = short_name(nameless.document());
+        let breaks_off = texts.get(&nameless).map_or("", String::as_str);
+        let text = format!(
+            "`{file}` has a maneuver group without a `name`, which cannot be referred to{breaks_off}"
+        );
+        let at = Spot::of(reference.node, "scenarioFileName");
+        finds.brought(at, nameless.into(), "the group without a name", text);
+    }
+}
+
+/// The first group after one in its file that a reference takes.
+fn taken_after<'d>(reference: &Followed<'d>, nameless: Node<'d>) -> Option<&'d str> {
+    let path = nameless.document().path();
     let is_after =
         |group: Node<'_>| group.document().path() == path && group.offset() > nameless.offset();
     let mut taken = reference.uses.iter().flat_map(|one| &one.copies);
-    let breaks_off = match taken.find(|copy| is_after(copy.group)) {
-        Some(copy) => format!(
-            ", and the reference tool breaks off at it before it finds `{}`",
-            copy.group.attr("name").unwrap_or("")
-        ),
-        None => String::new(),
+    let copy = taken.find(|copy| is_after(copy.group))?;
+    Some(copy.group.attr("name").unwrap_or(""))
+}
+
+/// Says that the group of a reference has no name that could come before those of what it takes.
+fn say_unnamed(reference: &Followed<'_>, found: &mut Sink<'_>) {
+    let taken = reference.uses.iter().flat_map(|one| &one.copies).next();
+    let own = taken.map(|copy| copy.group.attr("name").unwrap_or(""));
+    let own = own.filter(|own| !own.is_empty()).unwrap_or("Drive");
+    let lacks = match reference.group.attr("name") {
+        None => "the referring group has no `name`",
+        Some(_) => "the `name` of the referring group is empty",
     };
-    let text = format!(
-        "`{file}` has a maneuver group without a `name`, which cannot be referred to{breaks_off}"
-    );
-    let at = place(Spot::of(reference.node, "scenarioFileName"));
-    found
-        .issue(at, text)
-        .at(nameless, "the group without a name");
+    let then = match (reference.form, reference.group.attr("name")) {
+        (Form::Direct, _) => "what takes its place has none either".to_owned(),
+        (Form::Named, None) => format!(
+            "what takes its place is called by the library's group alone, as `{own}`; the reference tool breaks off at it"
+        ),
+        (Form::Named, Some(_)) => format!(
+            "what takes its place is called by the library's group alone, as `{own}`; the reference tool calls it \
+             `.{own}`"
+        ),
+    };
+    let text = format!("{lacks}, so {then}; give it one that no other group of the act has");
+    let finding = found.issue(place(Spot::of(reference.group, "name")), text);
+    if let Some(taken) = taken {
+        finding.at(taken.group, "the group that is referred to");
+    }
 }

@@ -4,7 +4,8 @@ use qcbus_document::{Document, Node};
 use qcbus_sdk::modular::{Followed, Form, Spot};
 use qcbus_sdk::{Rule, Sink};
 
-use crate::assembly::{Assembly, Modular, place};
+use crate::assembly::{Assembly, Modular};
+use crate::families::finds::Finds;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_reference_unexpanded",
@@ -15,6 +16,7 @@ pub static RULE: Rule<Modular> = Rule {
 };
 
 fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    let mut finds = Finds::default();
     for reference in &assembly.expansion.references {
         let Some(target) = reference.target else {
             continue;
@@ -35,10 +37,11 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
                 Form::Named => taken.contains(&group),
             };
             if is_taken {
-                say(reference, document, group, found);
+                note(reference, document, group, &mut finds);
             }
         }
     }
+    finds.say(found);
 }
 
 fn is_archive(document: Document<'_>) -> bool {
@@ -69,7 +72,12 @@ fn taken<'d>(
     inner.filter(is_named).map(|inner| inner.group).collect()
 }
 
-fn say(reference: &Followed<'_>, document: Document<'_>, group: Node<'_>, found: &mut Sink<'_>) {
+fn note<'d>(
+    reference: &Followed<'d>,
+    document: Document<'d>,
+    group: Node<'d>,
+    finds: &mut Finds<'d>,
+) {
     let path = document.path();
     let file = path.rsplit(['/', '!']).next().unwrap_or(path);
     let text = format!(
@@ -78,6 +86,6 @@ fn say(reference: &Followed<'_>, document: Document<'_>, group: Node<'_>, found:
         group.attr("name").unwrap_or("")
     );
     let inner = group.child("ScenarioReference").unwrap_or(group);
-    let at = place(Spot::of(reference.node, "scenarioFileName"));
-    found.issue(at, text).at(inner, "the reference in it");
+    let at = Spot::of(reference.node, "scenarioFileName");
+    finds.brought(at, inner.into(), "the reference in it", text);
 }
