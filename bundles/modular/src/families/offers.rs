@@ -91,3 +91,29 @@ pub fn path(attribute: Attribute<'_>, parts: usize) -> String {
     names.push(attribute.name());
     names.join(".")
 }
+
+/// Whether an element in any of some groups offers attributes.
+pub fn offers_any(groups: &[Node<'_>]) -> bool {
+    let mut elements = groups.iter().flat_map(|group| group.descendants());
+    elements.any(|element| element.attr(OFFERS).is_some())
+}
+
+/// The attributes in groups that a key would fit if they were offered.
+pub fn unoffered<'a, 'd: 'a>(
+    key: &'a str,
+    groups: &'a [Node<'d>],
+) -> impl Iterator<Item = Attribute<'d>> + use<'a, 'd> {
+    let elements = groups.iter().flat_map(|group| group.descendants());
+    elements.filter_map(move |element| named_by(key, element))
+}
+
+/// The attribute of an element that a key names.
+pub fn named_by<'d>(key: &str, element: Node<'d>) -> Option<Attribute<'d>> {
+    let mut parts = key.rsplit('.');
+    let attribute = element.attribute(parts.next()?);
+    let attribute = attribute.filter(|attribute| !attribute.is(OFFERS))?;
+    let mut around = std::iter::once(element).chain(element.ancestors());
+    parts
+        .all(|part| around.next().is_some_and(|element| element.is(part)))
+        .then_some(attribute)
+}

@@ -1,9 +1,11 @@
+use qcbus_document::{Attribute, Node};
 use qcbus_formats::distance::did_you_mean;
-use qcbus_sdk::modular::{Problem, Use, What};
+use qcbus_sdk::modular::{OFFERS, Problem, Use, What};
 use qcbus_sdk::{Rule, Sink};
 
 use crate::assembly::{Assembly, Modular, place};
-use crate::families::offers::{Offers, may_be_meant, path};
+use crate::families::copies::{is_offered, short_name};
+use crate::families::offers::{Offers, may_be_meant, named_by, offers_any, path, unoffered};
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_key_matches",
@@ -26,22 +28,88 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
             let one = uses.iter().find(|one| Some(one.node) == within);
             last = one.map(|one| (*one, Offers::of(one)));
         }
-        let hint = last.as_ref().map(|(_, offers)| hint(problem, offers));
-        let text = format!("{}{}", problem.text, hint.unwrap_or_default());
-        let finding = found.issue(place(problem.at), text);
+        let hint = last
+            .as_ref()
+            .map(|(one, offers)| hint(problem, one, offers));
+        let hint = hint.unwrap_or_default();
+        let text = format!("{}{}", problem.text, hint.text);
+        let mut finding = found.issue(place(problem.at), text);
         if let Some(group) = problem.target {
-            finding.at(place(group), "the group that is referred to");
+            finding = finding.at(place(group), "the group that is referred to");
+        }
+        for attribute in hint.attributes {
+            finding = finding.at(attribute, "the attribute that is not offered");
         }
     }
 }
+
+/// What is added to what is said of a key.
+#[derive(Default)]
+struct Hint<'d> {
+    text: String,
+    /// The attributes that it names and that are not offered.
+    attributes: Vec<Attribute<'d>>,
+}
+
+/// Most attributes that are shown.
+const MOST_SHOWN: usize = 5;
 
 /// Most paths that a key is compared with, and most that are listed.
 const MOST_COMPARED: usize = 64;
 const MOST_LISTED: usize = 5;
 
-/// What may have been meant by a key that fits nothing.
-fn hint<'d>(problem: &Problem<'d>, offers: &Offers<'d>) -> String {
+fn hint<'d>(problem: &Problem<'d>, one: &Use<'d>, offers: &Offers<'d>) -> Hint<'d> {
     let key = problem.at.node().attr("key").unwrap_or("");
+    let groups: Vec<Node<'d>> = one.copies.iter().map(|copy| copy.group).collect();
+    let mut hint = Hint::default();
+    if key.trim().is_empty() {
+        return hint;
+    }
+    let of_group = groups.iter().find_map(|&group| named_by(key, group));
+    let is_listed = of_group.is_some_and(|attribute| is_offered(attribute));
+    if !is_listed && offers_any(&groups) {
+        hint.attributes = unoffered(key, &groups).take(MOST_SHOWN).collect();
+    }
+    hint.text = match (hint.attributes.first(), of_group) {
+        (Some(&first), _) => say_unoffered(first),
+        (None, Some(_)) if is_listed => format!(
+            "; attributes of the `ManeuverGroup` itself are never replaced, though it lists them in `{OFFERS}`"
+        ),
+        (None, Some(_)) => {
+            "; attributes of the `ManeuverGroup` itself are never replaced".to_owned()
+        }
+        (None, None) => meant(key, offers),
+    };
+    hint
+}
+
+fn say_unoffered(attribute: Attribute<'_>) -> String {
+    let (name, element) = (attribute.name(), attribute.node());
+    let listed = element.attr(OFFERS).map(str::trim);
+    let mut words = listed.into_iter().flat_map(|listed| {
+        let is_of_name = |c: char| c.is_alphanumeric() || c == '_';
+        listed.split(move |c| !is_of_name(c))
+    });
+    let lists = match listed {
+        // What is wrong with it another rule says.
+        Some(listed) if words.any(|word| word == name) => {
+            return format!(
+                "; `{}` names `{name}` in `{OFFERS}`, but not as its name alone between commas: `{listed}`",
+                element.name()
+            );
+        }
+        Some(listed) => format!("does not list it in `{OFFERS}`, only `{listed}`"),
+        None => format!("does not list it in `{OFFERS}`"),
+    };
+    format!(
+        "; `{}` has the attribute `{name}` but {lists}: have it offered in `{}`, or leave the key out",
+        element.name(),
+        short_name(element.document())
+    )
+}
+
+/// What may have been meant by a key that fits nothing.
+fn meant<'d>(key: &'d str, offers: &Offers<'d>) -> String {
     if let Some(taken) = offers.taken_loosely(key).next() {
         let count = key.split('.').count();
         return format!(
@@ -59,19 +127,13 @@ fn hint<'d>(problem: &Problem<'d>, offers: &Offers<'d>) -> String {
     if !meant.is_empty() {
         return meant;
     }
-    let is_of_group = problem
-        .target
-        .is_some_and(|group| group.node().attribute(key).is_some());
-    if is_of_group {
-        return "; attributes of the group itself are never replaced".to_owned();
-    }
     let alike = offers.all.iter().filter(|offer| offer.is(name));
     let mut listed = distinct(alike.map(|&offer| path(offer, 2)));
     if listed.is_empty() {
         listed = distinct(offers.all.iter().map(|&offer| path(offer, 2)));
     }
     match listed.len() {
-        0 => "; it offers none".to_owned(),
+        0 => "; it offers none at all".to_owned(),
         1..=MOST_LISTED => format!("; it offers {}", quoted(&listed)),
         _ => format!("; it offers {}, …", quoted(&listed[..MOST_LISTED])),
     }
