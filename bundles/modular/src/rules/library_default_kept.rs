@@ -18,6 +18,10 @@ pub static RULE: Rule<Modular> = Rule {
 const MOST: usize = 8;
 
 fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
+    // What is to be mended first may well set what would be listed.
+    if !assembly.expansion.is_complete() {
+        return;
+    }
     // What an inner scenario leaves an outer one may still replace.
     let of_root = assembly.expansion.references.iter();
     for reference in of_root.filter(|reference| reference.piece == 0) {
