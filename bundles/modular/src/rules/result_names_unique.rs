@@ -75,7 +75,14 @@ fn say(act: Node<'_>, first: &Bearer<'_, '_>, second: &Bearer<'_, '_>, found: &m
         let taken = bearer.taken?;
         Some(taken.reference.group.attr("name").unwrap_or("").to_owned())
     };
+    let is_nameless = |one: &Option<String>| one.as_deref() == Some("");
     let advice = match (referring(first), referring(second)) {
+        (one, other) if is_nameless(&one) || is_nameless(&other) => {
+            match is_nameless(&one) && is_nameless(&other) {
+                true => "neither referring group has a name: give them different ones".to_owned(),
+                false => "a referring group has no name: give it one".to_owned(),
+            }
+        }
         (Some(one), Some(other)) if one == other => {
             format!("both referring groups are called `{one}`: give one of them another name")
         }
