@@ -1,11 +1,13 @@
 use std::collections::HashSet;
 
 use qcbus_document::{Attribute, Document, Node};
+use qcbus_schema::Version;
 use qcbus_sdk::modular::{Followed, Spot};
 use qcbus_sdk::{Level, Place, Rule, Sink};
 
 use crate::assembly::{Assembly, Modular, place};
 use crate::families::copies::{Taken, short_name};
+use crate::families::finds::Finds;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_library_context_mismatch",
@@ -32,6 +34,59 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
             seen.insert(piece);
         }
     }
+    let mut finds = Finds::default();
+    for taken in assembly.taken() {
+        note_prefix(&taken, &mut finds);
+    }
+    finds.say(found);
+}
+
+/// Notes a group whose names are in another namespace than those around the referring group.
+fn note_prefix<'d>(taken: &Taken<'_, 'd>, finds: &mut Finds<'d>) {
+    let group = taken.copy.group;
+    let (theirs, own) = (group.prefix(), taken.reference.group.prefix());
+    if theirs == own {
+        return;
+    }
+    let written = |prefix: &str| match prefix {
+        "" => "no prefix".to_owned(),
+        prefix => format!("the prefix `{prefix}:`"),
+    };
+    let name = match theirs {
+        "" => group.name().to_owned(),
+        prefix => format!("{prefix}:{}", group.name()),
+    };
+    let text = format!(
+        "the group `{}` of `{}` is written with {}, and the group whose place it takes with {}: to most readers of the \
+         expanded scenario `{name}` is another element, which they pass over or refuse; write both alike",
+        taken.own_name(),
+        short_name(group.document()),
+        written(theirs),
+        written(own)
+    );
+    finds.brought(taken.at(), group.into(), "the group", text);
+}
+
+/// Says that a library file names no version, by which it could be told how its groups are meant.
+fn say_no_version(
+    reference: &Followed<'_>,
+    library: Document<'_>,
+    own: Version,
+    found: &mut Sink<'_>,
+) {
+    let Some(root) = library.root() else {
+        return;
+    };
+    let text = format!(
+        "`{}` names no version of the standard, and its groups are read by that of this scenario, {own}; give it a \
+         `FileHeader` with `revMajor` and `revMinor`",
+        short_name(library)
+    );
+    let at = place(Spot::of(reference.node, "scenarioFileName"));
+    let place = root.child("FileHeader").unwrap_or(root);
+    found
+        .issue(at, text)
+        .at(place, "where the library file would name its version");
 }
 
 fn say_version<'d>(
@@ -41,9 +96,11 @@ fn say_version<'d>(
     found: &mut Sink<'_>,
 ) {
     let root = assembly.root();
-    let (Some(own), Some(theirs)) = (assembly.version_of(root), assembly.version_of(library))
-    else {
+    let Some(own) = assembly.version_of(root) else {
         return;
+    };
+    let Some(theirs) = assembly.version_of(library) else {
+        return say_no_version(reference, library, own, found);
     };
     let header = library.root().and_then(|root| root.child("FileHeader"));
     let Some(header) = header.filter(|_| own != theirs) else {
