@@ -197,6 +197,162 @@ fn a_group_that_is_not_found_hides_no_other() {
     ];
     assert_eq!(found("other", &files, "value_type").len(), 1);
 }
+
+/// So many groups that take one.
+fn often(count: usize, from: &str, keys: &[(&str, &str)]) -> String {
+    let groups = (0..count).map(|index| taking(&format!("G{index}"), from, "Drive", keys));
+    file(ENTITIES, &groups.collect::<String>())
+}
+
+#[test]
+fn what_is_wrong_with_a_library_is_said_once() {
+    let good = || offering("Drive", &speed(r#"value="0" parameterAttributes="value""#));
+    let nobody = good().replace(r#"<EntityRef entityRef="Veh"/>"#, "");
+    let two = good().replace("</Actors>", r#"<EntityRef entityRef="Veh2"/></Actors>"#);
+    let nameless = good().replace(r#"name="Drive" "#, "") + &good();
+    let inner = taking("Drive", "gone.xosc", "X", &[]);
+    let lists = offering(
+        "Drive",
+        &speed(r#"value="0" parameterAttributes="value,a,b""#),
+    );
+    let nothing = offering("Drive", &speed(r#"value="0""#));
+    for (test, library, rule, texts) in [
+        ("nobody", file("", &nobody), "actor_entity_ref", 1),
+        ("two", file("", &two), "actor_entity_ref", 1),
+        (
+            "twice",
+            file("", &(good() + &good())),
+            "reference_maneuver_group_known",
+            1,
+        ),
+        (
+            "nameless",
+            file("", &nameless),
+            "reference_maneuver_group_known",
+            1,
+        ),
+        (
+            "broken",
+            "<OpenSCENARIO>".to_owned(),
+            "reference_file_found",
+            1,
+        ),
+        ("empty", String::new(), "reference_file_found", 1),
+        ("map", "<OpenDRIVE/>".to_owned(), "reference_file_found", 1),
+        ("inner", file("", &inner), "reference_unexpanded", 1),
+        // One for each of the two elements with a list.
+        ("lists", file("", &lists), "key_path_exact", 2),
+        (
+            "nothing",
+            file("", &nothing),
+            "library_parameter_attributes_missing",
+            1,
+        ),
+    ] {
+        for count in [1, 3, 9] {
+            let main = often(count, "lib.xosc", &[("AbsoluteTargetSpeed.value", "1")]);
+            let files = [("main.xosc", main), ("lib.xosc", library.clone())];
+            let said = found(&format!("once_{test}_{count}"), &files, rule);
+            assert_eq!(said.len(), texts, "{test}: {said:?}");
+            let besides = usize::from(test == "nothing");
+            let places = 2 + besides + (count - 1).min(5);
+            assert!(
+                said.iter().all(|(_, all)| *all == places),
+                "{test}: {said:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_circle_is_said_once() {
+    let back = |from: &str| taking("Drive", from, "Drive", &[]) + &taking("B", from, "Drive", &[]);
+    let files = [
+        ("main.xosc", file(ENTITIES, &back("lib.xosc"))),
+        ("lib.xosc", file("", &back("main.xosc"))),
+    ];
+    let said = found("circle", &files, "reference_cycle");
+    assert_eq!(said.len(), 1, "{said:?}");
+    assert_eq!(said[0].1, 3, "{said:?}");
+    let files = [("main.xosc", file(ENTITIES, &back("main.xosc")))];
+    assert_eq!(found("circle_of_one", &files, "reference_cycle").len(), 1);
+}
+
+#[test]
+fn two_values_of_one_key_are_told_in_two_halves() {
+    let offers = speed(r#"value="0" parameterAttributes="value""#);
+    let key = "AbsoluteTargetSpeed.value";
+    let main = often(1, "lib.xosc", &[(key, "1"), (key, "2")]);
+    let files = [
+        ("main.xosc", main),
+        ("lib.xosc", file("", &offering("Drive", &offers))),
+    ];
+    let tie = found("tie", &files, "key_ambiguous");
+    assert!(
+        tie.len() == 1 && tie[0].0.contains("can have one value only"),
+        "{tie:?}"
+    );
+    let twice = found("tie", &files, "key_duplicate");
+    assert!(
+        twice.len() == 1 && twice[0].0.contains("takes the later value, `2`"),
+        "{twice:?}"
+    );
+    assert_eq!(found("tie", &files, "library_default_kept"), []);
+}
+
+#[test]
+fn what_is_there_and_not_offered_is_said_of_the_key() {
+    let action = r#"<TeleportAction><Position><WorldPosition x="0" y="0" parameterAttributes="x"/></Position>
+        </TeleportAction>"#;
+    for (key, text) in [
+        (
+            "WorldPosition.y",
+            "does not list it in `parameterAttributes`, only `x`",
+        ),
+        (
+            "Event.priority",
+            "`Event` has the attribute `priority` but does not list it in `parameterAttributes`:",
+        ),
+        (
+            "ManeuverGroup.name",
+            "attributes of the `ManeuverGroup` itself are never replaced",
+        ),
+        ("WorldPosition.X", "did you mean `WorldPosition.x`?"),
+        (" ", "`key` is empty"),
+    ] {
+        let files = [
+            ("main.xosc", often(1, "lib.xosc", &[(key, "1")])),
+            ("lib.xosc", file("", &offering("Drive", action))),
+        ];
+        let said = found("unoffered", &files, "key_matches");
+        assert!(said.len() == 1 && said[0].0.contains(text), "{said:?}");
+        assert_eq!(
+            said[0].0.contains("did you mean"),
+            key.ends_with('X'),
+            "{said:?}"
+        );
+        let missing = found("unoffered", &files, "library_parameter_attributes_missing");
+        assert_eq!(missing, []);
+    }
+}
+
+#[test]
+fn lists_that_cannot_be_read_are_told_from_those_that_lack_a_name() {
+    let action = r#"<TeleportAction><Position><WorldPosition x="0" y="0" parameterAttributes=" x ; y"/></Position>
+        </TeleportAction>"#;
+    let files = [
+        (
+            "main.xosc",
+            often(1, "lib.xosc", &[("WorldPosition.x", "1")]),
+        ),
+        ("lib.xosc", file("", &offering("Drive", action))),
+    ];
+    let said = found("misread", &files, "key_matches");
+    let text =
+        "names `x` in `parameterAttributes`, but not as its name alone between commas: `x ; y`";
+    assert!(said.len() == 1 && said[0].0.ends_with(text), "{said:?}");
+}
+
 #[test]
 fn what_cdata_has_stays() {
     let script = |text: &str| {
