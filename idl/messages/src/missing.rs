@@ -133,7 +133,7 @@ impl fmt::Display for Absence {
                 f.write_str("is the name of a map that the simulator knows, not of a file")
             }
             Absence::Escapes => f.write_str(
-                "leads out of the archive; what an archive refers to lies in it or in a directory of the search path",
+                "is no name for what lies in an archive or in a directory of the search path: such names are relative, parted by `/` and without `..`",
             ),
             Absence::NotAScenario => f.write_str(
                 "is not looked for: the name of a scenario ends in `.xosc`, that of an archive in `.mosc`",
