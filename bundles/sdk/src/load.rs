@@ -204,8 +204,11 @@ impl Source for Shelf<'_> {
         Ok(listing.ok().flatten().map(|prepared| prepared.build()))
     }
 
-    fn expanded(&self, expanded: &ExpandedImage<'_, '_>) -> Result<Vec<u8>, Infallible> {
-        Ok(expanded.build())
+    fn expanded(
+        &self,
+        expanded: &ExpandedImage<'_, '_>,
+    ) -> Result<Result<Vec<u8>, Absence>, Infallible> {
+        Ok(Ok(expanded.build()))
     }
 
     fn kept(&self, index: usize) -> &[u8] {

@@ -38,11 +38,14 @@ pub trait Source {
     /// Keeps a document. `referred_at` is the offset of the element in the root that leads to it.
     fn keep(&mut self, path: &Path, role: DocumentRole, referred_at: u32, document: Self::Document);
 
-    /// An image of what a modular scenario was expanded to.
+    /// An image of what a modular scenario was expanded to; `Ok(Err(…))` when there can be none.
     ///
     /// # Errors
     /// As [`Source::fetch`].
-    fn expanded(&self, expanded: &ExpandedImage<'_, '_>) -> Result<Self::Document, Self::Halt>;
+    fn expanded(
+        &self,
+        expanded: &ExpandedImage<'_, '_>,
+    ) -> Result<Result<Self::Document, Absence>, Self::Halt>;
 
     /// The image of a document that was kept, by how many were kept before it.
     fn kept(&self, index: usize) -> &[u8];
@@ -326,7 +329,10 @@ impl<S: Source> Walk<'_, S> {
             return Ok(Err((obstacle.text.clone(), at)));
         }
         match expansion.image(self.walking.max_image) {
-            Some(image) => self.source.expanded(&image).map(Ok),
+            Some(image) => {
+                let made = self.source.expanded(&image)?;
+                Ok(made.map_err(|why| (format!("what it is expanded to {why}"), 0)))
+            }
             None => {
                 let why = "its image would be larger than the limit max_image allows";
                 Ok(Err((why.to_owned(), 0)))

@@ -41,8 +41,11 @@ impl Source for Shelf {
         Ok(None)
     }
 
-    fn expanded(&self, expanded: &ExpandedImage<'_, '_>) -> Result<Vec<u8>, Infallible> {
-        Ok(expanded.build())
+    fn expanded(
+        &self,
+        expanded: &ExpandedImage<'_, '_>,
+    ) -> Result<Result<Vec<u8>, Absence>, Infallible> {
+        Ok(Ok(expanded.build()))
     }
 
     fn kept(&self, index: usize) -> &[u8] {

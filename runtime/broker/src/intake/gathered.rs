@@ -13,7 +13,7 @@ use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Absence, Digest, DocId, DocumentRole, JobDocument, MissingDocument};
 use sha2::{Digest as _, Sha256};
 
-use super::{Intake, Published, explained};
+use super::{Intake, Published};
 use crate::core::{Input, PrepareFailure, PreparedJob, Reading, Stamp};
 use crate::stamp::{from_content, is_racy, stamp_through_links};
 
@@ -190,10 +190,17 @@ impl Source for Links<'_> {
         }
     }
 
-    fn expanded(&self, expanded: &ExpandedImage<'_, '_>) -> Result<Published, PrepareFailure> {
-        let path = Path::new("what a modular scenario is expanded to");
-        let published = self.intake.publish_expanded(expanded);
-        published.map_err(|failure| explained(failure, path))
+    fn expanded(
+        &self,
+        expanded: &ExpandedImage<'_, '_>,
+    ) -> Result<Result<Published, Absence>, PrepareFailure> {
+        match self.intake.publish_expanded(expanded) {
+            Ok(published) => Ok(Ok(published)),
+            Err(failure) => {
+                let path = Path::new("what a modular scenario is expanded to");
+                failure.of_linked(path).map(Err)
+            }
+        }
     }
 
     fn kept(&self, index: usize) -> &[u8] {
