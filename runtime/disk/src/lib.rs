@@ -27,6 +27,25 @@ pub fn write_whole(path: &Path, content: &[u8], durable: bool) -> io::Result<()>
     Ok(())
 }
 
+/// Writes `content` where a person has named a place for it: as [`write_whole`], but what a link leads to
+/// is written and not the link, and into a device or a pipe, which must not be replaced by a file.
+///
+/// # Errors
+/// As [`write_whole`].
+pub fn write_named(path: &Path, content: &[u8], durable: bool) -> io::Result<()> {
+    let is_special = |data: &Metadata| !data.is_file() && !data.is_dir();
+    if std::fs::metadata(path).is_ok_and(|data| is_special(&data)) {
+        let mut file = File::options().write(true).open(path)?;
+        file.write_all(content)?;
+        return file.flush();
+    }
+    let meant = match path.is_symlink() {
+        true => path.canonicalize()?,
+        false => path.to_path_buf(),
+    };
+    write_whole(&meant, content, durable)
+}
+
 /// Writes `content` under a temporary name in the directory of `path`, to be renamed there later.
 /// With `durable`, the content is on the disk already.
 ///
@@ -201,6 +220,30 @@ fn is_dead(pid: u32) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn links_are_followed_and_devices_stay_devices() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        std::fs::write(at("file"), "old").unwrap();
+        std::os::unix::fs::symlink("file", at("link")).unwrap();
+        write_named(&at("link"), b"new", false).unwrap();
+        assert!(at("link").is_symlink());
+        assert_eq!(std::fs::read(at("file")).unwrap(), b"new");
+        write_named(&at("fresh"), b"first", false).unwrap();
+        assert_eq!(std::fs::read(at("fresh")).unwrap(), b"first");
+        assert!(write_named(dir.path(), b"x", false).is_err());
+
+        let pipe = at("pipe");
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+        assert!(made.unwrap().success());
+        let from = pipe.clone();
+        let reader = std::thread::spawn(move || std::fs::read(from).unwrap());
+        write_named(&pipe, b"through", false).unwrap();
+        assert_eq!(reader.join().unwrap(), b"through");
+        let is_file = std::fs::symlink_metadata(&pipe).unwrap().is_file();
+        assert!(!is_file, "it is a pipe still");
+    }
 
     #[test]
     fn only_what_the_dead_left_is_swept() {

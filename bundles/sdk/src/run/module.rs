@@ -155,7 +155,7 @@ fn result_path(bundle: &Bundle, config: &Config) -> PathBuf {
 }
 
 fn write(path: &Path, text: &str) -> Result<(), ModuleError> {
-    qcbus_disk::write_whole(path, text.as_bytes(), true).map_err(|source| ModuleError::Write {
+    qcbus_disk::write_named(path, text.as_bytes(), true).map_err(|source| ModuleError::Write {
         path: path.to_owned(),
         source,
     })

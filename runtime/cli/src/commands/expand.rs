@@ -58,7 +58,7 @@ fn expanded(args: &ExpandArgs) -> Result<Exit, Failed> {
         let text = format!("{output} is not written: the scenario is made of it ({source})");
         return Err((Exit::Usage, text));
     }
-    qcbus_disk::write_whole(output, text.as_bytes(), false).map_err(|error| {
+    qcbus_disk::write_named(output, text.as_bytes(), false).map_err(|error| {
         let text = format!("cannot write {}: {error}", output.display());
         (Exit::Internal, text)
     })?;

@@ -49,7 +49,7 @@ fn packed(args: &PackArgs) -> Result<Exit, (Exit, String)> {
         files.push((name, bytes));
     }
     let archive = pack(&files).map_err(|error| usage(format!("failed to {error}")))?;
-    qcbus_disk::write_whole(output, &archive, false).map_err(|error| {
+    qcbus_disk::write_named(output, &archive, false).map_err(|error| {
         (
             Exit::Internal,
             format!("cannot write {}: {error}", output.display()),
