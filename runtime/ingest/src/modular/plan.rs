@@ -93,6 +93,7 @@ pub fn expand(pieces: Vec<Piece<'_>>, max_text: u64) -> Expansion<'_> {
         chain: Vec::new(),
         left: max_text,
         copies: 0,
+        written: HashMap::new(),
         problems: Problems::default(),
         out: Expansion {
             pieces,
@@ -114,6 +115,8 @@ struct Expander<'d> {
     /// Bytes and groups that may still be copied.
     left: u64,
     copies: usize,
+    /// The groups of a piece by the names that are written there: the first, and another one.
+    written: HashMap<usize, HashMap<&'d str, (Node<'d>, Option<Node<'d>>)>>,
     problems: Problems<'d>,
     out: Expansion<'d>,
 }
@@ -346,12 +349,22 @@ impl<'d> Expander<'d> {
     /// are written in it, and what is wrong with others of its groups does not matter here.
     fn find(&mut self, target: usize, name: &str) -> (Vec<Rc<Copy<'d>>>, Option<Node<'d>>) {
         let document = self.document(target);
-        let mut written = document
-            .elements("ManeuverGroup")
-            .filter(|group| group.attr("name") == Some(name));
         let is_archive = document.path().ends_with(&format!(".mosc!{MAIN_MEMBER}"));
-        if let Some(first) = written.next().filter(|_| !is_archive) {
-            let second = written.next();
+        let written = self.written.entry(target).or_insert_with(|| {
+            let mut written: HashMap<&str, (Node<'d>, Option<Node<'d>>)> = HashMap::new();
+            for group in document.elements("ManeuverGroup") {
+                let Some(name) = group.attr("name") else {
+                    continue;
+                };
+                let known = written.entry(name).or_insert((group, None));
+                if known.0 != group {
+                    known.1.get_or_insert(group);
+                }
+            }
+            written
+        });
+        let written = written.get(name).copied().filter(|_| !is_archive);
+        if let Some((first, second)) = written {
             if first.child("ScenarioReference").is_none() {
                 return (vec![Rc::new(Copy::as_is(target, first))], second);
             }
