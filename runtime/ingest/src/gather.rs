@@ -195,6 +195,12 @@ impl<S: Source> Walk<'_, S> {
                 }
                 return Ok(());
             };
+            if reference.is_module && why != Absence::NotThere {
+                // It is there, and it is the one that is meant: another of its name further along the
+                // search path is not.
+                self.miss(from, reference, path, why, None);
+                return Ok(());
+            }
             if reference.means_all() {
                 self.miss(from, reference, path, why, None);
             } else if first

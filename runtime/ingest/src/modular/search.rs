@@ -109,8 +109,10 @@ fn check(from: &Path, text: &str) -> Result<(), Absence> {
     if !text.ends_with(".xosc") && !text.ends_with(".mosc") {
         return Err(Absence::NotAScenario);
     }
+    // To lead into an archive is not for a reference: it names the archive.
+    let into_archive = text.contains(".mosc!");
     let in_archive = !split_members(from).1.is_empty();
-    if in_archive && !crate::archive::stays_inside(text) {
+    if into_archive || in_archive && !crate::archive::stays_inside(text) {
         return Err(Absence::Escapes);
     }
     Ok(())
