@@ -351,3 +351,35 @@ fn a_scenario_that_cannot_be_expanded_is_not_accepted_whoever_is_asked() {
     assert!(said.stdout.contains("cannot be expanded"), "{whole}");
     assert!(said.stdout.contains("says `8` and `9`"), "{whole}");
 }
+
+#[test]
+fn a_library_that_cannot_be_read_is_not_passed_over() {
+    let desk = desk();
+    std::fs::remove_file(desk.path().join(LIBRARY)).unwrap();
+    std::fs::create_dir(desk.path().join(LIBRARY)).unwrap();
+    desk.write("far/moves.xosc", sample(LIBRARY));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+    let far = desk.path().join("far");
+    let said = desk.run(command.args(["check", MAIN]).env("SCENARIO_PATH", &far));
+    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    std::fs::remove_dir(desk.path().join(LIBRARY)).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+    let said = desk.run(command.args(["check", MAIN]).env("SCENARIO_PATH", &far));
+    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+}
+
+#[test]
+fn a_scenario_that_is_lost_on_its_way_out_is_no_success() {
+    let desk = desk();
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full");
+    let Ok(full) = full else { return };
+    let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+    command
+        .current_dir(desk.path())
+        .args(["expand", MAIN])
+        .stdout(full);
+    assert_eq!(command.status().unwrap().code(), Some(5));
+    let said = desk.qcbus(&["pack", MAIN, "/dev/zero", "-o", "x.mosc"]);
+    assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
+    assert!(said.stderr.contains("it is no file"), "{}", said.stderr);
+}

@@ -1,5 +1,6 @@
 //! `qcbus expand`.
 
+use std::io::Write as _;
 use std::path::Path;
 
 use qcbus_messages::Exit;
@@ -50,8 +51,7 @@ fn expanded(args: &ExpandArgs) -> Result<Exit, Failed> {
     say_moved(&expansion, args);
     let text = expansion.text();
     let Some(output) = &args.output else {
-        talk::print(&text);
-        return Ok(Exit::Accepted);
+        return written_out(&text);
     };
     if let Some(source) = source_at(&expansion, output) {
         let output = output.display();
@@ -63,6 +63,18 @@ fn expanded(args: &ExpandArgs) -> Result<Exit, Failed> {
         (Exit::Internal, text)
     })?;
     Ok(Exit::Accepted)
+}
+
+/// A scenario that is lost on its way is no success; a reader that has left knows so itself.
+fn written_out(text: &str) -> Result<Exit, Failed> {
+    let mut out = std::io::stdout().lock();
+    let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    match written {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err((Exit::Internal, format!("cannot write to stdout: {error}")))
+        }
+        _ => Ok(Exit::Accepted),
+    }
 }
 
 /// Reads a modular scenario and all that belongs to it.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use qcbus_document::FileKind;
+use qcbus_ingest::Limits;
 use qcbus_messages::Exit;
 use qcbus_sdk::Loaded;
 use qcbus_sdk::modular::pack;
@@ -44,9 +45,7 @@ fn packed(args: &PackArgs) -> Result<Exit, (Exit, String)> {
                 path.display()
             )));
         }
-        let bytes = std::fs::read(&path)
-            .map_err(|error| usage(format!("cannot read {}: {error}", path.display())))?;
-        files.push((name, bytes));
+        files.push((name, read(&path).map_err(usage)?));
     }
     let archive = pack(&files).map_err(|error| usage(format!("failed to {error}")))?;
     qcbus_disk::write_named(output, &archive, false).map_err(|error| {
@@ -63,6 +62,23 @@ fn packed(args: &PackArgs) -> Result<Exit, (Exit, String)> {
         true => Exit::Rejected,
         false => Exit::Accepted,
     })
+}
+
+/// A file that an archive can hold; what is no file has no end.
+fn read(path: &Path) -> Result<Vec<u8>, String> {
+    let most = Limits::default().max_archive;
+    let failed = |error: std::io::Error| format!("cannot read {}: {error}", path.display());
+    let data = std::fs::metadata(path).map_err(failed)?;
+    if !data.is_file() {
+        return Err(format!("cannot read {}: it is no file", path.display()));
+    }
+    if data.len() > most {
+        let (path, found) = (path.display(), data.len());
+        return Err(format!(
+            "{path} has {found} bytes; an archive holds {most} in all"
+        ));
+    }
+    std::fs::read(path).map_err(failed)
 }
 
 /// What the files are called in the archive.
