@@ -19,7 +19,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     let uses = assembly.expansion.references.iter();
     let uses: Vec<&Use<'_>> = uses.flat_map(|reference| &reference.uses).collect();
     let mut last: Option<(&Use<'_>, Offers<'_>)> = None;
-    for problem in assembly.problems(&[What::KeyUnmatched]) {
+    for (number, problem) in assembly.problems(&[What::KeyUnmatched]).enumerate() {
         let within = problem.at.node().parent();
         if last
             .as_ref()
@@ -30,6 +30,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
         }
         let hint = last
             .as_ref()
+            .filter(|_| number < MOST_HINTED)
             .map(|(one, offers)| hint(problem, one, offers));
         let hint = hint.unwrap_or_default();
         let text = format!("{}{}", problem.text, hint.text);
@@ -50,6 +51,9 @@ struct Hint<'d> {
     /// The attributes that it names and that are not offered.
     attributes: Vec<Attribute<'d>>,
 }
+
+/// Most keys for which it is said what may be meant: each takes a walk through the group.
+const MOST_HINTED: usize = 32;
 
 /// Most attributes that are shown.
 const MOST_SHOWN: usize = 5;
