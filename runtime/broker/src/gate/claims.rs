@@ -192,8 +192,15 @@ impl Claims {
             }
             for (file, digest) in self.files_of(&path, claim) {
                 let lies = self.lying.get(&file).is_some_and(|it| it.digest == digest);
-                if !lies && !plan.lacking.iter().any(|(other, _)| *other == file) {
-                    plan.lacking.push((file, digest));
+                if lies {
+                    continue;
+                }
+                match plan.lacking.iter().find(|(other, _)| *other == file) {
+                    // Accepted with other bytes of it: one of the two is out of date and is judged
+                    // anew. Until then nothing can satisfy both, however often it is tried.
+                    Some((_, other)) if *other != digest => return self.held_by(&file),
+                    Some(_) => {}
+                    None => plan.lacking.push((file, digest)),
                 }
             }
             plan.roots.push((path, claim.serial));
