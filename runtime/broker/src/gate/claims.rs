@@ -196,9 +196,16 @@ impl Claims {
                     continue;
                 }
                 match plan.lacking.iter().find(|(other, _)| *other == file) {
-                    // Accepted with other bytes of it: one of the two is out of date and is judged
-                    // anew. Until then nothing can satisfy both, however often it is tried.
-                    Some((_, other)) if *other != digest => return self.held_by(&file),
+                    // One of the two is out of date and is judged anew. Until then nothing can satisfy
+                    // both, however often it is tried.
+                    Some((_, other)) if *other != digest => {
+                        let file = to_text(&file);
+                        let why = format!(
+                            "it was accepted with other bytes of {file} than what it rests on"
+                        );
+                        let lasting = false;
+                        return Standing::Held { why, lasting };
+                    }
                     Some(_) => {}
                     None => plan.lacking.push((file, digest)),
                 }

@@ -434,6 +434,24 @@ proptest! {
 }
 
 #[test]
+fn claims_on_different_bytes_of_one_file_wait_for_a_verdict() {
+    let bench = Bench::new(Outside::Name);
+    bench.accept("a.xodr");
+    bench.write("part.xml", "2");
+    let stale = bench.judged("s.xosc");
+    let path = bench.path("s.xosc");
+    bench.gate.accept(&path, &stale).unwrap();
+    // What the map was accepted with lies there again, and what the scenario was accepted with does not.
+    bench.write("part.xml", "1");
+    bench.gate.accept(&path, &stale).unwrap();
+    assert!(!bench.behind().contains("s.xosc"));
+    for name in FARM.map(|it| it.0) {
+        bench.accept(name);
+    }
+    assert_eq!(bench.behind(), FARM.map(|it| it.0.to_owned()).into());
+}
+
+#[test]
 fn many_threads_neither_block_each_other_nor_leave_holes() {
     let bench = Bench::new(Outside::Name);
     std::thread::scope(|scope| {
