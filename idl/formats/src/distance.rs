@@ -31,6 +31,20 @@ pub fn closest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) ->
 /// How a hint of [`did_you_mean`] begins.
 pub const DID_YOU_MEAN: &str = "; did you mean ";
 
+/// Some of the names that there are, for a person to choose from: `` `a`, `b` ``, with `…` when there are
+/// more; `None` when there are none.
+pub fn some_of<'n>(names: impl IntoIterator<Item = &'n str>) -> Option<String> {
+    const MOST: usize = 5;
+    let mut names = names.into_iter();
+    let mut listed: Vec<String> = names
+        .by_ref()
+        .take(MOST)
+        .map(|name| format!("`{name}`"))
+        .collect();
+    listed.extend(names.next().map(|_| "…".to_owned()));
+    (!listed.is_empty()).then(|| listed.join(", "))
+}
+
 /// ``; did you mean `x`?`` to be put behind a message, or nothing when no candidate is near.
 pub fn did_you_mean<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> String {
     match closest(word, candidates) {

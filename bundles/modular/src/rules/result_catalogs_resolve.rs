@@ -1,6 +1,7 @@
 use std::collections::BTreeSet;
 
 use qcbus_document::{Attribute, Node};
+use qcbus_formats::distance::some_of;
 use qcbus_messages::DocumentRole;
 use qcbus_openscenario::closest;
 use qcbus_sdk::{Rule, Sink};
@@ -97,7 +98,6 @@ fn wrong<'d>(
 }
 
 fn known(name: &str, catalogs: &[Node<'_>]) -> String {
-    const MOST: usize = 5;
     let names: BTreeSet<&str> = catalogs
         .iter()
         .filter_map(|catalog| catalog.attr("name"))
@@ -105,14 +105,8 @@ fn known(name: &str, catalogs: &[Node<'_>]) -> String {
     if let Some(near) = closest(name, names.iter().copied()) {
         return format!("; perhaps `{near}` is meant");
     }
-    let listed: Vec<String> = names
-        .iter()
-        .take(MOST)
-        .map(|name| format!("`{name}`"))
-        .collect();
-    match names.len() {
-        0 => " (they lead to none)".to_owned(),
-        1..=MOST => format!(", only to {}", listed.join(", ")),
-        _ => format!(", only to {}, …", listed.join(", ")),
+    match some_of(names) {
+        None => " (they lead to none)".to_owned(),
+        Some(names) => format!(", only to {names}"),
     }
 }

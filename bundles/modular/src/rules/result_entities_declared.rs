@@ -1,6 +1,7 @@
 use std::borrow::Cow;
 
 use qcbus_document::Attribute;
+use qcbus_formats::distance::some_of;
 use qcbus_openscenario::{Declared, Scenario, closest};
 use qcbus_sdk::{Rule, Sink};
 
@@ -124,16 +125,8 @@ fn given(origin: WrittenAt<'_>, name: &str, scenario: &Scenario<'_>) -> String {
 
 /// Some of the entities that there are.
 fn known(scenario: &Scenario<'_>) -> String {
-    const MOST: usize = 5;
-    let names: Vec<&str> = scenario.entities().names().collect();
-    let listed: Vec<String> = names
-        .iter()
-        .take(MOST)
-        .map(|name| format!("`{name}`"))
-        .collect();
-    match names.len() {
-        0 => " (it declares none)".to_owned(),
-        1..=MOST => format!(" (it has {})", listed.join(", ")),
-        _ => format!(" (it has {}, …)", listed.join(", ")),
+    match some_of(scenario.entities().names()) {
+        None => " (it declares none)".to_owned(),
+        Some(names) => format!(" (it has {names})"),
     }
 }
