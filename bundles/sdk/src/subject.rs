@@ -16,6 +16,7 @@ use crate::{LinkedModel, Reads, ResourceValue, Version};
 pub struct Subject<'d> {
     root: Document<'d>,
     written: Document<'d>,
+    is_expanded: bool,
     links: Vec<Link>,
     kind: FileKind,
     version: Option<Version>,
@@ -86,6 +87,7 @@ impl<'d> Subject<'d> {
         Subject {
             root,
             written: root,
+            is_expanded: false,
             links: Vec::new(),
             kind,
             version,
@@ -117,7 +119,9 @@ impl<'d> Subject<'d> {
     pub fn read(mut self, reads: Reads) -> Subject<'d> {
         if reads == Reads::Expanded {
             let expanded = self.with_role(DocumentRole::Expanded).next();
-            self.root = expanded.map_or(self.written, |expanded| expanded.document);
+            let expanded = expanded.map(|expanded| expanded.document);
+            self.is_expanded = expanded.is_some();
+            self.root = expanded.unwrap_or(self.written);
             self.paths = RefCell::new(XPaths::new(self.root));
         }
         self
@@ -142,8 +146,7 @@ impl<'d> Subject<'d> {
 
     /// Whether the root is what a modular scenario was expanded to.
     pub fn is_expanded(&self) -> bool {
-        self.with_role(DocumentRole::Expanded)
-            .any(|expanded| expanded.document.content_hash() == self.root.content_hash())
+        self.is_expanded
     }
 
     /// Where the written root's references to maps and scenarios lead.
