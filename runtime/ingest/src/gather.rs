@@ -10,7 +10,7 @@ use qcbus_messages::path_text::{from_text, to_text};
 use qcbus_messages::{Absence, DocumentRole, Link, MissingDocument, Within};
 
 use crate::archive::MAIN_MEMBER;
-use crate::modular::{ExpandedImage, MAX_DEPTH, Piece, SearchPath, expand, modules};
+use crate::modular::{ExpandedImage, MAX_DEPTH, Piece, SearchPath, expand, libraries};
 use crate::references::{Parameters, Reference, references};
 
 /// Where documents come from and go to.
@@ -112,15 +112,15 @@ pub fn gather<S: Source>(
         missing: Vec::new(),
     };
     let of_root = references(root, walking.search);
-    let is_modular = of_root.iter().any(|reference| reference.is_module);
+    let is_modular = of_root.iter().any(|reference| reference.is_library);
     walk.list_archive(root.path())?;
     for reference in &of_root {
         walk.follow(0, reference)?;
     }
     let mut next = 1;
     while next < walk.documents.len() {
-        if walk.documents[next].is_module {
-            for reference in walk.modules_of(next) {
+        if walk.documents[next].is_library {
+            for reference in walk.libraries_of(next) {
                 walk.follow(next, &reference)?;
             }
         }
@@ -160,7 +160,7 @@ type Obstacle = (String, u32);
 #[derive(Debug, Default)]
 struct Had {
     links: Vec<Link>,
-    is_module: bool,
+    is_library: bool,
     /// How many references lead from the root to it, at least.
     depth: u32,
     /// The element of the root that leads to it.
@@ -168,12 +168,12 @@ struct Had {
 }
 
 impl<S: Source> Walk<'_, S> {
-    /// The references of a module to further ones.
-    fn modules_of(&self, from: usize) -> Vec<Reference> {
+    /// The references of a library to further ones.
+    fn libraries_of(&self, from: usize) -> Vec<Reference> {
         let image = self.source.kept(from - 1);
         Document::open(image).map_or_else(
             |_| Vec::new(),
-            |document| modules(&document, self.walking.search),
+            |document| libraries(&document, self.walking.search),
         )
     }
 
@@ -195,7 +195,7 @@ impl<S: Source> Walk<'_, S> {
                 }
                 return Ok(());
             };
-            if reference.is_module && why != Absence::NotThere {
+            if reference.is_library && why != Absence::NotThere {
                 // It is there, and it is the one that is meant: another of its name further along the
                 // search path is not.
                 self.miss(from, reference, path, why, None);
@@ -262,7 +262,7 @@ impl<S: Source> Walk<'_, S> {
         };
         self.documents.push(Had {
             links: Vec::new(),
-            is_module: reference.is_module,
+            is_library: reference.is_library,
             depth,
             referred_at,
         });
@@ -272,7 +272,7 @@ impl<S: Source> Walk<'_, S> {
         if let Some(why) = broken {
             self.miss(from, reference, path, why, None);
         }
-        if reference.is_module {
+        if reference.is_library {
             self.list_archive(&to_text(&own))?;
         }
         Ok(Ok(()))
@@ -308,7 +308,7 @@ impl<S: Source> Walk<'_, S> {
             Err((why, referred_at)) => {
                 let missing = MissingDocument {
                     role: DocumentRole::Expanded,
-                    reference: self.root.path().to_owned(),
+                    reference: own_name(self.root.path()).to_owned(),
                     path: String::new(),
                     why: Absence::NotExpanded { why },
                     level: Level::Error,
@@ -462,6 +462,11 @@ impl<S: Source> Walk<'_, S> {
         };
         self.missing.into_iter().map(weigh).collect()
     }
+}
+
+/// The name of a file without its directory: results do not tell where they were made.
+fn own_name(path: &str) -> &str {
+    path.rsplit('/').next().unwrap_or(path)
 }
 
 /// How much it weighs that a file cannot be had. Catalogs may be listed and never used.

@@ -8,7 +8,7 @@ use qcbus_document::{Document, Node};
 use qcbus_messages::path_text::from_text;
 use qcbus_messages::{Absence, DocumentRole};
 
-use crate::modular::{SearchPath, modules};
+use crate::modular::{SearchPath, libraries};
 use crate::prepare::{normal, split_members};
 
 /// A reference from a document to another file.
@@ -32,7 +32,7 @@ pub struct Reference {
     /// Why there is no candidate, or not every one.
     pub unresolved: Option<Absence>,
     /// Whether a modular scenario takes maneuver groups from it.
-    pub is_module: bool,
+    pub is_library: bool,
 }
 
 impl Reference {
@@ -53,7 +53,7 @@ pub fn references(document: &Document<'_>, search: &SearchPath) -> Vec<Reference
         .into_iter()
         .map(|(role, node, text)| resolve(role, node, text, &parameters))
         .collect();
-    found.extend(modules(document, search));
+    found.extend(libraries(document, search));
     found.sort_by_key(|reference| reference.offset);
     found
 }
@@ -107,7 +107,7 @@ fn resolve(
         candidates: Vec::new(),
         directory: None,
         unresolved: None,
-        is_module: false,
+        is_library: false,
     };
     let outcome = parameters
         .fill(text)

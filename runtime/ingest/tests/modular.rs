@@ -178,6 +178,10 @@ fn what_stops_an_expansion_is_said() {
         ),
         (referring("lib.XOSC", &named("G", "")), "ends in `.xosc`"),
         (
+            referring("in.mosc!lib.xosc", &named("G", "")),
+            "leads into an archive",
+        ),
+        (
             referring("../lib.xosc", &named("G", "")),
             "leads out of the archive",
         ),

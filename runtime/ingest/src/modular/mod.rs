@@ -14,6 +14,7 @@ mod keys;
 mod pack;
 mod plan;
 mod problem;
+mod refusal;
 mod search;
 mod text;
 
@@ -23,7 +24,7 @@ pub use keys::{Key, offered};
 pub use pack::{PackError, pack};
 pub use plan::{Expansion, Followed, Form, Use, expand};
 pub use problem::{Problem, Spot, What};
-pub(crate) use search::modules;
+pub(crate) use search::libraries;
 pub use search::{SEARCH_PATH_VARIABLE, SearchPath};
 
 pub use crate::archive::{has_only_backslashes, stays_inside};

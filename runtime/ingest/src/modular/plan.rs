@@ -3,12 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
 
-use qcbus_document::{Document, FaultCode, Node};
-use qcbus_formats::distance::did_you_mean;
+use qcbus_document::{Document, Node};
+use qcbus_formats::distance::{did_you_mean, some_of};
 
 use super::copy::{Copy, Value};
 use super::keys::{self, Key};
 use super::problem::{Problem, Problems, Spot, What};
+use super::refusal::{catalog_of, not_found, trouble};
 use super::{MAX_DEPTH, Piece, actor, foreign};
 use crate::archive::MAIN_MEMBER;
 
@@ -519,7 +520,6 @@ impl<'d> Expander<'d> {
     }
 
     fn unknown_group(&mut self, target: usize, name: &str) -> String {
-        const MOST: usize = 5;
         let groups = self.all_copies(target);
         let mut names: Vec<&str> = groups.iter().map(|copy| copy.name()).collect();
         names.dedup();
@@ -541,16 +541,10 @@ impl<'d> Expander<'d> {
             );
         }
         let meant = did_you_mean(name, names.iter().copied());
-        let listed: Vec<String> = names
-            .iter()
-            .take(MOST)
-            .map(|it| format!("`{it}`"))
-            .collect();
-        let known = match names.len() {
+        let known = match some_of(names) {
             _ if !meant.is_empty() => meant,
-            0 => "; it has none".to_owned(),
-            1..=MOST => format!("; it has {}", listed.join(", ")),
-            _ => format!("; it has {}, …", listed.join(", ")),
+            None => "; it has none".to_owned(),
+            Some(names) => format!("; it has {names}"),
         };
         format!("`{file}` has no maneuver group `{name}`{known}")
     }
@@ -568,75 +562,4 @@ impl<'d> Expander<'d> {
 struct Referring<'d> {
     piece: usize,
     group: Node<'d>,
-}
-
-/// Why a reference leads nowhere.
-fn not_found(node: Node<'_>) -> (What, String) {
-    let Some(name) = node.attr("scenarioFileName") else {
-        let text = "`ScenarioReference` needs the attribute `scenarioFileName`".to_owned();
-        return (What::FileNotFound, text);
-    };
-    if name.trim().is_empty() {
-        let text =
-            "`scenarioFileName` is empty; it names the file from which groups are taken".to_owned();
-        return (What::FileNotFound, text);
-    }
-    if !name.ends_with(".xosc") && !name.ends_with(".mosc") {
-        let text = format!(
-            "`{name}` is not looked for: the name of a scenario ends in `.xosc`, that of an archive in `.mosc`, in \
-             small letters"
-        );
-        return (What::Extension, text);
-    }
-    let in_archive = node.document().path().contains(".mosc!");
-    if in_archive && crate::archive::has_only_backslashes(name) {
-        let text = format!(
-            "`{name}` is not looked for: names in archives are parted by `/`; write `{}`",
-            name.replace('\\', "/")
-        );
-        return (What::Escapes, text);
-    }
-    if in_archive && !crate::archive::stays_inside(name) {
-        let text = format!(
-            "`{name}` leads out of the archive; what an archive refers to lies in it or in a directory of the search \
-             path, by a relative name with `/` and without `..`"
-        );
-        return (What::Escapes, text);
-    }
-    let around = match in_archive {
-        true => "in the archive nor in those around it",
-        false => "beside the scenario",
-    };
-    let text = format!(
-        "`{name}` is neither {around} nor in a directory of the search path ({})",
-        super::SEARCH_PATH_VARIABLE
-    );
-    (What::FileNotFound, text)
-}
-
-/// The catalog that a document is instead of a scenario.
-fn catalog_of(document: Document<'_>) -> Option<Node<'_>> {
-    let root = document.root()?;
-    let catalog = root.child("Catalog")?;
-    root.child("Storyboard").is_none().then_some(catalog)
-}
-
-/// What keeps a scenario from being taken as it is.
-fn trouble(document: Document<'_>) -> Option<String> {
-    // Of an archive with other faults the scenario itself is whole.
-    let whole = |code: FaultCode| {
-        !code.makes_partial()
-            || matches!(
-                code,
-                FaultCode::ArchiveEscapes | FaultCode::ArchiveDuplicate
-            )
-    };
-    if let Some(fault) = document.faults().find(|fault| !whole(fault.code)) {
-        let position = document.position(fault.offset);
-        return Some(format!("{position} cannot be read: {}", fault.text));
-    }
-    let root = document.root()?;
-    let found = root.name();
-    (found != "OpenSCENARIO")
-        .then(|| format!("{} is no scenario: its root is `{found}`", document.path()))
 }

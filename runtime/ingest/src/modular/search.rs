@@ -69,7 +69,7 @@ impl SearchPath {
 }
 
 /// What the `ScenarioReference` elements of a document refer to, in document order.
-pub(crate) fn modules(document: &Document<'_>, search: &SearchPath) -> Vec<Reference> {
+pub(crate) fn libraries(document: &Document<'_>, search: &SearchPath) -> Vec<Reference> {
     let names: HashSet<&str> = document
         .elements("ScenarioReference")
         .filter_map(|node| node.attr("scenarioFileName"))
@@ -92,7 +92,7 @@ pub(crate) fn modules(document: &Document<'_>, search: &SearchPath) -> Vec<Refer
             candidates,
             directory: None,
             unresolved,
-            is_module: true,
+            is_library: true,
         });
     }
     found
