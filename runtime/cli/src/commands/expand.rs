@@ -3,9 +3,9 @@
 use std::io::Write as _;
 use std::path::Path;
 
-use qcbus_messages::Exit;
 use qcbus_messages::path_text::from_text;
-use qcbus_sdk::modular::Expansion;
+use qcbus_messages::{Absence, DocumentRole, Exit};
+use qcbus_sdk::modular::{Expansion, SearchPath};
 use qcbus_sdk::{Level, Loaded, Plan};
 
 use crate::args::ExpandArgs;
@@ -123,15 +123,13 @@ fn say_moved(expansion: &Expansion<'_>, args: &ExpandArgs) {
     let Some(piece) = expansion.pieces.first() else {
         return;
     };
-    let named = [("LogicFile", "filepath"), ("Directory", "path")];
-    let paths = named.into_iter().flat_map(|(element, attribute)| {
-        let nodes = piece.document.elements(element);
-        nodes.filter_map(move |node| node.attr(attribute))
+    let all = qcbus_ingest::references(&piece.document, &SearchPath::default());
+    let of_main = all.iter().filter(|it| {
+        let is_file = it.unresolved != Some(Absence::SimulatorMap);
+        matches!(it.role, DocumentRole::Map | DocumentRole::Catalog) && is_file
     });
-    let is_relative = |path: &&str| {
-        let is_file = path.contains(['/', '\\', '.']);
-        is_file && !path.starts_with(['/', '$']) && !path.contains("://")
-    };
+    let paths = of_main.map(|it| it.text.as_str());
+    let is_relative = |path: &&str| !path.starts_with(['/', '$']) && !path.contains("://");
     for path in paths.filter(is_relative) {
         talk::say(&format!(
             "warning: `{path}` starts where a scenario lies, and {} is in another directory than {}",
