@@ -50,8 +50,7 @@ pub(super) fn not_found(node: Node<'_>) -> (What, String) {
         false => "beside the scenario",
     };
     let text = format!(
-        "`{name}` is neither {around} nor in a directory of the search path ({})",
-        SEARCH_PATH_VARIABLE
+        "`{name}` is neither {around} nor in a directory of the search path ({SEARCH_PATH_VARIABLE})"
     );
     (What::FileNotFound, text)
 }
