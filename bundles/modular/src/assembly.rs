@@ -149,13 +149,6 @@ pub fn archive_of(path: &str) -> Option<&str> {
     (FileKind::of_path(Path::new(archive)) == Some(FileKind::Mosc)).then_some(archive)
 }
 
-/// What people call a file: its name, and for a member of an archive that of the archive before it.
-pub fn name_of(path: &str) -> &str {
-    let outermost = path.find(".mosc!").unwrap_or(path.len());
-    let folder = path.get(..outermost).and_then(|file| file.rfind('/'));
-    folder.map_or(path, |at| &path[at + 1..])
-}
-
 /// The place of a spot.
 pub fn place(spot: Spot<'_>) -> Place<'_> {
     match spot {

@@ -9,6 +9,14 @@ use std::ffi::OsString;
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::path::{Path, PathBuf};
 
+/// What people call a file: its name without the directories, and for a member of an archive the name of
+/// the archive before it, `archive.mosc!folder/member`.
+pub fn name_of(path: &str) -> &str {
+    let outermost = path.find(".mosc!").unwrap_or(path.len());
+    let folder = path.get(..outermost).and_then(|file| file.rfind('/'));
+    folder.map_or(path, |at| path.get(at + 1..).unwrap_or(path))
+}
+
 /// Begins the text of a path that cannot be written as it is.
 const ESCAPED: &str = "bytes:";
 
@@ -132,6 +140,18 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    #[test]
+    fn a_member_is_called_by_its_archive_and_its_whole_name() {
+        for (path, name) in [
+            ("/a/b.xosc", "b.xosc"),
+            ("/a/x.mosc!lib/b.xosc", "x.mosc!lib/b.xosc"),
+            ("b.xosc", "b.xosc"),
+            ("", ""),
+        ] {
+            assert_eq!(name_of(path), name);
+        }
+    }
 
     fn path(bytes: &[u8]) -> PathBuf {
         PathBuf::from(OsString::from_vec(bytes.to_vec()))

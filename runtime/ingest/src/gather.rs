@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use qcbus_document::{Document, FaultGroup, FileKind};
 use qcbus_formats::xqar::Level;
-use qcbus_messages::path_text::{from_text, to_text};
+use qcbus_messages::path_text::{from_text, name_of, to_text};
 use qcbus_messages::{Absence, DocumentRole, Link, MissingDocument, Within};
 
 use crate::archive::MAIN_MEMBER;
@@ -308,7 +308,8 @@ impl<S: Source> Walk<'_, S> {
             Err((why, referred_at)) => {
                 let missing = MissingDocument {
                     role: DocumentRole::Expanded,
-                    reference: own_name(self.root.path()).to_owned(),
+                    // Without its directory: results do not tell where they were made.
+                    reference: name_of(self.root.path()).to_owned(),
                     path: String::new(),
                     why: Absence::NotExpanded { why },
                     level: Level::Error,
@@ -462,11 +463,6 @@ impl<S: Source> Walk<'_, S> {
         };
         self.missing.into_iter().map(weigh).collect()
     }
-}
-
-/// The name of a file without its directory: results do not tell where they were made.
-fn own_name(path: &str) -> &str {
-    path.rsplit('/').next().unwrap_or(path)
 }
 
 /// How much it weighs that a file cannot be had. Catalogs may be listed and never used.

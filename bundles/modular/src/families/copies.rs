@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use qcbus_document::{Attribute, Document, FileKind, Node};
 use qcbus_messages::DocumentRole;
+use qcbus_messages::path_text::name_of;
 use qcbus_openscenario::{Inputs, LinkedCatalog, LinkedMap, Scenario};
 use qcbus_schema::Version;
 use qcbus_sdk::modular::{Copy, Followed, OFFERS, Spot, Use, Value, offered};
@@ -128,8 +129,7 @@ impl<'d> Assembly<'d> {
 
 /// What people call a document: its file's name, of a member with that of its archive.
 pub fn short_name<'d>(document: Document<'d>) -> &'d str {
-    let path = document.path();
-    path.rsplit('/').next().unwrap_or(path)
+    name_of(document.path())
 }
 
 /// A value that replaces another, where it is written.

@@ -1,7 +1,8 @@
 use qcbus_document::FaultCode;
+use qcbus_messages::path_text::name_of;
 use qcbus_sdk::{Rule, Sink};
 
-use crate::assembly::{Assembly, Modular, name_of};
+use crate::assembly::{Assembly, Modular};
 use crate::families::file_faults::{ARCHIVE, of_archives};
 
 pub static RULE: Rule<Modular> = Rule {

@@ -1,7 +1,8 @@
 use qcbus_document::{Document, FaultCode};
+use qcbus_messages::path_text::name_of;
 use qcbus_sdk::{Level, Rule, Sink};
 
-use crate::assembly::{Assembly, Modular, name_of};
+use crate::assembly::{Assembly, Modular};
 use crate::families::file_faults::of;
 
 pub static RULE: Rule<Modular> = Rule {

@@ -5,6 +5,7 @@ use std::rc::Rc;
 
 use qcbus_document::{Document, Node};
 use qcbus_formats::distance::{did_you_mean, some_of};
+use qcbus_messages::path_text::name_of;
 
 use super::copy::{Copy, Value};
 use super::keys::{self, Key};
@@ -551,9 +552,7 @@ impl<'d> Expander<'d> {
 
     /// What people call a piece: the name of the file, or of the member after its archive.
     fn short_name(&self, piece: usize) -> String {
-        let path = self.document(piece).path();
-        let file = path.rsplit('/').next().unwrap_or(path);
-        file.to_owned()
+        name_of(self.document(piece).path()).to_owned()
     }
 }
 
