@@ -56,30 +56,38 @@ fn is_incomplete(assembly: &Assembly<'_>, document: Document<'_>) -> bool {
     expansion.references.iter().filter(of_it).any(is_short)
 }
 
-/// The first group without a name of the file that a reference takes groups from by their names.
-fn nameless<'d>(assembly: &Assembly<'d>, reference: &Followed<'d>) -> Option<Node<'d>> {
-    let target = reference.target.filter(|_| reference.form == Form::Named)?;
-    let document = assembly.expansion.pieces.get(target)?.document;
-    let mut groups = document.elements("ManeuverGroup");
-    groups.find(|group| group.attr("name").is_none())
+/// The references that take groups by their names from files with a group that has none, each with the
+/// first of those.
+fn past_nameless<'a, 'd>(assembly: &'a Assembly<'d>) -> Vec<(&'a Followed<'d>, Node<'d>)> {
+    // A file may be referred to ten thousand times, and has as many groups.
+    let mut nameless: HashMap<usize, Option<Node<'d>>> = HashMap::new();
+    let all = assembly.expansion.references.iter();
+    let named = all.filter(|reference| reference.form == Form::Named);
+    let past = named.filter_map(|reference| {
+        let target = reference.target?;
+        let first = nameless.entry(target).or_insert_with(|| {
+            let document = assembly.expansion.pieces.get(target)?.document;
+            let mut groups = document.elements("ManeuverGroup");
+            groups.find(|group| group.attr("name").is_none())
+        });
+        Some((reference, (*first)?))
+    });
+    past.collect()
 }
 
 /// Notes which library files have groups without a name, and where they are referred to.
 fn note_nameless<'d>(assembly: &Assembly<'d>, finds: &mut Finds<'d>) {
     let mut texts: HashMap<Node<'d>, String> = HashMap::new();
-    let references = || {
-        let all = assembly.expansion.references.iter();
-        all.filter_map(|reference| Some((reference, nameless(assembly, reference)?)))
-    };
+    let references = past_nameless(assembly);
     // The reference tool reads the names of groups up to the one that it looks for.
-    for (reference, nameless) in references() {
+    for &(reference, nameless) in &references {
         if let Some(name) = taken_after(reference, nameless) {
             texts.entry(nameless).or_insert_with(|| {
                 format!(", and the reference tool breaks off at it before it finds `{name}`")
             });
         }
     }
-    for (reference, nameless) in references() {
+    for &(reference, nameless) in &references {
         let file = short_name(nameless.document());
         let breaks_off = texts.get(&nameless).map_or("", String::as_str);
         let text = format!(

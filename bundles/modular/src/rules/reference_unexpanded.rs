@@ -1,4 +1,4 @@
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use qcbus_document::{Document, Node};
 use qcbus_sdk::modular::{Followed, Form, Spot};
@@ -17,6 +17,7 @@ pub static RULE: Rule<Modular> = Rule {
 
 fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     let mut finds = Finds::default();
+    let mut referring: HashMap<usize, Vec<Node<'_>>> = HashMap::new();
     for reference in &assembly.expansion.references {
         let Some(target) = reference.target else {
             continue;
@@ -29,9 +30,16 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
         let Some(document) = document.filter(|document| !is_archive(*document)) else {
             continue;
         };
+        let groups = referring.entry(target).or_insert_with(|| {
+            let refers = |group: &Node<'_>| group.child("ScenarioReference").is_some();
+            let groups = document.elements("ManeuverGroup");
+            groups.filter(refers).collect()
+        });
+        if groups.is_empty() {
+            continue;
+        }
         let taken = taken(assembly, reference, target);
-        let refers = |group: &Node<'_>| group.child("ScenarioReference").is_some();
-        for group in document.elements("ManeuverGroup").filter(refers) {
+        for &group in groups.iter() {
             let is_taken = match reference.form {
                 Form::Direct => true,
                 Form::Named => taken.contains(&group),
