@@ -258,15 +258,18 @@ fn only_the_poisonous_file_is_condemned() {
         "{reasons:#?}"
     );
     assert_eq!(farm.verdict("0.xodr").verdict, Verdict::Accepted);
-    // It is not tried again until something changes.
-    let restarts = |farm: &Farm| -> u64 {
-        let peers = farm.status().unwrap().peers;
-        peers
-            .iter()
-            .find(|it| it.name == "dies_on_some_files")
-            .unwrap()
-            .restarts
+    // It is not tried again until something changes. Before that the process that comes after the
+    // last death must be up: it is a restart of its own.
+    let peer = |farm: &Farm| {
+        let peers = farm.status()?.peers;
+        peers.into_iter().find(|it| it.name == "dies_on_some_files")
     };
+    until_or(
+        "it is up again",
+        || peer(&farm).filter(|it| it.state == "ready").map(drop),
+        || farm.log(),
+    );
+    let restarts = |farm: &Farm| peer(farm).unwrap().restarts;
     let before = restarts(&farm);
     farm.write("fresh.xodr", &Content::Good(8).bytes());
     assert_eq!(farm.verdict("fresh.xodr").verdict, Verdict::Accepted);
