@@ -1,7 +1,5 @@
 //! What rules about modular scenarios look at: `Rule<Modular>` gets an `&Assembly<'_>`.
 
-use std::path::Path;
-
 use qcbus_document::{Document, FileKind, Node};
 use qcbus_messages::DocumentRole;
 use qcbus_sdk::modular::{Expansion, OFFERS, Piece, Problem, Spot, What};
@@ -141,12 +139,6 @@ impl<'d> Assembly<'d> {
         let all = self.expansion.problems.iter();
         all.filter(move |problem| sorts.contains(&problem.what))
     }
-}
-
-/// The archive that a document lies in; of one within another, `archive!member`.
-pub fn archive_of(path: &str) -> Option<&str> {
-    let (archive, _) = path.rsplit_once('!')?;
-    (FileKind::of_path(Path::new(archive)) == Some(FileKind::Mosc)).then_some(archive)
 }
 
 /// The place of a spot.

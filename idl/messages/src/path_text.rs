@@ -9,12 +9,31 @@ use std::ffi::OsString;
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::path::{Path, PathBuf};
 
+use qcbus_document::FileKind;
+
+/// Where the name of an archive on disk ends in `archive.mosc!member`; `None` for a file that lies in
+/// no archive. A `!` that follows no archive is an ordinary character.
+pub fn end_of_archive(path: &[u8]) -> Option<usize> {
+    let is_archive = |path: &[u8]| {
+        FileKind::of_path(Path::new(std::ffi::OsStr::from_bytes(path))) == Some(FileKind::Mosc)
+    };
+    let mut marks = (0..path.len()).filter(|&at| path[at] == b'!');
+    marks.find(|&at| is_archive(&path[..at]))
+}
+
+/// The archive on disk and the member in it: `archive.mosc` and `folder/member` of
+/// `archive.mosc!folder/member`.
+pub fn split_archive(path: &str) -> Option<(&str, &str)> {
+    let end = end_of_archive(path.as_bytes())?;
+    Some((path.get(..end)?, path.get(end + 1..)?))
+}
+
 /// What people call a file: its name without the directories, and for a member of an archive the name of
 /// the archive before it, `archive.mosc!folder/member`.
 pub fn name_of(path: &str) -> &str {
-    let outermost = path.find(".mosc!").unwrap_or(path.len());
-    let folder = path.get(..outermost).and_then(|file| file.rfind('/'));
-    folder.map_or(path, |at| path.get(at + 1..).unwrap_or(path))
+    let file = split_archive(path).map_or(path, |(archive, _)| archive);
+    file.rfind('/')
+        .map_or(path, |at| path.get(at + 1..).unwrap_or(path))
 }
 
 /// Begins the text of a path that cannot be written as it is.
@@ -146,6 +165,9 @@ mod tests {
         for (path, name) in [
             ("/a/b.xosc", "b.xosc"),
             ("/a/x.mosc!lib/b.xosc", "x.mosc!lib/b.xosc"),
+            ("/a/X.MOSC!lib/b.xosc", "X.MOSC!lib/b.xosc"),
+            ("/oh!/x.mosc!y.mosc!b.xosc", "x.mosc!y.mosc!b.xosc"),
+            ("/oh!/b.xosc", "b.xosc"),
             ("b.xosc", "b.xosc"),
             ("", ""),
         ] {

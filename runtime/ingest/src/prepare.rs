@@ -6,6 +6,7 @@ use std::os::unix::ffi::OsStrExt;
 use std::path::{Component, Path, PathBuf};
 
 use qcbus_document::{FaultCode, FileKind, Suffix};
+use qcbus_messages::path_text::end_of_archive;
 
 use crate::archive::{Entry, MAIN_MEMBER, OpenArchive, is_zip};
 use crate::decode::decode;
@@ -145,7 +146,7 @@ impl Reader {
             Some((stamp, open)) => (stamp.clone(), open),
             None => return empty(path, Vec::new()),
         };
-        if ends_in_mosc(Path::new(name)) {
+        if FileKind::of_path(Path::new(name)) == Some(FileKind::Mosc) {
             if !known {
                 let member = open.member(name, &self.limits, &mut self.left);
                 if !member.present {
@@ -191,25 +192,17 @@ fn listing(entries: &[Entry]) -> String {
     text
 }
 
-/// Parts `archive.mosc!member!member` into the file on disk and the members. A `!` that follows
-/// no archive is an ordinary character.
+/// Parts `archive.mosc!member!member` into the file on disk and the members.
 pub(crate) fn split_members(path: &Path) -> (PathBuf, Vec<String>) {
     // The file's name may be no UTF-8; its members have names in the archive, which is.
     let bytes = path.as_os_str().as_bytes();
-    let file_of = |at: usize| Path::new(OsStr::from_bytes(&bytes[..at]));
-    let mut marks = (0..bytes.len()).filter(|&at| bytes[at] == b'!');
-    let archive = marks.find(|&at| ends_in_mosc(file_of(at)));
-    let Some((at, members)) =
-        archive.and_then(|at| Some((at, std::str::from_utf8(&bytes[at + 1..]).ok()?)))
+    let Some((at, members)) = end_of_archive(bytes)
+        .and_then(|at| Some((at, std::str::from_utf8(&bytes[at + 1..]).ok()?)))
     else {
         return (path.to_path_buf(), Vec::new());
     };
     let members = members.split('!').map(str::to_string).collect();
-    (file_of(at).to_path_buf(), members)
-}
-
-fn ends_in_mosc(path: &Path) -> bool {
-    FileKind::of_path(path) == Some(FileKind::Mosc)
+    (PathBuf::from(OsStr::from_bytes(&bytes[..at])), members)
 }
 
 /// `archive.mosc!member`.

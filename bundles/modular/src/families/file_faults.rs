@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use qcbus_document::{Document, Fault, FaultCode};
 
-use crate::assembly::{Assembly, archive_of};
+use crate::assembly::Assembly;
+use qcbus_sdk::modular::archive_of;
 
 /// What keeps an archive from being read, or from being a modular scenario.
 pub const ARCHIVE: &[FaultCode] = &[

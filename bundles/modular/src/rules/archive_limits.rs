@@ -1,8 +1,8 @@
 use qcbus_messages::path_text::name_of;
-use qcbus_sdk::modular::What;
+use qcbus_sdk::modular::{What, archive_of};
 use qcbus_sdk::{Rule, Sink};
 
-use crate::assembly::{Assembly, Modular, archive_of, say};
+use crate::assembly::{Assembly, Modular, say};
 use crate::families::file_faults::{LIMITS, of_archives};
 
 pub static RULE: Rule<Modular> = Rule {

@@ -1,7 +1,7 @@
 use std::collections::{HashMap, HashSet};
 
 use qcbus_document::{Document, Node};
-use qcbus_sdk::modular::{Followed, Form, Spot};
+use qcbus_sdk::modular::{Followed, Form, Spot, is_archive};
 use qcbus_sdk::{Rule, Sink};
 
 use crate::assembly::{Assembly, Modular};
@@ -50,10 +50,6 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
         }
     }
     finds.say(found);
-}
-
-fn is_archive(document: Document<'_>) -> bool {
-    document.path().ends_with(".mosc!main.xosc")
 }
 
 /// The groups of the target that are named as they are written, or whose place the groups take that

@@ -3,6 +3,8 @@
 use std::path::Path;
 use std::str::FromStr;
 
+use qcbus_messages::path_text::split_archive;
+
 use super::{Example, ExampleFile};
 use crate::load::{LoadError, Loaded};
 use crate::{AnyRule, Bundle, Version, VersionRange};
@@ -105,7 +107,7 @@ impl Staged {
             files.push((name, text));
         }
         let folder = match files.len() {
-            1 if !files[0].0.contains(MEMBER) => None,
+            1 if split_archive(&files[0].0).is_none() => None,
             _ => Some(written(&files).map_err(|error| format!("cannot write the files: {error}"))?),
         };
         Ok(Staged {
@@ -125,11 +127,7 @@ impl Staged {
         match &self.folder {
             None => Loaded::from_bytes(Path::new(name), text.as_bytes().to_vec()),
             Some(folder) => {
-                let file = name.split_once(MEMBER).map_or(name, |(archive, _)| archive);
-                let file = match name.contains(MEMBER) {
-                    true => format!("{file}.mosc"),
-                    false => file.to_owned(),
-                };
+                let file = split_archive(name).map_or(name, |(archive, _)| archive);
                 Loaded::from_path(&folder.path().join(file), folder.path())
             }
         }
@@ -143,9 +141,6 @@ impl Staged {
         }
     }
 }
-
-/// `archive.mosc!member` is a file in an archive; an archive may lie in another one.
-const MEMBER: &str = ".mosc!";
 
 /// Several files need a folder of their own.
 fn written(files: &[(String, String)]) -> std::io::Result<tempfile::TempDir> {
@@ -182,20 +177,19 @@ fn many(name: &str) -> impl Iterator<Item = String> {
 /// A file: its name and what is in it.
 type NamedBytes = (String, Vec<u8>);
 
-/// The files of a folder: those of archives are packed.
+/// The files of a folder: those called `archive.mosc!member` are packed. An archive may lie in another.
 fn packed(files: &[NamedBytes]) -> std::io::Result<Vec<NamedBytes>> {
     let mut whole: Vec<NamedBytes> = Vec::new();
     let mut archives: Vec<(String, Vec<NamedBytes>)> = Vec::new();
     for (name, bytes) in files {
-        let Some((archive, member)) = name.split_once(MEMBER) else {
+        let Some((archive, member)) = split_archive(name) else {
             whole.push((name.clone(), bytes.clone()));
             continue;
         };
-        let archive = format!("{archive}.mosc");
         let member = (member.to_owned(), bytes.clone());
         match archives.iter_mut().find(|(other, _)| *other == archive) {
             Some((_, members)) => members.push(member),
-            None => archives.push((archive, vec![member])),
+            None => archives.push((archive.to_owned(), vec![member])),
         }
     }
     for (archive, members) in archives {

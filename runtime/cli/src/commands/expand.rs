@@ -3,7 +3,7 @@
 use std::io::Write as _;
 use std::path::Path;
 
-use qcbus_messages::path_text::from_text;
+use qcbus_messages::path_text::{from_text, split_archive};
 use qcbus_messages::{Absence, DocumentRole, Exit};
 use qcbus_sdk::modular::{Expansion, SearchPath};
 use qcbus_sdk::{Level, Loaded, Plan};
@@ -169,13 +169,12 @@ fn source_at(expansion: &Expansion<'_>, output: &Path) -> Option<String> {
     let output = output.canonicalize().ok()?;
     let files = expansion.pieces.iter().map(|piece| piece.document.path());
     // Of a member the archive counts.
-    let mut files = files.map(|path| match path.split_once(".mosc!") {
-        Some((archive, _)) => format!("{archive}.mosc"),
-        None => path.to_owned(),
-    });
-    files.find(|file| {
-        from_text(file)
-            .canonicalize()
-            .is_ok_and(|file| file == output)
-    })
+    let mut files = files.map(|path| split_archive(path).map_or(path, |(archive, _)| archive));
+    files
+        .find(|file| {
+            from_text(file)
+                .canonicalize()
+                .is_ok_and(|file| file == output)
+        })
+        .map(str::to_owned)
 }

@@ -29,8 +29,12 @@ pub use search::{SEARCH_PATH_VARIABLE, SearchPath};
 
 pub use crate::archive::{has_only_backslashes, stays_inside};
 
-use qcbus_document::Document;
+use std::path::Path;
+
+use qcbus_document::{Document, FileKind};
 use qcbus_messages::Link;
+
+use crate::archive::MAIN_MEMBER;
 
 /// How deeply scenarios may refer to scenarios.
 pub const MAX_DEPTH: u32 = 32;
@@ -45,4 +49,20 @@ pub struct Piece<'d> {
     pub document: Document<'d>,
     /// Its references that were followed; [`Link::to`] counts the pieces.
     pub links: Vec<Link>,
+}
+
+/// The archive that a document lies in; of one within another, `archive!member`.
+pub fn archive_of(path: &str) -> Option<&str> {
+    archive_and_member(path).map(|(archive, _)| archive)
+}
+
+/// Whether a document is the scenario that an archive starts from, where that was referred to.
+pub fn is_archive(document: Document<'_>) -> bool {
+    archive_and_member(document.path()).is_some_and(|(_, member)| member == MAIN_MEMBER)
+}
+
+fn archive_and_member(path: &str) -> Option<(&str, &str)> {
+    let is_archive = |path: &str| FileKind::of_path(Path::new(path)) == Some(FileKind::Mosc);
+    path.rsplit_once('!')
+        .filter(|(archive, _)| is_archive(archive))
 }

@@ -11,8 +11,7 @@ use super::copy::{Copy, Value};
 use super::keys::{self, Key};
 use super::problem::{Problem, Problems, Spot, What};
 use super::refusal::{catalog_of, not_found, trouble};
-use super::{MAX_DEPTH, Piece, actor, foreign};
-use crate::archive::MAIN_MEMBER;
+use super::{MAX_DEPTH, Piece, actor, foreign, is_archive};
 
 /// What becomes of a modular scenario.
 #[derive(Debug)]
@@ -351,7 +350,7 @@ impl<'d> Expander<'d> {
     /// are written in it, and what is wrong with others of its groups does not matter here.
     fn find(&mut self, target: usize, name: &str) -> (Vec<Rc<Copy<'d>>>, Option<Node<'d>>) {
         let document = self.document(target);
-        let is_archive = document.path().ends_with(&format!(".mosc!{MAIN_MEMBER}"));
+        let is_archive = is_archive(document);
         let written = self.written.entry(target).or_insert_with(|| {
             let mut written: HashMap<&str, (Node<'d>, Option<Node<'d>>)> = HashMap::new();
             for group in document.elements("ManeuverGroup") {

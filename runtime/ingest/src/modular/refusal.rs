@@ -1,6 +1,7 @@
 //! Why a reference leads nowhere, or to nothing that groups can be taken from.
 
 use qcbus_document::{Document, FaultCode, Node};
+use qcbus_messages::path_text::split_archive;
 
 use super::SEARCH_PATH_VARIABLE;
 use super::problem::What;
@@ -24,13 +25,13 @@ pub(super) fn not_found(node: Node<'_>) -> (What, String) {
         );
         return (What::Extension, text);
     }
-    if let Some((archive, member)) = name.split_once(".mosc!") {
+    if let Some((archive, member)) = split_archive(name) {
         let text = format!(
-            "`{name}` leads into an archive; refer to `{archive}.mosc`, or put `{member}` beside it"
+            "`{name}` leads into an archive; refer to `{archive}`, or put `{member}` beside it"
         );
         return (What::Escapes, text);
     }
-    let in_archive = node.document().path().contains(".mosc!");
+    let in_archive = split_archive(node.document().path()).is_some();
     if in_archive && has_only_backslashes(name) {
         let text = format!(
             "`{name}` is not looked for: names in archives are parted by `/`; write `{}`",

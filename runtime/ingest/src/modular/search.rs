@@ -5,7 +5,7 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use qcbus_document::Document;
-use qcbus_messages::path_text::from_text;
+use qcbus_messages::path_text::{from_text, split_archive};
 use qcbus_messages::{Absence, DocumentRole};
 
 use crate::prepare::{normal, split_members};
@@ -110,7 +110,7 @@ fn check(from: &Path, text: &str) -> Result<(), Absence> {
         return Err(Absence::NotAScenario);
     }
     // To lead into an archive is not for a reference: it names the archive.
-    let into_archive = text.contains(".mosc!");
+    let into_archive = split_archive(text).is_some();
     let in_archive = !split_members(from).1.is_empty();
     if into_archive || in_archive && !crate::archive::stays_inside(text) {
         return Err(Absence::Escapes);
@@ -195,6 +195,15 @@ mod tests {
             path("/a;/b").then(&path("/b;/c")),
             plain(&["/a", "/b", "/c"])
         );
+    }
+
+    #[test]
+    fn nothing_in_an_archive_can_be_named_from_outside_however_the_archive_is_called() {
+        let from = Path::new("/d/main.xosc");
+        for text in ["x.mosc!a.xosc", "X.MOSC!a.xosc", "x.mosc!y.mosc!a.xosc"] {
+            assert_eq!(check(from, text), Err(Absence::Escapes), "{text}");
+        }
+        assert_eq!(check(from, "oh!/a.xosc"), Ok(()));
     }
 
     #[test]
