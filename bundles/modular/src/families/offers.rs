@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use qcbus_document::{Attribute, Node};
-use qcbus_sdk::modular::{OFFERS, Use};
+use qcbus_sdk::modular::{OFFERS, Use, offered};
 
 /// Most attributes of one name that a key is compared with; more than that no group offers.
 const MOST_ALIKE: usize = 256;
@@ -68,10 +68,7 @@ impl<'d> Offers<'d> {
 /// The attributes that the elements of a group offer and have. What the group itself offers is not
 /// replaced.
 pub fn offered_in<'d>(group: Node<'d>) -> impl Iterator<Item = Attribute<'d>> {
-    group.descendants().flat_map(|element| {
-        let names = element.attr(OFFERS).unwrap_or("").split(',').map(str::trim);
-        names.filter_map(move |name| element.attribute(name).filter(|_| name != OFFERS))
-    })
+    group.descendants().flat_map(offered)
 }
 
 /// Whether one name may stand where another was meant: of very short ones, like `x` and `y`, none is a
