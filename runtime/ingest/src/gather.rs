@@ -444,11 +444,9 @@ impl<S: Source> Walk<'_, S> {
     /// which is known only when all other catalogs are.
     fn weighed(self) -> Vec<MissingDocument> {
         // What a modular scenario takes from others may need catalogs that its own file does not.
-        let expanded = match self.documents.len() {
-            0 | 1 => None,
-            count => Document::open(self.source.kept(count - 2)).ok(),
-        };
-        let expanded = expanded.filter(|_| self.is_expanded);
+        let last = self.documents.len().checked_sub(2);
+        let expanded = last.filter(|_| self.is_expanded);
+        let expanded = expanded.and_then(|last| Document::open(self.source.kept(last)).ok());
         let root = expanded.as_ref().unwrap_or(self.root);
         let weigh = |(mut missing, catalogs): (MissingDocument, Option<String>)| {
             let gone = matches!(missing.why, Absence::NotThere | Absence::NotAFile);

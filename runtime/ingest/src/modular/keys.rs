@@ -87,10 +87,10 @@ pub(super) fn apply<'d>(
     keys: &[Key<'d>],
     problems: &mut Problems<'d>,
 ) {
-    let table = Table::of(keys);
     if keys.is_empty() {
         return;
     }
+    let table = Table::of(keys);
     let group = copy.group;
     for element in group.descendants() {
         for attribute in offered(element) {

@@ -90,7 +90,7 @@ const MOST_COPIES: usize = 1 << 16;
 /// When there is no piece at all.
 pub fn expand(pieces: Vec<Piece<'_>>, max_text: u64) -> Expansion<'_> {
     let mut expander = Expander {
-        states: (0..pieces.len()).map(|_| State::Unknown).collect(),
+        expanded: vec![None; pieces.len()],
         chain: Vec::new(),
         left: max_text,
         copies: 0,
@@ -110,7 +110,8 @@ pub fn expand(pieces: Vec<Piece<'_>>, max_text: u64) -> Expansion<'_> {
 }
 
 struct Expander<'d> {
-    states: Vec<State<'d>>,
+    /// The groups of each piece after its own expansion, once they have been asked for.
+    expanded: Vec<Option<Rc<Vec<Expanded<'d>>>>>,
     /// The pieces that are being expanded, the root first.
     chain: Vec<usize>,
     /// Bytes and groups that may still be copied.
@@ -120,11 +121,6 @@ struct Expander<'d> {
     written: HashMap<usize, HashMap<&'d str, (Node<'d>, Option<Node<'d>>)>>,
     problems: Problems<'d>,
     out: Expansion<'d>,
-}
-
-enum State<'d> {
-    Unknown,
-    Done(Rc<Vec<Expanded<'d>>>),
 }
 
 /// A group of a piece with what takes its place: itself, where it refers to nothing.
@@ -320,7 +316,7 @@ impl<'d> Expander<'d> {
 
     /// The groups of a piece after its own expansion.
     fn expanded(&mut self, piece: usize) -> Rc<Vec<Expanded<'d>>> {
-        if let State::Done(groups) = &self.states[piece] {
+        if let Some(groups) = &self.expanded[piece] {
             return groups.clone();
         }
         self.chain.push(piece);
@@ -335,7 +331,7 @@ impl<'d> Expander<'d> {
         }
         self.chain.pop();
         let groups = Rc::new(groups);
-        self.states[piece] = State::Done(groups.clone());
+        self.expanded[piece] = Some(groups.clone());
         groups
     }
 
