@@ -8,6 +8,7 @@ use std::time::Instant;
 use qcbus_formats::pool::{
     BundleOutcome, CheckerOutcome, Ending, NoPlaces, PoolInput, Pooled, Scope, pool,
 };
+use qcbus_formats::verdict::Verdict;
 use qcbus_formats::xqar::{Checker, CheckerBundle, Issue, Level, Location};
 
 use super::{Exit, Timings};
@@ -80,19 +81,24 @@ pub(super) fn run(
     pooled.verdict().into()
 }
 
-/// What a plan finds in a loaded file, a line each as `bundle run` prints them, from a level on. What
-/// could not be looked at is said in lines of its own.
+/// What a plan finds in a loaded file, a line each as `bundle run` prints them, from a level on, and the
+/// verdict. What could not be looked at is said in lines of its own.
 ///
 /// # Errors
 /// When the image that was built cannot be opened.
-pub fn findings(plan: &Plan, loaded: &Loaded, from: Level) -> Result<String, crate::LoadError> {
+pub fn findings(
+    plan: &Plan,
+    loaded: &Loaded,
+    from: Level,
+) -> Result<(String, Verdict), crate::LoadError> {
     let Judged { mut pooled, .. } = judge(plan, loaded)?;
+    let verdict = pooled.verdict();
     for bundle in &mut pooled.results.bundles {
         for checker in &mut bundle.checkers {
             checker.issues.retain(|issue| issue.level <= from);
         }
     }
-    Ok(as_text(loaded.path(), &pooled))
+    Ok((as_text(loaded.path(), &pooled), verdict))
 }
 
 struct Judged {

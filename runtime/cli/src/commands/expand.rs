@@ -4,7 +4,7 @@ use std::io::Write as _;
 use std::path::Path;
 
 use qcbus_messages::path_text::{from_text, split_archive};
-use qcbus_messages::{Absence, DocumentRole, Exit};
+use qcbus_messages::{Absence, DocumentRole, Exit, Verdict};
 use qcbus_sdk::modular::{Expansion, SearchPath};
 use qcbus_sdk::{Level, Loaded, Plan};
 
@@ -22,17 +22,18 @@ pub fn run(args: &ExpandArgs) -> Exit {
     }
 }
 
-type Failed = (Exit, String);
+pub(super) type Failed = (Exit, String);
 
 fn expanded(args: &ExpandArgs) -> Result<Exit, Failed> {
-    let internal = |error: qcbus_sdk::LoadError| (Exit::Internal, format!("failed to {error}"));
     if let Some(output) = args.output.as_deref().filter(|output| output.is_dir()) {
         let text = format!("{} is a directory; name a file", output.display());
         return Err((Exit::Usage, text));
     }
     let loaded = load(&args.file)?;
-    let said = say_findings(&loaded);
-    let subject = loaded.subject(&qcbus_modular::BUNDLE).map_err(internal)?;
+    let (said, _) = say_findings(&loaded)?;
+    let subject = loaded
+        .subject(&qcbus_modular::BUNDLE)
+        .map_err(|error| internal(&error))?;
     let expansion = subject.expansion();
     let name = args.file.display();
     if let Some(why) = in_the_way(&expansion) {
@@ -93,21 +94,20 @@ fn load(path: &Path) -> Result<Loaded, Failed> {
     Err((Exit::Usage, text))
 }
 
-/// What the rules about modular scenarios find, as errors and warnings on stderr.
-pub(super) fn say_findings(loaded: &Loaded) -> String {
+/// Says on stderr which errors and warnings the rules about modular scenarios find; gives them back,
+/// and what they come to.
+pub(super) fn say_findings(loaded: &Loaded) -> Result<(String, Verdict), Failed> {
     let plan = Plan::by_default(&qcbus_modular::BUNDLE);
-    match qcbus_sdk::findings(&plan, loaded, Level::Warning) {
-        Ok(text) => {
-            if !text.is_empty() {
-                talk::say(text.trim_end());
-            }
-            text
-        }
-        Err(error) => {
-            talk::fail(&format!("failed to {error}"));
-            String::new()
-        }
+    let (text, verdict) =
+        qcbus_sdk::findings(&plan, loaded, Level::Warning).map_err(|error| internal(&error))?;
+    if !text.is_empty() {
+        talk::say(text.trim_end());
     }
+    Ok((text, verdict))
+}
+
+fn internal(error: &qcbus_sdk::LoadError) -> Failed {
+    (Exit::Internal, format!("failed to {error}"))
 }
 
 /// Paths in a scenario start where it lies: in another directory they lead elsewhere.

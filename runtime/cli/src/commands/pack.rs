@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use qcbus_document::FileKind;
 use qcbus_ingest::Limits;
-use qcbus_messages::Exit;
+use qcbus_messages::{Exit, Verdict};
 use qcbus_sdk::Loaded;
 use qcbus_sdk::modular::pack;
 
-use super::expand::say_findings;
+use super::expand::{Failed, say_findings};
 use crate::args::PackArgs;
 use crate::talk;
 
@@ -25,7 +25,7 @@ pub fn run(args: &PackArgs) -> Exit {
     exit
 }
 
-fn packed(args: &PackArgs) -> Result<Exit, (Exit, String)> {
+fn packed(args: &PackArgs) -> Result<Exit, Failed> {
     let usage = |text: String| (Exit::Usage, text);
     let output = &args.output;
     if FileKind::of_path(output) != Some(FileKind::Mosc) {
@@ -57,10 +57,10 @@ fn packed(args: &PackArgs) -> Result<Exit, (Exit, String)> {
     let folder = output.parent().filter(|it| !it.as_os_str().is_empty());
     let loaded = Loaded::from_path(output, folder.unwrap_or(Path::new(".")))
         .map_err(|error| (Exit::Internal, format!("failed to {error}")))?;
-    let said = say_findings(&loaded);
-    Ok(match said.contains(": error: ") {
-        true => Exit::Rejected,
-        false => Exit::Accepted,
+    let (_, verdict) = say_findings(&loaded)?;
+    Ok(match verdict {
+        Verdict::Rejected => Exit::Rejected,
+        _ => Exit::Accepted,
     })
 }
 
