@@ -202,10 +202,12 @@ impl State {
             Ok(prepared) => self.read(id, &Arc::new(*prepared), actions),
             Err(PrepareFailure::Vanished) => {
                 let file = self.jobs.get(&id).map(|job| job.file);
-                self.end_job(id, actions);
-                if let Some(file) = file {
-                    self.vanished_file(file, actions);
+                // First, so that nobody is told of the verdict that it had. One of which something was
+                // heard meanwhile may be back.
+                if let Some(entry) = file.and_then(|file| self.files.get_mut(file)) {
+                    entry.present &= entry.doubted;
                 }
+                self.end_job(id, actions);
             }
             Err(PrepareFailure::NoRoom(why)) => {
                 // Every file in the queue would say the same and push out all other notices.

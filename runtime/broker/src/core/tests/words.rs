@@ -231,6 +231,38 @@ fn who_waits_for_a_file_that_nobody_checks_is_told_so() {
 }
 
 #[test]
+fn who_waits_for_a_file_that_goes_while_it_is_read_anew_is_not_told_what_it_was() {
+    let mut world = judged_world();
+    world.write(1);
+    world.wait(1);
+    // Nobody tells; who reads it finds nothing.
+    world.there.remove(&path_of(1));
+    let (job, _) = world.preparing.remove(0);
+    let result = Err(PrepareFailure::Vanished);
+    let actions = comes_of(&mut world, Event::Prepared { job, result });
+    let answers = answers(&actions);
+    assert!(
+        matches!(answers[..], [Response::Unwatched { .. }]),
+        "{answers:?}"
+    );
+}
+
+#[test]
+fn who_waits_for_a_file_that_is_back_is_not_told_that_it_has_gone() {
+    let mut world = judged_world();
+    world.write(1);
+    let (job, _) = world.preparing.remove(0);
+    // Who read it found nothing, and now it is back.
+    world.write(1);
+    world.wait(1);
+    let result = Err(PrepareFailure::Vanished);
+    let actions = comes_of(&mut world, Event::Prepared { job, result });
+    assert!(answers(&actions).is_empty());
+    let reads = |it: &Action| matches!(it, Action::Prepare { path, .. } if *path == path_of(1));
+    assert!(actions.iter().any(reads), "{actions:?}");
+}
+
+#[test]
 fn who_waits_for_a_verdict_that_stands_is_answered_at_once() {
     let mut world = judged_world();
     let now = stamp(world.there[&path_of(1)]);
