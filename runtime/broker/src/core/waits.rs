@@ -78,7 +78,7 @@ impl State {
     }
 
     /// Whether somebody waits for the verdict on this file.
-    pub(super) fn is_awaited(&self, path: &Path) -> bool {
+    pub fn is_awaited(&self, path: &Path) -> bool {
         self.waiters.iter().any(|it| *it.path == *path)
     }
 

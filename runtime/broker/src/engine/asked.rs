@@ -75,9 +75,13 @@ impl Broker {
         self.look_at_inputs(file);
         let stamp: Option<Stamp> = stamp_of(file).ok().flatten();
         let unwatched = self.why_unwatched(file, stamp);
-        if let (Some(stamp), None, Some(watcher)) = (stamp, &unwatched, &self.watcher) {
-            // The watcher may not have come to it, and must tell when it goes.
-            watcher.learn(file.into(), stamp);
+        if let (None, Some(watcher)) = (&unwatched, &self.watcher) {
+            match stamp {
+                // The watcher may not have come to it, and must tell when it goes.
+                Some(stamp) => watcher.learn(file.into(), stamp),
+                // Should it be back before the watcher has missed it, nothing else would tell.
+                None => watcher.look(file.into()),
+            }
         }
         let timeout = timeout_ms.map(Duration::from_millis);
         self.handle(Event::Wait {
@@ -87,6 +91,25 @@ impl Broker {
             unwatched,
             timeout,
         })
+    }
+
+    /// Whether a file that somebody waits for has gone and is there again by now. He must not be told
+    /// that it has gone: the watcher looks at it once more.
+    pub(super) fn is_back(&self, path: &Arc<Path>) -> bool {
+        let Some(watcher) = self
+            .watcher
+            .as_ref()
+            .filter(|_| self.state.is_awaited(path))
+        else {
+            return false;
+        };
+        let stamp = stamp_of(path).ok().flatten();
+        let stamp = stamp.filter(|_| crate::watch::is_looked_at(&self.options.roots, path));
+        if let Some(stamp) = stamp {
+            watcher.learn(path.clone(), stamp);
+            watcher.look(path.clone());
+        }
+        stamp.is_some()
     }
 
     /// A link from elsewhere to a watched file means that file.

@@ -383,6 +383,7 @@ impl Broker {
             }
             Seen::Touched(path, stamp) => self.handle(Event::Touched { path, stamp }),
             Seen::Present(path) => self.handle(Event::Present { path }),
+            Seen::Vanished(path) if self.is_back(&path) => true,
             Seen::Vanished(path) => self.handle(Event::Vanished { path }),
             Seen::Unseen(unseen) => {
                 self.unseen(unseen);

@@ -78,6 +78,7 @@ impl Looker {
                 Ok(Order::Undepend(paths)) => self.dependencies.remove(&paths),
                 Ok(Order::Forget(path)) => self.forget(&path),
                 Ok(Order::Learn(path, stamp)) => drop(self.known.entry(path).or_insert(stamp)),
+                Ok(Order::Look(path)) => self.look(&path),
                 Ok(Order::Event(event)) => self.event(event),
                 Err(RecvTimeoutError::Timeout) => {}
             }

@@ -103,6 +103,7 @@ enum Order {
     Undepend(Vec<Arc<Path>>),
     Forget(Arc<Path>),
     Learn(Arc<Path>, Stamp),
+    Look(Arc<Path>),
     Event(notify::Result<notify::Event>),
     Stop,
 }
@@ -148,6 +149,12 @@ impl Watcher {
     pub fn learn(&self, path: Arc<Path>, stamp: Stamp) {
         // The thread only ends when this is dropped.
         let _ = self.orders.send(Order::Learn(path, stamp));
+    }
+
+    /// Somebody found nothing where a file may have been: what is there now, or has gone, is told.
+    pub fn look(&self, path: Arc<Path>) {
+        // The thread only ends when this is dropped.
+        let _ = self.orders.send(Order::Look(path));
     }
 
     /// Lets go of files on which no verdict depends any more.

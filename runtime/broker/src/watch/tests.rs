@@ -232,3 +232,22 @@ fn what_is_no_file_to_check_is_only_told_to_have_become_another() {
     let said: Vec<Seen> = told.try_iter().collect();
     assert!(matches!(said[..], [Seen::Touched(..)]), "{said:?}");
 }
+
+#[test]
+fn whoever_asks_for_another_look_is_told_what_is_there_or_has_gone() {
+    let (_dir, root) = farm();
+    let path = root.join("a.xodr");
+    std::fs::write(&path, "one").unwrap();
+    let (mut looker, told) = looker(&root);
+    looker.scan_all(true);
+    settle(&mut looker);
+    words(&root, &told);
+    // It was away and came back between two events.
+    looker.look(&path);
+    assert_eq!(words(&root, &told), ["settled a.xodr"]);
+    std::fs::remove_file(&path).unwrap();
+    looker.look(&path);
+    assert_eq!(words(&root, &told), ["vanished a.xodr"]);
+    looker.look(&path);
+    assert!(words(&root, &told).is_empty());
+}
