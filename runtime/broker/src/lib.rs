@@ -20,6 +20,9 @@ pub mod memory;
 mod options;
 pub mod reload;
 mod result_paths;
+mod seams;
+#[cfg(test)]
+mod simulation;
 mod stages;
 mod stamp;
 mod store;

@@ -5,12 +5,13 @@ use std::fs::Metadata;
 use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, UNIX_EPOCH};
 
 use qcbus_document::FileKind;
 use qcbus_ingest::{Content, Stat};
 
 use crate::core::Stamp;
+use crate::seams::{stat, wall_time};
 
 /// The stamp of a regular file, which may lie behind a symbolic link; `None` for anything else, a
 /// link that leads nowhere or back to itself for instance.
@@ -88,7 +89,8 @@ pub fn from_content(content: &Content) -> Stamp {
         .map_or_else(Stamp::default, |stat| from_stat(content.size, stat))
 }
 
-fn from_stat(size: u64, stat: Stat) -> Stamp {
+fn from_stat(size: u64, told: Stat) -> Stamp {
+    let stat = stat(told);
     Stamp {
         size,
         mtime_ns: stat.modified_ns,
@@ -115,7 +117,7 @@ pub fn is_racy(stamp: Stamp) -> bool {
 /// that is still to come is another machine's, whose clock is ahead, or ours was set back; beyond
 /// an hour it can only be the latter, and then another change would bear another time.
 pub fn is_younger(stamp: Stamp, limit: Duration) -> bool {
-    let now = SystemTime::now().duration_since(UNIX_EPOCH);
+    let now = wall_time().duration_since(UNIX_EPOCH);
     was_younger(stamp, limit, nanoseconds(now.unwrap_or_default()))
 }
 
@@ -133,6 +135,7 @@ fn nanoseconds(time: Duration) -> i128 {
 pub(crate) mod tests {
     use std::fs::File;
     use std::io::Write;
+    use std::time::SystemTime;
 
     use super::*;
 

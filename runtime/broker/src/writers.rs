@@ -5,7 +5,7 @@ use std::collections::{HashSet, VecDeque};
 use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
 
 use qcbus_bus::Held;
@@ -15,6 +15,7 @@ use tokio::sync::mpsc::UnboundedSender;
 
 use crate::core::{Event, FinishedJob, Judged, Notice, StoreOutcome};
 use crate::journal::Entry;
+use crate::seams::{Receiver, Sender, channel, now, place, thread};
 use crate::store::{Store, Trouble};
 
 /// An order for a writer.
@@ -68,7 +69,7 @@ pub enum Order {
 #[derive(Debug)]
 pub struct Writers {
     writers: Vec<Sender<Order>>,
-    threads: Vec<std::thread::JoinHandle<()>>,
+    threads: Vec<thread::JoinHandle<()>>,
 }
 
 impl Writers {
@@ -98,7 +99,7 @@ impl Writers {
                 stopped: false,
                 told: false,
             };
-            let thread = std::thread::Builder::new().name(format!("write-{number}"));
+            let thread = thread::Builder::new().name(format!("write-{number}"));
             writers
                 .threads
                 .push(thread.spawn(move || writer.run(&receiver))?);
@@ -109,7 +110,7 @@ impl Writers {
 
     /// Gives an order that concerns `path`.
     pub fn order(&self, path: &Path, order: Order) {
-        let hash = BuildHasherDefault::<DefaultHasher>::new().hash_one(path);
+        let hash = BuildHasherDefault::<DefaultHasher>::new().hash_one(place(path));
         let writer = usize::try_from(hash % self.writers.len() as u64).unwrap_or(0);
         if let Some(writer) = self.writers.get(writer) {
             // A writer only ends after its sender, so somebody is there.
@@ -175,8 +176,7 @@ impl Writer {
                     Ok(order) => Some(order),
                     Err(_) => break,
                 },
-                Some(at) => match orders.recv_timeout(at.saturating_duration_since(Instant::now()))
-                {
+                Some(at) => match orders.recv_timeout(at.saturating_duration_since(now())) {
                     Ok(order) => Some(order),
                     Err(RecvTimeoutError::Timeout) => None,
                     Err(RecvTimeoutError::Disconnected) => break,
@@ -185,14 +185,14 @@ impl Writer {
             if let Some(order) = order {
                 self.take(order);
             }
-            if retry_at.is_some_and(|at| at <= Instant::now()) {
+            if retry_at.is_some_and(|at| at <= now()) {
                 self.retry();
                 retry_at = None;
             }
             if self.waiting.is_empty() {
                 retry_at = None;
             } else {
-                retry_at = retry_at.or_else(|| Some(Instant::now() + RETRY));
+                retry_at = retry_at.or_else(|| Some(now() + RETRY));
             }
         }
         self.retry();

@@ -21,6 +21,7 @@ mod hands;
 mod limits;
 mod maps;
 mod membership;
+mod outside;
 mod processes;
 mod reporting;
 mod things;

@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use qcbus_messages::{JobId, ToPeer};
 
 use super::{Announcement, Broker, Ready, Told};
 use crate::core::{Action, Delivery, Event, FinishedJob, Judged, Notice, SessionId};
 use crate::journal::Entry;
+use crate::seams::{now, spawn_blocking};
 use crate::stages::reached;
 use crate::writers::Order;
 
@@ -21,7 +22,7 @@ impl Broker {
             Action::Release { job } => self.intake.release(job),
             Action::PublishAgain { job, doc } => {
                 let intake = self.intake.clone();
-                tokio::task::spawn_blocking(move || intake.publish_again(job, doc));
+                spawn_blocking(move || intake.publish_again(job, doc));
             }
             Action::Spawn { launch, spec } => self.children.spawn(launch, &spec),
             Action::Kill { launch, pid } => self.children.kill(launch, pid),
@@ -186,10 +187,10 @@ impl Broker {
 
     pub(super) fn prepare(&self, job: JobId, path: Arc<Path>, waited: Duration) {
         // The clock of the state machine may stand still, ours does not: this is never too early.
-        let now = Instant::now();
-        let asked = now.checked_sub(waited).unwrap_or(now);
+        let begin = now();
+        let asked = begin.checked_sub(waited).unwrap_or(begin);
         let (intake, events) = (self.intake.clone(), self.inbox.events_in.clone());
-        tokio::task::spawn_blocking(move || {
+        spawn_blocking(move || {
             reached("taken", &path);
             let result = intake.prepare(job, &path, asked);
             // After the end of the loop nobody waits for this.
@@ -202,7 +203,7 @@ impl Broker {
         let document = self.intake.recent_root(job);
         let (store, config) = (self.store.clone(), self.in_force.config.clone());
         let deliveries = self.inbox.deliveries_in.clone();
-        tokio::task::spawn_blocking(move || {
+        spawn_blocking(move || {
             let message = crate::deliveries::message(
                 &reporter,
                 &delivery,

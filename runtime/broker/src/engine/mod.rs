@@ -2,8 +2,13 @@
 
 mod act;
 mod asked;
+#[cfg(test)]
+mod simulated;
 mod start;
 mod systemd;
+
+#[cfg(test)]
+pub(crate) use simulated::{line_of, simulate};
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
@@ -11,12 +16,12 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use qcbus_bus::{Host, HostEvent, PeerId, StartError as BusError};
+use qcbus_bus::{HostEvent, PeerId, StartError as BusError};
 use qcbus_messages::control::{Response, Unseen};
 use qcbus_messages::{JobId, ToPeer};
 use tokio::sync::{mpsc, oneshot};
 
-use crate::control::{Asked, ControlSocket};
+use crate::control::Asked;
 use crate::core::{Event, Judged, Launch, Notice, SessionId, State, Ticket};
 use crate::demand::InForce;
 use crate::directory_lock::{DirectoryLock, LockError};
@@ -25,9 +30,9 @@ use crate::intake::Intake;
 use crate::journal::JournalError;
 use crate::options::Options;
 use crate::reload::{LoadError, Loaded, Sources};
+use crate::seams::{Children, ControlSocket, Host, is_there, now, spawn_blocking};
 use crate::stages::reached;
 use crate::store::Store;
-use crate::supervise::{Children, is_there};
 use crate::watch::{Seen, Watcher};
 use crate::writers::Writers;
 
@@ -193,7 +198,7 @@ impl AttendedTime {
 
     fn new() -> AttendedTime {
         AttendedTime {
-            last: Instant::now(),
+            last: now(),
             sum: Duration::ZERO,
         }
     }
@@ -230,9 +235,9 @@ impl Broker {
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         // From before it was read: what has changed since is not in force.
         let mut fingerprint = self.loaded.read.clone();
-        let mut next_reload = Instant::now() + RELOAD_INTERVAL;
-        let mut next_prune = Instant::now();
-        let mut next_trim = Instant::now() + TRIM_INTERVAL;
+        let mut next_reload = now() + RELOAD_INTERVAL;
+        let mut next_prune = now();
+        let mut next_trim = now() + TRIM_INTERVAL;
         let mut quit = false;
         loop {
             let go_on = tokio::select! {
@@ -251,19 +256,19 @@ impl Broker {
             if !go_on {
                 break;
             }
-            if Instant::now() >= next_reload {
-                next_reload = Instant::now() + RELOAD_INTERVAL;
+            if now() >= next_reload {
+                next_reload = now() + RELOAD_INTERVAL;
                 self.reload_if_changed(&mut fingerprint);
                 self.notify_watchdog();
             }
-            if Instant::now() >= next_prune {
-                next_prune = Instant::now() + PRUNE_INTERVAL;
+            if now() >= next_prune {
+                next_prune = now() + PRUNE_INTERVAL;
                 self.prune();
             }
-            if self.untrimmed && Instant::now() >= next_trim {
-                next_trim = Instant::now() + TRIM_INTERVAL;
+            if self.untrimmed && now() >= next_trim {
+                next_trim = now() + TRIM_INTERVAL;
                 self.untrimmed = false;
-                tokio::task::spawn_blocking(crate::memory::give_back);
+                spawn_blocking(crate::memory::give_back);
             }
         }
         self.end(quit).await;
@@ -290,7 +295,7 @@ impl Broker {
     fn prune(&self) {
         let (store, keep) = (self.store.clone(), self.options.retention);
         let notices = self.inbox.notices_in.clone();
-        tokio::task::spawn_blocking(move || {
+        spawn_blocking(move || {
             if let Err(why) = store.prune(keep) {
                 // After the end of the loop nobody listens.
                 let _ = notices.send(Notice::Storing(why));
@@ -300,7 +305,7 @@ impl Broker {
 
     /// Gives one event to the state machine and does what it wants. `false`: the end.
     fn handle(&mut self, event: Event) -> bool {
-        let now = self.clock.now(Instant::now());
+        let now = self.clock.now(now());
         let actions = self.state.handle(now, event);
         // Before any of the actions: what is stored from now on is of this epoch.
         self.store
@@ -323,7 +328,7 @@ impl Broker {
     /// removed, off the loop.
     fn sweep_dead(&self) {
         let out = self.options.out.clone();
-        tokio::task::spawn_blocking(move || qcbus_disk::sweep_dead(&out));
+        spawn_blocking(move || qcbus_disk::sweep_dead(&out));
     }
 
     /// Looks through all processes of the machine, off the loop.
@@ -332,7 +337,7 @@ impl Broker {
             return;
         };
         let notices = self.inbox.notices_in.clone();
-        tokio::task::spawn_blocking(move || {
+        spawn_blocking(move || {
             for (pid, name) in former.kill_but(&joined) {
                 let why = format!(
                     "process {pid}, which an earlier broker had started, did not join this one"

@@ -5,9 +5,7 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
-use std::time::Instant;
 
-use qcbus_bus::Host;
 use qcbus_formats::config::Config;
 use qcbus_ingest::modular::SearchPath;
 use qcbus_messages::Role;
@@ -15,7 +13,6 @@ use qcbus_messages::control::Unseen;
 use tokio::sync::mpsc;
 
 use super::{AttendedTime, Broker, Inbox, Sessions, StartError, Told};
-use crate::control::ControlSocket;
 use crate::core::{Member, Notice, Stamp, State};
 use crate::demand::InForce;
 use crate::directory_lock::{DirectoryLock, LockError, Purpose};
@@ -25,9 +22,10 @@ use crate::journal::{Journal, JournalError, Void};
 use crate::options::Options;
 use crate::reload::{LoadError, Loaded, Sources};
 use crate::result_paths::ResultPaths;
+use crate::seams::{Children, ControlSocket, Host, now, spawn_blocking};
 use crate::stamp::stamp_of;
 use crate::store::{Reconciled, Store, remove_earlier_results};
-use crate::supervise::{Children, Surroundings};
+use crate::supervise::Surroundings;
 use crate::watch::{Seen, WatchOptions, Watcher, is_looked_at, scan_directory};
 use crate::writers::{Order, Writers};
 use qcbus_disk::sweep;
@@ -63,7 +61,7 @@ impl Broker {
         intake.search_in(in_force.search.clone());
         let children = children(&options, &inbox);
         let mut broker = Broker {
-            started: Instant::now(),
+            started: now(),
             clock: AttendedTime::new(),
             host,
             state,
@@ -157,7 +155,7 @@ impl Broker {
             return Ok(());
         }
         let (roots, files) = (self.options.roots.clone(), self.options.files.clone());
-        tokio::task::spawn_blocking(move || look_once(&roots, &files, &seen));
+        spawn_blocking(move || look_once(&roots, &files, &seen));
         Ok(())
     }
 }

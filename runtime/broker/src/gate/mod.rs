@@ -24,6 +24,7 @@ use crate::core::{Input, Judged, Reading};
 use crate::directory_lock::{DirectoryLock, Purpose};
 use crate::journal::Remembered;
 use crate::result_paths::ResultPaths;
+use crate::seams::step;
 use crate::stamp::is_listing;
 use crate::store::digest_of;
 use qcbus_disk::{is_for_good, write_ahead};
@@ -296,6 +297,7 @@ impl Gate {
             let Some(copies) = self.copy(&plan)? else {
                 return Ok(());
             };
+            step("copied", path);
             // Otherwise the claims have changed meanwhile, and it is looked at anew.
             if self.claims().publish(&plan, copies)? {
                 return Ok(());

@@ -132,6 +132,12 @@ impl Intake {
             .and_then(|all| all.first().map(|(_, held)| held.clone()))
     }
 
+    /// All images of a job, while they are held.
+    #[cfg(test)]
+    pub(crate) fn images(&self, job: JobId) -> Vec<(DocId, Held)> {
+        lock(&self.held).get(&job).cloned().unwrap_or_default()
+    }
+
     /// The root document of a job that is stored or has ended lately; it may still be on the bus.
     pub fn recent_root(&self, job: JobId) -> Option<DocId> {
         let held = lock(&self.held)

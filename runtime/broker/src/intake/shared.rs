@@ -8,6 +8,8 @@ use std::time::Instant;
 
 use qcbus_messages::DocId;
 
+use crate::seams::now;
+
 use super::gathered::{has_its_stamps, is_unchanged};
 use super::{Published, lock};
 
@@ -68,7 +70,7 @@ impl Shared {
             lock(&self.0).keep(path, &slot, &kept.published);
             return Ok(kept.published.clone());
         }
-        let begun = Instant::now();
+        let begun = now();
         // Whatever comes of it: what was known before counts for nobody any more.
         let before = kept.take();
         let published = read(before.as_ref().map(|before| &before.published));

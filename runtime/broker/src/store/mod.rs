@@ -22,6 +22,7 @@ use crate::core::{FinishedJob, Judged, StoreOutcome};
 use crate::gate::Gate;
 use crate::journal::{Entry, History, Journal, JournalError, Remembered, Void};
 use crate::result_paths::ResultPaths;
+use crate::seams::step;
 use crate::stages::reached;
 use crate::stamp::stamp_through_links;
 use crate::verdict_file;
@@ -62,6 +63,7 @@ impl Store {
         config: Option<&Config>,
         root: Option<&[u8]>,
     ) -> StoreOutcome {
+        step("storing", &job.path);
         if !refresh(job) {
             return StoreOutcome::Stale;
         }
@@ -78,6 +80,7 @@ impl Store {
         if let Err(failed) = self.write(job, &pooled, &judged) {
             return self.not_written(job, judged, failed);
         }
+        step("recorded", &job.path);
         // The file may have gone between the look and the rename: nothing may lie there then.
         if stamp_through_links(&job.path).is_none() {
             let _ = self.withdraw_files(&job.path);
@@ -116,8 +119,10 @@ impl Store {
                 gate.refuse(&job.path)
             };
             made_way.map_err(|error| unwritten(&job.path, &error))?;
+            step("made way", &job.path);
         }
         let written = self.write_files(job, pooled, judged)?;
+        step("named", &job.path);
         if let Some(gate) = self.gate.as_ref().filter(|_| judged.is_accepted()) {
             let published = gate.accept(&job.path, judged);
             published.map_err(|error| unwritten(&job.path, &error))?;

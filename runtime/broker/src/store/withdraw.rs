@@ -8,6 +8,7 @@ use qcbus_messages::path_text::to_text;
 
 use super::{Store, Trouble};
 use crate::journal::Entry;
+use crate::seams::step;
 use qcbus_disk::remove;
 
 impl Store {
@@ -21,6 +22,7 @@ impl Store {
             what: format!("cannot withdraw the result of {}: {error}", to_text(path)),
             concerns_all: false,
         })?;
+        step("withdrawn", path);
         let entry = Entry::Withdrawn {
             path: path.clone(),
             reporters: reporters.to_vec(),
@@ -32,8 +34,10 @@ impl Store {
     pub(super) fn withdraw_files(&self, path: &Arc<Path>) -> io::Result<()> {
         if let Some(gate) = &self.gate {
             gate.forget(path)?;
+            step("closed", path);
         }
         remove(&self.places.xqar(path))?;
+        step("half withdrawn", path);
         remove(&self.places.verdict(path))
     }
 }

@@ -1,19 +1,19 @@
 //! Events from the kernel, and what is done where they cannot be had.
 
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::Sender;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use notify::event::{
     AccessKind, AccessMode, CreateKind, EventKind, ModifyKind, RemoveKind, RenameMode,
 };
-use notify::{Config, RecommendedWatcher, RecursiveMode, Watcher as _};
+use notify::{Config, RecursiveMode, Watcher as _};
 use qcbus_document::FileKind;
 
 use super::ignore::{IGNORE_FILE, is_ignored_file};
 use super::looker::Looker;
 use super::sight::{Sight, look_at};
 use super::{Order, Seen};
+use crate::seams::{FileEvents, Sender, now};
 use crate::stamp::stamp_of;
 
 impl Looker {
@@ -33,7 +33,7 @@ impl Looker {
         };
         // Through a link to it a directory would have its events told under the link's path alone.
         let config = Config::default().with_follow_symlinks(false);
-        let watcher = RecommendedWatcher::new(tell, config);
+        let watcher = FileEvents::new(tell, config);
         let mut watcher = match watcher {
             Ok(watcher) => watcher,
             Err(error) => return self.fall_back(&error.to_string()),
@@ -178,7 +178,7 @@ impl Looker {
     fn touched(&mut self, path: &Path) {
         if self.cares_about(path) {
             self.settling
-                .touched(path, stamp_of(path).ok().flatten(), Instant::now());
+                .touched(path, stamp_of(path).ok().flatten(), now());
         }
         self.look_for_a_link(path);
     }

@@ -3,10 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
-use std::time::{Duration, Instant};
+use std::sync::mpsc::RecvTimeoutError;
+use std::time::Duration;
 
-use notify::RecommendedWatcher;
 use qcbus_document::FileKind;
 use qcbus_messages::control::Unseen;
 
@@ -17,6 +16,7 @@ use super::settle::{QUIET, Settling};
 use super::sight::{Sight, look_at};
 use super::{Order, Seen, WatchOptions};
 use crate::core::Stamp;
+use crate::seams::{FileEvents, Receiver, Sender, now, step};
 use crate::stamp::{is_younger, stamp_of};
 
 pub(super) struct Looker {
@@ -33,7 +33,7 @@ pub(super) struct Looker {
     pub dependencies: Dependencies,
     pub lost_roots: BTreeSet<PathBuf>,
     pub polling: Option<Duration>,
-    pub watcher: Option<RecommendedWatcher>,
+    pub watcher: Option<FileEvents>,
 }
 
 impl Looker {
@@ -63,16 +63,16 @@ impl Looker {
         self.watch(events);
         self.scan_all(true);
         (self.tell)(Seen::Scanned);
-        let mut next_scan = Instant::now() + self.scan_interval();
-        let mut next_dependencies = Instant::now() + dependencies::INTERVAL;
+        let mut next_scan = now() + self.scan_interval();
+        let mut next_dependencies = now() + dependencies::INTERVAL;
         loop {
-            let now = Instant::now();
+            let begin = now();
             let due = self
                 .settling
                 .next_due()
                 .map_or(next_scan, |due| due.min(next_scan));
             let due = due.min(next_dependencies);
-            match inbox.recv_timeout(due.saturating_duration_since(now)) {
+            match inbox.recv_timeout(due.saturating_duration_since(begin)) {
                 Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => return,
                 Ok(Order::Depend(files)) => self.dependencies.add(files),
                 Ok(Order::Undepend(paths)) => self.dependencies.remove(&paths),
@@ -82,24 +82,24 @@ impl Looker {
                 Ok(Order::Event(event)) => self.event(event),
                 Err(RecvTimeoutError::Timeout) => {}
             }
-            let now = Instant::now();
+            let begin = now();
             // A directory may have gone since the next look was fixed.
-            next_scan = next_scan.min(now + self.scan_interval());
+            next_scan = next_scan.min(begin + self.scan_interval());
             for path in self
                 .settling
-                .settled(now, |path| stamp_of(path).ok().flatten())
+                .settled(begin, |path| stamp_of(path).ok().flatten())
             {
                 self.look(&path);
             }
-            if now >= next_scan {
+            if begin >= next_scan {
                 self.recover_roots(events);
                 self.scan_all(false);
-                next_scan = Instant::now() + self.scan_interval();
+                next_scan = now() + self.scan_interval();
             }
-            if now >= next_dependencies {
+            if begin >= next_dependencies {
                 self.look_at_dependencies();
                 self.look_behind_links();
-                next_dependencies = Instant::now() + dependencies::INTERVAL;
+                next_dependencies = now() + dependencies::INTERVAL;
             }
         }
     }
@@ -126,6 +126,7 @@ impl Looker {
             return;
         }
         let sight = look_at(path, &self.options.roots);
+        step("looked", path);
         let is_checkable = FileKind::of_path(path).is_some() && !self.ignored(path, false);
         if is_checkable && path.is_symlink() {
             self.links.insert(path.to_path_buf());
@@ -220,7 +221,7 @@ impl Looker {
             let found = self.scan(directory, index);
             for (path, stamp) in found.files {
                 if self.known.get(path.as_path()) != Some(&stamp) {
-                    self.settling.seen(&path, stamp, Instant::now());
+                    self.settling.seen(&path, stamp, now());
                 }
             }
             for it in found.unseen {
@@ -332,7 +333,7 @@ impl Looker {
             // And should it go before it has settled, that is told.
             self.known.insert(path.into(), Stamp::default());
         }
-        self.settling.seen(path, stamp, Instant::now());
+        self.settling.seen(path, stamp, now());
     }
 
     pub fn look_at_dependencies(&mut self) {
@@ -358,7 +359,7 @@ impl Looker {
             match look_at(&path, &self.options.roots) {
                 Sight::File(stamp) if self.known.get(path.as_path()) == Some(&stamp) => {}
                 // It may still be written to.
-                Sight::File(stamp) => self.settling.seen(&path, stamp, Instant::now()),
+                Sight::File(stamp) => self.settling.seen(&path, stamp, now()),
                 _ => self.look(&path),
             }
         }

@@ -16,7 +16,6 @@ mod tests;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::{Sender, channel};
 use std::time::Duration;
 
 use qcbus_document::FileKind;
@@ -26,6 +25,7 @@ use self::ignore::IgnoreRules;
 use self::looker::Looker;
 use self::scan::scan;
 use crate::core::Stamp;
+use crate::seams::{Sender, channel, thread};
 
 pub use self::scan::Scan;
 
@@ -126,7 +126,7 @@ impl Watcher {
     ) -> std::io::Result<Watcher> {
         let (orders, inbox) = channel();
         let events = orders.clone();
-        std::thread::Builder::new()
+        thread::Builder::new()
             .name("watch".to_owned())
             .spawn(move || Looker::new(options, Box::new(tell)).run(&inbox, &events))?;
         Ok(Watcher { orders })

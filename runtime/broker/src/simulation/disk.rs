@@ -1,0 +1,418 @@
+//! The files, who writes them, and what the kernel tells of it.
+
+use std::collections::{HashMap, VecDeque};
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::{Duration, UNIX_EPOCH};
+
+use notify::event::{
+    AccessKind, AccessMode, CreateKind, DataChange, EventKind, Flag, MetadataKind, ModifyKind,
+    RemoveKind, RenameMode,
+};
+use qcbus_ingest::Stat;
+use qcbus_messages::Digest;
+
+use crate::store::digest_of;
+
+/// The files: two maps, scenarios on them, and what the second map includes.
+pub const FILES: [&str; 6] = [
+    "a.xodr",
+    "b.xodr",
+    "s.xosc",
+    "t.xosc",
+    "sub/u.xosc",
+    "p.xml",
+];
+/// Of them those that get a verdict.
+pub const JUDGED: std::ops::Range<usize> = 0..5;
+/// The part that the second map includes.
+const PART: usize = 5;
+
+/// The map of a scenario.
+pub fn map_of(file: usize) -> Option<usize> {
+    match file {
+        2 | 4 => Some(0),
+        3 => Some(1),
+        _ => None,
+    }
+}
+
+/// What is wrong with bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mark {
+    Good,
+    Bad,
+    /// Of a map: it is sound, but not for scenarios.
+    Unfit,
+}
+
+/// Bytes, as who wrote them meant them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Meant {
+    pub mark: Mark,
+    /// All of them are there.
+    pub whole: bool,
+    /// They include the part.
+    pub includes: bool,
+}
+
+/// What lies at every path.
+pub type Lying = [Option<Digest>; FILES.len()];
+
+type Kernel = Box<dyn FnMut(notify::Event) + Send>;
+
+/// The files.
+pub struct Disk {
+    pub root: PathBuf,
+    pub lying: Lying,
+    /// What lay there before each step at which something changed, the newest last.
+    pub changes: Vec<(usize, Lying)>,
+    pub meant: HashMap<Digest, Meant>,
+    /// Who is told of changes, if anybody.
+    pub kernel: Option<Kernel>,
+    pub telling: VecDeque<notify::Event>,
+    /// Changes of which nobody is told.
+    pub deaf: bool,
+    /// By the time of modification that a file really has: both its times in the simulation.
+    times: HashMap<i128, (i128, i128)>,
+    /// Numbers in the order in which files were first looked at, the same every time.
+    inodes: Mutex<HashMap<u64, u64>>,
+    serial: u64,
+    texts: u64,
+    sub_is_away: bool,
+}
+
+impl Disk {
+    pub fn new(root: PathBuf) -> Disk {
+        Disk {
+            root,
+            lying: [None; FILES.len()],
+            changes: Vec::new(),
+            meant: HashMap::new(),
+            kernel: None,
+            telling: VecDeque::new(),
+            deaf: false,
+            times: HashMap::new(),
+            inodes: Mutex::default(),
+            serial: 0,
+            texts: 0,
+            sub_is_away: false,
+        }
+    }
+
+    pub fn path(&self, file: usize) -> PathBuf {
+        self.root.join(FILES[file])
+    }
+
+    pub fn file_at(&self, path: &Path) -> Option<usize> {
+        FILES.iter().position(|name| self.root.join(name) == path)
+    }
+
+    pub fn stat(&self, told: Stat) -> Stat {
+        let mut inodes = self.inodes.lock().unwrap();
+        let next = inodes.len() as u64 + 1;
+        let inode = *inodes.entry(told.inode).or_insert(next);
+        match self.times.get(&told.modified_ns) {
+            Some((modified_ns, changed_ns)) => Stat {
+                inode,
+                modified_ns: *modified_ns,
+                changed_ns: *changed_ns,
+            },
+            None => told,
+        }
+    }
+
+    fn meant_at(&self, lying: &Lying, file: usize) -> Option<Meant> {
+        lying[file].and_then(|digest| self.meant.get(&digest).copied())
+    }
+
+    /// Whether a file must be accepted where this lies. `maps`: who looks at maps must judge, too.
+    pub fn is_sound(&self, lying: &Lying, file: usize, maps: bool) -> bool {
+        let sound = |it: Meant| it.whole && it.mark != Mark::Bad;
+        let part = self.meant_at(lying, PART);
+        let own = |it: Meant| sound(it) && (!it.includes || part.is_some_and(sound));
+        let map = |it: Meant| {
+            it.whole
+                && (it.mark != Mark::Unfit || !maps)
+                && (!it.includes || part.is_some_and(|it| it.whole))
+        };
+        self.meant_at(lying, file).is_some_and(own)
+            && map_of(file).is_none_or(|it| self.meant_at(lying, it).is_some_and(map))
+    }
+
+    /// Whether a bundle must have found an error in the file itself.
+    pub fn is_faulty(&self, lying: &Lying, file: usize) -> bool {
+        let faulty = |it: Meant| !it.whole || it.mark == Mark::Bad;
+        self.meant_at(lying, file).is_some_and(faulty)
+    }
+
+    /// Whether what lies there includes the part.
+    pub fn includes(&self, lying: &Lying, file: usize) -> bool {
+        self.meant_at(lying, file).is_some_and(|it| it.includes)
+    }
+
+    /// Everything that lay there at some moment since a step.
+    pub fn since(&self, step: usize) -> impl Iterator<Item = &Lying> {
+        let recent = self.changes.iter().rev();
+        let recent = recent.take_while(move |(at, _)| *at >= step);
+        std::iter::once(&self.lying).chain(recent.map(|(_, before)| before))
+    }
+
+    fn text(&mut self, file: usize, mark: Mark, whole: bool) -> Vec<u8> {
+        self.texts += 1;
+        let (number, mark) = (
+            self.texts % 1_000_000,
+            match mark {
+                Mark::Good => "good-",
+                Mark::Bad => "bad--",
+                Mark::Unfit => "unfit",
+            },
+        );
+        let text = match file {
+            PART => {
+                format!(
+                    "<OpenDRIVE><end name=\"PART-{mark} {number:06}\"/><end name=\"PART-WHOLE\"/></OpenDRIVE>"
+                )
+            }
+            0 | 1 => {
+                let include = if file == 1 {
+                    "<include file=\"p.xml\"/><end name=\"NEEDS-PART\"/>"
+                } else {
+                    ""
+                };
+                format!(
+                    "<OpenDRIVE><header revMajor=\"1\" revMinor=\"7\" name=\"MARK-{mark} {number:06}\"/>\
+                     {include}<end name=\"ALL-THERE\"/></OpenDRIVE>"
+                )
+            }
+            _ => {
+                let map = FILES[map_of(file).unwrap_or(0)];
+                let up = if FILES[file].contains('/') { "../" } else { "" };
+                format!(
+                    "<OpenSCENARIO><FileHeader description=\"MARK-{mark} {number:06}\"/><RoadNetwork>\
+                     <LogicFile filepath=\"{up}{map}\"/></RoadNetwork><end name=\"ALL-THERE\"/></OpenSCENARIO>"
+                )
+            }
+        };
+        let most = if whole {
+            text.len()
+        } else {
+            text.len() * 2 / 3
+        };
+        text.as_bytes()[..most].to_vec()
+    }
+
+    fn tell(&mut self, kind: EventKind, paths: &[&Path]) {
+        if self.kernel.is_some() && !self.deaf {
+            let event = notify::Event::new(kind);
+            let event = paths
+                .iter()
+                .fold(event, |it, path| it.add_path(path.to_path_buf()));
+            self.telling.push_back(event);
+        }
+    }
+
+    /// The queue of the kernel is full.
+    pub fn overflow(&mut self) {
+        if self.kernel.is_some() {
+            self.telling.clear();
+            let event = notify::Event::new(EventKind::Other).set_flag(Flag::Rescan);
+            self.telling.push_back(event);
+        }
+    }
+
+    fn lies(&mut self, file: usize, step: usize, digest: Option<Digest>) {
+        self.changes.push((step, self.lying));
+        self.lying[file] = digest;
+    }
+
+    /// Gives a file its times: as if it had been changed now, and modified then.
+    fn mark_times(&mut self, path: &Path, wall: i128, modified: Option<i128>) {
+        self.serial += 1;
+        let real = UNIX_EPOCH + Duration::from_secs(1_000_000) + Duration::from_nanos(self.serial);
+        let key = 1_000_000_000_000_000 + i128::from(self.serial);
+        let now = wall + i128::from(self.serial);
+        self.times.insert(key, (modified.unwrap_or(now), now));
+        let file = File::options().write(true).open(path);
+        file.and_then(|it| it.set_modified(real))
+            .expect("a file of the simulation takes a time");
+    }
+
+    /// Times of modification of a file that is there.
+    fn modified(&self, path: &Path) -> Option<i128> {
+        let data = fs::metadata(path).ok()?;
+        Some(self.stat(Stat::of(&data)).modified_ns)
+    }
+
+    pub fn write(&mut self, file: usize, at: (usize, i128), mark: Mark, how: How) {
+        let (step, wall) = at;
+        let path = self.path(file);
+        if how.keeps_bytes() && self.lying[file].is_some() {
+            return self.touch(file, at, how);
+        }
+        let bytes = self.text(file, mark, how != How::Torn);
+        let digest = digest_of(&bytes);
+        let whole = how != How::Torn;
+        let meant = Meant {
+            mark,
+            whole,
+            includes: file == 1,
+        };
+        self.meant.insert(digest, meant);
+        let was_there = path.exists();
+        let before = self.modified(&path);
+        let parent = path
+            .parent()
+            .expect("a file lies in a directory")
+            .to_path_buf();
+        if !parent.exists() {
+            fs::create_dir_all(&parent).expect("a directory is made");
+            self.sub_is_away = false;
+            self.tell(EventKind::Create(CreateKind::Folder), &[&parent]);
+        }
+        if how == How::Renamed {
+            let aside = self.root.with_extension("aside");
+            fs::write(&aside, &bytes).expect("a file is written aside");
+            self.mark_times(&aside, wall, None);
+            fs::rename(&aside, &path).expect("a file is renamed");
+            self.lies(file, step, Some(digest));
+            return self.tell(
+                EventKind::Modify(ModifyKind::Name(RenameMode::To)),
+                &[&path],
+            );
+        }
+        fs::write(&path, &bytes).expect("a file is written");
+        self.mark_times(&path, wall, before.filter(|_| how == How::TimePutBack));
+        self.lies(file, step, Some(digest));
+        if !was_there {
+            self.tell(EventKind::Create(CreateKind::File), &[&path]);
+        }
+        self.tell(
+            EventKind::Modify(ModifyKind::Data(DataChange::Any)),
+            &[&path],
+        );
+        if how != How::Torn {
+            let closed = AccessKind::Close(AccessMode::Write);
+            self.tell(EventKind::Access(closed), &[&path]);
+        }
+    }
+
+    /// The bytes stay what they are.
+    fn touch(&mut self, file: usize, (_, wall): (usize, i128), how: How) {
+        let path = self.path(file);
+        let before = self.modified(&path).filter(|_| how == How::Touched);
+        self.mark_times(&path, wall, before);
+        if how == How::Touched {
+            self.tell(
+                EventKind::Modify(ModifyKind::Metadata(MetadataKind::Any)),
+                &[&path],
+            );
+        } else {
+            self.tell(
+                EventKind::Modify(ModifyKind::Data(DataChange::Any)),
+                &[&path],
+            );
+            let closed = AccessKind::Close(AccessMode::Write);
+            self.tell(EventKind::Access(closed), &[&path]);
+        }
+    }
+
+    pub fn remove(&mut self, file: usize, step: usize) {
+        let path = self.path(file);
+        if fs::remove_file(&path).is_ok() {
+            self.lies(file, step, None);
+            self.tell(EventKind::Remove(RemoveKind::File), &[&path]);
+        }
+    }
+
+    /// One file takes the place of another.
+    pub fn rename(&mut self, from: usize, to: usize, (step, wall): (usize, i128)) {
+        let (old, new) = (self.path(from), self.path(to));
+        let parent_is_there = new.parent().is_some_and(Path::exists);
+        let Some(digest) = self.lying[from].filter(|_| from != to && parent_is_there) else {
+            return;
+        };
+        let modified = self.modified(&old);
+        fs::rename(&old, &new).expect("a file is renamed");
+        self.mark_times(&new, wall, modified);
+        self.lies(from, step, None);
+        // At once.
+        self.lying[to] = Some(digest);
+        let name = |mode| EventKind::Modify(ModifyKind::Name(mode));
+        self.tell(name(RenameMode::From), &[&old]);
+        self.tell(name(RenameMode::To), &[&new]);
+        self.tell(name(RenameMode::Both), &[&old, &new]);
+    }
+
+    /// The directory goes as a whole, or comes back.
+    pub fn move_directory(&mut self, step: usize) {
+        let (here, away) = (self.root.join("sub"), self.root.with_extension("away"));
+        let name = |mode| EventKind::Modify(ModifyKind::Name(mode));
+        let file = 4;
+        if self.sub_is_away && !here.exists() {
+            fs::rename(&away, &here).expect("a directory is moved");
+            self.sub_is_away = false;
+            let bytes = fs::read(self.path(file)).ok();
+            self.lies(file, step, bytes.map(|it| digest_of(&it)));
+            self.tell(name(RenameMode::To), &[&here]);
+        } else if here.exists() {
+            let _ = fs::remove_dir_all(&away);
+            fs::rename(&here, &away).expect("a directory is moved");
+            self.sub_is_away = true;
+            self.lies(file, step, None);
+            self.tell(name(RenameMode::From), &[&here]);
+        }
+    }
+}
+
+/// How a file is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum How {
+    InPlace,
+    TimePutBack,
+    Renamed,
+    /// Not to its end: it stays open.
+    Torn,
+    /// The same bytes again.
+    Again,
+    /// Other rights.
+    Touched,
+}
+
+impl How {
+    fn keeps_bytes(self) -> bool {
+        matches!(self, How::Again | How::Touched)
+    }
+}
+
+/// What can be seen in an image.
+pub struct Found {
+    whole: bool,
+    bad: bool,
+    unfit: bool,
+    lacks_part: bool,
+    bad_part: bool,
+}
+
+impl Found {
+    pub fn is_faulty(&self) -> bool {
+        !self.whole || self.bad || self.lacks_part || self.bad_part
+    }
+
+    pub fn is_unfit(&self) -> bool {
+        !self.whole || self.unfit || self.lacks_part
+    }
+}
+
+/// Looks through an image, without any model.
+pub fn found_in(image: &[u8]) -> Found {
+    let text = String::from_utf8_lossy(image);
+    Found {
+        whole: text.contains("ALL-THERE"),
+        bad: text.contains("MARK-bad--"),
+        unfit: text.contains("MARK-unfit"),
+        lacks_part: text.contains("NEEDS-PART") && !text.contains("PART-WHOLE"),
+        bad_part: text.contains("PART-bad--"),
+    }
+}

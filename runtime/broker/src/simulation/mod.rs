@@ -1,0 +1,163 @@
+//! The broker in a simulated world: its loop, its watcher, its writers, its readers, its journal and what
+//! a start makes of them, all of it real, on threads of which one runs at a time. A seed says who
+//! is next, how far the clock goes, what happens to the files, when bundles answer, when the kernel
+//! tells of changes, when the broker is killed. Real are also the files, in a directory in memory; not
+//! real are time, the bus, processes and the kernel's tellings.
+//!
+//! `QCBUS_SIM_SEED=7` plays one schedule and prints it, `QCBUS_SIM_SCHEDULES=10000` plays as many,
+//! `QCBUS_SIM_FROM=1000000` begins with that seed.
+
+mod disk;
+mod oracle;
+mod peers;
+mod schedule;
+pub mod seams;
+mod surroundings;
+mod tests;
+mod threads;
+mod world;
+
+use std::path::Path;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use qcbus_bus::{Documents, Held};
+use qcbus_ingest::Stat;
+use qcbus_messages::{DocId, JobId};
+
+use threads::{Crew, State, Steps, here};
+use world::World;
+pub use world::{Serving, Summary};
+
+/// One schedule being played.
+pub struct Simulation {
+    world: Mutex<World>,
+    crew: Arc<Crew>,
+    documents: Documents,
+    steps: Steps,
+}
+
+impl Simulation {
+    pub fn world(&self) -> MutexGuard<'_, World> {
+        self.world.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub fn now(&self) -> Duration {
+        self.world().now
+    }
+
+    pub fn instant(&self) -> Instant {
+        let world = self.world();
+        world.start + world.now
+    }
+
+    pub fn wall_time(&self) -> SystemTime {
+        let since = u64::try_from(self.world().wall_now()).unwrap_or_default();
+        UNIX_EPOCH + Duration::from_nanos(since)
+    }
+
+    pub fn stat(&self, told: Stat) -> Stat {
+        self.world().disk.stat(told)
+    }
+
+    /// Does something on a thread of its own, when it is its turn.
+    pub fn spawn(self: &Arc<Simulation>, name: String, body: Box<dyn FnOnce() + Send>) {
+        let task = self.crew.start(self, name, body);
+        self.world().tasks.push(task);
+    }
+
+    /// A thread has got so far.
+    pub fn reaches(&self, what: &'static str, path: &Path) {
+        let mut world = self.world();
+        world.say(|| format!("  {what} {}", name_of(path)));
+        match what {
+            "named" => world.verdict_is_written(path),
+            "pooled" => world.stored += 1,
+            _ => {}
+        }
+    }
+
+    /// And goes on from there.
+    pub fn goes_on(&self, what: &'static str, path: &Path) {
+        let mut world = self.world();
+        let step = world.step;
+        match what {
+            "storing" => world.looker.looks(path, step),
+            "pooled" => world.looker.asks(path, step),
+            _ => {}
+        }
+    }
+
+    /// While a file is read, others may be written.
+    pub fn user_meddles(&self) {
+        let mut world = self.world();
+        if world.faults.is_some() && world.rng.u32(0..12) == 0 {
+            world.deed();
+        }
+    }
+
+    pub fn images(&self, job: JobId) -> Vec<(DocId, Held)> {
+        let intake = self.world().serving.as_ref().map(|it| it.intake.clone());
+        intake.map(|it| it.images(job)).unwrap_or_default()
+    }
+}
+
+fn name_of(path: &Path) -> String {
+    let parts: Vec<_> = path.iter().rev().take(2).collect();
+    let parts: Vec<_> = parts
+        .into_iter()
+        .rev()
+        .map(|it| it.to_string_lossy())
+        .collect();
+    parts.join("/")
+}
+
+/// What the loop of a simulated broker does where the real one waits for anything to happen.
+pub struct Turns {
+    simulation: Arc<Simulation>,
+}
+
+impl Turns {
+    /// The loop begins.
+    pub fn begin(serving: Serving) -> Turns {
+        let simulation = here().expect("a simulation").simulation;
+        simulation.world().serving = Some(serving);
+        Turns { simulation }
+    }
+
+    pub fn now(&self) -> Duration {
+        self.simulation.now()
+    }
+
+    /// One of so many.
+    pub fn choose(&self, count: usize) -> usize {
+        self.simulation.world().rng.usize(0..count)
+    }
+
+    pub fn say(&self, line: impl FnOnce() -> String) {
+        self.simulation.world().say(line);
+    }
+
+    /// A turn is over.
+    pub fn is_over(&self, summary: Summary) {
+        let mut world = self.simulation.world();
+        if summary.demanded.iter().any(|it| it == peers::SECOND) {
+            let step = world.step;
+            world.peers.second_since.get_or_insert(step);
+        }
+        world.summary = summary;
+        drop(world);
+        self.stop(State::Ready);
+    }
+
+    /// Nothing is there to be done until then.
+    pub fn rest(&self, until: Duration) {
+        self.stop(State::AtRest(self.simulation.steps.count(), until));
+    }
+
+    fn stop(&self, state: State) {
+        if let Some(task) = here().and_then(|it| it.task) {
+            task.stop(state);
+        }
+    }
+}

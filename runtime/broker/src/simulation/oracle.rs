@@ -1,0 +1,377 @@
+//! What must be so: at every moment, and when everything has settled.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::path::{Path, PathBuf};
+
+use qcbus_disk::FileMark;
+use qcbus_messages::control::Response;
+use qcbus_messages::path_text::to_text;
+use qcbus_messages::{Digest, JobId, Verdict};
+use serde::Deserialize;
+
+use super::disk::{Disk, FILES, JUDGED, Lying, map_of};
+use super::peers::SECOND;
+use super::world::{Wait, World};
+use crate::journal::Remembered;
+use crate::result_paths::with_suffix;
+use crate::store::digest_of;
+
+/// A verdict file, as anybody can read it.
+#[derive(Debug, Clone, Deserialize)]
+struct Written {
+    verdict: Verdict,
+    sha256: String,
+    depends_on: Vec<Dependency>,
+    demanded: Vec<String>,
+}
+
+impl Written {
+    /// Whether who looks at maps had to judge.
+    fn maps(&self) -> bool {
+        self.demanded.iter().any(|it| it == SECOND)
+    }
+}
+
+#[derive(Debug, Clone, Deserialize)]
+struct Dependency {
+    path: String,
+    sha256: Option<String>,
+}
+
+type Seen<T> = HashMap<PathBuf, (FileMark, T)>;
+
+/// Looks at results and gate all the time.
+pub struct Looker {
+    pub out: PathBuf,
+    pub gate: PathBuf,
+    /// The step at which a writer last began to store a result of each file.
+    looked: HashMap<PathBuf, usize>,
+    /// And at which it asked who must judge.
+    asked: HashMap<PathBuf, usize>,
+    verdicts: Seen<Option<Written>>,
+    published: Seen<Digest>,
+}
+
+impl Looker {
+    pub fn new(out: PathBuf, gate: PathBuf) -> Looker {
+        Looker {
+            out,
+            gate,
+            looked: HashMap::new(),
+            asked: HashMap::new(),
+            verdicts: HashMap::new(),
+            published: HashMap::new(),
+        }
+    }
+
+    pub fn looks(&mut self, path: &Path, step: usize) {
+        self.looked.insert(path.to_path_buf(), step);
+    }
+
+    pub fn asks(&mut self, path: &Path, step: usize) {
+        self.asked.insert(path.to_path_buf(), step);
+    }
+
+    fn verdict(&mut self, file: usize) -> Option<Written> {
+        let path = with_suffix(&self.out.join(FILES[file]), ".verdict.json");
+        let read = |path: &Path| serde_json::from_slice(&std::fs::read(path).ok()?).ok();
+        seen(&mut self.verdicts, path, read).flatten()
+    }
+
+    /// The bytes behind the gate.
+    fn published(&mut self, file: usize) -> Option<Digest> {
+        let path = self.gate.join(FILES[file]);
+        let read = |path: &Path| digest_of(&std::fs::read(path).unwrap_or_default());
+        seen(&mut self.published, path, read)
+    }
+}
+
+/// What was read of a file, which is only read again when it is another.
+fn seen<T: Clone>(known: &mut Seen<T>, path: PathBuf, read: impl Fn(&Path) -> T) -> Option<T> {
+    let mark = FileMark::at(&path)?;
+    if let Some((_, value)) = known.get(&path).filter(|it| it.0 == mark) {
+        return Some(value.clone());
+    }
+    let value = read(&path);
+    known.insert(path, (mark, value.clone()));
+    Some(value)
+}
+
+fn is(digest: Option<Digest>, text: &str) -> bool {
+    digest.is_some_and(|it| it.to_string() == text)
+}
+
+impl World {
+    /// A verdict has its name: it must be true of what lay there when the writer looked, or later.
+    pub fn verdict_is_written(&mut self, path: &Path) {
+        let Some(file) = self.disk.file_at(path) else {
+            return;
+        };
+        let Some(written) = self.looker.verdict(file) else {
+            return self.wrong(format!(
+                "{} has no verdict after it was written",
+                FILES[file]
+            ));
+        };
+        let since = self.looker.looked.get(path).copied().unwrap_or(0);
+        let fits = |lying: &&Lying| fits(&self.disk, lying, file, &written);
+        let moments: Vec<bool> = self
+            .disk
+            .since(since)
+            .filter(fits)
+            .map(|it| self.disk.is_sound(it, file, written.maps()))
+            .collect();
+        let accepted = written.verdict == Verdict::Accepted;
+        if moments.is_empty() && !written.sha256.is_empty() {
+            self.wrong(format!(
+                "{} is {:?} for what was not there when the writer looked",
+                FILES[file], written.verdict
+            ));
+        } else if accepted && !moments.contains(&true) {
+            self.wrong(format!("{} is accepted and must not be", FILES[file]));
+        }
+        let asked = self.looker.asked.get(path).copied().unwrap_or(0);
+        let must = self.peers.second_since.is_some_and(|since| since < asked);
+        if must && !written.maps() {
+            let name = FILES[file];
+            self.wrong(format!(
+                "{name} is judged without one who must judge by now"
+            ));
+        }
+    }
+
+    /// What lies behind the gate stands accepted and is complete.
+    pub fn gate_is_true(&mut self) {
+        for (file, name) in FILES.iter().enumerate() {
+            let Some(digest) = self.looker.published(file) else {
+                continue;
+            };
+            if JUDGED.contains(&file) {
+                let verdict = self.looker.verdict(file);
+                let stands =
+                    |it: &Written| it.verdict == Verdict::Accepted && is(Some(digest), &it.sha256);
+                if !verdict.as_ref().is_some_and(stands) {
+                    self.wrong(format!(
+                        "{name} is behind the gate and not accepted: {verdict:?}"
+                    ));
+                }
+            }
+        }
+        let mut lying: Lying = [None; FILES.len()];
+        for (file, it) in lying.iter_mut().enumerate() {
+            *it = self.looker.published(file);
+        }
+        for file in JUDGED {
+            let maps = self.looker.verdict(file).is_some_and(|it| it.maps());
+            let complete = lying[file].is_none() || self.disk.is_sound(&lying, file, maps);
+            let map = map_of(file).is_none_or(|map| lying[map].is_some());
+            if !complete || (lying[file].is_some() && !map) {
+                let name = FILES[file];
+                self.wrong(format!("{name} is behind the gate without what it needs"));
+            }
+        }
+    }
+
+    /// Nothing is under way: what is doubted is not behind the gate.
+    pub fn shut_is_shut(&mut self) {
+        let open = self.summary.shut.iter();
+        let mut open = open.filter_map(|path| self.disk.file_at(path));
+        let open = open.find(|file| self.looker.gate.join(FILES[*file]).exists());
+        if let Some(file) = open {
+            let name = FILES[file];
+            self.wrong(format!(
+                "{name} is doubted, nobody is at work, and it is behind the gate"
+            ));
+        }
+    }
+
+    /// Takes in what those who wait are told.
+    pub fn hear_answers(&mut self) {
+        for mut wait in std::mem::take(&mut self.waits) {
+            match wait.answer.try_recv() {
+                Ok(response) => self.is_answered(&wait, &response),
+                Err(tokio::sync::oneshot::error::TryRecvError::Empty) => self.waits.push(wait),
+                // The broker is no more.
+                Err(tokio::sync::oneshot::error::TryRecvError::Closed) => {}
+            }
+        }
+    }
+
+    fn is_answered(&mut self, wait: &Wait, response: &Response) {
+        let (disk, file) = (&self.disk, wait.file);
+        let maps = self.peers.second_since.is_some_and(|it| it < wait.asked);
+        let mut moments = disk.since(wait.asked);
+        let is_true = match response {
+            Response::Verdict(told) => moments.any(|lying| {
+                is(lying[file], &told.digest)
+                    && match told.verdict {
+                        Verdict::Accepted => disk.is_sound(lying, file, maps),
+                        Verdict::Rejected => !disk.is_sound(lying, file, true),
+                        Verdict::Undetermined => true,
+                    }
+            }),
+            Response::Unwatched { .. } => moments.any(|lying| lying[file].is_none()),
+            _ => false,
+        };
+        drop(moments);
+        let name = FILES[file];
+        if is_true {
+            self.say(|| format!("who waits for {name} is told"));
+        } else {
+            let asked = wait.asked;
+            self.wrong(format!(
+                "who waited for {name} since {asked} is told {response:?}"
+            ));
+        }
+    }
+
+    /// What is not as it must be once everything has settled.
+    pub fn unsettled(&mut self) -> Result<(), String> {
+        if !self.summary.quiet {
+            return Err("there is work left".to_owned());
+        }
+        let rows = self.serving.as_ref().map(|it| it.store.remembered());
+        let rows = rows
+            .and_then(Result::ok)
+            .ok_or("the journal cannot be read")?;
+        let rows: BTreeMap<PathBuf, Remembered> = rows
+            .into_iter()
+            .map(|it| (it.path.to_path_buf(), it))
+            .collect();
+        let mut accepted = BTreeSet::new();
+        for file in JUDGED {
+            let row = rows.get(&self.disk.path(file));
+            if self
+                .agrees(file, row)
+                .map_err(|why| format!("{}: {why}", FILES[file]))?
+            {
+                accepted.insert(file);
+            }
+        }
+        if let Some(path) = rows.keys().find(|it| self.disk.file_at(it).is_none()) {
+            return Err(format!("the journal knows {}", path.display()));
+        }
+        self.gate_holds(&accepted)?;
+        self.no_litter()?;
+        self.reports_are_new(&rows)?;
+        let there = |it: &&Wait| self.disk.lying[it.file].is_some();
+        if let Some(wait) = self.waits.iter().find(there) {
+            return Err(format!("somebody still waits for {}", FILES[wait.file]));
+        }
+        Ok(())
+    }
+
+    /// Whether a file is accepted, if all that is said of it is the same and true.
+    fn agrees(&mut self, file: usize, row: Option<&Remembered>) -> Result<bool, String> {
+        let written = self.looker.verdict(file);
+        let result = with_suffix(&self.looker.out.join(FILES[file]), ".xqar").exists();
+        if self.disk.lying[file].is_none() {
+            let nothing = written.is_none() && !result && row.is_none();
+            let why = || format!("it is gone: result {result}, {written:?}, journal {row:?}");
+            return nothing.then_some(false).ok_or_else(why);
+        }
+        let (Some(written), Some(row), true) = (written, row, result) else {
+            return Err("it has no result, or the journal does not know it".to_owned());
+        };
+        let judged = &row.judged;
+        if judged.verdict != written.verdict {
+            return Err(format!("the journal says {:?}", judged.verdict));
+        }
+        if row.written.as_ref()
+            != self
+                .looker
+                .verdicts
+                .values()
+                .map(|it| &it.0)
+                .find(|mark| row.written.as_ref() == Some(*mark))
+        {
+            return Err("the journal knows another verdict file".to_owned());
+        }
+        let given_up = judged
+            .why
+            .iter()
+            .any(|it| it.contains("alone in a fresh process"));
+        if given_up && self.peers.deaths >= 2 {
+            return Ok(false);
+        }
+        if !fits(&self.disk, &self.disk.lying, file, &written) {
+            return Err(format!("its verdict is about other bytes: {written:?}"));
+        }
+        let digest = self.disk.lying[file];
+        if Some(judged.digest) != digest {
+            return Err("the journal knows other bytes".to_owned());
+        }
+        let sound = self.disk.is_sound(&self.disk.lying, file, true);
+        let faulty = self.disk.is_faulty(&self.disk.lying, file);
+        let is_true = match written.verdict {
+            Verdict::Accepted => sound,
+            Verdict::Rejected => !sound,
+            Verdict::Undetermined => !sound && !faulty,
+        };
+        let path = with_suffix(&self.looker.out.join(FILES[file]), ".xqar");
+        let why = || {
+            let result = std::fs::read_to_string(&path).unwrap_or_default();
+            let (verdict, why) = (written.verdict, &judged.why);
+            format!("it is {verdict:?}, sound: {sound}; {why:?}\n{result}")
+        };
+        is_true.then_some(sound).ok_or_else(why)
+    }
+
+    fn gate_holds(&mut self, accepted: &BTreeSet<usize>) -> Result<(), String> {
+        let published = |file: &usize| {
+            let map = map_of(*file);
+            accepted.contains(file) && map.is_none_or(|map| accepted.contains(&map))
+        };
+        for (file, name) in FILES.iter().enumerate() {
+            let belongs = match JUDGED.contains(&file) {
+                true => published(&file),
+                false => {
+                    (0..2).any(|map| published(&map) && self.disk.includes(&self.disk.lying, map))
+                }
+            };
+            let expected = self.disk.lying[file].filter(|_| belongs);
+            if self.looker.published(file) != expected {
+                return Err(format!(
+                    "{name} belongs behind the gate: {belongs}, and is not as it must be"
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    fn no_litter(&self) -> Result<(), String> {
+        let mut open = vec![self.looker.out.clone(), self.looker.gate.clone()];
+        while let Some(next) = open.pop() {
+            for entry in std::fs::read_dir(&next).into_iter().flatten().flatten() {
+                let name = entry.file_name().to_string_lossy().into_owned();
+                if entry.path().is_dir() {
+                    open.push(entry.path());
+                } else if name.starts_with(".qcbus-") && name.ends_with(".tmp") {
+                    return Err(format!("a half file is left: {}", entry.path().display()));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn reports_are_new(&self, rows: &BTreeMap<PathBuf, Remembered>) -> Result<(), String> {
+        let jobs = rows
+            .iter()
+            .map(|(path, row)| (to_text(path), row.judged.job));
+        let jobs: BTreeMap<String, JobId> = jobs.collect();
+        let reports = &self.peers.reports;
+        (*reports == jobs)
+            .then_some(())
+            .ok_or_else(|| format!("the reporter has {reports:?}, and there is {jobs:?}"))
+    }
+}
+
+/// Whether a verdict is about what lies there.
+fn fits(disk: &Disk, lying: &Lying, file: usize, written: &Written) -> bool {
+    let dependency = |it: &Dependency| match disk.file_at(Path::new(&it.path)) {
+        // One that could not be read has no digest, either.
+        Some(other) => it.sha256.as_ref().is_none_or(|text| is(lying[other], text)),
+        None => true,
+    };
+    is(lying[file], &written.sha256) && written.depends_on.iter().all(dependency)
+}

@@ -1,0 +1,466 @@
+//! A schedule: what happens next, as a seed says.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use qcbus_bus::{Documents, HostOptions, Instance};
+
+use super::Simulation;
+use super::peers::{FIRST, REPORTER, SECOND, children};
+use super::threads::{Crew, Here, State, Steps, Task, enter};
+use super::world::World;
+use crate::core::Settings;
+use crate::engine::{line_of, simulate};
+use crate::options::Options;
+
+/// What is used for many schedules, one after the other.
+pub struct Stage {
+    pub crew: Arc<Crew>,
+    pub documents: Documents,
+    pub dir: PathBuf,
+}
+
+/// A schedule in which something was wrong.
+#[derive(Debug)]
+pub struct Wrong {
+    pub what: String,
+    pub lines: Vec<String>,
+}
+
+/// How much one schedule was.
+#[derive(Debug, Default, Clone, Copy)]
+pub struct Figures {
+    pub steps: usize,
+    pub kills: u64,
+    pub stored: usize,
+    pub virtual_seconds: f64,
+}
+
+/// Steps to rest, at most: beyond that nothing comes to rest.
+const MOST_STEPS: usize = 30_000;
+
+struct Play {
+    simulation: Arc<Simulation>,
+    options: Options,
+    kills: u64,
+}
+
+/// Plays one schedule, and writes it down if wanted.
+pub fn play(stage: &Stage, seed: u64, verbose: bool) -> Result<(Figures, Vec<String>), Wrong> {
+    let dir = stage.dir.join(format!("{seed}"));
+    let root = dir.join("farm");
+    for made in [root.join("sub"), dir.join("i")] {
+        std::fs::create_dir_all(made).expect("a directory is made");
+    }
+    let mut world = World::new(seed, root, dir.join("out"), dir.join("gate"));
+    world.verbose = verbose;
+    let simulation = Arc::new(Simulation {
+        world: Mutex::new(world),
+        crew: stage.crew.clone(),
+        documents: stage.documents.clone(),
+        steps: Steps::default(),
+    });
+    enter(Some(Here {
+        simulation: simulation.clone(),
+        task: None,
+    }));
+    let mut play = Play {
+        options: options(&dir),
+        simulation: simulation.clone(),
+        kills: 0,
+    };
+    let ended = play.all();
+    play.kill();
+    let mut world = simulation.world();
+    let (steps, lines) = (world.step, std::mem::take(&mut world.lines));
+    let figures = Figures {
+        steps,
+        kills: play.kills,
+        stored: world.stored,
+        virtual_seconds: world.now.as_secs_f64(),
+    };
+    drop(world);
+    enter(None);
+    // It lies in memory, and goes with all others at the end if it does not now.
+    let _ = std::fs::remove_dir_all(&dir);
+    match ended {
+        Ok(()) => Ok((figures, lines)),
+        Err(what) => Err(Wrong { what, lines }),
+    }
+}
+
+fn options(dir: &Path) -> Options {
+    Options {
+        instance: Instance::at(dir.join("i")),
+        roots: vec![dir.join("farm")],
+        files: Vec::new(),
+        watch: true,
+        poll: None,
+        rescan: Duration::from_secs(5),
+        out: dir.join("out"),
+        here: None,
+        single_result: None,
+        state: Some(dir.join("state")),
+        retention: Duration::from_secs(3600),
+        dialect: qcbus_formats::xqar::Dialect::default(),
+        durable: false,
+        verdict_files: true,
+        gate: Some(dir.join("gate")),
+        gate_outside: crate::gate::Outside::default(),
+        config: None,
+        bundles_d: None,
+        standard: children(),
+        reporters: Vec::new(),
+        known: qcbus_formats::config::Known::default(),
+        die_with_broker: false,
+        memory_limit: None,
+        limits: qcbus_ingest::Limits::default(),
+        host: HostOptions::default(),
+        settings: Settings {
+            max_active: 4,
+            max_preparing: 2,
+            max_storing: 2,
+            read_again_after: Duration::from_secs(2),
+            ..Settings::default()
+        },
+    }
+}
+
+type Ended = Result<(), String>;
+
+impl Play {
+    fn all(&mut self) -> Ended {
+        self.prologue();
+        let steps = self.with(|world| world.rng.usize(150..600));
+        for _ in 0..steps {
+            self.step()?;
+        }
+        self.settle()?;
+        if self.with(|world| world.rng.u32(0..4)) == 0 {
+            self.nothing_is_judged_again()?;
+        }
+        Ok(())
+    }
+
+    fn with<T>(&self, body: impl FnOnce(&mut World) -> T) -> T {
+        body(&mut self.simulation.world())
+    }
+
+    /// Some files are there before the broker comes.
+    fn prologue(&mut self) {
+        self.with(|world| {
+            for _ in 0..world.rng.usize(0..8) {
+                world.deed();
+            }
+            // Half of the worlds begin with old files.
+            if world.rng.bool() {
+                world.now += Duration::from_secs(10);
+            }
+            world.faults = Some(0);
+        });
+        self.start();
+    }
+
+    fn start(&mut self) {
+        let mut options = self.options.clone();
+        self.with(|world| {
+            world.generation += 1;
+            options.settings.generation = world.generation;
+            world.say(|| "the broker starts".to_owned());
+        });
+        let simulation = self.simulation.clone();
+        let tell = move |told| {
+            if let Some(line) = line_of(&told) {
+                simulation.world().say(|| line);
+            }
+        };
+        let body = Box::new(move || simulate(options, tell));
+        self.simulation.spawn("loop".to_owned(), body);
+    }
+
+    fn is_alive(&self) -> bool {
+        self.with(|world| !world.tasks.is_empty())
+    }
+
+    fn kill(&mut self) {
+        let tasks = self.with(|world| {
+            world.asked = None;
+            world.serving = None;
+            std::mem::take(&mut world.tasks)
+        });
+        if tasks.is_empty() {
+            return;
+        }
+        self.kills += 1;
+        self.with(|world| world.say(|| "the broker is killed".to_owned()));
+        for task in tasks {
+            task.kill();
+        }
+        self.with(|world| {
+            world.tasks.clear();
+            world.peers.are_alone();
+            world.disk.kernel = None;
+            world.disk.telling.clear();
+            world.summary = super::Summary::default();
+            world.hear_answers();
+        });
+    }
+
+    fn step(&mut self) -> Ended {
+        let chance = self.with(|world| world.rng.u32(0..1000));
+        match chance {
+            0..700 => drop(self.run_one()?),
+            700..780 => drop(self.tell_one()),
+            780..880 => self.peer_acts(),
+            880..930 => self.with(World::deed),
+            930..970 => self.time_passes(),
+            970..985 => self.with(World::ask),
+            985..989 if self.is_alive() => self.kill(),
+            989..994 => self.trouble(),
+            _ => self.somebody_comes(),
+        }
+        self.with(|world| {
+            world.step += 1;
+            world.hear_answers();
+        });
+        self.simulation.steps.next();
+        self.verdict_so_far()
+    }
+
+    fn verdict_so_far(&self) -> Ended {
+        self.with(|world| world.fault.clone().map_or(Ok(()), Err))
+    }
+
+    /// The threads that could go on.
+    fn runnable(&self) -> Vec<Arc<Task>> {
+        let count = self.simulation.steps.count();
+        let world = self.simulation.world();
+        let now = world.now;
+        let can = |task: &&Arc<Task>| match &*task.state.lock().unwrap() {
+            State::Ready => true,
+            State::Asleep(signal, until) => {
+                signal.load(std::sync::atomic::Ordering::Relaxed)
+                    || until.is_some_and(|until| until <= now)
+            }
+            State::AtRest(since, until) => count > *since || *until <= now,
+            State::Ended => false,
+        };
+        world.tasks.iter().filter(can).cloned().collect()
+    }
+
+    /// One of the threads goes on to where it stops next. `false`: none can.
+    fn run_one(&mut self) -> Result<bool, String> {
+        let runnable = self.runnable();
+        if runnable.is_empty() {
+            return Ok(false);
+        }
+        let at = self.with(|world| world.rng.usize(0..runnable.len()));
+        let task = &runnable[at];
+        task.resume();
+        if let Some(panic) = task.panic.lock().unwrap().clone() {
+            return Err(format!("{} panics: {panic}", task.name));
+        }
+        let rests = matches!(*task.state.lock().unwrap(), State::AtRest(..));
+        let mut world = self.simulation.world();
+        world.step += 1;
+        world.tasks.retain(|it| !it.has_ended());
+        // The loop itself touches the disk while it starts.
+        if task.name.starts_with("write") || world.serving.is_none() {
+            world.gate_is_true();
+        }
+        world.hear_answers();
+        drop(world);
+        if !rests {
+            self.simulation.steps.next();
+        }
+        self.verdict_so_far()?;
+        Ok(true)
+    }
+
+    /// The kernel tells of one change.
+    fn tell_one(&self) -> bool {
+        let told = self.with(|world| {
+            let event = world.disk.telling.pop_front()?;
+            world.say(|| format!("the kernel tells: {:?} {:?}", event.kind, event.paths));
+            Some((world.disk.kernel.take()?, event))
+        });
+        let Some((mut kernel, event)) = told else {
+            return false;
+        };
+        kernel(event);
+        self.with(|world| world.disk.kernel = Some(kernel));
+        self.simulation.steps.next();
+        true
+    }
+
+    fn peer_acts(&self) {
+        self.with(|world| {
+            let able = world.peers.at_work();
+            if able.is_empty() {
+                return;
+            }
+            let pid = able[world.rng.usize(0..able.len())];
+            match world.rng.u32(0..40) {
+                0 => {
+                    world.peers.dies(pid);
+                    world.say(|| format!("process {pid} dies"));
+                }
+                1 => {
+                    if let Some(process) = world.peers.processes.get_mut(&pid) {
+                        process.hangs = true;
+                    }
+                    world.say(|| format!("process {pid} hangs"));
+                }
+                n => {
+                    let at_once = world.rng.bool();
+                    let text = world.peers.act(pid, n as usize, at_once);
+                    world.say(|| text);
+                }
+            }
+        });
+    }
+
+    fn somebody_comes(&mut self) {
+        if !self.is_alive() {
+            return self.start();
+        }
+        self.with(|world| {
+            let n = world.rng.usize(0..8);
+            if world.peers.has_starting() && n > 2 {
+                world.peers.arrive();
+            } else if !world.peers.return_one(n) && !world.peers.is_there(SECOND) {
+                world.peers.begin(SECOND, None);
+            }
+        });
+    }
+
+    /// A clock is set, the kernel loses something, processes wake up.
+    fn trouble(&self) {
+        self.with(|world| match world.rng.u32(0..6) {
+            0 => {
+                let hours = world.rng.i32(-2..3);
+                world.wall += i128::from(hours) * 3_600_000_000_000;
+                world.say(|| format!("the clock is set by {hours} hours"));
+            }
+            1 => {
+                world.disk.overflow();
+                world.say(|| "the kernel drops what it had to tell".to_owned());
+            }
+            2 => {
+                world.disk.deaf = true;
+                world.deed();
+                world.disk.deaf = false;
+                world.say(|| "and the kernel tells nobody".to_owned());
+            }
+            _ => world
+                .peers
+                .processes
+                .values_mut()
+                .for_each(|it| it.hangs = false),
+        });
+    }
+
+    /// When something is due next.
+    fn next_due(&self) -> Option<Duration> {
+        let world = self.simulation.world();
+        let due = |task: &Arc<Task>| match &*task.state.lock().unwrap() {
+            State::Asleep(_, until) => *until,
+            State::AtRest(_, until) => Some(*until),
+            _ => None,
+        };
+        world.tasks.iter().filter_map(due).min()
+    }
+
+    fn time_passes(&self) {
+        let due = self.next_due();
+        self.with(|world| {
+            let millis = match world.rng.u32(0..20) {
+                0..8 => return world.now = due.unwrap_or_default().max(world.now),
+                8..14 => world.rng.u64(1..100),
+                14..19 => world.rng.u64(200..1500),
+                _ => 30_000,
+            };
+            world.now += Duration::from_millis(millis);
+        });
+    }
+
+    /// Everybody is there, nothing is in the way, and time passes until all is as it must be.
+    fn settle(&mut self) -> Ended {
+        self.with(|world| {
+            world.faults = None;
+            world.say(|| "everything settles".to_owned());
+        });
+        if !self.is_alive() {
+            self.start();
+        }
+        let mut last = Ok(());
+        for round in 0..240 {
+            self.come_to_rest()?;
+            last = self.with(World::unsettled);
+            if last.is_ok() && round > 3 {
+                return Ok(());
+            }
+            self.with(|world| world.now += Duration::from_millis(500));
+        }
+        last.map_err(|why| format!("it does not settle: {why}"))
+    }
+
+    /// All goes on until nothing can, without time passing.
+    fn come_to_rest(&mut self) -> Ended {
+        for _ in 0..MOST_STEPS {
+            let acted = self.all_peers_act();
+            let told = self.tell_one();
+            if !self.run_one()? && !told && !acted {
+                self.with(World::shut_is_shut);
+                return self.verdict_so_far();
+            }
+        }
+        Err("it does not come to rest".to_owned())
+    }
+
+    fn all_peers_act(&self) -> bool {
+        let acted = self.with(|world| {
+            world
+                .peers
+                .processes
+                .values_mut()
+                .for_each(|it| it.hangs = false);
+            let mut acted = world.peers.return_one(0);
+            if world.peers.has_starting() {
+                world.peers.arrive();
+                acted = true;
+            }
+            if world.generation > 0 && !world.peers.is_there(SECOND) && world.asked.is_some() {
+                world.peers.begin(SECOND, None);
+                acted = true;
+            }
+            for pid in world.peers.at_work() {
+                let text = world.peers.act(pid, 0, true);
+                world.say(|| text);
+                acted = true;
+            }
+            acted
+        });
+        if acted {
+            self.simulation.steps.next();
+        }
+        acted
+    }
+
+    /// What has settled stands after a kill, too.
+    fn nothing_is_judged_again(&mut self) -> Ended {
+        let before = self.with(|world| world.peers.reports.clone());
+        self.kill();
+        self.start();
+        self.settle()?;
+        let after = self.with(|world| world.peers.reports.clone());
+        let there = self.with(|world| [FIRST, SECOND, REPORTER].map(|it| world.peers.is_there(it)));
+        if before == after {
+            return Ok(());
+        }
+        Err(format!(
+            "after a kill at rest files are judged again: {before:?}, {after:?}, there: {there:?}"
+        ))
+    }
+}

@@ -1,0 +1,226 @@
+//! What the broker takes from the system, taken from the simulation where one runs: tests without one
+//! have the system's.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, RecvError, RecvTimeoutError, TryRecvError};
+use std::time::{Duration, Instant, SystemTime};
+
+use notify::{EventHandler, RecommendedWatcher, RecursiveMode, WatcherKind};
+use qcbus_ingest::Stat;
+
+use super::threads::{Signal, State, here};
+
+pub use super::surroundings::{Children, ControlSocket, Host, is_there};
+
+/// The time that passes.
+pub fn now() -> Instant {
+    here().map_or_else(Instant::now, |it| it.simulation.instant())
+}
+
+/// The time of the day, which may be set.
+pub fn wall_time() -> SystemTime {
+    here().map_or_else(SystemTime::now, |it| it.simulation.wall_time())
+}
+
+/// What `stat` says of the times of a file.
+pub fn stat(told: Stat) -> Stat {
+    here().map_or(told, |it| it.simulation.stat(told))
+}
+
+/// What tells files apart when they are shared out: the path, without the directory of this run.
+pub fn place(path: &Path) -> &Path {
+    let root = here().map(|it| it.simulation.world().disk.root.clone());
+    root.and_then(|root| path.strip_prefix(root).ok())
+        .unwrap_or(path)
+}
+
+/// Here others may come in between. No lock is held by who calls it, but for what is said while
+/// files are read: then nobody comes in between but who writes them.
+pub fn step(what: &'static str, path: &Path) {
+    let Some(here) = here() else { return };
+    let Some(task) = &here.task else { return };
+    if std::thread::panicking() {
+        return;
+    }
+    here.simulation.reaches(what, path);
+    if matches!(what, "read" | "built" | "published") {
+        here.simulation.user_meddles();
+    } else {
+        task.stop(State::Ready);
+        here.simulation.goes_on(what, path);
+    }
+}
+
+/// As [`mpsc::channel`].
+pub fn channel<T>() -> (Sender<T>, Receiver<T>) {
+    let (sender, receiver) = mpsc::channel();
+    let signal = Signal::default();
+    (Sender(sender, signal.clone()), Receiver(receiver, signal))
+}
+
+/// As [`mpsc::Sender`].
+pub struct Sender<T>(mpsc::Sender<T>, Signal);
+
+impl<T> std::fmt::Debug for Sender<T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl<T> Clone for Sender<T> {
+    fn clone(&self) -> Sender<T> {
+        Sender(self.0.clone(), self.1.clone())
+    }
+}
+
+impl<T> Sender<T> {
+    /// As [`mpsc::Sender::send`].
+    pub fn send(&self, value: T) -> Result<(), mpsc::SendError<T>> {
+        self.1.store(true, Ordering::Relaxed);
+        self.0.send(value)
+    }
+}
+
+impl<T> Drop for Sender<T> {
+    fn drop(&mut self) {
+        // It may have been the last.
+        self.1.store(true, Ordering::Relaxed);
+    }
+}
+
+/// As [`mpsc::Receiver`].
+pub struct Receiver<T>(mpsc::Receiver<T>, Arc<AtomicBool>);
+
+impl<T> Receiver<T> {
+    /// As [`mpsc::Receiver::recv`].
+    pub fn recv(&self) -> Result<T, RecvError> {
+        let Some(task) = here().and_then(|it| it.task) else {
+            return self.0.recv();
+        };
+        task.stop(State::Ready);
+        loop {
+            self.1.store(false, Ordering::Relaxed);
+            match self.0.try_recv() {
+                Ok(value) => return Ok(value),
+                Err(TryRecvError::Disconnected) => return Err(RecvError),
+                Err(TryRecvError::Empty) => task.stop(State::Asleep(self.1.clone(), None)),
+            }
+        }
+    }
+
+    /// As [`mpsc::Receiver::recv_timeout`].
+    pub fn recv_timeout(&self, timeout: Duration) -> Result<T, RecvTimeoutError> {
+        let here = here();
+        let simulated = here.and_then(|it| Some((it.simulation, it.task?)));
+        let Some((simulation, task)) = simulated else {
+            return self.0.recv_timeout(timeout);
+        };
+        let until = simulation.now() + timeout;
+        task.stop(State::Ready);
+        loop {
+            self.1.store(false, Ordering::Relaxed);
+            match self.0.try_recv() {
+                Ok(value) => return Ok(value),
+                Err(TryRecvError::Disconnected) => return Err(RecvTimeoutError::Disconnected),
+                Err(TryRecvError::Empty) if simulation.now() >= until => {
+                    return Err(RecvTimeoutError::Timeout);
+                }
+                Err(TryRecvError::Empty) => task.stop(State::Asleep(self.1.clone(), Some(until))),
+            }
+        }
+    }
+}
+
+/// Does something aside.
+pub fn spawn_blocking<R: Send + 'static>(body: impl FnOnce() -> R + Send + 'static) {
+    match here() {
+        Some(here) => here
+            .simulation
+            .spawn("aside".to_owned(), Box::new(move || drop(body()))),
+        None => drop(tokio::task::spawn_blocking(body)),
+    }
+}
+
+/// As [`std::thread`].
+pub mod thread {
+    use std::io;
+
+    use crate::simulation::threads::here;
+
+    /// As [`std::thread::Builder`].
+    #[derive(Default)]
+    pub struct Builder(String);
+
+    impl Builder {
+        /// As there.
+        pub fn new() -> Builder {
+            Builder::default()
+        }
+
+        /// As there.
+        pub fn name(self, name: String) -> Builder {
+            Builder(name)
+        }
+
+        /// As there.
+        pub fn spawn(self, body: impl FnOnce() + Send + 'static) -> io::Result<JoinHandle<()>> {
+            let Some(here) = here() else {
+                let thread = std::thread::Builder::new().name(self.0);
+                return thread.spawn(body).map(|it| JoinHandle(Some(it)));
+            };
+            here.simulation.spawn(self.0, Box::new(body));
+            Ok(JoinHandle(None))
+        }
+    }
+
+    /// As [`std::thread::JoinHandle`]. No simulated thread is waited for: a simulated broker is killed.
+    #[derive(Debug)]
+    pub struct JoinHandle<T>(Option<std::thread::JoinHandle<T>>);
+
+    impl JoinHandle<()> {
+        /// As there.
+        pub fn join(self) -> std::thread::Result<()> {
+            self.0.map_or(Ok(()), std::thread::JoinHandle::join)
+        }
+    }
+}
+
+/// The kernel's tellings of files.
+#[derive(Debug)]
+pub enum FileEvents {
+    /// Of the real one.
+    Real(RecommendedWatcher),
+    /// Of the simulated one.
+    Simulated,
+}
+
+impl notify::Watcher for FileEvents {
+    fn new<F: EventHandler>(mut handler: F, config: notify::Config) -> notify::Result<FileEvents> {
+        let Some(here) = here() else {
+            return RecommendedWatcher::new(handler, config).map(FileEvents::Real);
+        };
+        let tell = move |event| handler.handle_event(Ok(event));
+        here.simulation.world().disk.kernel = Some(Box::new(tell));
+        Ok(FileEvents::Simulated)
+    }
+
+    fn watch(&mut self, path: &Path, mode: RecursiveMode) -> notify::Result<()> {
+        match self {
+            FileEvents::Real(real) => real.watch(path, mode),
+            FileEvents::Simulated => Ok(()),
+        }
+    }
+
+    fn unwatch(&mut self, path: &Path) -> notify::Result<()> {
+        match self {
+            FileEvents::Real(real) => real.unwatch(path),
+            FileEvents::Simulated => Ok(()),
+        }
+    }
+
+    fn kind() -> WatcherKind {
+        RecommendedWatcher::kind()
+    }
+}

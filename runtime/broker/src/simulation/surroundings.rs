@@ -1,0 +1,165 @@
+//! The bus, the control socket and the processes, as the simulated broker has them.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use qcbus_bus::{Documents, HostEvent, HostOptions, Instance, PeerId, StartError};
+use qcbus_messages::{Digest, FromPeer, ToPeer};
+use tokio::sync::mpsc::UnboundedSender;
+
+use super::Simulation;
+use super::threads::here;
+use crate::control::Asked;
+use crate::core::{ChildSpec, Event, Launch};
+use crate::former::Former;
+use crate::supervise::{self, Surroundings};
+
+fn simulation() -> Arc<Simulation> {
+    here()
+        .expect("a broker is started in tests by a simulation")
+        .simulation
+}
+
+/// The broker's end of the bus.
+pub struct Host {
+    simulation: Arc<Simulation>,
+    generation: u64,
+}
+
+impl Host {
+    pub fn start(_: &Instance, _: HostOptions) -> Result<Host, StartError> {
+        let simulation = simulation();
+        let generation = simulation.world().generation;
+        Ok(Host {
+            simulation,
+            generation,
+        })
+    }
+
+    pub fn generation(&self) -> u64 {
+        self.generation
+    }
+
+    pub async fn next(&mut self) -> HostEvent {
+        std::future::pending().await
+    }
+
+    /// What is on the bus for the broker.
+    pub fn take(&mut self) -> Option<HostEvent> {
+        self.simulation.world().peers.words.pop_front()
+    }
+
+    pub fn has_words(&self) -> bool {
+        !self.simulation.world().peers.words.is_empty()
+    }
+
+    pub fn accept(&mut self, peer: PeerId, _: &ToPeer) {
+        self.simulation.world().peers.accepted(peer);
+    }
+
+    pub fn refuse(&mut self, peer: PeerId, _: &str) {
+        self.simulation.world().peers.dropped(peer);
+    }
+
+    pub fn send(&mut self, peer: PeerId, message: &ToPeer) {
+        let images = match message {
+            ToPeer::Job(job) => self.simulation.images(job.job),
+            _ => Vec::new(),
+        };
+        let now = self.simulation.now();
+        self.simulation.world().told(peer, message, &images, now);
+    }
+
+    pub fn disconnect(&mut self, peer: PeerId) {
+        self.simulation.world().peers.dropped(peer);
+    }
+
+    pub fn set_config(&mut self, _: Digest, _: &[u8]) {}
+
+    pub fn documents(&self) -> Documents {
+        self.simulation.documents.clone()
+    }
+}
+
+/// Where commands ask.
+pub struct ControlSocket;
+
+impl ControlSocket {
+    pub fn listen(_: &Path, inbox: UnboundedSender<Asked>) -> std::io::Result<ControlSocket> {
+        simulation().world().asked = Some(inbox);
+        Ok(ControlSocket)
+    }
+
+    pub async fn flush(&self) {}
+}
+
+/// The processes that the broker starts.
+pub enum Children {
+    Real(supervise::Children),
+    Simulated(Arc<Simulation>),
+}
+
+impl Children {
+    pub fn new(
+        surroundings: Surroundings,
+        generation: u64,
+        events: UnboundedSender<Event>,
+    ) -> Children {
+        let Some(here) = here() else {
+            let real = supervise::Children::new(surroundings, generation, events);
+            return Children::Real(real);
+        };
+        here.simulation.world().peers.exits = Some(events);
+        Children::Simulated(here.simulation)
+    }
+
+    pub fn spawn(&mut self, launch: Launch, spec: &ChildSpec) {
+        match self {
+            Children::Real(real) => real.spawn(launch, spec),
+            Children::Simulated(it) => it.world().peers.launched(launch, spec),
+        }
+    }
+
+    pub fn ended(&mut self, launch: Launch) {
+        if let Children::Real(real) = self {
+            real.ended(launch);
+        }
+    }
+
+    pub fn kill(&self, launch: Option<Launch>, pid: u32) {
+        let simulation = match self {
+            Children::Real(real) => return real.kill(launch, pid),
+            Children::Simulated(simulation) => simulation,
+        };
+        let mut world = simulation.world();
+        let pid = world.peers.pid_of(launch).unwrap_or(pid);
+        world.say(|| format!("  the broker kills process {pid}"));
+        world.peers.dies(pid);
+    }
+
+    pub fn former(&self) -> Option<Former> {
+        match self {
+            Children::Real(real) => real.former(),
+            Children::Simulated(_) => None,
+        }
+    }
+
+    pub fn kill_all(&self) {
+        if let Children::Real(real) = self {
+            real.kill_all();
+        }
+    }
+}
+
+/// Whether a process runs.
+pub fn is_there(pid: u32) -> bool {
+    match here() {
+        Some(here) => here.simulation.world().peers.processes.contains_key(&pid),
+        None => supervise::is_there(pid),
+    }
+}
+
+/// What a process says first after it was let in.
+pub fn word(peer: PeerId, message: FromPeer) -> HostEvent {
+    HostEvent::Message { peer, message }
+}

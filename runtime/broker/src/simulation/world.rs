@@ -1,0 +1,207 @@
+//! The world around the simulated broker.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use fastrand::Rng;
+use qcbus_bus::{Held, PeerId};
+use qcbus_messages::control::{Request, Response};
+use qcbus_messages::{DocId, ToPeer};
+use tokio::sync::mpsc::UnboundedSender;
+use tokio::sync::oneshot;
+
+use super::disk::{Disk, How, JUDGED, Mark};
+use super::oracle::Looker;
+use super::peers::{Letter, Peers};
+use super::threads::Task;
+use crate::control::Asked;
+use crate::intake::Intake;
+use crate::store::Store;
+
+/// What the broker is made of, as far as the simulation looks into it.
+pub struct Serving {
+    pub store: Arc<Store>,
+    pub intake: Arc<Intake>,
+}
+
+/// What the state machine has come to.
+#[derive(Debug, Default)]
+pub struct Summary {
+    /// Nothing waits and nothing is under way.
+    pub quiet: bool,
+    /// Acceptances that must not lie behind the gate.
+    pub shut: Vec<Arc<Path>>,
+    /// Who must judge.
+    pub demanded: Vec<String>,
+}
+
+/// A client that waits for a verdict.
+pub struct Wait {
+    pub file: usize,
+    /// The step at which it asked.
+    pub asked: usize,
+    pub answer: oneshot::Receiver<Response>,
+}
+
+/// The world.
+pub struct World {
+    pub rng: Rng,
+    pub now: Duration,
+    pub start: Instant,
+    /// Nanoseconds since 1970, less what has passed.
+    pub wall: i128,
+    pub generation: u64,
+    pub disk: Disk,
+    pub peers: Peers,
+    pub asked: Option<UnboundedSender<Asked>>,
+    pub serving: Option<Serving>,
+    pub summary: Summary,
+    pub waits: Vec<Wait>,
+    /// The simulated threads, the loop of the broker first.
+    pub tasks: Vec<Arc<Task>>,
+    pub looker: Looker,
+    /// What must never happen and has.
+    pub fault: Option<String>,
+    pub lines: Vec<String>,
+    /// Whether the schedule is written down.
+    pub verbose: bool,
+    /// One thing in so many that the disk is asked for fails; none: nothing does.
+    pub faults: Option<u32>,
+    pub step: usize,
+    pub stored: usize,
+}
+
+impl World {
+    pub fn new(seed: u64, root: PathBuf, out: PathBuf, gate: PathBuf) -> World {
+        World {
+            rng: Rng::with_seed(seed),
+            now: Duration::ZERO,
+            start: Instant::now(),
+            wall: 1_800_000_000_000_000_000,
+            generation: 0,
+            disk: Disk::new(root),
+            peers: Peers::default(),
+            asked: None,
+            serving: None,
+            summary: Summary::default(),
+            waits: Vec::new(),
+            tasks: Vec::new(),
+            looker: Looker::new(out, gate),
+            fault: None,
+            lines: Vec::new(),
+            verbose: false,
+            faults: None,
+            step: 0,
+            stored: 0,
+        }
+    }
+
+    /// Writes a line of the schedule.
+    pub fn say(&mut self, line: impl FnOnce() -> String) {
+        if !self.verbose {
+            return;
+        }
+        let root = self
+            .disk
+            .root
+            .parent()
+            .map(|it| format!("{}/", it.display()));
+        let line = line().replace(&root.unwrap_or_default(), "");
+        let line = format!("{:5} {:>9.3} {}", self.step, self.now.as_secs_f64(), line);
+        self.lines.push(line);
+    }
+
+    /// Something that must never happen.
+    pub fn wrong(&mut self, what: String) {
+        self.say(|| format!("WRONG: {what}"));
+        self.fault.get_or_insert(what);
+    }
+
+    pub fn wall_now(&self) -> i128 {
+        self.wall + i128::try_from(self.now.as_nanos()).unwrap_or(i128::MAX)
+    }
+
+    /// A peer is told something.
+    pub fn told(&mut self, peer: PeerId, message: &ToPeer, images: &[(DocId, Held)], _: Duration) {
+        match message {
+            ToPeer::Job(job) => self.peers.has_job(peer, job, images),
+            ToPeer::Cancel { job } => {
+                let heard = self.rng.bool();
+                self.peers.cancelled(peer, *job, heard);
+            }
+            ToPeer::Result(result) => {
+                let letter = Letter::Write(result.input.clone(), result.job);
+                self.peers.has_letter(peer, letter);
+            }
+            ToPeer::Withdrawn(gone) => {
+                let letter = Letter::TakeBack(gone.input.clone());
+                self.peers.has_letter(peer, letter);
+            }
+            ToPeer::Drain => self.peers.is_told_to_go(peer),
+            ToPeer::Welcome { .. } | ToPeer::Refused { .. } => {}
+        }
+    }
+
+    /// Somebody does something to the files.
+    pub fn deed(&mut self) {
+        let step = self.step;
+        let at = (step, self.wall_now());
+        let file = self.rng.usize(0..super::disk::FILES.len());
+        let name = super::disk::FILES[file];
+        let chance = self.rng.u32(0..100);
+        let is_there = self.disk.lying[file].is_some();
+        match chance {
+            0..15 if is_there => {
+                self.disk.remove(file, step);
+                self.say(|| format!("{name} is removed"));
+            }
+            15..22 => {
+                let to = if file < 2 { 1 - file } else { file };
+                self.disk.rename(file, to, at);
+                self.say(|| format!("{name} takes the place of its like"));
+            }
+            22..27 => {
+                self.disk.move_directory(step);
+                self.say(|| "sub is moved".to_owned());
+            }
+            _ => {
+                let mark = [Mark::Good, Mark::Good, Mark::Good, Mark::Bad, Mark::Unfit];
+                let mark = mark[self.rng.usize(0..mark.len())];
+                let how = self.how();
+                self.disk.write(file, at, mark, how);
+                self.say(|| format!("{name} is written: {mark:?} {how:?}"));
+            }
+        }
+    }
+
+    fn how(&mut self) -> How {
+        match self.rng.u32(0..20) {
+            0..6 => How::InPlace,
+            6..8 => How::TimePutBack,
+            8..13 => How::Renamed,
+            13..15 => How::Torn,
+            15..17 => How::Again,
+            _ => How::Touched,
+        }
+    }
+
+    /// A client asks for a verdict.
+    pub fn ask(&mut self) {
+        let Some(asked) = &self.asked else { return };
+        let file = self.rng.usize(JUDGED);
+        let (answer, receiver) = oneshot::channel();
+        let request = Request::Wait {
+            file: self.disk.path(file),
+            timeout_ms: None,
+        };
+        if asked.send(Asked { request, answer }).is_ok() {
+            self.say(|| format!("somebody waits for {}", super::disk::FILES[file]));
+            self.waits.push(Wait {
+                file,
+                asked: self.step,
+                answer: receiver,
+            });
+        }
+    }
+}
