@@ -91,7 +91,7 @@ impl Simulation {
     /// While a file is read, others may be written.
     pub fn user_meddles(&self) {
         let mut world = self.world();
-        if world.faults.is_some() && world.rng.u32(0..12) == 0 {
+        if world.meddles && world.rng.u32(0..12) == 0 {
             world.deed();
         }
     }

@@ -132,11 +132,18 @@ type Ended = Result<(), String>;
 impl Play {
     fn all(&mut self) -> Ended {
         self.prologue();
-        let steps = self.with(|world| world.rng.usize(150..600));
-        for _ in 0..steps {
-            self.step()?;
+        // What changes after all has settled shows what was forgotten.
+        for most in [400, 160] {
+            let steps = self.with(|world| {
+                world.meddles = true;
+                world.deed();
+                world.rng.usize(most / 4..most)
+            });
+            for _ in 0..steps {
+                self.step()?;
+            }
+            self.settle()?;
         }
-        self.settle()?;
         if self.with(|world| world.rng.u32(0..4)) == 0 {
             self.nothing_is_judged_again()?;
         }
@@ -157,7 +164,6 @@ impl Play {
             if world.rng.bool() {
                 world.now += Duration::from_secs(10);
             }
-            world.faults = Some(0);
         });
         self.start();
     }
@@ -210,7 +216,7 @@ impl Play {
     fn step(&mut self) -> Ended {
         let chance = self.with(|world| world.rng.u32(0..1000));
         match chance {
-            0..700 => drop(self.run_one()?),
+            0..700 => self.go_on()?,
             700..780 => drop(self.tell_one()),
             780..880 => self.peer_acts(),
             880..930 => self.with(World::deed),
@@ -232,6 +238,17 @@ impl Play {
         self.with(|world| world.fault.clone().map_or(Ok(()), Err))
     }
 
+    /// One of the threads goes on. That of a writer may be the last to do so.
+    fn go_on(&mut self) -> Ended {
+        let ran = self.run_one()?;
+        if ran.is_some_and(|name| name.starts_with("write"))
+            && self.with(|it| it.rng.u32(0..60)) == 0
+        {
+            self.kill();
+        }
+        Ok(())
+    }
+
     /// The threads that could go on.
     fn runnable(&self) -> Vec<Arc<Task>> {
         let count = self.simulation.steps.count();
@@ -249,11 +266,11 @@ impl Play {
         world.tasks.iter().filter(can).cloned().collect()
     }
 
-    /// One of the threads goes on to where it stops next. `false`: none can.
-    fn run_one(&mut self) -> Result<bool, String> {
+    /// One of the threads goes on to where it stops next; gives its name, if one can.
+    fn run_one(&mut self) -> Result<Option<String>, String> {
         let runnable = self.runnable();
         if runnable.is_empty() {
-            return Ok(false);
+            return Ok(None);
         }
         let at = self.with(|world| world.rng.usize(0..runnable.len()));
         let task = &runnable[at];
@@ -275,7 +292,7 @@ impl Play {
             self.simulation.steps.next();
         }
         self.verdict_so_far()?;
-        Ok(true)
+        Ok(Some(task.name.clone()))
     }
 
     /// The kernel tells of one change.
@@ -388,7 +405,7 @@ impl Play {
     /// Everybody is there, nothing is in the way, and time passes until all is as it must be.
     fn settle(&mut self) -> Ended {
         self.with(|world| {
-            world.faults = None;
+            world.meddles = false;
             world.say(|| "everything settles".to_owned());
         });
         if !self.is_alive() {
@@ -411,7 +428,7 @@ impl Play {
         for _ in 0..MOST_STEPS {
             let acted = self.all_peers_act();
             let told = self.tell_one();
-            if !self.run_one()? && !told && !acted {
+            if self.run_one()?.is_none() && !told && !acted {
                 self.with(World::shut_is_shut);
                 return self.verdict_so_far();
             }

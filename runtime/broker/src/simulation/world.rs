@@ -66,8 +66,8 @@ pub struct World {
     pub lines: Vec<String>,
     /// Whether the schedule is written down.
     pub verbose: bool,
-    /// One thing in so many that the disk is asked for fails; none: nothing does.
-    pub faults: Option<u32>,
+    /// Whether files are written while they are read.
+    pub meddles: bool,
     pub step: usize,
     pub stored: usize,
 }
@@ -91,7 +91,7 @@ impl World {
             fault: None,
             lines: Vec::new(),
             verbose: false,
-            faults: None,
+            meddles: false,
             step: 0,
             stored: 0,
         }
