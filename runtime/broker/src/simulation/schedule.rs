@@ -414,9 +414,12 @@ impl Play {
         let mut last = Ok(());
         for round in 0..240 {
             self.come_to_rest()?;
-            last = self.with(World::unsettled);
-            if last.is_ok() && round > 3 {
-                return Ok(());
+            // It must stay so for a while, and to look costs more than to wait.
+            if round > 3 {
+                last = self.with(World::unsettled);
+                if last.is_ok() {
+                    return Ok(());
+                }
             }
             self.with(|world| world.now += Duration::from_millis(500));
         }
