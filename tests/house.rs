@@ -26,7 +26,7 @@ const MAY_KNOW: &[(&str, Option<&[&str]>)] = &[
     ("qcbus-messages", Some(&[])),
     ("qcbus-bus", Some(&[])),
     ("qcbus-disk", Some(&[])),
-    ("qcbus-ingest", Some(&[])),
+    ("qcbus-ingest", Some(&["qcbus-disk"])),
     ("qcbus-broker", Some(PROCESS)),
     ("qcbus-sdk", Some(PROCESS)),
     ("qcbus-opendrive", Some(&[])),
