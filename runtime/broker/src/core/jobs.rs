@@ -16,7 +16,7 @@ use super::staging::Staged;
 use super::types::{Input, Judged, PrepareFailure, PreparedJob, Reading};
 use super::{Actions, State};
 
-/// Between two notices that there is no room.
+/// Between two notices that there is no room, or that files cannot be read for now.
 const ROOM_NOTICE_PAUSE: Duration = Duration::from_secs(10);
 
 /// A job in flight.
@@ -219,7 +219,28 @@ impl State {
                 self.requeue_later(id, self.settings.busy_pause, actions);
             }
             Err(PrepareFailure::Unreadable(reason)) => self.not_read(id, reason, actions),
+            Err(PrepareFailure::Moment(reason)) => self.hindered(id, reason, actions),
         }
+    }
+
+    /// Something kept the file from being read that will pass. It is tried again and again, with growing
+    /// pauses; then its verdict says so, and it is tried as everything that could not be read is.
+    fn hindered(&mut self, id: JobId, reason: String, actions: &mut Actions) {
+        let file = self.jobs.get(&id).map(|job| job.file);
+        let Some(entry) = file.and_then(|file| self.files.get_mut(file)) else {
+            return;
+        };
+        let pause = self.settings.moment_pause * 2_u32.saturating_pow(entry.hindered);
+        if pause > self.settings.moment_pause_max {
+            return self.not_read(id, reason, actions);
+        }
+        entry.hindered += 1;
+        if self.now >= self.mute_hindered_until {
+            self.mute_hindered_until = self.now + ROOM_NOTICE_PAUSE;
+            let what = format!("{reason}; it is tried again");
+            self.notice(Notice::NotRead(what), actions);
+        }
+        self.requeue_later(id, pause, actions);
     }
 
     /// The file cannot be read. That may be known, and said.
@@ -274,6 +295,7 @@ impl State {
         if let Some((stamp, _)) = prepared.root() {
             entry.stamp = stamp;
         }
+        entry.hindered = 0;
         entry.doubted |= entry.touched && prepared.racy;
         if entry.doubted || !entry.present {
             self.end_job(id, actions);

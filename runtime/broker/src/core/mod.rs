@@ -99,6 +99,7 @@ pub struct State {
     judged_once: bool,
     /// Until then nobody need be told again that there is no room.
     mute_room_until: Duration,
+    mute_hindered_until: Duration,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -148,6 +149,7 @@ impl State {
             rate: Rate::default(),
             judged_once: false,
             mute_room_until: Duration::ZERO,
+            mute_hindered_until: Duration::ZERO,
         };
         state.begin_epoch();
         state

@@ -39,6 +39,8 @@ pub enum Notice {
     },
     /// There is no room for a file's image.
     NoRoom(String),
+    /// A file cannot be read for now.
+    NotRead(String),
     /// A result could not be written.
     NotWritten(String),
     /// A result could not be read back for a reporter.
@@ -87,6 +89,7 @@ impl Notice {
             Notice::GaveUp { .. } => "gave-up",
             Notice::NotUpgraded { .. } => "not-upgraded",
             Notice::NoRoom(_) => "no-room",
+            Notice::NotRead(_) => "not-read",
             Notice::NotWritten(_) => "not-written",
             Notice::NotDelivered(_) => "not-delivered",
             Notice::NotReported { .. } => "not-reported",
@@ -139,6 +142,7 @@ impl fmt::Display for Notice {
             }
             Notice::NotReported { name, why } => write!(f, "{name} {why}"),
             Notice::NoRoom(text)
+            | Notice::NotRead(text)
             | Notice::NotWritten(text)
             | Notice::NotDelivered(text)
             | Notice::Watching(text)

@@ -46,6 +46,11 @@ pub struct Settings {
     pub retry_after: Duration,
     /// Pause before a file is tried again for which the bus had no place.
     pub busy_pause: Duration,
+    /// First pause before a file is read again that something which passes kept from being read; it
+    /// doubles up to the pause after which a verdict says so.
+    pub moment_pause: Duration,
+    /// See `moment_pause`.
+    pub moment_pause_max: Duration,
     /// How often what could not be read is tried again though nothing tells of a change.
     pub read_again_after: Duration,
     /// Drain limit after which unfinished work is given up.
@@ -77,6 +82,8 @@ impl Default for Settings {
             max_text: 8 << 10,
             retry_after: Duration::from_secs(1),
             busy_pause: Duration::from_millis(20),
+            moment_pause: Duration::from_millis(125),
+            moment_pause_max: Duration::from_secs(4),
             read_again_after: Duration::from_secs(60),
             drain_limit: Duration::from_secs(30),
             once: false,

@@ -167,6 +167,41 @@ fn a_file_without_room_on_the_bus_is_tried_again_after_a_pause() {
 }
 
 #[test]
+fn what_a_moment_hinders_is_tried_again_with_growing_pauses_and_then_said() {
+    let mut world = World::new();
+    world.join("First");
+    world.write(0);
+    let hinder = |world: &mut World| {
+        let (job, _) = world.preparing.remove(0);
+        let result = Err(PrepareFailure::Moment("too many open files".to_owned()));
+        world.event(Event::Prepared { job, result });
+    };
+    let settings = world.state.settings.clone();
+    let mut pause = settings.moment_pause;
+    let tick = Duration::from_millis(1);
+    while pause <= settings.moment_pause_max {
+        hinder(&mut world);
+        world.pass(pause - tick);
+        assert!(world.preparing.is_empty(), "not yet");
+        assert!(world.storing.is_empty(), "nothing is said of it");
+        world.pass(tick);
+        pause *= 2;
+    }
+    hinder(&mut world);
+    assert!(world.preparing.is_empty());
+    let finished = &world.storing[0];
+    assert_eq!(finished.unreadable.as_deref(), Some("too many open files"));
+    // When it is read the next time, and can be, nothing of this is left.
+    let job = world.storing.remove(0).job;
+    let outcome = StoreOutcome::Stale;
+    world.event(Event::Stored { job, outcome });
+    world.prepare(0, true);
+    world.answer(0);
+    assert_eq!(world.storing.len(), 1);
+    assert_eq!(world.storing[0].unreadable, None);
+}
+
+#[test]
 fn more_findings_than_a_checker_may_report_are_no_judgement() {
     let mut world = World::new();
     world.state.settings.max_issues = 1;
