@@ -42,6 +42,11 @@ pub enum Response {
     Verdict(FileVerdict),
     /// Answer to `Wait`: the time is over.
     TimedOut,
+    /// Answer to `Wait`: the file, or one that it refers to, lies on a disk that does not answer.
+    Unanswered {
+        /// For a person.
+        reason: String,
+    },
     /// Answer to `Wait`: nobody watches this file, and why.
     Unwatched {
         /// For a person.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
+use qcbus_disk::foreign;
 use qcbus_formats::config::{Config, reporter_for};
 use qcbus_formats::xqar::{self, Checker, Param, Results};
 use qcbus_messages::codec::MAX_MESSAGE;
@@ -34,7 +35,7 @@ pub fn message(
         let xqar = to_text(xqar);
         format!("cannot read {xqar} back for {reporter}: {error}")
     };
-    let bytes = std::fs::read(xqar).map_err(|error| fail(&error))?;
+    let bytes = foreign::read(xqar, MOST_OF_A_RESULT).map_err(|error| fail(&error))?;
     let mut results = xqar::read(&bytes).map_err(|error| fail(&error))?;
     drop(bytes);
     cut_to(&mut results, MOST_BYTES);
@@ -72,6 +73,9 @@ pub fn withdrawn(
         params: params_of(reporter, config),
     }
 }
+
+/// A result that holds what the broker keeps of every bundle is far smaller.
+const MOST_OF_A_RESULT: u64 = 4 << 30;
 
 /// Findings in one message, in bytes of memory. Half of what the bus carries in one: the encoded
 /// form is smaller, and the rest of the message has room, too.

@@ -4,7 +4,7 @@
 //! of hands: `watch` sees files, `intake` reads and publishes them, `store` and `writers` put
 //! results on the disk, `journal` remembers, `directory_lock` keeps others out, `supervise` starts
 //! and kills, `control` answers commands, `reload` reads configuration and manifests, `memory`
-//! gives back what was taken.
+//! gives back what was taken, `scouts` look at files that may never answer.
 
 pub mod control;
 mod core;
@@ -20,6 +20,7 @@ pub mod memory;
 mod options;
 pub mod reload;
 mod result_paths;
+mod scouts;
 mod stages;
 mod stamp;
 mod store;

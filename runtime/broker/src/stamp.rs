@@ -7,6 +7,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
+use qcbus_disk::foreign;
 use qcbus_document::FileKind;
 use qcbus_ingest::{Content, Stat};
 
@@ -18,7 +19,7 @@ use crate::core::Stamp;
 /// # Errors
 /// Whatever `stat` says, other than that there is no such file: there may be one.
 pub fn stamp_of(path: &Path) -> io::Result<Option<Stamp>> {
-    match std::fs::metadata(path) {
+    match foreign::metadata(path) {
         Ok(data) if data.is_file() => Ok(Some(from_metadata(&data))),
         Ok(_) => Ok(None),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
@@ -33,7 +34,7 @@ pub fn stamp_of(path: &Path) -> io::Result<Option<Stamp>> {
 /// directory's stamp tells its scenarios: it changes when one comes or goes, not when something
 /// else, such as a result, is written there.
 pub fn stamp_through_links(path: &Path) -> Option<Stamp> {
-    let data = std::fs::metadata(path).ok()?;
+    let data = foreign::metadata(path).ok()?;
     if data.is_file() {
         Some(from_metadata(&data))
     } else if data.is_dir() {
@@ -47,9 +48,9 @@ pub fn stamp_through_links(path: &Path) -> Option<Stamp> {
 const LISTED: i128 = i64::MIN as i128;
 
 fn listing(directory: &Path, inode: u64) -> Option<Stamp> {
-    let entries = std::fs::read_dir(directory).ok()?;
+    let entries = foreign::list(directory).ok()?;
     let mut names: Vec<OsString> = entries
-        .flatten()
+        .iter()
         .filter(|entry| FileKind::of_path(&entry.path()) == Some(FileKind::Xosc))
         .map(|entry| entry.file_name())
         .collect();

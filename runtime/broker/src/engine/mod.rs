@@ -2,6 +2,7 @@
 
 mod act;
 mod asked;
+mod looks;
 mod start;
 mod systemd;
 
@@ -11,7 +12,9 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
+use looks::{Look, Looked};
 use qcbus_bus::{Host, HostEvent, PeerId, StartError as BusError};
+use qcbus_disk::foreign::Lookout;
 use qcbus_messages::control::{Response, Unseen};
 use qcbus_messages::{JobId, ToPeer};
 use tokio::sync::{mpsc, oneshot};
@@ -25,6 +28,7 @@ use crate::intake::Intake;
 use crate::journal::JournalError;
 use crate::options::Options;
 use crate::reload::{LoadError, Loaded, Sources};
+use crate::scouts::Scouts;
 use crate::stages::reached;
 use crate::store::Store;
 use crate::supervise::{Children, is_there};
@@ -111,6 +115,13 @@ pub struct Broker {
     watch_mode: String,
     /// What could not be looked at, and why.
     unseen: BTreeMap<PathBuf, String>,
+    /// Sees who waits for which file.
+    lookout: Arc<Lookout>,
+    scouts: Scouts,
+    /// Files that did not answer when they were last asked for.
+    hanging: BTreeSet<PathBuf>,
+    /// Who waits for a look at a file, by the number of the scout.
+    looks: HashMap<u64, Look>,
     sessions: Sessions,
     tickets: HashMap<Ticket, oneshot::Sender<Response>>,
     downs: Vec<oneshot::Sender<Response>>,
@@ -144,6 +155,8 @@ struct Inbox {
     asked: mpsc::UnboundedReceiver<Asked>,
     notices: mpsc::UnboundedReceiver<Notice>,
     notices_in: mpsc::UnboundedSender<Notice>,
+    looked: mpsc::UnboundedReceiver<Looked>,
+    looked_in: mpsc::UnboundedSender<Looked>,
     deliveries: mpsc::UnboundedReceiver<Ready>,
     deliveries_in: mpsc::UnboundedSender<Ready>,
 }
@@ -246,7 +259,8 @@ impl Broker {
                     Stop::Drain => { self.notify_stopping(); self.handle(Event::Drain) }
                     Stop::Quit => { quit = true; false }
                 },
-                _ = tick.tick() => self.handle(Event::Tick),
+                Some(looked) = self.inbox.looked.recv() => self.looked(looked),
+                _ = tick.tick() => { self.give_up_the_overdue(); self.handle(Event::Tick) }
             };
             if !go_on {
                 break;
@@ -276,7 +290,12 @@ impl Broker {
             former.kill_but(&BTreeSet::new());
         }
         if !quit {
-            self.writers.finish();
+            // A disk that does not answer must not keep anybody from stopping.
+            for writer in self.writers.finish(self.options.settings.drain_limit) {
+                let what =
+                    format!("{writer} hangs; what it did not write is made good at the next start");
+                (self.tell)(Told::Notice(Notice::Storing(what)));
+            }
         }
         for down in self.downs.drain(..) {
             // A client that has left needs no answer.
@@ -432,6 +451,7 @@ impl Inbox {
         let (seen_in, seen) = mpsc::unbounded_channel();
         let (asked_in, asked) = mpsc::unbounded_channel();
         let (notices_in, notices) = mpsc::unbounded_channel();
+        let (looked_in, looked) = mpsc::unbounded_channel();
         let (deliveries_in, deliveries) = mpsc::unbounded_channel();
         let inbox = Inbox {
             events,
@@ -440,6 +460,8 @@ impl Inbox {
             asked,
             notices,
             notices_in: notices_in.clone(),
+            looked,
+            looked_in,
             deliveries,
             deliveries_in,
         };

@@ -1,6 +1,6 @@
 //! How a broker starts: the instance, the journal, the configuration, the first look.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicU64;
@@ -25,11 +25,13 @@ use crate::journal::{Journal, JournalError, Void};
 use crate::options::Options;
 use crate::reload::{LoadError, Loaded, Sources};
 use crate::result_paths::ResultPaths;
+use crate::scouts::{PATIENCE, Scouts};
 use crate::stamp::stamp_of;
 use crate::store::{Reconciled, Store, remove_earlier_results};
 use crate::supervise::{Children, Surroundings};
 use crate::watch::{Seen, WatchOptions, Watcher, is_looked_at, scan_directory};
 use crate::writers::{Order, Writers};
+use qcbus_disk::foreign::Lookout;
 use qcbus_disk::sweep;
 
 impl Broker {
@@ -55,7 +57,9 @@ impl Broker {
         let (inbox, senders) = Inbox::new();
         let control = ControlSocket::listen(options.instance.dir(), senders.asked)
             .map_err(|source| system("listen for commands", source))?;
-        let store = Arc::new(store(&options, journal, &senders.notices)?);
+        let lookout = Arc::new(Lookout::default());
+        let scouts = Scouts::new(lookout.clone(), PATIENCE);
+        let store = Arc::new(store(&options, journal, scouts.clone(), &senders.notices)?);
         let reconciled = reconcile(&options, &loaded, &store)?;
         let voids = store.voids()?;
         let writers = writers(&options, &store, &inbox, &senders.notices)?;
@@ -77,6 +81,10 @@ impl Broker {
             watcher: None,
             watch_mode: "once".to_owned(),
             unseen: BTreeMap::new(),
+            lookout,
+            scouts,
+            hanging: BTreeSet::new(),
+            looks: HashMap::new(),
             sessions: Sessions::default(),
             tickets: HashMap::new(),
             downs: Vec::new(),
@@ -208,6 +216,7 @@ fn results_of(options: &Options) -> Result<DirectoryLock, LockError> {
 fn store(
     options: &Options,
     journal: Journal,
+    scouts: Scouts,
     notices: &mpsc::UnboundedSender<Notice>,
 ) -> Result<Store, GateError> {
     let (out, roots) = (options.out.clone(), options.roots.clone());
@@ -217,7 +226,10 @@ fn store(
     };
     places.single.clone_from(&options.single_result);
     let gate = options.gate.as_ref();
-    let gate = gate.map(|directory| gate_of(options, directory, &places, notices.clone()));
+    let gate = gate.map(|directory| {
+        let (scouts, notices) = (scouts.clone(), notices.clone());
+        gate_of(options, directory, &places, scouts, notices)
+    });
     Ok(Store {
         places,
         dialect: options.dialect,
@@ -225,6 +237,7 @@ fn store(
         verdict_files: options.verdict_files,
         retries: options.watch,
         gate: gate.transpose()?,
+        scouts,
         journal: Mutex::new(journal),
         epoch: AtomicU64::new(0),
     })
@@ -245,10 +258,13 @@ fn gate_of(
     options: &Options,
     directory: &Path,
     paths: &ResultPaths,
+    scouts: Scouts,
     notices: mpsc::UnboundedSender<Notice>,
 ) -> Result<Gate, GateError> {
     let roots = options.roots.clone();
     let gate = GateOptions {
+        max_file: options.limits.max_file,
+        scouts,
         directory: directory.to_path_buf(),
         paths: paths.clone(),
         durable: options.durable,

@@ -3,9 +3,11 @@
 
 use std::collections::HashMap;
 use std::ffi::OsStr;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use ignore::gitignore::{Gitignore, GitignoreBuilder};
+use qcbus_disk::foreign;
 
 /// Name of the file in which a directory's owner says what is not to be checked.
 pub const IGNORE_FILE: &str = ".qcignore";
@@ -85,15 +87,25 @@ fn is_ignored_directory(path: &Path) -> bool {
         .is_some_and(|name| name == ".git" || name == ".qcbus")
 }
 
+/// People write these by hand.
+const MOST_OF_RULES: u64 = 1 << 20;
+
 fn read(directory: &Path) -> Option<Gitignore> {
     let file = directory.join(IGNORE_FILE);
-    if !file.is_file() {
-        return None;
-    }
+    let bytes = match foreign::read(&file, MOST_OF_RULES) {
+        Ok(bytes) => bytes,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return None,
+        Err(error) => {
+            tracing::warn!("{}: {error}", file.display());
+            return None;
+        }
+    };
     let mut builder = GitignoreBuilder::new(directory);
-    // A line that cannot be understood is passed over; the others count.
-    if let Some(error) = builder.add(&file) {
-        tracing::warn!("{}: {error}", file.display());
+    for line in String::from_utf8_lossy(&bytes).lines() {
+        // A line that cannot be understood is passed over; the others count.
+        if let Err(error) = builder.add_line(Some(file.clone()), line) {
+            tracing::warn!("{}: {error}", file.display());
+        }
     }
     builder.build().ok()
 }

@@ -75,6 +75,11 @@ pub fn wait(args: &WaitArgs) -> Exit {
             ));
             Exit::Undetermined
         }
+        Ok(Response::Unanswered { reason }) => {
+            let file = to_text(&args.file);
+            talk::fail(&format!("no verdict on {file}: {reason}"));
+            Exit::Undetermined
+        }
         Ok(Response::Unwatched { reason }) => {
             talk::fail(&reason);
             Exit::Usage
