@@ -1,0 +1,169 @@
+//! Who writes into the watched directory puts there whatever the system has: pipes, devices, files of the
+//! kernel, files on which somebody has a lease, and swaps one for the other all the time. The files of
+//! others are judged as ever, and the broker stops when it is told to.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::fs::File;
+use std::os::unix::fs::symlink;
+use std::path::Path;
+use std::process::Command;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use qcbus_messages::Verdict;
+use qcbus_messages::control::{Request, Response};
+use support::content::Content;
+use support::farm::Farm;
+use support::inside::skip;
+use support::watchdog::until_or;
+
+fn fifo(path: &Path) {
+    let made = Command::new("mkfifo").arg(path).status().unwrap();
+    assert!(made.success());
+}
+
+fn is_judged(farm: &Farm, name: &str, content: &Content) {
+    farm.write(name, &content.bytes());
+    assert_eq!(farm.verdict(name).verdict, content.verdict(), "{name}");
+}
+
+#[test]
+fn files_that_turn_into_pipes_hold_up_nobody() {
+    const NAMES: usize = 16;
+    const ROUNDS: usize = 150;
+    let farm = Farm::new();
+    let mut broker = farm.serve_ready();
+    let pipes = farm.base().join("pipes");
+    std::fs::create_dir(&pipes).unwrap();
+    let bytes = Content::Good(1).bytes();
+    let ended = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let swapping = scope.spawn(|| {
+            for round in 0..ROUNDS {
+                for name in 0..NAMES {
+                    let (pipe, file) = (pipes.join("pipe"), pipes.join("file"));
+                    let at = farm.root().join(format!("{name}.xodr"));
+                    std::fs::write(&file, &bytes).unwrap();
+                    std::fs::rename(&file, &at).unwrap();
+                    if (name + round) % 2 == 0 {
+                        fifo(&pipe);
+                        std::fs::rename(&pipe, &at).unwrap();
+                    }
+                }
+            }
+            ended.store(true, Ordering::Release);
+        });
+        let mut number = 100;
+        while !ended.load(Ordering::Acquire) && !swapping.is_finished() {
+            number += 1;
+            is_judged(
+                &farm,
+                &format!("honest-{number}.xodr"),
+                &Content::Good(number),
+            );
+        }
+    });
+    is_judged(&farm, "last.xodr", &Content::NoHeader(9));
+    for name in 0..NAMES {
+        let name = format!("{name}.xodr");
+        std::fs::remove_file(farm.root().join(&name)).unwrap();
+        is_judged(&farm, &name, &Content::Good(2));
+    }
+    assert_eq!(farm.qcbus(&["down"]).status.code(), Some(0));
+    assert!(broker.wait().success());
+}
+
+#[test]
+fn maps_that_the_kernel_makes_up_hold_up_nobody() {
+    let farm = Farm::new();
+    let mut broker = farm.serve_ready();
+    let maps = ["/proc/kmsg", "/dev/zero", "/dev/tty", "/proc/self/maps"];
+    for (number, map) in maps.iter().enumerate() {
+        for copy in 0..4 {
+            farm.write(
+                &format!("{number}-{copy}.xosc"),
+                &Content::Scenario(copy, (*map).to_owned()).bytes(),
+            );
+        }
+    }
+    is_judged(&farm, "honest.xodr", &Content::Good(1));
+    for number in 0..maps.len() {
+        let verdict = farm.verdict(&format!("{number}-0.xosc"));
+        assert_ne!(
+            verdict.verdict,
+            Verdict::Accepted,
+            "nobody has seen the map"
+        );
+    }
+    symlink("/dev/zero", farm.root().join("zero.xodr")).unwrap();
+    symlink("/proc/kmsg", farm.root().join("kernel.xodr")).unwrap();
+    is_judged(&farm, "another.xodr", &Content::Good(2));
+    assert_eq!(farm.qcbus(&["down"]).status.code(), Some(0));
+    assert!(broker.wait().success());
+}
+
+/// Somebody has asked to be told before others read the file, and does not answer.
+#[expect(unsafe_code, reason = "no crate wraps leases")]
+fn lease(file: &File) -> bool {
+    use std::os::fd::AsRawFd;
+    // SAFETY: a bare system call on a descriptor that is open.
+    unsafe { nix::libc::fcntl(file.as_raw_fd(), nix::libc::F_SETLEASE, nix::libc::F_WRLCK) == 0 }
+}
+
+#[test]
+fn leases_hold_up_nobody() {
+    // The kernel asks for the lease back by this signal, which would end the process.
+    #[expect(unsafe_code, reason = "no other call keeps the default action away")]
+    // SAFETY: nothing is called when the signal comes.
+    unsafe {
+        nix::libc::signal(nix::libc::SIGIO, nix::libc::SIG_IGN);
+    }
+    let farm = Farm::new();
+    let aside = farm.base().join("aside");
+    std::fs::create_dir(&aside).unwrap();
+    let mut leased = Vec::new();
+    for number in 0..8 {
+        let path = aside.join(format!("{number}.xodr"));
+        std::fs::write(&path, Content::Good(number).bytes()).unwrap();
+        let file = File::options().read(true).write(true).open(&path).unwrap();
+        if !lease(&file) {
+            let why = std::io::Error::last_os_error();
+            return skip(
+                "leases_hold_up_nobody",
+                &format!("no lease is given: {why}"),
+            );
+        }
+        leased.push(file);
+    }
+    let mut broker = farm.serve_ready();
+    for number in 0..8 {
+        let name = format!("{number}.xodr");
+        std::fs::rename(aside.join(&name), farm.root().join(&name)).unwrap();
+    }
+    for number in 20..40 {
+        is_judged(&farm, &format!("{number}.xodr"), &Content::Good(number));
+    }
+    drop(leased);
+    for number in 0..8 {
+        let name = format!("{number}.xodr");
+        let verdict = || {
+            let request = Request::Wait {
+                file: farm.root().join(&name),
+                timeout_ms: Some(1_000),
+            };
+            match farm.ask(&request)? {
+                Response::Verdict(it) => (it.verdict == Verdict::Accepted).then_some(()),
+                _ => None,
+            }
+        };
+        until_or("what was leased is judged", verdict, || farm.log());
+    }
+    assert_eq!(farm.qcbus(&["down"]).status.code(), Some(0));
+    assert!(broker.wait().success());
+}
