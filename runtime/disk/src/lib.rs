@@ -133,7 +133,7 @@ fn write_aside(path: &Path, content: &[u8]) -> io::Result<NamedTempFile> {
         Some(directory) if !directory.as_os_str().is_empty() => directory,
         _ => Path::new("."),
     };
-    std::fs::create_dir_all(directory)?;
+    make_directory(directory)?;
     // For whoever the umask lets read it, unlike most temporary files.
     let readable = std::os::unix::fs::PermissionsExt::from_mode(0o666);
     let mut file = tempfile::Builder::new()
@@ -144,6 +144,19 @@ fn write_aside(path: &Path, content: &[u8]) -> io::Result<NamedTempFile> {
         .map_err(without_path)?;
     file.as_file_mut().write_all(content)?;
     Ok(file)
+}
+
+/// Makes a directory with those above it, unless it is there.
+fn make_directory(directory: &Path) -> io::Result<()> {
+    match std::fs::create_dir_all(directory) {
+        // It is there already, and std could not tell whether it is a directory: what kept it from
+        // looking may pass, so that is the error, and not that something is in the way.
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+            let is_directory = std::fs::metadata(directory)?.is_dir();
+            if is_directory { Ok(()) } else { Err(error) }
+        }
+        made => made,
+    }
 }
 
 /// The error alone: the temporary name in it says nothing to anybody, and differs every time.
