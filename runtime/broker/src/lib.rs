@@ -10,6 +10,7 @@ pub mod control;
 mod core;
 pub mod deliveries;
 mod demand;
+mod descriptors;
 mod directory_lock;
 mod engine;
 mod former;

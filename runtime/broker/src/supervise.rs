@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
-use rustix::process::Pid;
+use rustix::process::{Pid, Resource, Rlimit, setrlimit};
 use tokio::process::{Child, Command};
 use tokio::sync::mpsc::UnboundedSender;
 
@@ -22,6 +22,8 @@ pub struct Surroundings {
     /// Most private memory (data segment and anonymous mappings) of a child, in bytes. The shared
     /// segment does not count: it is mapped from a file.
     pub memory_limit: Option<u64>,
+    /// How many files a child may have open, where that is not what the broker has.
+    pub descriptors: Option<Rlimit>,
 }
 
 /// The children of this broker.
@@ -166,6 +168,7 @@ fn end_of(status: std::process::ExitStatus) -> ChildEnd {
 )]
 fn restrict(command: &mut Command, surroundings: &Surroundings) {
     let memory = surroundings.memory_limit;
+    let descriptors = surroundings.descriptors;
     let with_broker = surroundings.die_with_broker;
     let broker = std::process::id();
     // SAFETY: between fork and exec only async-signal-safe functions are called: setrlimit, prctl
@@ -180,6 +183,9 @@ fn restrict(command: &mut Command, surroundings: &Surroundings) {
                 if libc::setrlimit(libc::RLIMIT_DATA, &raw const limit) != 0 {
                     return Err(std::io::Error::last_os_error());
                 }
+            }
+            if let Some(limit) = descriptors {
+                setrlimit(Resource::Nofile, limit)?;
             }
             if with_broker {
                 if libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) != 0 {
@@ -211,6 +217,7 @@ mod tests {
             instance_dir: "/nowhere".into(),
             die_with_broker: true,
             memory_limit: None,
+            descriptors: None,
         };
         (Children::new(surroundings, 2, events), inbox)
     }

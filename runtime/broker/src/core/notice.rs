@@ -52,6 +52,8 @@ pub enum Notice {
         /// Why.
         why: String,
     },
+    /// What the system allows is less than may be needed.
+    Limited(String),
     /// Of the directories that are watched.
     Watching(String),
     /// Of the configuration and the manifests.
@@ -93,6 +95,7 @@ impl Notice {
             Notice::NotWritten(_) => "not-written",
             Notice::NotDelivered(_) => "not-delivered",
             Notice::NotReported { .. } => "not-reported",
+            Notice::Limited(_) => "limited",
             Notice::Watching(_) => "watching",
             Notice::Loading(_) => "loading",
             Notice::HeldBack(_) => "held-back",
@@ -145,6 +148,7 @@ impl fmt::Display for Notice {
             | Notice::NotRead(text)
             | Notice::NotWritten(text)
             | Notice::NotDelivered(text)
+            | Notice::Limited(text)
             | Notice::Watching(text)
             | Notice::Loading(text)
             | Notice::HeldBack(text)

@@ -18,6 +18,7 @@ use super::{AttendedTime, Broker, Inbox, Sessions, StartError, Told};
 use crate::control::ControlSocket;
 use crate::core::{Member, Notice, Stamp, State};
 use crate::demand::InForce;
+use crate::descriptors::Descriptors;
 use crate::directory_lock::{DirectoryLock, LockError, Purpose};
 use crate::gate::{Gate, GateError, GateOptions};
 use crate::intake::Intake;
@@ -46,6 +47,9 @@ impl Broker {
     ) -> Result<Broker, StartError> {
         let sources = sources_of(&options);
         let loaded = sources.load()?;
+        let descriptors = Descriptors::take();
+        let (peers, limited) = descriptors.peers(options.host.max_peers);
+        options.host.max_peers = peers;
         let mut host = Host::start(&options.instance, options.host)?;
         options.settings.generation = host.generation();
         let journal = journal_of(&options)?;
@@ -65,7 +69,7 @@ impl Broker {
         let writers = writers(&options, &store, &inbox, &senders.notices)?;
         let intake = intake(&options, &host);
         intake.search_in(in_force.search.clone());
-        let children = children(&options, &inbox);
+        let children = children(&options, descriptors, &inbox);
         let mut broker = Broker {
             started: Instant::now(),
             clock: AttendedTime::new(),
@@ -99,6 +103,9 @@ impl Broker {
             options,
         };
         broker.take_up(members, voids);
+        if let Some(limited) = limited {
+            let _ = senders.notices.send(Notice::Limited(limited));
+        }
         for said in &reconciled.said {
             let _ = senders.notices.send(Notice::Storing(said.clone()));
         }
@@ -305,8 +312,9 @@ fn intake(options: &Options, host: &Host) -> Arc<Intake> {
     ))
 }
 
-fn children(options: &Options, inbox: &Inbox) -> Children {
+fn children(options: &Options, descriptors: Descriptors, inbox: &Inbox) -> Children {
     let surroundings = Surroundings {
+        descriptors: descriptors.before,
         instance_dir: options.instance.dir().to_path_buf(),
         die_with_broker: options.die_with_broker,
         memory_limit: options.memory_limit,
