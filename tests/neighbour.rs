@@ -1,6 +1,7 @@
 //! Who writes into the watched directory puts there whatever the system has: pipes, devices, files of the
 //! kernel, files on which somebody has a lease, and swaps one for the other all the time. The files of
-//! others are judged as ever, and the broker stops when it is told to.
+//! others are judged as ever, and the broker stops when it is told to. So it does with few descriptors, and
+//! with a clock that jumps.
 
 #![expect(
     clippy::unwrap_used,
@@ -12,12 +13,13 @@ mod support;
 
 use std::fs::File;
 use std::os::unix::fs::symlink;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use qcbus_messages::Verdict;
-use qcbus_messages::control::{Request, Response};
+use qcbus_messages::control::{NoticeStatus, Request, Response};
+use support::broker::Broker;
 use support::content::Content;
 use support::farm::Farm;
 use support::inside::skip;
@@ -164,6 +166,83 @@ fn leases_hold_up_nobody() {
         };
         until_or("what was leased is judged", verdict, || farm.log());
     }
+    assert_eq!(farm.qcbus(&["down"]).status.code(), Some(0));
+    assert!(broker.wait().success());
+}
+
+#[test]
+fn few_descriptors_are_said_and_enough_for_every_file() {
+    let farm = Farm::new();
+    let serve = farm.serve_command();
+    let mut limited = Command::new("sh");
+    limited.args(["-c", "ulimit -n 256 && exec \"$@\"", "sh"]);
+    limited.arg(serve.get_program()).args(serve.get_args());
+    let _broker = Broker::start(&mut limited, &farm.log_path());
+    for number in 0..200 {
+        farm.write(&format!("{number}.xodr"), &Content::Good(number).bytes());
+    }
+    let status = farm.settle(200);
+    assert_eq!(status.files.accepted, 200);
+    let said = |it: &NoticeStatus| it.kind == "limited" && it.text.contains("LimitNOFILE=");
+    assert!(status.notices.iter().any(said), "{:#?}", status.notices);
+}
+
+/// Builds what makes the clock jump; `None`, and said, where that cannot be.
+fn clock(farm: &Farm) -> Option<PathBuf> {
+    let library = farm.base().join("libclock.so");
+    let compiler = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+    let source = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/clock/clock.rs");
+    let mut build = Command::new(compiler);
+    build.args(["--edition", "2024", "--crate-type", "cdylib", "-O", "-o"]);
+    let built = build.arg(&library).arg(source).output();
+    let why = match built {
+        Ok(built) if built.status.success() => return Some(library),
+        Ok(built) => String::from_utf8_lossy(&built.stderr).into_owned(),
+        Err(error) => error.to_string(),
+    };
+    skip("a_clock_that_jumps_costs_no_verdict", &why);
+    None
+}
+
+#[test]
+fn a_clock_that_jumps_costs_no_verdict() {
+    const YEAR: i64 = 366 * 24 * 3600;
+    let farm = Farm::new();
+    let Some(library) = clock(&farm) else { return };
+    let offset = farm.base().join("offset");
+    let jump = |seconds: i64| {
+        let aside = farm.base().join("offset.new");
+        std::fs::write(&aside, seconds.to_string()).unwrap();
+        std::fs::rename(aside, &offset).unwrap();
+    };
+    jump(0);
+    let serve = || {
+        let mut command = farm.serve_command();
+        command
+            .env("LD_PRELOAD", &library)
+            .env("QCBUS_TEST_CLOCK", &offset);
+        Broker::start(&mut command, &farm.log_path())
+    };
+    let mut broker = serve();
+    is_judged(&farm, "map.xodr", &Content::Good(1));
+    is_judged(&farm, "stays.xodr", &Content::NoHeader(1));
+    for (round, seconds) in (1..).zip([YEAR, -YEAR, 3600, -3600, -20 * YEAR, 2, 0]) {
+        jump(seconds);
+        is_judged(&farm, "map.xodr", &Content::Good(10 + round));
+        is_judged(&farm, "map.xodr", &Content::NoHeader(10 + round));
+        is_judged(
+            &farm,
+            &format!("new-{round}.xodr"),
+            &Content::Good(20 + round),
+        );
+        assert_eq!(farm.verdict("stays.xodr").verdict, Verdict::Rejected);
+        if round % 3 == 0 {
+            broker.kill();
+            broker = serve();
+        }
+    }
+    let status = farm.settle(2 + 7);
+    assert_eq!((status.files.accepted, status.files.rejected), (7, 2));
     assert_eq!(farm.qcbus(&["down"]).status.code(), Some(0));
     assert!(broker.wait().success());
 }
