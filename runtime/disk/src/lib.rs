@@ -1,9 +1,11 @@
 //! Writing files so that nobody ever sees half of one: results, reports, manifests, and what a bundle
 //! that is run by itself writes. The broker sweeps what writers that were killed have left.
 //!
-//! Reading files that others may write, without being held up by them: [`foreign`].
+//! Reading files that others may write, without being held up by them: [`foreign`]. And whether what lies
+//! somewhere may be believed: [`trust`].
 
 pub mod foreign;
+pub mod trust;
 
 use std::fs::{File, Metadata};
 use std::io::{self, Write};
