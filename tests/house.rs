@@ -24,7 +24,7 @@ const MAY_KNOW: &[(&str, Option<&[&str]>)] = &[
     ("qcbus-document", Some(&[])),
     ("qcbus-formats", Some(&[])),
     ("qcbus-messages", Some(&[])),
-    ("qcbus-bus", Some(&[])),
+    ("qcbus-bus", Some(&["qcbus-disk"])),
     ("qcbus-disk", Some(&[])),
     ("qcbus-ingest", Some(&["qcbus-disk"])),
     ("qcbus-broker", Some(PROCESS)),
