@@ -2,22 +2,21 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use qcbus_messages::control::{Request, Response};
-use tokio::io::{AsyncBufReadExt, AsyncReadExt, AsyncWriteExt, BufReader};
-use tokio::net::{UnixListener, UnixStream};
+use tokio::net::UnixListener;
 use tokio::sync::{mpsc, oneshot};
+
+use clients::{Bounds, Clients};
+
+mod clients;
 
 /// File name of the socket in the instance's directory.
 pub const SOCKET: &str = "control.sock";
 
 /// How long the end waits for answers to be written.
 const FLUSH_LIMIT: Duration = Duration::from_millis(500);
-
-/// Longest request, in bytes.
-const MAX_REQUEST: u64 = 64 << 10;
 
 /// A request with the place for its answer.
 #[derive(Debug)]
@@ -32,7 +31,7 @@ pub struct Asked {
 #[derive(Debug)]
 pub struct ControlSocket {
     path: PathBuf,
-    busy: Arc<AtomicUsize>,
+    clients: Arc<Clients>,
 }
 
 impl ControlSocket {
@@ -49,15 +48,15 @@ impl ControlSocket {
         qcbus_disk::remove(&path)?;
         let listener = UnixListener::bind(&path)?;
         std::fs::set_permissions(&path, std::os::unix::fs::PermissionsExt::from_mode(0o600))?;
-        let busy = Arc::new(AtomicUsize::new(0));
-        tokio::spawn(accept(listener, inbox, busy.clone()));
-        Ok(ControlSocket { path, busy })
+        let clients = Clients::new(Bounds::of_this_process(), inbox);
+        tokio::spawn(clients.clone().accept(listener));
+        Ok(ControlSocket { path, clients })
     }
 
     /// Waits until answers that have been given are written, but not for clients that do not read.
     pub async fn flush(&self) {
         let deadline = tokio::time::Instant::now() + FLUSH_LIMIT;
-        while self.busy.load(Ordering::Acquire) > 0 && tokio::time::Instant::now() < deadline {
+        while self.clients.is_busy() && tokio::time::Instant::now() < deadline {
             tokio::time::sleep(Duration::from_millis(1)).await;
         }
     }
@@ -68,72 +67,6 @@ impl Drop for ControlSocket {
         // The directory may have been removed already.
         let _ = qcbus_disk::remove(&self.path);
     }
-}
-
-async fn accept(
-    listener: UnixListener,
-    inbox: mpsc::UnboundedSender<Asked>,
-    busy: Arc<AtomicUsize>,
-) {
-    loop {
-        match listener.accept().await {
-            Ok((stream, _)) => {
-                tokio::spawn(serve(stream, inbox.clone(), busy.clone()));
-            }
-            Err(error) => {
-                tracing::warn!("control socket: {error}");
-                tokio::time::sleep(Duration::from_millis(100)).await;
-            }
-        }
-    }
-}
-
-async fn serve(stream: UnixStream, inbox: mpsc::UnboundedSender<Asked>, busy: Arc<AtomicUsize>) {
-    let (read, mut write) = stream.into_split();
-    let mut lines = BufReader::new(read.take(MAX_REQUEST)).lines();
-    while let Ok(Some(line)) = lines.next_line().await {
-        let _busy = Busy::new(&busy);
-        let response = match serde_json::from_str(&line) {
-            Ok(request) => ask(request, &inbox).await,
-            Err(error) => Response::Failed {
-                reason: format!("not a request: {error}"),
-            },
-        };
-        let Ok(mut text) = serde_json::to_vec(&response) else {
-            return;
-        };
-        text.push(b'\n');
-        if write.write_all(&text).await.is_err() {
-            return;
-        }
-    }
-}
-
-/// Counts an answer that is being found or written.
-struct Busy(Arc<AtomicUsize>);
-
-impl Busy {
-    fn new(count: &Arc<AtomicUsize>) -> Busy {
-        count.fetch_add(1, Ordering::AcqRel);
-        Busy(count.clone())
-    }
-}
-
-impl Drop for Busy {
-    fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::AcqRel);
-    }
-}
-
-async fn ask(request: Request, inbox: &mpsc::UnboundedSender<Asked>) -> Response {
-    let (answer, answered) = oneshot::channel();
-    let stopped = || Response::Failed {
-        reason: "the broker is stopping".to_owned(),
-    };
-    if inbox.send(Asked { request, answer }).is_err() {
-        return stopped();
-    }
-    answered.await.unwrap_or_else(|_| stopped())
 }
 
 /// Why a broker could not be asked.

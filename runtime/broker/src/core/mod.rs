@@ -215,6 +215,7 @@ impl State {
             } => {
                 self.wait(ticket, &path, stamp, unwatched, timeout, &mut actions);
             }
+            Event::ClientLeft { ticket } => self.waiters.retain(|it| it.ticket() != ticket),
             Event::RemoveBundle { ticket, name } => {
                 self.removal(ticket, &name, &mut actions);
             }

@@ -20,6 +20,11 @@ const UNSEEN_SHOWN: usize = 100;
 
 impl Broker {
     pub(super) fn asked(&mut self, asked: Asked) -> bool {
+        let only_tells = matches!(asked.request, Request::Status | Request::Wait { .. });
+        if only_tells && asked.answer.is_closed() {
+            // Nobody is there to be told.
+            return true;
+        }
         match asked.request {
             Request::Status => {
                 let status = self.status();
@@ -58,6 +63,17 @@ impl Broker {
                 let ticket = self.ticket(asked.answer);
                 self.handle(Event::RemoveBundle { ticket, name })
             }
+        }
+    }
+
+    /// Forgets clients that have left without their answer.
+    pub(super) fn forget_clients(&mut self) {
+        self.downs.retain(|it| !it.is_closed());
+        let left = self.tickets.iter().filter(|(_, it)| it.is_closed());
+        let left: Vec<Ticket> = left.map(|(ticket, _)| *ticket).collect();
+        for ticket in left {
+            self.tickets.remove(&ticket);
+            self.handle(Event::ClientLeft { ticket });
         }
     }
 

@@ -268,6 +268,7 @@ impl Broker {
             if Instant::now() >= next_reload {
                 next_reload = Instant::now() + RELOAD_INTERVAL;
                 self.reload_if_changed(&mut fingerprint);
+                self.forget_clients();
                 self.notify_watchdog();
             }
             if Instant::now() >= next_prune {
