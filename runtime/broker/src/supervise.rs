@@ -10,6 +10,7 @@ use tokio::sync::mpsc::UnboundedSender;
 
 use crate::core::{ChildEnd, ChildSpec, Event, Launch};
 use crate::former::{self, Former, kill_with_group};
+use crate::reload::ready;
 
 /// What every child is given.
 #[derive(Debug, Clone)]
@@ -59,18 +60,18 @@ impl Children {
                 }
                 tokio::spawn(watch(launch, child, self.events.clone()));
             }
-            Err(error) => {
-                let program = spec.command.first().map_or("", String::as_str);
-                let end = ChildEnd::NotStarted(format!("cannot start {program}: {error}"));
+            Err(why) => {
+                let end = ChildEnd::NotStarted(why);
                 // The loop that receives this is the one that called; it is there.
                 let _ = self.events.send(Event::Exited { launch, end });
             }
         }
     }
 
-    fn start(&self, launch: Launch, spec: &ChildSpec) -> std::io::Result<Child> {
-        let Some((program, arguments)) = spec.command.split_first() else {
-            return Err(std::io::Error::other("the command is empty"));
+    fn start(&self, launch: Launch, spec: &ChildSpec) -> Result<Child, String> {
+        let words = ready(&spec.command)?;
+        let Some((program, arguments)) = words.split_first() else {
+            return Err("cannot start it: the command is empty".to_owned());
         };
         let mut command = Command::new(program);
         command
@@ -86,7 +87,9 @@ impl Children {
             command.arg("--die-with-parent");
         }
         restrict(&mut command, &self.surroundings);
-        command.spawn()
+        command
+            .spawn()
+            .map_err(|error| format!("cannot start {program}: {error}"))
     }
 
     /// Forgets a child that has ended.

@@ -180,6 +180,7 @@ impl Broker {
 fn sources_of(options: &Options) -> Sources {
     Sources {
         config: options.config.clone(),
+        lasting: options.watch,
         bundles_d: options.bundles_d.clone(),
         standard: options.standard.clone(),
         reporters: options.reporters.clone(),

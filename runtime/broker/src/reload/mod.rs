@@ -3,12 +3,14 @@
 
 mod differences;
 mod modules;
+mod programs;
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
+use qcbus_disk::trust;
 use qcbus_formats::config::{
     Config, Known, KnownBundle, Oddity, Parsed, reporter_for, same_bundle,
 };
@@ -19,12 +21,19 @@ use crate::stamp::stamp_through_links;
 
 pub use differences::differences;
 use modules::{add_module, read_manifest};
+pub use programs::ready;
+
+/// Largest configuration or manifest, in bytes.
+const MAX_FILE: u64 = 16 << 20;
 
 /// Where the configuration and the children come from.
 #[derive(Debug, Clone)]
 pub struct Sources {
     /// The configuration file.
     pub config: Option<PathBuf>,
+    /// Whether the configuration stays in force while others are about: then it must be ours alone, as
+    /// manifests must.
+    pub lasting: bool,
     /// Directory of manifests.
     pub bundles_d: Option<PathBuf>,
     /// The children that come with the program.
@@ -85,12 +94,16 @@ impl Sources {
         let parsed = match &self.config {
             Some(path) => {
                 note(&mut loaded, path);
-                Some((path, read_config(path)?))
+                Some((path, self.read_config(path)?))
             }
             None => None,
         };
         if let Some((_, parsed)) = &parsed {
             self.add_reporters(&parsed.config, &mut loaded);
+        }
+        if let Some(directory) = &self.bundles_d {
+            // Who may write to it is no file's stamp.
+            note(&mut loaded, directory);
         }
         let manifests = self.manifests(&mut loaded.notices)?;
         loaded.manifests = self
@@ -112,6 +125,17 @@ impl Sources {
             loaded.config = Some(parsed.config);
         }
         Ok(loaded)
+    }
+
+    fn read_config(&self, path: &Path) -> Result<Parsed, LoadError> {
+        if !self.lasting {
+            return read_config(path);
+        }
+        let bytes = trust::read(path, MAX_FILE);
+        parse(
+            path,
+            &bytes.map_err(|error| LoadError::Config(error.to_string()))?,
+        )
     }
 
     /// What there is to be named: what comes with the program, and what manifests bring.
@@ -151,11 +175,13 @@ impl Sources {
         let cannot_look = |error: &std::io::Error| {
             LoadError::Manifest(format!("cannot look into {}: {error}", directory.display()))
         };
-        let entries = match std::fs::read_dir(directory) {
-            Ok(entries) => entries,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-            Err(error) => return Err(cannot_look(&error)),
-        };
+        match trust::directory(directory) {
+            Ok(_) => {}
+            Err(error) if error.is_absent() => return Ok(Vec::new()),
+            Err(error) => return Err(LoadError::Manifest(error.to_string())),
+        }
+        // Nobody else can put another in its place.
+        let entries = std::fs::read_dir(directory).map_err(|error| cannot_look(&error))?;
         let all: Result<Vec<PathBuf>, LoadError> = entries
             .map(|entry| {
                 entry
@@ -246,7 +272,11 @@ fn unasked(path: &Path, config: &Config, loaded: &Loaded) -> Vec<String> {
 pub fn read_config(path: &Path) -> Result<Parsed, LoadError> {
     let bytes = std::fs::read(path)
         .map_err(|error| LoadError::Config(format!("cannot read {}: {error}", path.display())))?;
-    Config::parse(&bytes).map_err(|error| LoadError::Config(format!("{}:{error}", path.display())))
+    parse(path, &bytes)
+}
+
+fn parse(path: &Path, bytes: &[u8]) -> Result<Parsed, LoadError> {
+    Config::parse(bytes).map_err(|error| LoadError::Config(format!("{}:{error}", path.display())))
 }
 
 #[cfg(test)]

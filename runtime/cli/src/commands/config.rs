@@ -25,6 +25,7 @@ pub fn check(file: &Path, bundles_d: Option<&Path>) -> Exit {
 fn load(file: &Path, bundles_d: Option<&Path>) -> Result<Loaded, String> {
     let sources = Sources {
         config: Some(file.to_path_buf()),
+        lasting: false,
         bundles_d: bundles_d.map(manifest_directory).transpose()?,
         standard: Vec::new(),
         reporters: Vec::new(),

@@ -49,7 +49,9 @@ async fn serve(options: Options) -> Exit {
             return match error {
                 StartError::Load(_)
                 | StartError::Bus(BusError::AlreadyRunning { .. })
-                | StartError::Journal(JournalError::State(LockError::Held { .. }))
+                | StartError::Journal(
+                    JournalError::State(LockError::Held { .. }) | JournalError::Foreign(_),
+                )
                 | StartError::Results(LockError::Held { .. } | LockError::Shared { .. })
                 | StartError::Gate(GateError::Lock(_) | GateError::Foreign { .. }) => Exit::Usage,
                 _ => Exit::Internal,

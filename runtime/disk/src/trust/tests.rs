@@ -43,7 +43,9 @@ fn what_is_ours_alone_is_read() {
     let (dir, file) = place();
     assert_eq!(read(&file, 4).unwrap(), b"ours");
     let too_large = read(&file, 3).unwrap_err();
-    assert!(matches!(too_large, TrustError::Io { source, .. } if source.kind() == io::ErrorKind::FileTooLarge));
+    assert!(
+        matches!(too_large, TrustError::Io { source, .. } if source.kind() == io::ErrorKind::FileTooLarge)
+    );
     symlink("file", dir.path().join("link")).unwrap();
     symlink(dir.path(), dir.path().join("around")).unwrap();
     for way in ["link", "around/link", "around/around/../", "./around/file"] {
@@ -137,7 +139,10 @@ fn what_belongs_to_somebody_else_is_not_believed() {
     symlink("below/file", &ours).unwrap();
     assert_eq!(why(read(&ours, 100)), (below.clone(), theirs));
     let said = read(&ours, 100).unwrap_err().to_string();
-    assert!(said.contains("chown 0") && said.contains("docker run --user 12345"), "{said}");
+    assert!(
+        said.contains("chown 0") && said.contains("docker run --user 12345"),
+        "{said}"
+    );
     // In a directory of everybody what is theirs stays theirs.
     mode(dir.path(), 0o1777);
     assert!(make_directory(&below.join("more")).is_err());
@@ -176,7 +181,11 @@ fn a_private_directory_is_ours_and_closed() {
     symlink(&target, &link).unwrap();
     std::os::unix::fs::lchown(&link, Some(STRANGER), None).unwrap();
     assert!(make_private_directory(&link).is_err());
-    assert_eq!(mode_of(&target), 0o755, "nothing was changed behind the link");
+    assert_eq!(
+        mode_of(&target),
+        0o755,
+        "nothing was changed behind the link"
+    );
     chown(&target, Some(STRANGER), None).unwrap();
     assert!(make_private_directory(&target).is_err());
     assert_eq!(mode_of(&target), 0o755, "what is not ours stays as it is");
