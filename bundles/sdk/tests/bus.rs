@@ -76,7 +76,7 @@ async fn talk(host: &mut Host) -> (usize, Status) {
     let (mut issues, mut status) = (0, Status::Error);
     loop {
         match host.next().await {
-            HostEvent::Hello { peer, hello } => {
+            HostEvent::Hello { peer, hello, .. } => {
                 assert_eq!(hello.name, "testBundle");
                 let generation = host.generation();
                 host.accept(

@@ -11,11 +11,13 @@ use qcbus_messages::services::{FRAME_BUFFER, Limits, SPARE_SESSIONS, Services, T
 use qcbus_messages::{Digest, FromPeer, Hello, ToPeer};
 
 use crate::documents::{Documents, fitting_reserve, free_shared_memory};
+use crate::entrance::{Entrance, Known};
 use crate::generation::{Generation, sweep};
 use crate::instance::{Instance, InstanceError, InstanceLock, LockError};
 use crate::janitor::Janitor;
 use crate::link::SessionKey;
 use crate::ports::{self, Access, Hub, PortError, Pub, Sub};
+use crate::process::Process;
 use crate::session::Session;
 use crate::wake::{TICK, Waker};
 
@@ -27,6 +29,13 @@ const MAX_WAITING: usize = 512;
 const HELLOS: usize = 64;
 /// How long a session that has been ended waits for its last words to be read.
 const LINGER: Duration = Duration::from_secs(1);
+/// How long a peer may take to prove who it is, from its introduction.
+const PROVE_WITHIN: Duration = Duration::from_secs(1);
+/// Those who have not proven it and are remembered, and for how long.
+const MAX_STRANGERS: usize = 64;
+const STRANGE_FOR: Duration = Duration::from_secs(60);
+/// Sessions in which such are told why they may not take part.
+const MAX_TOLD: usize = 4;
 /// Processes whose attempts are remembered; beyond that, only those in session.
 const MAX_REMEMBERED: usize = 4096;
 /// How often processes are looked at.
@@ -137,8 +146,17 @@ pub enum HostEvent {
     Hello {
         /// Its session, new.
         peer: PeerId,
-        /// Its introduction.
+        /// Its introduction; with the true process id, 0 where the process cannot be seen from here.
         hello: Hello,
+        /// The process that it is, as the kernel says.
+        process: Option<Process>,
+        /// What its starter has put into [`crate::LAUNCH`] of its environment, empty if nothing.
+        launch: String,
+    },
+    /// Somebody wanted to take part and did not prove who it is; it was told why.
+    TurnedAway {
+        /// For a person.
+        why: String,
     },
     /// A peer says something.
     Message {
@@ -175,10 +193,13 @@ pub struct Host {
     sessions: BTreeMap<PeerId, Session>,
     /// The last attempt of every process to get a session.
     attempts: HashMap<u64, u64>,
+    /// Who has not proven who it is, since when, and whether it was told so.
+    strangers: HashMap<SessionKey, (Instant, bool)>,
     next_peer: u64,
     next_turn: u64,
     last_tick: Instant,
     last_watch: Instant,
+    entrance: Entrance,
     // What follows is dropped in this order: ports, the janitor, the node.
     waker: Waker,
     hello: Sub<u8, HelloHeader>,
@@ -267,6 +288,8 @@ impl Host {
             events: VecDeque::new(),
             sessions: BTreeMap::new(),
             attempts: HashMap::new(),
+            strangers: HashMap::new(),
+            entrance: Entrance::open(instance, generation.number)?,
             next_peer: 1,
             next_turn: 0,
             last_tick: Instant::now(),
@@ -378,6 +401,7 @@ impl Host {
         let ticked = now.duration_since(self.last_tick) >= TICK;
         if ticked {
             self.last_tick = now;
+            self.entrance.turn(now);
         }
         for session in self.sessions.values_mut() {
             if ticked {
@@ -438,14 +462,73 @@ impl Host {
                 continue;
             }
             match codec::decode::<Hello>(&sample) {
-                Ok(hello) if hello.incarnation == key.incarnation => self.open(key, hello, now),
+                Ok(hello) if hello.incarnation == key.incarnation => self.meet(key, hello, now),
                 Ok(_) => tracing::warn!("an introduction contradicts itself"),
                 Err(error) => tracing::warn!(%error, "an introduction cannot be read"),
             }
         }
     }
 
-    fn open(&mut self, key: SessionKey, hello: Hello, now: Instant) {
+    /// Whoever has proven who it is gets a session.
+    fn meet(&mut self, key: SessionKey, hello: Hello, now: Instant) {
+        // It has said who it is before it said hello.
+        self.entrance.turn(now);
+        let Some(known) = self.entrance.take(&key) else {
+            return self.is_strange(key, &hello, now);
+        };
+        let mut sessions = self.sessions.values();
+        let older = sessions.find(|it| it.key().incarnation == key.incarnation);
+        if older.is_some_and(|it| !it.is_of(&known)) {
+            let why = "another process that runs has said so of itself before: give every process a number \
+                 of its own";
+            return self.turn_away(key, &hello, why, now);
+        }
+        self.open(key, hello, known, now);
+    }
+
+    /// Somebody says hello and has not proven who it is. It may be about to.
+    fn is_strange(&mut self, key: SessionKey, hello: &Hello, now: Instant) {
+        self.strangers
+            .retain(|_, (since, _)| now.saturating_duration_since(*since) < STRANGE_FOR);
+        if self.strangers.len() >= MAX_STRANGERS && !self.strangers.contains_key(&key) {
+            return;
+        }
+        let (since, _) = *self.strangers.entry(key).or_insert((now, false));
+        if now.saturating_duration_since(since) >= PROVE_WITHIN {
+            let why = "it has not proven which process it is: build it with this version of qcbus, and let it \
+                 connect to peers.sock in the instance's directory before it says hello (in another container: \
+                 share that directory, and run as the same user)";
+            self.turn_away(key, hello, why, now);
+        }
+    }
+
+    /// Tells somebody who is not believed why, once.
+    fn turn_away(&mut self, key: SessionKey, hello: &Hello, why: &str, now: Instant) {
+        let told = self.sessions.values().filter(|it| it.is_silent()).count();
+        if self.strangers.get(&key).is_some_and(|(_, told)| *told) || told >= MAX_TOLD {
+            return;
+        }
+        self.strangers.insert(key, (now, true));
+        let name: String = hello.name.chars().take(64).collect();
+        let why = format!("`{}`: {why}", name.escape_debug());
+        match Session::open(&self.hub, &self.services, key, None, now) {
+            Ok(session) => {
+                let peer = self.number();
+                self.sessions.insert(peer, session);
+                self.refuse(peer, &why);
+            }
+            Err(error) => tracing::warn!(%error, "cannot tell a peer why it may not join"),
+        }
+        self.events.push_back(HostEvent::TurnedAway { why });
+    }
+
+    fn number(&mut self) -> PeerId {
+        let peer = PeerId(self.next_peer);
+        self.next_peer += 1;
+        peer
+    }
+
+    fn open(&mut self, key: SessionKey, mut hello: Hello, known: Known, now: Instant) {
         self.supersede(&key);
         let allowed = self.limits.peers + SPARE_SESSIONS;
         if self.sessions.len() >= allowed {
@@ -455,15 +538,16 @@ impl Host {
             );
             return;
         }
-        let session = match Session::open(&self.hub, &self.services, key, hello.pid, now) {
+        let (process, launch) = (known.process.clone(), known.launch.clone());
+        hello.pid = process.as_ref().map_or(0, Process::id);
+        let session = match Session::open(&self.hub, &self.services, key, Some(known), now) {
             Ok(session) => session,
             Err(error) => {
                 tracing::warn!(%error, name = hello.name, "cannot open a session");
                 return;
             }
         };
-        let peer = PeerId(self.next_peer);
-        self.next_peer += 1;
+        let peer = self.number();
         let full = self.sessions.len() >= self.limits.peers;
         self.sessions.insert(peer, session);
         self.remember(&key);
@@ -474,7 +558,12 @@ impl Host {
                 &format!("the broker serves {limit} bundles and reporters already"),
             );
         } else {
-            self.events.push_back(HostEvent::Hello { peer, hello });
+            self.events.push_back(HostEvent::Hello {
+                peer,
+                hello,
+                process,
+                launch,
+            });
         }
     }
 

@@ -10,10 +10,11 @@
 //! * `ports`: iceoryx2's configuration, and the only constructor of services and ports;
 //! * `stream`, `link`: the streams, first as arithmetic, then on the bus;
 //! * `instance`, `generation`, `process`, `janitor`: finding each other, noticing deaths, leaving
-//!   nothing behind;
+//!   nothing behind; `entrance`: who is at the other end;
 //! * `host` with `session`, `documents`; `peer` with `membership`, `library`; `held`; `wake`.
 
 mod documents;
+mod entrance;
 mod generation;
 mod held;
 mod host;
@@ -31,9 +32,13 @@ mod stream;
 mod wake;
 
 pub use documents::{Documents, Loan, LoanError, PublishError};
+pub use entrance::LAUNCH;
 pub use held::Held;
 pub use host::{Host, HostEvent, HostOptions, PeerId, StartError};
 pub use instance::{Instance, InstanceError};
+#[doc(hidden)]
+pub use peer::Claims;
 pub use peer::{JoinError, Peer, PeerEvent, PeerOptions};
 pub use ports::ICEORYX2_VERSION;
 pub use private::{PRIVATE_PREFIX, sweep_private_instances};
+pub use process::Process;

@@ -1,6 +1,7 @@
 //! A peer's side of one session, from the introduction to its end.
 
 use std::collections::VecDeque;
+use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -8,6 +9,7 @@ use iceoryx2::prelude::*;
 use qcbus_messages::services::{HELLO_BYTES, Services};
 use qcbus_messages::{Digest, Hello, ToPeer, codec};
 
+use crate::entrance::introduce;
 use crate::generation::Generation;
 use crate::host::{ConfigHeader, HelloHeader};
 use crate::instance::Instance;
@@ -20,6 +22,8 @@ use crate::wake::{TICK, Waker};
 
 /// How often an introduction is repeated.
 const HELLO_EVERY: Duration = Duration::from_millis(50);
+/// So many introductions, and it is said again which process this is.
+const PROVE_EVERY: u32 = 20;
 /// Frames read before documents are looked at.
 const QUOTA: usize = 32;
 
@@ -66,6 +70,11 @@ pub(crate) struct Membership {
     broker: Process,
     introduction: Vec<u8>,
     last_hello: Option<Instant>,
+    hellos: u32,
+    proves: bool,
+    instance: Instance,
+    /// Where we have said who we are; the broker sees by them whether we live.
+    said: Vec<UnixStream>,
     last_tick: Instant,
     welcome: bool,
     refused: Option<String>,
@@ -82,10 +91,12 @@ impl Membership {
     /// Joins the generation and subscribes to what is shared, so that the broker's answer to the
     /// introduction finds subscribers for documents and configuration.
     pub(crate) fn begin(
+        instance: &Instance,
         generation: Generation,
         broker: Process,
         hello: &Hello,
         attempt: u64,
+        proves: bool,
     ) -> Result<Membership, BeginError> {
         let introduction =
             codec::encode(hello).map_err(|error| BeginError::Hello(error.to_string()))?;
@@ -115,6 +126,10 @@ impl Membership {
             broker,
             introduction,
             last_hello: None,
+            hellos: 0,
+            proves,
+            instance: instance.clone(),
+            said: Vec::new(),
             last_tick: Instant::now(),
             welcome: false,
             refused: None,
@@ -323,7 +338,14 @@ impl Membership {
         })
     }
 
-    fn introduce(&self) -> Result<(), String> {
+    fn introduce(&mut self) -> Result<(), String> {
+        if self.proves && self.hellos.is_multiple_of(PROVE_EVERY) {
+            let said = introduce(&self.instance, self.key);
+            self.said.push(said.map_err(|error| {
+                format!("cannot say to the broker which process this is: {error}")
+            })?);
+        }
+        self.hellos += 1;
         let mut sample = self
             .hello
             .loan_slice_uninit(self.introduction.len())

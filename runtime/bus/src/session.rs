@@ -7,10 +7,10 @@ use iceoryx2::prelude::*;
 use qcbus_messages::services::Services;
 use qcbus_messages::{FromPeer, codec};
 
+use crate::entrance::Known;
 use crate::host::{HostEvent, PeerId};
 use crate::link::{FrameHeader, Link, SessionKey};
 use crate::ports::{self, Hub, PortError, TopicService, WakeService};
-use crate::process::Process;
 
 /// How long a peer may take to open its channels after its introduction.
 const CONNECT_WITHIN: Duration = Duration::from_secs(10);
@@ -21,8 +21,8 @@ pub(crate) struct Session {
     to: TopicService<u8, FrameHeader>,
     _from: TopicService<u8, FrameHeader>,
     _wake: WakeService,
-    /// `None` when the process id means nothing here, as between containers.
-    process: Option<Process>,
+    /// `None`: it has not said who it is, and is told so.
+    known: Option<Known>,
     opened: Instant,
     connected: bool,
     farewell: bool,
@@ -36,7 +36,7 @@ impl Session {
         hub: &Hub,
         services: &Services,
         key: SessionKey,
-        pid: u32,
+        known: Option<Known>,
         now: Instant,
     ) -> Result<Session, PortError> {
         let suffix = key.suffix();
@@ -56,7 +56,7 @@ impl Session {
             to,
             _from: from,
             _wake: wake,
-            process: Process::open(pid, None),
+            known,
             opened: now,
             connected: false,
             farewell: false,
@@ -66,6 +66,11 @@ impl Session {
 
     pub(crate) fn key(&self) -> SessionKey {
         self.key
+    }
+
+    /// Whether it is one of this process.
+    pub(crate) fn is_of(&self, known: &Known) -> bool {
+        self.known.as_ref().is_some_and(|own| own.is_same(known))
     }
 
     /// Reads up to `quota` frames; `true` when there was one.
@@ -108,7 +113,7 @@ impl Session {
     pub(crate) fn is_there(&mut self) -> bool {
         let subscribed = self.to.dynamic_config().number_of_subscribers() > 0;
         self.connected |= subscribed;
-        let alive = self.process.as_ref().is_none_or(Process::is_alive);
+        let alive = self.known.as_ref().is_none_or(Known::is_there);
         let left = self.connected && !subscribed;
         let never_came = !self.connected && self.opened.elapsed() > CONNECT_WITHIN;
         alive && !left && !never_came && !self.farewell

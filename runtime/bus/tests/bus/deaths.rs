@@ -37,7 +37,7 @@ fn a_killed_peer_is_gone_and_leaves_nothing() {
         let identity = identity_of(&site.instance);
         let helper = Helper::start("answers_jobs", &site.instance);
         let id = loop {
-            if let HostEvent::Hello { peer, hello } = host.next().await {
+            if let HostEvent::Hello { peer, hello, .. } = host.next().await {
                 assert_eq!(hello.pid, helper.pid());
                 let welcome = welcome(&host);
                 host.accept(peer, &welcome);

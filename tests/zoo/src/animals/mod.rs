@@ -9,6 +9,7 @@ mod hangs_in_a_job;
 mod judges_strictly;
 mod lies_about_job_id;
 mod never_acknowledges;
+mod proves_nothing;
 mod reporter_never_acknowledges;
 mod sends_garbage;
 mod slow;
@@ -33,6 +34,7 @@ pub static ANIMALS: &[Animal] = &[
     judges_strictly::ANIMAL,
     lies_about_job_id::ANIMAL,
     never_acknowledges::ANIMAL,
+    proves_nothing::ANIMAL,
     reporter_never_acknowledges::ANIMAL,
     sends_garbage::ANIMAL,
     slow::ANIMAL,
