@@ -178,7 +178,11 @@ impl Sources {
         match trust::directory(directory) {
             Ok(_) => {}
             Err(error) if error.is_absent() => return Ok(Vec::new()),
-            Err(error) => return Err(LoadError::Manifest(error.to_string())),
+            Err(error) => {
+                return Err(LoadError::Manifest(format!(
+                    "{error}; or choose another place with --out, --state or --bundles-d"
+                )));
+            }
         }
         // Nobody else can put another in its place.
         let entries = std::fs::read_dir(directory).map_err(|error| cannot_look(&error))?;

@@ -1,6 +1,7 @@
 //! The programs of manifests: what a command runs must be in the broker's hands alone.
 
 use std::path::{Path, PathBuf};
+use std::str::CharIndices;
 
 use qcbus_disk::trust::{self, TrustError};
 
@@ -129,8 +130,9 @@ impl Words<'_> {
                 '\'' => quote(&mut letters, &mut word, '\'')?,
                 '"' => quote(&mut letters, &mut word, '"')?,
                 '\\' => word.push(letters.next()?.1),
+                '$' => word.push_str(&variable(&mut letters)?),
                 '~' if !any => return None,
-                c if "$`*?[;&|<>(){}#!\n".contains(c) => return None,
+                c if SPECIAL.contains(c) => return None,
                 c => word.push(c),
             }
             any = true;
@@ -140,12 +142,41 @@ impl Words<'_> {
     }
 }
 
+/// What means something to the shell where it stands outside of quotes.
+const SPECIAL: &str = "`*?[;&|<>(){}#!\n";
+
+/// The value of the variable whose name follows, as a child sees it, too. `None`: it is not set, or the
+/// shell would take it apart.
+fn variable(letters: &mut CharIndices<'_>) -> Option<String> {
+    let rest = letters.as_str();
+    let (name, length) = match rest.strip_prefix('{') {
+        Some(inner) => inner
+            .split_once('}')
+            .map(|(name, _)| (name, name.len() + 2))?,
+        None => {
+            let end = rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
+            let name = &rest[..end.unwrap_or(rest.len())];
+            (name, name.len())
+        }
+    };
+    let is_name = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    if name.is_empty() || !name.chars().all(is_name) {
+        return None;
+    }
+    let value = std::env::var(name).ok()?;
+    let plain = |c: char| !c.is_whitespace() && !SPECIAL.contains(c);
+    // The name is letters of one byte each.
+    letters.nth(length - 1);
+    value.chars().all(plain).then_some(value)
+}
+
 /// Takes what stands in quotes. `None`: they are not closed, or the shell would work something out.
-fn quote(letters: &mut std::str::CharIndices<'_>, word: &mut String, mark: char) -> Option<()> {
+fn quote(letters: &mut CharIndices<'_>, word: &mut String, mark: char) -> Option<()> {
     loop {
         match letters.next()?.1 {
             c if c == mark => return Some(()),
-            '$' | '`' if mark == '"' => return None,
+            '`' if mark == '"' => return None,
+            '$' if mark == '"' => word.push_str(&variable(letters)?),
             '\\' if mark == '"' => word.push(letters.next()?.1),
             c => word.push(c),
         }
@@ -167,7 +198,14 @@ mod tests {
             ("/opt/run --x 7", &["/opt/run", "--x", "7"]),
             (" '/opt/my run' \"a b\"c\\ d ", &["/opt/my run", "a bc d"]),
             ("run 2>/dev/null more", &["run"]),
-            ("$HOME/run", &[]),
+            (
+                "$CARGO_PKG_NAME/run ${CARGO_PKG_NAME}x",
+                &["qcbus-broker/run", "qcbus-brokerx"],
+            ),
+            ("\"$CARGO_PKG_NAME\"", &["qcbus-broker"]),
+            ("$no_such_variable_here/run", &[]),
+            ("${CARGO_PKG_NAME:-x}", &[]),
+            ("$1 x", &[]),
             ("~/run", &[]),
             ("\"$(evil)\" x", &[]),
             ("'$(name)'", &["$(name)"]),
