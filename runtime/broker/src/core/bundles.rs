@@ -169,8 +169,17 @@ impl State {
         }
     }
 
-    /// A name is taken while another live process bears it, unless the newcomer replaces it.
+    /// A name is taken while another live process bears it, unless the newcomer replaces it. Children
+    /// have theirs whether they run or not: nobody else may judge in their place.
     fn taken(&self, hello: &Hello) -> Option<String> {
+        if hello.launch.is_none() && self.children.contains_key(&hello.name) {
+            return Some(format!(
+                "the broker itself starts `{}`, from a manifest or because it comes with qcbus, and no other \
+                 process may take its place: give this one another name (to run bundles that come with qcbus \
+                 by hand, start the broker with --no-standard-bundles)",
+                hello.name
+            ));
+        }
         let (incarnation, pid) = match hello.role {
             Role::Bundle => {
                 let bundle = self.bundles.get(&hello.name)?;
@@ -186,7 +195,9 @@ impl State {
         let replaces = hello
             .launch
             .is_some_and(|launch| self.is_successor(&hello.name, Launch(launch)));
-        (incarnation != hello.incarnation && pid != hello.pid && !replaces)
+        // A process that cannot be seen from here has no number.
+        let same = incarnation == hello.incarnation || (pid == hello.pid && pid != 0);
+        (!same && !replaces)
             .then(|| format!("`{}` has already joined, as process {pid}", hello.name))
     }
 
@@ -197,7 +208,7 @@ impl State {
             .get(&hello.name)
             .filter(|it| it.session.is_some());
         if let Some(old) = there {
-            let same_process = old.pid == hello.pid;
+            let same_process = old.pid == hello.pid && old.pid != 0;
             self.replace_session(&hello.name, same_process, actions);
         }
         self.child_joined(&hello.name, launch, &hello.version, actions);
@@ -232,13 +243,13 @@ impl State {
         let Some(old) = bundle.session.take() else {
             return;
         };
-        let (launch, pid) = (bundle.launch, bundle.pid);
+        let launch = bundle.launch;
         self.sessions.remove(&old);
         self.take_back(name, false);
         if same_process {
             actions.push(Action::Disconnect { session: old });
         } else {
-            self.retire(old, launch, pid);
+            self.retire(old, launch);
             actions.push(Action::Send {
                 session: old,
                 message: ToPeer::Drain,
@@ -359,12 +370,8 @@ impl State {
         let Some(bundle) = self.bundles.get(name) else {
             return;
         };
-        if let Some(launch) = bundle.launch {
-            actions.push(Action::Kill {
-                launch: Some(launch),
-                pid: bundle.pid,
-            });
-        }
+        let launch = bundle.launch;
+        actions.extend(launch.map(|launch| Action::Kill { launch }));
         let notice = Notice::killed(name, why);
         self.bundle_is_down(name, notice, actions);
     }

@@ -89,11 +89,11 @@ impl State {
         bundle.leaving = false;
         bundle.ready = false;
         bundle.away_since = Some(now);
-        let (session, launch, pid) = (bundle.session.take(), bundle.launch, bundle.pid);
+        let (session, launch) = (bundle.session.take(), bundle.launch);
         self.take_back(name, false);
         if let Some(session) = session {
             self.sessions.remove(&session);
-            self.retire(session, launch, pid);
+            self.retire(session, launch);
         }
     }
 

@@ -27,7 +27,7 @@ impl Broker {
                 tokio::task::spawn_blocking(move || intake.publish_again(job, doc));
             }
             Action::Spawn { launch, spec } => self.children.spawn(launch, &spec),
-            Action::Kill { launch, pid } => self.children.kill(launch, pid),
+            Action::Kill { launch } => self.children.kill(launch),
             Action::KillFormer { joined } => self.kill_former(joined),
             Action::Store(job) => self.order_store(job),
             Action::Withdraw { ref path, .. } => {

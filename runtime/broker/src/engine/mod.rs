@@ -13,10 +13,10 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use looks::{Look, Looked};
-use qcbus_bus::{Host, HostEvent, PeerId, StartError as BusError};
+use qcbus_bus::{Host, HostEvent, PeerId, Process, StartError as BusError};
 use qcbus_disk::foreign::Lookout;
 use qcbus_messages::control::{Response, Unseen};
-use qcbus_messages::{JobId, ToPeer};
+use qcbus_messages::{Hello, JobId, ToPeer};
 use tokio::sync::{mpsc, oneshot};
 
 use crate::control::{Asked, ControlSocket};
@@ -31,7 +31,7 @@ use crate::reload::{LoadError, Loaded, Sources};
 use crate::scouts::Scouts;
 use crate::stages::reached;
 use crate::store::Store;
-use crate::supervise::{Children, is_there};
+use crate::supervise::Children;
 use crate::watch::{Seen, Watcher};
 use crate::writers::Writers;
 
@@ -290,6 +290,7 @@ impl Broker {
         if let Some(former) = self.children.former() {
             former.kill_but(&BTreeSet::new());
         }
+        self.children.forget_launches();
         if !quit {
             // A disk that does not answer must not keep anybody from stopping.
             for writer in self.writers.finish(self.options.settings.drain_limit) {
@@ -366,15 +367,15 @@ impl Broker {
     fn bus_event(&mut self, event: HostEvent) -> bool {
         let known = |peer, sessions: &Sessions| sessions.sessions.get(&peer).copied();
         match event {
-            // A child is a process of this machine. One that has died since it said hello would be
-            // taken for one of another container, and keep its name from the next.
-            HostEvent::Hello { peer, hello } if hello.launch.is_some() && !is_there(hello.pid) => {
-                self.host.disconnect(peer);
+            HostEvent::Hello {
+                peer,
+                hello,
+                process,
+                launch,
+            } => self.peer_says_hello(peer, hello, process.as_ref(), &launch),
+            HostEvent::TurnedAway { why } => {
+                self.say(Notice::TurnedAway(why));
                 true
-            }
-            HostEvent::Hello { peer, hello } => {
-                let session = self.sessions.add(peer);
-                self.handle(Event::Hello { session, hello })
             }
             HostEvent::Message { peer, message } => match known(peer, &self.sessions) {
                 Some(session) => self.handle(Event::Message { session, message }),
@@ -393,6 +394,30 @@ impl Broker {
                 None => true,
             },
         }
+    }
+
+    /// Somebody who has proven which process it is wants to take part. `proof` is of who has started it.
+    fn peer_says_hello(
+        &mut self,
+        peer: PeerId,
+        hello: Hello,
+        process: Option<&Process>,
+        proof: &str,
+    ) -> bool {
+        if let Some(launch) = hello.launch.map(Launch) {
+            // One that has died since it said hello would keep its name from the next.
+            if process.is_some_and(|it| !it.is_alive()) {
+                self.host.disconnect(peer);
+                return true;
+            }
+            if let Err(why) = self.children.joined(launch, &hello.name, process, proof) {
+                self.host.refuse(peer, &why);
+                self.say(Notice::TurnedAway(why));
+                return true;
+            }
+        }
+        let session = self.sessions.add(peer);
+        self.handle(Event::Hello { session, hello })
     }
 
     fn seen(&mut self, seen: Seen) -> bool {

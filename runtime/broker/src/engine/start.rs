@@ -23,6 +23,7 @@ use crate::directory_lock::{DirectoryLock, LockError, Purpose};
 use crate::gate::{Gate, GateError, GateOptions};
 use crate::intake::Intake;
 use crate::journal::{Journal, JournalError, Void};
+use crate::launches::Launches;
 use crate::options::Options;
 use crate::reload::{LoadError, Loaded, Sources};
 use crate::result_paths::ResultPaths;
@@ -69,7 +70,7 @@ impl Broker {
         let writers = writers(&options, &store, &inbox, &senders.notices)?;
         let intake = intake(&options, &host);
         intake.search_in(in_force.search.clone());
-        let children = children(&options, descriptors, &inbox);
+        let children = children(&options, descriptors, &inbox)?;
         let mut broker = Broker {
             started: Instant::now(),
             clock: AttendedTime::new(),
@@ -313,7 +314,11 @@ fn intake(options: &Options, host: &Host) -> Arc<Intake> {
     ))
 }
 
-fn children(options: &Options, descriptors: Descriptors, inbox: &Inbox) -> Children {
+fn children(
+    options: &Options,
+    descriptors: Descriptors,
+    inbox: &Inbox,
+) -> Result<Children, StartError> {
     let surroundings = Surroundings {
         descriptors: descriptors.before,
         instance_dir: options.instance.dir().to_path_buf(),
@@ -321,7 +326,10 @@ fn children(options: &Options, descriptors: Descriptors, inbox: &Inbox) -> Child
         memory_limit: options.memory_limit,
     };
     let generation = options.settings.generation;
-    Children::new(surroundings, generation, inbox.events_in.clone())
+    let launches = Launches::of(options.instance.dir())
+        .map_err(|source| system("write to the runtime directory", source))?;
+    let events = inbox.events_in.clone();
+    Ok(Children::new(surroundings, launches, generation, events))
 }
 
 fn look_once(roots: &[PathBuf], files: &[PathBuf], seen: &mpsc::UnboundedSender<Seen>) {

@@ -49,6 +49,23 @@ fn who_cannot_take_part_is_turned_away() {
 }
 
 #[test]
+fn processes_that_cannot_be_seen_from_here_are_not_the_same() {
+    let mut world = World::new();
+    for (session, refused) in [(98, false), (99, true)] {
+        let session = SessionId(session);
+        let hello = Hello {
+            incarnation: session.0,
+            pid: 0,
+            ..a_hello("far")
+        };
+        let actions = world
+            .state
+            .handle(world.now, Event::Hello { session, hello });
+        assert_eq!(is_refused(&actions), refused, "{actions:?}");
+    }
+}
+
+#[test]
 fn a_process_that_says_hello_again_takes_its_own_place() {
     let mut world = World::new();
     world.join("First");
