@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::Stdio;
 
-use rustix::process::{Pid, Resource, Rlimit, setrlimit};
+use rustix::process::{Resource, Rlimit, setrlimit};
 use qcbus_bus::{LAUNCH, Process};
 use tokio::process::{Child, Command};
 use tokio::sync::mpsc::UnboundedSender;
