@@ -250,7 +250,7 @@ fn a_directory_that_may_not_be_read_counts() {
         std::fs::copy(env!("CARGO_BIN_EXE_qcbus"), &program).unwrap();
         let run = desk.path().join(".run");
         for path in [desk.path(), &run, &desk.path().join("maps")] {
-            rights(path, 0o777);
+            rights(path, 0o1777);
         }
         let _ = std::os::unix::fs::chown(&run, NOBODY.parse().ok(), NOBODY.parse().ok());
         rights(&run, 0o700);

@@ -1,6 +1,6 @@
 //! Starting and killing child processes. When to do so is the state machine's business.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::process::Stdio;
 
@@ -159,6 +159,14 @@ impl Children {
     pub fn kill_all(&self) {
         for launch in self.own.keys() {
             self.kill(*launch);
+        }
+    }
+
+    /// Kills whatever brokers of this instance have ever started, and what that has started, also where it
+    /// has left its group or its session.
+    pub fn kill_what_they_started(&self) {
+        if !self.surroundings.die_with_broker {
+            Former::of(&self.launches, Launch(u64::MAX)).kill_but(&BTreeSet::new());
         }
     }
 

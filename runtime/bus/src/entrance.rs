@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{self, Read, Write};
 use std::os::fd::{AsRawFd, FromRawFd, OwnedFd};
-use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -174,6 +174,11 @@ impl Entrance {
         latest
     }
 
+    /// Takes back what was taken: there was no room for the peer yet.
+    pub(crate) fn keep(&mut self, key: SessionKey, known: Known, now: Instant) {
+        self.known.push_back((key, known, now));
+    }
+
     /// Opens the socket again when its file was removed: by a cleaner of temporary files, say.
     fn stay_open(&mut self) {
         if file_of(&self.directory).is_some_and(|file| Some(file) == self.file) {
@@ -182,8 +187,11 @@ impl Entrance {
         match listen(&self.directory) {
             Ok((listener, file)) => (self.listener, self.file) = (listener, file),
             Err(error) => {
-                let directory = to_text(&self.directory);
-                tracing::warn!(%error, directory, "the socket for peers is gone, nobody can join");
+                // Once is enough, it is tried again every second.
+                if self.file.take().is_some() {
+                    let directory = to_text(&self.directory);
+                    tracing::warn!(%error, directory, "the socket for peers is gone, nobody can join");
+                }
             }
         }
     }
@@ -212,7 +220,11 @@ fn file_of(directory: &Path) -> Option<(u64, u64)> {
 
 /// A way to the socket that is short enough for the kernel, and what must be kept open meanwhile.
 fn short(directory: &Path) -> io::Result<(File, PathBuf)> {
-    let directory = File::open(directory)?;
+    // Only the way to it is wanted: who is confined may not be allowed to look into it.
+    let directory = File::options()
+        .read(true)
+        .custom_flags(libc::O_PATH | libc::O_DIRECTORY)
+        .open(directory)?;
     let path = PathBuf::from(format!("/proc/self/fd/{}", directory.as_raw_fd()));
     Ok((directory, path.join(SOCKET)))
 }

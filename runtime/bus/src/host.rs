@@ -511,7 +511,7 @@ impl Host {
         self.strangers.insert(key, (now, true));
         let name: String = hello.name.chars().take(64).collect();
         let why = format!("`{}`: {why}", name.escape_debug());
-        match Session::open(&self.hub, &self.services, key, None, now) {
+        match Session::open(&self.hub, &self.services, key, now) {
             Ok(session) => {
                 let peer = self.number();
                 self.sessions.insert(peer, session);
@@ -536,17 +536,18 @@ impl Host {
                 name = hello.name,
                 "no room even to refuse a peer; it has to wait"
             );
-            return;
+            return self.entrance.keep(key, known, now);
         }
         let (process, launch) = (known.process.clone(), known.launch.clone());
         hello.pid = process.as_ref().map_or(0, Process::id);
-        let session = match Session::open(&self.hub, &self.services, key, Some(known), now) {
+        let mut session = match Session::open(&self.hub, &self.services, key, now) {
             Ok(session) => session,
             Err(error) => {
                 tracing::warn!(%error, name = hello.name, "cannot open a session");
-                return;
+                return self.entrance.keep(key, known, now);
             }
         };
+        session.is_known(known);
         let peer = self.number();
         let full = self.sessions.len() >= self.limits.peers;
         self.sessions.insert(peer, session);

@@ -36,7 +36,6 @@ impl Session {
         hub: &Hub,
         services: &Services,
         key: SessionKey,
-        known: Option<Known>,
         now: Instant,
     ) -> Result<Session, PortError> {
         let suffix = key.suffix();
@@ -56,7 +55,7 @@ impl Session {
             to,
             _from: from,
             _wake: wake,
-            known,
+            known: None,
             opened: now,
             connected: false,
             farewell: false,
@@ -66,6 +65,11 @@ impl Session {
 
     pub(crate) fn key(&self) -> SessionKey {
         self.key
+    }
+
+    /// Who is at the other end.
+    pub(crate) fn is_known(&mut self, known: Known) {
+        self.known = Some(known);
     }
 
     /// Whether it is one of this process.

@@ -287,9 +287,7 @@ impl Broker {
     async fn end(mut self, quit: bool) {
         self.watcher = None;
         self.children.kill_all();
-        if let Some(former) = self.children.former() {
-            former.kill_but(&BTreeSet::new());
-        }
+        self.children.kill_what_they_started();
         self.children.forget_launches();
         if !quit {
             // A disk that does not answer must not keep anybody from stopping.
