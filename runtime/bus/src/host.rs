@@ -476,7 +476,8 @@ impl Host {
         let Some(known) = self.entrance.take(&key) else {
             return self.is_strange(key, &hello, now);
         };
-        let mut sessions = self.sessions.values();
+        // Who was told why it may not take part has no claim to anything.
+        let mut sessions = self.sessions.values().filter(|it| !it.is_silent());
         let older = sessions.find(|it| it.key().incarnation == key.incarnation);
         if older.is_some_and(|it| !it.is_of(&known)) {
             let why = "another process that runs has said so of itself before: give every process a number \
