@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
-use qcbus_disk::trust;
+use qcbus_disk::trust::{self, TrustError};
 use qcbus_formats::config::{
     Config, Known, KnownBundle, Oddity, Parsed, reporter_for, same_bundle,
 };
@@ -131,11 +131,12 @@ impl Sources {
         if !self.lasting {
             return read_config(path);
         }
-        let bytes = trust::read(path, MAX_FILE);
-        parse(
-            path,
-            &bytes.map_err(|error| LoadError::Config(error.to_string()))?,
-        )
+        let cannot = |error: TrustError| match error {
+            TrustError::Io { source, .. } => format!("cannot read {}: {source}", path.display()),
+            foreign @ TrustError::Foreign { .. } => foreign.to_string(),
+        };
+        let bytes = trust::read(path, MAX_FILE).map_err(cannot);
+        parse(path, &bytes.map_err(LoadError::Config)?)
     }
 
     /// What there is to be named: what comes with the program, and what manifests bring.
