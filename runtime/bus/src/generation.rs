@@ -16,12 +16,12 @@ use qcbus_messages::services::Limits;
 use serde::{Deserialize, Serialize};
 
 use crate::instance::{Instance, private_dir, private_temporary_dir};
+use crate::memory::SHARED_MEMORY;
 use crate::ports::ICEORYX2_VERSION;
 use crate::process::{Process, start_time};
 
 const CURRENT: &str = "current";
 const IDENTITY: &str = "id";
-const SHARED_MEMORY: &str = "/dev/shm";
 /// What the directories of generations begin with in there; segments begin with the prefix itself.
 const ROOT: &str = "d";
 /// iceoryx2 binds Unix sockets below the root path: 107 bytes are the kernel's limit, of which a

@@ -10,12 +10,13 @@ use qcbus_messages::codec;
 use qcbus_messages::services::{FRAME_BUFFER, Limits, SPARE_SESSIONS, Services, Topic};
 use qcbus_messages::{Digest, FromPeer, Hello, ToPeer};
 
-use crate::documents::{Documents, fitting_reserve, free_shared_memory};
+use crate::documents::Documents;
 use crate::entrance::{Entrance, Known};
 use crate::generation::{Generation, sweep};
 use crate::instance::{Instance, InstanceError, InstanceLock, LockError};
 use crate::janitor::Janitor;
 use crate::link::SessionKey;
+use crate::memory::{SharedMemory, Turns, fitting_reserve, keep_room};
 use crate::ports::{self, Access, Hub, PortError, Pub, Sub};
 use crate::process::Process;
 use crate::session::Session;
@@ -63,8 +64,11 @@ pub struct HostOptions {
     pub large_active_documents: usize,
     /// Largest image of the small class, in bytes.
     pub small_class_bytes: usize,
-    /// Bytes of /dev/shm that stay free; at most a quarter of a small one is kept.
+    /// Bytes of /dev/shm that stay free; at most an eighth of a small one is kept.
     pub shm_reserve_bytes: u64,
+    /// Bundles and reporters that are expected: for so many there is shared memory from the
+    /// beginning.
+    pub expected_peers: usize,
 }
 
 impl Default for HostOptions {
@@ -76,11 +80,42 @@ impl Default for HostOptions {
             large_active_documents: limits.large_active,
             small_class_bytes: limits.small_bytes,
             shm_reserve_bytes: 64 << 20,
+            expected_peers: 0,
         }
     }
 }
 
+/// Sizes for a process that may not map much: images of the small class, and what the large class
+/// begins with.
+const FEW_ADDRESSES: [usize; 2] = [128 << 10, 1 << 20];
+
 impl HostOptions {
+    /// What the bus looks like within a limited address space.
+    fn limits_within(&self, space: Option<u64>) -> Result<Limits, StartError> {
+        let limits = self.limits();
+        let Some(space) = space else {
+            return Ok(limits);
+        };
+        let [small_bytes, large_initial_bytes] = FEW_ADDRESSES;
+        let less = Limits {
+            small_bytes: limits.small_bytes.min(small_bytes),
+            large_initial_bytes: limits.large_initial_bytes.min(large_initial_bytes),
+            ..limits
+        };
+        let least = Limits {
+            peers: limits.peers.min(self.expected_peers + 1),
+            ..less
+        };
+        let needed = |limits: &Limits| Services::new(limits).address_bytes();
+        let fits = [limits, less, least]
+            .into_iter()
+            .find(|it| needed(it) <= space);
+        fits.ok_or_else(|| StartError::AddressSpace {
+            limit: space,
+            needed: needed(&least),
+        })
+    }
+
     fn limits(&self) -> Limits {
         let held = |active: usize| active + active.div_ceil(2) + 2;
         let small_active = self.active_documents.max(1);
@@ -116,12 +151,24 @@ pub enum StartError {
     Io(#[from] std::io::Error),
     /// There is no room for the bus itself; without it, the first write is a bus error.
     #[error(
-        "not enough shared memory: {free} bytes are free in /dev/shm, a broker needs {needed} to start; make room there, or mount it larger"
+        "not enough shared memory: {free} of {size} bytes are free in /dev/shm, a broker needs {needed} to start; {}", way_out(*size, *needed)
     )]
     NoSharedMemory {
+        /// Bytes of /dev/shm.
+        size: u64,
         /// Free bytes.
         free: u64,
         /// Bytes that must be free.
+        needed: u64,
+    },
+    /// The process may not map the bus.
+    #[error(
+        "the address space of this process is limited to {limit} bytes (`ulimit -v`), a broker for so many bundles needs {needed}; raise it with `ulimit -v unlimited`"
+    )]
+    AddressSpace {
+        /// The limit, in bytes.
+        limit: u64,
+        /// Bytes of addresses that would do.
         needed: u64,
     },
     /// The bus refused, in its words.
@@ -129,9 +176,23 @@ pub enum StartError {
     Bus(String),
 }
 
-/// Bytes of shared memory that must be free before a broker starts: its services and ports take a
-/// few, and its peers' as much again.
-const START_BYTES: u64 = 16 << 20;
+impl StartError {
+    /// Whether it may pass by itself, when others let go of shared memory.
+    pub fn may_pass(&self) -> bool {
+        matches!(self, StartError::NoSharedMemory { size, needed, .. } if needed <= size)
+    }
+}
+
+fn way_out(size: u64, needed: u64) -> String {
+    let advised = needed.max(size / 2).saturating_mul(2).div_ceil(1 << 20);
+    let make = format!(
+        "make it larger: `mount -o remount,size={advised}M /dev/shm`, for a container `docker run --shm-size={advised}m`"
+    );
+    match needed <= size {
+        true => format!("wait for others to end, remove what they left there, or {make}"),
+        false => make,
+    }
+}
 
 impl From<PortError> for StartError {
     fn from(error: PortError) -> Self {
@@ -263,19 +324,24 @@ impl Host {
             instance: instance.clone(),
             lock: Some(lock),
         };
-        let limits = options.limits();
+        let space = rustix::process::getrlimit(rustix::process::Resource::As).current;
+        let limits = options.limits_within(space)?;
         let services = Services::new(&limits);
-        let (free, needed) = (free_shared_memory(), fitting_reserve(START_BYTES));
-        if free < needed {
-            return Err(StartError::NoSharedMemory { free, needed });
-        }
+        let turns = Turns::new();
+        let turn = turns.take();
+        let expected = options.expected_peers.min(limits.peers) as u64;
+        let room = expected * services.peer_bytes();
+        let own = services.broker_bytes();
+        look_for_room(own + room, fitting_reserve(options.shm_reserve_bytes))?;
         let generation = Generation::begin(instance, limits)?;
+        keep_room(&generation.prefix, room)?;
         let hub = Hub::new(&generation.root, &generation.prefix, Access::Create)?;
         let documents = Documents::new(
             &hub,
             generation.number,
             [services.document_small, services.document_large],
             fitting_reserve(options.shm_reserve_bytes),
+            own + room,
         )?;
         let wake = hub.wake(&services.wake_broker, "")?;
         let host = Host {
@@ -300,6 +366,7 @@ impl Host {
             limits,
             services,
         };
+        drop(turn);
         host.generation.announce(instance)?;
         Ok(host)
     }
@@ -647,6 +714,21 @@ impl Drop for Host {
             session.link.farewell("");
         }
         self.sessions.clear();
+    }
+}
+
+/// Whether a broker has room to start, beside what stays free.
+fn look_for_room(needed: u64, reserve: u64) -> Result<(), StartError> {
+    let memory = SharedMemory::now()?;
+    let needed = needed + reserve;
+    // A memory of size 0 has no limit.
+    match memory.size == 0 || memory.free >= needed {
+        true => Ok(()),
+        false => Err(StartError::NoSharedMemory {
+            size: memory.size,
+            free: memory.free,
+            needed,
+        }),
     }
 }
 

@@ -11,6 +11,7 @@
 //! * `stream`, `link`: the streams, first as arithmetic, then on the bus;
 //! * `instance`, `generation`, `process`, `janitor`: finding each other, noticing deaths, leaving
 //!   nothing behind; `entrance`: who is at the other end;
+//! * `memory`: how shared memory is had before it is written to;
 //! * `host` with `session`, `documents`; `peer` with `membership`, `library`; `held`; `wake`.
 
 mod documents;
@@ -23,6 +24,7 @@ mod janitor;
 mod library;
 mod link;
 mod membership;
+mod memory;
 mod peer;
 mod ports;
 mod private;
@@ -38,6 +40,7 @@ pub use host::{Host, HostEvent, HostOptions, PeerId, StartError};
 pub use instance::{Instance, InstanceError};
 #[doc(hidden)]
 pub use peer::Claims;
+pub use memory::SharedMemory;
 pub use peer::{JoinError, Peer, PeerEvent, PeerOptions};
 pub use ports::ICEORYX2_VERSION;
 pub use private::{PRIVATE_PREFIX, sweep_private_instances};

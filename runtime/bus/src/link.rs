@@ -3,7 +3,9 @@
 use std::time::Instant;
 
 use iceoryx2::prelude::*;
+use qcbus_messages::services::FRAME_BYTES;
 
+use crate::memory::Backing;
 use crate::ports::{Pub, Sub, WakeNotifier};
 use crate::stream::{BrokenStream, Incoming, Outgoing};
 
@@ -68,6 +70,7 @@ pub(crate) struct Drained {
 pub(crate) struct Link {
     key: SessionKey,
     sender: Pub<u8, FrameHeader>,
+    backing: Backing,
     receiver: Sub<u8, FrameHeader>,
     wake: WakeNotifier,
     out: Outgoing,
@@ -81,13 +84,14 @@ pub(crate) struct Link {
 impl Link {
     pub(crate) fn new(
         key: SessionKey,
-        sender: Pub<u8, FrameHeader>,
+        (sender, backing): (Pub<u8, FrameHeader>, Backing),
         receiver: Sub<u8, FrameHeader>,
         wake: WakeNotifier,
     ) -> Link {
         Link {
             key,
             sender,
+            backing,
             receiver,
             wake,
             out: Outgoing::new(Instant::now()),
@@ -122,7 +126,7 @@ impl Link {
         let ack = self.incoming.arrived();
         while let Some((seq, bytes)) = self.out.next() {
             let header = header(self.key, DATA, seq, ack, self.urgent);
-            if !transmit(&self.sender, header, bytes) {
+            if !transmit(&self.sender, &mut self.backing, header, bytes) {
                 break;
             }
             self.out.was_taken(Instant::now());
@@ -153,7 +157,7 @@ impl Link {
     fn acknowledge(&mut self) -> bool {
         let ack = self.incoming.arrived();
         let header = header(self.key, ACKNOWLEDGEMENT, 0, ack, false);
-        let sent = transmit(&self.sender, header, &[]);
+        let sent = transmit(&self.sender, &mut self.backing, header, &[]);
         if sent {
             self.incoming.acknowledged();
             self.asked = false;
@@ -169,7 +173,8 @@ impl Link {
             end -= 1;
         }
         let header = header(self.key, FAREWELL, 0, self.incoming.arrived(), false);
-        transmit(&self.sender, header, &reason.as_bytes()[..end]);
+        let reason = &reason.as_bytes()[..end];
+        transmit(&self.sender, &mut self.backing, header, reason);
         self.notify();
     }
 
@@ -239,10 +244,19 @@ fn header(key: SessionKey, kind: u32, seq: u64, ack: u64, urgent: bool) -> Frame
 
 /// `true` when the other side's buffer took the frame. Everything else, `Ok(0)` included, means
 /// that it is not known to have arrived.
-fn transmit(sender: &Pub<u8, FrameHeader>, header: FrameHeader, bytes: &[u8]) -> bool {
+fn transmit(
+    sender: &Pub<u8, FrameHeader>,
+    backing: &mut Backing,
+    header: FrameHeader,
+    bytes: &[u8],
+) -> bool {
+    if !backing.is_ahead() {
+        return false;
+    }
     let Ok(mut sample) = sender.loan_slice_uninit(bytes.len().max(1)) else {
         return false;
     };
+    backing.lent(sample.payload().as_ptr().addr(), FRAME_BYTES);
     *sample.user_header_mut() = header;
     let sample = if bytes.is_empty() {
         sample.write_from_slice(&[0])

@@ -15,6 +15,7 @@ use crate::host::{ConfigHeader, HelloHeader};
 use crate::instance::Instance;
 use crate::library::Library;
 use crate::link::{FrameHeader, Link, SessionKey};
+use crate::memory::{Turns, free_shared_memory, take_room};
 use crate::peer::PeerEvent;
 use crate::ports::{self, Access, Hub, PortError, Pub, Sub, TopicService, WakeNotifier};
 use crate::process::Process;
@@ -106,6 +107,9 @@ impl Membership {
             return Err(BeginError::Hello(why));
         }
         let services = Services::new(&generation.limits);
+        let turns = Turns::new();
+        let _turn = turns.take();
+        take_part(&generation.prefix, services.peer_bytes())?;
         let hub = Hub::new(&generation.root, &generation.prefix, Access::Open)?;
         let config = hub.topic(&services.config, "")?;
         let greetings = hub.topic(&services.hello, "")?;
@@ -118,7 +122,7 @@ impl Membership {
             },
             library: Library::new(&hub, generation.number, &services)?,
             config: ports::subscriber(&config, &services.config)?,
-            hello: ports::publisher(&greetings, &services.hello)?,
+            hello: ports::small_publisher(&greetings, &services.hello)?,
             wake_broker: Some(ports::notifier(&wake)?),
             channels: None,
             generation,
@@ -327,7 +331,7 @@ impl Membership {
         };
         let waker = Waker::new(ports::listener(&wake)?).map_err(|why| PortError::waiting(&why))?;
         let receiver = ports::subscriber(&to, &self.services.to_peer)?;
-        let sender = ports::publisher(&from, &self.services.from_peer)?;
+        let sender = ports::stream_publisher(&from, &self.services.from_peer)?;
         let link = Link::new(self.key, sender, receiver, wake_broker);
         link.ring();
         Ok(Channels {
@@ -375,4 +379,14 @@ impl Membership {
         kept && self.broker.is_alive()
             && Generation::current(instance).as_ref() == Some(&self.generation)
     }
+}
+
+/// Makes room for what joining takes: out of what the broker has kept for it, else out of what is
+/// free.
+fn take_part(prefix: &str, needed: u64) -> Result<(), PortError> {
+    let free = free_shared_memory();
+    if take_room(prefix, needed) || free >= needed {
+        return Ok(());
+    }
+    Err(PortError::no_room(needed, free))
 }

@@ -14,6 +14,8 @@ use iceoryx2::prelude::*;
 use iceoryx2::service::port_factory::{event, publish_subscribe};
 use qcbus_messages::services::{Growth, Topic, Wake};
 
+use crate::memory::Backing;
+
 pub(crate) type Service = ipc_threadsafe::Service;
 pub(crate) type Pub<T, H> = Publisher<Service, [T], H>;
 pub(crate) type Sub<T, H> = Subscriber<Service, [T], H>;
@@ -41,6 +43,24 @@ impl PortError {
         PortError {
             what: "waiting for the other side".to_owned(),
             why: why.to_string(),
+        }
+    }
+
+    /// There is no shared memory for a topic's slots.
+    fn memory(row: &Topic, why: &std::io::Error) -> PortError {
+        PortError {
+            what: format!("shared memory for {}", row.name),
+            why: why.to_string(),
+        }
+    }
+
+    /// There is no shared memory for one more who joins.
+    pub(crate) fn no_room(needed: u64, free: u64) -> PortError {
+        PortError {
+            what: "joining".to_owned(),
+            why: format!(
+                "not enough shared memory: {needed} bytes are needed, {free} are free in /dev/shm"
+            ),
         }
     }
 }
@@ -199,6 +219,33 @@ where
         .backpressure_strategy(BackpressureStrategy::DiscardData)
         .create()
         .explain(format!("a publisher of {}", row.name))
+}
+
+/// A publisher of a stream, with the memory that its slots need.
+pub(crate) fn stream_publisher<H>(
+    service: &TopicService<u8, H>,
+    row: &Topic,
+) -> Result<(Pub<u8, H>, Backing), PortError>
+where
+    H: Debug + ZeroCopySend + 'static,
+{
+    let publisher = publisher(service, row)?;
+    let backing = Backing::of(publisher.id().value());
+    let backing = backing.map_err(|why| PortError::memory(row, &why))?;
+    Ok((publisher, backing))
+}
+
+/// A publisher with few and small slots, all of whose memory is there from the beginning.
+pub(crate) fn small_publisher<H>(
+    service: &TopicService<u8, H>,
+    row: &Topic,
+) -> Result<Pub<u8, H>, PortError>
+where
+    H: Debug + ZeroCopySend + 'static,
+{
+    let publisher = publisher(service, row)?;
+    Backing::whole(publisher.id().value()).map_err(|why| PortError::memory(row, &why))?;
+    Ok(publisher)
 }
 
 /// A subscriber as its row wants it.

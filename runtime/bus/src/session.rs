@@ -45,7 +45,7 @@ impl Session {
         let to = hub.topic(&services.to_peer, &suffix)?;
         let link = Link::new(
             key,
-            ports::publisher(&to, &services.to_peer)?,
+            ports::stream_publisher(&to, &services.to_peer)?,
             ports::subscriber(&from, &services.from_peer)?,
             ports::notifier(&wake)?,
         );

@@ -15,4 +15,5 @@ mod deaths;
 mod delivery;
 mod documents;
 mod liars;
+mod memory;
 mod torture;
