@@ -23,13 +23,13 @@ const MAX_IMAGE: usize = u32::MAX as usize;
 pub enum LoanError {
     /// Shared memory has not enough room. Writing on would kill the process, so nothing was lent.
     #[error(
-        "not enough shared memory: {needed} bytes are needed, {free} are free, of which {reserve} are kept in reserve"
+        "not enough shared memory: {needed} bytes are needed, and so many are not free of the {size} bytes of /dev/shm, of which {reserve} are kept in reserve"
     )]
     NoSpace {
         /// Bytes asked for.
         needed: u64,
-        /// Bytes free in /dev/shm, less what has been lent and may still be filled.
-        free: u64,
+        /// Bytes of /dev/shm.
+        size: u64,
         /// Bytes that stay free.
         reserve: u64,
     },
@@ -233,21 +233,26 @@ impl Documents {
         let mut sample = publisher
             .loan_slice_uninit(blocks)
             .map_err(|why| match why {
-                iceoryx2::port::LoanError::ExceedsMaxLoans
-                | iceoryx2::port::LoanError::OutOfMemory => LoanError::Busy,
-                other => refused(bytes, &other),
+                iceoryx2::port::LoanError::ExceedsMaxLoans => LoanError::Busy,
+                // All slots are taken, or larger ones could not be mapped.
+                iceoryx2::port::LoanError::OutOfMemory => {
+                    let grows = bytes > class.row.slot_bytes() as u64;
+                    let limited = || limited_addresses(bytes);
+                    grows.then(limited).flatten().unwrap_or(LoanError::Busy)
+                }
+                other => limited_addresses(bytes).unwrap_or(LoanError::Bus(format!("{other:?}"))),
             })?;
         drop(publisher);
         match back_with_memory(sample.payload_mut()) {
             Ok(()) => Ok(sample),
-            Err(()) => Err(self.no_space(bytes, SharedMemory::now().map_or(0, |it| it.free))),
+            Err(()) => Err(self.no_space(bytes)),
         }
     }
 
     /// Whether there is room beside the reserve.
     fn look_for(&self, needed: u64) -> Result<(), LoanError> {
         let Ok(memory) = SharedMemory::now() else {
-            return Err(self.no_space(needed, 0));
+            return Err(self.no_space(needed));
         };
         let kept = self.shared.reserve.saturating_add(self.shared.own);
         let whole = needed.saturating_add(kept);
@@ -263,14 +268,14 @@ impl Documents {
         let enough = memory.free >= needed.saturating_add(self.shared.reserve);
         match enough || memory.size == 0 {
             true => Ok(()),
-            false => Err(self.no_space(needed, memory.free)),
+            false => Err(self.no_space(needed)),
         }
     }
 
-    fn no_space(&self, needed: u64, free: u64) -> LoanError {
+    fn no_space(&self, needed: u64) -> LoanError {
         LoanError::NoSpace {
             needed,
-            free,
+            size: SharedMemory::now().map_or(0, |memory| memory.size),
             reserve: self.shared.reserve,
         }
     }
@@ -322,13 +327,10 @@ impl Documents {
     }
 }
 
-/// What it means that the bus has no slot for so many bytes, for another reason than that all are taken.
-fn refused(needed: u64, why: &dyn std::fmt::Debug) -> LoanError {
+/// Why a slot cannot be had, where the address space is limited.
+fn limited_addresses(needed: u64) -> Option<LoanError> {
     let limit = rustix::process::getrlimit(rustix::process::Resource::As).current;
-    match limit {
-        Some(limit) => LoanError::AddressSpace { needed, limit },
-        None => LoanError::Bus(format!("{why:?}")),
-    }
+    limit.map(|limit| LoanError::AddressSpace { needed, limit })
 }
 
 /// Has the kernel back the pages now. Without it the first write to a page that cannot be had

@@ -89,23 +89,46 @@ impl Default for HostOptions {
 /// begins with.
 const FEW_ADDRESSES: [usize; 2] = [128 << 10, 1 << 20];
 
+fn with_few_addresses(limits: Limits) -> Limits {
+    let [small_bytes, large_initial_bytes] = FEW_ADDRESSES;
+    Limits {
+        small_bytes: limits.small_bytes.min(small_bytes),
+        large_initial_bytes: limits.large_initial_bytes.min(large_initial_bytes),
+        ..limits
+    }
+}
+
 impl HostOptions {
+    /// Bytes of shared memory that a broker takes or keeps free, without documents: what it needs
+    /// itself, as much for each peer that is expected as that will take, and the reserve.
+    pub fn shared_memory_bytes(&self) -> u64 {
+        let services = Services::new(&self.limits());
+        let peers = self.expected_peers as u64 * services.peer_bytes();
+        services.broker_bytes() + peers + fitting_reserve(self.shm_reserve_bytes)
+    }
+
+    /// Bytes of addresses that a broker needs at least, and to carry everything.
+    pub fn address_bytes(&self) -> (u64, u64) {
+        let all = self.limits();
+        let needed = |limits: &Limits| Services::new(limits).address_bytes();
+        (needed(&self.least(all)), needed(&all))
+    }
+
+    /// The same bus for small images alone, and for few peers.
+    fn least(&self, limits: Limits) -> Limits {
+        Limits {
+            peers: limits.peers.min(self.expected_peers + 1),
+            ..with_few_addresses(limits)
+        }
+    }
+
     /// What the bus looks like within a limited address space.
     fn limits_within(&self, space: Option<u64>) -> Result<Limits, StartError> {
         let limits = self.limits();
         let Some(space) = space else {
             return Ok(limits);
         };
-        let [small_bytes, large_initial_bytes] = FEW_ADDRESSES;
-        let less = Limits {
-            small_bytes: limits.small_bytes.min(small_bytes),
-            large_initial_bytes: limits.large_initial_bytes.min(large_initial_bytes),
-            ..limits
-        };
-        let least = Limits {
-            peers: limits.peers.min(self.expected_peers + 1),
-            ..less
-        };
+        let (less, least) = (with_few_addresses(limits), self.least(limits));
         let needed = |limits: &Limits| Services::new(limits).address_bytes();
         let fits = [limits, less, least]
             .into_iter()
