@@ -25,6 +25,8 @@ pub fn run(args: &ServeArgs) -> Exit {
             return Exit::Usage;
         }
     };
+    // What killed checks hold of the shared memory may be what is missing.
+    qcbus_bus::sweep_private_instances();
     let runtime = match tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()
