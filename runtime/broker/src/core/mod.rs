@@ -100,6 +100,8 @@ pub struct State {
     /// Until then nobody need be told again that there is no room.
     mute_room_until: Duration,
     mute_hindered_until: Duration,
+    /// Since when there has been no room for anything while nothing moved.
+    stuck_since: Option<Duration>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -150,6 +152,7 @@ impl State {
             judged_once: false,
             mute_room_until: Duration::ZERO,
             mute_hindered_until: Duration::ZERO,
+            stuck_since: None,
         };
         state.begin_epoch();
         state

@@ -44,6 +44,9 @@ pub struct Settings {
     pub max_text: usize,
     /// Pause before something that failed for want of room or disk is tried again.
     pub retry_after: Duration,
+    /// A file for which there is no room is waited for so long without anything moving; then it is
+    /// undetermined, and tried again as what cannot be read is.
+    pub room_limit: Duration,
     /// Pause before a file is tried again for which the bus had no place.
     pub busy_pause: Duration,
     /// First pause before a file is read again that something which passes kept from being read; it
@@ -81,6 +84,7 @@ impl Default for Settings {
             max_findings_bytes: 16 << 20,
             max_text: 8 << 10,
             retry_after: Duration::from_secs(1),
+            room_limit: Duration::from_secs(60),
             busy_pause: Duration::from_millis(20),
             moment_pause: Duration::from_millis(125),
             moment_pause_max: Duration::from_secs(4),

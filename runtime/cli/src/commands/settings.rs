@@ -97,6 +97,7 @@ pub fn settings(args: &LimitArgs) -> Settings {
     settings.job_deadline = args.job_deadline.unwrap_or(settings.job_deadline);
     settings.silence_limit = args.silence_limit.unwrap_or(settings.silence_limit);
     settings.absence_limit = args.absence_limit.unwrap_or(settings.absence_limit);
+    settings.room_limit = args.room_limit.unwrap_or(settings.room_limit);
     settings.max_restarts = args.max_restarts.unwrap_or(settings.max_restarts);
     settings
 }

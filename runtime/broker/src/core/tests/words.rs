@@ -219,6 +219,55 @@ fn what_a_moment_hinders_is_tried_again_with_growing_pauses_and_then_said() {
 }
 
 #[test]
+fn a_file_without_room_is_undetermined_when_nothing_moves_for_long() {
+    let mut world = World::new();
+    world.join("First");
+    world.write(0);
+    world.write(4);
+    let no_room = || Err(PrepareFailure::NoRoom("full".to_owned()));
+    let limit = world.state.settings.room_limit;
+    let begun = world.now;
+    while world.storing.is_empty() {
+        assert!(world.now <= begun + limit + 2 * world.state.settings.retry_after);
+        match world.preparing.pop() {
+            Some((job, _)) => world.event(Event::Prepared {
+                job,
+                result: no_room(),
+            }),
+            None => world.pass(world.state.settings.retry_after),
+        }
+    }
+    assert!(world.now >= begun + limit);
+    let why = "full; nothing became free for 60 seconds";
+    assert_eq!(world.storing[0].unreadable.as_deref(), Some(why));
+    // What waited as long does not wait as long again.
+    let (job, _) = world.preparing.pop().unwrap();
+    world.event(Event::Prepared {
+        job,
+        result: no_room(),
+    });
+    assert_eq!(world.storing.len(), 2);
+}
+
+#[test]
+fn a_file_without_room_waits_while_another_is_checked() {
+    let mut world = World::new();
+    world.join("First");
+    world.write(0);
+    world.prepare(0, true);
+    world.write(4);
+    let begun = world.now;
+    while world.now < begun + world.state.settings.room_limit / 2 {
+        if let Some((job, _)) = world.preparing.pop() {
+            let result = Err(PrepareFailure::NoRoom("full".to_owned()));
+            world.event(Event::Prepared { job, result });
+        }
+        world.pass(world.state.settings.retry_after);
+    }
+    assert!(world.storing.is_empty() && world.state.stuck_since.is_none());
+}
+
+#[test]
 fn more_findings_than_a_checker_may_report_are_no_judgement() {
     let mut world = World::new();
     world.state.settings.max_issues = 1;
