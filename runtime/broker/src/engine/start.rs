@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-use qcbus_bus::Host;
+use qcbus_bus::{Host, HostOptions};
 use qcbus_formats::config::Config;
 use qcbus_ingest::modular::SearchPath;
 use qcbus_messages::Role;
@@ -51,7 +51,7 @@ impl Broker {
         let descriptors = Descriptors::take();
         let (peers, limited) = descriptors.peers(options.host.max_peers);
         options.host.max_peers = peers;
-        let mut host = Host::start(&options.instance, options.host)?;
+        let mut host = Host::start(&options.instance, shape(&options, &loaded))?;
         options.settings.generation = host.generation();
         let journal = journal_of(&options)?;
         let results = results_of(&options)?;
@@ -302,6 +302,21 @@ fn reconcile(options: &Options, loaded: &Loaded, store: &Store) -> Result<Reconc
     let reporters: Vec<String> = reporters.map(|it| it.name.clone()).collect();
     let remembered = store.remembered()?;
     Ok(store.reconcile(remembered, &reporters)?)
+}
+
+/// The bus is made for those who are expected. Nobody else joins what ends by itself; a newer process
+/// may stand beside each that was started.
+fn shape(options: &Options, loaded: &Loaded) -> HostOptions {
+    let expected_peers = loaded.children.len();
+    let most = match options.watch {
+        true => options.host.max_peers,
+        false => 2 * expected_peers + 1,
+    };
+    HostOptions {
+        expected_peers,
+        max_peers: options.host.max_peers.min(most),
+        ..options.host
+    }
 }
 
 fn intake(options: &Options, host: &Host) -> Arc<Intake> {
