@@ -107,6 +107,20 @@ impl Topic {
         self.subscribers * (self.buffer + self.borrowed) + self.history + self.loans
     }
 
+    /// Bytes of shared memory that a publisher takes, at most, before it has lent anything.
+    pub const fn publisher_bytes(&self) -> u64 {
+        (16 * self.slots() + (64 << 10)) as u64
+    }
+
+    /// Bytes of shared memory that a publisher and a subscriber take for knowing each other.
+    pub const fn connection_bytes(&self) -> u64 {
+        let each = match self.growth {
+            Growth::Fixed => 2,
+            Growth::PowerOfTwo => GROWING_SLOT_BYTES,
+        };
+        (each * self.slots() + (16 << 10)) as u64
+    }
+
     /// Bytes of a slot's payload, to begin with.
     pub const fn slot_bytes(&self) -> usize {
         self.element * self.elements

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use iceoryx2::port::update_connections::UpdateConnections;
+use iceoryx2::prelude::PortFactory;
 use iceoryx2::sample_mut::SampleMut;
 use qcbus_document::FileKind;
 use qcbus_messages::services::{BLOCK_BYTES, Topic};
@@ -12,7 +13,7 @@ use qcbus_messages::{Digest, DocId};
 use tokio::sync::Notify;
 
 use crate::held::{Block, DocumentHeader, Held, LET_GO, Ticket, kind_code};
-use crate::memory::{SharedMemory, Turns};
+use crate::memory::{SharedMemory, Turns, free_shared_memory};
 use crate::ports::{self, Hub, PortError, Pub, Service, Sub, TopicService};
 
 /// Largest image, in bytes: offsets within an image are 32 bits wide.
@@ -113,12 +114,22 @@ impl Class {
         })
     }
 
+    /// Bytes of shared memory that another publisher takes, with a connection to everybody who reads.
+    fn renewal_bytes(&self) -> u64 {
+        let readers = self.service.dynamic_config().number_of_subscribers() as u64;
+        self.row.publisher_bytes() + readers * self.row.connection_bytes()
+    }
+
     /// Replaces the publisher, and with it the history and every slot that was ever used: their
     /// memory comes back when the last reader has let go. Without it a small /dev/shm would stay
     /// full of documents that nobody needs, because only publishing pushes them out of the
     /// history. To be called with a ticket to lend; does nothing when others have one, because
     /// what was lent by the old publisher could not be published any more.
-    fn renew(&self) {
+    fn renew(&self, turns: &Turns) {
+        let _turn = turns.take();
+        if free_shared_memory() < self.renewal_bytes() {
+            return;
+        }
         let mut publisher = self
             .publisher
             .write()
@@ -320,7 +331,7 @@ impl Documents {
     fn give_back(&self, ours: usize) {
         for (index, class) in self.shared.classes.iter().enumerate() {
             let ticket = (index != ours).then(|| Ticket::take(&class.lent, class.row.loans));
-            class.renew();
+            class.renew(&self.shared.turns);
             drop(ticket);
         }
         self.shared.again.notify_one();

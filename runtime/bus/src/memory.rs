@@ -20,8 +20,9 @@ use crate::instance::Instance;
 /// Where it is.
 pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 
-/// A turn that takes longer belongs to a process that was stopped in it.
-const TURN: Duration = Duration::from_millis(200);
+/// A turn takes milliseconds, and many processes may stand in line on a busy machine. Whoever waits
+/// longer waits for a process that was stopped in its turn.
+const IN_LINE: Duration = Duration::from_secs(10);
 
 /// The shared memory of this system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,10 +77,10 @@ impl Turns {
         Turns(Mutex::new(open()))
     }
 
-    /// Waits for a turn, but not for long: whoever was stopped in its turn must not stop the others.
+    /// Waits for a turn, but not for ever: whoever was stopped in its turn must not stop the others.
     pub(crate) fn take(&self) -> Turn<'_> {
         let file = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let until = Instant::now() + TURN;
+        let until = Instant::now() + IN_LINE;
         let mut locked = false;
         while let (false, Some(file)) = (locked, file.as_ref()) {
             match flock(file, FlockOperation::NonBlockingLockExclusive) {
