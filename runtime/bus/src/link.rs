@@ -82,11 +82,13 @@ pub(crate) struct Link {
 }
 
 impl Link {
+    /// The other side may send messages of up to `most` bytes.
     pub(crate) fn new(
         key: SessionKey,
         (sender, backing): (Pub<u8, FrameHeader>, Backing),
         receiver: Sub<u8, FrameHeader>,
         wake: WakeNotifier,
+        most: usize,
     ) -> Link {
         Link {
             key,
@@ -95,7 +97,7 @@ impl Link {
             receiver,
             wake,
             out: Outgoing::new(Instant::now()),
-            incoming: Incoming::default(),
+            incoming: Incoming::new(most),
             broken: false,
             urgent: false,
             asked: false,

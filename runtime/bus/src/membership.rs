@@ -332,7 +332,7 @@ impl Membership {
         let waker = Waker::new(ports::listener(&wake)?).map_err(|why| PortError::waiting(&why))?;
         let receiver = ports::subscriber(&to, &self.services.to_peer)?;
         let sender = ports::stream_publisher(&from, &self.services.from_peer)?;
-        let link = Link::new(self.key, sender, receiver, wake_broker);
+        let link = Link::new(self.key, sender, receiver, wake_broker, codec::MAX_MESSAGE);
         link.ring();
         Ok(Channels {
             link,

@@ -253,14 +253,19 @@ impl Peer {
     }
 
     /// Sends a message: it is kept until the broker has acknowledged it. Never blocks. Without a
-    /// session nothing is sent, because a new session voids everything older.
+    /// session nothing is sent, because a new session voids everything older. One that is larger than
+    /// the broker takes ([`codec::MAX_FROM_PEER`]) ends the session.
     pub fn send(&mut self, message: &FromPeer) {
         let State::Member(membership) = &mut self.state else {
             return;
         };
         match codec::encode(message) {
             Ok(bytes) => membership.push(&bytes),
-            Err(error) => tracing::error!(%error, "a message was not sent"),
+            Err(error) => {
+                tracing::error!(%error, "a message cannot be sent, the session ends");
+                // Were it left out, the rest would be taken for the whole. Nothing is no message.
+                membership.push(&[]);
+            }
         }
     }
 

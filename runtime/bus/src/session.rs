@@ -48,6 +48,7 @@ impl Session {
             ports::stream_publisher(&to, &services.to_peer)?,
             ports::subscriber(&from, &services.from_peer)?,
             ports::notifier(&wake)?,
+            codec::MAX_FROM_PEER,
         );
         Ok(Session {
             key,
