@@ -1,6 +1,7 @@
 //! The three ways in which a bundle runs: on the bus, on one file, as a module of ASAM's framework.
 
 mod args;
+mod batches;
 mod bus;
 mod exit;
 mod file;
