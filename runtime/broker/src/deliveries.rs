@@ -12,7 +12,7 @@ use qcbus_messages::codec::MAX_MESSAGE;
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::{DocId, ResultMessage, Withdrawn};
 
-use crate::core::{Delivery, weight};
+use crate::core::{Delivery, facts_weight, weight};
 use crate::result_paths::ResultPaths;
 
 /// Builds the message for one reporter.
@@ -89,7 +89,10 @@ fn cut_to(results: &mut Results, most: usize) {
         .iter_mut()
         .flat_map(|bundle| &mut bundle.checkers)
         .collect();
-    let bytes = |checker: &Checker| checker.issues.iter().map(weight).sum::<usize>();
+    let bytes = |checker: &Checker| {
+        let issues = checker.issues.iter().map(weight).sum::<usize>();
+        issues + facts_weight(&checker.params, &checker.metadata)
+    };
     let mut weighed: Vec<usize> = checkers.iter().map(|checker| bytes(checker)).collect();
     let before: Vec<usize> = checkers.iter().map(|it| it.issues.len()).collect();
     while weighed.iter().sum::<usize>() > most {
@@ -98,6 +101,10 @@ fn cut_to(results: &mut Results, most: usize) {
         let (Some(checker), Some(weighs)) = (checkers.get_mut(at), weighed.get_mut(at)) else {
             break;
         };
+        if checker.issues.is_empty() {
+            checker.params.clear();
+            checker.metadata.clear();
+        }
         checker.issues.truncate(checker.issues.len() / 2);
         *weighs = bytes(checker);
     }

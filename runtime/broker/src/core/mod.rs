@@ -48,7 +48,7 @@ pub use action::Action;
 pub use event::Event;
 pub use jury::{Epoch, Juror, Jury, Mark, Member, Origin};
 pub use notice::Notice;
-pub(crate) use outcome::weight;
+pub(crate) use outcome::{facts_weight, weight};
 pub use settings::Settings;
 pub use types::*;
 

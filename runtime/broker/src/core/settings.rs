@@ -35,7 +35,9 @@ pub struct Settings {
     pub restart_window: Duration,
     /// Issues kept per checker and job.
     pub max_issues: usize,
-    /// Bytes of texts kept per bundle and job.
+    /// Bytes of parameters and metadata kept per checker and job.
+    pub max_facts: usize,
+    /// Bytes of all that is kept per bundle and job.
     pub max_staged_bytes: usize,
     /// Bytes of findings of all jobs that are not stored yet, beyond which no further job is given
     /// out: what a bundle that reports far too much can make the broker hold.
@@ -94,3 +96,4 @@ impl Default for Settings {
         }
     }
 }
+            max_facts: 64 << 10,
