@@ -6,6 +6,7 @@
 
 mod absent;
 mod action;
+mod announcing;
 mod bundles;
 mod changes;
 mod checking;
@@ -52,6 +53,7 @@ pub(crate) use outcome::{facts_weight, weight};
 pub use settings::Settings;
 pub use types::*;
 
+use announcing::Unrest;
 use bundles::Bundle;
 use children::Child;
 use files::Files;
@@ -74,6 +76,8 @@ pub struct State {
     jobs: BTreeMap<JobId, ActiveJob>,
     bundles: BTreeMap<String, Bundle>,
     reporters: Vec<Reporter>,
+    /// By name, how often bundles have changed lately.
+    unrest: BTreeMap<String, Unrest>,
     sessions: BTreeMap<SessionId, (Role, String)>,
     children: BTreeMap<String, Child>,
     retired: BTreeMap<SessionId, Retired>,
@@ -130,6 +134,7 @@ impl State {
             jobs: BTreeMap::new(),
             bundles: BTreeMap::new(),
             reporters: Vec::new(),
+            unrest: BTreeMap::new(),
             sessions: BTreeMap::new(),
             children: BTreeMap::new(),
             retired: BTreeMap::new(),
@@ -307,6 +312,7 @@ impl State {
     fn tick(&mut self, actions: &mut Actions) {
         self.watch_children(actions);
         self.kill_what_did_not_return(actions);
+        self.believe_announced(actions);
         self.watch_bundles(actions);
         self.watch_reporters(actions);
         self.fail_absent();

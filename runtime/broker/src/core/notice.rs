@@ -3,6 +3,7 @@
 use std::fmt;
 
 use qcbus_messages::control::Unseen;
+use qcbus_messages::shown;
 
 /// Something that a person should read.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -21,6 +22,13 @@ pub enum Notice {
         /// Its name.
         name: String,
         /// What it did wrong.
+        why: String,
+    },
+    /// A bundle changes what it is all the time, and is not believed for a while.
+    Restless {
+        /// Its name.
+        name: String,
+        /// How often, and until when.
         why: String,
     },
     /// A child failed too often and is left alone for a while.
@@ -88,6 +96,7 @@ impl Notice {
             Notice::TurnedAway(_) => "turned-away",
             Notice::Ended { .. } => "ended",
             Notice::Killed { .. } => "killed",
+            Notice::Restless { .. } => "restless",
             Notice::GaveUp { .. } => "gave-up",
             Notice::NotUpgraded { .. } => "not-upgraded",
             Notice::NoRoom(_) => "no-room",
@@ -109,6 +118,7 @@ impl Notice {
         match self {
             Notice::Ended { name, .. }
             | Notice::Killed { name, .. }
+            | Notice::Restless { name, .. }
             | Notice::GaveUp { name, .. }
             | Notice::NotUpgraded { name, .. }
             | Notice::NotReported { name, .. } => Some(name),
@@ -121,6 +131,7 @@ impl Notice {
         match self {
             Notice::Ended { why, .. }
             | Notice::Killed { why, .. }
+            | Notice::Restless { why, .. }
             | Notice::GaveUp { why, .. }
             | Notice::NotUpgraded { why, .. }
             | Notice::NotReported { why, .. } => why.clone(),
@@ -130,20 +141,24 @@ impl Notice {
 }
 
 impl fmt::Display for Notice {
+    /// On one line, whoever has chosen the names and reasons in it.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&shown::line(&self.text()))
+    }
+}
+
+impl Notice {
+    fn text(&self) -> String {
         match self {
-            Notice::TurnedAway(reason) => write!(f, "turned away: {reason}"),
-            Notice::Ended { name, why } | Notice::Killed { name, why } => {
-                write!(f, "{name}: {why}")
-            }
-            Notice::GaveUp { name, why } => write!(f, "{name} {why}"),
+            Notice::TurnedAway(reason) => format!("turned away: {reason}"),
+            Notice::Ended { name, why }
+            | Notice::Killed { name, why }
+            | Notice::Restless { name, why } => format!("{name}: {why}"),
+            Notice::GaveUp { name, why } => format!("{name} {why}"),
             Notice::NotUpgraded { name, why } => {
-                write!(
-                    f,
-                    "{name} is not upgraded, the process before goes on: {why}"
-                )
+                format!("{name} is not upgraded, the process before goes on: {why}")
             }
-            Notice::NotReported { name, why } => write!(f, "{name} {why}"),
+            Notice::NotReported { name, why } => format!("{name} {why}"),
             Notice::NoRoom(text)
             | Notice::NotRead(text)
             | Notice::NotWritten(text)
@@ -152,8 +167,8 @@ impl fmt::Display for Notice {
             | Notice::Watching(text)
             | Notice::Loading(text)
             | Notice::HeldBack(text)
-            | Notice::Storing(text) => f.write_str(text),
-            Notice::Unseen(unseen) => unseen.fmt(f),
+            | Notice::Storing(text) => text.clone(),
+            Notice::Unseen(unseen) => unseen.to_string(),
         }
     }
 }

@@ -33,6 +33,14 @@ pub struct Settings {
     pub max_restarts: u32,
     /// See `max_restarts`.
     pub restart_window: Duration,
+    /// Changes of what a bundle is or checks, by its own will, that are believed at once.
+    pub changes_forgiven: u32,
+    /// Pause before the first change beyond them is believed; doubles up to `disbelief_max`.
+    pub disbelief: Duration,
+    /// Longest such pause.
+    pub disbelief_max: Duration,
+    /// After this long without a change, earlier ones are forgotten.
+    pub calm_after: Duration,
     /// Issues kept per checker and job.
     pub max_issues: usize,
     /// Bytes of parameters and metadata kept per checker and job.
@@ -81,7 +89,12 @@ impl Default for Settings {
             healthy_after: Duration::from_secs(10),
             max_restarts: 20,
             restart_window: Duration::from_secs(60),
+            changes_forgiven: 8,
+            disbelief: Duration::from_secs(2),
+            disbelief_max: Duration::from_secs(300),
+            calm_after: Duration::from_secs(600),
             max_issues: 10_000,
+            max_facts: 64 << 10,
             max_staged_bytes: 16 << 20,
             max_findings_bytes: 16 << 20,
             max_text: 8 << 10,
@@ -96,4 +109,3 @@ impl Default for Settings {
         }
     }
 }
-            max_facts: 64 << 10,
