@@ -128,7 +128,7 @@ fn writable(out: &Path) -> Result<(), Refusal> {
         Err(rustix::io::Errno::NOTDIR)
     };
     refused.map_err(|error| {
-        let (out, there) = (out.display(), there.display());
+        let (out, there) = (to_text(out), to_text(there));
         usage(format!(
             "cannot write results into {out}: {there}: {error}; choose another directory with --out"
         ))
@@ -544,7 +544,7 @@ impl Printer {
                 count(Verdict::Accepted),
                 count(Verdict::Rejected),
                 count(Verdict::Undetermined),
-                self.places.out.display()
+                to_text(&self.places.out)
             ));
         }
         let exit = Exit::of_verdicts(self.verdicts.iter().copied());

@@ -6,7 +6,8 @@ use qcbus_broker::control::ask_broker;
 use qcbus_broker::journal::Journal;
 use qcbus_bus::{HostOptions, SharedMemory};
 use qcbus_messages::control::{Request, Response};
-use qcbus_messages::{Exit, PROTOCOL_VERSION};
+use qcbus_messages::path_text::to_text;
+use qcbus_messages::{Exit, PROTOCOL_VERSION, shown};
 
 use super::settings::{absolute, instance};
 use crate::args::DoctorArgs;
@@ -44,7 +45,8 @@ pub fn run(args: &DoctorArgs) -> Exit {
     remarks.push(journal(&absolute(&args.state)));
     for remark in &remarks {
         let mark = if remark.ok { "ok  " } else { "FIX " };
-        talk::print(&format!("{mark} {:<18} {}\n", remark.what, remark.text));
+        let text = shown::line(&remark.text);
+        talk::print(&format!("{mark} {:<18} {text}\n", remark.what));
         if !remark.ok {
             talk::print(&format!("     {:<18} {}\n", "", remark.advice));
         }
@@ -178,7 +180,7 @@ fn versions() -> Remark {
 fn runtime_directory(directory: &Path) -> Remark {
     let what = "runtime directory";
     let probe = directory.join(".doctor");
-    let text = directory.display().to_string();
+    let text = to_text(directory);
     match std::fs::create_dir_all(directory).and_then(|()| std::fs::write(&probe, b"")) {
         Ok(()) => {
             // Only just made; if it stays, it harms nobody.

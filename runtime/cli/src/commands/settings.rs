@@ -6,6 +6,7 @@ use qcbus_broker::Settings;
 use qcbus_bus::Instance;
 use qcbus_formats::xqar::Dialect;
 use qcbus_ingest::Limits;
+use qcbus_messages::path_text::to_text;
 
 use crate::args::{DialectArg, InstanceArgs, LimitArgs};
 
@@ -56,7 +57,7 @@ pub fn manifest_directory(named: &Path) -> Result<PathBuf, String> {
         Ok(_) => Ok(path),
         Err(error) => Err(format!(
             "cannot take bundles from --bundles-d {}: {error}",
-            path.display()
+            to_text(&path)
         )),
     }
 }
