@@ -178,6 +178,7 @@ impl std::fmt::Display for Unseen {
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct GateStatus {
     /// The directory.
+    #[serde(with = "path_text::one")]
     pub directory: PathBuf,
     /// Accepted files that are published.
     pub published: u64,
@@ -191,6 +192,7 @@ pub struct GateStatus {
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct HeldBack {
     /// Absolute path.
+    #[serde(with = "path_text::one")]
     pub file: PathBuf,
     /// Why: for a person.
     pub why: String,
