@@ -15,6 +15,7 @@ use qcbus_formats::config::{
     Config, Known, KnownBundle, Oddity, Parsed, reporter_for, same_bundle,
 };
 use qcbus_messages::Role;
+use qcbus_messages::path_text::to_text;
 
 use crate::core::{ChildSpec, Stamp};
 use crate::stamp::stamp_through_links;
@@ -174,7 +175,7 @@ impl Sources {
             return Ok(Vec::new());
         };
         let cannot_look = |error: &std::io::Error| {
-            LoadError::Manifest(format!("cannot look into {}: {error}", directory.display()))
+            LoadError::Manifest(format!("cannot look into {}: {error}", to_text(&directory)))
         };
         match trust::directory(directory) {
             Ok(_) => {}
@@ -203,7 +204,7 @@ impl Sources {
         let (mut paths, mut others): (Vec<PathBuf>, Vec<PathBuf>) = all.partition(is_manifest);
         others.sort();
         notices.extend(others.iter().map(|path| {
-            let shown = path.display();
+            let shown = to_text(&path);
             format!("{shown}: is no manifest, those are files of this directory that end in .json")
         }));
         paths.sort();
@@ -244,7 +245,7 @@ impl Sources {
         if !is_away {
             return Ok(());
         }
-        let shown = directory.display();
+        let shown = to_text(&directory);
         Err(LoadError::Manifest(format!(
             "{shown} is not the directory that it was, and there is no manifest in it; its bundles stay \
              demanded until it is back (to do without them, start the broker anew)"
@@ -262,7 +263,7 @@ fn unasked(path: &Path, config: &Config, loaded: &Loaded) -> Vec<String> {
     let brought = bundles.filter_map(|it| Some((&it.name, loaded.brought.get(&it.name)?)));
     let unasked = brought.filter(|(name, _)| !config.bundles.is_empty() && !named(name));
     let (shown, note) = (
-        path.display(),
+        to_text(&path),
         "it judges nothing, unless it is named by its short name",
     );
     unasked
@@ -276,12 +277,12 @@ fn unasked(path: &Path, config: &Config, loaded: &Loaded) -> Vec<String> {
 /// [`LoadError::Config`] with path, row and column.
 pub fn read_config(path: &Path) -> Result<Parsed, LoadError> {
     let bytes = std::fs::read(path)
-        .map_err(|error| LoadError::Config(format!("cannot read {}: {error}", path.display())))?;
+        .map_err(|error| LoadError::Config(format!("cannot read {}: {error}", to_text(path))))?;
     parse(path, &bytes)
 }
 
 fn parse(path: &Path, bytes: &[u8]) -> Result<Parsed, LoadError> {
-    Config::parse(bytes).map_err(|error| LoadError::Config(format!("{}:{error}", path.display())))
+    Config::parse(bytes).map_err(|error| LoadError::Config(format!("{}:{error}", to_text(path))))
 }
 
 #[cfg(test)]

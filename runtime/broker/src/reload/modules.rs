@@ -6,6 +6,7 @@ use qcbus_disk::trust;
 use qcbus_formats::manifest::{self, Mode, Module, ModuleType};
 use qcbus_formats::pool::OWN_BUNDLE;
 use qcbus_messages::Role;
+use qcbus_messages::path_text::to_text;
 
 use super::{LoadError, Loaded, MAX_FILE, programs};
 use crate::core::{ChildSpec, Restart};
@@ -27,7 +28,7 @@ pub(super) fn read_manifest(path: &Path, note: &dyn Fn(&Path)) -> Result<Vec<Mod
 /// # Errors
 /// [`LoadError::Manifest`] when its name is taken, or it would have to judge and cannot be asked.
 pub(super) fn add_module(module: Module, loaded: &mut Loaded) -> Result<(), LoadError> {
-    let manifest = module.manifest.display().to_string();
+    let manifest = to_text(&module.manifest);
     let role = match module.module_type {
         ModuleType::CheckerBundle => Role::Bundle,
         ModuleType::ReportModule => Role::Reporter,
@@ -64,7 +65,7 @@ pub(super) fn add_module(module: Module, loaded: &mut Loaded) -> Result<(), Load
 
 /// Nobody misses a reporter that is not started. A bundle would have to judge.
 fn not_on_the_bus(module: &Module, role: Role, loaded: &mut Loaded) -> Result<(), LoadError> {
-    let (manifest, name) = (module.manifest.display(), &module.name);
+    let (manifest, name) = (to_text(&module.manifest), &module.name);
     if role == Role::Bundle {
         return Err(LoadError::Manifest(format!(
             "{manifest}: `{name}` has no \"mode\": \"bus\", so it cannot be asked, and what it would reject \
