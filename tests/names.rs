@@ -408,3 +408,128 @@ fn a_scenario_with_such_a_path_finds_its_map() {
     let found = found.filter(|it| it["path"] == *map && it["sha256"].is_string());
     assert_eq!(found.count(), 1, "{file:#}");
 }
+
+/// A name that prints a line of its own, one that steers a terminal, and what each is called.
+const STEERING: [(&[u8], &str); 2] = [
+    (
+        b"x.xodr\nimportant.xodr: accepted\n.xodr",
+        "bytes:x.xodr%0Aimportant.xodr: accepted%0A.xodr",
+    ),
+    (
+        b"\x1b[2Kb\xe2\x80\xaec.xodr",
+        "bytes:%1B[2Kb%E2%80%AEc.xodr",
+    ),
+];
+
+/// No line is another's, and nothing steers.
+fn has_only_lines_of_ours(what: &str, text: &str) {
+    let steering = |c: char| qcbus_messages::shown::moves(c) && c != '\n';
+    assert!(!text.chars().any(steering), "{what}: {text:?}");
+    let forged = |line: &str| line.starts_with("important.xodr: accepted");
+    assert!(!text.lines().any(forged), "{what}:\n{text}");
+}
+
+#[test]
+fn names_that_would_be_lines_are_none_in_what_check_prints() {
+    let desk = Desk::new();
+    std::fs::create_dir(desk.path().join("in")).unwrap();
+    for (bytes, _) in STEERING {
+        let path = desk.path().join("in").join(name(bytes));
+        std::fs::write(path, Content::NoHeader(1).bytes()).unwrap();
+    }
+    for more in [&[][..], &["-q"], &["--format", "json"]] {
+        let said = check(&desk, &[&["in"], more].concat());
+        assert_eq!(said.code, Some(1), "{}", said.stderr);
+        for (what, text) in [("stdout", &said.stdout), ("stderr", &said.stderr)] {
+            has_only_lines_of_ours(what, text);
+        }
+        for (_, text) in STEERING {
+            let called = text.trim_start_matches("bytes:");
+            assert!(said.stdout.contains(called), "{}", said.stdout);
+        }
+    }
+}
+
+#[test]
+fn names_and_words_of_others_are_no_lines_of_a_broker() {
+    let farm = Farm::new();
+    let broker = farm.serve_ready();
+    farm.let_in("speaks_in_lines", "");
+    for (bytes, _) in STEERING {
+        std::fs::write(farm.root().join(name(bytes)), Content::Good(1).bytes()).unwrap();
+    }
+    farm.write("plain.xodr", &Content::Good(2).bytes());
+    let spoken = || {
+        let why = verdict(&farm, &farm.root().join("plain.xodr")).why;
+        why.iter()
+            .any(|why| why.contains("important"))
+            .then_some(())
+    };
+    until_or("the animal has judged", spoken, || tail(&farm.log()));
+    farm.settle(3);
+    for (bytes, text) in STEERING {
+        let path = farm.root().join(name(bytes));
+        let mut wait = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+        wait.arg("wait")
+            .arg(&path)
+            .arg("--instance-dir")
+            .arg(farm.instance());
+        let waited = wait.output().unwrap();
+        let waited = String::from_utf8(waited.stdout).unwrap();
+        has_only_lines_of_ours("wait", &waited);
+        let called = to_text(&path);
+        assert!(called.ends_with(text.trim_start_matches("bytes:")));
+        assert!(waited.starts_with(&format!("{called}: ")), "{waited}");
+    }
+    for command in [&["status"][..], &["bundle", "list"], &["doctor"]] {
+        let said = farm.qcbus(command);
+        has_only_lines_of_ours(command[0], &String::from_utf8(said.stdout).unwrap());
+        has_only_lines_of_ours(command[0], &String::from_utf8(said.stderr).unwrap());
+    }
+    down(&farm, broker);
+    has_only_lines_of_ours("log", &farm.log());
+}
+
+#[test]
+fn words_of_others_are_no_lines_of_a_text_report() {
+    let mut farm = Farm::new();
+    farm.arguments.extend(["--report".into(), "text".into()]);
+    let broker = farm.serve_ready();
+    farm.let_in("speaks_in_lines", "");
+    farm.write("plain.xodr", &Content::Good(2).bytes());
+    let report = || {
+        let files = files_below(&farm.out());
+        let text = files.iter().find(|it| it.ends_with("plain.xodr.txt"))?;
+        let text = std::fs::read_to_string(farm.out().join(text)).ok()?;
+        text.contains("important").then_some(text)
+    };
+    let text = until_or("the animal is reported", report, || tail(&farm.log()));
+    has_only_lines_of_ours("report", &text);
+    down(&farm, broker);
+}
+
+#[test]
+fn what_is_printed_and_lost_is_no_success() {
+    let desk = Desk::new();
+    desk.write("in/a.xodr", Content::Good(1).bytes());
+    let run = |stdout: std::process::Stdio| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+        command.args(["check", "in"]).current_dir(desk.path());
+        command.stdout(stdout).output().unwrap()
+    };
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full");
+    let lost = run(full.unwrap().into());
+    let said = String::from_utf8(lost.stderr).unwrap();
+    assert_eq!(lost.status.code(), Some(5), "{said}");
+    assert!(said.contains("cannot write to stdout"), "{said}");
+    // Whoever reads no further knows so itself.
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let closed = run(writer.into());
+    assert_eq!(closed.status.code(), Some(0));
+    assert!(
+        closed.stderr.is_empty(),
+        "{:?}",
+        String::from_utf8(closed.stderr)
+    );
+}

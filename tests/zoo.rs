@@ -190,7 +190,7 @@ fn floods_with_huge_messages() {
 
 #[test]
 fn never_the_same() {
-    let (farm, _broker) = beside("never_the_same", "never_the_same is not asked");
+    let (farm, _broker) = beside("never_the_same", "");
     let status = farm.status().unwrap();
     let restless = status.notices.iter().filter(|it| it.kind == "restless");
     assert!(restless.count() > 0, "{:#?}", status.notices);

@@ -17,6 +17,7 @@ mod reporter_never_acknowledges;
 mod sends_garbage;
 mod slow;
 mod speaks_another_protocol;
+mod speaks_in_lines;
 mod stops_reading;
 mod writes_to_the_image;
 
@@ -45,6 +46,7 @@ pub static ANIMALS: &[Animal] = &[
     sends_garbage::ANIMAL,
     slow::ANIMAL,
     speaks_another_protocol::ANIMAL,
+    speaks_in_lines::ANIMAL,
     stops_reading::ANIMAL,
     writes_to_the_image::ANIMAL,
 ];
