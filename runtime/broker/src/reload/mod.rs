@@ -175,7 +175,7 @@ impl Sources {
             return Ok(Vec::new());
         };
         let cannot_look = |error: &std::io::Error| {
-            LoadError::Manifest(format!("cannot look into {}: {error}", to_text(&directory)))
+            LoadError::Manifest(format!("cannot look into {}: {error}", to_text(directory)))
         };
         match trust::directory(directory) {
             Ok(_) => {}
@@ -204,7 +204,7 @@ impl Sources {
         let (mut paths, mut others): (Vec<PathBuf>, Vec<PathBuf>) = all.partition(is_manifest);
         others.sort();
         notices.extend(others.iter().map(|path| {
-            let shown = to_text(&path);
+            let shown = to_text(path);
             format!("{shown}: is no manifest, those are files of this directory that end in .json")
         }));
         paths.sort();
@@ -245,7 +245,7 @@ impl Sources {
         if !is_away {
             return Ok(());
         }
-        let shown = to_text(&directory);
+        let shown = to_text(directory);
         Err(LoadError::Manifest(format!(
             "{shown} is not the directory that it was, and there is no manifest in it; its bundles stay \
              demanded until it is back (to do without them, start the broker anew)"
@@ -263,7 +263,7 @@ fn unasked(path: &Path, config: &Config, loaded: &Loaded) -> Vec<String> {
     let brought = bundles.filter_map(|it| Some((&it.name, loaded.brought.get(&it.name)?)));
     let unasked = brought.filter(|(name, _)| !config.bundles.is_empty() && !named(name));
     let (shown, note) = (
-        to_text(&path),
+        to_text(path),
         "it judges nothing, unless it is named by its short name",
     );
     unasked
