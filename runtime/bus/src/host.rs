@@ -355,9 +355,11 @@ impl Host {
         let expected = options.expected_peers.min(limits.peers) as u64;
         let room = expected * services.peer_bytes();
         let own = services.broker_bytes();
-        look_for_room(own + room, fitting_reserve(options.shm_reserve_bytes))?;
+        let needed = own + room + fitting_reserve(options.shm_reserve_bytes);
+        look_for_room(needed)?;
         let generation = Generation::begin(instance, limits)?;
-        keep_room(&generation.prefix, room)?;
+        // Somebody who takes no turns may have been faster.
+        keep_room(&generation.prefix, room).map_err(|_| no_room(needed))?;
         let hub = Hub::new(&generation.root, &generation.prefix, Access::Create)?;
         let documents = Documents::new(
             &hub,
@@ -740,18 +742,20 @@ impl Drop for Host {
     }
 }
 
-/// Whether a broker has room to start, beside what stays free.
-fn look_for_room(needed: u64, reserve: u64) -> Result<(), StartError> {
+/// Whether a broker has room to start.
+fn look_for_room(needed: u64) -> Result<(), StartError> {
     let memory = SharedMemory::now()?;
-    let needed = needed + reserve;
     // A memory of size 0 has no limit.
     match memory.size == 0 || memory.free >= needed {
         true => Ok(()),
-        false => Err(StartError::NoSharedMemory {
-            size: memory.size,
-            free: memory.free,
-            needed,
-        }),
+        false => Err(no_room(needed)),
+    }
+}
+
+fn no_room(needed: u64) -> StartError {
+    match SharedMemory::now() {
+        Ok(SharedMemory { size, free }) => StartError::NoSharedMemory { size, free, needed },
+        Err(error) => StartError::Io(error),
     }
 }
 
