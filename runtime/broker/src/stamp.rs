@@ -81,6 +81,17 @@ pub fn from_metadata(data: &Metadata) -> Stamp {
     from_stat(data.len(), Stat::of(data))
 }
 
+/// The stamp in what `fstatat` returned.
+pub fn from_statat(data: &rustix::fs::Stat) -> Stamp {
+    let time = |seconds, rest| i128::from(seconds) * 1_000_000_000 + rest;
+    Stamp {
+        size: u64::try_from(data.st_size).unwrap_or_default(),
+        mtime_ns: time(data.st_mtime, i128::from(data.st_mtime_nsec)),
+        ctime_ns: time(data.st_ctime, i128::from(data.st_ctime_nsec)),
+        inode: data.st_ino,
+    }
+}
+
 /// The stamp of a file as it was read.
 pub fn from_content(content: &Content) -> Stamp {
     // Bytes that are of no file have the stamp of none.
@@ -166,6 +177,8 @@ pub(crate) mod tests {
         for (time, expected) in times {
             let stamp = put(&path, b"<OpenDRIVE/>", time);
             assert_eq!(stamp_through_links(&path), Some(stamp));
+            let data = rustix::fs::stat(&path).unwrap();
+            assert_eq!(from_statat(&data), stamp);
             let limits = qcbus_ingest::Limits::default();
             let read = qcbus_ingest::prepare(&path, dir.path(), &limits).unwrap();
             let content = read.files()[0].content.as_ref().unwrap();

@@ -192,6 +192,11 @@ impl Broker {
             why: why.clone(),
         };
         // Whoever asks wants to see where to look, and no answer of any length.
-        self.unseen.iter().take(UNSEEN_SHOWN).map(unseen).collect()
+        let unseen = self.unseen.iter().take(UNSEEN_SHOWN).map(unseen);
+        self.looking
+            .takes_long()
+            .into_iter()
+            .chain(unseen)
+            .collect()
     }
 }

@@ -31,7 +31,7 @@ use crate::scouts::{PATIENCE, Scouts};
 use crate::stamp::stamp_of;
 use crate::store::{Reconciled, Store, remove_earlier_results};
 use crate::supervise::{Children, Surroundings};
-use crate::watch::{Seen, WatchOptions, Watcher, is_looked_at, scan_directory};
+use crate::watch::{Looking, Seen, WatchOptions, Watcher, is_looked_at, scan_directory};
 use crate::writers::{Order, Writers};
 use qcbus_disk::foreign::Lookout;
 use qcbus_disk::sweep;
@@ -84,6 +84,8 @@ impl Broker {
             loaded,
             in_force,
             watcher: None,
+            looking: Arc::default(),
+            takes_long: None,
             watch_mode: "once".to_owned(),
             unseen: BTreeMap::new(),
             lookout,
@@ -163,7 +165,7 @@ impl Broker {
                 poll: self.options.poll,
                 rescan: self.options.rescan,
             };
-            let watcher = Watcher::start(options, move |what| {
+            let watcher = Watcher::start(options, self.looking.clone(), move |what| {
                 // After the end of the loop nobody listens.
                 let _ = seen.send(what);
             });
@@ -173,7 +175,8 @@ impl Broker {
             return Ok(());
         }
         let (roots, files) = (self.options.roots.clone(), self.options.files.clone());
-        tokio::task::spawn_blocking(move || look_once(&roots, &files, &seen));
+        let looking = self.looking.clone();
+        tokio::task::spawn_blocking(move || look_once(&roots, &files, &looking, &seen));
         Ok(())
     }
 }
@@ -347,11 +350,16 @@ fn children(
     Ok(Children::new(surroundings, launches, generation, events))
 }
 
-fn look_once(roots: &[PathBuf], files: &[PathBuf], seen: &mpsc::UnboundedSender<Seen>) {
+fn look_once(
+    roots: &[PathBuf],
+    files: &[PathBuf],
+    looking: &Looking,
+    seen: &mpsc::UnboundedSender<Seen>,
+) {
     // The loop may have been told to quit meanwhile; then nobody listens.
     let tell = |what| drop(seen.send(what));
     for root in roots {
-        let found = scan_directory(root, roots);
+        let found = scan_directory(root, roots, looking);
         for unseen in found.unseen {
             tell(Seen::Unseen(unseen));
         }
@@ -361,7 +369,7 @@ fn look_once(roots: &[PathBuf], files: &[PathBuf], seen: &mpsc::UnboundedSender<
     }
     for file in files {
         let path = file.clone();
-        let why = match stamp_of(file) {
+        let why = match looking.at(file, || stamp_of(file)) {
             Ok(Some(stamp)) => {
                 tell(Seen::Settled(path.into(), stamp));
                 continue;
