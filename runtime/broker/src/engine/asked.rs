@@ -36,6 +36,7 @@ impl Broker {
                     file,
                     timeout_ms,
                     answer: asked.answer,
+                    is_led: false,
                 };
                 self.look_at(look)
             }

@@ -14,12 +14,15 @@ use crate::core::{Event, Input, PrepareFailure, Stamp};
 use crate::result_paths::ResultPaths;
 use crate::scouts::PATIENCE;
 use crate::stamp::{stamp_of, stamp_through_links};
+use crate::watch::{is_behind_a_link, is_left_alone, is_looked_at};
 
 /// A client that waits for the verdict on a file, which is being looked at for it.
 pub(super) struct Look {
     pub file: PathBuf,
     pub timeout_ms: Option<u64>,
     pub answer: oneshot::Sender<Response>,
+    /// The path that was given led to this file.
+    pub is_led: bool,
 }
 
 /// What a scout has seen.
@@ -40,26 +43,21 @@ pub(super) struct Looked {
 }
 
 enum Seen {
-    /// It is watched under this name.
-    Named(PathBuf),
+    /// The path means another file.
+    Elsewhere(PathBuf),
     Sighted(Sighted),
 }
 
 impl Broker {
     /// Sends a scout to a file that a client asks for.
     pub(super) fn look_at(&mut self, look: Look) -> bool {
-        if !self.store.places.contains(&look.file) {
-            let (file, places) = (look.file.clone(), self.store.clone());
-            return self.send_scout(look, move || Seen::Named(as_watched(file, &places.places)));
-        }
-        self.look_closely_at(look)
-    }
-
-    fn look_closely_at(&mut self, look: Look) -> bool {
-        let file = look.file.clone();
+        let (file, is_led) = (look.file.clone(), look.is_led);
         let inputs = self.state.inputs_of(&file).into_iter().skip(1).collect();
         let (store, roots) = (self.store.clone(), self.options.roots.clone());
         self.send_scout(look, move || {
+            if let Some(file) = meant(&file, &store.places, &roots).filter(|_| !is_led) {
+                return Seen::Elsewhere(file);
+            }
             let moved = moved(inputs);
             let stamp = stamp_of(&file).ok().flatten();
             let unwatched = why_unwatched(&file, stamp, &store.places, &roots);
@@ -102,7 +100,14 @@ impl Broker {
             return true;
         };
         match looked.seen {
-            Seen::Named(file) => self.look_closely_at(Look { file, ..look }),
+            Seen::Elsewhere(file) => {
+                let is_led = true;
+                self.look_at(Look {
+                    file,
+                    is_led,
+                    ..look
+                })
+            }
             Seen::Sighted(seen) => self.wait(look, seen),
         }
     }
@@ -146,9 +151,19 @@ impl Broker {
     }
 }
 
-fn as_watched(file: PathBuf, places: &ResultPaths) -> PathBuf {
-    let real = foreign::canonicalize(&file).ok();
-    real.filter(|real| places.contains(real)).unwrap_or(file)
+/// A link from elsewhere to a watched file means that file, and so does a path to it through a link to its
+/// directory.
+fn meant(file: &Path, places: &ResultPaths, roots: &[PathBuf]) -> Option<PathBuf> {
+    if !places.contains(file) {
+        let real = foreign::canonicalize(file).ok();
+        return real.filter(|real| places.contains(real));
+    }
+    if !is_behind_a_link(file, roots) {
+        return None;
+    }
+    let real = foreign::canonicalize(file.parent()?).ok()?;
+    let real = real.join(file.file_name()?);
+    is_looked_at(roots, &real).then_some(real)
 }
 
 fn moved(inputs: Vec<Input>) -> Vec<(Arc<Path>, Option<Stamp>)> {
@@ -173,11 +188,12 @@ fn why_unwatched(
         ))
     } else if !places.contains(file) {
         Some(format!("{shown} lies outside the watched directories"))
-    } else if stamp.is_some() && crate::watch::is_left_alone(roots, file) {
+    } else if stamp.is_some() && is_left_alone(roots, file) {
         Some(format!("{shown} is ignored (by its name or a .qcignore)"))
-    } else if stamp.is_some() && !crate::watch::is_looked_at(roots, file) {
+    } else if stamp.is_some() && !is_looked_at(roots, file) {
         Some(format!(
-            "{shown} lies behind a symbolic link to a directory, and such links are not followed"
+            "{shown} lies behind a symbolic link to a directory that is not watched, and such links are not \
+             followed; name that directory, too, to have it watched"
         ))
     } else {
         None

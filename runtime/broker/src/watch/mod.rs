@@ -34,11 +34,11 @@ use rustix::event::EventfdFlags;
 use self::ignore::IgnoreRules;
 use self::looker::Looker;
 use self::scan::scan;
-use self::sight::is_behind_a_link;
 use crate::core::Stamp;
 
 pub use self::looking::Looking;
 pub use self::scan::Scan;
+pub use self::sight::is_behind_a_link;
 
 /// Every checkable file below a directory, once. `roots` are all the directories that are looked
 /// at, without symbolic links; `looking` says where the look is.
