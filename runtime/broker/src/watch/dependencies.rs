@@ -9,6 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
+use super::looking::Looking;
 use super::tree::below;
 use crate::core::Stamp;
 use crate::stamp::stamp_through_links;
@@ -28,6 +29,8 @@ pub struct Dependencies {
     told: BTreeMap<Arc<Path>, Option<Stamp>>,
     /// The last of `told` that was looked at: the others have their turn after it.
     last: Option<Arc<Path>>,
+    /// Says where the look is: they may lie anywhere.
+    looking: Arc<Looking>,
 }
 
 #[derive(Debug)]
@@ -41,6 +44,14 @@ struct Polled {
 pub type Changed = (Arc<Path>, Option<Stamp>);
 
 impl Dependencies {
+    /// None yet; `looking` says where the look at them is.
+    pub fn new(looking: Arc<Looking>) -> Dependencies {
+        Dependencies {
+            looking,
+            ..Dependencies::default()
+        }
+    }
+
     /// Adds files, each with the stamp under which it was read: a change since then is one, too.
     pub fn add(&mut self, files: Vec<(Arc<Path>, Option<Stamp>)>) {
         for (path, stamp) in files {
@@ -69,7 +80,7 @@ impl Dependencies {
         let polled = self.polled.remove_entry(path);
         let polled = polled.map(|(path, polled)| (path, polled.stamp));
         let (path, seen) = polled.or_else(|| self.told.remove_entry(path))?;
-        let stamp = stamp_through_links(&path);
+        let stamp = self.looking.at(&path, || stamp_through_links(&path));
         self.poll(path.clone(), stamp);
         (stamp != seen).then_some((path, stamp))
     }
@@ -105,7 +116,7 @@ impl Dependencies {
                     told.push(path.clone());
                 }
             }
-            let stamp = stamp_through_links(path);
+            let stamp = self.looking.at(path, || stamp_through_links(path));
             if stamp != polled.stamp {
                 polled.stamp = stamp;
                 polled.asked = false;
@@ -132,7 +143,7 @@ impl Dependencies {
             .collect();
         self.last = due.last().map(|(path, _)| path.clone());
         let look = |(path, seen): Changed| {
-            let stamp = stamp_through_links(&path);
+            let stamp = self.looking.at(&path, || stamp_through_links(&path));
             (stamp != seen).then_some((path, stamp))
         };
         let changed: Vec<Changed> = due.into_iter().filter_map(look).collect();

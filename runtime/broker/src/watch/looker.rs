@@ -75,7 +75,7 @@ impl Looker {
             unseen: BTreeMap::new(),
             is_more_unseen: false,
             settling: Settling::default(),
-            dependencies: Dependencies::default(),
+            dependencies: Dependencies::new(looking.clone()),
             roots: Roots::default(),
             tree: Tree::default(),
             due: Due::new(Instant::now()),
