@@ -109,9 +109,7 @@ impl Broker {
         if let Some(limited) = limited {
             let _ = senders.notices.send(Notice::Limited(limited));
         }
-        for said in &reconciled.said {
-            let _ = senders.notices.send(Notice::Storing(said.clone()));
-        }
+        tell_what_was_put_right(&reconciled, &senders.notices);
         let dependencies = broker.remember(reconciled);
         broker.look(dependencies, senders.seen)?;
         Ok(broker)
@@ -178,6 +176,13 @@ impl Broker {
         let looking = self.looking.clone();
         tokio::task::spawn_blocking(move || look_once(&roots, &files, &looking, &seen));
         Ok(())
+    }
+}
+
+fn tell_what_was_put_right(reconciled: &Reconciled, notices: &mpsc::UnboundedSender<Notice>) {
+    for said in &reconciled.said {
+        // The loop that listens has not ended before it began.
+        let _ = notices.send(Notice::Storing(said.clone()));
     }
 }
 
