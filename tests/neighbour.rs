@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use nix::libc;
 use qcbus_messages::Verdict;
 use qcbus_messages::control::{NoticeStatus, Request, Response};
 use support::broker::Broker;
@@ -115,7 +116,7 @@ fn maps_that_the_kernel_makes_up_hold_up_nobody() {
 fn lease(file: &File) -> bool {
     use std::os::fd::AsRawFd;
     // SAFETY: a bare system call on a descriptor that is open.
-    unsafe { nix::libc::fcntl(file.as_raw_fd(), nix::libc::F_SETLEASE, nix::libc::F_WRLCK) == 0 }
+    unsafe { libc::fcntl(file.as_raw_fd(), libc::F_SETLEASE, libc::F_WRLCK) == 0 }
 }
 
 #[test]
@@ -124,7 +125,7 @@ fn leases_hold_up_nobody() {
     #[expect(unsafe_code, reason = "no other call keeps the default action away")]
     // SAFETY: nothing is called when the signal comes.
     unsafe {
-        nix::libc::signal(nix::libc::SIGIO, nix::libc::SIG_IGN);
+        libc::signal(libc::SIGIO, libc::SIG_IGN);
     }
     let farm = Farm::new();
     let aside = farm.base().join("aside");

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::process::Stdio;
 
-use rustix::process::{Resource, Rlimit, setrlimit};
 use qcbus_bus::{LAUNCH, Process};
+use rustix::process::{Resource, Rlimit, setrlimit};
 use tokio::process::{Child, Command};
 use tokio::sync::mpsc::UnboundedSender;
 

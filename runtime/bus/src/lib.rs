@@ -38,9 +38,9 @@ pub use entrance::LAUNCH;
 pub use held::Held;
 pub use host::{Host, HostEvent, HostOptions, PeerId, StartError};
 pub use instance::{Instance, InstanceError};
+pub use memory::SharedMemory;
 #[doc(hidden)]
 pub use peer::Claims;
-pub use memory::SharedMemory;
 pub use peer::{JoinError, Peer, PeerEvent, PeerOptions};
 pub use ports::ICEORYX2_VERSION;
 pub use private::{PRIVATE_PREFIX, sweep_private_instances};
