@@ -11,7 +11,7 @@ use qcbus_messages::services::{FRAME_BUFFER, Limits, SPARE_SESSIONS, Services, T
 use qcbus_messages::{Digest, FromPeer, Hello, ToPeer};
 
 use crate::documents::{Documents, fitting_reserve, free_shared_memory};
-use crate::generation::{Generation, sweep};
+use crate::generation::{Generation, close_to_others, sweep};
 use crate::instance::{Instance, InstanceError, InstanceLock, LockError};
 use crate::janitor::Janitor;
 use crate::link::SessionKey;
@@ -277,6 +277,7 @@ impl Host {
             limits,
             services,
         };
+        close_to_others(&host.generation.root)?;
         host.generation.announce(instance)?;
         Ok(host)
     }

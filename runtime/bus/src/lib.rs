@@ -7,13 +7,15 @@
 //!
 //! This is the only crate that names iceoryx2. How it is made:
 //!
-//! * `ports`: iceoryx2's configuration, and the only constructor of services and ports;
+//! * `enclosed`: where iceoryx2 puts its memory; `ports`: its configuration, and the only
+//!   constructor of services and ports;
 //! * `stream`, `link`: the streams, first as arithmetic, then on the bus;
 //! * `instance`, `generation`, `process`, `janitor`: finding each other, noticing deaths, leaving
 //!   nothing behind;
 //! * `host` with `session`, `documents`; `peer` with `membership`, `library`; `held`; `wake`.
 
 mod documents;
+mod enclosed;
 mod generation;
 mod held;
 mod host;

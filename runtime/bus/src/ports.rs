@@ -14,7 +14,8 @@ use iceoryx2::prelude::*;
 use iceoryx2::service::port_factory::{event, publish_subscribe};
 use qcbus_messages::services::{Growth, Topic, Wake};
 
-pub(crate) type Service = ipc_threadsafe::Service;
+pub(crate) use crate::enclosed::Enclosed as Service;
+
 pub(crate) type Pub<T, H> = Publisher<Service, [T], H>;
 pub(crate) type Sub<T, H> = Subscriber<Service, [T], H>;
 pub(crate) type TopicService<T, H> = publish_subscribe::PortFactory<Service, [T], H>;

@@ -14,4 +14,5 @@ mod support;
 mod deaths;
 mod delivery;
 mod documents;
+mod privacy;
 mod torture;
