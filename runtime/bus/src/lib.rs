@@ -12,10 +12,12 @@
 //! * `stream`, `link`: the streams, first as arithmetic, then on the bus;
 //! * `instance`, `generation`, `process`, `janitor`: finding each other, noticing deaths, leaving
 //!   nothing behind;
-//! * `host` with `session`, `documents`; `peer` with `membership`, `library`; `held`; `wake`.
+//! * `host` with `session`, `turn`, `documents`; `peer` with `membership`, `library`; `held`; `wake`.
 
 mod documents;
 mod enclosed;
+#[doc(hidden)]
+pub mod fuzzing;
 mod generation;
 mod held;
 mod host;
@@ -30,6 +32,7 @@ mod private;
 mod process;
 mod session;
 mod stream;
+mod turn;
 mod wake;
 
 pub use documents::{Documents, Loan, LoanError, PublishError};

@@ -12,7 +12,7 @@ use crate::generation::Generation;
 use crate::host::{ConfigHeader, HelloHeader};
 use crate::instance::Instance;
 use crate::library::Library;
-use crate::link::{FrameHeader, Link, SessionKey};
+use crate::link::{FrameHeader, Link, SessionKey, Wants};
 use crate::peer::PeerEvent;
 use crate::ports::{self, Access, Hub, PortError, Pub, Sub, TopicService, WakeNotifier};
 use crate::process::Process;
@@ -221,6 +221,7 @@ impl Membership {
             loop {
                 let drained = channels.link.drain(QUOTA, |bytes| {
                     messages.push(codec::decode::<ToPeer>(bytes));
+                    Wants::More
                 });
                 ended |= drained.farewell.is_some() || drained.broken.is_some();
                 if drained.frames < QUOTA || messages.len() + events.len() >= max_events {

@@ -93,10 +93,11 @@ impl Outgoing {
         self.taken += 1;
     }
 
-    /// Everything up to and including `seq` has arrived. Numbers never sent are ignored.
-    pub(crate) fn acknowledge(&mut self, seq: u64, now: Instant) {
+    /// Everything up to and including `seq` has arrived. Numbers never sent are ignored; `true` when
+    /// this is news.
+    pub(crate) fn acknowledge(&mut self, seq: u64, now: Instant) -> bool {
         if seq < self.base || seq >= self.base + self.sealed as u64 {
-            return;
+            return false;
         }
         let arrived = (seq + 1 - self.base) as usize;
         for mut frame in self.frames.drain(..arrived) {
@@ -111,6 +112,7 @@ impl Outgoing {
         self.sealed -= arrived;
         self.last_progress = now;
         self.patience = RESEND_AFTER;
+        true
     }
 
     /// Goes back to the first unacknowledged frame when there was no sign of it for too long.
@@ -133,10 +135,19 @@ impl Outgoing {
     }
 }
 
-/// What arrived is no stream of ours: a length that no message has.
+/// What arrived is no stream of ours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("a message of {0} bytes was announced; at most {MAX_MESSAGE} are allowed")]
-pub(crate) struct BrokenStream(pub(crate) u32);
+pub(crate) enum BrokenStream {
+    /// A length that no message has.
+    #[error("a message of {0} bytes was announced; at most {MAX_MESSAGE} are allowed")]
+    Message(u32),
+    /// A length that no frame has.
+    #[error("a frame of {0} bytes came; at most {FRAME_BYTES} are allowed")]
+    Frame(usize),
+    /// A flood.
+    #[error("{0} frames in a row brought nothing")]
+    Useless(u32),
+}
 
 /// The receiving half.
 #[derive(Debug, Default)]
@@ -171,7 +182,8 @@ impl Incoming {
                 if let Some(length) = self.expected()
                     && length > MAX_MESSAGE
                 {
-                    return Err(BrokenStream(u32::try_from(length).unwrap_or(u32::MAX)));
+                    let length = u32::try_from(length).unwrap_or(u32::MAX);
+                    return Err(BrokenStream::Message(length));
                 }
                 continue;
             };
@@ -374,7 +386,7 @@ mod tests {
         let too_long = (huge + 1).to_le_bytes();
         assert_eq!(
             incoming.accept(1, &too_long, |_| {}),
-            Err(BrokenStream(huge + 1))
+            Err(BrokenStream::Message(huge + 1))
         );
     }
 }

@@ -14,5 +14,6 @@ mod support;
 mod deaths;
 mod delivery;
 mod documents;
+mod hostile;
 mod privacy;
 mod torture;
