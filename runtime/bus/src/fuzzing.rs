@@ -51,8 +51,7 @@ impl Rogue {
     pub fn new(instance: &Instance) -> Result<Rogue, String> {
         let generation = Generation::current(instance).ok_or("no broker")?;
         let services = Services::new(&generation.limits);
-        let hub = Hub::new(&generation.root, &generation.prefix, Access::Open)
-            .map_err(|error| in_words(&error))?;
+        let hub = Hub::new(&generation.root, Access::Open).map_err(|error| in_words(&error))?;
         let greetings = hub
             .topic(&services.hello, "")
             .map_err(|error| in_words(&error))?;

@@ -63,10 +63,11 @@ impl Generation {
         let dir = instance.dir().join(format!("g{number}"));
         let _ = fs::remove_dir_all(&dir);
         fs::DirBuilder::new().mode(0o700).create(&dir)?;
-        let root = root_in_memory(&identity, number)?;
+        let prefix = format!("{identity}{number:x}_");
+        let root = root_in_memory(&prefix)?;
         Ok(Generation {
             number,
-            prefix: format!("g{number:x}_"),
+            prefix,
             root,
             protocol: PROTOCOL_VERSION,
             iceoryx2: ICEORYX2_VERSION.to_owned(),
@@ -100,9 +101,15 @@ pub(crate) fn sweep(instance: &Instance, keep: Option<&Generation>) {
     };
     for name in names_in(Path::new(SHARED_MEMORY)) {
         let path = Path::new(SHARED_MEMORY).join(&name);
-        if name.starts_with(&identity) && keep.is_none_or(|keep| keep.root != path) {
-            let _ = fs::remove_dir_all(path);
+        let kept = keep.is_some_and(|keep| keep.root == path);
+        if !name.starts_with(&identity) || kept {
+            continue;
         }
+        let _ = match path.is_dir() {
+            true => fs::remove_dir_all(path),
+            // Of a version that put its segments there.
+            false => fs::remove_file(path),
+        };
     }
     for name in names_in(instance.dir()) {
         let kept = keep.is_some_and(|keep| name == format!("g{}", keep.number));
@@ -163,11 +170,11 @@ pub(crate) fn random() -> u64 {
 /// The directory of everything that iceoryx2 makes, segments and the small files that it writes for
 /// every service and port: in memory, and open to nobody else. Its name cannot be known beforehand, so
 /// nobody can take it first.
-fn root_in_memory(identity: &str, number: u64) -> io::Result<PathBuf> {
+fn root_in_memory(prefix: &str) -> io::Result<PathBuf> {
     let mut last = io::Error::from(io::ErrorKind::AlreadyExists);
     for _ in 0..ATTEMPTS {
-        // iceoryx2 binds Unix sockets in it, whose own names take up to 66 of the kernel's 107 bytes.
-        let name = format!("{identity}{number:x}_{:08x}", random() >> 32);
+        // iceoryx2 binds Unix sockets in it, whose own names take up to 48 of the kernel's 107 bytes.
+        let name = format!("{prefix}{:08x}", random() >> 32);
         let root = Path::new(SHARED_MEMORY).join(name);
         match fs::DirBuilder::new().mode(0o700).create(&root) {
             Ok(()) => return Ok(root),

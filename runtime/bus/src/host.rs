@@ -255,7 +255,7 @@ impl Host {
             return Err(StartError::NoSharedMemory { free, needed });
         }
         let generation = Generation::begin(instance, limits)?;
-        let hub = Hub::new(&generation.root, &generation.prefix, Access::Create)?;
+        let hub = Hub::new(&generation.root, Access::Create)?;
         let documents = Documents::new(
             &hub,
             generation.number,

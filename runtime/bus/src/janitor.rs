@@ -24,8 +24,7 @@ pub(crate) struct Janitor {
 
 impl Janitor {
     pub(crate) fn start(instance: &Instance, generation: &Generation) -> std::io::Result<Janitor> {
-        let config = generation_config(&generation.root, &generation.prefix)
-            .map_err(std::io::Error::other)?;
+        let config = generation_config(&generation.root).map_err(std::io::Error::other)?;
         let (stop, asked) = channel();
         let (done, stopped) = channel();
         let (instance, generation) = (instance.clone(), generation.clone());

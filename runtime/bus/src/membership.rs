@@ -95,7 +95,7 @@ impl Membership {
             return Err(BeginError::Hello(why));
         }
         let services = Services::new(&generation.limits);
-        let hub = Hub::new(&generation.root, &generation.prefix, Access::Open)?;
+        let hub = Hub::new(&generation.root, Access::Open)?;
         let config = hub.topic(&services.config, "")?;
         let greetings = hub.topic(&services.hello, "")?;
         let wake = hub.wake(&services.wake_broker, "")?;

@@ -78,14 +78,18 @@ pub(crate) struct Hub {
     access: Access,
 }
 
+/// What iceoryx2's files begin with. Short, for sockets are among them; they lie in a directory of
+/// their own, so it need not tell them from others.
+const PREFIX: &[u8] = b"q_";
+
 /// iceoryx2's settings for one generation. Never the global ones: those read a file from the
 /// working directory.
-pub(crate) fn generation_config(root: &Path, prefix: &str) -> Result<Config, PortError> {
+pub(crate) fn generation_config(root: &Path) -> Result<Config, PortError> {
     let mut config = Config::default();
     let root = iceoryx2::prelude::Path::new(root.as_os_str().as_encoded_bytes())
         .explain("the runtime directory's path")?;
     config.global.set_root_path(&root);
-    config.global.prefix = FileName::new(prefix.as_bytes()).explain("the prefix")?;
+    config.global.prefix = FileName::new(PREFIX).explain("the prefix")?;
     config.global.creation_timeout = Duration::from_millis(500);
     // Dead nodes are cleaned by the broker's janitor and by nobody else: a peer has no business
     // there, and the broker's loop has no 20 ms to give away.
@@ -101,10 +105,10 @@ pub(crate) fn generation_config(root: &Path, prefix: &str) -> Result<Config, Por
 
 impl Hub {
     /// Joins a generation.
-    pub(crate) fn new(root: &Path, prefix: &str, access: Access) -> Result<Hub, PortError> {
+    pub(crate) fn new(root: &Path, access: Access) -> Result<Hub, PortError> {
         // What iceoryx2 has to say arrives as error values; it prints nothing of its own.
         set_log_level_from_env_or(LogLevel::Fatal);
-        let config = generation_config(root, prefix)?;
+        let config = generation_config(root)?;
         let node = NodeBuilder::new()
             .config(&config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
@@ -295,7 +299,7 @@ mod tests {
         let instance = crate::Instance::at(dir.path().to_owned());
         let limits = Limits::default();
         let generation = crate::generation::Generation::begin(&instance, limits).unwrap();
-        let hub = Hub::new(&generation.root, &generation.prefix, Access::Create).unwrap();
+        let hub = Hub::new(&generation.root, Access::Create).unwrap();
         let services = Services::new(&limits);
         for row in services.topics() {
             if row.element == size_of::<Block>() {
