@@ -6,8 +6,13 @@ use std::path::PathBuf;
 use std::process::Command;
 use std::time::Duration;
 
+use qcbus_bus::{Held, PeerEvent};
+use qcbus_document::fuzzing::{Tree, walk};
+use qcbus_document::{Document, FileKind};
+use qcbus_messages::{Digest, DocId};
+
 use crate::helper::Helper;
-use crate::support::{Site, identity_of, join, run, shared_memory_named};
+use crate::support::{Site, WATCHDOG, identity_of, join, run, shared_memory_named};
 
 /// Somebody who has nothing.
 const NOBODY: u32 = 65534;
@@ -116,5 +121,79 @@ fn others_see_one_name_and_cannot_foresee_the_next() {
         assert_eq!(host.generation(), 2);
         let _peer = join(&mut host, &site, "there").await;
         let _ = std::fs::remove_file(&planted);
+    });
+}
+
+/// An image of a few dozen elements, in ASCII.
+fn image() -> Vec<u8> {
+    let mut root = Tree::new("OpenDRIVE");
+    for id in 0..6 {
+        let lane = Tree::new("lane").with("id", "-1").saying("sidewalk");
+        let road = Tree::new("road").with("id", &id.to_string());
+        let road = road.with("name", "Street").with("length", "12.5");
+        root = root.holding(road.holding(Tree::new("lanes").holding(lane.clone()).holding(lane)));
+    }
+    root.image("maps/straight.xodr").unwrap()
+}
+
+/// Reads an image in every way until it was seen as it is and changed, often each. Returns how often
+/// it was refused.
+fn read_it_while_it_changes(held: &Held, sound: &[u8]) -> usize {
+    let as_it_is = walk(Document::open(sound).unwrap());
+    let (mut same, mut other, mut refused) = (0, 0, 0);
+    let before = Document::open(sound).unwrap().len();
+    while same < 20 || other < 2_000 {
+        let Ok(document) = Document::open(held) else {
+            refused += 1;
+            continue;
+        };
+        match walk(document) == as_it_is {
+            true => same += 1,
+            false => other += 1,
+        }
+        // Whatever it says, it ends; and what it says is not believed.
+        for _ in 0..50 {
+            let _ = document.validate();
+        }
+        if let Some(node) = document.root() {
+            assert!(node.ancestors().count() <= before as usize);
+        }
+    }
+    refused
+}
+
+#[test]
+fn a_slot_that_is_rewritten_while_it_is_read() {
+    run(async {
+        let site = Site::new();
+        let mut host = site.host();
+        let sound = image();
+        let mut loan = host.documents().loan(sound.len()).unwrap();
+        loan.copy_from_slice(&sound);
+        let ours = loan
+            .publish(DocId(1), sound.len(), Digest::default(), FileKind::Xodr)
+            .unwrap();
+        let (_, mut peer) = join(&mut host, &site, "reader").await;
+        let held = loop {
+            tokio::select! {
+                event = host.next() => panic!("{event:?}"),
+                event = peer.next() => if matches!(event, PeerEvent::Document(_)) {
+                    break peer.document(DocId(1)).unwrap();
+                }
+            }
+        };
+        assert_eq!(&*held, &sound[..]);
+        let mut rewriter = Helper::start("rewrites_images", &site.instance);
+        assert_eq!(rewriter.line(), "rewrites");
+        let (done, reading) = std::sync::mpsc::channel();
+        let original = sound.clone();
+        std::thread::spawn(move || {
+            let _ = done.send(read_it_while_it_changes(&held, &original));
+        });
+        let refused = reading.recv_timeout(WATCHDOG);
+        rewriter.kill();
+        let refused = refused.expect("reading ended neither well nor at all");
+        println!("refused {refused} times");
+        drop(ours);
     });
 }
