@@ -14,6 +14,7 @@ mod support;
 mod deaths;
 mod delivery;
 mod documents;
+mod fuzz;
 mod hostile;
 mod privacy;
 mod torture;
