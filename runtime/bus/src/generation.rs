@@ -21,6 +21,8 @@ use crate::process::{Process, start_time};
 
 const CURRENT: &str = "current";
 const IDENTITY: &str = "id";
+/// Bytes of what is in it.
+const IDENTITY_LEN: usize = 18;
 const SHARED_MEMORY: &str = "/dev/shm";
 /// Names that are tried for such a directory; each is as good as new.
 const ATTEMPTS: usize = 16;
@@ -86,7 +88,26 @@ impl Generation {
         Ok(())
     }
 
-    /// Withdraws it, so that peers stop trying to join. First step of a stop.
+    /// Makes again what was taken from the runtime directory. What somebody else has put into a file's
+    /// place stays.
+    pub(crate) fn restore(&self, instance: &Instance) -> io::Result<()> {
+        if !instance.dir().join(IDENTITY).exists()
+            && let Some(identity) = self.prefix.get(..IDENTITY_LEN)
+        {
+            write_identity(instance, identity)?;
+        }
+        let dir = instance.dir().join(format!("g{}", self.number));
+        if !dir.exists() {
+            fs::DirBuilder::new().mode(0o700).create(&dir)?;
+        }
+        if !instance.dir().join(CURRENT).exists() {
+            tracing::warn!("`{CURRENT}` was removed from the runtime directory; it was made again");
+            self.announce(instance)?;
+        }
+        Ok(())
+    }
+
+    /// Withdraws it, so that peers stop trying to join.
     pub(crate) fn withdraw(&self, instance: &Instance) {
         let _ = fs::remove_file(instance.dir().join(CURRENT));
     }
@@ -148,7 +169,7 @@ fn last_number(instance: &Instance) -> u64 {
 fn identity(instance: &Instance) -> io::Result<String> {
     let path = instance.dir().join(IDENTITY);
     if let Ok(text) = fs::read_to_string(&path)
-        && text.len() == 18
+        && text.len() == IDENTITY_LEN
         && text.starts_with("qc")
         && text[2..17].bytes().all(|byte| byte.is_ascii_hexdigit())
         && text.ends_with('g')
@@ -156,10 +177,15 @@ fn identity(instance: &Instance) -> io::Result<String> {
         return Ok(text);
     }
     let fresh = format!("qc{:015x}g", random() >> 4);
-    let mut file = tempfile::NamedTempFile::new_in(instance.dir())?;
-    file.write_all(fresh.as_bytes())?;
-    file.persist(&path)?;
+    write_identity(instance, &fresh)?;
     Ok(fresh)
+}
+
+fn write_identity(instance: &Instance, identity: &str) -> io::Result<()> {
+    let mut file = tempfile::NamedTempFile::new_in(instance.dir())?;
+    file.write_all(identity.as_bytes())?;
+    file.persist(instance.dir().join(IDENTITY))?;
+    Ok(())
 }
 
 /// A random number; not for secrets.

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 use std::ops::Bound;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use iceoryx2::port::update_connections::UpdateConnections;
@@ -19,6 +20,7 @@ use crate::instance::{Instance, InstanceError, InstanceLock, LockError};
 use crate::janitor::Janitor;
 use crate::link::SessionKey;
 use crate::ports::{self, Access, Hub, PortError, Pub, Sub};
+use crate::presence::{Claim, Presence};
 use crate::session::Session;
 use crate::turn::{Budget, Waiting};
 use crate::wake::{TICK, Waker};
@@ -172,7 +174,7 @@ pub enum HostEvent {
 /// memory that somebody has mapped stays readable.
 pub struct Host {
     generation: Generation,
-    instance: Instance,
+    presence: Arc<Presence>,
     limits: Limits,
     services: Services,
     waiting: Waiting,
@@ -198,14 +200,15 @@ pub struct Host {
 /// Dropped last: unlinks what is still there, and only then gives the instance up.
 struct Remains {
     instance: Instance,
-    lock: Option<InstanceLock>,
+    claim: Claim,
 }
 
 impl Drop for Remains {
     fn drop(&mut self) {
         // The ports have unlinked what is theirs; this is for what workers and peers still hold.
         sweep(&self.instance, None);
-        if let Some(lock) = self.lock.take() {
+        let mut claim = self.claim.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(lock) = claim.take() {
             lock.release();
         }
     }
@@ -244,9 +247,10 @@ impl Host {
             },
             LockError::Io(error) => StartError::Io(error),
         })?;
+        let claim: Claim = Arc::new(Mutex::new(Some(lock)));
         let remains = Remains {
             instance: instance.clone(),
-            lock: Some(lock),
+            claim: Arc::clone(&claim),
         };
         let limits = options.limits();
         let services = Services::new(&limits);
@@ -263,11 +267,17 @@ impl Host {
             fitting_reserve(options.shm_reserve_bytes),
         )?;
         let wake = hub.wake(&services.wake_broker, "")?;
+        let hello = subscribe(&hub, &services.hello)?;
+        let config = publish(&hub, &services.config)?;
+        let waker = Waker::new(ports::listener(&wake)?)?;
+        close_to_others(&generation.root)?;
+        let presence = Arc::new(Presence::new(instance, &generation, &claim));
         let host = Host {
-            hello: subscribe(&hub, &services.hello)?,
-            config: publish(&hub, &services.config)?,
-            waker: Waker::new(ports::listener(&wake)?)?,
-            _janitor: Janitor::start(instance, &generation)?,
+            hello,
+            config,
+            waker,
+            _janitor: Janitor::start(instance, &generation, Arc::clone(&presence))?,
+            presence,
             documents,
             hub,
             waiting: Waiting::default(),
@@ -278,14 +288,12 @@ impl Host {
             last_turn: Instant::now(),
             last_tick: Instant::now(),
             last_watch: Instant::now(),
-            instance: instance.clone(),
             _remains: remains,
             generation,
             limits,
             services,
         };
-        close_to_others(&host.generation.root)?;
-        host.generation.announce(instance)?;
+        host.presence.announce()?;
         Ok(host)
     }
 
@@ -600,7 +608,7 @@ impl Host {
 
 impl Drop for Host {
     fn drop(&mut self) {
-        self.generation.withdraw(&self.instance);
+        self.presence.withdraw();
         self.documents.stop();
         for session in self.sessions.values_mut() {
             session.link.farewell("");

@@ -10,7 +10,7 @@
 //! * `enclosed`: where iceoryx2 puts its memory; `ports`: its configuration, and the only
 //!   constructor of services and ports;
 //! * `stream`, `link`: the streams, first as arithmetic, then on the bus;
-//! * `instance`, `generation`, `process`, `janitor`: finding each other, noticing deaths, leaving
+//! * `instance`, `generation`, `presence`, `process`, `janitor`: finding each other, noticing deaths, leaving
 //!   nothing behind;
 //! * `host` with `session`, `turn`, `documents`; `peer` with `membership`, `library`; `held`; `wake`.
 
@@ -28,6 +28,7 @@ mod link;
 mod membership;
 mod peer;
 mod ports;
+mod presence;
 mod private;
 mod process;
 mod session;

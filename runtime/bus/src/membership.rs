@@ -351,7 +351,9 @@ impl Membership {
             }
             None => true,
         };
-        kept && self.broker.is_alive()
-            && Generation::current(instance).as_ref() == Some(&self.generation)
+        // A file that is not there says nothing: a broker that goes closes its channels, and one whose
+        // directory was cleaned makes it again.
+        let told = Generation::current(instance);
+        kept && self.broker.is_alive() && told.is_none_or(|current| current == self.generation)
     }
 }

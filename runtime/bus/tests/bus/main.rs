@@ -11,6 +11,7 @@
 mod helper;
 mod support;
 
+mod cleaned;
 mod deaths;
 mod delivery;
 mod documents;
