@@ -9,6 +9,9 @@ use qcbus_messages::control::{Request, Response};
 use tokio::io::{AsyncBufReadExt, AsyncReadExt, AsyncWriteExt, BufReader};
 use tokio::net::{UnixListener, UnixStream};
 use tokio::sync::{mpsc, oneshot};
+use tokio::task::AbortHandle;
+
+mod place;
 
 /// File name of the socket in the instance's directory.
 pub const SOCKET: &str = "control.sock";
@@ -33,6 +36,7 @@ pub struct Asked {
 pub struct ControlSocket {
     path: PathBuf,
     busy: Arc<AtomicUsize>,
+    kept: AbortHandle,
 }
 
 impl ControlSocket {
@@ -47,11 +51,18 @@ impl ControlSocket {
     ) -> std::io::Result<ControlSocket> {
         let path = directory.join(SOCKET);
         qcbus_disk::remove(&path)?;
-        let listener = UnixListener::bind(&path)?;
-        std::fs::set_permissions(&path, std::os::unix::fs::PermissionsExt::from_mode(0o600))?;
+        let listener = place::listen(directory)?;
         let busy = Arc::new(AtomicUsize::new(0));
-        tokio::spawn(accept(listener, inbox, busy.clone()));
-        Ok(ControlSocket { path, busy })
+        let counted = busy.clone();
+        let serve = move |listener| {
+            tokio::spawn(accept(listener, inbox.clone(), counted.clone())).abort_handle()
+        };
+        let kept = tokio::spawn(place::keep(directory.to_owned(), listener, serve));
+        Ok(ControlSocket {
+            path,
+            busy,
+            kept: kept.abort_handle(),
+        })
     }
 
     /// Waits until answers that have been given are written, but not for clients that do not read.
@@ -65,6 +76,8 @@ impl ControlSocket {
 
 impl Drop for ControlSocket {
     fn drop(&mut self) {
+        // First, or it would be made again.
+        self.kept.abort();
         // The directory may have been removed already.
         let _ = qcbus_disk::remove(&self.path);
     }
@@ -162,8 +175,7 @@ pub enum AskError {
 pub fn ask_broker(directory: &Path, request: &Request) -> Result<Response, AskError> {
     use std::io::{BufRead, Write};
     let path = directory.join(SOCKET);
-    let mut stream =
-        std::os::unix::net::UnixStream::connect(&path).map_err(|_| AskError::NoBroker { path })?;
+    let mut stream = place::connect(directory).map_err(|_| AskError::NoBroker { path })?;
     let lost = |error: std::io::Error| AskError::Left(error.to_string());
     let mut text =
         serde_json::to_vec(request).map_err(|error| AskError::NoAnswer(error.to_string()))?;
