@@ -20,7 +20,7 @@ use crate::instance::{Instance, InstanceError, InstanceLock, LockError};
 use crate::janitor::Janitor;
 use crate::link::SessionKey;
 use crate::ports::{self, Access, Hub, PortError, Pub, Sub};
-use crate::presence::{Claim, Presence};
+use crate::presence::{LockSlot, Presence};
 use crate::session::Session;
 use crate::turn::{Budget, Waiting};
 use crate::wake::{TICK, Waker};
@@ -200,15 +200,15 @@ pub struct Host {
 /// Dropped last: unlinks what is still there, and only then gives the instance up.
 struct Remains {
     instance: Instance,
-    claim: Claim,
+    lock: LockSlot,
 }
 
 impl Drop for Remains {
     fn drop(&mut self) {
         // The ports have unlinked what is theirs; this is for what workers and peers still hold.
         sweep(&self.instance, None);
-        let mut claim = self.claim.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(lock) = claim.take() {
+        let mut lock = self.lock.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(lock) = lock.take() {
             lock.release();
         }
     }
@@ -247,10 +247,10 @@ impl Host {
             },
             LockError::Io(error) => StartError::Io(error),
         })?;
-        let claim: Claim = Arc::new(Mutex::new(Some(lock)));
+        let lock: LockSlot = Arc::new(Mutex::new(Some(lock)));
         let remains = Remains {
             instance: instance.clone(),
-            claim: Arc::clone(&claim),
+            lock: Arc::clone(&lock),
         };
         let limits = options.limits();
         let services = Services::new(&limits);
@@ -271,7 +271,7 @@ impl Host {
         let config = publish(&hub, &services.config)?;
         let waker = Waker::new(ports::listener(&wake)?)?;
         close_to_others(&generation.root)?;
-        let presence = Arc::new(Presence::new(instance, &generation, &claim));
+        let presence = Arc::new(Presence::new(instance, &generation, &lock));
         let host = Host {
             hello,
             config,
@@ -407,9 +407,9 @@ impl Host {
     /// more to read.
     fn turn(&mut self) -> bool {
         let now = Instant::now();
-        let mut budget = Budget::new(now);
-        self.greet(now, &budget);
-        let more = self.read(&mut budget);
+        self.greet(now, &Budget::new(now));
+        // One of its own: whoever introduces himself again and again keeps nobody from being heard.
+        let more = self.read(&mut Budget::new(Instant::now()));
         let ticked = now.duration_since(self.last_tick) >= TICK;
         if ticked {
             self.last_tick = now;
@@ -442,7 +442,7 @@ impl Host {
         loop {
             let mut progress = false;
             for peer in &order {
-                if self.waiting.is_full() || budget.is_spent() {
+                if self.waiting.is_full() {
                     return true;
                 }
                 if let Some(session) = self.sessions.get_mut(peer)
@@ -450,6 +450,10 @@ impl Host {
                 {
                     self.last_read = *peer;
                     progress = true;
+                }
+                // Afterwards, so that every turn hears somebody, however slow the machine is.
+                if progress && budget.is_spent() {
+                    return true;
                 }
             }
             if !progress {

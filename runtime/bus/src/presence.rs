@@ -9,14 +9,16 @@ use crate::generation::Generation;
 use crate::instance::{Instance, InstanceLock, LockError};
 
 /// The broker's claim on its instance, until it is given up.
-pub(crate) type Claim = Arc<Mutex<Option<InstanceLock>>>;
+pub(crate) type LockSlot = Arc<Mutex<Option<InstanceLock>>>;
 
 /// A broker that is to be found.
 pub(crate) struct Presence {
     instance: Instance,
     generation: Generation,
-    claim: Claim,
+    lock: LockSlot,
     state: Mutex<State>,
+    /// What was said last about what cannot be made again yet.
+    trouble: Mutex<String>,
 }
 
 /// What is done about what is missing.
@@ -32,12 +34,13 @@ enum State {
 
 impl Presence {
     /// Of a broker that is not to be found yet.
-    pub(crate) fn new(instance: &Instance, generation: &Generation, claim: &Claim) -> Presence {
+    pub(crate) fn new(instance: &Instance, generation: &Generation, lock: &LockSlot) -> Presence {
         Presence {
             instance: instance.clone(),
             generation: generation.clone(),
-            claim: Arc::clone(claim),
+            lock: Arc::clone(lock),
             state: Mutex::new(State::Hidden),
+            trouble: Mutex::default(),
         }
     }
 
@@ -76,15 +79,28 @@ impl Presence {
         }
         self.restore_lock()?;
         if let Err(error) = self.generation.restore(&self.instance) {
-            tracing::warn!(%error, "cannot make again what was removed from the runtime directory");
+            self.say(
+                "cannot make again what was removed from the runtime directory",
+                &error,
+            );
         }
         Ok(())
     }
 
+    /// Once, however often it is tried.
+    fn say(&self, what: &str, error: &std::io::Error) {
+        let text = format!("{what}: {error}");
+        let mut said = self.trouble.lock().unwrap_or_else(PoisonError::into_inner);
+        if *said != text {
+            tracing::warn!("{text}; it is tried again and again");
+            *said = text;
+        }
+    }
+
     /// A lock whose file is gone keeps nobody out.
     fn restore_lock(&self) -> Result<(), String> {
-        let mut claim = self.claim.lock().unwrap_or_else(PoisonError::into_inner);
-        if claim.as_ref().is_none_or(InstanceLock::is_there) {
+        let mut lock = self.lock.lock().unwrap_or_else(PoisonError::into_inner);
+        if lock.as_ref().is_none_or(InstanceLock::is_there) {
             return Ok(());
         }
         let taken = self
@@ -93,9 +109,9 @@ impl Presence {
             .map_err(|error| LockError::Io(std::io::Error::other(error)))
             .and_then(|()| InstanceLock::take(&self.instance));
         match taken {
-            Ok(lock) => {
+            Ok(taken) => {
                 tracing::warn!("the lock of the runtime directory was removed; it was made again");
-                *claim = Some(lock);
+                *lock = Some(taken);
                 Ok(())
             }
             Err(LockError::Held { pid }) => {
@@ -108,7 +124,10 @@ impl Presence {
             }
             // Next time, perhaps.
             Err(LockError::Io(error)) => {
-                tracing::warn!(%error, "cannot make the lock of the runtime directory again");
+                self.say(
+                    "cannot make the lock of the runtime directory again",
+                    &error,
+                );
                 Ok(())
             }
         }
