@@ -74,6 +74,9 @@ const ONLY_DOCUMENT: &[&str] = &["qcbus-opendrive", "qcbus-schema"];
 /// Foreign crates that few may name, so that they can be exchanged. Benches compare with them.
 const FENCED: &[(&str, &[&str])] = &[
     ("iceoryx2", &["qcbus-bus", "qcbus-benches"]),
+    ("iceoryx2-cal", &["qcbus-bus"]),
+    ("iceoryx2-bb-elementary-traits", &["qcbus-bus"]),
+    ("iceoryx2-bb-lock-free", &["qcbus-bus"]),
     ("bincode", &["qcbus-messages", "qcbus-benches"]),
     (
         "quick-xml",

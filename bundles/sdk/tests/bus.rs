@@ -106,7 +106,9 @@ async fn talk(host: &mut Host) -> (usize, Status) {
                 | FromPeer::ResultDone { .. }
                 | FromPeer::WithdrawalDone { .. } => {}
             },
-            HostEvent::Garbage { what, .. } => panic!("{what}"),
+            HostEvent::Garbage { what, .. } | HostEvent::TurnedAway { why: what } => {
+                panic!("{what}")
+            }
             HostEvent::Gone { .. } => panic!("the bundle went away"),
         }
     }

@@ -5,8 +5,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use qcbus_messages::control::{Request, Response};
-use tokio::net::UnixListener;
 use tokio::sync::{mpsc, oneshot};
+use tokio::task::AbortHandle;
+
+mod place;
 
 use clients::{Bounds, Clients};
 
@@ -32,6 +34,7 @@ pub struct Asked {
 pub struct ControlSocket {
     path: PathBuf,
     clients: Arc<Clients>,
+    kept: AbortHandle,
 }
 
 impl ControlSocket {
@@ -46,11 +49,16 @@ impl ControlSocket {
     ) -> std::io::Result<ControlSocket> {
         let path = directory.join(SOCKET);
         qcbus_disk::remove(&path)?;
-        let listener = UnixListener::bind(&path)?;
-        std::fs::set_permissions(&path, std::os::unix::fs::PermissionsExt::from_mode(0o600))?;
+        let listener = place::listen(directory)?;
         let clients = Clients::new(Bounds::of_this_process(), inbox);
-        tokio::spawn(clients.clone().accept(listener));
-        Ok(ControlSocket { path, clients })
+        let of_all = clients.clone();
+        let serve = move |listener| tokio::spawn(of_all.clone().accept(listener)).abort_handle();
+        let kept = tokio::spawn(place::keep(directory.to_owned(), listener, serve));
+        Ok(ControlSocket {
+            path,
+            clients,
+            kept: kept.abort_handle(),
+        })
     }
 
     /// Waits until answers that have been given are written, but not for clients that do not read.
@@ -64,6 +72,8 @@ impl ControlSocket {
 
 impl Drop for ControlSocket {
     fn drop(&mut self) {
+        // First, or it would be made again.
+        self.kept.abort();
         // The directory may have been removed already.
         let _ = qcbus_disk::remove(&self.path);
     }
@@ -95,8 +105,7 @@ pub enum AskError {
 pub fn ask_broker(directory: &Path, request: &Request) -> Result<Response, AskError> {
     use std::io::{BufRead, Write};
     let path = directory.join(SOCKET);
-    let mut stream =
-        std::os::unix::net::UnixStream::connect(&path).map_err(|_| AskError::NoBroker { path })?;
+    let mut stream = place::connect(directory).map_err(|_| AskError::NoBroker { path })?;
     let lost = |error: std::io::Error| AskError::Left(error.to_string());
     let mut text =
         serde_json::to_vec(request).map_err(|error| AskError::NoAnswer(error.to_string()))?;

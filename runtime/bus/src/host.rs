@@ -1,31 +1,37 @@
 //! The broker's end of the bus.
 
-use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::collections::{BTreeMap, HashMap};
 use std::fmt;
+use std::ops::Bound;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::*;
 use qcbus_messages::codec;
-use qcbus_messages::services::{FRAME_BUFFER, Limits, SPARE_SESSIONS, Services, Topic};
+use qcbus_messages::services::{
+    FRAME_BUFFER, HELLO_BYTES, Limits, SPARE_SESSIONS, Services, Topic,
+};
 use qcbus_messages::{Digest, FromPeer, Hello, ToPeer};
 
 use crate::documents::Documents;
 use crate::entrance::{Entrance, Known};
-use crate::generation::{Generation, sweep};
+use crate::generation::{Generation, close_to_others, sweep};
 use crate::instance::{Instance, InstanceError, InstanceLock, LockError};
 use crate::janitor::Janitor;
 use crate::link::SessionKey;
 use crate::memory::{SharedMemory, Turns, fitting_reserve, keep_room};
 use crate::ports::{self, Access, Hub, PortError, Pub, Sub};
+use crate::presence::{LockSlot, Presence};
 use crate::process::Process;
 use crate::session::Session;
+use crate::turn::{Budget, Waiting};
 use crate::wake::{TICK, Waker};
 
 /// Frames read from one peer before it is the next one's turn.
 const QUOTA: usize = 8;
-/// Events that wait to be fetched before reading pauses.
-const MAX_WAITING: usize = 512;
+/// Turns without an event before everything else of the process gets its turn.
+const TURNS_IN_A_ROW: usize = 8;
 /// Introductions read in one turn.
 const HELLOS: usize = 64;
 /// How long a session that has been ended waits for its last words to be read.
@@ -270,17 +276,19 @@ pub enum HostEvent {
 /// memory that somebody has mapped stays readable.
 pub struct Host {
     generation: Generation,
-    instance: Instance,
+    presence: Arc<Presence>,
     limits: Limits,
     services: Services,
-    events: VecDeque<HostEvent>,
+    waiting: Waiting,
     sessions: BTreeMap<PeerId, Session>,
     /// The last attempt of every process to get a session.
     attempts: HashMap<u64, u64>,
     /// Who has not proven who it is, since when, and whether it was told so.
     strangers: HashMap<SessionKey, (Instant, bool)>,
     next_peer: u64,
-    next_turn: u64,
+    /// Whom something was read from last: the next turn begins behind it.
+    last_read: PeerId,
+    last_turn: Instant,
     last_tick: Instant,
     last_watch: Instant,
     entrance: Entrance,
@@ -297,14 +305,15 @@ pub struct Host {
 /// Dropped last: unlinks what is still there, and only then gives the instance up.
 struct Remains {
     instance: Instance,
-    lock: Option<InstanceLock>,
+    lock: LockSlot,
 }
 
 impl Drop for Remains {
     fn drop(&mut self) {
         // The ports have unlinked what is theirs; this is for what workers and peers still hold.
         sweep(&self.instance, None);
-        if let Some(lock) = self.lock.take() {
+        let mut lock = self.lock.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(lock) = lock.take() {
             lock.release();
         }
     }
@@ -343,9 +352,10 @@ impl Host {
             },
             LockError::Io(error) => StartError::Io(error),
         })?;
+        let lock: LockSlot = Arc::new(Mutex::new(Some(lock)));
         let remains = Remains {
             instance: instance.clone(),
-            lock: Some(lock),
+            lock: Arc::clone(&lock),
         };
         let space = rustix::process::getrlimit(rustix::process::Resource::As).current;
         let limits = options.limits_within(space)?;
@@ -359,8 +369,8 @@ impl Host {
         look_for_room(needed)?;
         let generation = Generation::begin(instance, limits)?;
         // Somebody who takes no turns may have been faster.
-        keep_room(&generation.prefix, room).map_err(|_| no_room(needed))?;
-        let hub = Hub::new(&generation.root, &generation.prefix, Access::Create)?;
+        keep_room(&generation.root, room).map_err(|_| no_room(needed))?;
+        let hub = Hub::new(&generation.root, Access::Create)?;
         let documents = Documents::new(
             &hub,
             generation.number,
@@ -369,30 +379,36 @@ impl Host {
             own + room,
         )?;
         let wake = hub.wake(&services.wake_broker, "")?;
+        let hello = subscribe(&hub, &services.hello)?;
+        let config = publish(&hub, &services.config)?;
+        let waker = Waker::new(ports::listener(&wake)?)?;
+        close_to_others(&generation.root)?;
+        let presence = Arc::new(Presence::new(instance, &generation, &lock));
         let host = Host {
-            hello: subscribe(&hub, &services.hello)?,
-            config: publish(&hub, &services.config)?,
-            waker: Waker::new(ports::listener(&wake)?)?,
-            _janitor: Janitor::start(instance, &generation)?,
+            hello,
+            config,
+            waker,
+            _janitor: Janitor::start(instance, &generation, Arc::clone(&presence))?,
+            presence,
             documents,
             hub,
-            events: VecDeque::new(),
+            waiting: Waiting::default(),
             sessions: BTreeMap::new(),
             attempts: HashMap::new(),
             strangers: HashMap::new(),
             entrance: Entrance::open(instance, generation.number)?,
             next_peer: 1,
-            next_turn: 0,
+            last_read: PeerId(0),
+            last_turn: Instant::now(),
             last_tick: Instant::now(),
             last_watch: Instant::now(),
-            instance: instance.clone(),
             _remains: remains,
             generation,
             limits,
             services,
         };
         drop(turn);
-        host.generation.announce(instance)?;
+        host.presence.announce()?;
         Ok(host)
     }
 
@@ -402,14 +418,25 @@ impl Host {
     }
 
     /// The next event; meanwhile everything queued is sent. Cancel-safe: nothing is lost when the
-    /// future is dropped. Nothing moves on the bus unless this is awaited.
+    /// future is dropped. Nothing moves on the bus unless this is awaited. However much peers say,
+    /// it is read in turns of a few milliseconds, and others get theirs in between.
     pub async fn next(&mut self) -> HostEvent {
+        let mut turns = 0;
         loop {
-            if let Some(event) = self.events.pop_front() {
+            // Also while events wait, or nothing would be sent until the last of them is fetched.
+            let more = if self.waiting.is_empty() || self.last_turn.elapsed() >= TICK {
+                self.turn()
+            } else {
+                false
+            };
+            if let Some(event) = self.waiting.pop() {
                 return event;
             }
-            self.turn();
-            if !self.events.is_empty() {
+            turns += 1;
+            if more || turns % TURNS_IN_A_ROW == 0 {
+                tokio::task::yield_now().await;
+            }
+            if more {
                 continue;
             }
             let documents = self.documents.clone();
@@ -463,6 +490,12 @@ impl Host {
             .map_or(0, |session| session.link.backlog())
     }
 
+    /// Bytes of what was read and is not yet fetched: that there is an end to it has to be tested.
+    #[doc(hidden)]
+    pub fn waiting_bytes(&self) -> usize {
+        self.waiting.bytes()
+    }
+
     /// Ends a session at once and gives its window back, whether the peer reacts or not. A peer
     /// that still lives may introduce itself again.
     pub fn disconnect(&mut self, peer: PeerId) {
@@ -485,11 +518,13 @@ impl Host {
         self.documents.clone()
     }
 
-    /// Sends and reads as much as there is, once, without waiting.
-    fn turn(&mut self) {
+    /// Sends what there is and reads as much as one turn may, without waiting. `true`: there may be
+    /// more to read.
+    fn turn(&mut self) -> bool {
         let now = Instant::now();
-        self.greet(now);
-        self.read();
+        self.greet(now, &Budget::new(now));
+        // One of its own: whoever introduces himself again and again keeps nobody from being heard.
+        let more = self.read(&mut Budget::new(Instant::now()));
         let ticked = now.duration_since(self.last_tick) >= TICK;
         if ticked {
             self.last_tick = now;
@@ -506,33 +541,50 @@ impl Host {
             self.last_watch = now;
             self.watch(now);
         }
+        self.last_turn = Instant::now();
+        more
     }
 
-    /// Reads from every peer in turn, a few frames each, beginning with another one every time.
-    fn read(&mut self) {
-        let mut order: Vec<PeerId> = self.sessions.keys().copied().collect();
-        let count = order.len().max(1);
-        order.rotate_left((self.next_turn % count as u64) as usize);
-        self.next_turn = self.next_turn.wrapping_add(1);
+    /// Reads from every peer in turn, a few frames each, beginning behind the one that was read from
+    /// last. `true` when it stopped although there may be more.
+    fn read(&mut self, budget: &mut Budget) -> bool {
+        let behind = (Bound::Excluded(self.last_read), Bound::Unbounded);
+        let later = self.sessions.range(behind).map(|(peer, _)| *peer);
+        let earlier = self
+            .sessions
+            .range(..=self.last_read)
+            .map(|(peer, _)| *peer);
+        let order: Vec<PeerId> = later.chain(earlier).collect();
         loop {
             let mut progress = false;
             for peer in &order {
-                if self.events.len() >= MAX_WAITING {
-                    return;
+                if self.waiting.is_full() {
+                    return true;
                 }
-                if let Some(session) = self.sessions.get_mut(peer) {
-                    progress |= session.read(*peer, QUOTA, &mut self.events);
+                if let Some(session) = self.sessions.get_mut(peer)
+                    && session.read(*peer, QUOTA, budget, &mut self.waiting)
+                {
+                    self.last_read = *peer;
+                    progress = true;
+                }
+                // Afterwards, so that every turn hears somebody, however slow the machine is.
+                if progress && budget.is_spent() {
+                    return true;
                 }
             }
             if !progress {
-                return;
+                return false;
             }
         }
     }
 
     /// Opens a session for everyone who is new.
-    fn greet(&mut self, now: Instant) {
-        for _ in 0..HELLOS {
+    fn greet(&mut self, now: Instant, budget: &Budget) {
+        for read in 0..HELLOS {
+            // Opening a session takes longest of all.
+            if read > 0 && budget.is_spent() {
+                return;
+            }
             let sample = match self.hello.receive() {
                 Ok(Some(sample)) => sample,
                 Ok(None) => return,
@@ -612,7 +664,8 @@ impl Host {
             }
             Err(error) => tracing::warn!(%error, "cannot tell a peer why it may not join"),
         }
-        self.events.push_back(HostEvent::TurnedAway { why });
+        let len = why.len();
+        self.waiting.push(HostEvent::TurnedAway { why }, len);
     }
 
     fn number(&mut self) -> PeerId {
@@ -652,12 +705,13 @@ impl Host {
                 &format!("the broker serves {limit} bundles and reporters already"),
             );
         } else {
-            self.events.push_back(HostEvent::Hello {
+            let hello = HostEvent::Hello {
                 peer,
                 hello,
                 process,
                 launch,
-            });
+            };
+            self.waiting.push(hello, HELLO_BYTES);
         }
     }
 
@@ -671,7 +725,7 @@ impl Host {
         if let Some((peer, silent)) = older {
             self.sessions.remove(&peer);
             if !silent {
-                self.events.push_back(HostEvent::Gone { peer });
+                self.waiting.push(HostEvent::Gone { peer }, 0);
             }
         }
     }
@@ -700,14 +754,23 @@ impl Host {
             })
             .collect();
         for (peer, silent) in over {
-            // What it said before it went still counts.
-            if let Some(session) = self.sessions.get_mut(&peer) {
-                session.read(peer, FRAME_BUFFER * 2, &mut self.events);
-            }
+            self.hear_out(peer);
             self.sessions.remove(&peer);
             if !silent {
-                self.events.push_back(HostEvent::Gone { peer });
+                self.waiting.push(HostEvent::Gone { peer }, 0);
             }
+        }
+    }
+
+    /// What a peer said before it went still counts; it fits into its buffer.
+    fn hear_out(&mut self, peer: PeerId) {
+        let Some(session) = self.sessions.get_mut(&peer) else {
+            return;
+        };
+        let mut budget = Budget::new(Instant::now());
+        let mut left = FRAME_BUFFER * 2;
+        while left > 0 && session.read(peer, 1, &mut budget, &mut self.waiting) {
+            left -= 1;
         }
     }
 
@@ -733,7 +796,7 @@ impl Host {
 
 impl Drop for Host {
     fn drop(&mut self) {
-        self.generation.withdraw(&self.instance);
+        self.presence.withdraw();
         self.documents.stop();
         for session in self.sessions.values_mut() {
             session.link.farewell("");

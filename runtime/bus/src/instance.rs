@@ -137,7 +137,7 @@ impl From<TrustError> for InstanceError {
 /// The broker's claim on an instance; released by the kernel when the process ends.
 #[derive(Debug)]
 pub(crate) struct InstanceLock {
-    _file: File,
+    file: File,
     path: PathBuf,
 }
 
@@ -178,7 +178,7 @@ impl InstanceLock {
                 Ok(()) if is_still_there(&file, &path) => {
                     file.set_len(0).map_err(LockError::Io)?;
                     write!(file, "{}", std::process::id()).map_err(LockError::Io)?;
-                    return Ok(InstanceLock { _file: file, path });
+                    return Ok(InstanceLock { file, path });
                 }
                 Ok(()) => continue,
                 Err(rustix::io::Errno::WOULDBLOCK) => holder = read_pid(&file),
@@ -187,6 +187,11 @@ impl InstanceLock {
             std::thread::sleep(std::time::Duration::from_millis(2));
         }
         Err(LockError::Held { pid: holder })
+    }
+
+    /// Whether the file is there by which others see the claim.
+    pub(crate) fn is_there(&self) -> bool {
+        is_still_there(&self.file, &self.path)
     }
 
     /// Gives the instance up and leaves no file behind.

@@ -7,15 +7,19 @@
 //!
 //! This is the only crate that names iceoryx2. How it is made:
 //!
-//! * `ports`: iceoryx2's configuration, and the only constructor of services and ports;
+//! * `enclosed`: where iceoryx2 puts its memory; `ports`: its configuration, and the only
+//!   constructor of services and ports;
 //! * `stream`, `link`: the streams, first as arithmetic, then on the bus;
-//! * `instance`, `generation`, `process`, `janitor`: finding each other, noticing deaths, leaving
+//! * `instance`, `generation`, `presence`, `process`, `janitor`: finding each other, noticing deaths, leaving
 //!   nothing behind; `entrance`: who is at the other end;
 //! * `memory`: how shared memory is had before it is written to;
-//! * `host` with `session`, `documents`; `peer` with `membership`, `library`; `held`; `wake`.
+//! * `host` with `session`, `turn`, `documents`; `peer` with `membership`, `library`; `held`; `wake`.
 
 mod documents;
+mod enclosed;
 mod entrance;
+#[doc(hidden)]
+pub mod fuzzing;
 mod generation;
 mod held;
 mod host;
@@ -27,10 +31,12 @@ mod membership;
 mod memory;
 mod peer;
 mod ports;
+mod presence;
 mod private;
 mod process;
 mod session;
 mod stream;
+mod turn;
 mod wake;
 
 pub use documents::{Documents, Loan, LoanError, PublishError};

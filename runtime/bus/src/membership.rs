@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::os::unix::net::UnixStream;
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -14,7 +15,7 @@ use crate::generation::Generation;
 use crate::host::{ConfigHeader, HelloHeader};
 use crate::instance::Instance;
 use crate::library::Library;
-use crate::link::{FrameHeader, Link, SessionKey};
+use crate::link::{FrameHeader, Link, SessionKey, Wants};
 use crate::memory::{Turns, free_shared_memory, take_room};
 use crate::peer::PeerEvent;
 use crate::ports::{self, Access, Hub, PortError, Pub, Sub, TopicService, WakeNotifier};
@@ -109,8 +110,8 @@ impl Membership {
         let services = Services::new(&generation.limits);
         let turns = Turns::new();
         let _turn = turns.take();
-        take_part(&generation.prefix, services.peer_bytes())?;
-        let hub = Hub::new(&generation.root, &generation.prefix, Access::Open)?;
+        take_part(&generation.root, services.peer_bytes())?;
+        let hub = Hub::new(&generation.root, Access::Open)?;
         let config = hub.topic(&services.config, "")?;
         let greetings = hub.topic(&services.hello, "")?;
         let wake = hub.wake(&services.wake_broker, "")?;
@@ -122,7 +123,7 @@ impl Membership {
             },
             library: Library::new(&hub, generation.number, &services)?,
             config: ports::subscriber(&config, &services.config)?,
-            hello: ports::small_publisher(&greetings, &services.hello)?,
+            hello: hub.small_publisher(&greetings, &services.hello)?,
             wake_broker: Some(ports::notifier(&wake)?),
             channels: None,
             generation,
@@ -240,6 +241,7 @@ impl Membership {
             loop {
                 let drained = channels.link.drain(QUOTA, |bytes| {
                     messages.push(codec::decode::<ToPeer>(bytes));
+                    Wants::More
                 });
                 ended |= drained.farewell.is_some() || drained.broken.is_some();
                 if drained.frames < QUOTA || messages.len() + events.len() >= max_events {
@@ -331,7 +333,7 @@ impl Membership {
         };
         let waker = Waker::new(ports::listener(&wake)?).map_err(|why| PortError::waiting(&why))?;
         let receiver = ports::subscriber(&to, &self.services.to_peer)?;
-        let sender = ports::stream_publisher(&from, &self.services.from_peer)?;
+        let sender = self.hub.stream_publisher(&from, &self.services.from_peer)?;
         let link = Link::new(self.key, sender, receiver, wake_broker, codec::MAX_MESSAGE);
         link.ring();
         Ok(Channels {
@@ -376,16 +378,18 @@ impl Membership {
             }
             None => true,
         };
-        kept && self.broker.is_alive()
-            && Generation::current(instance).as_ref() == Some(&self.generation)
+        // A file that is not there says nothing: a broker that goes closes its channels, and one whose
+        // directory was cleaned makes it again.
+        let told = Generation::current(instance);
+        kept && self.broker.is_alive() && told.is_none_or(|current| current == self.generation)
     }
 }
 
 /// Makes room for what joining takes: out of what the broker has kept for it, else out of what is
 /// free.
-fn take_part(prefix: &str, needed: u64) -> Result<(), PortError> {
+fn take_part(root: &Path, needed: u64) -> Result<(), PortError> {
     let free = free_shared_memory();
-    if take_room(prefix, needed) || free >= needed {
+    if take_room(root, needed) || free >= needed {
         return Ok(());
     }
     Err(PortError::no_room(needed, free))

@@ -111,8 +111,8 @@ impl Drop for Turn<'_> {
 ///
 /// # Errors
 /// When it cannot be had; then nothing of it is kept.
-pub(crate) fn keep_room(prefix: &str, bytes: u64) -> io::Result<()> {
-    let path = room(prefix);
+pub(crate) fn keep_room(root: &Path, bytes: u64) -> io::Result<()> {
+    let path = room(root);
     let mut how = OpenOptions::new();
     let file = how.write(true).create_new(true).mode(0o600).open(&path)?;
     fallocate(&file, FallocateFlags::empty(), 0, bytes.max(1)).map_err(|error| {
@@ -122,10 +122,10 @@ pub(crate) fn keep_room(prefix: &str, bytes: u64) -> io::Result<()> {
 }
 
 /// Gives back a part of what was kept for those who join. `false`: there is not so much left.
-pub(crate) fn take_room(prefix: &str, bytes: u64) -> bool {
+pub(crate) fn take_room(root: &Path, bytes: u64) -> bool {
     let mut how = OpenOptions::new();
     let file = how.write(true).custom_flags(libc::O_NOFOLLOW);
-    let Ok(file) = file.open(room(prefix)) else {
+    let Ok(file) = file.open(room(root)) else {
         return false;
     };
     let left = file
@@ -135,8 +135,8 @@ pub(crate) fn take_room(prefix: &str, bytes: u64) -> bool {
     left.is_some_and(|left| file.set_len(left).is_ok())
 }
 
-fn room(prefix: &str) -> PathBuf {
-    Path::new(SHARED_MEMORY).join(format!("{prefix}room"))
+fn room(root: &Path) -> PathBuf {
+    root.join("room")
 }
 
 /// The memory of one publisher's slots of a fixed size. It is had some slots ahead of those in use:
@@ -157,9 +157,9 @@ impl Backing {
     ///
     /// # Errors
     /// When there is no room.
-    pub(crate) fn of(publisher: u128) -> io::Result<Backing> {
+    pub(crate) fn of(root: &Path, publisher: u128) -> io::Result<Backing> {
         let mut backing = Backing {
-            file: segment(publisher),
+            file: segment(root, publisher),
             len: 0,
             had: 0,
             first: None,
@@ -179,8 +179,8 @@ impl Backing {
     ///
     /// # Errors
     /// When there is no room.
-    pub(crate) fn whole(publisher: u128) -> io::Result<()> {
-        let mut backing = Backing::of(publisher)?;
+    pub(crate) fn whole(root: &Path, publisher: u128) -> io::Result<()> {
+        let mut backing = Backing::of(root, publisher)?;
         match backing.reach(u64::MAX) {
             true => Ok(()),
             false => Err(io::ErrorKind::StorageFull.into()),
@@ -222,9 +222,9 @@ impl Backing {
 }
 
 /// The segment of a publisher: its name ends with the publisher's number, which nobody else has.
-fn segment(publisher: u128) -> Option<File> {
+fn segment(root: &Path, publisher: u128) -> Option<File> {
     let end = format!("_{publisher}.data");
-    let mut entries = fs::read_dir(SHARED_MEMORY).ok()?.flatten();
+    let mut entries = fs::read_dir(root).ok()?.flatten();
     let found = entries.find(|entry| {
         entry
             .file_name()

@@ -1,6 +1,5 @@
 //! The broker's side of one session.
 
-use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use iceoryx2::prelude::*;
@@ -9,8 +8,9 @@ use qcbus_messages::{FromPeer, codec};
 
 use crate::entrance::Known;
 use crate::host::{HostEvent, PeerId};
-use crate::link::{FrameHeader, Link, SessionKey};
+use crate::link::{FrameHeader, Link, SessionKey, Wants};
 use crate::ports::{self, Hub, PortError, TopicService, WakeService};
+use crate::turn::{Budget, Waiting};
 
 /// How long a peer may take to open its channels after its introduction.
 const CONNECT_WITHIN: Duration = Duration::from_secs(10);
@@ -45,7 +45,7 @@ impl Session {
         let to = hub.topic(&services.to_peer, &suffix)?;
         let link = Link::new(
             key,
-            ports::stream_publisher(&to, &services.to_peer)?,
+            hub.stream_publisher(&to, &services.to_peer)?,
             ports::subscriber(&from, &services.from_peer)?,
             ports::notifier(&wake)?,
             codec::MAX_FROM_PEER,
@@ -83,33 +83,27 @@ impl Session {
         &mut self,
         peer: PeerId,
         quota: usize,
-        events: &mut VecDeque<HostEvent>,
+        budget: &mut Budget,
+        waiting: &mut Waiting,
     ) -> bool {
         let silent = self.is_silent();
+        let before = waiting.len();
         let drained = self.link.drain(quota, |bytes| {
-            if silent {
-                return;
+            if !silent {
+                waiting.push(understand(peer, bytes), bytes.len());
             }
-            events.push_back(match codec::decode::<FromPeer>(bytes) {
-                Ok(message) => HostEvent::Message { peer, message },
-                Err(error) => HostEvent::Garbage {
-                    peer,
-                    what: error.to_string(),
-                },
-            });
+            match waiting.is_enough_since(before) {
+                true => Wants::NoMore,
+                false => Wants::More,
+            }
         });
+        budget.spend(drained.frames, drained.bytes);
         self.farewell |= drained.farewell.is_some();
-        if let Some(broken) = drained.broken {
-            events.push_back(HostEvent::Garbage {
-                peer,
-                what: broken.to_string(),
-            });
-        }
-        if drained.foreign > 0 && !silent {
-            events.push_back(HostEvent::Garbage {
-                peer,
-                what: format!("{} frames belong to no session", drained.foreign),
-            });
+        let broken = drained.broken.map(|broken| broken.to_string());
+        let foreign = (drained.foreign > 0 && !silent)
+            .then(|| format!("{} frames belong to no session", drained.foreign));
+        for what in broken.into_iter().chain(foreign) {
+            waiting.push(HostEvent::Garbage { peer, what }, 0);
         }
         drained.frames > 0
     }
@@ -145,5 +139,15 @@ impl Session {
             self.link.farewell(reason);
         }
         over
+    }
+}
+
+fn understand(peer: PeerId, bytes: &[u8]) -> HostEvent {
+    match codec::decode::<FromPeer>(bytes) {
+        Ok(message) => HostEvent::Message { peer, message },
+        Err(error) => HostEvent::Garbage {
+            peer,
+            what: error.to_string(),
+        },
     }
 }

@@ -93,10 +93,11 @@ impl Outgoing {
         self.taken += 1;
     }
 
-    /// Everything up to and including `seq` has arrived. Numbers never sent are ignored.
-    pub(crate) fn acknowledge(&mut self, seq: u64, now: Instant) {
+    /// Everything up to and including `seq` has arrived. Numbers never sent are ignored; `true` when
+    /// this is news.
+    pub(crate) fn acknowledge(&mut self, seq: u64, now: Instant) -> bool {
         if seq < self.base || seq >= self.base + self.sealed as u64 {
-            return;
+            return false;
         }
         let arrived = (seq + 1 - self.base) as usize;
         for mut frame in self.frames.drain(..arrived) {
@@ -111,6 +112,7 @@ impl Outgoing {
         self.sealed -= arrived;
         self.last_progress = now;
         self.patience = RESEND_AFTER;
+        true
     }
 
     /// Goes back to the first unacknowledged frame when there was no sign of it for too long.
@@ -133,12 +135,23 @@ impl Outgoing {
     }
 }
 
-/// What arrived is no stream of ours: a length that no message has.
+/// What arrived is no stream of ours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("a message of {announced} bytes was announced; at most {most} are allowed")]
-pub(crate) struct BrokenStream {
-    pub(crate) announced: usize,
-    pub(crate) most: usize,
+pub(crate) enum BrokenStream {
+    /// A length that no message has.
+    #[error("a message of {announced} bytes was announced; at most {most} are allowed")]
+    Message {
+        /// Bytes.
+        announced: usize,
+        /// That the sender may say in one message.
+        most: usize,
+    },
+    /// A length that no frame has.
+    #[error("a frame of {0} bytes came; at most {FRAME_BYTES} are allowed")]
+    Frame(usize),
+    /// A flood.
+    #[error("{0} frames in a row brought nothing")]
+    Useless(u32),
 }
 
 /// The receiving half.
@@ -188,7 +201,7 @@ impl Incoming {
                     && length > self.most
                 {
                     let (announced, most) = (length, self.most);
-                    return Err(BrokenStream { announced, most });
+                    return Err(BrokenStream::Message { announced, most });
                 }
                 continue;
             };
@@ -390,7 +403,7 @@ mod tests {
         assert!(incoming.body.capacity() < 1_000);
         let mut incoming = Incoming::new(MAX_MESSAGE);
         let too_long = (huge + 1).to_le_bytes();
-        let broken = BrokenStream {
+        let broken = BrokenStream::Message {
             announced: MAX_MESSAGE + 1,
             most: MAX_MESSAGE,
         };

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
+use std::os::unix::fs::FileExt;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
@@ -133,6 +134,7 @@ fn other_process() {
             "answers_jobs" => answers_jobs(&instance).await,
             "writes_into_a_document" => writes_into_a_document(&instance).await,
             "serves" => serves(&instance).await,
+            "rewrites_images" => rewrite_images(&instance),
             other => panic!("no role {other}"),
         }
     });
@@ -407,6 +409,74 @@ async fn writes_into_a_document(instance: &Instance) {
     }
 }
 
+/// Opens the segment in which the first image lies for writing, as any program of the same user may
+/// that nothing confines, and rewrites it at random until it is killed. What it writes is ASCII: a
+/// text that ceases to be UTF-8 while it is borrowed is beyond what any accessor can be asked for.
+fn rewrite_images(instance: &Instance) {
+    let (segment, at) = segments_of(instance)
+        .into_iter()
+        .find_map(|path| {
+            let file = std::fs::File::options().read(true).write(true).open(path);
+            let file = file.ok()?;
+            let at = find_image(&file)?;
+            Some((file, at))
+        })
+        .expect("there is an image");
+    let mut random = qcbus_document::fuzzing::Random(crate::support::fresh_number());
+    let mut sound = vec![0; IMAGE_AT_MOST];
+    let len = segment.read_at(&mut sound, at).unwrap();
+    sound.truncate(len);
+    say("rewrites");
+    loop {
+        let mut spoilt = sound.clone();
+        for _ in 0..20 {
+            qcbus_document::fuzzing::corrupt(&mut spoilt, &mut random);
+            spoilt.resize(sound.len(), 0);
+            for (byte, whole) in spoilt.iter_mut().zip(&sound) {
+                *byte = if byte == whole { *byte } else { *byte & 0x7F };
+            }
+            // What says where the text is stays: it may not come to lie over numbers.
+            segment
+                .write_all_at(&spoilt[HEADER..], at + HEADER as u64)
+                .unwrap();
+        }
+        segment.write_all_at(&sound, at).unwrap();
+    }
+}
+
+/// No image of a test that is rewritten is larger.
+const IMAGE_AT_MOST: usize = 4 << 10;
+
+/// Bytes of an image before its sections.
+const HEADER: usize = 256;
+
+fn segments_of(instance: &Instance) -> Vec<std::path::PathBuf> {
+    let identity = crate::support::identity_of(instance);
+    let mut found: Vec<std::path::PathBuf> = crate::support::shared_memory_named(&identity)
+        .iter()
+        .flat_map(|root| std::fs::read_dir(format!("/dev/shm/{root}")).unwrap())
+        .map(|entry| entry.unwrap().path())
+        .collect();
+    found.retain(|path| path.extension().is_some_and(|it| it == "data"));
+    found
+}
+
+/// Where a segment has an image, if it has one.
+fn find_image(segment: &std::fs::File) -> Option<u64> {
+    const WINDOW: usize = 1 << 20;
+    let mut from = rustix::fs::seek(segment, rustix::fs::SeekFrom::Data(0)).ok()?;
+    loop {
+        let mut bytes = vec![0; WINDOW];
+        let len = segment.read_at(&mut bytes, from).ok()?;
+        let magic = bytes[..len].windows(8).position(|it| it == b"qcbusDOC");
+        if let Some(place) = magic {
+            return Some(from + place as u64);
+        }
+        let next = from + WINDOW as u64;
+        from = rustix::fs::seek(segment, rustix::fs::SeekFrom::Data(next)).ok()?;
+    }
+}
+
 /// Jobs that a peer of [`serves`] has before it.
 const IN_FLIGHT: u64 = 8;
 
@@ -452,7 +522,7 @@ async fn serves(instance: &Instance) {
                 _ => {}
             },
             HostEvent::Garbage { what, .. } => say(&format!("wrong: garbage, {what}")),
-            HostEvent::Gone { .. } => {}
+            HostEvent::Gone { .. } | HostEvent::TurnedAway { .. } => {}
         }
     }
 }
