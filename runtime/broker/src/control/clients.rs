@@ -173,21 +173,21 @@ impl Clients {
             go: go.clone(),
         };
         self.there().insert(number, client);
-        let place = Place {
+        let visit = Visit {
             clients: self.clone(),
             number,
         };
-        tokio::spawn(serve(place, stream, go));
+        tokio::spawn(serve(visit, stream, go));
     }
 }
 
-/// The place of a client among all; given back when this is dropped, in whatever way.
-struct Place {
+/// One client among all; it is counted until this is dropped, in whatever way.
+struct Visit {
     clients: Arc<Clients>,
     number: u64,
 }
 
-impl Place {
+impl Visit {
     fn enter(&self, stage: Stage) {
         if let Some(client) = self.clients.there().get_mut(&self.number) {
             (client.stage, client.since) = (stage, Instant::now());
@@ -202,18 +202,18 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for Visit {
     fn drop(&mut self) {
         self.clients.there().remove(&self.number);
         self.clients.gone.notify_one();
     }
 }
 
-async fn serve(place: Place, stream: UnixStream, go: Arc<Notify>) {
-    let bounds = place.clients.bounds;
+async fn serve(visit: Visit, stream: UnixStream, go: Arc<Notify>) {
+    let bounds = visit.clients.bounds;
     let mut stream = BufReader::new(stream);
     loop {
-        place.enter(Stage::Silent);
+        visit.enter(Stage::Silent);
         let read = tokio::select! {
             read = timeout(bounds.request_within, read_line(&mut stream)) => read,
             () = go.notified() => Ok(Err(made_room(&bounds))),
@@ -229,7 +229,7 @@ async fn serve(place: Place, stream: UnixStream, go: Arc<Notify>) {
                 return turn_away(stream.get_ref(), reason);
             }
         };
-        let Some(response) = answer(&place, &line, stream.get_ref()).await else {
+        let Some(response) = answer(&visit, &line, stream.get_ref()).await else {
             return;
         };
         let Ok(mut text) = serde_json::to_vec(&response) else {
@@ -237,7 +237,7 @@ async fn serve(place: Place, stream: UnixStream, go: Arc<Notify>) {
         };
         drop(response);
         text.push(b'\n');
-        place.enter(Stage::Reading);
+        visit.enter(Stage::Reading);
         let written = tokio::select! {
             written = timeout(bounds.answer_within, stream.get_mut().write_all(&text)) => written,
             () = go.notified() => return,
@@ -270,7 +270,7 @@ async fn read_line(stream: &mut BufReader<UnixStream>) -> Result<Option<Vec<u8>>
 }
 
 /// The answer to a request; `None` when the client has left before there was one.
-async fn answer(place: &Place, line: &[u8], stream: &UnixStream) -> Option<Response> {
+async fn answer(visit: &Visit, line: &[u8], stream: &UnixStream) -> Option<Response> {
     let request = match serde_json::from_slice(line) {
         Ok(request) => request,
         Err(error) => {
@@ -279,15 +279,15 @@ async fn answer(place: &Place, line: &[u8], stream: &UnixStream) -> Option<Respo
         }
     };
     let takes_long = matches!(request, Request::Wait { .. } | Request::Down);
-    if matches!(request, Request::Wait { .. }) && !place.may_wait() {
-        let waiting = place.clients.bounds.waiting;
+    if matches!(request, Request::Wait { .. }) && !visit.may_wait() {
+        let waiting = visit.clients.bounds.waiting;
         let reason = format!(
             "{waiting} clients wait for verdicts already, as many as this broker may have; ask again when \
              some have theirs, or start the broker with a higher limit of open files (`ulimit -n`)"
         );
         return Some(Response::Failed { reason });
     }
-    place.enter(if takes_long {
+    visit.enter(if takes_long {
         Stage::Waiting
     } else {
         Stage::Asking
@@ -296,7 +296,7 @@ async fn answer(place: &Place, line: &[u8], stream: &UnixStream) -> Option<Respo
         reason: "the broker is stopping".to_owned(),
     };
     let (answer, mut answered) = oneshot::channel();
-    if place.clients.inbox.send(Asked { request, answer }).is_err() {
+    if visit.clients.inbox.send(Asked { request, answer }).is_err() {
         return Some(stopped());
     }
     loop {
