@@ -24,9 +24,9 @@ const MAY_KNOW: &[(&str, Option<&[&str]>)] = &[
     ("qcbus-document", Some(&[])),
     ("qcbus-formats", Some(&[])),
     ("qcbus-messages", Some(&[])),
-    ("qcbus-bus", Some(&[])),
+    ("qcbus-bus", Some(&["qcbus-disk"])),
     ("qcbus-disk", Some(&[])),
-    ("qcbus-ingest", Some(&[])),
+    ("qcbus-ingest", Some(&["qcbus-disk"])),
     ("qcbus-broker", Some(PROCESS)),
     ("qcbus-sdk", Some(PROCESS)),
     ("qcbus-opendrive", Some(&[])),
@@ -74,6 +74,9 @@ const ONLY_DOCUMENT: &[&str] = &["qcbus-opendrive", "qcbus-schema"];
 /// Foreign crates that few may name, so that they can be exchanged. Benches compare with them.
 const FENCED: &[(&str, &[&str])] = &[
     ("iceoryx2", &["qcbus-bus", "qcbus-benches"]),
+    ("iceoryx2-cal", &["qcbus-bus"]),
+    ("iceoryx2-bb-elementary-traits", &["qcbus-bus"]),
+    ("iceoryx2-bb-lock-free", &["qcbus-bus"]),
     ("bincode", &["qcbus-messages", "qcbus-benches"]),
     (
         "quick-xml",

@@ -14,10 +14,15 @@ mod system {
     pub use std::thread;
 
     pub use crate::control::ControlSocket;
-    pub use crate::supervise::{Children, is_there};
-    pub use notify::RecommendedWatcher as FileEvents;
+    pub use crate::supervise::Children;
+    pub use crate::watch::kernel::{Bell, Kernel};
     pub use qcbus_bus::Host;
     pub use tokio::task::spawn_blocking;
+
+    /// Whether all this is simulated.
+    pub fn is_simulated() -> bool {
+        false
+    }
 
     /// The time that passes.
     pub fn now() -> Instant {

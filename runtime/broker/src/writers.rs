@@ -118,12 +118,23 @@ impl Writers {
         }
     }
 
-    /// Waits until everything ordered is done, or cannot be.
-    pub fn finish(mut self) {
+    /// Waits until everything ordered is done, or cannot be, but not longer than `limit`: says then which
+    /// writers hang. They end with the process.
+    pub fn finish(mut self, limit: Duration) -> Vec<String> {
         self.writers.clear();
-        for thread in self.threads.drain(..) {
-            let _ = thread.join();
+        let end = Instant::now() + limit;
+        let mut hung = Vec::new();
+        for (number, thread) in self.threads.drain(..).enumerate() {
+            while !thread.is_finished() && Instant::now() < end {
+                thread::sleep(Duration::from_millis(1));
+            }
+            if thread.is_finished() {
+                let _ = thread.join();
+            } else {
+                hung.push(format!("write-{number}"));
+            }
         }
+        hung
     }
 }
 

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use qcbus_bus::{Instance, JoinError, Peer, PeerEvent, PeerOptions};
+use qcbus_bus::{Claims, Instance, JoinError, Peer, PeerEvent, PeerOptions};
 use qcbus_document::FileKind;
 use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::Level;
@@ -22,8 +22,8 @@ pub struct Animal {
     pub name: &'static str,
     /// Bundle or reporter.
     pub role: Role,
-    /// The version of the messages that it claims to speak.
-    pub protocol: u32,
+    /// What it claims: the version of the messages that it speaks, who it is.
+    pub claims: Claims,
     /// How it behaves.
     pub manners: Manners,
 }
@@ -50,11 +50,17 @@ pub enum Mood {
     Die,
 }
 
+/// What is true.
+pub const HONEST: Claims = Claims {
+    protocol: PROTOCOL_VERSION,
+    proves: true,
+};
+
 /// An animal with good manners, to begin with.
 pub const GOOD: Animal = Animal {
     name: "",
     role: Role::Bundle,
-    protocol: PROTOCOL_VERSION,
+    claims: HONEST,
     manners: Manners {
         welcomed: introduce,
         job: check,
@@ -103,7 +109,8 @@ pub fn checker_done(peer: &mut Peer, job: JobId, checker: u32) {
 /// Checkers of every animal.
 pub const CHECKERS: u32 = 2;
 
-fn catalogue() -> Catalogue {
+/// What it checks.
+pub fn catalogue() -> Catalogue {
     let checker = |number: u32| CheckerInfo {
         id: format!("check_zoo_{number}"),
         description: "looks at nothing".to_owned(),
@@ -149,7 +156,7 @@ pub fn keep(animal: &'static Animal, args: &Args) -> ExitCode {
 
 async fn live(animal: &'static Animal, args: &Args, instance: &Instance) -> ExitCode {
     let hello = hello(animal, args);
-    let joined = Peer::join_claiming(animal.protocol, instance, hello, PeerOptions::default());
+    let joined = Peer::join_claiming(animal.claims, instance, hello, PeerOptions::default());
     let peer = match joined.await {
         Ok(peer) => peer,
         Err(error @ JoinError::NoBroker { .. }) => return fail(&error.to_string(), 4),

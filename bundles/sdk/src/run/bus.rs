@@ -17,6 +17,7 @@ use qcbus_messages::{
 use tokio::sync::mpsc;
 
 use super::Exit;
+use super::batches::batches;
 use super::file::complain;
 use super::module::configured;
 use super::worker::{self, CheckerAtWork, Order, Progress, Work};
@@ -55,8 +56,6 @@ impl Default for BusOptions {
 const CAPACITY: u16 = 8;
 /// How often a sign of life is given, and missing documents are asked for again.
 const HEARTBEAT: Duration = Duration::from_secs(1);
-/// Issues per message: large enough to be cheap, small enough to interleave with other traffic.
-const BATCH: usize = 64;
 
 pub(super) fn run(bundle: &'static Bundle, options: BusOptions, given: Option<UserFiles>) -> Exit {
     if options.die_with_parent && !follow_parent() {
@@ -465,9 +464,7 @@ impl Daemon {
     }
 
     fn send_outcome(&mut self, job: JobId, checker: u32, issues: Vec<Issue>, outcome: Outcome) {
-        let mut rest = issues.into_iter().peekable();
-        while rest.peek().is_some() {
-            let issues = rest.by_ref().take(BATCH).collect();
+        for issues in batches(issues) {
             self.peer.send(&FromPeer::Issues {
                 job,
                 checker,

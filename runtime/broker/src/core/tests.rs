@@ -24,6 +24,7 @@ mod membership;
 mod outside;
 mod processes;
 mod reporting;
+mod restless;
 mod things;
 mod words;
 mod world;

@@ -13,6 +13,7 @@ enum Source {
     Events,
     Seen,
     Asked,
+    Looked,
     Notices,
     Deliveries,
     Tick,
@@ -54,6 +55,7 @@ impl Broker {
             (!self.inbox.events.is_empty(), Source::Events),
             (!self.inbox.seen.is_empty(), Source::Seen),
             (!self.inbox.asked.is_empty(), Source::Asked),
+            (!self.inbox.looked.is_empty(), Source::Looked),
             (!self.inbox.notices.is_empty(), Source::Notices),
             (!self.inbox.deliveries.is_empty(), Source::Deliveries),
             (tick, Source::Tick),
@@ -86,6 +88,12 @@ impl Broker {
                 if let Ok(asked) = self.inbox.asked.try_recv() {
                     turns.say(|| format!("loop: {:?}", asked.request));
                     self.asked(asked);
+                }
+            }
+            Source::Looked => {
+                if let Ok(looked) = self.inbox.looked.try_recv() {
+                    turns.say(|| "loop: a scout comes back".to_owned());
+                    self.looked(looked);
                 }
             }
             Source::Notices => {

@@ -1,18 +1,16 @@
 //! The files, who writes them, and what the kernel tells of it.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::HashMap;
 use std::fs::{self, File};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use std::time::{Duration, UNIX_EPOCH};
+use std::time::Duration;
 
-use notify::event::{
-    AccessKind, AccessMode, CreateKind, DataChange, EventKind, Flag, MetadataKind, ModifyKind,
-    RemoveKind, RenameMode,
-};
 use qcbus_ingest::Stat;
 use qcbus_messages::Digest;
 
+use super::kernel::Telling;
 use crate::store::digest_of;
 
 /// The files: two maps, scenarios on them, and what the second map includes.
@@ -60,8 +58,6 @@ pub struct Meant {
 /// What lies at every path.
 pub type Lying = [Option<Digest>; FILES.len()];
 
-type Kernel = Box<dyn FnMut(notify::Event) + Send>;
-
 /// The files.
 pub struct Disk {
     pub root: PathBuf,
@@ -69,11 +65,10 @@ pub struct Disk {
     /// What lay there before each step at which something changed, the newest last.
     pub changes: Vec<(usize, Lying)>,
     pub meant: HashMap<Digest, Meant>,
-    /// Who is told of changes, if anybody.
-    pub kernel: Option<Kernel>,
-    pub telling: VecDeque<notify::Event>,
-    /// Changes of which nobody is told.
-    pub deaf: bool,
+    /// Who tells of changes.
+    pub telling: Telling,
+    /// Files that somebody has not written to their end.
+    open: Vec<File>,
     /// By the time of modification that a file really has: both its times in the simulation.
     times: HashMap<i128, (i128, i128)>,
     /// Numbers in the order in which files were first looked at, the same every time.
@@ -90,9 +85,8 @@ impl Disk {
             lying: [None; FILES.len()],
             changes: Vec::new(),
             meant: HashMap::new(),
-            kernel: None,
-            telling: VecDeque::new(),
-            deaf: false,
+            telling: Telling::default(),
+            open: Vec::new(),
             times: HashMap::new(),
             inodes: Mutex::default(),
             serial: 0,
@@ -203,25 +197,6 @@ impl Disk {
         text.as_bytes()[..most].to_vec()
     }
 
-    fn tell(&mut self, kind: EventKind, paths: &[&Path]) {
-        if self.kernel.is_some() && !self.deaf {
-            let event = notify::Event::new(kind);
-            let event = paths
-                .iter()
-                .fold(event, |it, path| it.add_path(path.to_path_buf()));
-            self.telling.push_back(event);
-        }
-    }
-
-    /// The queue of the kernel is full.
-    pub fn overflow(&mut self) {
-        if self.kernel.is_some() {
-            self.telling.clear();
-            let event = notify::Event::new(EventKind::Other).set_flag(Flag::Rescan);
-            self.telling.push_back(event);
-        }
-    }
-
     fn lies(&mut self, file: usize, step: usize, digest: Option<Digest>) {
         self.changes.push((step, self.lying));
         self.lying[file] = digest;
@@ -230,12 +205,21 @@ impl Disk {
     /// Gives a file its times: as if it had been changed now, and modified then.
     fn mark_times(&mut self, path: &Path, wall: i128, modified: Option<i128>) {
         self.serial += 1;
-        let real = UNIX_EPOCH + Duration::from_secs(1_000_000) + Duration::from_nanos(self.serial);
+        let real = Duration::from_secs(1_000_000) + Duration::from_nanos(self.serial);
         let key = 1_000_000_000_000_000 + i128::from(self.serial);
         let now = wall + i128::from(self.serial);
         self.times.insert(key, (modified.unwrap_or(now), now));
-        let file = File::options().write(true).open(path);
-        file.and_then(|it| it.set_modified(real))
+        // Without opening it, which would be told as well.
+        let set = |time: Duration| rustix::fs::Timespec {
+            tv_sec: i64::try_from(time.as_secs()).unwrap_or(i64::MAX),
+            tv_nsec: i64::from(time.subsec_nanos()),
+        };
+        let times = rustix::fs::Timestamps {
+            last_access: set(real),
+            last_modification: set(real),
+        };
+        let flags = rustix::fs::AtFlags::empty();
+        rustix::fs::utimensat(rustix::fs::CWD, path, &times, flags)
             .expect("a file of the simulation takes a time");
     }
 
@@ -260,7 +244,6 @@ impl Disk {
             includes: file == 1,
         };
         self.meant.insert(digest, meant);
-        let was_there = path.exists();
         let before = self.modified(&path);
         let parent = path
             .parent()
@@ -269,60 +252,38 @@ impl Disk {
         if !parent.exists() {
             fs::create_dir_all(&parent).expect("a directory is made");
             self.sub_is_away = false;
-            self.tell(EventKind::Create(CreateKind::Folder), &[&parent]);
         }
         if how == How::Renamed {
             let aside = self.root.with_extension("aside");
             fs::write(&aside, &bytes).expect("a file is written aside");
             self.mark_times(&aside, wall, None);
             fs::rename(&aside, &path).expect("a file is renamed");
-            self.lies(file, step, Some(digest));
-            return self.tell(
-                EventKind::Modify(ModifyKind::Name(RenameMode::To)),
-                &[&path],
-            );
+            return self.lies(file, step, Some(digest));
         }
-        fs::write(&path, &bytes).expect("a file is written");
+        let mut open = File::create(&path).expect("a file is made");
+        open.write_all(&bytes).expect("a file is written");
+        if how == How::Torn {
+            self.open.push(open);
+        }
         self.mark_times(&path, wall, before.filter(|_| how == How::TimePutBack));
         self.lies(file, step, Some(digest));
-        if !was_there {
-            self.tell(EventKind::Create(CreateKind::File), &[&path]);
-        }
-        self.tell(
-            EventKind::Modify(ModifyKind::Data(DataChange::Any)),
-            &[&path],
-        );
-        if how != How::Torn {
-            let closed = AccessKind::Close(AccessMode::Write);
-            self.tell(EventKind::Access(closed), &[&path]);
-        }
     }
 
     /// The bytes stay what they are.
     fn touch(&mut self, file: usize, (_, wall): (usize, i128), how: How) {
         let path = self.path(file);
         let before = self.modified(&path).filter(|_| how == How::Touched);
-        self.mark_times(&path, wall, before);
-        if how == How::Touched {
-            self.tell(
-                EventKind::Modify(ModifyKind::Metadata(MetadataKind::Any)),
-                &[&path],
-            );
-        } else {
-            self.tell(
-                EventKind::Modify(ModifyKind::Data(DataChange::Any)),
-                &[&path],
-            );
-            let closed = AccessKind::Close(AccessMode::Write);
-            self.tell(EventKind::Access(closed), &[&path]);
+        if how == How::Again {
+            let bytes = fs::read(&path).expect("a file is read");
+            fs::write(&path, bytes).expect("a file is written");
         }
+        self.mark_times(&path, wall, before);
     }
 
     pub fn remove(&mut self, file: usize, step: usize) {
         let path = self.path(file);
         if fs::remove_file(&path).is_ok() {
             self.lies(file, step, None);
-            self.tell(EventKind::Remove(RemoveKind::File), &[&path]);
         }
     }
 
@@ -339,29 +300,22 @@ impl Disk {
         self.lies(from, step, None);
         // At once.
         self.lying[to] = Some(digest);
-        let name = |mode| EventKind::Modify(ModifyKind::Name(mode));
-        self.tell(name(RenameMode::From), &[&old]);
-        self.tell(name(RenameMode::To), &[&new]);
-        self.tell(name(RenameMode::Both), &[&old, &new]);
     }
 
     /// The directory goes as a whole, or comes back.
     pub fn move_directory(&mut self, step: usize) {
         let (here, away) = (self.root.join("sub"), self.root.with_extension("away"));
-        let name = |mode| EventKind::Modify(ModifyKind::Name(mode));
         let file = 4;
         if self.sub_is_away && !here.exists() {
             fs::rename(&away, &here).expect("a directory is moved");
             self.sub_is_away = false;
             let bytes = fs::read(self.path(file)).ok();
             self.lies(file, step, bytes.map(|it| digest_of(&it)));
-            self.tell(name(RenameMode::To), &[&here]);
         } else if here.exists() {
             let _ = fs::remove_dir_all(&away);
             fs::rename(&here, &away).expect("a directory is moved");
             self.sub_is_away = true;
             self.lies(file, step, None);
-            self.tell(name(RenameMode::From), &[&here]);
         }
     }
 }

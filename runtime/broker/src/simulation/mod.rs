@@ -8,6 +8,7 @@
 //! `QCBUS_SIM_FROM=1000000` begins with that seed.
 
 mod disk;
+mod kernel;
 mod oracle;
 mod peers;
 mod schedule;

@@ -82,8 +82,8 @@ impl Peers {
         self.starting.push((launch.0, name));
     }
 
-    pub fn pid_of(&self, launch: Option<Launch>) -> Option<u32> {
-        let launch = launch?.0;
+    pub fn pid_of(&self, launch: Launch) -> Option<u32> {
+        let launch = launch.0;
         let mut all = self.processes.iter();
         all.find(|(_, it)| it.launch == Some(launch))
             .map(|it| *it.0)
@@ -138,7 +138,12 @@ impl Peers {
             launch: process.launch,
             capacity: 2,
         };
-        self.words.push_back(HostEvent::Hello { peer, hello });
+        self.words.push_back(HostEvent::Hello {
+            peer,
+            hello,
+            process: None,
+            launch: String::new(),
+        });
     }
 
     fn of(&mut self, peer: PeerId) -> Option<&mut Process> {
@@ -157,7 +162,7 @@ impl Peers {
 
     /// The broker has ended a session: the process ends, too.
     pub fn dropped(&mut self, peer: PeerId) {
-        self.words.retain(|it| peer_of(it) != peer);
+        self.words.retain(|it| peer_of(it) != Some(peer));
         let of = |it: &(&u32, &Process)| it.1.peer == Some(peer);
         let pid = self.processes.iter().find(of).map(|it| *it.0);
         if let Some(pid) = pid {
@@ -312,12 +317,13 @@ impl Peers {
     }
 }
 
-fn peer_of(event: &HostEvent) -> PeerId {
+fn peer_of(event: &HostEvent) -> Option<PeerId> {
     match event {
         HostEvent::Hello { peer, .. }
         | HostEvent::Message { peer, .. }
         | HostEvent::Garbage { peer, .. }
-        | HostEvent::Gone { peer } => *peer,
+        | HostEvent::Gone { peer } => Some(*peer),
+        HostEvent::TurnedAway { .. } => None,
     }
 }
 

@@ -206,8 +206,7 @@ impl Play {
         self.with(|world| {
             world.tasks.clear();
             world.peers.are_alone();
-            world.disk.kernel = None;
-            world.disk.telling.clear();
+            world.disk.telling.forget();
             world.summary = super::Summary::default();
             world.hear_answers();
         });
@@ -298,17 +297,14 @@ impl Play {
     /// The kernel tells of one change.
     fn tell_one(&self) -> bool {
         let told = self.with(|world| {
-            let event = world.disk.telling.pop_front()?;
-            world.say(|| format!("the kernel tells: {:?} {:?}", event.kind, event.paths));
-            Some((world.disk.kernel.take()?, event))
+            let said = world.disk.telling.tell()?;
+            world.say(|| format!("the kernel tells: {said}"));
+            Some(())
         });
-        let Some((mut kernel, event)) = told else {
-            return false;
-        };
-        kernel(event);
-        self.with(|world| world.disk.kernel = Some(kernel));
-        self.simulation.steps.next();
-        true
+        if told.is_some() {
+            self.simulation.steps.next();
+        }
+        told.is_some()
     }
 
     fn peer_acts(&self) {
@@ -361,13 +357,13 @@ impl Play {
                 world.say(|| format!("the clock is set by {hours} hours"));
             }
             1 => {
-                world.disk.overflow();
+                world.disk.telling.overflow();
                 world.say(|| "the kernel drops what it had to tell".to_owned());
             }
             2 => {
-                world.disk.deaf = true;
+                let before = world.disk.telling.count();
                 world.deed();
-                world.disk.deaf = false;
+                world.disk.telling.drop_new(before);
                 world.say(|| "and the kernel tells nobody".to_owned());
             }
             _ => world

@@ -7,12 +7,17 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, RecvError, RecvTimeoutError, TryRecvError};
 use std::time::{Duration, Instant, SystemTime};
 
-use notify::{EventHandler, RecommendedWatcher, RecursiveMode, WatcherKind};
 use qcbus_ingest::Stat;
 
 use super::threads::{Signal, State, here};
 
-pub use super::surroundings::{Children, ControlSocket, Host, is_there};
+pub use super::kernel::{Bell, Kernel};
+pub use super::surroundings::{Children, ControlSocket, Host};
+
+/// Whether all this is simulated.
+pub fn is_simulated() -> bool {
+    here().is_some_and(|it| it.task.is_some())
+}
 
 /// The time that passes.
 pub fn now() -> Instant {
@@ -94,6 +99,11 @@ impl<T> Drop for Sender<T> {
 pub struct Receiver<T>(mpsc::Receiver<T>, Arc<AtomicBool>);
 
 impl<T> Receiver<T> {
+    /// As [`mpsc::Receiver::try_recv`].
+    pub fn try_recv(&self) -> Result<T, TryRecvError> {
+        self.0.try_recv()
+    }
+
     /// As [`mpsc::Receiver::recv`].
     pub fn recv(&self) -> Result<T, RecvError> {
         let Some(task) = here().and_then(|it| it.task) else {
@@ -149,6 +159,8 @@ pub mod thread {
 
     use crate::simulation::threads::here;
 
+    pub use std::thread::sleep;
+
     /// As [`std::thread::Builder`].
     #[derive(Default)]
     pub struct Builder(String);
@@ -181,46 +193,15 @@ pub mod thread {
 
     impl JoinHandle<()> {
         /// As there.
+        pub fn is_finished(&self) -> bool {
+            self.0
+                .as_ref()
+                .is_none_or(std::thread::JoinHandle::is_finished)
+        }
+
+        /// As there.
         pub fn join(self) -> std::thread::Result<()> {
             self.0.map_or(Ok(()), std::thread::JoinHandle::join)
         }
-    }
-}
-
-/// The kernel's tellings of files.
-#[derive(Debug)]
-pub enum FileEvents {
-    /// Of the real one.
-    Real(RecommendedWatcher),
-    /// Of the simulated one.
-    Simulated,
-}
-
-impl notify::Watcher for FileEvents {
-    fn new<F: EventHandler>(mut handler: F, config: notify::Config) -> notify::Result<FileEvents> {
-        let Some(here) = here() else {
-            return RecommendedWatcher::new(handler, config).map(FileEvents::Real);
-        };
-        let tell = move |event| handler.handle_event(Ok(event));
-        here.simulation.world().disk.kernel = Some(Box::new(tell));
-        Ok(FileEvents::Simulated)
-    }
-
-    fn watch(&mut self, path: &Path, mode: RecursiveMode) -> notify::Result<()> {
-        match self {
-            FileEvents::Real(real) => real.watch(path, mode),
-            FileEvents::Simulated => Ok(()),
-        }
-    }
-
-    fn unwatch(&mut self, path: &Path) -> notify::Result<()> {
-        match self {
-            FileEvents::Real(real) => real.unwatch(path),
-            FileEvents::Simulated => Ok(()),
-        }
-    }
-
-    fn kind() -> WatcherKind {
-        RecommendedWatcher::kind()
     }
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use qcbus_bus::{Documents, HostEvent, HostOptions, Instance, PeerId, StartError};
+use qcbus_bus::{Documents, HostEvent, HostOptions, Instance, PeerId, Process, StartError};
 use qcbus_messages::{Digest, FromPeer, ToPeer};
 use tokio::sync::mpsc::UnboundedSender;
 
@@ -12,6 +12,7 @@ use super::threads::here;
 use crate::control::Asked;
 use crate::core::{ChildSpec, Event, Launch};
 use crate::former::Former;
+use crate::launches::Launches;
 use crate::supervise::{self, Surroundings};
 
 fn simulation() -> Arc<Simulation> {
@@ -102,11 +103,12 @@ pub enum Children {
 impl Children {
     pub fn new(
         surroundings: Surroundings,
+        launches: Launches,
         generation: u64,
         events: UnboundedSender<Event>,
     ) -> Children {
         let Some(here) = here() else {
-            let real = supervise::Children::new(surroundings, generation, events);
+            let real = supervise::Children::new(surroundings, launches, generation, events);
             return Children::Real(real);
         };
         here.simulation.world().peers.exits = Some(events);
@@ -126,15 +128,42 @@ impl Children {
         }
     }
 
-    pub fn kill(&self, launch: Option<Launch>, pid: u32) {
+    pub fn joined(
+        &mut self,
+        launch: Launch,
+        name: &str,
+        process: Option<&Process>,
+        proof: &str,
+    ) -> Result<(), String> {
+        match self {
+            Children::Real(real) => real.joined(launch, name, process, proof),
+            Children::Simulated(_) => Ok(()),
+        }
+    }
+
+    pub fn kill(&self, launch: Launch) {
         let simulation = match self {
-            Children::Real(real) => return real.kill(launch, pid),
+            Children::Real(real) => return real.kill(launch),
             Children::Simulated(simulation) => simulation,
         };
         let mut world = simulation.world();
-        let pid = world.peers.pid_of(launch).unwrap_or(pid);
+        let Some(pid) = world.peers.pid_of(launch) else {
+            return;
+        };
         world.say(|| format!("  the broker kills process {pid}"));
         world.peers.dies(pid);
+    }
+
+    pub fn kill_what_they_started(&self) {
+        if let Children::Real(real) = self {
+            real.kill_what_they_started();
+        }
+    }
+
+    pub fn forget_launches(&self) {
+        if let Children::Real(real) = self {
+            real.forget_launches();
+        }
     }
 
     pub fn former(&self) -> Option<Former> {
@@ -148,14 +177,6 @@ impl Children {
         if let Children::Real(real) = self {
             real.kill_all();
         }
-    }
-}
-
-/// Whether a process runs.
-pub fn is_there(pid: u32) -> bool {
-    match here() {
-        Some(here) => here.simulation.world().peers.processes.contains_key(&pid),
-        None => supervise::is_there(pid),
     }
 }
 
