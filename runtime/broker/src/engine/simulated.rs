@@ -2,8 +2,11 @@
 //! simulation says which of the sources that have something comes next. Configuration and
 //! manifests stay as they are.
 
-use super::{Broker, TICK, Told};
+use super::{Broker, StartError, TICK, Told};
 use crate::core::{Event, Notice};
+use crate::directory_lock::LockError;
+use crate::gate::GateError;
+use crate::journal::JournalError;
 use crate::options::Options;
 use crate::simulation::{Serving, Turns};
 
@@ -20,9 +23,25 @@ enum Source {
 }
 
 /// A broker from its start until it is killed.
-pub fn simulate(options: Options, tell: impl FnMut(Told) + Send + 'static) {
-    let broker = Broker::start(options, tell).expect("a simulated broker starts");
-    broker.run_simulated();
+pub fn simulate(options: &Options, tell: impl FnMut(Told) + Clone + Send + 'static) {
+    loop {
+        match Broker::start(options.clone(), tell.clone()) {
+            Ok(broker) => return broker.run_simulated(),
+            // Another test of this process starts a program, which holds for a moment what is open here.
+            Err(error) if is_held(&error) => std::thread::yield_now(),
+            Err(error) => panic!("a simulated broker does not start: {error}"),
+        }
+    }
+}
+
+fn is_held(error: &StartError) -> bool {
+    let lock = match error {
+        StartError::Journal(JournalError::State(lock))
+        | StartError::Results(lock)
+        | StartError::Gate(GateError::Lock(lock)) => lock,
+        _ => return false,
+    };
+    matches!(lock, LockError::Held { .. })
 }
 
 impl Broker {

@@ -181,7 +181,7 @@ impl Play {
                 simulation.world().say(|| line);
             }
         };
-        let body = Box::new(move || simulate(options, tell));
+        let body = Box::new(move || simulate(&options, tell));
         self.simulation.spawn("loop".to_owned(), body);
     }
 
