@@ -192,7 +192,7 @@ impl Broker {
         let now = Instant::now();
         let asked = now.checked_sub(waited).unwrap_or(now);
         let (intake, events) = (self.intake.clone(), self.inbox.events_in.clone());
-        let lookout = self.lookout.clone();
+        let lookout = self.looks.lookout();
         tokio::task::spawn_blocking(move || {
             reached("taken", &path);
             let attendance = lookout.attend(job.0);
