@@ -62,7 +62,6 @@ impl Broker {
         let looks = Looks::default();
         let store = Arc::new(store(&options, journal, looks.scouts(), &senders.notices)?);
         let reconciled = reconcile(&options, &loaded, &store)?;
-        let voids = store.voids()?;
         let writers = writers(&options, &store, &inbox, &senders.notices)?;
         let intake = intake(&options, &host, &in_force);
         let children = children(&options, descriptors, &inbox)?;
@@ -97,7 +96,7 @@ impl Broker {
             _results: results,
             options,
         };
-        broker.take_up(members, voids);
+        broker.take_up(members, broker.store.voids()?);
         tell_what_was_put_right(&reconciled, limited, &senders.notices);
         let dependencies = broker.remember(reconciled);
         broker.look(dependencies, senders.seen)?;
