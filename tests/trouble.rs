@@ -274,7 +274,7 @@ fn a_state_disk_that_is_full() {
         let state = farm.base().join("state");
         std::fs::create_dir(&state).unwrap();
         // Room enough for the journal with what bundles offer (0.2 MiB) and its log, once there is room.
-        mount(&state, "size=4m");
+        mount(&state, "size=4m,mode=700");
         farm.arguments = vec!["--state".to_owned(), state.to_string_lossy().into_owned()];
         let _broker = farm.serve_ready();
         let filler = std::fs::File::create(state.join("filler")).unwrap();

@@ -13,7 +13,7 @@
 //! * `instance`, `generation`, `presence`, `process`, `janitor`: finding each other, noticing deaths, leaving
 //!   nothing behind; `entrance`: who is at the other end;
 //! * `memory`: how shared memory is had before it is written to;
-//! * `host` with `session`, `turn`, `documents`; `peer` with `membership`, `library`; `held`; `wake`.
+//! * `host` with `options`, `session`, `turn`, `documents`; `peer` with `membership`, `library`; `held`; `wake`.
 
 mod documents;
 mod enclosed;
@@ -29,6 +29,7 @@ mod library;
 mod link;
 mod membership;
 mod memory;
+mod options;
 mod peer;
 mod ports;
 mod presence;
@@ -42,9 +43,10 @@ mod wake;
 pub use documents::{Documents, Loan, LoanError, PublishError};
 pub use entrance::LAUNCH;
 pub use held::Held;
-pub use host::{Host, HostEvent, HostOptions, PeerId, StartError};
+pub use host::{Host, HostEvent, PeerId};
 pub use instance::{Instance, InstanceError};
 pub use memory::SharedMemory;
+pub use options::{HostOptions, StartError};
 #[doc(hidden)]
 pub use peer::Claims;
 pub use peer::{JoinError, Peer, PeerEvent, PeerOptions};

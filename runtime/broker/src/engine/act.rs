@@ -193,7 +193,7 @@ impl Broker {
         let begin = now();
         let asked = begin.checked_sub(waited).unwrap_or(begin);
         let (intake, events) = (self.intake.clone(), self.inbox.events_in.clone());
-        let lookout = self.lookout.clone();
+        let lookout = self.looks.lookout();
         spawn_blocking(move || {
             reached("taken", &path);
             let attendance = lookout.attend(job.0);

@@ -1,10 +1,11 @@
 //! What the loop wants to know of files: it sends scouts, because it must never wait for a disk.
 
+use std::collections::{BTreeSet, HashMap};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use qcbus_disk::foreign::{self, Overdue};
+use qcbus_disk::foreign::{self, Lookout, Overdue};
 use qcbus_messages::JobId;
 use qcbus_messages::control::{Response, Unseen};
 use qcbus_messages::path_text::to_text;
@@ -13,9 +14,46 @@ use tokio::sync::oneshot;
 use super::Broker;
 use crate::core::{Event, Input, PrepareFailure, Stamp};
 use crate::result_paths::ResultPaths;
-use crate::scouts::PATIENCE;
+use crate::scouts::{PATIENCE, Scouts};
 use crate::stamp::{stamp_of, stamp_through_links};
 use crate::watch::{is_behind_a_link, is_left_alone, is_looked_at};
+
+/// Who looks at files, and for whom.
+pub(super) struct Looks {
+    /// Sees who waits for which file.
+    lookout: Arc<Lookout>,
+    scouts: Scouts,
+    /// Files that did not answer when they were last asked for.
+    hanging: BTreeSet<PathBuf>,
+    /// Who waits for a look at a file, by the number of the scout.
+    pending: HashMap<u64, Look>,
+    /// Files that have gone while somebody waits for them, which are looked at once more.
+    missed: HashMap<u64, Arc<Path>>,
+}
+
+impl Default for Looks {
+    fn default() -> Looks {
+        let lookout = Arc::new(Lookout::default());
+        Looks {
+            scouts: Scouts::new(lookout.clone(), PATIENCE),
+            lookout,
+            hanging: BTreeSet::new(),
+            pending: HashMap::new(),
+            missed: HashMap::new(),
+        }
+    }
+}
+
+impl Looks {
+    /// For whoever else looks at files.
+    pub(super) fn scouts(&self) -> Scouts {
+        self.scouts.clone()
+    }
+
+    pub(super) fn lookout(&self) -> Arc<Lookout> {
+        self.lookout.clone()
+    }
+}
 
 /// A client that waits for the verdict on a file, which is being looked at for it.
 pub(super) struct Look {
@@ -83,7 +121,7 @@ impl Broker {
         });
         match scout {
             Ok(scout) => {
-                self.missed.insert(scout, path);
+                self.looks.missed.insert(scout, path);
                 true
             }
             Err(_) => self.missed(path, None),
@@ -107,7 +145,7 @@ impl Broker {
     fn scout(&self, see: impl FnOnce() -> Seen + Send + 'static) -> io::Result<u64> {
         let (tell, told) = std::sync::mpsc::channel();
         let inbox = self.inbox.looked_in.clone();
-        let sent = self.scouts.send(move || {
+        let sent = self.looks.scouts.send(move || {
             let seen = see();
             // It is told its number right after it was sent. After the end of the loop nobody listens.
             if let Ok(scout) = told.recv() {
@@ -121,7 +159,7 @@ impl Broker {
     fn send_scout(&mut self, look: Look, see: impl FnOnce() -> Seen + Send + 'static) -> bool {
         match self.scout(see) {
             Ok(scout) => {
-                self.looks.insert(scout, look);
+                self.looks.pending.insert(scout, look);
             }
             Err(error) => {
                 let reason = format!("cannot look at {}: {error}", to_text(&look.file));
@@ -134,11 +172,11 @@ impl Broker {
 
     pub(super) fn looked(&mut self, looked: Looked) -> bool {
         if let Seen::Again(stamp) = looked.seen {
-            let path = self.missed.remove(&looked.scout);
+            let path = self.looks.missed.remove(&looked.scout);
             return path.is_none_or(|path| self.missed(path, stamp));
         }
         // Given up, and answered, if it is not there.
-        let Some(look) = self.looks.remove(&looked.scout) else {
+        let Some(look) = self.looks.pending.remove(&looked.scout) else {
             return true;
         };
         match looked.seen {
@@ -157,19 +195,19 @@ impl Broker {
 
     /// Ends what waits for a file that does not answer, and says so as long as it is so.
     pub(super) fn give_up_the_overdue(&mut self) {
-        for overdue in self.lookout.overdue(PATIENCE) {
+        for overdue in self.looks.lookout.overdue(PATIENCE) {
             self.give_up(&overdue);
         }
-        let hanging = self.lookout.hanging();
-        if self.hanging.is_empty() && hanging.is_empty() {
+        let hanging = self.looks.lookout.hanging();
+        if self.looks.hanging.is_empty() && hanging.is_empty() {
             return;
         }
-        let before = std::mem::take(&mut self.hanging);
-        self.hanging.extend(hanging);
-        for path in before.difference(&self.hanging) {
+        let before = std::mem::take(&mut self.looks.hanging);
+        self.looks.hanging.extend(hanging);
+        for path in before.difference(&self.looks.hanging) {
             self.unseen.remove(path);
         }
-        for path in self.hanging.clone().difference(&before) {
+        for path in self.looks.hanging.clone().difference(&before) {
             let seconds = PATIENCE.as_secs();
             let why = format!(
                 "the system has not answered for {seconds} s; is its disk or server there?"
@@ -182,12 +220,12 @@ impl Broker {
     fn give_up(&mut self, overdue: &Overdue) {
         let (path, seconds) = (to_text(&overdue.path), overdue.waited.as_secs());
         let reason = format!("read {path}: the system has not answered for {seconds} s");
-        if let Some(look) = self.looks.remove(&overdue.owner) {
+        if let Some(look) = self.looks.pending.remove(&overdue.owner) {
             // As when no verdict came in time: there is none, and nothing of the question is wrong.
             let _ = look.answer.send(Response::Unanswered { reason });
             return;
         }
-        if let Some(path) = self.missed.remove(&overdue.owner) {
+        if let Some(path) = self.looks.missed.remove(&overdue.owner) {
             self.missed(path, None);
             return;
         }

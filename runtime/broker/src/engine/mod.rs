@@ -17,9 +17,8 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use looks::{Look, Looked};
+use looks::{Looked, Looks};
 use qcbus_bus::{HostEvent, PeerId, Process, StartError as BusError};
-use qcbus_disk::foreign::Lookout;
 use qcbus_messages::control::{Response, Unseen};
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Hello, JobId, ToPeer};
@@ -34,7 +33,6 @@ use crate::intake::Intake;
 use crate::journal::JournalError;
 use crate::options::Options;
 use crate::reload::{LoadError, Loaded, Sources};
-use crate::scouts::Scouts;
 use crate::seams::{Children, ControlSocket, Host, now, spawn_blocking};
 use crate::stages::reached;
 use crate::store::Store;
@@ -124,16 +122,7 @@ pub struct Broker {
     watch_mode: String,
     /// What could not be looked at, and why.
     unseen: BTreeMap<PathBuf, String>,
-    /// Sees who waits for which file.
-    lookout: Arc<Lookout>,
-    scouts: Scouts,
-    /// Files that did not answer when they were last asked for.
-    hanging: BTreeSet<PathBuf>,
-    /// Who waits for a look at a file, by the number of the scout.
-    looks: HashMap<u64, Look>,
-    /// Files that have gone while somebody waits for them, which are looked at once more, by the number
-    /// of the scout.
-    missed: HashMap<u64, Arc<Path>>,
+    looks: Looks,
     sessions: Sessions,
     tickets: HashMap<Ticket, oneshot::Sender<Response>>,
     downs: Vec<oneshot::Sender<Response>>,

@@ -1,6 +1,6 @@
 //! How a broker starts: the instance, the journal, the configuration, the first look.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, HashMap};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicU64;
@@ -13,7 +13,9 @@ use qcbus_messages::Role;
 use qcbus_messages::control::Unseen;
 use tokio::sync::mpsc;
 
+use super::looks::Looks;
 use super::{AttendedTime, Broker, Inbox, Sessions, StartError, Told};
+use crate::control::Asked;
 use crate::core::{Member, Notice, Stamp, State};
 use crate::demand::InForce;
 use crate::descriptors::Descriptors;
@@ -25,14 +27,13 @@ use crate::launches::Launches;
 use crate::options::Options;
 use crate::reload::{LoadError, Loaded, Sources};
 use crate::result_paths::ResultPaths;
-use crate::scouts::{PATIENCE, Scouts};
+use crate::scouts::Scouts;
 use crate::seams::{Children, ControlSocket, Host, now, spawn_blocking};
 use crate::stamp::stamp_of;
 use crate::store::{Reconciled, Store, remove_earlier_results};
 use crate::supervise::Surroundings;
 use crate::watch::{Looking, Seen, WatchOptions, Watcher, is_looked_at, scan_directory};
 use crate::writers::{Order, Writers};
-use qcbus_disk::foreign::Lookout;
 use qcbus_disk::sweep;
 
 impl Broker {
@@ -47,9 +48,7 @@ impl Broker {
     ) -> Result<Broker, StartError> {
         let sources = sources_of(&options);
         let loaded = sources.load()?;
-        let descriptors = Descriptors::take();
-        let (peers, limited) = descriptors.peers(options.host.max_peers);
-        options.host.max_peers = peers;
+        let (descriptors, limited) = take_descriptors(&mut options);
         let mut host = Host::start(&options.instance, shape(&options, &loaded))?;
         options.settings.generation = host.generation();
         let journal = journal_of(&options)?;
@@ -59,16 +58,12 @@ impl Broker {
         host.set_config(in_force.digest, &in_force.encoded);
         let state = State::new(options.settings.clone(), in_force.digest, in_force.demand());
         let (inbox, senders) = Inbox::new();
-        let control = ControlSocket::listen(options.instance.dir(), senders.asked)
-            .map_err(|source| system("listen for commands", source))?;
-        let lookout = Arc::new(Lookout::default());
-        let scouts = Scouts::new(lookout.clone(), PATIENCE);
-        let store = Arc::new(store(&options, journal, scouts.clone(), &senders.notices)?);
+        let control = control_of(&options, senders.asked)?;
+        let looks = Looks::default();
+        let store = Arc::new(store(&options, journal, looks.scouts(), &senders.notices)?);
         let reconciled = reconcile(&options, &loaded, &store)?;
-        let voids = store.voids()?;
         let writers = writers(&options, &store, &inbox, &senders.notices)?;
-        let intake = intake(&options, &host);
-        intake.search_in(in_force.search.clone());
+        let intake = intake(&options, &host, &in_force);
         let children = children(&options, descriptors, &inbox)?;
         let mut broker = Broker {
             started: now(),
@@ -87,11 +82,7 @@ impl Broker {
             takes_long: None,
             watch_mode: "once".to_owned(),
             unseen: BTreeMap::new(),
-            lookout,
-            scouts,
-            hanging: BTreeSet::new(),
-            looks: HashMap::new(),
-            missed: HashMap::new(),
+            looks,
             sessions: Sessions::default(),
             tickets: HashMap::new(),
             downs: Vec::new(),
@@ -105,11 +96,8 @@ impl Broker {
             _results: results,
             options,
         };
-        broker.take_up(members, voids);
-        if let Some(limited) = limited {
-            let _ = senders.notices.send(Notice::Limited(limited));
-        }
-        tell_what_was_put_right(&reconciled, &senders.notices);
+        broker.take_up(members, broker.store.voids()?);
+        tell_what_was_put_right(&reconciled, limited, &senders.notices);
         let dependencies = broker.remember(reconciled);
         broker.look(dependencies, senders.seen)?;
         Ok(broker)
@@ -179,10 +167,23 @@ impl Broker {
     }
 }
 
-fn tell_what_was_put_right(reconciled: &Reconciled, notices: &mpsc::UnboundedSender<Notice>) {
-    for said in &reconciled.said {
+fn control_of(
+    options: &Options,
+    inbox: mpsc::UnboundedSender<Asked>,
+) -> Result<ControlSocket, StartError> {
+    ControlSocket::listen(options.instance.dir(), inbox)
+        .map_err(|source| system("listen for commands", source))
+}
+
+fn tell_what_was_put_right(
+    reconciled: &Reconciled,
+    limited: Option<String>,
+    notices: &mpsc::UnboundedSender<Notice>,
+) {
+    let right = reconciled.said.iter().cloned().map(Notice::Storing);
+    for notice in limited.map(Notice::Limited).into_iter().chain(right) {
         // The loop that listens has not ended before it began.
-        let _ = notices.send(Notice::Storing(said.clone()));
+        let _ = notices.send(notice);
     }
 }
 
@@ -327,14 +328,24 @@ fn shape(options: &Options, loaded: &Loaded) -> HostOptions {
     }
 }
 
-fn intake(options: &Options, host: &Host) -> Arc<Intake> {
+fn intake(options: &Options, host: &Host, in_force: &InForce) -> Arc<Intake> {
     let roots = options.roots.clone();
-    Arc::new(Intake::new(
+    let intake = Intake::new(
         host.documents(),
         options.limits,
         roots,
         options.settings.max_documents,
-    ))
+    );
+    intake.search_in(in_force.search.clone());
+    Arc::new(intake)
+}
+
+/// As many as may be had; peers that there are none for are not let in, and what is to be said then.
+fn take_descriptors(options: &mut Options) -> (Descriptors, Option<String>) {
+    let descriptors = Descriptors::take();
+    let (peers, limited) = descriptors.peers(options.host.max_peers);
+    options.host.max_peers = peers;
+    (descriptors, limited)
 }
 
 fn children(

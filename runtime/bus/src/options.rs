@@ -1,0 +1,178 @@
+//! What a broker's end of the bus is made for, and why it cannot be had.
+
+use qcbus_messages::services::{Limits, Services};
+
+use crate::instance::InstanceError;
+use crate::memory::fitting_reserve;
+use crate::ports::PortError;
+
+/// What the bus is made for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct HostOptions {
+    /// Bundles and reporters at once.
+    pub max_peers: usize,
+    /// Documents that jobs under way may need, in the small class. The broker keeps its active
+    /// jobs below it, or slow peers have to ask for documents again.
+    pub active_documents: usize,
+    /// The same in the large class.
+    pub large_active_documents: usize,
+    /// Largest image of the small class, in bytes.
+    pub small_class_bytes: usize,
+    /// Bytes of /dev/shm that stay free; at most an eighth of a small one is kept.
+    pub shm_reserve_bytes: u64,
+    /// Bundles and reporters that are expected: for so many there is shared memory from the
+    /// beginning.
+    pub expected_peers: usize,
+}
+
+impl Default for HostOptions {
+    fn default() -> Self {
+        let limits = Limits::default();
+        HostOptions {
+            max_peers: limits.peers,
+            active_documents: limits.small_active,
+            large_active_documents: limits.large_active,
+            small_class_bytes: limits.small_bytes,
+            shm_reserve_bytes: 64 << 20,
+            expected_peers: 0,
+        }
+    }
+}
+
+/// Sizes for a process that may not map much: images of the small class, and what the large class
+/// begins with.
+const FEW_ADDRESSES: [usize; 2] = [128 << 10, 1 << 20];
+
+fn with_few_addresses(limits: Limits) -> Limits {
+    let [small_bytes, large_initial_bytes] = FEW_ADDRESSES;
+    Limits {
+        small_bytes: limits.small_bytes.min(small_bytes),
+        large_initial_bytes: limits.large_initial_bytes.min(large_initial_bytes),
+        ..limits
+    }
+}
+
+impl HostOptions {
+    /// Bytes of shared memory that a broker takes or keeps free, without documents: what it needs
+    /// itself, as much for each peer that is expected as that will take, and the reserve.
+    pub fn shared_memory_bytes(&self) -> u64 {
+        let services = Services::new(&self.limits());
+        let peers = self.expected_peers as u64 * services.peer_bytes();
+        services.broker_bytes() + peers + fitting_reserve(self.shm_reserve_bytes)
+    }
+
+    /// Bytes of addresses that a broker needs at least, and to carry everything.
+    pub fn address_bytes(&self) -> (u64, u64) {
+        let all = self.limits();
+        let needed = |limits: &Limits| Services::new(limits).address_bytes();
+        (needed(&self.least(all)), needed(&all))
+    }
+
+    /// The same bus for small images alone, and for few peers.
+    fn least(&self, limits: Limits) -> Limits {
+        Limits {
+            peers: limits.peers.min(self.expected_peers + 1),
+            ..with_few_addresses(limits)
+        }
+    }
+
+    /// What the bus looks like within a limited address space.
+    pub(crate) fn limits_within(&self, space: Option<u64>) -> Result<Limits, StartError> {
+        let limits = self.limits();
+        let Some(space) = space else {
+            return Ok(limits);
+        };
+        let (less, least) = (with_few_addresses(limits), self.least(limits));
+        let needed = |limits: &Limits| Services::new(limits).address_bytes();
+        let fits = [limits, less, least]
+            .into_iter()
+            .find(|it| needed(it) <= space);
+        fits.ok_or_else(|| StartError::AddressSpace {
+            limit: space,
+            needed: needed(&least),
+        })
+    }
+
+    fn limits(&self) -> Limits {
+        let held = |active: usize| active + active.div_ceil(2) + 2;
+        let small_active = self.active_documents.max(1);
+        let large_active = self.large_active_documents.max(1);
+        Limits {
+            peers: self.max_peers.max(1),
+            small_active,
+            small_held: held(small_active),
+            small_bytes: self.small_class_bytes.max(4 << 10),
+            large_active,
+            large_held: held(large_active),
+            ..Limits::default()
+        }
+    }
+}
+
+/// Why the bus could not be set up.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// Another broker serves this instance.
+    #[error("instance `{instance}` is already served{}", .pid.map(|pid| format!(" by process {pid}")).unwrap_or_default())]
+    AlreadyRunning {
+        /// The instance.
+        instance: String,
+        /// The other broker.
+        pid: Option<u32>,
+    },
+    /// The runtime directory cannot be used.
+    #[error(transparent)]
+    Instance(#[from] InstanceError),
+    /// A file in the runtime directory cannot be written.
+    #[error("cannot write to the runtime directory: {0}")]
+    Io(#[from] std::io::Error),
+    /// There is no room for the bus itself; without it, the first write is a bus error.
+    #[error(
+        "not enough shared memory: {free} of {size} bytes are free in /dev/shm, a broker needs {needed} to start; {}", way_out(*size, *needed)
+    )]
+    NoSharedMemory {
+        /// Bytes of /dev/shm.
+        size: u64,
+        /// Free bytes.
+        free: u64,
+        /// Bytes that must be free.
+        needed: u64,
+    },
+    /// The process may not map the bus.
+    #[error(
+        "the address space of this process is limited to {limit} bytes (`ulimit -v`), a broker for so many bundles needs {needed}; raise it with `ulimit -v unlimited`"
+    )]
+    AddressSpace {
+        /// The limit, in bytes.
+        limit: u64,
+        /// Bytes of addresses that would do.
+        needed: u64,
+    },
+    /// The bus refused, in its words.
+    #[error("the bus refused: {0}")]
+    Bus(String),
+}
+
+impl StartError {
+    /// Whether it may pass by itself, when others let go of shared memory.
+    pub fn may_pass(&self) -> bool {
+        matches!(self, StartError::NoSharedMemory { size, needed, .. } if needed <= size)
+    }
+}
+
+fn way_out(size: u64, needed: u64) -> String {
+    let advised = needed.max(size / 2).saturating_mul(2).div_ceil(1 << 20);
+    let make = format!(
+        "make it larger: `mount -o remount,size={advised}M /dev/shm`, for a container `docker run --shm-size={advised}m`"
+    );
+    match needed <= size {
+        true => format!("wait for others to end, remove what they left there, or {make}"),
+        false => make,
+    }
+}
+
+impl From<PortError> for StartError {
+    fn from(error: PortError) -> Self {
+        StartError::Bus(error.to_string())
+    }
+}
