@@ -24,6 +24,9 @@ const LEAVE_WITHIN: Duration = Duration::from_secs(3);
 /// Events that wait to be fetched before reading pauses.
 const MAX_WAITING: usize = 256;
 
+/// Why a session is closed that no other one follows.
+const LOST: &str = "the session was lost";
+
 /// How patient a peer is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PeerOptions {
@@ -31,6 +34,9 @@ pub struct PeerOptions {
     pub patience: Duration,
     /// How long to survive the loss of the broker.
     pub grace: Duration,
+    /// Whether a session that is lost is followed by another one. A process that can open nothing any more has
+    /// no second one: it is closed at once.
+    pub rejoins: bool,
 }
 
 impl Default for PeerOptions {
@@ -38,6 +44,7 @@ impl Default for PeerOptions {
         PeerOptions {
             patience: Duration::from_secs(2),
             grace: Duration::from_secs(10),
+            rejoins: true,
         }
     }
 }
@@ -164,7 +171,8 @@ impl Peer {
                 ..hello
             },
             options,
-            attempts: 0,
+            // Processes that follow each other may bear the same incarnation.
+            attempts: u64::from(std::process::id()) << 32,
             state: State::Seeking,
             lost: Some(Instant::now()),
             joined_before: false,
@@ -295,6 +303,11 @@ impl Peer {
         }
     }
 
+    /// Whether it is closed because its session was lost and it does not rejoin (see [`PeerOptions::rejoins`]).
+    pub fn has_lost_its_session(&self) -> bool {
+        matches!(&self.state, State::Closed(reason) if reason == LOST)
+    }
+
     fn no_broker(&self) -> JoinError {
         JoinError::NoBroker {
             instance: self.instance.name().to_owned(),
@@ -351,7 +364,11 @@ impl Peer {
     }
 
     fn lose(&mut self, now: Instant) {
-        self.state = State::Seeking;
+        self.state = if self.joined_before && !self.options.rejoins {
+            State::Closed(LOST.to_owned())
+        } else {
+            State::Seeking
+        };
         // What was not fetched belongs to the session that is over.
         self.events.clear();
         self.lost.get_or_insert(now);
