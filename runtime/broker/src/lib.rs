@@ -18,6 +18,7 @@ mod intake;
 pub mod journal;
 pub mod memory;
 mod options;
+mod orphans;
 pub mod reload;
 mod result_paths;
 mod stages;

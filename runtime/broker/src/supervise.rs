@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
+use std::time::Duration;
 
 use rustix::process::Pid;
 use tokio::process::{Child, Command};
@@ -10,6 +11,10 @@ use tokio::sync::mpsc::UnboundedSender;
 
 use crate::core::{ChildEnd, ChildSpec, Event, Launch};
 use crate::former::{self, Former, kill_with_group};
+use crate::orphans::{self, Strangers};
+
+/// Looks for orphans at the end, two milliseconds apart.
+const ORPHANS_AT_MOST: u32 = 500;
 
 /// What every child is given.
 #[derive(Debug, Clone)]
@@ -30,6 +35,7 @@ pub struct Children {
     surroundings: Surroundings,
     first: Launch,
     pids: BTreeMap<Launch, u32>,
+    strangers: Strangers,
     events: UnboundedSender<Event>,
 }
 
@@ -41,6 +47,7 @@ impl Children {
         events: UnboundedSender<Event>,
     ) -> Children {
         Children {
+            strangers: orphans::adopt(),
             surroundings,
             first: Launch::first_of(generation),
             pids: BTreeMap::new(),
@@ -77,6 +84,7 @@ impl Children {
             .arg(&self.surroundings.instance_dir)
             .arg("--launch")
             .arg(launch.0.to_string())
+            .env(orphans::LAUNCH, launch.0.to_string())
             .stdin(Stdio::null())
             .process_group(0)
             .kill_on_drop(false);
@@ -90,6 +98,16 @@ impl Children {
     /// Forgets a child that has ended.
     pub fn ended(&mut self, launch: Launch) {
         self.pids.remove(&launch);
+        orphans::sweep(&self.pids, &self.strangers);
+    }
+
+    /// Kills and buries what children that have ended, or hidden it, have left. Meant to be called now and then:
+    /// where the kernel keeps no list of children it is left to the next end of a child, for looking through all
+    /// processes takes too long.
+    pub fn look_for_orphans(&self) {
+        if orphans::are_listed() {
+            orphans::sweep(&self.pids, &self.strangers);
+        }
     }
 
     /// Kills a child with its process group, or a process that a former broker started.
@@ -105,6 +123,7 @@ impl Children {
         if own.is_none() && former::launch_of(pid).is_none() {
             return;
         }
+        orphans::kill_below(pid);
         kill_with_group(pid);
     }
 
@@ -116,10 +135,18 @@ impl Children {
             .flatten()
     }
 
-    /// Kills whatever is left.
+    /// Kills whatever is left, also what it has started.
     pub fn kill_all(&self) {
         for launch in self.pids.keys() {
             self.kill(Some(*launch), 0);
+        }
+        // One that ends hands over what it has started; hence more than one look, but not for ever.
+        let nobody = BTreeMap::new();
+        for _ in 0..ORPHANS_AT_MOST {
+            if orphans::sweep(&nobody, &self.strangers) == 0 {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(2));
         }
     }
 }
@@ -197,8 +224,6 @@ fn restrict(command: &mut Command, surroundings: &Surroundings) {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
     use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
 
     use super::*;

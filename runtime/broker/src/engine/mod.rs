@@ -255,6 +255,7 @@ impl Broker {
                 next_reload = Instant::now() + RELOAD_INTERVAL;
                 self.reload_if_changed(&mut fingerprint);
                 self.notify_watchdog();
+                self.children.look_for_orphans();
             }
             if Instant::now() >= next_prune {
                 next_prune = Instant::now() + PRUNE_INTERVAL;
