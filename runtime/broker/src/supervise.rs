@@ -5,6 +5,9 @@ use std::path::{Path, PathBuf};
 use std::process::Stdio;
 use std::time::Duration;
 
+use qcbus_confine::{Looks, Orders, Outer, SandboxError, kernel_level, looks};
+use qcbus_messages::Role;
+use qcbus_messages::control::{PeerStatus, SandboxStatus};
 use rustix::process::Pid;
 use tokio::process::{Child, Command};
 use tokio::sync::mpsc::UnboundedSender;
@@ -24,6 +27,8 @@ pub struct Surroundings {
     /// Whether children die with the broker at once (a private instance), or may outlive it and
     /// join the next one.
     pub die_with_broker: bool,
+    /// Whether bundles are confined.
+    pub sandbox: bool,
     /// Most private memory (data segment and anonymous mappings) of a child, in bytes. The shared
     /// segment does not count: it is mapped from a file.
     pub memory_limit: Option<u64>,
@@ -92,7 +97,52 @@ impl Children {
             command.arg("--die-with-parent");
         }
         restrict(&mut command, &self.surroundings);
+        if spec.role == Role::Bundle {
+            self.confine(&mut command, spec)
+                .map_err(std::io::Error::other)?;
+        }
         command.spawn()
+    }
+
+    /// Reporters write files where they are told to, and are ours; bundles are not.
+    fn confine(&self, command: &mut Command, spec: &ChildSpec) -> Result<(), SandboxError> {
+        let command = command.as_std_mut();
+        if !self.surroundings.sandbox {
+            return Orders::Off.give(command);
+        }
+        Orders::On(spec.may.clone()).give(command)?;
+        if let Some(outer) = Outer::new(&self.surroundings.instance_dir, &spec.may)? {
+            outer.surround(command);
+        }
+        Ok(())
+    }
+
+    /// How far a bundle is confined, by what the kernel says of its process: it is not asked itself.
+    pub fn sandbox_of(&self, peer: &PeerStatus) -> Option<SandboxStatus> {
+        let there = peer.role == "bundle" && peer.pid != 0 && peer.state != "down";
+        if !there || peer.state == "starting" {
+            return None;
+        }
+        let is_ours = self
+            .pids
+            .values()
+            .any(|pid| *pid == peer.pid || orphans::is_below(peer.pid, *pid));
+        let surrounded = self.surroundings.sandbox && is_ours;
+        let (state, why) = match (looks(peer.pid), kernel_level()) {
+            (Looks::Unknown, _) => return None,
+            (Looks::Filtered, 1..) => ("confined", ""),
+            (Looks::Filtered, 0) => ("partly", "this kernel has no Landlock"),
+            (Looks::Open, _) if !self.surroundings.sandbox => ("open", "--no-sandbox"),
+            (Looks::Open, 1..) if surrounded => {
+                ("partly", "it has not confined itself after it joined")
+            }
+            (Looks::Open, 0) if is_ours => ("open", "this kernel has no Landlock"),
+            (Looks::Open, _) => ("open", "it has not confined itself after it joined"),
+        };
+        Some(SandboxStatus {
+            state: state.to_owned(),
+            why: why.to_owned(),
+        })
     }
 
     /// Forgets a child that has ended.
@@ -228,13 +278,13 @@ mod tests {
 
     use super::*;
     use crate::core::Restart;
-    use qcbus_messages::Role;
 
     fn children() -> (Children, UnboundedReceiver<Event>) {
         let (events, inbox) = unbounded_channel();
         let surroundings = Surroundings {
             instance_dir: "/nowhere".into(),
             die_with_broker: true,
+            sandbox: false,
             memory_limit: None,
         };
         (Children::new(surroundings, 2, events), inbox)
@@ -247,6 +297,7 @@ mod tests {
             version: None,
             command: command.iter().map(|it| (*it).to_owned()).collect(),
             restart: Restart::Never,
+            may: Default::default(),
         }
     }
 

@@ -293,6 +293,7 @@ fn children(options: &Options, inbox: &Inbox) -> Children {
     let surroundings = Surroundings {
         instance_dir: options.instance.dir().to_path_buf(),
         die_with_broker: options.die_with_broker,
+        sandbox: options.sandbox,
         memory_limit: options.memory_limit,
     };
     let generation = options.settings.generation;

@@ -95,5 +95,6 @@ fn spec_of(module: Module, role: Role) -> ChildSpec {
         name: module.name,
         role,
         restart,
+        may: module.may,
     }
 }
