@@ -5,6 +5,7 @@ mod bus;
 mod exit;
 mod file;
 mod module;
+mod stand;
 mod timings;
 mod worker;
 
