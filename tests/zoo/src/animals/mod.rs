@@ -8,8 +8,10 @@ mod hangs_after_hello;
 mod hangs_in_a_job;
 mod judges_strictly;
 mod lies_about_job_id;
+mod meddles;
 mod never_acknowledges;
 mod reporter_never_acknowledges;
+mod scribbles_on_others;
 mod sends_garbage;
 mod slow;
 mod speaks_another_protocol;
@@ -32,8 +34,10 @@ pub static ANIMALS: &[Animal] = &[
     hangs_in_a_job::ANIMAL,
     judges_strictly::ANIMAL,
     lies_about_job_id::ANIMAL,
+    meddles::ANIMAL,
     never_acknowledges::ANIMAL,
     reporter_never_acknowledges::ANIMAL,
+    scribbles_on_others::ANIMAL,
     sends_garbage::ANIMAL,
     slow::ANIMAL,
     speaks_another_protocol::ANIMAL,
