@@ -24,10 +24,10 @@ const MAY_KNOW: &[(&str, Option<&[&str]>)] = &[
     ("qcbus-document", Some(&[])),
     ("qcbus-formats", Some(&[])),
     ("qcbus-messages", Some(&[])),
-    ("qcbus-bus", Some(&[])),
+    ("qcbus-bus", Some(&["qcbus-disk"])),
     ("qcbus-confine", Some(&[])),
     ("qcbus-disk", Some(&[])),
-    ("qcbus-ingest", Some(&[])),
+    ("qcbus-ingest", Some(&["qcbus-disk"])),
     ("qcbus-broker", Some(PROCESS)),
     ("qcbus-sdk", Some(PROCESS)),
     ("qcbus-opendrive", Some(&[])),
@@ -75,6 +75,9 @@ const ONLY_DOCUMENT: &[&str] = &["qcbus-opendrive", "qcbus-schema"];
 /// Foreign crates that few may name, so that they can be exchanged. Benches compare with them.
 const FENCED: &[(&str, &[&str])] = &[
     ("iceoryx2", &["qcbus-bus", "qcbus-benches"]),
+    ("iceoryx2-cal", &["qcbus-bus"]),
+    ("iceoryx2-bb-elementary-traits", &["qcbus-bus"]),
+    ("iceoryx2-bb-lock-free", &["qcbus-bus"]),
     ("bincode", &["qcbus-messages", "qcbus-benches"]),
     (
         "quick-xml",

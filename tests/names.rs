@@ -231,50 +231,241 @@ fn links_to_what_is_looked_at_anyway_are_nothing_to_speak_of() {
     assert!(!said.stderr.contains("note"), "{}", said.stderr);
 }
 
+#[test]
+fn a_file_is_known_by_a_link_to_its_directory_and_judged_once() {
+    let (farm, gate, beside) = farm_with_gate();
+    let day = farm.root().join("2026-11-20");
+    std::fs::create_dir(&day).unwrap();
+    std::fs::write(day.join("a.xodr"), Content::Good(1).bytes()).unwrap();
+    std::fs::write(beside.join("b.xodr"), Content::Good(2).bytes()).unwrap();
+    symlink("2026-11-20", farm.root().join("latest")).unwrap();
+    symlink(&beside, farm.root().join("other")).unwrap();
+    let _broker = farm.serve_ready();
+    becomes(&farm, &gate, "2026-11-20/a.xodr", Some(Verdict::Accepted));
+    let told = verdict(&farm, &farm.root().join("latest/a.xodr"));
+    assert_eq!(told.file, day.join("a.xodr"));
+    // What lies behind the other is nobody's, and that is said.
+    let request = Request::Wait {
+        file: farm.root().join("other/b.xodr"),
+        timeout_ms: Some(120_000),
+    };
+    let answer = farm.ask(&request);
+    let Some(Response::Unwatched { reason }) = &answer else {
+        panic!("{answer:?}");
+    };
+    assert!(reason.contains("links are not followed"), "{reason}");
+    // Pointed to another day: the same name means another file.
+    let next = farm.root().join("2026-11-21");
+    std::fs::create_dir(&next).unwrap();
+    std::fs::write(next.join("a.xodr"), Content::NoHeader(3).bytes()).unwrap();
+    symlink("2026-11-21", farm.root().join("new")).unwrap();
+    std::fs::rename(farm.root().join("new"), farm.root().join("latest")).unwrap();
+    let told = verdict(&farm, &farm.root().join("latest/a.xodr"));
+    assert_eq!(
+        (told.file, told.verdict),
+        (next.join("a.xodr"), Verdict::Rejected)
+    );
+    let published = gate.join("latest");
+    assert!(!published.exists() && farm.settle(2).unseen.len() == 1);
+}
+
 /// Who is nobody: root may look into every directory.
 const NOBODY: &str = "65534";
+
+fn rights(path: &Path, mode: u32) {
+    std::fs::set_permissions(path, std::fs::Permissions::from_mode(mode)).unwrap();
+}
+
+/// What begins a command as somebody who may not read `closed`: nothing, if this user is one.
+/// `None`: that cannot be done here, and has been said.
+fn as_nobody(test: &str, closed: &Path) -> Option<Vec<&'static str>> {
+    if std::fs::read_dir(closed).is_err() {
+        return Some(Vec::new());
+    }
+    let who = [
+        "setpriv",
+        "--reuid",
+        NOBODY,
+        "--regid",
+        NOBODY,
+        "--clear-groups",
+    ];
+    let tried = Command::new(who[0]).args(&who[1..]).arg("true").output();
+    if tried.is_ok_and(|it| it.status.success()) {
+        return Some(who.to_vec());
+    }
+    support::inside::skip(test, "this user may read everything and cannot be another");
+    None
+}
+
+/// A command as somebody else, with a copy of the program where everybody may run it.
+fn command_of(who: &[&str], program: &Path) -> Command {
+    std::fs::copy(env!("CARGO_BIN_EXE_qcbus"), program).unwrap();
+    let mut words = who.iter().map(OsStr::new).chain([program.as_os_str()]);
+    let mut command = Command::new(words.next().unwrap());
+    command.args(words);
+    command
+}
+
+fn give_to_nobody(path: &Path) {
+    let nobody = NOBODY.parse().ok();
+    // Only who may read everything gives anything away.
+    let _ = std::os::unix::fs::chown(path, nobody, nobody);
+}
 
 #[test]
 fn a_directory_that_may_not_be_read_counts() {
     let desk = desk_with_a_good_file();
     let closed = desk.path().join("maps/closed");
     std::fs::create_dir(&closed).unwrap();
-    let rights = |path: &Path, mode| {
-        std::fs::set_permissions(path, std::fs::Permissions::from_mode(mode)).unwrap();
-    };
     rights(&closed, 0o000);
-    let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
-    if std::fs::read_dir(&closed).is_ok() {
-        // As somebody else, with a program and places that everybody may use.
-        let program = desk.path().join("qcbus");
-        std::fs::copy(env!("CARGO_BIN_EXE_qcbus"), &program).unwrap();
-        let run = desk.path().join(".run");
-        for path in [desk.path(), &run, &desk.path().join("maps")] {
-            rights(path, 0o777);
-        }
-        let _ = std::os::unix::fs::chown(&run, NOBODY.parse().ok(), NOBODY.parse().ok());
-        rights(&run, 0o700);
-        command = Command::new("setpriv");
-        command.args(["--reuid", NOBODY, "--regid", NOBODY, "--clear-groups"]);
-        if !command
-            .arg("true")
-            .output()
-            .is_ok_and(|it| it.status.success())
-        {
-            let why = "this user may read everything and cannot be another";
-            support::inside::skip("a_directory_that_may_not_be_read_counts", why);
-            return;
-        }
-        command = Command::new("setpriv");
-        command.args(["--reuid", NOBODY, "--regid", NOBODY, "--clear-groups"]);
-        command.arg(program);
+    let Some(who) = as_nobody("a_directory_that_may_not_be_read_counts", &closed) else {
+        return;
+    };
+    let run = desk.path().join(".run");
+    for path in [desk.path(), &run, &desk.path().join("maps")] {
+        rights(path, 0o1777);
     }
+    give_to_nobody(&run);
+    rights(&run, 0o700);
+    let mut command = command_of(&who, &desk.path().join("qcbus"));
     let said = desk.run(command.args(["check", "maps", "--out", "out"]));
     rights(&closed, 0o700);
     assert_eq!(said.code, Some(3), "{}", said.whole(&desk));
     let told = desk.tidy(&said.stderr);
     let note = "note: not looked at: [DESK]/maps/closed: cannot look into this directory";
     assert_eq!(told.matches(note).count(), 1, "{told}");
+}
+
+/// A farm of somebody else, and the command that serves it.
+fn farm_of(who: &[&str]) -> (Farm, Command) {
+    let farm = Farm::new();
+    let program = farm.base().join("qcbus");
+    let mut command = command_of(who, &program);
+    command.args(farm.serve_command().get_args());
+    command.env("NO_COLOR", "1");
+    rights(farm.base(), 0o777);
+    for path in [farm.base(), &farm.root(), &farm.bundles_d()] {
+        give_to_nobody(path);
+    }
+    rights(farm.base(), 0o755);
+    (farm, command)
+}
+
+fn wait_for_mode(farm: &Farm, mode: &str) {
+    let now = || farm.status().map(|it| it.watch_mode);
+    until_or(
+        "the mode",
+        || now().filter(|it| it.starts_with(mode)),
+        || format!("{:?}\n{}", now(), tail(&farm.log())),
+    );
+}
+
+#[test]
+fn a_closed_directory_costs_no_other_its_events() {
+    let place = tempfile::tempdir().unwrap();
+    rights(place.path(), 0o000);
+    let test = "a_closed_directory_costs_no_other_its_events";
+    let who = as_nobody(test, place.path());
+    rights(place.path(), 0o700);
+    let Some(who) = who else { return };
+    let (farm, mut command) = farm_of(&who);
+    // As every file system has one at its top.
+    let found = farm.root().join("lost+found");
+    std::fs::create_dir(&found).unwrap();
+    std::fs::write(found.join("a.xodr"), Content::Good(1).bytes()).unwrap();
+    symlink("/", farm.root().join("everything")).unwrap();
+    rights(&found, 0o000);
+    let _broker = Broker::start(&mut command, &farm.log_path());
+    wait_for_mode(&farm, "events");
+    until_so("what is unseen is said", || {
+        farm.status().is_some_and(|it| it.unseen.len() == 2)
+    });
+    assert_eq!(farm.status().unwrap().watch_mode, "events");
+    std::fs::create_dir(farm.root().join("maps")).unwrap();
+    farm.write("maps/b.xodr", &Content::Good(2).bytes());
+    until_so("its file is judged", || {
+        farm.out().join("maps/b.xodr.xqar").exists()
+    });
+    // And when it may be read, that is noticed at once.
+    rights(&found, 0o755);
+    until_so("the other is judged", || {
+        farm.out().join("lost+found/a.xodr.xqar").exists()
+    });
+    assert_eq!(farm.status().unwrap().watch_mode, "events");
+    drop(farm.qcbus(&["down"]));
+}
+
+/// A farm whose broker has no more than so many of a kind of limit of inotify.
+fn serve_with(test: &str, limit: &str, farm: &Farm) -> Option<Broker> {
+    let set = format!("echo {limit}");
+    let alone = ["--user", "--map-root-user", "sh", "-c"];
+    let tried = Command::new("unshare").args(alone).arg(&set).output();
+    if !tried.as_ref().is_ok_and(|it| it.status.success()) {
+        let why = format!("the limits of inotify cannot be set here: {tried:?}");
+        support::inside::skip(test, &why);
+        return None;
+    }
+    let serve = farm.serve_command();
+    let mut command = Command::new("unshare");
+    command
+        .args(alone)
+        .arg(format!("{set} && exec \"$@\""))
+        .arg("sh");
+    command.arg(serve.get_program()).args(serve.get_args());
+    Some(Broker::start(&mut command, &farm.log_path()))
+}
+
+#[test]
+fn without_watches_left_only_what_has_none_is_looked_through() {
+    let test = "without_watches_left_only_what_has_none_is_looked_through";
+    let farm = Farm::with(&["--rescan", "1h"]);
+    for number in 0..10 {
+        std::fs::create_dir(farm.root().join(number.to_string())).unwrap();
+    }
+    let limit = "4 > /proc/sys/user/max_inotify_watches";
+    let Some(_broker) = serve_with(test, limit, &farm) else {
+        return;
+    };
+    // The watched directory and three in it have what there is.
+    wait_for_mode(&farm, "events; 7 directories every 2 s");
+    for number in 0..10 {
+        farm.write(&format!("{number}/a.xodr"), &Content::Good(number).bytes());
+    }
+    std::fs::create_dir_all(farm.root().join("9/new/deep")).unwrap();
+    farm.write("9/new/deep/b.xodr", &Content::Good(11).bytes());
+    farm.settle(11);
+    std::fs::remove_file(farm.root().join("8/a.xodr")).unwrap();
+    std::fs::remove_dir_all(farm.root().join("9")).unwrap();
+    farm.settle(8);
+    let log = farm.log();
+    assert_eq!(
+        log.matches("fs.inotify.max_user_watches").count(),
+        1,
+        "{log}"
+    );
+    drop(farm.qcbus(&["down"]));
+}
+
+#[test]
+fn without_events_everything_is_looked_through_and_it_is_said_what_to_do() {
+    let test = "without_events_everything_is_looked_through_and_it_is_said_what_to_do";
+    let farm = Farm::new();
+    let limit = "0 > /proc/sys/user/max_inotify_instances";
+    let Some(_broker) = serve_with(test, limit, &farm) else {
+        return;
+    };
+    wait_for_mode(&farm, "poll every 2 s, because events cannot be had");
+    std::fs::create_dir(farm.root().join("maps")).unwrap();
+    farm.write("maps/a.xodr", &Content::Good(1).bytes());
+    farm.settle(1);
+    let log = farm.log();
+    assert_eq!(
+        log.matches("fs.inotify.max_user_instances").count(),
+        1,
+        "{log}"
+    );
+    drop(farm.qcbus(&["down"]));
 }
 
 /// Two names that differ in one byte, which is no text in either.
@@ -407,4 +598,129 @@ fn a_scenario_with_such_a_path_finds_its_map() {
     let found = file["depends_on"].as_array().unwrap().iter();
     let found = found.filter(|it| it["path"] == *map && it["sha256"].is_string());
     assert_eq!(found.count(), 1, "{file:#}");
+}
+
+/// A name that prints a line of its own, one that steers a terminal, and what each is called.
+const STEERING: [(&[u8], &str); 2] = [
+    (
+        b"x.xodr\nimportant.xodr: accepted\n.xodr",
+        "bytes:x.xodr%0Aimportant.xodr: accepted%0A.xodr",
+    ),
+    (
+        b"\x1b[2Kb\xe2\x80\xaec.xodr",
+        "bytes:%1B[2Kb%E2%80%AEc.xodr",
+    ),
+];
+
+/// No line is another's, and nothing steers.
+fn has_only_lines_of_ours(what: &str, text: &str) {
+    let steering = |c: char| qcbus_messages::shown::moves(c) && c != '\n';
+    assert!(!text.chars().any(steering), "{what}: {text:?}");
+    let forged = |line: &str| line.starts_with("important.xodr: accepted");
+    assert!(!text.lines().any(forged), "{what}:\n{text}");
+}
+
+#[test]
+fn names_that_would_be_lines_are_none_in_what_check_prints() {
+    let desk = Desk::new();
+    std::fs::create_dir(desk.path().join("in")).unwrap();
+    for (bytes, _) in STEERING {
+        let path = desk.path().join("in").join(name(bytes));
+        std::fs::write(path, Content::NoHeader(1).bytes()).unwrap();
+    }
+    for more in [&[][..], &["-q"], &["--format", "json"]] {
+        let said = check(&desk, &[&["in"], more].concat());
+        assert_eq!(said.code, Some(1), "{}", said.stderr);
+        for (what, text) in [("stdout", &said.stdout), ("stderr", &said.stderr)] {
+            has_only_lines_of_ours(what, text);
+        }
+        for (_, text) in STEERING {
+            let called = text.trim_start_matches("bytes:");
+            assert!(said.stdout.contains(called), "{}", said.stdout);
+        }
+    }
+}
+
+#[test]
+fn names_and_words_of_others_are_no_lines_of_a_broker() {
+    let farm = Farm::new();
+    let broker = farm.serve_ready();
+    farm.let_in("speaks_in_lines", "");
+    for (bytes, _) in STEERING {
+        std::fs::write(farm.root().join(name(bytes)), Content::Good(1).bytes()).unwrap();
+    }
+    farm.write("plain.xodr", &Content::Good(2).bytes());
+    let spoken = || {
+        let why = verdict(&farm, &farm.root().join("plain.xodr")).why;
+        why.iter()
+            .any(|why| why.contains("important"))
+            .then_some(())
+    };
+    until_or("the animal has judged", spoken, || tail(&farm.log()));
+    farm.settle(3);
+    for (bytes, text) in STEERING {
+        let path = farm.root().join(name(bytes));
+        let mut wait = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+        wait.arg("wait")
+            .arg(&path)
+            .arg("--instance-dir")
+            .arg(farm.instance());
+        let waited = wait.output().unwrap();
+        let waited = String::from_utf8(waited.stdout).unwrap();
+        has_only_lines_of_ours("wait", &waited);
+        let called = to_text(&path);
+        assert!(called.ends_with(text.trim_start_matches("bytes:")));
+        assert!(waited.starts_with(&format!("{called}: ")), "{waited}");
+    }
+    for command in [&["status"][..], &["bundle", "list"], &["doctor"]] {
+        let said = farm.qcbus(command);
+        has_only_lines_of_ours(command[0], &String::from_utf8(said.stdout).unwrap());
+        has_only_lines_of_ours(command[0], &String::from_utf8(said.stderr).unwrap());
+    }
+    down(&farm, broker);
+    has_only_lines_of_ours("log", &farm.log());
+}
+
+#[test]
+fn words_of_others_are_no_lines_of_a_text_report() {
+    let mut farm = Farm::new();
+    farm.arguments.extend(["--report".into(), "text".into()]);
+    let broker = farm.serve_ready();
+    farm.let_in("speaks_in_lines", "");
+    farm.write("plain.xodr", &Content::Good(2).bytes());
+    let report = || {
+        let files = files_below(&farm.out());
+        let text = files.iter().find(|it| it.ends_with("plain.xodr.txt"))?;
+        let text = std::fs::read_to_string(farm.out().join(text)).ok()?;
+        text.contains("important").then_some(text)
+    };
+    let text = until_or("the animal is reported", report, || tail(&farm.log()));
+    has_only_lines_of_ours("report", &text);
+    down(&farm, broker);
+}
+
+#[test]
+fn what_is_printed_and_lost_is_no_success() {
+    let desk = Desk::new();
+    desk.write("in/a.xodr", Content::Good(1).bytes());
+    let run = |stdout: std::process::Stdio| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+        command.args(["check", "in"]).current_dir(desk.path());
+        command.stdout(stdout).output().unwrap()
+    };
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full");
+    let lost = run(full.unwrap().into());
+    let said = String::from_utf8(lost.stderr).unwrap();
+    assert_eq!(lost.status.code(), Some(5), "{said}");
+    assert!(said.contains("cannot write to stdout"), "{said}");
+    // Whoever reads no further knows so itself.
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let closed = run(writer.into());
+    assert_eq!(closed.status.code(), Some(0));
+    assert!(
+        closed.stderr.is_empty(),
+        "{:?}",
+        String::from_utf8(closed.stderr)
+    );
 }

@@ -158,6 +158,48 @@ fn floods_issues() {
     assert!(peak < FLOODED_KIB, "the broker held {peak} KiB");
 }
 
+/// Most of a result's bytes beside a bundle that says far too much: none of it is kept.
+const RESULT_BYTES: u64 = 1 << 20;
+
+fn results_are_small(farm: &Farm) {
+    let result = farm.verdict("0.xodr").xqar;
+    let bytes = result.metadata().unwrap().len();
+    assert!(bytes < RESULT_BYTES, "the result has {bytes} bytes");
+}
+
+#[test]
+fn floods_metadata() {
+    let reason = "its parameters and metadata take 3145";
+    let (farm, broker) = beside("floods_metadata", reason);
+    results_are_small(&farm);
+    let peak = peak_private_kib(broker.pid()).unwrap();
+    assert!(peak < FLOODED_KIB, "the broker held {peak} KiB");
+}
+
+#[test]
+fn floods_with_huge_messages() {
+    let reason = "at most 4194304 are allowed";
+    let (farm, broker) = beside("floods_with_huge_messages", "floods_with_huge_messages");
+    let reasons = reasons_of(&farm, "0.xodr", "floods_with_huge_messages");
+    let said = format!("{reasons:#?}{}", notices(&farm));
+    assert!(said.contains(reason), "{said}");
+    results_are_small(&farm);
+    let peak = peak_private_kib(broker.pid()).unwrap();
+    assert!(peak < FLOODED_KIB, "the broker held {peak} KiB");
+}
+
+#[test]
+fn never_the_same() {
+    let (farm, _broker) = beside("never_the_same", "");
+    let status = farm.status().unwrap();
+    let restless = status.notices.iter().filter(|it| it.kind == "restless");
+    assert!(restless.count() > 0, "{:#?}", status.notices);
+    // An epoch began with each change that was believed: of hundreds, those that were forgiven and a
+    // few later ones.
+    let epochs = status.epoch & 0xffff_ffff;
+    assert!(epochs < 40, "{epochs} epochs");
+}
+
 #[test]
 fn dies_on_every_job() {
     let (farm, _broker) = beside("dies_on_every_job", "dies_on_every_job");

@@ -272,8 +272,6 @@ impl Farm {
         {
             let name = entry.file_name().to_string_lossy().into_owned();
             if name.starts_with(&prefix) {
-                let _ = std::fs::remove_file(entry.path());
-            } else if name.starts_with(&format!("d{prefix}")) {
                 let _ = std::fs::remove_dir_all(entry.path());
             }
         }
@@ -292,7 +290,7 @@ impl Drop for Farm {
     }
 }
 
-/// Segments in /dev/shm whose name begins like this.
+/// What lies in /dev/shm under a name that begins like this.
 pub fn shm_segments(prefix: &str) -> Vec<String> {
     let entries = std::fs::read_dir("/dev/shm").unwrap().flatten();
     let names = entries.filter_map(|entry| entry.file_name().into_string().ok());

@@ -222,7 +222,7 @@ fn is_being_written(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let writer = name
         .strip_prefix(".qcbus-")
-        .and_then(|it| it.split_once('-'));
+        .and_then(|it| it.split_once('.'));
     writer.is_some_and(|(pid, _)| Path::new("/proc").join(pid).exists())
 }
 

@@ -1,5 +1,6 @@
 //! A broker under a tracer. It sees every system call that changes something on the disk (a *deed*),
-//! and kills the broker before or after a certain one, as a crash at that very moment would.
+//! and kills the broker before or after a certain one, as a crash at that very moment would. Or it gives
+//! the broker another answer than the system would, or none for as long as it likes.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::os::unix::fs::FileExt;
@@ -9,6 +10,7 @@ use std::process::{Command, ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
+use nix::errno::Errno;
 use nix::libc;
 use nix::sys::ptrace::{self, Options};
 use nix::sys::signal::Signal;
@@ -33,6 +35,48 @@ pub struct Aim {
     pub side: Side,
 }
 
+/// What a system call comes to instead.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Answer {
+    /// This error, and nothing is done.
+    Error(Errno),
+    /// A read that gives one byte.
+    Short,
+    /// Nothing, until the trouble is over.
+    Never,
+}
+
+/// What a system call has to do with a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// It looks at it or opens it.
+    Look,
+    /// It reads from it.
+    Read,
+    /// It changes what lies on the disk.
+    Deed,
+}
+
+/// What goes wrong.
+#[derive(Debug, Clone)]
+pub struct Trouble {
+    /// With files below this path, or with this one.
+    pub below: PathBuf,
+    /// With these calls.
+    pub kinds: &'static [Kind],
+    /// What they come to.
+    pub answer: Answer,
+    /// Of so many calls one.
+    pub one_in: usize,
+}
+
+/// Why no other answers can be given here; `None` when they can.
+pub fn no_other_answers() -> Option<String> {
+    let known = cfg!(target_arch = "x86_64");
+    let why = "the registers of this processor are not known to the test";
+    (!known).then(|| why.to_owned()).or_else(refused)
+}
+
 /// A broker that runs under a tracer. Killed when dropped.
 #[derive(Debug)]
 pub struct Traced {
@@ -54,6 +98,9 @@ struct State {
     deeds: Vec<String>,
     hit: Option<String>,
     ended: Option<ExitStatus>,
+    trouble: Option<Trouble>,
+    /// Calls that the trouble is about, and those of them that it was given to.
+    troubled: (usize, usize),
 }
 
 impl Shared {
@@ -91,6 +138,18 @@ impl Traced {
         let mut state = self.shared.state();
         state.aim = aim;
         state.deeds.clear();
+    }
+
+    /// From now on this goes wrong, or nothing. Says how often the last trouble came to something.
+    pub fn trouble(&self, trouble: Option<Trouble>) -> usize {
+        let mut state = self.shared.state();
+        state.trouble = trouble;
+        std::mem::take(&mut state.troubled).1
+    }
+
+    /// How often the trouble has come to something.
+    pub fn troubled(&self) -> usize {
+        self.shared.state().troubled.1
     }
 
     /// What it has done since it was aimed at.
@@ -161,6 +220,8 @@ fn trace(command: &mut Command, shared: &Shared) {
         shared,
         known: BTreeSet::from([pid]),
         dies_after: BTreeMap::new(),
+        answers: BTreeMap::new(),
+        held: Vec::new(),
     };
     // Any that has been killed meanwhile is waited for below.
     let _ = ptrace::syscall(pid, None);
@@ -180,6 +241,10 @@ struct Tracer<'s> {
     known: BTreeSet<Pid>,
     /// Threads at whose return from a system call all is over, with what they do there.
     dies_after: BTreeMap<Pid, String>,
+    /// What system calls that are not made are said to have come to.
+    answers: BTreeMap<Pid, Errno>,
+    /// Threads that wait for the trouble to be over.
+    held: Vec<Pid>,
 }
 
 impl Tracer<'_> {
@@ -193,7 +258,11 @@ impl Tracer<'_> {
                 return Some(ExitStatus::from_raw(signal as i32));
             }
             WaitStatus::PtraceSyscall(thread) => {
-                self.system_call(thread);
+                self.let_go();
+                if self.system_call(thread) {
+                    self.held.push(thread);
+                    return None;
+                }
                 (thread, None)
             }
             // Every thread begins with a stop of the tracer's making.
@@ -209,11 +278,25 @@ impl Tracer<'_> {
         None
     }
 
-    fn system_call(&mut self, thread: Pid) {
+    /// Lets those go on who waited for the end of the trouble. Somebody calls the system all the time.
+    fn let_go(&mut self) {
+        if !self.held.is_empty() && self.shared.state().trouble.is_none() {
+            for thread in self.held.drain(..) {
+                // One that was killed meanwhile is waited for.
+                let _ = ptrace::syscall(thread, None);
+            }
+        }
+    }
+
+    /// Whether the thread is to wait.
+    fn system_call(&mut self, thread: Pid) -> bool {
         let Ok(info) = ptrace::syscall_info(thread) else {
-            return;
+            return false;
         };
         if info.op == libc::PTRACE_SYSCALL_INFO_EXIT {
+            if let Some(error) = self.answers.remove(&thread) {
+                say_it_came_to(thread, error);
+            }
             if let Some(what) = self.dies_after.remove(&thread) {
                 self.kill(format!("after {what}"));
             }
@@ -227,7 +310,39 @@ impl Tracer<'_> {
             if let Some(what) = deed(thread, call.nr, &call.args, &self.shared.below) {
                 self.count(thread, what);
             }
+            return self.meddle(thread, call.nr, &call.args);
         }
+        false
+    }
+
+    /// Gives another answer, if there is trouble for this call. `true`: none for now.
+    fn meddle(&mut self, thread: Pid, number: u64, args: &[u64; 6]) -> bool {
+        let Some(answer) = self.trouble_with(thread, number, args) else {
+            return false;
+        };
+        match answer {
+            Answer::Never => return true,
+            Answer::Short => read_one_byte(thread),
+            Answer::Error(error) => {
+                make_no_call(thread);
+                self.answers.insert(thread, error);
+            }
+        }
+        false
+    }
+
+    fn trouble_with(&self, thread: Pid, number: u64, args: &[u64; 6]) -> Option<Answer> {
+        let trouble = self.shared.state().trouble.clone()?;
+        let (kind, path) = touched(thread, number, args)?;
+        let concerned = trouble.kinds.contains(&kind) && path.starts_with(&trouble.below);
+        let mut state = self.shared.state();
+        if !concerned || state.trouble.is_none() {
+            return None;
+        }
+        state.troubled.0 += 1;
+        let now = state.troubled.0.is_multiple_of(trouble.one_in);
+        state.troubled.1 += usize::from(now);
+        now.then_some(trouble.answer)
     }
 
     fn count(&mut self, thread: Pid, what: String) {
@@ -255,12 +370,7 @@ fn deed(thread: Pid, number: u64, args: &[u64; 6], below: &[PathBuf]) -> Option<
     let call = CALLS
         .iter()
         .find(|it| u64::try_from(it.number) == Ok(number))?;
-    let path = match call.of {
-        Of::Descriptor => of_descriptor(thread, args[0])?,
-        Of::Path(at) => absolute(thread, None, args[at])?,
-        Of::PathAt(at) => absolute(thread, Some(args[at]), args[at + 1])?,
-    };
-    let writes = |flags: u64| flags & u64::try_from(libc::O_ACCMODE | libc::O_CREAT).unwrap() != 0;
+    let path = path_of(thread, call, args)?;
     if call.flags.is_some_and(|at| !writes(args[at])) {
         return None;
     }
@@ -268,6 +378,74 @@ fn deed(thread: Pid, number: u64, args: &[u64; 6], below: &[PathBuf]) -> Option<
     let shown = path.strip_prefix(base.parent()?).unwrap();
     Some(format!("{} {}", call.name, shown.display()))
 }
+
+/// What a system call has to do with which file.
+fn touched(thread: Pid, number: u64, args: &[u64; 6]) -> Option<(Kind, PathBuf)> {
+    let of = |calls: &'static [Call]| {
+        let mut calls = calls.iter();
+        calls.find(|it| u64::try_from(it.number) == Ok(number))
+    };
+    let (kind, call) = match (of(LOOKS), of(READS), of(CALLS)) {
+        (_, Some(call), _) => (Kind::Read, call),
+        (_, _, Some(call)) if call.flags.is_none_or(|at| writes(args[at])) => (Kind::Deed, call),
+        (Some(call), ..) => (Kind::Look, call),
+        _ => return None,
+    };
+    Some((kind, path_of(thread, call, args)?))
+}
+
+fn writes(flags: u64) -> bool {
+    flags & u64::try_from(libc::O_ACCMODE | libc::O_CREAT).unwrap() != 0
+}
+
+fn path_of(thread: Pid, call: &Call, args: &[u64; 6]) -> Option<PathBuf> {
+    let path = match call.of {
+        Of::Descriptor => of_descriptor(thread, args[0])?,
+        Of::Path(at) => absolute(thread, None, args[at])?,
+        Of::PathAt(at) => absolute(thread, Some(args[at]), args[at + 1])?,
+    };
+    // What is opened a second time by its descriptor.
+    let Ok(descriptor) = path.strip_prefix("/proc/self/fd") else {
+        return Some(path);
+    };
+    of_descriptor(thread, descriptor.to_str()?.parse().ok()?)
+}
+
+/// The call is none that the system knows, so that nothing is done.
+#[cfg(target_arch = "x86_64")]
+fn make_no_call(thread: Pid) {
+    with_registers(thread, |registers| registers.orig_rax = u64::MAX);
+}
+
+#[cfg(target_arch = "x86_64")]
+fn say_it_came_to(thread: Pid, error: Errno) {
+    let answer = -i64::from(error as i32);
+    with_registers(thread, |registers| registers.rax = answer.cast_unsigned());
+}
+
+/// The third argument of a read says how much.
+#[cfg(target_arch = "x86_64")]
+fn read_one_byte(thread: Pid) {
+    with_registers(thread, |registers| registers.rdx = registers.rdx.min(1));
+}
+
+#[cfg(target_arch = "x86_64")]
+fn with_registers(thread: Pid, change: impl FnOnce(&mut libc::user_regs_struct)) {
+    // A thread that was killed meanwhile has none.
+    if let Ok(mut registers) = ptrace::getregs(thread) {
+        change(&mut registers);
+        let _ = ptrace::setregs(thread, registers);
+    }
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn make_no_call(_: Pid) {}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn say_it_came_to(_: Pid, _: Errno) {}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn read_one_byte(_: Pid) {}
 
 /// What a system call is about.
 #[derive(Debug, Clone, Copy)]
@@ -296,6 +474,29 @@ const fn call(number: libc::c_long, name: &'static str, of: Of) -> Call {
         flags: None,
     }
 }
+
+/// All that looks at a file or opens it.
+const LOOKS: &[Call] = &[
+    call(libc::SYS_openat, "open", Of::PathAt(0)),
+    call(libc::SYS_statx, "look", Of::PathAt(0)),
+    call(libc::SYS_newfstatat, "look", Of::PathAt(0)),
+    call(libc::SYS_readlinkat, "look", Of::PathAt(0)),
+    call(libc::SYS_getdents64, "list", Of::Descriptor),
+    #[cfg(target_arch = "x86_64")]
+    call(libc::SYS_open, "open", Of::Path(0)),
+    #[cfg(target_arch = "x86_64")]
+    call(libc::SYS_stat, "look", Of::Path(0)),
+    #[cfg(target_arch = "x86_64")]
+    call(libc::SYS_lstat, "look", Of::Path(0)),
+    #[cfg(target_arch = "x86_64")]
+    call(libc::SYS_readlink, "look", Of::Path(0)),
+];
+
+/// All that reads from a file, so much as the third argument says.
+const READS: &[Call] = &[
+    call(libc::SYS_read, "read", Of::Descriptor),
+    call(libc::SYS_pread64, "read", Of::Descriptor),
+];
 
 /// All that changes what lies on the disk, by the path that is changed: a rename's is the new one.
 const CALLS: &[Call] = &[

@@ -7,6 +7,7 @@ use qcbus_document::{Document, FileKind, Image, ImageError, Suffix};
 use qcbus_formats::pool::{BundleOutcome, Remark};
 use qcbus_ingest::modular::{ExpandedImage, SearchPath};
 use qcbus_ingest::{IngestError, Limits, Prepared, Reader, Source, Walking};
+use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Absence, Digest, DocumentRole, Link, MissingDocument};
 
 use crate::kept::KeptModels;
@@ -28,7 +29,7 @@ pub struct Loaded {
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// Its name promises nothing that can be checked.
-    #[error("check {}: its name ends in none of {}", .0.display(), Suffix::list())]
+    #[error("check {}: its name ends in none of {}", to_text(.0), Suffix::list())]
     UnknownKind(PathBuf),
     /// No byte of it could be had.
     #[error("{error}")]
@@ -219,7 +220,7 @@ impl Source for Shelf<'_> {
         self.linked.push(LinkedImage {
             links: Vec::new(),
             role,
-            path: qcbus_messages::path_text::to_text(path),
+            path: to_text(path),
             referred_at,
             id: (0, self.linked.len() as u64),
             image: Image::new(image),

@@ -76,7 +76,7 @@ async fn talk(host: &mut Host) -> (usize, Status) {
     let (mut issues, mut status) = (0, Status::Error);
     loop {
         match host.next().await {
-            HostEvent::Hello { peer, hello } => {
+            HostEvent::Hello { peer, hello, .. } => {
                 assert_eq!(hello.name, "testBundle");
                 let generation = host.generation();
                 host.accept(
@@ -106,7 +106,9 @@ async fn talk(host: &mut Host) -> (usize, Status) {
                 | FromPeer::ResultDone { .. }
                 | FromPeer::WithdrawalDone { .. } => {}
             },
-            HostEvent::Garbage { what, .. } => panic!("{what}"),
+            HostEvent::Garbage { what, .. } | HostEvent::TurnedAway { why: what } => {
+                panic!("{what}")
+            }
             HostEvent::Gone { .. } => panic!("the bundle went away"),
         }
     }

@@ -290,14 +290,21 @@ impl<'a> Image<'a> {
                 && node.end.get() as usize == self.nodes.len();
         }
         let mut outer = index - 1;
-        // Nodes before this one have been found sound: parents come before their children.
-        while self.nodes[outer].end.get() as usize <= index {
-            if self.nodes[outer].parent.get() == NONE {
+        // Parents come before their children, or the image is not sound: were that only taken from the
+        // nodes already looked at, an image that changes meanwhile could lead round in circles.
+        loop {
+            let Some(before) = self.nodes.get(outer) else {
+                return false;
+            };
+            let (parent, end) = (before.parent.get() as usize, before.end.get());
+            if end as usize > index {
+                return node.parent.get() as usize == outer && node.end.get() <= end;
+            }
+            if parent >= outer {
                 return false;
             }
-            outer = self.nodes[outer].parent.get() as usize;
+            outer = parent;
         }
-        node.parent.get() as usize == outer && node.end.get() <= self.nodes[outer].end.get()
     }
 
     fn is_character_data(&self, node: &NodeRecord) -> bool {

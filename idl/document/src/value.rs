@@ -156,7 +156,7 @@ impl fmt::Display for Shown<'_> {
         match self.0 {
             "" => f.write_str("empty"),
             value => match value.char_indices().nth(LONGEST) {
-                Some((cut, _)) => write!(f, "'{}…'", &value[..cut]),
+                Some((cut, _)) => write!(f, "'{}…'", value.get(..cut).unwrap_or("")),
                 None => write!(f, "'{value}'"),
             },
         }

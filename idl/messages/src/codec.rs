@@ -7,6 +7,10 @@ use serde::de::DeserializeOwned;
 /// Largest encoded message, in bytes. A result with its issues is the largest thing said.
 pub const MAX_MESSAGE: usize = 64 << 20;
 
+/// Largest encoded message that a bundle or reporter may send, in bytes: what it says is small, and
+/// findings come in any number of batches. Decoded it takes up to four times as much.
+pub const MAX_FROM_PEER: usize = 4 << 20;
+
 /// Why bytes could not be read as a message, or a message not be written.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CodecError {

@@ -42,6 +42,11 @@ pub enum Response {
     Verdict(FileVerdict),
     /// Answer to `Wait`: the time is over.
     TimedOut,
+    /// Answer to `Wait`: the file, or one that it refers to, lies on a disk that does not answer.
+    Unanswered {
+        /// For a person.
+        reason: String,
+    },
     /// Answer to `Wait`: nobody watches this file, and why.
     Unwatched {
         /// For a person.
@@ -173,6 +178,7 @@ impl std::fmt::Display for Unseen {
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct GateStatus {
     /// The directory.
+    #[serde(with = "path_text::one")]
     pub directory: PathBuf,
     /// Accepted files that are published.
     pub published: u64,
@@ -186,6 +192,7 @@ pub struct GateStatus {
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct HeldBack {
     /// Absolute path.
+    #[serde(with = "path_text::one")]
     pub file: PathBuf,
     /// Why: for a person.
     pub why: String,

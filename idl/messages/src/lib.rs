@@ -13,6 +13,7 @@ pub mod missing;
 pub mod path_text;
 pub mod peer_to_broker;
 pub mod services;
+pub mod shown;
 
 /// Day of the build, `YYYY-MM-DD`: that of the commit, so that two builds of one source give the
 /// same results. See `build.rs`.

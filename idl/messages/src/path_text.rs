@@ -11,6 +11,8 @@ use std::path::{Path, PathBuf};
 
 use qcbus_document::FileKind;
 
+use crate::shown::moves;
+
 /// Where the name of an archive on disk ends in `archive.mosc!member`; `None` for a file that lies in
 /// no archive. A `!` that follows no archive is an ordinary character.
 pub fn end_of_archive(path: &[u8]) -> Option<usize> {
@@ -58,15 +60,6 @@ pub fn to_text(path: &Path) -> String {
         escape(chunk.invalid(), &mut text);
     }
     text
-}
-
-/// Whether a terminal or a reader line by line takes this for more than a character: control
-/// characters, line and paragraph separators, changes of the direction of writing.
-fn moves(c: char) -> bool {
-    let directed = ['\u{202a}'..='\u{202e}', '\u{2066}'..='\u{2069}'];
-    c.is_control()
-        || matches!(c, '\u{2028}' | '\u{2029}')
-        || directed.iter().any(|it| it.contains(&c))
 }
 
 fn escape(bytes: &[u8], text: &mut String) {

@@ -19,6 +19,9 @@ pub const HELLO_BYTES: usize = 4 << 10;
 pub const BLOCK_BYTES: usize = 64;
 /// Ports kept free on shared services for debugging tools and a tunnel.
 pub const SPARE_PORTS: usize = 4;
+/// Bytes by which the memory of a stream grows, and half of which is had ahead of the frames in use:
+/// four frames.
+pub const STREAM_STEP_BYTES: u64 = 4 * (FRAME_BYTES as u64 + 256);
 /// Sessions beyond the peers allowed, used to tell a peer that there is no room for it.
 pub const SPARE_SESSIONS: usize = 4;
 
@@ -104,6 +107,20 @@ impl Topic {
         self.subscribers * (self.buffer + self.borrowed) + self.history + self.loans
     }
 
+    /// Bytes of shared memory that a publisher takes, at most, before it has lent anything.
+    pub const fn publisher_bytes(&self) -> u64 {
+        (16 * self.slots() + (64 << 10)) as u64
+    }
+
+    /// Bytes of shared memory that a publisher and a subscriber take for knowing each other.
+    pub const fn connection_bytes(&self) -> u64 {
+        let each = match self.growth {
+            Growth::Fixed => 2,
+            Growth::PowerOfTwo => GROWING_SLOT_BYTES,
+        };
+        (each * self.slots() + (16 << 10)) as u64
+    }
+
     /// Bytes of a slot's payload, to begin with.
     pub const fn slot_bytes(&self) -> usize {
         self.element * self.elements
@@ -124,6 +141,13 @@ pub struct Wake {
     /// Largest event id; only 0 is used.
     pub max_event_id: usize,
 }
+
+// What iceoryx2 keeps, measured; `runtime/bus/tests/bus/memory.rs` compares.
+/// Kept of a slot that may grow, for each who reads: a byte for each of the 256 sizes that it may have.
+const GROWING_SLOT_BYTES: usize = 264;
+const FIXED_BYTES: usize = 96 << 10;
+/// Addresses for the program itself, its threads and what it allocates.
+const ADDRESSES_BESIDE: u64 = 512 << 20;
 
 /// The table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -233,6 +257,35 @@ impl Services {
                 max_event_id: 0,
             },
         }
+    }
+
+    /// Bytes of shared memory that a broker takes for itself, without documents: what is kept of
+    /// every slot that it may lend, of everybody who may join, and some pages.
+    pub const fn broker_bytes(&self) -> u64 {
+        let small = 16 * self.document_small.slots();
+        let large = (16 + GROWING_SLOT_BYTES) * self.document_large.slots();
+        let everybody = 600 * self.document_small.subscribers;
+        (small + large + 16 * self.config.slots() + everybody + FIXED_BYTES) as u64
+    }
+
+    /// Bytes of shared memory that broker and peer together take for a session, without documents:
+    /// what is kept of every slot that the peer may be sent, introductions, the first frames of both
+    /// streams, and some pages.
+    pub const fn peer_bytes(&self) -> u64 {
+        let growing = GROWING_SLOT_BYTES * (self.document_large.slots() + self.config.slots());
+        let hello = self.hello.slots() * (self.hello.slot_bytes() + 128);
+        let small = 2 * self.document_small.slots();
+        (growing + small + hello + FIXED_BYTES) as u64 + 2 * STREAM_STEP_BYTES
+    }
+
+    /// Bytes of addresses that a broker needs for the bus. Segments are mapped in full, although
+    /// hardly anything of them is ever touched; the broker reads what it publishes, so that it maps
+    /// them twice.
+    pub const fn address_bytes(&self) -> u64 {
+        let documents = self.document_small.slots() * self.document_small.slot_bytes()
+            + self.document_large.slots() * self.document_large.slot_bytes();
+        let streams = self.hello.publishers * 2 * self.to_peer.slots() * FRAME_BYTES;
+        (2 * documents + streams) as u64 + ADDRESSES_BESIDE
     }
 
     /// All publish-subscribe services.

@@ -2,7 +2,10 @@
 //!
 //! Descriptions, paths and source lines come from the files that are checked. Printed as they
 //! are, an escape sequence could recolour or rewrite a terminal, and a bidirectional override
-//! could show another text than the file holds.
+//! could show another text than the file holds. What steers is known in one place
+//! ([`qcbus_messages::shown`]); here it becomes one character each, so that columns stay.
+
+use qcbus_messages::shown::moves;
 
 /// The text with everything that steers a terminal replaced by U+FFFD; tabs and line feeds stay.
 pub fn printable(text: &str) -> String {
@@ -19,8 +22,7 @@ pub fn one_line(text: &str) -> String {
 }
 
 fn steers(c: char) -> bool {
-    let bidirectional = matches!(c, '\u{202A}'..='\u{202E}' | '\u{2066}'..='\u{2069}');
-    (c.is_control() && c != '\t' && c != '\n') || bidirectional
+    moves(c) && c != '\t' && c != '\n'
 }
 
 #[cfg(test)]
@@ -30,8 +32,8 @@ mod tests {
     #[test]
     fn escape_sequences_and_overrides_do_not_get_through() {
         assert_eq!(
-            printable("a\u{1b}[31mb\u{202e}c\r\nd\te"),
-            "a\u{FFFD}[31mb\u{FFFD}c\nd\te"
+            printable("a\u{1b}[31mb\u{202e}c\r\nd\te\u{2028}f"),
+            "a\u{FFFD}[31mb\u{FFFD}c\nd\te\u{FFFD}f"
         );
     }
 

@@ -33,6 +33,7 @@ pub use sources::{Answer, BothSources, FileSources, ImageSources, Line, NoSource
 
 use std::path::PathBuf;
 
+use qcbus_messages::path_text::to_text;
 use qcbus_messages::{ResultMessage, Withdrawn};
 
 /// Something that writes results.
@@ -66,7 +67,7 @@ pub trait Reporter {
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// The file system or the stream refused.
-    #[error("write {}: {source}", path.display())]
+    #[error("write {}: {source}", to_text(path))]
     Write {
         /// The file, or `__stdout__` and `__stderr__`.
         path: PathBuf,

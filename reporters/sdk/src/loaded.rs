@@ -11,7 +11,7 @@ use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// The file system refused.
-    #[error("read {}: {source}", path.display())]
+    #[error("read {}: {source}", to_text(path))]
     Read {
         /// The file.
         path: PathBuf,
@@ -19,7 +19,7 @@ pub enum LoadError {
         source: std::io::Error,
     },
     /// It is no result file.
-    #[error("read {} as a result: {why}", path.display())]
+    #[error("read {} as a result: {why}", to_text(path))]
     Content {
         /// The file.
         path: PathBuf,

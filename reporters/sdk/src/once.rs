@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use qcbus_formats::config::Config;
 use qcbus_formats::xqar::Param;
+use qcbus_messages::path_text::to_text;
 
 use crate::loaded::{LoadError, load};
 use crate::output::asked;
@@ -31,7 +32,7 @@ pub struct OneShot {
 #[derive(Debug, thiserror::Error)]
 pub enum OnceError {
     /// The configuration cannot be used.
-    #[error("read the configuration {}: {why}", path.display())]
+    #[error("read the configuration {}: {why}", to_text(path))]
     Config {
         /// The file.
         path: PathBuf,

@@ -104,7 +104,7 @@ impl Broker {
 
     async fn welcome(&mut self) -> Hello {
         loop {
-            if let HostEvent::Hello { peer, hello } = self.host.next().await {
+            if let HostEvent::Hello { peer, hello, .. } = self.host.next().await {
                 let welcome = ToPeer::Welcome {
                     generation: self.host.generation(),
                     config: Digest::default(),
@@ -130,7 +130,8 @@ impl Broker {
                 } => {}
                 HostEvent::Message { message, .. } => return message,
                 HostEvent::Garbage { what, .. } => panic!("garbage: {what}"),
-                HostEvent::Hello { .. } | HostEvent::Gone { .. } => {}
+                HostEvent::Hello { .. } | HostEvent::Gone { .. } | HostEvent::TurnedAway { .. } => {
+                }
             }
         }
     }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use qcbus_formats::xqar::{DomainInfo, InfoElement, Level};
-use qcbus_messages::ResultMessage;
+use qcbus_messages::{ResultMessage, shown};
 use qcbus_reporter_sdk::{IssueLocation, Sources, one_line, printable};
 
 use crate::Entry;
@@ -28,7 +28,7 @@ impl View<'_> {
             self.place(out, place, entry.issue.level, gutter, number == 0);
         }
         if entry.places.is_empty() {
-            let path = printable(&self.result.display_path);
+            let path = shown::line(&self.result.display_path);
             let arrow = self.paint.frame("-->");
             let _ = writeln!(out, "{:gutter$}{arrow} {path}", "");
         }
@@ -86,8 +86,8 @@ impl View<'_> {
     /// `PATH:ROW:COLUMN`, as far as known.
     fn name(&self, place: &IssueLocation) -> String {
         let mut name = match &place.path {
-            Some(path) => printable(&self.shortened(path)),
-            None => printable(&self.result.display_path),
+            Some(path) => shown::line(&self.shortened(path)).into_owned(),
+            None => shown::line(&self.result.display_path).into_owned(),
         };
         if let Some(row) = place.row {
             name.push_str(&row_column((row, place.column.unwrap_or(0))));

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use qcbus_formats::pool::{BLOCKED, NotAsked};
 use qcbus_formats::xqar::{Checker, Level, Status};
-use qcbus_messages::{Digest, ResultMessage};
-use qcbus_reporter_sdk::{one_line, printable};
+use qcbus_messages::{Digest, ResultMessage, shown};
+use qcbus_reporter_sdk::one_line;
 
 use crate::Options;
 use crate::paint::Paint;
@@ -14,7 +14,7 @@ use crate::wrap::wrap;
 /// Writes the verdict line and the summary.
 pub(crate) fn write(out: &mut String, result: &ResultMessage, paint: Paint, options: &Options) {
     let verdict = result.verdict;
-    let path = paint.bold(&printable(&result.display_path));
+    let path = paint.bold(&shown::line(&result.display_path));
     let word = paint.verdict(verdict, verdict.as_str());
     let _ = writeln!(out, "{word}: {path}: {}", issues(result));
     let _ = writeln!(out, "  checkers: {}", checkers(result, options));
@@ -24,7 +24,7 @@ pub(crate) fn write(out: &mut String, result: &ResultMessage, paint: Paint, opti
     let not_asked = NotAsked::of(&result.results);
     if !not_asked.is_empty() {
         let not_asked: Vec<String> = not_asked.iter().map(ToString::to_string).collect();
-        let _ = writeln!(out, "  not asked: {}", printable(&not_asked.join(", ")));
+        let _ = writeln!(out, "  not asked: {}", shown::line(&not_asked.join(", ")));
     }
     if result.digest != Digest::default() {
         let _ = writeln!(out, "  sha256: {}", result.digest);
@@ -144,7 +144,7 @@ fn groups(result: &ResultMessage, options: &Options) -> Vec<Group> {
             if is_inapplicable(checker) && !options.inapplicable {
                 continue;
             }
-            let name = printable(&format!("{}/{}", bundle.name, checker.id));
+            let name = shown::line(&format!("{}/{}", bundle.name, checker.id)).into_owned();
             let reason = without_count(&one_line(&checker.summary)).to_owned();
             let known = groups
                 .iter_mut()

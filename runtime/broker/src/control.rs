@@ -2,22 +2,23 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use qcbus_messages::control::{Request, Response};
-use tokio::io::{AsyncBufReadExt, AsyncReadExt, AsyncWriteExt, BufReader};
-use tokio::net::{UnixListener, UnixStream};
 use tokio::sync::{mpsc, oneshot};
+use tokio::task::AbortHandle;
+
+mod place;
+
+use clients::{Bounds, Clients};
+
+mod clients;
 
 /// File name of the socket in the instance's directory.
 pub const SOCKET: &str = "control.sock";
 
 /// How long the end waits for answers to be written.
 const FLUSH_LIMIT: Duration = Duration::from_millis(500);
-
-/// Longest request, in bytes.
-const MAX_REQUEST: u64 = 64 << 10;
 
 /// A request with the place for its answer.
 #[derive(Debug)]
@@ -32,7 +33,8 @@ pub struct Asked {
 #[derive(Debug)]
 pub struct ControlSocket {
     path: PathBuf,
-    busy: Arc<AtomicUsize>,
+    clients: Arc<Clients>,
+    kept: AbortHandle,
 }
 
 impl ControlSocket {
@@ -47,17 +49,22 @@ impl ControlSocket {
     ) -> std::io::Result<ControlSocket> {
         let path = directory.join(SOCKET);
         qcbus_disk::remove(&path)?;
-        let listener = UnixListener::bind(&path)?;
-        std::fs::set_permissions(&path, std::os::unix::fs::PermissionsExt::from_mode(0o600))?;
-        let busy = Arc::new(AtomicUsize::new(0));
-        tokio::spawn(accept(listener, inbox, busy.clone()));
-        Ok(ControlSocket { path, busy })
+        let listener = place::listen(directory)?;
+        let clients = Clients::new(Bounds::of_this_process(), inbox);
+        let of_all = clients.clone();
+        let serve = move |listener| tokio::spawn(of_all.clone().accept(listener)).abort_handle();
+        let kept = tokio::spawn(place::keep(directory.to_owned(), listener, serve));
+        Ok(ControlSocket {
+            path,
+            clients,
+            kept: kept.abort_handle(),
+        })
     }
 
     /// Waits until answers that have been given are written, but not for clients that do not read.
     pub async fn flush(&self) {
         let deadline = tokio::time::Instant::now() + FLUSH_LIMIT;
-        while self.busy.load(Ordering::Acquire) > 0 && tokio::time::Instant::now() < deadline {
+        while self.clients.is_busy() && tokio::time::Instant::now() < deadline {
             tokio::time::sleep(Duration::from_millis(1)).await;
         }
     }
@@ -65,75 +72,11 @@ impl ControlSocket {
 
 impl Drop for ControlSocket {
     fn drop(&mut self) {
+        // First, or it would be made again.
+        self.kept.abort();
         // The directory may have been removed already.
         let _ = qcbus_disk::remove(&self.path);
     }
-}
-
-async fn accept(
-    listener: UnixListener,
-    inbox: mpsc::UnboundedSender<Asked>,
-    busy: Arc<AtomicUsize>,
-) {
-    loop {
-        match listener.accept().await {
-            Ok((stream, _)) => {
-                tokio::spawn(serve(stream, inbox.clone(), busy.clone()));
-            }
-            Err(error) => {
-                tracing::warn!("control socket: {error}");
-                tokio::time::sleep(Duration::from_millis(100)).await;
-            }
-        }
-    }
-}
-
-async fn serve(stream: UnixStream, inbox: mpsc::UnboundedSender<Asked>, busy: Arc<AtomicUsize>) {
-    let (read, mut write) = stream.into_split();
-    let mut lines = BufReader::new(read.take(MAX_REQUEST)).lines();
-    while let Ok(Some(line)) = lines.next_line().await {
-        let _busy = Busy::new(&busy);
-        let response = match serde_json::from_str(&line) {
-            Ok(request) => ask(request, &inbox).await,
-            Err(error) => Response::Failed {
-                reason: format!("not a request: {error}"),
-            },
-        };
-        let Ok(mut text) = serde_json::to_vec(&response) else {
-            return;
-        };
-        text.push(b'\n');
-        if write.write_all(&text).await.is_err() {
-            return;
-        }
-    }
-}
-
-/// Counts an answer that is being found or written.
-struct Busy(Arc<AtomicUsize>);
-
-impl Busy {
-    fn new(count: &Arc<AtomicUsize>) -> Busy {
-        count.fetch_add(1, Ordering::AcqRel);
-        Busy(count.clone())
-    }
-}
-
-impl Drop for Busy {
-    fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::AcqRel);
-    }
-}
-
-async fn ask(request: Request, inbox: &mpsc::UnboundedSender<Asked>) -> Response {
-    let (answer, answered) = oneshot::channel();
-    let stopped = || Response::Failed {
-        reason: "the broker is stopping".to_owned(),
-    };
-    if inbox.send(Asked { request, answer }).is_err() {
-        return stopped();
-    }
-    answered.await.unwrap_or_else(|_| stopped())
 }
 
 /// Why a broker could not be asked.
@@ -162,8 +105,7 @@ pub enum AskError {
 pub fn ask_broker(directory: &Path, request: &Request) -> Result<Response, AskError> {
     use std::io::{BufRead, Write};
     let path = directory.join(SOCKET);
-    let mut stream =
-        std::os::unix::net::UnixStream::connect(&path).map_err(|_| AskError::NoBroker { path })?;
+    let mut stream = place::connect(directory).map_err(|_| AskError::NoBroker { path })?;
     let lost = |error: std::io::Error| AskError::Left(error.to_string());
     let mut text =
         serde_json::to_vec(request).map_err(|error| AskError::NoAnswer(error.to_string()))?;

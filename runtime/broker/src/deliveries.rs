@@ -5,13 +5,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
+use qcbus_disk::foreign;
 use qcbus_formats::config::{Config, reporter_for};
 use qcbus_formats::xqar::{self, Checker, Param, Results};
 use qcbus_messages::codec::MAX_MESSAGE;
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::{DocId, ResultMessage, Withdrawn};
 
-use crate::core::{Delivery, weight};
+use crate::core::{Delivery, facts_weight, weight};
 use crate::result_paths::ResultPaths;
 
 /// Builds the message for one reporter.
@@ -34,7 +35,7 @@ pub fn message(
         let xqar = to_text(xqar);
         format!("cannot read {xqar} back for {reporter}: {error}")
     };
-    let bytes = std::fs::read(xqar).map_err(|error| fail(&error))?;
+    let bytes = foreign::read(xqar, MOST_OF_A_RESULT).map_err(|error| fail(&error))?;
     let mut results = xqar::read(&bytes).map_err(|error| fail(&error))?;
     drop(bytes);
     cut_to(&mut results, MOST_BYTES);
@@ -73,6 +74,9 @@ pub fn withdrawn(
     }
 }
 
+/// A result that holds what the broker keeps of every bundle is far smaller.
+const MOST_OF_A_RESULT: u64 = 4 << 30;
+
 /// Findings in one message, in bytes of memory. Half of what the bus carries in one: the encoded
 /// form is smaller, and the rest of the message has room, too.
 const MOST_BYTES: usize = MAX_MESSAGE / 2;
@@ -85,7 +89,10 @@ fn cut_to(results: &mut Results, most: usize) {
         .iter_mut()
         .flat_map(|bundle| &mut bundle.checkers)
         .collect();
-    let bytes = |checker: &Checker| checker.issues.iter().map(weight).sum::<usize>();
+    let bytes = |checker: &Checker| {
+        let issues = checker.issues.iter().map(weight).sum::<usize>();
+        issues + facts_weight(&checker.params, &checker.metadata)
+    };
     let mut weighed: Vec<usize> = checkers.iter().map(|checker| bytes(checker)).collect();
     let before: Vec<usize> = checkers.iter().map(|it| it.issues.len()).collect();
     while weighed.iter().sum::<usize>() > most {
@@ -94,6 +101,10 @@ fn cut_to(results: &mut Results, most: usize) {
         let (Some(checker), Some(weighs)) = (checkers.get_mut(at), weighed.get_mut(at)) else {
             break;
         };
+        if checker.issues.is_empty() {
+            checker.params.clear();
+            checker.metadata.clear();
+        }
         checker.issues.truncate(checker.issues.len() / 2);
         *weighs = bytes(checker);
     }

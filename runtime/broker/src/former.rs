@@ -2,154 +2,99 @@
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
+use std::os::unix::ffi::OsStrExt as _;
 use std::path::{Path, PathBuf};
 
-use rustix::process::Pid;
+use qcbus_bus::Process;
 
 use crate::core::Launch;
+use crate::launches::Launches;
 
-/// Processes that former brokers of an instance have started. Their command lines tell: no list can
-/// miss one of a broker that was killed before it wrote the list.
+/// Processes that former brokers of an instance have started, and what those have started. Their
+/// environments prove it: no list can miss one of a broker that was killed before it wrote the list.
 #[derive(Debug)]
 pub struct Former {
-    directory: Identity,
+    launches: Launches,
     before: Launch,
 }
 
-/// Device and inode of a directory. A path may lead elsewhere in another container.
-type Identity = (u64, u64);
-
 impl Former {
-    /// Those of the instance with this directory, started before this launch. `None`: there is no
-    /// such directory.
-    pub fn of(instance_dir: &Path, before: Launch) -> Option<Former> {
-        let directory = identity(instance_dir)?;
-        Some(Former { directory, before })
+    /// Those started before this launch.
+    pub fn of(launches: &Launches, before: Launch) -> Former {
+        let launches = launches.clone();
+        Former { launches, before }
+    }
+
+    /// Kills those of this start.
+    pub fn kill_those_of(&self, launch: Launch) {
+        self.kill(|it| it == launch);
     }
 
     /// Kills those that are of none of these starts. Returns their process ids and programs.
     pub fn kill_but(&self, joined: &BTreeSet<Launch>) -> Vec<(u32, String)> {
+        self.kill(|launch| launch < self.before && !joined.contains(&launch))
+    }
+
+    fn kill(&self, is_meant: impl Fn(Launch) -> bool) -> Vec<(u32, String)> {
         let mut killed = Vec::new();
-        for pid in processes() {
-            let Some(command) = CommandLine::of(pid) else {
+        for id in processes() {
+            // The handle first: what is read afterwards is of this process or of none.
+            let Some(process) = Process::open(id, None) else {
                 continue;
             };
-            let Some(launch) = command.launch() else {
+            let Some(launch) = self.launches.of_process(id) else {
                 continue;
             };
-            let former = launch < self.before && !joined.contains(&launch);
-            if former && command.instance() == Some(self.directory) {
-                kill_with_group(pid);
-                killed.push((pid.as_raw_nonzero().get().unsigned_abs(), command.program()));
+            if is_meant(launch) && process.is_alive() {
+                let program = program(id);
+                process.kill();
+                killed.push((id, program));
             }
         }
         killed
     }
 }
 
-fn processes() -> impl Iterator<Item = Pid> {
+fn processes() -> impl Iterator<Item = u32> {
     let entries = std::fs::read_dir("/proc").into_iter().flatten().flatten();
-    let numbers = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
-    numbers.filter_map(Pid::from_raw)
+    entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok())
 }
 
-/// Kills a process with its group, or alone where it leads none.
-pub fn kill_with_group(pid: Pid) {
-    use rustix::process::{Signal, kill_process, kill_process_group};
-    if kill_process_group(pid, Signal::KILL).is_err() {
-        // Not the leader of a group, or gone already.
-        let _ = kill_process(pid, Signal::KILL);
-    }
+fn of_process(id: u32) -> PathBuf {
+    Path::new("/proc").join(id.to_string())
 }
 
-fn of_process(pid: Pid) -> PathBuf {
-    Path::new("/proc").join(pid.as_raw_nonzero().to_string())
-}
-
-fn identity(directory: &Path) -> Option<Identity> {
-    use std::os::unix::fs::MetadataExt as _;
-    let found = std::fs::metadata(directory).ok()?;
-    Some((found.dev(), found.ino()))
-}
-
-/// The launch that a process was started with, if it is a child of some broker.
-pub fn launch_of(pid: Pid) -> Option<Launch> {
-    CommandLine::of(pid)?.launch()
-}
-
-/// The words with which a process was started.
-struct CommandLine {
-    pid: Pid,
-    words: Vec<Vec<u8>>,
-}
-
-impl CommandLine {
-    /// `None`: there is no such process, or it has ended and nobody has buried it yet.
-    fn of(pid: Pid) -> Option<CommandLine> {
-        let line = std::fs::read(of_process(pid).join("cmdline")).ok()?;
-        let words = line.split(|byte| *byte == 0).map(<[u8]>::to_vec);
-        (!line.is_empty()).then(|| CommandLine {
-            pid,
-            words: words.collect(),
-        })
-    }
-
-    fn behind(&self, flag: &str) -> Option<&[u8]> {
-        let at = self
-            .words
-            .iter()
-            .rposition(|word| word == flag.as_bytes())?;
-        self.words.get(at + 1).map(Vec::as_slice)
-    }
-
-    /// Which start of a broker it is. A process id may have been given to somebody else since: only
-    /// what was started with `--launch` is ours.
-    fn launch(&self) -> Option<Launch> {
-        let number = std::str::from_utf8(self.behind("--launch")?).ok()?;
-        number.parse().ok().map(Launch)
-    }
-
-    /// Its directory, as the process itself sees it.
-    fn instance(&self) -> Option<Identity> {
-        use std::os::unix::ffi::OsStrExt as _;
-        let told = Path::new(OsStr::from_bytes(self.behind("--instance-dir")?));
-        let seen = match told.strip_prefix("/") {
-            Ok(below) => of_process(self.pid).join("root").join(below),
-            Err(_) => of_process(self.pid).join("cwd").join(told),
-        };
-        identity(&seen)
-    }
-
-    fn program(&self) -> String {
-        let first = self.words.first().map(Vec::as_slice).unwrap_or_default();
-        String::from_utf8_lossy(first).into_owned()
-    }
+/// The first word of its command line.
+fn program(id: u32) -> String {
+    let line = std::fs::read(of_process(id).join("cmdline")).unwrap_or_default();
+    let first = line.split(|byte| *byte == 0).next().unwrap_or_default();
+    qcbus_messages::path_text::to_text(Path::new(OsStr::from_bytes(first)))
 }
 
 #[cfg(test)]
 mod tests {
     use std::os::unix::process::CommandExt as _;
-    use std::process::{Child, Command, Stdio};
+    use std::process::{Child, Command};
+
+    use qcbus_bus::LAUNCH;
 
     use super::*;
 
-    fn start(instance: &Path, launch: Launch) -> Child {
+    /// Starts a process with this proof, or without one.
+    fn start(proof: Option<&str>) -> Child {
         let mut command = Command::new("sh");
-        command.args(["-c", "sleep 1000; true", "sh", "--instance-dir"]);
-        command.arg(instance);
-        command.args(["--launch", &launch.0.to_string()]);
-        command.stdout(Stdio::null()).stderr(Stdio::null());
-        let child = command.process_group(0).spawn().unwrap();
-        // It may be there before its words are.
-        while launch_of(Pid::from_child(&child)).is_none() {
-            std::thread::yield_now();
-        }
-        child
+        // Its command line says whatever it likes.
+        command.args(["-c", "sleep 1000; true", "sh", "--launch", "1099511627776"]);
+        command.process_group(0);
+        command
+            .env_remove(LAUNCH)
+            .envs(proof.map(|it| (LAUNCH, it)));
+        command.spawn().unwrap()
     }
 
     fn ends(mut child: Child) -> bool {
         let runs = child.try_wait().unwrap().is_none();
-        kill_with_group(Pid::from_child(&child));
+        child.kill().unwrap();
         child.wait().unwrap();
         runs
     }
@@ -157,32 +102,40 @@ mod tests {
     #[test]
     fn only_what_a_former_broker_of_this_instance_started_and_did_not_join_is_killed() {
         let base = tempfile::tempdir().unwrap();
-        let [here, link, elsewhere] = ["here", "link", "elsewhere"].map(|it| base.path().join(it));
-        std::fs::create_dir(&here).unwrap();
-        std::fs::create_dir(&elsewhere).unwrap();
-        std::os::unix::fs::symlink(&here, &link).unwrap();
+        let [here, elsewhere] = ["here", "elsewhere"].map(|name| {
+            let path = base.path().join(name);
+            std::fs::create_dir(&path).unwrap();
+            Launches::of(&path).unwrap()
+        });
         let [first, joined, now] = [1, 2, 3].map(Launch::first_of);
-        let mut stuck = [start(&here, first), start(&link, first)];
+        let proof = here.proof(first, "a");
+        // Whatever it starts, in whatever session, is of the same start.
+        let mut grandchild = Command::new("sh");
+        grandchild.args(["-c", "setsid sleep 1000 & wait"]);
+        let grandchild = grandchild
+            .env(LAUNCH, &proof)
+            .process_group(0)
+            .spawn()
+            .unwrap();
+        let mut stuck = [start(Some(&proof)), grandchild];
         let others = [
-            start(&here, joined),
-            start(&here, now),
-            start(&elsewhere, first),
+            start(Some(&here.proof(joined, "a"))),
+            start(Some(&here.proof(now, "a"))),
+            start(Some(&elsewhere.proof(first, "a"))),
+            start(Some(&proof.replace(":a", ":b"))),
+            start(None),
         ];
-        let former = Former::of(&here, now).unwrap();
+        let former = Former::of(&here, now);
         let killed = former.kill_but(&BTreeSet::from([joined]));
         let last = stuck.each_mut().map(|it| it.wait().unwrap().success());
-        let told = |id: u32| killed.contains(&(id, "sh".to_owned()));
-        // There may be more: what a shell has just forked bears its words.
+        let told = |id: u32| killed.iter().any(|(it, _)| *it == id);
         assert!(stuck.iter().all(|it| told(it.id())), "{killed:?}");
         assert!(!others.iter().any(|it| told(it.id())), "{killed:?}");
         let spared = others.map(ends);
-        assert_eq!((last, spared), ([false; 2], [true; 3]));
-    }
-
-    #[test]
-    fn an_instance_without_a_directory_has_left_nothing() {
-        let base = tempfile::tempdir().unwrap();
-        let gone = base.path().join("gone");
-        assert!(Former::of(&gone, Launch::first_of(1)).is_none());
+        assert_eq!((last, spared), ([false; 2], [true; 5]));
+        // What was just being started is found by the next look.
+        while !former.kill_but(&BTreeSet::from([joined])).is_empty() {
+            std::thread::yield_now();
+        }
     }
 }

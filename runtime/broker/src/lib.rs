@@ -4,23 +4,26 @@
 //! of hands: `watch` sees files, `intake` reads and publishes them, `store` and `writers` put
 //! results on the disk, `journal` remembers, `directory_lock` keeps others out, `supervise` starts
 //! and kills, `control` answers commands, `reload` reads configuration and manifests, `memory`
-//! gives back what was taken.
+//! gives back what was taken, `scouts` look at files that may never answer.
 
 pub mod control;
 mod core;
 pub mod deliveries;
 mod demand;
+mod descriptors;
 mod directory_lock;
 mod engine;
 mod former;
 mod gate;
 mod intake;
 pub mod journal;
+mod launches;
 pub mod memory;
 mod options;
 mod orphans;
 pub mod reload;
 mod result_paths;
+mod scouts;
 mod stages;
 mod stamp;
 mod store;

@@ -6,12 +6,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use qcbus_bus::Process;
 use rustix::process::{Pid, Signal, WaitOptions, kill_process, waitpid};
 
 use crate::core::Launch;
-
-/// In the environment of every child, and so of what it starts: which start of a child it was.
-pub const LAUNCH: &str = "QCBUS_LAUNCH";
+use crate::launches::Launches;
 
 /// Children of this process that no bundle has left: it may have had some before it became a broker, as when a script
 /// starts something and then becomes it.
@@ -65,12 +64,12 @@ fn listed(pid: i32) -> Option<Listed> {
 }
 
 /// Kills what a process has started, and what that has started. It is to be stopped or killed itself at once after.
-pub fn kill_below(pid: Pid) {
+pub fn kill_below(process: &Process) {
     // What is started while we look is found by looking again; a hostile one may go on for as long as it likes,
     // so not for ever.
     for _ in 0..8 {
         let all = processes();
-        let below = below(&all, pid.as_raw_nonzero().get());
+        let below = below(&all, process.id().cast_signed());
         let living: Vec<i32> = below.into_iter().filter(|it| !all[it].is_dead).collect();
         if living.is_empty() {
             return;
@@ -111,8 +110,13 @@ fn below(all: &BTreeMap<i32, Listed>, root: i32) -> BTreeSet<i32> {
 /// Kills and buries orphans: children of this process that are none of `ours`. Those that a start among `ours` has left
 /// on purpose stay as long as it does. Whose it is, its environment tells; one that has none of that is nobody's, unless
 /// it may be a stranger. Returns how many are still there.
-pub fn sweep(ours: &BTreeMap<Launch, u32>, strangers: &Strangers) -> usize {
-    let known: BTreeSet<i32> = ours.values().map(|pid| pid.cast_signed()).collect();
+pub fn sweep(
+    ours: &BTreeMap<Launch, Option<u32>>,
+    strangers: &Strangers,
+    launches: &Launches,
+) -> usize {
+    let known = ours.values().flatten().map(|pid| pid.cast_signed());
+    let known: BTreeSet<i32> = known.collect();
     let mut left = 0;
     let theirs = |pid: &i32| known.contains(pid) || strangers.before.contains(pid);
     for pid in children().into_iter().filter(|pid| !theirs(pid)) {
@@ -121,7 +125,7 @@ pub fn sweep(ours: &BTreeMap<Launch, u32>, strangers: &Strangers) -> usize {
             bury(pid);
             continue;
         }
-        let is_left = match launch_of(pid) {
+        let is_left = match launches.of_process(pid.unsigned_abs()) {
             Some(launch) => !ours.contains_key(&launch),
             None => !strangers.is_first,
         };
@@ -175,15 +179,6 @@ fn children() -> BTreeSet<i32> {
 }
 
 const ESRCH: i32 = rustix::io::Errno::SRCH.raw_os_error();
-
-/// From which start of a child a process comes, by its environment.
-fn launch_of(pid: i32) -> Option<Launch> {
-    let environment =
-        std::fs::read(Path::new("/proc").join(pid.to_string()).join("environ")).ok()?;
-    let mut variables = environment.split(|byte| *byte == 0);
-    let value = variables.find_map(|it| it.strip_prefix(LAUNCH.as_bytes())?.strip_prefix(b"="))?;
-    std::str::from_utf8(value).ok()?.parse().ok().map(Launch)
-}
 
 fn kill(pid: i32) {
     if let Some(pid) = Pid::from_raw(pid) {

@@ -7,6 +7,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
+use qcbus_disk::foreign;
 use qcbus_document::FileKind;
 use qcbus_ingest::{Content, Stat};
 
@@ -18,7 +19,7 @@ use crate::core::Stamp;
 /// # Errors
 /// Whatever `stat` says, other than that there is no such file: there may be one.
 pub fn stamp_of(path: &Path) -> io::Result<Option<Stamp>> {
-    match std::fs::metadata(path) {
+    match foreign::metadata(path) {
         Ok(data) if data.is_file() => Ok(Some(from_metadata(&data))),
         Ok(_) => Ok(None),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
@@ -33,7 +34,7 @@ pub fn stamp_of(path: &Path) -> io::Result<Option<Stamp>> {
 /// directory's stamp tells its scenarios: it changes when one comes or goes, not when something
 /// else, such as a result, is written there.
 pub fn stamp_through_links(path: &Path) -> Option<Stamp> {
-    let data = std::fs::metadata(path).ok()?;
+    let data = foreign::metadata(path).ok()?;
     if data.is_file() {
         Some(from_metadata(&data))
     } else if data.is_dir() {
@@ -47,9 +48,9 @@ pub fn stamp_through_links(path: &Path) -> Option<Stamp> {
 const LISTED: i128 = i64::MIN as i128;
 
 fn listing(directory: &Path, inode: u64) -> Option<Stamp> {
-    let entries = std::fs::read_dir(directory).ok()?;
+    let entries = foreign::list(directory).ok()?;
     let mut names: Vec<OsString> = entries
-        .flatten()
+        .iter()
         .filter(|entry| FileKind::of_path(&entry.path()) == Some(FileKind::Xosc))
         .map(|entry| entry.file_name())
         .collect();
@@ -78,6 +79,17 @@ pub fn is_listing(stamp: &Stamp) -> bool {
 /// The stamp in what `stat` returned.
 pub fn from_metadata(data: &Metadata) -> Stamp {
     from_stat(data.len(), Stat::of(data))
+}
+
+/// The stamp in what `fstatat` returned.
+pub fn from_statat(data: &rustix::fs::Stat) -> Stamp {
+    let time = |seconds, rest| i128::from(seconds) * 1_000_000_000 + rest;
+    Stamp {
+        size: u64::try_from(data.st_size).unwrap_or_default(),
+        mtime_ns: time(data.st_mtime, i128::from(data.st_mtime_nsec)),
+        ctime_ns: time(data.st_ctime, i128::from(data.st_ctime_nsec)),
+        inode: data.st_ino,
+    }
 }
 
 /// The stamp of a file as it was read.
@@ -165,6 +177,8 @@ pub(crate) mod tests {
         for (time, expected) in times {
             let stamp = put(&path, b"<OpenDRIVE/>", time);
             assert_eq!(stamp_through_links(&path), Some(stamp));
+            let data = rustix::fs::stat(&path).unwrap();
+            assert_eq!(from_statat(&data), stamp);
             let limits = qcbus_ingest::Limits::default();
             let read = qcbus_ingest::prepare(&path, dir.path(), &limits).unwrap();
             let content = read.files()[0].content.as_ref().unwrap();

@@ -1,20 +1,23 @@
 //! Starting and killing child processes. When to do so is the state machine's business.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
 use std::process::Stdio;
 use std::time::Duration;
 
+use qcbus_bus::{LAUNCH, Process};
 use qcbus_confine::{Looks, Orders, Outer, SandboxError, kernel_level, looks};
 use qcbus_messages::Role;
 use qcbus_messages::control::{PeerStatus, SandboxStatus};
-use rustix::process::Pid;
+use rustix::process::{Resource, Rlimit, setrlimit};
 use tokio::process::{Child, Command};
 use tokio::sync::mpsc::UnboundedSender;
 
 use crate::core::{ChildEnd, ChildSpec, Event, Launch};
-use crate::former::{self, Former, kill_with_group};
+use crate::former::Former;
+use crate::launches::Launches;
 use crate::orphans::{self, Strangers};
+use crate::reload::ready;
 
 /// Looks for orphans at the end, two milliseconds apart.
 const ORPHANS_AT_MOST: u32 = 500;
@@ -32,14 +35,20 @@ pub struct Surroundings {
     /// Most private memory (data segment and anonymous mappings) of a child, in bytes. The shared
     /// segment does not count: it is mapped from a file.
     pub memory_limit: Option<u64>,
+    /// How many files a child may have open, where that is not what the broker has.
+    pub descriptors: Option<Rlimit>,
 }
 
 /// The children of this broker.
 #[derive(Debug)]
 pub struct Children {
     surroundings: Surroundings,
+    launches: Launches,
     first: Launch,
-    pids: BTreeMap<Launch, u32>,
+    /// What this broker has started, by its name and with a handle on the process.
+    own: BTreeMap<Launch, (String, Option<Process>)>,
+    /// What former brokers have started and has joined this one.
+    adopted: BTreeMap<Launch, Process>,
     strangers: Strangers,
     events: UnboundedSender<Event>,
 }
@@ -48,14 +57,17 @@ impl Children {
     /// No children yet of the broker of this generation. Their ends are told to `events`.
     pub fn new(
         surroundings: Surroundings,
+        launches: Launches,
         generation: u64,
         events: UnboundedSender<Event>,
     ) -> Children {
         Children {
             strangers: orphans::adopt(),
             surroundings,
+            launches,
             first: Launch::first_of(generation),
-            pids: BTreeMap::new(),
+            own: BTreeMap::new(),
+            adopted: BTreeMap::new(),
             events,
         }
     }
@@ -64,23 +76,23 @@ impl Children {
     pub fn spawn(&mut self, launch: Launch, spec: &ChildSpec) {
         match self.start(launch, spec) {
             Ok(child) => {
-                if let Some(pid) = child.id() {
-                    self.pids.insert(launch, pid);
-                }
+                // Nobody has waited for it yet, so the id is its own.
+                let process = child.id().and_then(|id| Process::open(id, None));
+                self.own.insert(launch, (spec.name.clone(), process));
                 tokio::spawn(watch(launch, child, self.events.clone()));
             }
-            Err(error) => {
-                let program = spec.command.first().map_or("", String::as_str);
-                let end = ChildEnd::NotStarted(format!("cannot start {program}: {error}"));
+            Err(why) => {
+                let end = ChildEnd::NotStarted(why);
                 // The loop that receives this is the one that called; it is there.
                 let _ = self.events.send(Event::Exited { launch, end });
             }
         }
     }
 
-    fn start(&self, launch: Launch, spec: &ChildSpec) -> std::io::Result<Child> {
-        let Some((program, arguments)) = spec.command.split_first() else {
-            return Err(std::io::Error::other("the command is empty"));
+    fn start(&self, launch: Launch, spec: &ChildSpec) -> Result<Child, String> {
+        let words = ready(&spec.command)?;
+        let Some((program, arguments)) = words.split_first() else {
+            return Err("cannot start it: the command is empty".to_owned());
         };
         let mut command = Command::new(program);
         command
@@ -89,7 +101,7 @@ impl Children {
             .arg(&self.surroundings.instance_dir)
             .arg("--launch")
             .arg(launch.0.to_string())
-            .env(orphans::LAUNCH, launch.0.to_string())
+            .env(LAUNCH, self.launches.proof(launch, &spec.name))
             .stdin(Stdio::null())
             .process_group(0)
             .kill_on_drop(false);
@@ -99,9 +111,11 @@ impl Children {
         restrict(&mut command, &self.surroundings);
         if spec.role == Role::Bundle {
             self.confine(&mut command, spec)
-                .map_err(std::io::Error::other)?;
+                .map_err(|error| format!("cannot confine it: {error}"))?;
         }
-        command.spawn()
+        command
+            .spawn()
+            .map_err(|error| format!("cannot start {program}: {error}"))
     }
 
     /// Reporters write files where they are told to, and are ours; bundles are not.
@@ -111,7 +125,7 @@ impl Children {
             return Orders::Off.give(command);
         }
         Orders::On(spec.may.clone()).give(command)?;
-        if let Some(outer) = Outer::new(&self.surroundings.instance_dir, &spec.may)? {
+        if let Some(outer) = Outer::new(&spec.may)? {
             outer.surround(command);
         }
         Ok(())
@@ -123,10 +137,8 @@ impl Children {
         if !there || peer.state == "starting" {
             return None;
         }
-        let is_ours = self
-            .pids
-            .values()
-            .any(|pid| *pid == peer.pid || orphans::is_below(peer.pid, *pid));
+        let mut own = self.own.values().filter_map(|(_, it)| it.as_ref());
+        let is_ours = own.any(|it| it.id() == peer.pid || orphans::is_below(peer.pid, it.id()));
         let surrounded = self.surroundings.sandbox && is_ours;
         let (state, why) = match (looks(peer.pid), kernel_level()) {
             (Looks::Unknown, _) => return None,
@@ -147,8 +159,8 @@ impl Children {
 
     /// Forgets a child that has ended.
     pub fn ended(&mut self, launch: Launch) {
-        self.pids.remove(&launch);
-        orphans::sweep(&self.pids, &self.strangers);
+        self.own.remove(&launch);
+        self.sweep();
     }
 
     /// Kills and buries what children that have ended, or hidden it, have left. Meant to be called now and then:
@@ -156,57 +168,100 @@ impl Children {
     /// processes takes too long.
     pub fn look_for_orphans(&self) {
         if orphans::are_listed() {
-            orphans::sweep(&self.pids, &self.strangers);
+            self.sweep();
         }
     }
 
-    /// Kills a child with its process group, or a process that a former broker started.
-    pub fn kill(&self, launch: Option<Launch>, pid: u32) {
-        let own = launch.and_then(|launch| self.pids.get(&launch).copied());
-        let Some(pid) = own.or((pid > 1).then_some(pid)) else {
-            return;
+    fn sweep(&self) {
+        let id = |(launch, (_, process)): (&Launch, &(String, Option<Process>))| {
+            (*launch, process.as_ref().map(Process::id))
         };
-        let Ok(raw) = i32::try_from(pid) else { return };
-        let Some(pid) = Pid::from_raw(raw) else {
-            return;
-        };
-        if own.is_none() && former::launch_of(pid).is_none() {
-            return;
+        let ours = self.own.iter().map(id).collect();
+        orphans::sweep(&ours, &self.strangers, &self.launches);
+    }
+
+    /// A process has joined as a child: is it the one that a broker of this instance has started, under
+    /// this very name? `proof` is what its environment says. From now on it can be killed.
+    ///
+    /// # Errors
+    /// Why it is not believed, for a person.
+    pub fn joined(
+        &mut self,
+        launch: Launch,
+        name: &str,
+        process: Option<&Process>,
+        proof: &str,
+    ) -> Result<(), String> {
+        let proven = self.launches.proven(proof) == Some((launch, name));
+        let own = self.own.get(&launch);
+        let is_it = own.is_some_and(|(own_name, own)| {
+            let id = |it: &Process| it.id();
+            own_name == name && own.is_some() && own.as_ref().map(id) == process.map(id)
+        });
+        if !proven && !is_it {
+            return Err(format!(
+                "`{}` says that a broker has started it (--launch {}), and does not prove it: start it without \
+                 --launch, or where something starts it for the broker, hand on the environment variable \
+                 {LAUNCH} as it is; a bundle or reporter joins under the name of its manifest",
+                name.escape_debug(),
+                launch.0
+            ));
         }
-        orphans::kill_below(pid);
-        kill_with_group(pid);
+        if let (None, Some(process)) = (own, process) {
+            self.adopted.retain(|_, process| process.is_alive());
+            self.adopted.insert(launch, process.clone());
+        }
+        Ok(())
+    }
+
+    /// Kills a child with its process group: one of this broker, or one of a former that has joined.
+    pub fn kill(&self, launch: Launch) {
+        let own = self.own.get(&launch).and_then(|(_, it)| it.as_ref());
+        if let Some(process) = own.or(self.adopted.get(&launch)) {
+            if process.is_alive() {
+                orphans::kill_below(process);
+            }
+            process.kill();
+        }
+        if self.adopted.contains_key(&launch) {
+            // The process that has joined need not be the first of those that were started.
+            Former::of(&self.launches, Launch(u64::MAX)).kill_those_of(launch);
+        }
     }
 
     /// What former brokers of this instance have started; `None` where children die with their broker.
     pub fn former(&self) -> Option<Former> {
         let may_be = !self.surroundings.die_with_broker;
-        may_be
-            .then(|| Former::of(&self.surroundings.instance_dir, self.first))
-            .flatten()
+        may_be.then(|| Former::of(&self.launches, self.first))
     }
 
     /// Kills whatever is left, also what it has started.
     pub fn kill_all(&self) {
-        for launch in self.pids.keys() {
-            self.kill(Some(*launch), 0);
+        for launch in self.own.keys() {
+            self.kill(*launch);
         }
         // One that ends hands over what it has started; hence more than one look, but not for ever.
         let nobody = BTreeMap::new();
         for _ in 0..ORPHANS_AT_MOST {
-            if orphans::sweep(&nobody, &self.strangers) == 0 {
+            if orphans::sweep(&nobody, &self.strangers, &self.launches) == 0 {
                 return;
             }
             std::thread::sleep(Duration::from_millis(2));
         }
     }
-}
 
-/// Whether a process of this machine runs. One that nobody has buried yet does not.
-pub fn is_there(pid: u32) -> bool {
-    let stat = std::fs::read_to_string(Path::new("/proc").join(pid.to_string()).join("stat"));
-    // The command stands in parentheses and may contain anything; behind it comes the state.
-    let state = stat.as_deref().ok().and_then(|it| it.rsplit_once(')'));
-    state.is_some_and(|(_, rest)| !rest.trim_start().starts_with(['Z', 'X']))
+    /// Kills whatever brokers of this instance have ever started, and what that has started, also where it
+    /// has left its group or its session.
+    pub fn kill_what_they_started(&self) {
+        if !self.surroundings.die_with_broker {
+            Former::of(&self.launches, Launch(u64::MAX)).kill_but(&BTreeSet::new());
+        }
+    }
+
+    /// The end: nobody can prove any more that this broker has started it.
+    pub fn forget_launches(&self) {
+        self.launches.forget();
+    }
 }
 
 async fn watch(launch: Launch, mut child: Child, events: UnboundedSender<Event>) {
@@ -243,6 +298,7 @@ fn end_of(status: std::process::ExitStatus) -> ChildEnd {
 )]
 fn restrict(command: &mut Command, surroundings: &Surroundings) {
     let memory = surroundings.memory_limit;
+    let descriptors = surroundings.descriptors;
     let with_broker = surroundings.die_with_broker;
     let broker = std::process::id();
     // SAFETY: between fork and exec only async-signal-safe functions are called: setrlimit, prctl
@@ -257,6 +313,9 @@ fn restrict(command: &mut Command, surroundings: &Surroundings) {
                 if libc::setrlimit(libc::RLIMIT_DATA, &raw const limit) != 0 {
                     return Err(std::io::Error::last_os_error());
                 }
+            }
+            if let Some(limit) = descriptors {
+                setrlimit(Resource::Nofile, limit)?;
             }
             if with_broker {
                 if libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) != 0 {
@@ -281,13 +340,16 @@ mod tests {
 
     fn children() -> (Children, UnboundedReceiver<Event>) {
         let (events, inbox) = unbounded_channel();
+        let dir = tempfile::tempdir().unwrap();
         let surroundings = Surroundings {
             instance_dir: "/nowhere".into(),
             die_with_broker: true,
             sandbox: false,
             memory_limit: None,
+            descriptors: None,
         };
-        (Children::new(surroundings, 2, events), inbox)
+        let launches = Launches::of(dir.path()).unwrap();
+        (Children::new(surroundings, launches, 2, events), inbox)
     }
 
     fn spec(command: &[&str]) -> ChildSpec {
@@ -356,11 +418,11 @@ mod tests {
         tokio::time::timeout(Duration::from_secs(60), started)
             .await
             .unwrap();
-        children.kill(Some(Launch(1)), 0);
+        children.kill(Launch(1));
         let (_, end) = end(&mut inbox).await;
         assert!(matches!(end, ChildEnd::Failed(how) if how.contains("signal 9")));
         let grandchild = std::fs::read_to_string(&pid).unwrap();
-        let stat = Path::new("/proc").join(grandchild.trim()).join("stat");
+        let stat = PathBuf::from(format!("/proc/{}/stat", grandchild.trim()));
         let gone = async {
             // A zombie that nobody has buried yet is as good as gone.
             let runs = || std::fs::read_to_string(&stat).is_ok_and(|it| !it.contains(") Z "));
@@ -373,31 +435,45 @@ mod tests {
             .unwrap();
     }
 
-    #[test]
-    fn the_dead_are_not_there_before_they_are_buried() {
-        assert!(is_there(std::process::id()));
-        let mut child = std::process::Command::new("true").spawn().unwrap();
-        let stat = Path::new("/proc").join(child.id().to_string()).join("stat");
-        while !std::fs::read_to_string(&stat).unwrap().contains(") Z ") {
-            std::thread::yield_now();
-        }
-        assert!(!is_there(child.id()), "it has ended");
-        child.wait().unwrap();
-        assert!(!is_there(child.id()), "it is buried");
-    }
-
     #[tokio::test]
-    async fn a_process_of_somebody_else_is_let_alone() {
-        let (children, _inbox) = children();
-        let mut stranger = std::process::Command::new("sleep")
-            .arg("1000")
-            .spawn()
+    async fn only_what_a_broker_has_started_is_believed_and_killed() {
+        let (mut children, mut inbox) = children();
+        let start = || {
+            let mut command = std::process::Command::new("sleep");
+            command.arg("1000").spawn().unwrap()
+        };
+        let [mut stranger, mut former] = [start(), start()];
+        let process = |it: &std::process::Child| Process::open(it.id(), None).unwrap();
+        let (strange, adopted) = (process(&stranger), process(&former));
+        let earlier = Launch::first_of(1);
+        let proof = children.launches.proof(earlier, "child");
+        let lies = [
+            (earlier, "child", ""),
+            (earlier, "other", &proof),
+            (Launch(earlier.0 + 1), "child", &proof),
+        ];
+        for (launch, name, proof) in lies {
+            let refused = children.joined(launch, name, Some(&strange), proof);
+            assert!(refused.unwrap_err().contains("does not prove it"));
+            children.kill(launch);
+        }
+        children
+            .joined(earlier, "child", Some(&adopted), &proof)
             .unwrap();
-        children.kill(Some(Launch(7)), stranger.id());
+        children.kill(earlier);
+        assert!(!former.wait().unwrap().success());
+        // A child of this broker is known without any proof, and nobody else is taken for it.
+        children.spawn(Launch(1), &spec(&["sleep", "1000"]));
+        let own = children.own[&Launch(1)].1.clone().unwrap();
+        children.joined(Launch(1), "child", Some(&own), "").unwrap();
+        let refused = children.joined(Launch(1), "child", Some(&strange), "");
+        assert!(refused.is_err());
+        children.kill(Launch(1));
+        let (_, end) = end(&mut inbox).await;
         assert!(
-            stranger.try_wait().unwrap().is_none(),
-            "it was started without --launch"
+            matches!(end, ChildEnd::Failed(how) if how.contains("signal 9") || how.contains("exit"))
         );
+        assert!(stranger.try_wait().unwrap().is_none());
         stranger.kill().unwrap();
         stranger.wait().unwrap();
     }

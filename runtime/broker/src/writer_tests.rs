@@ -19,6 +19,7 @@ const NOW: u64 = (3 << 32) + 5;
 
 fn store_in(dir: &Path) -> Store {
     Store {
+        scouts: crate::scouts::Scouts::default(),
         places: ResultPaths::of_watched(dir.join("out"), vec![dir.join("farm")]),
         dialect: Dialect::default(),
         durable: false,

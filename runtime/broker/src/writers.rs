@@ -117,12 +117,23 @@ impl Writers {
         }
     }
 
-    /// Waits until everything ordered is done, or cannot be.
-    pub fn finish(mut self) {
+    /// Waits until everything ordered is done, or cannot be, but not longer than `limit`: says then which
+    /// writers hang. They end with the process.
+    pub fn finish(mut self, limit: Duration) -> Vec<String> {
         self.writers.clear();
+        let end = Instant::now() + limit;
+        let mut hung = Vec::new();
         for thread in self.threads.drain(..) {
-            let _ = thread.join();
+            while !thread.is_finished() && Instant::now() < end {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            if thread.is_finished() {
+                let _ = thread.join();
+            } else {
+                hung.extend(thread.thread().name().map(str::to_owned));
+            }
         }
+        hung
     }
 }
 

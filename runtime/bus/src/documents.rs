@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::ops::{Deref, DerefMut};
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use iceoryx2::port::update_connections::UpdateConnections;
@@ -13,6 +13,7 @@ use qcbus_messages::{Digest, DocId};
 use tokio::sync::Notify;
 
 use crate::held::{Block, DocumentHeader, Held, LET_GO, Ticket, kind_code};
+use crate::memory::{SharedMemory, Turns, free_shared_memory};
 use crate::ports::{self, Hub, PortError, Pub, Service, Sub, TopicService};
 
 /// Largest image, in bytes: offsets within an image are 32 bits wide.
@@ -23,15 +24,39 @@ const MAX_IMAGE: usize = u32::MAX as usize;
 pub enum LoanError {
     /// Shared memory has not enough room. Writing on would kill the process, so nothing was lent.
     #[error(
-        "not enough shared memory: {needed} bytes are needed, {free} are free, of which {reserve} are kept in reserve"
+        "not enough shared memory: {needed} bytes are needed, and so many are not free of the {size} bytes of /dev/shm, of which {reserve} are kept in reserve"
     )]
     NoSpace {
         /// Bytes asked for.
         needed: u64,
-        /// Bytes free in /dev/shm, less what has been lent and may still be filled.
-        free: u64,
+        /// Bytes of /dev/shm.
+        size: u64,
         /// Bytes that stay free.
         reserve: u64,
+    },
+    /// Shared memory is too small, whoever lets go of whatever.
+    #[error(
+        "{needed} bytes of shared memory are needed, and /dev/shm has {size} in all, of which {kept} are kept for the bus itself; make it larger: `mount -o remount,size={advised}M /dev/shm`, for a container `docker run --shm-size={advised}m`"
+    )]
+    NeverFits {
+        /// Bytes asked for.
+        needed: u64,
+        /// Bytes of /dev/shm.
+        size: u64,
+        /// Bytes of it that no document may have.
+        kept: u64,
+        /// A size that would do, in MiB.
+        advised: u64,
+    },
+    /// The process may not map so much.
+    #[error(
+        "the address space of a process is limited to {limit} bytes here (`ulimit -v`), too little to map shared memory for {needed} bytes; raise it with `ulimit -v unlimited`"
+    )]
+    AddressSpace {
+        /// Bytes asked for.
+        needed: u64,
+        /// The limit in bytes.
+        limit: u64,
     },
     /// No image may be that large.
     #[error("an image of {0} bytes is larger than any image may be")]
@@ -92,12 +117,20 @@ impl Class {
         })
     }
 
+    /// Bytes of shared memory that it may take to push everything out: what leads a slot, and its first block, may
+    /// lie on either side of a page's end.
+    fn letting_go_bytes(&self) -> u64 {
+        let slots = self.row.history.max(self.row.buffer);
+        (2 * rustix::param::page_size() * slots) as u64
+    }
+
     /// Gives back the memory of every slot that nobody has in hand. Without it a small /dev/shm would stay
     /// full of documents that nobody needs, because only publishing pushes them out of the history. To be
     /// called with a ticket to lend; does nothing when others have one.
     ///
     /// The publisher stays the same: a confined peer could not connect to another one.
-    fn empty(&self) {
+    fn empty(&self, turns: &Turns) {
+        let _turn = turns.take();
         let publisher = self
             .publisher
             .write()
@@ -105,7 +138,9 @@ impl Class {
         if self.lent.load(Ordering::Acquire) != 1 {
             return;
         }
-        if self.used.swap(false, Ordering::AcqRel) {
+        if free_shared_memory() >= self.letting_go_bytes()
+            && self.used.swap(false, Ordering::AcqRel)
+        {
             self.push_everything_out(&publisher);
         }
         let mut used = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
@@ -148,8 +183,9 @@ struct Shared {
     generation: u64,
     classes: [Class; 2],
     reserve: u64,
-    /// Bytes lent and perhaps not yet written, which `statvfs` does not count.
-    unwritten: AtomicU64,
+    /// What the bus takes for itself, in bytes.
+    own: u64,
+    turns: Turns,
     stopped: AtomicBool,
     /// Tells the broker's loop that peers wait for a document.
     again: Notify,
@@ -167,13 +203,15 @@ impl Documents {
         generation: u64,
         rows: [Topic; 2],
         reserve: u64,
+        own: u64,
     ) -> Result<Documents, PortError> {
         let [small, large] = rows;
         let shared = Shared {
             generation,
             classes: [Class::new(hub, small)?, Class::new(hub, large)?],
             reserve,
-            unwritten: AtomicU64::new(0),
+            own,
+            turns: Turns::new(),
             stopped: AtomicBool::new(false),
             again: Notify::new(),
         };
@@ -200,11 +238,29 @@ impl Documents {
         let held = Ticket::take(&class.held, class.row.borrowed - 1).ok_or(LoanError::Busy)?;
         let lent = Ticket::take(&class.lent, class.row.loans).ok_or(LoanError::Busy)?;
         let blocks = len.div_ceil(BLOCK_BYTES).max(1);
-        let room = self.reserve((blocks * BLOCK_BYTES) as u64).or_else(|_| {
+        let bytes = (blocks * BLOCK_BYTES) as u64;
+        let sample = self.take(class, blocks, bytes).or_else(|error| {
+            if !matches!(error, LoanError::NoSpace { .. }) {
+                return Err(error);
+            }
             // Both: what is needed in one class may lie in the other.
             self.give_back(index);
-            self.reserve((blocks * BLOCK_BYTES) as u64)
+            self.take(class, blocks, bytes)
         })?;
+        Ok(Loan {
+            sample: initialised(sample),
+            class: index,
+            len,
+            held,
+            _lent: lent,
+            documents: self.clone(),
+        })
+    }
+
+    /// Takes a slot, and all memory that it needs.
+    fn take(&self, class: &Class, blocks: usize, bytes: u64) -> Result<Uninit, LoanError> {
+        let _turn = self.shared.turns.take();
+        self.look_for(bytes)?;
         let publisher = class
             .publisher
             .read()
@@ -212,22 +268,52 @@ impl Documents {
         let mut sample = publisher
             .loan_slice_uninit(blocks)
             .map_err(|why| match why {
-                iceoryx2::port::LoanError::ExceedsMaxLoans
-                | iceoryx2::port::LoanError::OutOfMemory => LoanError::Busy,
-                other => LoanError::Bus(format!("{other:?}")),
+                iceoryx2::port::LoanError::ExceedsMaxLoans => LoanError::Busy,
+                // All slots are taken, or larger ones could not be mapped.
+                iceoryx2::port::LoanError::OutOfMemory => {
+                    let grows = bytes > class.row.slot_bytes() as u64;
+                    let limited = || limited_addresses(bytes);
+                    grows.then(limited).flatten().unwrap_or(LoanError::Busy)
+                }
+                other => limited_addresses(bytes).unwrap_or(LoanError::Bus(format!("{other:?}"))),
             })?;
         drop(publisher);
         class.remember(sample.payload_mut());
-        back_with_memory(sample.payload_mut()).map_err(|()| room.error())?;
-        Ok(Loan {
-            sample: initialised(sample),
-            class: index,
-            len,
-            held,
-            _lent: lent,
-            _room: room,
-            documents: self.clone(),
-        })
+        match back_with_memory(sample.payload_mut()) {
+            Ok(()) => Ok(sample),
+            Err(()) => Err(self.no_space(bytes)),
+        }
+    }
+
+    /// Whether there is room beside the reserve.
+    fn look_for(&self, needed: u64) -> Result<(), LoanError> {
+        let Ok(memory) = SharedMemory::now() else {
+            return Err(self.no_space(needed));
+        };
+        let kept = self.shared.reserve.saturating_add(self.shared.own);
+        let whole = needed.saturating_add(kept);
+        // A memory of size 0 has no limit.
+        if memory.size > 0 && memory.size < whole {
+            return Err(LoanError::NeverFits {
+                needed,
+                size: memory.size,
+                kept,
+                advised: whole.saturating_mul(2).div_ceil(1 << 20),
+            });
+        }
+        let enough = memory.free >= needed.saturating_add(self.shared.reserve);
+        match enough || memory.size == 0 {
+            true => Ok(()),
+            false => Err(self.no_space(needed)),
+        }
+    }
+
+    fn no_space(&self, needed: u64) -> LoanError {
+        LoanError::NoSpace {
+            needed,
+            size: SharedMemory::now().map_or(0, |memory| memory.size),
+            reserve: self.shared.reserve,
+        }
     }
 
     /// Publishes a held image once more, for a peer that says that it lacks it. The bytes are
@@ -270,63 +356,17 @@ impl Documents {
     fn give_back(&self, ours: usize) {
         for (index, class) in self.shared.classes.iter().enumerate() {
             let ticket = (index != ours).then(|| Ticket::take(&class.lent, class.row.loans));
-            class.empty();
+            class.empty(&self.shared.turns);
             drop(ticket);
         }
         self.shared.again.notify_one();
     }
-
-    fn reserve(&self, needed: u64) -> Result<Room, LoanError> {
-        let before = self.shared.unwritten.fetch_add(needed, Ordering::AcqRel);
-        let mut room = Room {
-            shared: Arc::clone(&self.shared),
-            bytes: needed,
-            free: 0,
-        };
-        room.free = free_shared_memory().saturating_sub(before);
-        if room.free < needed.saturating_add(self.shared.reserve) {
-            return Err(room.error());
-        }
-        Ok(room)
-    }
 }
 
-/// Bytes set aside until they have been written.
-struct Room {
-    shared: Arc<Shared>,
-    bytes: u64,
-    free: u64,
-}
-
-impl Room {
-    fn error(&self) -> LoanError {
-        LoanError::NoSpace {
-            needed: self.bytes,
-            free: self.free,
-            reserve: self.shared.reserve,
-        }
-    }
-}
-
-impl Drop for Room {
-    fn drop(&mut self) {
-        self.shared
-            .unwritten
-            .fetch_sub(self.bytes, Ordering::AcqRel);
-    }
-}
-
-/// Bytes that an ordinary user may still take in /dev/shm.
-pub(crate) fn free_shared_memory() -> u64 {
-    rustix::fs::statvfs("/dev/shm").map_or(0, |stat| stat.f_bavail.saturating_mul(stat.f_frsize))
-}
-
-/// The reserve asked for, but not more than a quarter of a small /dev/shm.
-pub(crate) fn fitting_reserve(wanted: u64) -> u64 {
-    match rustix::fs::statvfs("/dev/shm") {
-        Ok(stat) => wanted.min(stat.f_blocks.saturating_mul(stat.f_frsize) / 4),
-        Err(_) => wanted,
-    }
+/// Why a slot cannot be had, where the address space is limited.
+fn limited_addresses(needed: u64) -> Option<LoanError> {
+    let limit = rustix::process::getrlimit(rustix::process::Resource::As).current;
+    limit.map(|limit| LoanError::AddressSpace { needed, limit })
 }
 
 /// Has the kernel back the pages now. Without it the first write to a page that cannot be had
@@ -345,13 +385,19 @@ fn back_with_memory<T>(blocks: &mut [T]) -> Result<(), ()> {
     match done {
         Ok(()) | Err(rustix::io::Errno::INVAL) => Ok(()),
         Err(error) => {
-            tracing::warn!(%error, "shared memory cannot be had");
+            tracing::debug!(%error, "shared memory cannot be had");
+            give_up(blocks);
             Err(())
         }
     }
 }
 
-/// Has the kernel take the whole pages of a slot; they read as zeroes until they are written again.
+/// Gives back what was had of a slot that is too large.
+fn give_up<T>(blocks: &mut [T]) {
+    take_memory_from(blocks.as_mut_ptr().cast(), size_of_val(blocks));
+}
+
+/// Has the kernel take the pages that are a slot's alone; they read as zeroes until they are written again.
 fn take_memory_from(start: *mut u8, len: usize) {
     let page = rustix::param::page_size();
     let lead = start.addr().next_multiple_of(page) - start.addr();
@@ -361,7 +407,7 @@ fn take_memory_from(start: *mut u8, len: usize) {
     }
     let first: *mut std::ffi::c_void = start.wrapping_add(lead).cast();
     #[expect(unsafe_code, reason = "madvise takes raw pointers")]
-    // SAFETY: the pages lie wholly in a slot that is lent to us, of which at least this much was written before;
+    // SAFETY: the pages lie wholly in a slot that is lent to us, of which at least this much was asked for before;
     // nobody else reads or writes it. The kernel zeroes them, which is a valid value of every block.
     let done = unsafe { rustix::mm::madvise(first, whole, rustix::mm::Advice::LinuxRemove) };
     if let Err(error) = done {
@@ -392,7 +438,6 @@ pub struct Loan {
     len: usize,
     held: Ticket,
     _lent: Ticket,
-    _room: Room,
     documents: Documents,
 }
 

@@ -8,25 +8,24 @@ use std::collections::hash_map::RandomState;
 use std::fs;
 use std::hash::BuildHasher;
 use std::io::{self, Write};
-use std::os::unix::fs::DirBuilderExt;
+use std::os::unix::fs::{DirBuilderExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
 use qcbus_messages::PROTOCOL_VERSION;
 use qcbus_messages::services::Limits;
 use serde::{Deserialize, Serialize};
 
-use crate::instance::{Instance, private_dir, private_temporary_dir};
+use crate::instance::Instance;
+use crate::memory::SHARED_MEMORY;
 use crate::ports::ICEORYX2_VERSION;
 use crate::process::{Process, start_time};
 
 const CURRENT: &str = "current";
 const IDENTITY: &str = "id";
-const SHARED_MEMORY: &str = "/dev/shm";
-/// What the directories of generations begin with in there; segments begin with the prefix itself.
-const ROOT: &str = "d";
-/// iceoryx2 binds Unix sockets below the root path: 107 bytes are the kernel's limit, of which a
-/// socket's own name takes up to 66.
-const MAX_ROOT: usize = 40;
+/// Bytes of what is in it.
+const IDENTITY_LEN: usize = 18;
+/// Names that are tried for such a directory; each is as good as new.
+const ATTEMPTS: usize = 16;
 
 /// What a broker writes for its peers.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -65,12 +64,9 @@ impl Generation {
         let number = last_number(instance) + 1;
         let dir = instance.dir().join(format!("g{number}"));
         let _ = fs::remove_dir_all(&dir);
-        fs::create_dir(&dir)?;
+        fs::DirBuilder::new().mode(0o700).create(&dir)?;
         let prefix = format!("{identity}{number:x}_");
-        let root = match root_in_memory(&prefix) {
-            Some(root) => root,
-            None => short_path(instance, &identity, &dir)?,
-        };
+        let root = root_in_memory(&prefix)?;
         Ok(Generation {
             number,
             prefix,
@@ -92,7 +88,26 @@ impl Generation {
         Ok(())
     }
 
-    /// Withdraws it, so that peers stop trying to join. First step of a stop.
+    /// Makes again what was taken from the runtime directory. What somebody else has put into a file's
+    /// place stays.
+    pub(crate) fn restore(&self, instance: &Instance) -> io::Result<()> {
+        if !instance.dir().join(IDENTITY).exists()
+            && let Some(identity) = self.prefix.get(..IDENTITY_LEN)
+        {
+            write_identity(instance, identity)?;
+        }
+        let dir = instance.dir().join(format!("g{}", self.number));
+        if !dir.exists() {
+            fs::DirBuilder::new().mode(0o700).create(&dir)?;
+        }
+        if !instance.dir().join(CURRENT).exists() {
+            tracing::warn!("`{CURRENT}` was removed from the runtime directory; it was made again");
+            self.announce(instance)?;
+        }
+        Ok(())
+    }
+
+    /// Withdraws it, so that peers stop trying to join.
     pub(crate) fn withdraw(&self, instance: &Instance) {
         let _ = fs::remove_file(instance.dir().join(CURRENT));
     }
@@ -107,13 +122,13 @@ pub(crate) fn sweep(instance: &Instance, keep: Option<&Generation>) {
     };
     for name in names_in(Path::new(SHARED_MEMORY)) {
         let path = Path::new(SHARED_MEMORY).join(&name);
-        let bare = name.strip_prefix(ROOT).unwrap_or(&name);
-        let kept = keep.is_some_and(|keep| bare.starts_with(&keep.prefix));
-        if !bare.starts_with(&identity) || kept {
+        let kept = keep.is_some_and(|keep| keep.root == path);
+        if !name.starts_with(&identity) || kept {
             continue;
         }
-        let _ = match name.starts_with(ROOT) {
+        let _ = match path.is_dir() {
             true => fs::remove_dir_all(path),
+            // Of a version that put its segments there.
             false => fs::remove_file(path),
         };
     }
@@ -127,7 +142,6 @@ pub(crate) fn sweep(instance: &Instance, keep: Option<&Generation>) {
         }
     }
     if keep.is_none() {
-        let _ = fs::remove_file(link_path(&identity));
         let _ = fs::remove_file(instance.dir().join(IDENTITY));
     }
 }
@@ -155,7 +169,7 @@ fn last_number(instance: &Instance) -> u64 {
 fn identity(instance: &Instance) -> io::Result<String> {
     let path = instance.dir().join(IDENTITY);
     if let Ok(text) = fs::read_to_string(&path)
-        && text.len() == 18
+        && text.len() == IDENTITY_LEN
         && text.starts_with("qc")
         && text[2..17].bytes().all(|byte| byte.is_ascii_hexdigit())
         && text.ends_with('g')
@@ -163,10 +177,15 @@ fn identity(instance: &Instance) -> io::Result<String> {
         return Ok(text);
     }
     let fresh = format!("qc{:015x}g", random() >> 4);
-    let mut file = tempfile::NamedTempFile::new_in(instance.dir())?;
-    file.write_all(fresh.as_bytes())?;
-    file.persist(&path)?;
+    write_identity(instance, &fresh)?;
     Ok(fresh)
+}
+
+fn write_identity(instance: &Instance, identity: &str) -> io::Result<()> {
+    let mut file = tempfile::NamedTempFile::new_in(instance.dir())?;
+    file.write_all(identity.as_bytes())?;
+    file.persist(instance.dir().join(IDENTITY))?;
+    Ok(())
 }
 
 /// A random number; not for secrets.
@@ -174,31 +193,34 @@ pub(crate) fn random() -> u64 {
     RandomState::new().hash_one(std::process::id())
 }
 
-/// A directory for the small files that iceoryx2 writes for every service and port. It syncs each
-/// of them to the disk, dozens for one start and one join: in memory, where the segments that they
-/// describe are anyhow, that is free, and nothing of them is of use after a power cut.
-fn root_in_memory(prefix: &str) -> Option<PathBuf> {
-    let root = Path::new(SHARED_MEMORY).join(format!("{ROOT}{prefix}"));
-    fs::DirBuilder::new().mode(0o700).create(&root).ok()?;
-    Some(root)
+/// The directory of everything that iceoryx2 makes, segments and the small files that it writes for
+/// every service and port: in memory, and open to nobody else. Its name cannot be known beforehand, so
+/// nobody can take it first.
+fn root_in_memory(prefix: &str) -> io::Result<PathBuf> {
+    let mut last = io::Error::from(io::ErrorKind::AlreadyExists);
+    for _ in 0..ATTEMPTS {
+        // iceoryx2 binds Unix sockets in it, whose own names take up to 48 of the kernel's 107 bytes.
+        let name = format!("{prefix}{:08x}", random() >> 32);
+        let root = Path::new(SHARED_MEMORY).join(name);
+        match fs::DirBuilder::new().mode(0o700).create(&root) {
+            Ok(()) => return Ok(root),
+            Err(error) => last = error,
+        }
+    }
+    let text = format!("cannot make a directory in {SHARED_MEMORY}: {last}");
+    Err(io::Error::new(last.kind(), text))
 }
 
-/// The directory itself, or a way to it through a symbolic link in our own temporary directory
-/// when its path is too long for a socket's name.
-fn short_path(instance: &Instance, identity: &str, dir: &Path) -> io::Result<PathBuf> {
-    if dir.is_absolute() && dir.as_os_str().len() <= MAX_ROOT {
-        return Ok(dir.to_owned());
+/// Takes from group and others what iceoryx2 gives them of its own accord, whatever the umask is.
+/// They do not get into `root` anyhow; this is for the day on which somebody opens it to them.
+pub(crate) fn close_to_others(root: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(root)? {
+        let entry = entry?;
+        let mut rights = entry.metadata()?.permissions();
+        if rights.mode() & 0o077 != 0 {
+            rights.set_mode(rights.mode() & 0o700);
+            fs::set_permissions(entry.path(), rights)?;
+        }
     }
-    let link = link_path(identity);
-    if let Some(parent) = link.parent() {
-        private_dir(parent).map_err(io::Error::other)?;
-    }
-    let _ = fs::remove_file(&link);
-    std::os::unix::fs::symlink(fs::canonicalize(instance.dir())?, &link)?;
-    let name = dir.file_name().unwrap_or_default();
-    Ok(link.join(name))
-}
-
-fn link_path(identity: &str) -> PathBuf {
-    private_temporary_dir().join(&identity[..12])
+    Ok(())
 }

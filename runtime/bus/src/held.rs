@@ -95,9 +95,9 @@ struct Mapped {
     unsafe_code,
     reason = "a raw pointer makes the type neither Send nor Sync by itself"
 )]
-// SAFETY: `start` points into the mapping that `_sample` keeps; the memory is mapped read-only in
-// this process and no slot is written again before every hold of it has been dropped. The sample
-// itself is Send, and is only touched when it is dropped.
+// SAFETY: `start` points into the mapping that `_sample` keeps, which is read from any thread as
+// from one; what is read does not change (see `Held::deref`). The sample itself is Send, and is only
+// touched when it is dropped.
 unsafe impl Send for Mapped {}
 #[expect(unsafe_code, reason = "see above")]
 // SAFETY: as above; shared access only reads immutable memory.
@@ -165,8 +165,17 @@ impl Deref for Held {
         reason = "the image is read in place, in memory that Rust does not own"
     )]
     fn deref(&self) -> &[u8] {
-        // SAFETY: `start` and `len` were taken from the sample's payload, within its bounds; the
-        // mapping lives as long as `self.0`, and nobody writes to it (see `Mapped`).
+        // SAFETY: `start` and `len` were taken from the sample's payload, within its bounds, and the
+        // mapping lives as long as `self.0`. A slice must not change while it is borrowed:
+        // - this process cannot write there, for subscribers map the segment for reading only;
+        // - the broker, which publishes, lends no slot again before every hold of it was given back;
+        // - other users cannot open the segment: it is 0600, in a directory that is 0700;
+        // - other bundles cannot open it for writing once they are confined.
+        // What is left is a program of the same user that nothing confines. It may as well write into
+        // the memory of this process itself, so nothing is promised against it: a text that it spoils
+        // while it is borrowed is a `str` that is none. Whatever else it spoils ends in wrong or absent
+        // values (`a_slot_that_is_rewritten_while_it_is_read` in `tests/bus/privacy.rs`), because the
+        // accessors of `qcbus_document` check what they use when they use it.
         unsafe { std::slice::from_raw_parts(self.0.start, self.0.len) }
     }
 }

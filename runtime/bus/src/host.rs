@@ -1,32 +1,48 @@
 //! The broker's end of the bus.
 
-use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::collections::{BTreeMap, HashMap};
 use std::fmt;
+use std::ops::Bound;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::*;
 use qcbus_messages::codec;
-use qcbus_messages::services::{FRAME_BUFFER, Limits, SPARE_SESSIONS, Services, Topic};
+use qcbus_messages::services::{
+    FRAME_BUFFER, HELLO_BYTES, Limits, SPARE_SESSIONS, Services, Topic,
+};
 use qcbus_messages::{Digest, FromPeer, Hello, ToPeer};
 
-use crate::documents::{Documents, fitting_reserve, free_shared_memory};
-use crate::generation::{Generation, sweep};
+use crate::documents::Documents;
+use crate::entrance::{Entrance, Known};
+use crate::generation::{Generation, close_to_others, sweep};
 use crate::instance::{Instance, InstanceError, InstanceLock, LockError};
 use crate::janitor::Janitor;
 use crate::link::SessionKey;
+use crate::memory::{SharedMemory, Turns, fitting_reserve, keep_room};
 use crate::ports::{self, Access, Hub, PortError, Pub, Sub};
+use crate::presence::{LockSlot, Presence};
+use crate::process::Process;
 use crate::session::Session;
+use crate::turn::{Budget, Waiting};
 use crate::wake::{TICK, Waker};
 
 /// Frames read from one peer before it is the next one's turn.
 const QUOTA: usize = 8;
-/// Events that wait to be fetched before reading pauses.
-const MAX_WAITING: usize = 512;
+/// Turns without an event before everything else of the process gets its turn.
+const TURNS_IN_A_ROW: usize = 8;
 /// Introductions read in one turn.
 const HELLOS: usize = 64;
 /// How long a session that has been ended waits for its last words to be read.
 const LINGER: Duration = Duration::from_secs(1);
+/// How long a peer may take to prove who it is, from its introduction.
+const PROVE_WITHIN: Duration = Duration::from_secs(1);
+/// Those who have not proven it and are remembered, and for how long.
+const MAX_STRANGERS: usize = 64;
+const STRANGE_FOR: Duration = Duration::from_secs(60);
+/// Sessions in which such are told why they may not take part.
+const MAX_TOLD: usize = 4;
 /// Processes whose attempts are remembered; beyond that, only those in session.
 const MAX_REMEMBERED: usize = 4096;
 /// How often processes are looked at.
@@ -54,8 +70,11 @@ pub struct HostOptions {
     pub large_active_documents: usize,
     /// Largest image of the small class, in bytes.
     pub small_class_bytes: usize,
-    /// Bytes of /dev/shm that stay free; at most a quarter of a small one is kept.
+    /// Bytes of /dev/shm that stay free; at most an eighth of a small one is kept.
     pub shm_reserve_bytes: u64,
+    /// Bundles and reporters that are expected: for so many there is shared memory from the
+    /// beginning.
+    pub expected_peers: usize,
 }
 
 impl Default for HostOptions {
@@ -67,11 +86,65 @@ impl Default for HostOptions {
             large_active_documents: limits.large_active,
             small_class_bytes: limits.small_bytes,
             shm_reserve_bytes: 64 << 20,
+            expected_peers: 0,
         }
     }
 }
 
+/// Sizes for a process that may not map much: images of the small class, and what the large class
+/// begins with.
+const FEW_ADDRESSES: [usize; 2] = [128 << 10, 1 << 20];
+
+fn with_few_addresses(limits: Limits) -> Limits {
+    let [small_bytes, large_initial_bytes] = FEW_ADDRESSES;
+    Limits {
+        small_bytes: limits.small_bytes.min(small_bytes),
+        large_initial_bytes: limits.large_initial_bytes.min(large_initial_bytes),
+        ..limits
+    }
+}
+
 impl HostOptions {
+    /// Bytes of shared memory that a broker takes or keeps free, without documents: what it needs
+    /// itself, as much for each peer that is expected as that will take, and the reserve.
+    pub fn shared_memory_bytes(&self) -> u64 {
+        let services = Services::new(&self.limits());
+        let peers = self.expected_peers as u64 * services.peer_bytes();
+        services.broker_bytes() + peers + fitting_reserve(self.shm_reserve_bytes)
+    }
+
+    /// Bytes of addresses that a broker needs at least, and to carry everything.
+    pub fn address_bytes(&self) -> (u64, u64) {
+        let all = self.limits();
+        let needed = |limits: &Limits| Services::new(limits).address_bytes();
+        (needed(&self.least(all)), needed(&all))
+    }
+
+    /// The same bus for small images alone, and for few peers.
+    fn least(&self, limits: Limits) -> Limits {
+        Limits {
+            peers: limits.peers.min(self.expected_peers + 1),
+            ..with_few_addresses(limits)
+        }
+    }
+
+    /// What the bus looks like within a limited address space.
+    fn limits_within(&self, space: Option<u64>) -> Result<Limits, StartError> {
+        let limits = self.limits();
+        let Some(space) = space else {
+            return Ok(limits);
+        };
+        let (less, least) = (with_few_addresses(limits), self.least(limits));
+        let needed = |limits: &Limits| Services::new(limits).address_bytes();
+        let fits = [limits, less, least]
+            .into_iter()
+            .find(|it| needed(it) <= space);
+        fits.ok_or_else(|| StartError::AddressSpace {
+            limit: space,
+            needed: needed(&least),
+        })
+    }
+
     fn limits(&self) -> Limits {
         let held = |active: usize| active + active.div_ceil(2) + 2;
         let small_active = self.active_documents.max(1);
@@ -107,12 +180,24 @@ pub enum StartError {
     Io(#[from] std::io::Error),
     /// There is no room for the bus itself; without it, the first write is a bus error.
     #[error(
-        "not enough shared memory: {free} bytes are free in /dev/shm, a broker needs {needed} to start; make room there, or mount it larger"
+        "not enough shared memory: {free} of {size} bytes are free in /dev/shm, a broker needs {needed} to start; {}", way_out(*size, *needed)
     )]
     NoSharedMemory {
+        /// Bytes of /dev/shm.
+        size: u64,
         /// Free bytes.
         free: u64,
         /// Bytes that must be free.
+        needed: u64,
+    },
+    /// The process may not map the bus.
+    #[error(
+        "the address space of this process is limited to {limit} bytes (`ulimit -v`), a broker for so many bundles needs {needed}; raise it with `ulimit -v unlimited`"
+    )]
+    AddressSpace {
+        /// The limit, in bytes.
+        limit: u64,
+        /// Bytes of addresses that would do.
         needed: u64,
     },
     /// The bus refused, in its words.
@@ -120,9 +205,23 @@ pub enum StartError {
     Bus(String),
 }
 
-/// Bytes of shared memory that must be free before a broker starts: its services and ports take a
-/// few, and its peers' as much again.
-const START_BYTES: u64 = 16 << 20;
+impl StartError {
+    /// Whether it may pass by itself, when others let go of shared memory.
+    pub fn may_pass(&self) -> bool {
+        matches!(self, StartError::NoSharedMemory { size, needed, .. } if needed <= size)
+    }
+}
+
+fn way_out(size: u64, needed: u64) -> String {
+    let advised = needed.max(size / 2).saturating_mul(2).div_ceil(1 << 20);
+    let make = format!(
+        "make it larger: `mount -o remount,size={advised}M /dev/shm`, for a container `docker run --shm-size={advised}m`"
+    );
+    match needed <= size {
+        true => format!("wait for others to end, remove what they left there, or {make}"),
+        false => make,
+    }
+}
 
 impl From<PortError> for StartError {
     fn from(error: PortError) -> Self {
@@ -137,8 +236,17 @@ pub enum HostEvent {
     Hello {
         /// Its session, new.
         peer: PeerId,
-        /// Its introduction.
+        /// Its introduction; with the true process id, 0 where the process cannot be seen from here.
         hello: Hello,
+        /// The process that it is, as the kernel says.
+        process: Option<Process>,
+        /// What its starter has put into [`crate::LAUNCH`] of its environment, empty if nothing.
+        launch: String,
+    },
+    /// Somebody wanted to take part and did not prove who it is; it was told why.
+    TurnedAway {
+        /// For a person.
+        why: String,
     },
     /// A peer says something.
     Message {
@@ -168,17 +276,22 @@ pub enum HostEvent {
 /// memory that somebody has mapped stays readable.
 pub struct Host {
     generation: Generation,
-    instance: Instance,
+    presence: Arc<Presence>,
     limits: Limits,
     services: Services,
-    events: VecDeque<HostEvent>,
+    waiting: Waiting,
     sessions: BTreeMap<PeerId, Session>,
     /// The last attempt of every process to get a session.
     attempts: HashMap<u64, u64>,
+    /// Who has not proven who it is, since when, and whether it was told so.
+    strangers: HashMap<SessionKey, (Instant, bool)>,
     next_peer: u64,
-    next_turn: u64,
+    /// Whom something was read from last: the next turn begins behind it.
+    last_read: PeerId,
+    last_turn: Instant,
     last_tick: Instant,
     last_watch: Instant,
+    entrance: Entrance,
     // What follows is dropped in this order: ports, the janitor, the node.
     waker: Waker,
     hello: Sub<u8, HelloHeader>,
@@ -192,14 +305,15 @@ pub struct Host {
 /// Dropped last: unlinks what is still there, and only then gives the instance up.
 struct Remains {
     instance: Instance,
-    lock: Option<InstanceLock>,
+    lock: LockSlot,
 }
 
 impl Drop for Remains {
     fn drop(&mut self) {
         // The ports have unlinked what is theirs; this is for what workers and peers still hold.
         sweep(&self.instance, None);
-        if let Some(lock) = self.lock.take() {
+        let mut lock = self.lock.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(lock) = lock.take() {
             lock.release();
         }
     }
@@ -238,46 +352,63 @@ impl Host {
             },
             LockError::Io(error) => StartError::Io(error),
         })?;
+        let lock: LockSlot = Arc::new(Mutex::new(Some(lock)));
         let remains = Remains {
             instance: instance.clone(),
-            lock: Some(lock),
+            lock: Arc::clone(&lock),
         };
-        let limits = options.limits();
+        let space = rustix::process::getrlimit(rustix::process::Resource::As).current;
+        let limits = options.limits_within(space)?;
         let services = Services::new(&limits);
-        let (free, needed) = (free_shared_memory(), fitting_reserve(START_BYTES));
-        if free < needed {
-            return Err(StartError::NoSharedMemory { free, needed });
-        }
+        let turns = Turns::new();
+        let turn = turns.take();
+        let expected = options.expected_peers.min(limits.peers) as u64;
+        let room = expected * services.peer_bytes();
+        let own = services.broker_bytes();
+        let needed = own + room + fitting_reserve(options.shm_reserve_bytes);
+        look_for_room(needed)?;
         let generation = Generation::begin(instance, limits)?;
-        let hub = Hub::new(&generation.root, &generation.prefix, Access::Create)?;
+        // Somebody who takes no turns may have been faster.
+        keep_room(&generation.root, room).map_err(|_| no_room(needed))?;
+        let hub = Hub::new(&generation.root, Access::Create)?;
         let documents = Documents::new(
             &hub,
             generation.number,
             [services.document_small, services.document_large],
             fitting_reserve(options.shm_reserve_bytes),
+            own + room,
         )?;
         let wake = hub.wake(&services.wake_broker, "")?;
+        let hello = subscribe(&hub, &services.hello)?;
+        let config = publish(&hub, &services.config)?;
+        let waker = Waker::new(ports::listener(&wake)?)?;
+        close_to_others(&generation.root)?;
+        let presence = Arc::new(Presence::new(instance, &generation, &lock));
         let host = Host {
-            hello: subscribe(&hub, &services.hello)?,
-            config: publish(&hub, &services.config)?,
-            waker: Waker::new(ports::listener(&wake)?)?,
-            _janitor: Janitor::start(instance, &generation)?,
+            hello,
+            config,
+            waker,
+            _janitor: Janitor::start(instance, &generation, Arc::clone(&presence))?,
+            presence,
             documents,
             hub,
-            events: VecDeque::new(),
+            waiting: Waiting::default(),
             sessions: BTreeMap::new(),
             attempts: HashMap::new(),
+            strangers: HashMap::new(),
+            entrance: Entrance::open(instance, generation.number)?,
             next_peer: 1,
-            next_turn: 0,
+            last_read: PeerId(0),
+            last_turn: Instant::now(),
             last_tick: Instant::now(),
             last_watch: Instant::now(),
-            instance: instance.clone(),
             _remains: remains,
             generation,
             limits,
             services,
         };
-        host.generation.announce(instance)?;
+        drop(turn);
+        host.presence.announce()?;
         Ok(host)
     }
 
@@ -287,14 +418,25 @@ impl Host {
     }
 
     /// The next event; meanwhile everything queued is sent. Cancel-safe: nothing is lost when the
-    /// future is dropped. Nothing moves on the bus unless this is awaited.
+    /// future is dropped. Nothing moves on the bus unless this is awaited. However much peers say,
+    /// it is read in turns of a few milliseconds, and others get theirs in between.
     pub async fn next(&mut self) -> HostEvent {
+        let mut turns = 0;
         loop {
-            if let Some(event) = self.events.pop_front() {
+            // Also while events wait, or nothing would be sent until the last of them is fetched.
+            let more = if self.waiting.is_empty() || self.last_turn.elapsed() >= TICK {
+                self.turn()
+            } else {
+                false
+            };
+            if let Some(event) = self.waiting.pop() {
                 return event;
             }
-            self.turn();
-            if !self.events.is_empty() {
+            turns += 1;
+            if more || turns % TURNS_IN_A_ROW == 0 {
+                tokio::task::yield_now().await;
+            }
+            if more {
                 continue;
             }
             let documents = self.documents.clone();
@@ -348,6 +490,12 @@ impl Host {
             .map_or(0, |session| session.link.backlog())
     }
 
+    /// Bytes of what was read and is not yet fetched: that there is an end to it has to be tested.
+    #[doc(hidden)]
+    pub fn waiting_bytes(&self) -> usize {
+        self.waiting.bytes()
+    }
+
     /// Ends a session at once and gives its window back, whether the peer reacts or not. A peer
     /// that still lives may introduce itself again.
     pub fn disconnect(&mut self, peer: PeerId) {
@@ -370,14 +518,17 @@ impl Host {
         self.documents.clone()
     }
 
-    /// Sends and reads as much as there is, once, without waiting.
-    fn turn(&mut self) {
+    /// Sends what there is and reads as much as one turn may, without waiting. `true`: there may be
+    /// more to read.
+    fn turn(&mut self) -> bool {
         let now = Instant::now();
-        self.greet(now);
-        self.read();
+        self.greet(now, &Budget::new(now));
+        // One of its own: whoever introduces himself again and again keeps nobody from being heard.
+        let more = self.read(&mut Budget::new(Instant::now()));
         let ticked = now.duration_since(self.last_tick) >= TICK;
         if ticked {
             self.last_tick = now;
+            self.entrance.turn(now);
         }
         for session in self.sessions.values_mut() {
             if ticked {
@@ -390,33 +541,50 @@ impl Host {
             self.last_watch = now;
             self.watch(now);
         }
+        self.last_turn = Instant::now();
+        more
     }
 
-    /// Reads from every peer in turn, a few frames each, beginning with another one every time.
-    fn read(&mut self) {
-        let mut order: Vec<PeerId> = self.sessions.keys().copied().collect();
-        let count = order.len().max(1);
-        order.rotate_left((self.next_turn % count as u64) as usize);
-        self.next_turn = self.next_turn.wrapping_add(1);
+    /// Reads from every peer in turn, a few frames each, beginning behind the one that was read from
+    /// last. `true` when it stopped although there may be more.
+    fn read(&mut self, budget: &mut Budget) -> bool {
+        let behind = (Bound::Excluded(self.last_read), Bound::Unbounded);
+        let later = self.sessions.range(behind).map(|(peer, _)| *peer);
+        let earlier = self
+            .sessions
+            .range(..=self.last_read)
+            .map(|(peer, _)| *peer);
+        let order: Vec<PeerId> = later.chain(earlier).collect();
         loop {
             let mut progress = false;
             for peer in &order {
-                if self.events.len() >= MAX_WAITING {
-                    return;
+                if self.waiting.is_full() {
+                    return true;
                 }
-                if let Some(session) = self.sessions.get_mut(peer) {
-                    progress |= session.read(*peer, QUOTA, &mut self.events);
+                if let Some(session) = self.sessions.get_mut(peer)
+                    && session.read(*peer, QUOTA, budget, &mut self.waiting)
+                {
+                    self.last_read = *peer;
+                    progress = true;
+                }
+                // Afterwards, so that every turn hears somebody, however slow the machine is.
+                if progress && budget.is_spent() {
+                    return true;
                 }
             }
             if !progress {
-                return;
+                return false;
             }
         }
     }
 
     /// Opens a session for everyone who is new.
-    fn greet(&mut self, now: Instant) {
-        for _ in 0..HELLOS {
+    fn greet(&mut self, now: Instant, budget: &Budget) {
+        for read in 0..HELLOS {
+            // Opening a session takes longest of all.
+            if read > 0 && budget.is_spent() {
+                return;
+            }
             let sample = match self.hello.receive() {
                 Ok(Some(sample)) => sample,
                 Ok(None) => return,
@@ -438,14 +606,75 @@ impl Host {
                 continue;
             }
             match codec::decode::<Hello>(&sample) {
-                Ok(hello) if hello.incarnation == key.incarnation => self.open(key, hello, now),
+                Ok(hello) if hello.incarnation == key.incarnation => self.meet(key, hello, now),
                 Ok(_) => tracing::warn!("an introduction contradicts itself"),
                 Err(error) => tracing::warn!(%error, "an introduction cannot be read"),
             }
         }
     }
 
-    fn open(&mut self, key: SessionKey, hello: Hello, now: Instant) {
+    /// Whoever has proven who it is gets a session.
+    fn meet(&mut self, key: SessionKey, hello: Hello, now: Instant) {
+        // It has said who it is before it said hello.
+        self.entrance.turn(now);
+        let Some(known) = self.entrance.take(&key) else {
+            return self.is_strange(key, &hello, now);
+        };
+        // Who was told why it may not take part has no claim to anything.
+        let mut sessions = self.sessions.values().filter(|it| !it.is_silent());
+        let older = sessions.find(|it| it.key().incarnation == key.incarnation);
+        if older.is_some_and(|it| !it.is_of(&known)) {
+            let why = "another process that runs has said so of itself before: give every process a number \
+                 of its own";
+            return self.turn_away(key, &hello, why, now);
+        }
+        self.open(key, hello, known, now);
+    }
+
+    /// Somebody says hello and has not proven who it is. It may be about to.
+    fn is_strange(&mut self, key: SessionKey, hello: &Hello, now: Instant) {
+        self.strangers
+            .retain(|_, (since, _)| now.saturating_duration_since(*since) < STRANGE_FOR);
+        if self.strangers.len() >= MAX_STRANGERS && !self.strangers.contains_key(&key) {
+            return;
+        }
+        let (since, _) = *self.strangers.entry(key).or_insert((now, false));
+        if now.saturating_duration_since(since) >= PROVE_WITHIN {
+            let why = "it has not proven which process it is: build it with this version of qcbus, and let it \
+                 connect to peers.sock in the instance's directory before it says hello (in another container: \
+                 share that directory, and run as the same user)";
+            self.turn_away(key, hello, why, now);
+        }
+    }
+
+    /// Tells somebody who is not believed why, once.
+    fn turn_away(&mut self, key: SessionKey, hello: &Hello, why: &str, now: Instant) {
+        let told = self.sessions.values().filter(|it| it.is_silent()).count();
+        if self.strangers.get(&key).is_some_and(|(_, told)| *told) || told >= MAX_TOLD {
+            return;
+        }
+        self.strangers.insert(key, (now, true));
+        let name: String = hello.name.chars().take(64).collect();
+        let why = format!("`{}`: {why}", name.escape_debug());
+        match Session::open(&self.hub, &self.services, key, now) {
+            Ok(session) => {
+                let peer = self.number();
+                self.sessions.insert(peer, session);
+                self.refuse(peer, &why);
+            }
+            Err(error) => tracing::warn!(%error, "cannot tell a peer why it may not join"),
+        }
+        let len = why.len();
+        self.waiting.push(HostEvent::TurnedAway { why }, len);
+    }
+
+    fn number(&mut self) -> PeerId {
+        let peer = PeerId(self.next_peer);
+        self.next_peer += 1;
+        peer
+    }
+
+    fn open(&mut self, key: SessionKey, mut hello: Hello, known: Known, now: Instant) {
         self.supersede(&key);
         let allowed = self.limits.peers + SPARE_SESSIONS;
         if self.sessions.len() >= allowed {
@@ -453,17 +682,19 @@ impl Host {
                 name = hello.name,
                 "no room even to refuse a peer; it has to wait"
             );
-            return;
+            return self.entrance.keep(key, known, now);
         }
-        let session = match Session::open(&self.hub, &self.services, key, hello.pid, now) {
+        let (process, launch) = (known.process.clone(), known.launch.clone());
+        hello.pid = process.as_ref().map_or(0, Process::id);
+        let mut session = match Session::open(&self.hub, &self.services, key, now) {
             Ok(session) => session,
             Err(error) => {
                 tracing::warn!(%error, name = hello.name, "cannot open a session");
-                return;
+                return self.entrance.keep(key, known, now);
             }
         };
-        let peer = PeerId(self.next_peer);
-        self.next_peer += 1;
+        session.is_known(known);
+        let peer = self.number();
         let full = self.sessions.len() >= self.limits.peers;
         self.sessions.insert(peer, session);
         self.remember(&key);
@@ -474,7 +705,13 @@ impl Host {
                 &format!("the broker serves {limit} bundles and reporters already"),
             );
         } else {
-            self.events.push_back(HostEvent::Hello { peer, hello });
+            let hello = HostEvent::Hello {
+                peer,
+                hello,
+                process,
+                launch,
+            };
+            self.waiting.push(hello, HELLO_BYTES);
         }
     }
 
@@ -488,7 +725,7 @@ impl Host {
         if let Some((peer, silent)) = older {
             self.sessions.remove(&peer);
             if !silent {
-                self.events.push_back(HostEvent::Gone { peer });
+                self.waiting.push(HostEvent::Gone { peer }, 0);
             }
         }
     }
@@ -517,14 +754,23 @@ impl Host {
             })
             .collect();
         for (peer, silent) in over {
-            // What it said before it went still counts.
-            if let Some(session) = self.sessions.get_mut(&peer) {
-                session.read(peer, FRAME_BUFFER * 2, &mut self.events);
-            }
+            self.hear_out(peer);
             self.sessions.remove(&peer);
             if !silent {
-                self.events.push_back(HostEvent::Gone { peer });
+                self.waiting.push(HostEvent::Gone { peer }, 0);
             }
+        }
+    }
+
+    /// What a peer said before it went still counts; it fits into its buffer.
+    fn hear_out(&mut self, peer: PeerId) {
+        let Some(session) = self.sessions.get_mut(&peer) else {
+            return;
+        };
+        let mut budget = Budget::new(Instant::now());
+        let mut left = FRAME_BUFFER * 2;
+        while left > 0 && session.read(peer, 1, &mut budget, &mut self.waiting) {
+            left -= 1;
         }
     }
 
@@ -550,12 +796,29 @@ impl Host {
 
 impl Drop for Host {
     fn drop(&mut self) {
-        self.generation.withdraw(&self.instance);
+        self.presence.withdraw();
         self.documents.stop();
         for session in self.sessions.values_mut() {
             session.link.farewell("");
         }
         self.sessions.clear();
+    }
+}
+
+/// Whether a broker has room to start.
+fn look_for_room(needed: u64) -> Result<(), StartError> {
+    let memory = SharedMemory::now()?;
+    // A memory of size 0 has no limit.
+    match memory.size == 0 || memory.free >= needed {
+        true => Ok(()),
+        false => Err(no_room(needed)),
+    }
+}
+
+fn no_room(needed: u64) -> StartError {
+    match SharedMemory::now() {
+        Ok(SharedMemory { size, free }) => StartError::NoSharedMemory { size, free, needed },
+        Err(error) => StartError::Io(error),
     }
 }
 

@@ -1,10 +1,11 @@
 //! An instance: one runtime directory, one broker.
 
-use std::fs::{self, DirBuilder, File, OpenOptions};
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Seek, Write};
-use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
+use qcbus_disk::trust::{self, TrustError};
 use rustix::fs::{FlockOperation, flock};
 
 const LOCK: &str = "lock";
@@ -26,8 +27,8 @@ pub enum InstanceError {
     )]
     BadName(String),
     /// The directory belongs to somebody else, who could read and replace what is in it.
-    #[error("the runtime directory {} belongs to another user; set XDG_RUNTIME_DIR to a directory of your own", .0.display())]
-    NotOurs(PathBuf),
+    #[error("no runtime directory: {0}; or set XDG_RUNTIME_DIR to a directory of your own")]
+    NotOurs(TrustError),
     /// The directory cannot be made.
     #[error("cannot use the runtime directory {}: {source}", dir.display())]
     Io {
@@ -101,12 +102,13 @@ impl Instance {
     }
 
     /// Makes the directory when it is missing. One that is there keeps its permissions: it may
-    /// have been chosen by a person.
+    /// have been chosen by a person. Nobody else may write to it.
     pub(crate) fn create_dir(&self) -> Result<(), InstanceError> {
-        if self.dir.is_dir() {
-            return Ok(());
+        match trust::directory(&self.dir) {
+            Ok(_) => Ok(()),
+            Err(error) if error.is_absent() => private_dir(&self.dir),
+            Err(error) => Err(error.into()),
         }
-        private_dir(&self.dir)
     }
 }
 
@@ -116,31 +118,26 @@ pub(crate) fn private_temporary_dir() -> PathBuf {
     std::env::temp_dir().join(format!("qcbus-{uid}"))
 }
 
-/// Makes a directory that only we can read, or checks that it is one.
+/// Makes a directory that only we can read, or sees to it that it is one. What is not ours is left as
+/// it is.
 pub(crate) fn private_dir(dir: &Path) -> Result<(), InstanceError> {
-    let io = |source| InstanceError::Io {
-        dir: dir.to_owned(),
-        source,
-    };
-    DirBuilder::new()
-        .recursive(true)
-        .mode(0o700)
-        .create(dir)
-        .map_err(io)?;
-    let found = fs::metadata(dir).map_err(io)?;
-    if found.uid() != rustix::process::geteuid().as_raw() {
-        return Err(InstanceError::NotOurs(dir.to_owned()));
-    }
-    if found.permissions().mode() & 0o077 != 0 {
-        fs::set_permissions(dir, fs::Permissions::from_mode(0o700)).map_err(io)?;
-    }
+    trust::make_private_directory(dir)?;
     Ok(())
+}
+
+impl From<TrustError> for InstanceError {
+    fn from(error: TrustError) -> Self {
+        match error {
+            TrustError::Io { path: dir, source } => InstanceError::Io { dir, source },
+            foreign @ TrustError::Foreign { .. } => InstanceError::NotOurs(foreign),
+        }
+    }
 }
 
 /// The broker's claim on an instance; released by the kernel when the process ends.
 #[derive(Debug)]
 pub(crate) struct InstanceLock {
-    _file: File,
+    file: File,
     path: PathBuf,
 }
 
@@ -181,7 +178,7 @@ impl InstanceLock {
                 Ok(()) if is_still_there(&file, &path) => {
                     file.set_len(0).map_err(LockError::Io)?;
                     write!(file, "{}", std::process::id()).map_err(LockError::Io)?;
-                    return Ok(InstanceLock { _file: file, path });
+                    return Ok(InstanceLock { file, path });
                 }
                 Ok(()) => continue,
                 Err(rustix::io::Errno::WOULDBLOCK) => holder = read_pid(&file),
@@ -190,6 +187,11 @@ impl InstanceLock {
             std::thread::sleep(std::time::Duration::from_millis(2));
         }
         Err(LockError::Held { pid: holder })
+    }
+
+    /// Whether the file is there by which others see the claim.
+    pub(crate) fn is_there(&self) -> bool {
+        is_still_there(&self.file, &self.path)
     }
 
     /// Gives the instance up and leaves no file behind.

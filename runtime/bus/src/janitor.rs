@@ -1,5 +1,6 @@
 //! Cleaning up after the dead, off the broker's loop.
 
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
@@ -9,13 +10,14 @@ use iceoryx2::prelude::Config;
 use crate::generation::{Generation, sweep};
 use crate::instance::Instance;
 use crate::ports::{clean_dead_nodes, generation_config};
+use crate::presence::Presence;
 
 const EVERY: Duration = Duration::from_millis(250);
 /// A clean-up takes milliseconds; one that hangs must not keep the broker from stopping.
 const STOP_WITHIN: Duration = Duration::from_secs(2);
 
 /// A thread that removes what older generations left, once, and what dead peers left, again and
-/// again.
+/// again; and that makes again what was taken from the runtime directory.
 pub(crate) struct Janitor {
     stop: Option<Sender<()>>,
     stopped: Receiver<()>,
@@ -23,9 +25,12 @@ pub(crate) struct Janitor {
 }
 
 impl Janitor {
-    pub(crate) fn start(instance: &Instance, generation: &Generation) -> std::io::Result<Janitor> {
-        let config = generation_config(&generation.root, &generation.prefix)
-            .map_err(std::io::Error::other)?;
+    pub(crate) fn start(
+        instance: &Instance,
+        generation: &Generation,
+        presence: Arc<Presence>,
+    ) -> std::io::Result<Janitor> {
+        let config = generation_config(&generation.root).map_err(std::io::Error::other)?;
         let (stop, asked) = channel();
         let (done, stopped) = channel();
         let (instance, generation) = (instance.clone(), generation.clone());
@@ -33,7 +38,7 @@ impl Janitor {
             .name("bus-janitor".to_owned())
             .spawn(move || {
                 sweep(&instance, Some(&generation));
-                clean_until_asked(&config, &asked);
+                clean_until_asked(&config, &presence, &asked);
                 let _ = done.send(());
             })?;
         Ok(Janitor {
@@ -44,8 +49,9 @@ impl Janitor {
     }
 }
 
-fn clean_until_asked(config: &Config, asked: &Receiver<()>) {
+fn clean_until_asked(config: &Config, presence: &Presence, asked: &Receiver<()>) {
     while let Err(RecvTimeoutError::Timeout) = asked.recv_timeout(EVERY) {
+        presence.look_after();
         clean_dead_nodes(config);
     }
 }

@@ -7,13 +7,19 @@
 //!
 //! This is the only crate that names iceoryx2. How it is made:
 //!
-//! * `ports`: iceoryx2's configuration, and the only constructor of services and ports;
+//! * `enclosed`: where iceoryx2 puts its memory; `ports`: its configuration, and the only
+//!   constructor of services and ports;
 //! * `stream`, `link`: the streams, first as arithmetic, then on the bus;
-//! * `instance`, `generation`, `process`, `janitor`: finding each other, noticing deaths, leaving
-//!   nothing behind;
-//! * `host` with `session`, `documents`; `peer` with `membership`, `library`; `held`; `wake`.
+//! * `instance`, `generation`, `presence`, `process`, `janitor`: finding each other, noticing deaths, leaving
+//!   nothing behind; `entrance`: who is at the other end;
+//! * `memory`: how shared memory is had before it is written to;
+//! * `host` with `session`, `turn`, `documents`; `peer` with `membership`, `library`; `held`; `wake`.
 
 mod documents;
+mod enclosed;
+mod entrance;
+#[doc(hidden)]
+pub mod fuzzing;
 mod generation;
 mod held;
 mod host;
@@ -22,18 +28,26 @@ mod janitor;
 mod library;
 mod link;
 mod membership;
+mod memory;
 mod peer;
 mod ports;
+mod presence;
 mod private;
 mod process;
 mod session;
 mod stream;
+mod turn;
 mod wake;
 
 pub use documents::{Documents, Loan, LoanError, PublishError};
+pub use entrance::LAUNCH;
 pub use held::Held;
 pub use host::{Host, HostEvent, HostOptions, PeerId, StartError};
 pub use instance::{Instance, InstanceError};
+pub use memory::SharedMemory;
+#[doc(hidden)]
+pub use peer::Claims;
 pub use peer::{JoinError, Peer, PeerEvent, PeerOptions};
 pub use ports::ICEORYX2_VERSION;
 pub use private::{PRIVATE_PREFIX, sweep_private_instances};
+pub use process::Process;

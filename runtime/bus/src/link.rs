@@ -3,13 +3,20 @@
 use std::time::Instant;
 
 use iceoryx2::prelude::*;
+use qcbus_messages::services::FRAME_BYTES;
 
+use crate::memory::Backing;
 use crate::ports::{Pub, Sub, WakeNotifier};
 use crate::stream::{BrokenStream, Incoming, Outgoing};
 
 /// Frames that arrive before an acknowledgement is sent on its own, when none could ride along.
 /// Well below the window, so that a sender does not stall.
 const ACKNOWLEDGE_EVERY: u32 = 8;
+
+/// Frames in a row that bring nothing before a stream counts as broken: duplicates, frames after a
+/// gap, acknowledgements of what is known. Honest ones send a window of them again at most every
+/// half a second, and are heard in between.
+const MAX_USELESS: u32 = 4096;
 
 /// What a frame is for; see [`FrameHeader::kind`].
 const DATA: u32 = 1;
@@ -22,16 +29,16 @@ const FAREWELL: u32 = 3;
 #[type_name("qcbus.FrameHeader.1")]
 #[repr(C)]
 pub(crate) struct FrameHeader {
-    generation: u64,
-    incarnation: u64,
-    attempt: u64,
+    pub(crate) generation: u64,
+    pub(crate) incarnation: u64,
+    pub(crate) attempt: u64,
     /// Number of the frame in its stream; 0 when it carries no data.
-    seq: u64,
+    pub(crate) seq: u64,
     /// The last frame that arrived in the other direction.
-    ack: u64,
-    kind: u32,
+    pub(crate) ack: u64,
+    pub(crate) kind: u32,
     /// 1: the sender waits for the acknowledgement, so please do not put it off.
-    urgent: u32,
+    pub(crate) urgent: u32,
 }
 
 /// What a session is bound to; frames of another one are void.
@@ -56,6 +63,8 @@ impl SessionKey {
 pub(crate) struct Drained {
     /// Frames read.
     pub(crate) frames: usize,
+    /// Bytes in them.
+    pub(crate) bytes: usize,
     /// The other side has said farewell, and why.
     pub(crate) farewell: Option<String>,
     /// The other side sends what is no stream.
@@ -64,10 +73,18 @@ pub(crate) struct Drained {
     pub(crate) foreign: usize,
 }
 
+/// Whether whoever gets messages wants another frame of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Wants {
+    More,
+    NoMore,
+}
+
 /// Both directions of a session.
 pub(crate) struct Link {
     key: SessionKey,
     sender: Pub<u8, FrameHeader>,
+    backing: Backing,
     receiver: Sub<u8, FrameHeader>,
     wake: WakeNotifier,
     out: Outgoing,
@@ -76,25 +93,31 @@ pub(crate) struct Link {
     urgent: bool,
     /// The other side waits for an acknowledgement.
     asked: bool,
+    /// Frames since the last one that brought something.
+    useless: u32,
 }
 
 impl Link {
+    /// The other side may send messages of up to `most` bytes.
     pub(crate) fn new(
         key: SessionKey,
-        sender: Pub<u8, FrameHeader>,
+        (sender, backing): (Pub<u8, FrameHeader>, Backing),
         receiver: Sub<u8, FrameHeader>,
         wake: WakeNotifier,
+        most: usize,
     ) -> Link {
         Link {
             key,
             sender,
+            backing,
             receiver,
             wake,
             out: Outgoing::new(Instant::now()),
-            incoming: Incoming::default(),
+            incoming: Incoming::new(most),
             broken: false,
             urgent: false,
             asked: false,
+            useless: 0,
         }
     }
 
@@ -122,7 +145,7 @@ impl Link {
         let ack = self.incoming.arrived();
         while let Some((seq, bytes)) = self.out.next() {
             let header = header(self.key, DATA, seq, ack, self.urgent);
-            if !transmit(&self.sender, header, bytes) {
+            if !transmit(&self.sender, &mut self.backing, header, bytes) {
                 break;
             }
             self.out.was_taken(Instant::now());
@@ -153,7 +176,7 @@ impl Link {
     fn acknowledge(&mut self) -> bool {
         let ack = self.incoming.arrived();
         let header = header(self.key, ACKNOWLEDGEMENT, 0, ack, false);
-        let sent = transmit(&self.sender, header, &[]);
+        let sent = transmit(&self.sender, &mut self.backing, header, &[]);
         if sent {
             self.incoming.acknowledged();
             self.asked = false;
@@ -169,7 +192,8 @@ impl Link {
             end -= 1;
         }
         let header = header(self.key, FAREWELL, 0, self.incoming.arrived(), false);
-        transmit(&self.sender, header, &reason.as_bytes()[..end]);
+        let reason = &reason.as_bytes()[..end];
+        transmit(&self.sender, &mut self.backing, header, reason);
         self.notify();
     }
 
@@ -184,10 +208,16 @@ impl Link {
         }
     }
 
-    /// Reads up to `quota` frames; `deliver` gets each message that they complete.
-    pub(crate) fn drain(&mut self, quota: usize, mut deliver: impl FnMut(&[u8])) -> Drained {
+    /// Reads up to `quota` frames; `deliver` gets each message that they complete, and says whether
+    /// it wants more.
+    pub(crate) fn drain(
+        &mut self,
+        quota: usize,
+        mut deliver: impl FnMut(&[u8]) -> Wants,
+    ) -> Drained {
         let mut drained = Drained::default();
-        while drained.frames < quota && !self.broken {
+        let mut wants = Wants::More;
+        while drained.frames < quota && wants == Wants::More && !self.broken {
             let sample = match self.receiver.receive() {
                 Ok(Some(sample)) => sample,
                 Ok(None) => break,
@@ -197,31 +227,55 @@ impl Link {
                 }
             };
             drained.frames += 1;
+            drained.bytes += sample.len().min(FRAME_BYTES);
             // Copied out once, so that what is checked is what is used.
             let header = *sample.user_header();
-            let session = (header.generation, header.incarnation, header.attempt);
-            if session != (self.key.generation, self.key.incarnation, self.key.attempt) {
-                drained.foreign += 1;
-                continue;
-            }
-            self.out.acknowledge(header.ack, Instant::now());
-            match header.kind {
-                DATA => {
-                    self.asked |= header.urgent != 0;
-                    let accepted = self.incoming.accept(header.seq, &sample, &mut deliver);
-                    if let Err(broken) = accepted {
-                        self.broken = true;
-                        drained.broken = Some(broken);
-                    }
-                }
-                ACKNOWLEDGEMENT => {}
-                FAREWELL => {
-                    drained.farewell = Some(String::from_utf8_lossy(&sample).into_owned());
-                }
-                _ => drained.foreign += 1,
+            let taken = self.take(header, &sample, &mut drained, |message| {
+                wants = deliver(message);
+            });
+            if let Err(broken) = taken {
+                self.broken = true;
+                drained.broken = Some(broken);
             }
         }
         drained
+    }
+
+    fn take(
+        &mut self,
+        header: FrameHeader,
+        bytes: &[u8],
+        drained: &mut Drained,
+        deliver: impl FnMut(&[u8]),
+    ) -> Result<(), BrokenStream> {
+        // The sender's publisher says how long it is, and may have slots of any size.
+        if bytes.len() > FRAME_BYTES {
+            return Err(BrokenStream::Frame(bytes.len()));
+        }
+        let session = (header.generation, header.incarnation, header.attempt);
+        if session != (self.key.generation, self.key.incarnation, self.key.attempt) {
+            drained.foreign += 1;
+            return Ok(());
+        }
+        let mut brings = self.out.acknowledge(header.ack, Instant::now());
+        match header.kind {
+            DATA => {
+                self.asked |= header.urgent != 0;
+                let before = self.incoming.arrived();
+                self.incoming.accept(header.seq, bytes, deliver)?;
+                brings |= self.incoming.arrived() > before && !bytes.is_empty();
+            }
+            ACKNOWLEDGEMENT => {}
+            FAREWELL => {
+                drained.farewell = Some(String::from_utf8_lossy(bytes).into_owned());
+            }
+            _ => drained.foreign += 1,
+        }
+        self.useless = if brings { 0 } else { self.useless + 1 };
+        if self.useless > MAX_USELESS {
+            return Err(BrokenStream::Useless(self.useless));
+        }
+        Ok(())
     }
 }
 
@@ -239,10 +293,19 @@ fn header(key: SessionKey, kind: u32, seq: u64, ack: u64, urgent: bool) -> Frame
 
 /// `true` when the other side's buffer took the frame. Everything else, `Ok(0)` included, means
 /// that it is not known to have arrived.
-fn transmit(sender: &Pub<u8, FrameHeader>, header: FrameHeader, bytes: &[u8]) -> bool {
+fn transmit(
+    sender: &Pub<u8, FrameHeader>,
+    backing: &mut Backing,
+    header: FrameHeader,
+    bytes: &[u8],
+) -> bool {
+    if !backing.is_ahead() {
+        return false;
+    }
     let Ok(mut sample) = sender.loan_slice_uninit(bytes.len().max(1)) else {
         return false;
     };
+    backing.lent(sample.payload().as_ptr().addr(), FRAME_BYTES);
     *sample.user_header_mut() = header;
     let sample = if bytes.is_empty() {
         sample.write_from_slice(&[0])

@@ -1,6 +1,8 @@
 //! A peer's side of one session, from the introduction to its end.
 
 use std::collections::VecDeque;
+use std::os::unix::net::UnixStream;
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -8,11 +10,13 @@ use iceoryx2::prelude::*;
 use qcbus_messages::services::{HELLO_BYTES, Services};
 use qcbus_messages::{Digest, Hello, ToPeer, codec};
 
+use crate::entrance::introduce;
 use crate::generation::Generation;
 use crate::host::{ConfigHeader, HelloHeader};
 use crate::instance::Instance;
 use crate::library::Library;
-use crate::link::{FrameHeader, Link, SessionKey};
+use crate::link::{FrameHeader, Link, SessionKey, Wants};
+use crate::memory::{Turns, free_shared_memory, take_room};
 use crate::peer::PeerEvent;
 use crate::ports::{self, Access, Hub, PortError, Pub, Sub, TopicService, WakeNotifier};
 use crate::process::Process;
@@ -20,6 +24,8 @@ use crate::wake::{TICK, Waker};
 
 /// How often an introduction is repeated.
 const HELLO_EVERY: Duration = Duration::from_millis(50);
+/// So many introductions, and it is said again which process this is.
+const PROVE_EVERY: u32 = 20;
 /// Frames read before documents are looked at.
 const QUOTA: usize = 32;
 
@@ -66,6 +72,11 @@ pub(crate) struct Membership {
     broker: Process,
     introduction: Vec<u8>,
     last_hello: Option<Instant>,
+    hellos: u32,
+    proves: bool,
+    instance: Instance,
+    /// Where we have said who we are; the broker sees by them whether we live.
+    said: Vec<UnixStream>,
     last_tick: Instant,
     welcome: bool,
     refused: Option<String>,
@@ -82,10 +93,12 @@ impl Membership {
     /// Joins the generation and subscribes to what is shared, so that the broker's answer to the
     /// introduction finds subscribers for documents and configuration.
     pub(crate) fn begin(
+        instance: &Instance,
         generation: Generation,
         broker: Process,
         hello: &Hello,
         attempt: u64,
+        proves: bool,
     ) -> Result<Membership, BeginError> {
         let introduction =
             codec::encode(hello).map_err(|error| BeginError::Hello(error.to_string()))?;
@@ -95,7 +108,10 @@ impl Membership {
             return Err(BeginError::Hello(why));
         }
         let services = Services::new(&generation.limits);
-        let hub = Hub::new(&generation.root, &generation.prefix, Access::Open)?;
+        let turns = Turns::new();
+        let _turn = turns.take();
+        take_part(&generation.root, services.peer_bytes())?;
+        let hub = Hub::new(&generation.root, Access::Open)?;
         let config = hub.topic(&services.config, "")?;
         let greetings = hub.topic(&services.hello, "")?;
         let wake = hub.wake(&services.wake_broker, "")?;
@@ -107,7 +123,7 @@ impl Membership {
             },
             library: Library::new(&hub, generation.number, &services)?,
             config: ports::subscriber(&config, &services.config)?,
-            hello: ports::publisher(&greetings, &services.hello)?,
+            hello: hub.small_publisher(&greetings, &services.hello)?,
             wake_broker: Some(ports::notifier(&wake)?),
             channels: None,
             generation,
@@ -115,11 +131,20 @@ impl Membership {
             broker,
             introduction,
             last_hello: None,
+            hellos: 0,
+            proves,
+            instance: instance.clone(),
+            said: Vec::new(),
             last_tick: Instant::now(),
             welcome: false,
             refused: None,
             hub,
         })
+    }
+
+    /// Where everything of the generation lies.
+    pub(crate) fn root(&self) -> &Path {
+        &self.generation.root
     }
 
     pub(crate) fn library(&self) -> &Library {
@@ -221,6 +246,7 @@ impl Membership {
             loop {
                 let drained = channels.link.drain(QUOTA, |bytes| {
                     messages.push(codec::decode::<ToPeer>(bytes));
+                    Wants::More
                 });
                 ended |= drained.farewell.is_some() || drained.broken.is_some();
                 if drained.frames < QUOTA || messages.len() + events.len() >= max_events {
@@ -312,8 +338,8 @@ impl Membership {
         };
         let waker = Waker::new(ports::listener(&wake)?).map_err(|why| PortError::waiting(&why))?;
         let receiver = ports::subscriber(&to, &self.services.to_peer)?;
-        let sender = ports::publisher(&from, &self.services.from_peer)?;
-        let link = Link::new(self.key, sender, receiver, wake_broker);
+        let sender = self.hub.stream_publisher(&from, &self.services.from_peer)?;
+        let link = Link::new(self.key, sender, receiver, wake_broker, codec::MAX_MESSAGE);
         link.ring();
         Ok(Channels {
             link,
@@ -323,7 +349,14 @@ impl Membership {
         })
     }
 
-    fn introduce(&self) -> Result<(), String> {
+    fn introduce(&mut self) -> Result<(), String> {
+        if self.proves && self.hellos.is_multiple_of(PROVE_EVERY) {
+            let said = introduce(&self.instance, self.key);
+            self.said.push(said.map_err(|error| {
+                format!("cannot say to the broker which process this is: {error}")
+            })?);
+        }
+        self.hellos += 1;
         let mut sample = self
             .hello
             .loan_slice_uninit(self.introduction.len())
@@ -350,7 +383,19 @@ impl Membership {
             }
             None => true,
         };
-        kept && self.broker.is_alive()
-            && Generation::current(instance).as_ref() == Some(&self.generation)
+        // A file that is not there says nothing: a broker that goes closes its channels, and one whose
+        // directory was cleaned makes it again.
+        let told = Generation::current(instance);
+        kept && self.broker.is_alive() && told.is_none_or(|current| current == self.generation)
     }
+}
+
+/// Makes room for what joining takes: out of what the broker has kept for it, else out of what is
+/// free.
+fn take_part(root: &Path, needed: u64) -> Result<(), PortError> {
+    let free = free_shared_memory();
+    if take_room(root, needed) || free >= needed {
+        return Ok(());
+    }
+    Err(PortError::no_room(needed, free))
 }

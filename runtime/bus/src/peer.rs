@@ -1,6 +1,7 @@
 //! A bundle's or reporter's end of the bus.
 
 use std::collections::VecDeque;
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -45,6 +46,25 @@ impl Default for PeerOptions {
             patience: Duration::from_secs(2),
             grace: Duration::from_secs(10),
             rejoins: true,
+        }
+    }
+}
+
+/// What a peer claims.
+#[doc(hidden)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Claims {
+    /// Version of the messages.
+    pub protocol: u32,
+    /// Whether it proves which process it is.
+    pub proves: bool,
+}
+
+impl Default for Claims {
+    fn default() -> Self {
+        Claims {
+            protocol: PROTOCOL_VERSION,
+            proves: true,
         }
     }
 }
@@ -127,6 +147,7 @@ enum State {
 pub struct Peer {
     instance: Instance,
     hello: Hello,
+    proves: bool,
     options: PeerOptions,
     attempts: u64,
     state: State,
@@ -151,14 +172,18 @@ impl Peer {
         hello: Hello,
         options: PeerOptions,
     ) -> Result<Peer, JoinError> {
-        Peer::join_claiming(PROTOCOL_VERSION, instance, hello, options).await
+        let hello = Hello {
+            pid: std::process::id(),
+            ..hello
+        };
+        Peer::join_claiming(Claims::default(), instance, hello, options).await
     }
 
-    /// Joins and claims to speak this version of the messages: how a broker takes a peer of
-    /// another version has to be tested.
+    /// Joins with these claims, and says to be the process that `hello` says: how a broker takes a peer of
+    /// another version, or one that lies, has to be tested.
     #[doc(hidden)]
     pub async fn join_claiming(
-        protocol: u32,
+        claims: Claims,
         instance: &Instance,
         hello: Hello,
         options: PeerOptions,
@@ -166,10 +191,10 @@ impl Peer {
         let mut peer = Peer {
             instance: instance.clone(),
             hello: Hello {
-                protocol,
-                pid: std::process::id(),
+                protocol: claims.protocol,
                 ..hello
             },
+            proves: claims.proves,
             options,
             // Processes that follow each other may bear the same incarnation.
             attempts: u64::from(std::process::id()) << 32,
@@ -237,14 +262,19 @@ impl Peer {
     }
 
     /// Sends a message: it is kept until the broker has acknowledged it. Never blocks. Without a
-    /// session nothing is sent, because a new session voids everything older.
+    /// session nothing is sent, because a new session voids everything older. One that is larger than
+    /// the broker takes ([`codec::MAX_FROM_PEER`]) ends the session.
     pub fn send(&mut self, message: &FromPeer) {
         let State::Member(membership) = &mut self.state else {
             return;
         };
         match codec::encode(message) {
             Ok(bytes) => membership.push(&bytes),
-            Err(error) => tracing::error!(%error, "a message was not sent"),
+            Err(error) => {
+                tracing::error!(%error, "a message cannot be sent, the session ends");
+                // Were it left out, the rest would be taken for the whole. Nothing is no message.
+                membership.push(&[]);
+            }
         }
     }
 
@@ -300,6 +330,15 @@ impl Peer {
             membership.wait(TICK).await;
             // What arrives now is nobody's concern any more, but acknowledgements are among it.
             membership.read(usize::MAX, &mut VecDeque::new(), &mut None);
+        }
+    }
+
+    /// The directory in which everything of its generation lies: whoever may read the files there needs nothing
+    /// besides to take part. `None`: it is in no session.
+    pub fn memory(&self) -> Option<&Path> {
+        match &self.state {
+            State::Member(membership) => Some(membership.root()),
+            _ => None,
         }
     }
 
@@ -385,7 +424,14 @@ impl Peer {
         check_versions(&generation)?;
         self.attempts += 1;
         self.seek_at = Instant::now() + SEEK_AGAIN_AFTER;
-        match Membership::begin(generation, broker, &self.hello, self.attempts) {
+        match Membership::begin(
+            &self.instance,
+            generation,
+            broker,
+            &self.hello,
+            self.attempts,
+            self.proves,
+        ) {
             Ok(membership) => self.state = State::Member(Box::new(membership)),
             Err(crate::membership::BeginError::Hello(why)) => {
                 return Err(JoinError::HelloTooLarge(why));

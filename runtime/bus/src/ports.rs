@@ -3,7 +3,7 @@
 //! Whoever wants a service hands in a row of [`qcbus_messages::services`]; there is no other way.
 
 use std::fmt::Debug;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use iceoryx2::port::listener::Listener;
@@ -14,7 +14,9 @@ use iceoryx2::prelude::*;
 use iceoryx2::service::port_factory::{event, publish_subscribe};
 use qcbus_messages::services::{Growth, Topic, Wake};
 
-pub(crate) type Service = ipc_threadsafe::Service;
+pub(crate) use crate::enclosed::Enclosed as Service;
+use crate::memory::Backing;
+
 pub(crate) type Pub<T, H> = Publisher<Service, [T], H>;
 pub(crate) type Sub<T, H> = Subscriber<Service, [T], H>;
 pub(crate) type TopicService<T, H> = publish_subscribe::PortFactory<Service, [T], H>;
@@ -41,6 +43,24 @@ impl PortError {
         PortError {
             what: "waiting for the other side".to_owned(),
             why: why.to_string(),
+        }
+    }
+
+    /// There is no shared memory for a topic's slots.
+    fn memory(row: &Topic, why: &std::io::Error) -> PortError {
+        PortError {
+            what: format!("shared memory for {}", row.name),
+            why: why.to_string(),
+        }
+    }
+
+    /// There is no shared memory for one more who joins.
+    pub(crate) fn no_room(needed: u64, free: u64) -> PortError {
+        PortError {
+            what: "joining".to_owned(),
+            why: format!(
+                "not enough shared memory: {needed} bytes are needed, {free} are free in /dev/shm"
+            ),
         }
     }
 }
@@ -75,16 +95,22 @@ pub(crate) enum Access {
 pub(crate) struct Hub {
     node: Node<Service>,
     access: Access,
+    /// Where everything of the generation lies.
+    root: PathBuf,
 }
+
+/// What iceoryx2's files begin with. Short, for sockets are among them; they lie in a directory of
+/// their own, so it need not tell them from others.
+const PREFIX: &[u8] = b"q_";
 
 /// iceoryx2's settings for one generation. Never the global ones: those read a file from the
 /// working directory.
-pub(crate) fn generation_config(root: &Path, prefix: &str) -> Result<Config, PortError> {
+pub(crate) fn generation_config(root: &Path) -> Result<Config, PortError> {
     let mut config = Config::default();
     let root = iceoryx2::prelude::Path::new(root.as_os_str().as_encoded_bytes())
         .explain("the runtime directory's path")?;
     config.global.set_root_path(&root);
-    config.global.prefix = FileName::new(prefix.as_bytes()).explain("the prefix")?;
+    config.global.prefix = FileName::new(PREFIX).explain("the prefix")?;
     config.global.creation_timeout = Duration::from_millis(500);
     // Dead nodes are cleaned by the broker's janitor and by nobody else: a peer has no business
     // there, and the broker's loop has no 20 ms to give away.
@@ -100,16 +126,47 @@ pub(crate) fn generation_config(root: &Path, prefix: &str) -> Result<Config, Por
 
 impl Hub {
     /// Joins a generation.
-    pub(crate) fn new(root: &Path, prefix: &str, access: Access) -> Result<Hub, PortError> {
+    pub(crate) fn new(root: &Path, access: Access) -> Result<Hub, PortError> {
         // What iceoryx2 has to say arrives as error values; it prints nothing of its own.
         set_log_level_from_env_or(LogLevel::Fatal);
-        let config = generation_config(root, prefix)?;
+        let config = generation_config(root)?;
         let node = NodeBuilder::new()
             .config(&config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<Service>()
             .explain("the node")?;
-        Ok(Hub { node, access })
+        let root = root.to_path_buf();
+        Ok(Hub { node, access, root })
+    }
+
+    /// A publisher of a stream, with the memory that its slots need.
+    pub(crate) fn stream_publisher<H>(
+        &self,
+        service: &TopicService<u8, H>,
+        row: &Topic,
+    ) -> Result<(Pub<u8, H>, Backing), PortError>
+    where
+        H: Debug + ZeroCopySend + 'static,
+    {
+        let publisher = publisher(service, row)?;
+        let backing = Backing::of(&self.root, publisher.id().value());
+        let backing = backing.map_err(|why| PortError::memory(row, &why))?;
+        Ok((publisher, backing))
+    }
+
+    /// A publisher with few and small slots, all of whose memory is there from the beginning.
+    pub(crate) fn small_publisher<H>(
+        &self,
+        service: &TopicService<u8, H>,
+        row: &Topic,
+    ) -> Result<Pub<u8, H>, PortError>
+    where
+        H: Debug + ZeroCopySend + 'static,
+    {
+        let publisher = publisher(service, row)?;
+        Backing::whole(&self.root, publisher.id().value())
+            .map_err(|why| PortError::memory(row, &why))?;
+        Ok(publisher)
     }
 
     /// The only constructor of publish-subscribe services. `key` distinguishes the services of
@@ -318,7 +375,7 @@ mod tests {
         let instance = crate::Instance::at(dir.path().to_owned());
         let limits = Limits::default();
         let generation = crate::generation::Generation::begin(&instance, limits).unwrap();
-        let hub = Hub::new(&generation.root, &generation.prefix, Access::Create).unwrap();
+        let hub = Hub::new(&generation.root, Access::Create).unwrap();
         let services = Services::new(&limits);
         for row in services.topics() {
             if row.element == size_of::<Block>() {

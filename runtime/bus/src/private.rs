@@ -8,7 +8,7 @@ use crate::instance::{Instance, InstanceLock};
 /// Private instances (of `qcbus check`) begin with this and are nobody's but their process'.
 pub const PRIVATE_PREFIX: &str = "check-";
 
-/// Private instances younger than this may be on the way to taking their lock.
+/// Private instances of living processes that are younger than this may be on the way to taking their lock.
 const YOUNG: std::time::Duration = std::time::Duration::from_secs(10);
 
 /// Removes what dead private instances have left: their directories and their shared memory.
@@ -26,11 +26,20 @@ pub fn sweep_private_instances() -> usize {
             .file_name()
             .to_string_lossy()
             .starts_with(PRIVATE_PREFIX);
-        if is_private && !is_young(&entry.path()) {
-            swept += usize::from(sweep_one(&entry.path()));
+        let path = entry.path();
+        if is_private && (maker_is_dead(&path) || !is_young(&path)) {
+            swept += usize::from(sweep_one(&path));
         }
     }
     swept
+}
+
+/// Whether the process that made it, whose id is in the name, is gone.
+fn maker_is_dead(directory: &Path) -> bool {
+    let name = directory.file_name().unwrap_or_default().to_string_lossy();
+    let rest = name.strip_prefix(PRIVATE_PREFIX);
+    let pid = rest.and_then(|rest| rest.split_once('-')?.0.parse::<u32>().ok());
+    pid.is_some_and(|pid| !Path::new("/proc").join(pid.to_string()).exists())
 }
 
 fn is_young(directory: &Path) -> bool {

@@ -2,36 +2,58 @@
 
 use std::fs;
 use std::os::fd::OwnedFd;
+use std::sync::Arc;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::process::{Pid, PidfdFlags, pidfd_open};
+use rustix::process::{
+    Pid, PidfdFlags, Signal, getpgid, kill_process_group, pidfd_open, pidfd_send_signal,
+};
 
 /// A handle on a process that stays with it when the id is used again.
-#[derive(Debug)]
-pub(crate) struct Process {
-    fd: OwnedFd,
+#[derive(Debug, Clone)]
+pub struct Process {
+    pid: Pid,
+    fd: Arc<OwnedFd>,
 }
 
 impl Process {
     /// `None` when there is no such process (any more), or it is not the one that started at
-    /// `started`.
-    pub(crate) fn open(pid: u32, started: Option<u64>) -> Option<Process> {
-        let fd = pidfd_open(
-            Pid::from_raw(i32::try_from(pid).ok()?)?,
-            PidfdFlags::empty(),
-        )
-        .ok()?;
-        let process = Process { fd };
+    /// `started`, in clock ticks since boot.
+    pub fn open(pid: u32, started: Option<u64>) -> Option<Process> {
+        let id = Pid::from_raw(i32::try_from(pid).ok()?)?;
+        let process = Process::from_fd(id, pidfd_open(id, PidfdFlags::empty()).ok()?);
         // The handle was opened first: when the start time fits now, it fits the handle.
         let same = started.is_none_or(|started| start_time(pid) == Some(started));
         (same && process.is_alive()).then_some(process)
     }
 
+    pub(crate) fn from_fd(pid: Pid, fd: OwnedFd) -> Process {
+        let fd = Arc::new(fd);
+        Process { pid, fd }
+    }
+
+    /// Its id; only while it lives nobody else has the same.
+    pub fn id(&self) -> u32 {
+        self.pid.as_raw_nonzero().get().unsigned_abs()
+    }
+
     /// A process that has ended but was not yet waited for counts as dead.
-    pub(crate) fn is_alive(&self) -> bool {
+    pub fn is_alive(&self) -> bool {
         let mut fds = [PollFd::new(&self.fd, PollFlags::IN)];
         let at_once = Timespec::default();
         !matches!(poll(&mut fds, Some(&at_once)), Ok(ready) if ready > 0)
+    }
+
+    /// Kills it, with its group where it leads one. One that is dead stays so, and whoever has been given
+    /// its id since is let alone.
+    pub fn kill(&self) {
+        let leads = self.is_alive() && getpgid(Some(self.pid)) == Ok(self.pid);
+        if leads {
+            // It lived a moment ago, so the id is its own, and its group's as long as anybody is in it.
+            let _ = kill_process_group(self.pid, Signal::KILL);
+        }
+        // It may have gone by itself.
+        let _ = pidfd_send_signal(&self.fd, Signal::KILL);
     }
 }
 
@@ -55,6 +77,32 @@ mod tests {
         assert!(Process::open(own, Some(1)).is_none());
         assert!(Process::open(0, None).is_none());
         assert!(Process::open(u32::MAX, None).is_none());
+    }
+
+    #[test]
+    fn a_process_is_killed_with_its_group_and_nobody_else_is() {
+        use std::os::unix::process::CommandExt as _;
+        let start = |group: bool| {
+            let mut command = std::process::Command::new("sleep");
+            command.arg("1000");
+            if group {
+                command.process_group(0);
+            }
+            command.spawn().unwrap()
+        };
+        for group in [true, false] {
+            let mut child = start(group);
+            let mut bystander = start(false);
+            let process = Process::open(child.id(), None).unwrap();
+            assert_eq!(process.id(), child.id());
+            process.kill();
+            assert!(!child.wait().unwrap().success());
+            // There is no such process any more.
+            process.kill();
+            assert!(bystander.try_wait().unwrap().is_none());
+            bystander.kill().unwrap();
+            bystander.wait().unwrap();
+        }
     }
 
     #[test]

@@ -1,16 +1,16 @@
 //! The broker's side of one session.
 
-use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use iceoryx2::prelude::*;
 use qcbus_messages::services::Services;
 use qcbus_messages::{FromPeer, codec};
 
+use crate::entrance::Known;
 use crate::host::{HostEvent, PeerId};
-use crate::link::{FrameHeader, Link, SessionKey};
+use crate::link::{FrameHeader, Link, SessionKey, Wants};
 use crate::ports::{self, Hub, PortError, TopicService, WakeService};
-use crate::process::Process;
+use crate::turn::{Budget, Waiting};
 
 /// How long a peer may take to open its channels after its introduction.
 const CONNECT_WITHIN: Duration = Duration::from_secs(10);
@@ -21,8 +21,8 @@ pub(crate) struct Session {
     to: TopicService<u8, FrameHeader>,
     _from: TopicService<u8, FrameHeader>,
     _wake: WakeService,
-    /// `None` when the process id means nothing here, as between containers.
-    process: Option<Process>,
+    /// `None`: it has not said who it is, and is told so.
+    known: Option<Known>,
     opened: Instant,
     connected: bool,
     farewell: bool,
@@ -36,7 +36,6 @@ impl Session {
         hub: &Hub,
         services: &Services,
         key: SessionKey,
-        pid: u32,
         now: Instant,
     ) -> Result<Session, PortError> {
         let suffix = key.suffix();
@@ -46,9 +45,10 @@ impl Session {
         let to = hub.topic(&services.to_peer, &suffix)?;
         let link = Link::new(
             key,
-            ports::publisher(&to, &services.to_peer)?,
+            hub.stream_publisher(&to, &services.to_peer)?,
             ports::subscriber(&from, &services.from_peer)?,
             ports::notifier(&wake)?,
+            codec::MAX_FROM_PEER,
         );
         Ok(Session {
             key,
@@ -56,7 +56,7 @@ impl Session {
             to,
             _from: from,
             _wake: wake,
-            process: Process::open(pid, None),
+            known: None,
             opened: now,
             connected: false,
             farewell: false,
@@ -68,38 +68,42 @@ impl Session {
         self.key
     }
 
+    /// Who is at the other end.
+    pub(crate) fn is_known(&mut self, known: Known) {
+        self.known = Some(known);
+    }
+
+    /// Whether it is one of this process.
+    pub(crate) fn is_of(&self, known: &Known) -> bool {
+        self.known.as_ref().is_some_and(|own| own.is_same(known))
+    }
+
     /// Reads up to `quota` frames; `true` when there was one.
     pub(crate) fn read(
         &mut self,
         peer: PeerId,
         quota: usize,
-        events: &mut VecDeque<HostEvent>,
+        budget: &mut Budget,
+        waiting: &mut Waiting,
     ) -> bool {
         let silent = self.is_silent();
+        let before = waiting.len();
         let drained = self.link.drain(quota, |bytes| {
-            if silent {
-                return;
+            if !silent {
+                waiting.push(understand(peer, bytes), bytes.len());
             }
-            events.push_back(match codec::decode::<FromPeer>(bytes) {
-                Ok(message) => HostEvent::Message { peer, message },
-                Err(error) => HostEvent::Garbage {
-                    peer,
-                    what: error.to_string(),
-                },
-            });
+            match waiting.is_enough_since(before) {
+                true => Wants::NoMore,
+                false => Wants::More,
+            }
         });
+        budget.spend(drained.frames, drained.bytes);
         self.farewell |= drained.farewell.is_some();
-        if let Some(broken) = drained.broken {
-            events.push_back(HostEvent::Garbage {
-                peer,
-                what: broken.to_string(),
-            });
-        }
-        if drained.foreign > 0 && !silent {
-            events.push_back(HostEvent::Garbage {
-                peer,
-                what: format!("{} frames belong to no session", drained.foreign),
-            });
+        let broken = drained.broken.map(|broken| broken.to_string());
+        let foreign = (drained.foreign > 0 && !silent)
+            .then(|| format!("{} frames belong to no session", drained.foreign));
+        for what in broken.into_iter().chain(foreign) {
+            waiting.push(HostEvent::Garbage { peer, what }, 0);
         }
         drained.frames > 0
     }
@@ -108,7 +112,7 @@ impl Session {
     pub(crate) fn is_there(&mut self) -> bool {
         let subscribed = self.to.dynamic_config().number_of_subscribers() > 0;
         self.connected |= subscribed;
-        let alive = self.process.as_ref().is_none_or(Process::is_alive);
+        let alive = self.known.as_ref().is_none_or(Known::is_there);
         let left = self.connected && !subscribed;
         let never_came = !self.connected && self.opened.elapsed() > CONNECT_WITHIN;
         alive && !left && !never_came && !self.farewell
@@ -135,5 +139,15 @@ impl Session {
             self.link.farewell(reason);
         }
         over
+    }
+}
+
+fn understand(peer: PeerId, bytes: &[u8]) -> HostEvent {
+    match codec::decode::<FromPeer>(bytes) {
+        Ok(message) => HostEvent::Message { peer, message },
+        Err(error) => HostEvent::Garbage {
+            peer,
+            what: error.to_string(),
+        },
     }
 }

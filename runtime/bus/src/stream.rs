@@ -93,10 +93,11 @@ impl Outgoing {
         self.taken += 1;
     }
 
-    /// Everything up to and including `seq` has arrived. Numbers never sent are ignored.
-    pub(crate) fn acknowledge(&mut self, seq: u64, now: Instant) {
+    /// Everything up to and including `seq` has arrived. Numbers never sent are ignored; `true` when
+    /// this is news.
+    pub(crate) fn acknowledge(&mut self, seq: u64, now: Instant) -> bool {
         if seq < self.base || seq >= self.base + self.sealed as u64 {
-            return;
+            return false;
         }
         let arrived = (seq + 1 - self.base) as usize;
         for mut frame in self.frames.drain(..arrived) {
@@ -111,6 +112,7 @@ impl Outgoing {
         self.sealed -= arrived;
         self.last_progress = now;
         self.patience = RESEND_AFTER;
+        true
     }
 
     /// Goes back to the first unacknowledged frame when there was no sign of it for too long.
@@ -133,14 +135,30 @@ impl Outgoing {
     }
 }
 
-/// What arrived is no stream of ours: a length that no message has.
+/// What arrived is no stream of ours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("a message of {0} bytes was announced; at most {MAX_MESSAGE} are allowed")]
-pub(crate) struct BrokenStream(pub(crate) u32);
+pub(crate) enum BrokenStream {
+    /// A length that no message has.
+    #[error("a message of {announced} bytes was announced; at most {most} are allowed")]
+    Message {
+        /// Bytes.
+        announced: usize,
+        /// That the sender may say in one message.
+        most: usize,
+    },
+    /// A length that no frame has.
+    #[error("a frame of {0} bytes came; at most {FRAME_BYTES} are allowed")]
+    Frame(usize),
+    /// A flood.
+    #[error("{0} frames in a row brought nothing")]
+    Useless(u32),
+}
 
 /// The receiving half.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Incoming {
+    /// Bytes of the largest message that the other side may send.
+    most: usize,
     /// Number of the last frame taken.
     arrived: u64,
     /// Frames since the last acknowledgement went out.
@@ -150,6 +168,17 @@ pub(crate) struct Incoming {
 }
 
 impl Incoming {
+    /// Nothing has arrived yet; no message may have more than `most` bytes.
+    pub(crate) fn new(most: usize) -> Incoming {
+        Incoming {
+            most,
+            arrived: 0,
+            owed: 0,
+            length: Vec::new(),
+            body: Vec::new(),
+        }
+    }
+
     /// Takes a frame; `deliver` gets each message that it completes.
     ///
     /// # Errors
@@ -169,9 +198,10 @@ impl Incoming {
             let Some(expected) = self.expected() else {
                 bytes = fill(&mut self.length, 4, bytes);
                 if let Some(length) = self.expected()
-                    && length > MAX_MESSAGE
+                    && length > self.most
                 {
-                    return Err(BrokenStream(u32::try_from(length).unwrap_or(u32::MAX)));
+                    let (announced, most) = (length, self.most);
+                    return Err(BrokenStream::Message { announced, most });
                 }
                 continue;
             };
@@ -224,6 +254,7 @@ fn fill<'a>(target: &mut Vec<u8>, wanted: usize, bytes: &'a [u8]) -> &'a [u8] {
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
+    use qcbus_messages::codec::MAX_FROM_PEER;
 
     use super::*;
 
@@ -267,7 +298,7 @@ mod tests {
             fates in prop::collection::vec(fate(), 1..200),
         ) {
             let mut now = Instant::now();
-            let (mut out, mut incoming) = (Outgoing::new(now), Incoming::default());
+            let (mut out, mut incoming) = (Outgoing::new(now), Incoming::new(MAX_MESSAGE));
             let mut got = Vec::new();
             let mut fates = fates.into_iter().cycle();
             let mut to_send = messages.iter();
@@ -305,7 +336,7 @@ mod tests {
         fn arbitrary_frames_never_panic(
             frames in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..64), 0..32),
         ) {
-            let mut incoming = Incoming::default();
+            let mut incoming = Incoming::new(MAX_MESSAGE);
             for (seq, frame) in (1..).zip(&frames) {
                 if incoming.accept(seq, frame, |_| {}).is_err() {
                     break;
@@ -364,17 +395,32 @@ mod tests {
 
     #[test]
     fn a_hostile_length_reserves_nothing_and_ends_the_stream() {
-        let mut incoming = Incoming::default();
+        let mut incoming = Incoming::new(MAX_MESSAGE);
         let huge = u32::try_from(MAX_MESSAGE).unwrap();
         incoming.accept(1, &huge.to_le_bytes(), |_| {}).unwrap();
         assert!(incoming.body.capacity() == 0);
         incoming.accept(2, &[0; 100], |_| {}).unwrap();
         assert!(incoming.body.capacity() < 1_000);
-        let mut incoming = Incoming::default();
+        let mut incoming = Incoming::new(MAX_MESSAGE);
         let too_long = (huge + 1).to_le_bytes();
-        assert_eq!(
-            incoming.accept(1, &too_long, |_| {}),
-            Err(BrokenStream(huge + 1))
+        let broken = BrokenStream::Message {
+            announced: MAX_MESSAGE + 1,
+            most: MAX_MESSAGE,
+        };
+        assert_eq!(incoming.accept(1, &too_long, |_| {}), Err(broken));
+    }
+
+    #[test]
+    fn a_peer_may_announce_less_than_a_broker_may() {
+        let largest = u32::try_from(MAX_FROM_PEER).unwrap();
+        let mut incoming = Incoming::new(MAX_FROM_PEER);
+        assert_eq!(incoming.accept(1, &largest.to_le_bytes(), |_| {}), Ok(()));
+        let mut incoming = Incoming::new(MAX_FROM_PEER);
+        let said = incoming.accept(1, &(largest + 1).to_le_bytes(), |_| {});
+        let text = said.unwrap_err().to_string();
+        assert!(
+            text.contains("4194305") && text.contains("4194304"),
+            "{text}"
         );
     }
 }

@@ -123,6 +123,9 @@ pub struct LimitArgs {
     /// A bundle that must judge and is not there is waited for this long, then files are undetermined
     #[arg(long, value_name = "TIME", value_parser = duration, hide_short_help = true)]
     pub absence_limit: Option<Duration>,
+    /// A file without room in shared memory is waited for this long while nothing moves
+    #[arg(long, value_name = "TIME", value_parser = duration, hide_short_help = true)]
+    pub room_limit: Option<Duration>,
     /// Most private memory of a bundle, in MiB
     #[arg(long, value_name = "MIB", hide_short_help = true)]
     pub memory_limit: Option<u64>,

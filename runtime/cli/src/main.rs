@@ -25,5 +25,5 @@ fn main() -> ExitCode {
             return exit.into();
         }
     };
-    commands::run(args).into()
+    talk::exit(commands::run(args)).into()
 }

@@ -1,6 +1,6 @@
 //! The ring that a bundle draws around itself once it has joined.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use qcbus_formats::manifest::May;
 
@@ -29,9 +29,9 @@ const HARMLESS: &[&str] = &[
 
 /// What a bundle needs besides what its manifest declares.
 #[derive(Debug, Default)]
-pub struct Fenced<'a> {
-    /// Directory of the instance: there it sees that its broker is still the one that it has joined.
-    pub instance: Option<&'a Path>,
+pub struct Fenced {
+    /// The directory of shared memory of the generation that it has joined. Of others it sees nothing.
+    pub memory: Option<PathBuf>,
     /// Files and directories that it reads.
     pub reads: Vec<PathBuf>,
     /// What its manifest declares.
@@ -46,23 +46,22 @@ pub struct Fenced<'a> {
 ///
 /// # Errors
 /// [`SandboxError::Kernel`]: the process is not confined, or not wholly.
-pub fn confine(fenced: &Fenced<'_>) -> Result<(), SandboxError> {
+pub fn confine(fenced: &Fenced) -> Result<(), SandboxError> {
     if threads() != Some(1) {
         let why = "threads run already that would stay outside";
         return Err(SandboxError::kernel("a single thread is needed", why));
     }
     let may = &fenced.may;
+    let mut rules = Rules::new(may.network)?.allow("/dev/null", everything())?;
     // Images are published in segments that come later, under names that nobody knows before.
-    let mut rules = Rules::new(may.network)?.allow("/dev/shm", files())?;
-    rules = rules.allow("/dev/null", everything())?;
+    if let Some(memory) = &fenced.memory {
+        rules = rules.allow(memory, files())?;
+    }
     for path in HARMLESS {
         rules = rules.allow(path, trees())?;
     }
     if let Ok(program) = std::env::current_exe() {
         rules = rules.allow(program, files())?;
-    }
-    if let Some(instance) = fenced.instance {
-        rules = rules.allow(instance, files())?;
     }
     for path in fenced.reads.iter().chain(&may.read) {
         rules = rules.allow(path, trees())?;

@@ -2,7 +2,6 @@
 
 use std::os::fd::{AsRawFd, OwnedFd};
 use std::os::unix::process::CommandExt as _;
-use std::path::Path;
 use std::process::Command;
 
 use qcbus_formats::manifest::May;
@@ -24,20 +23,14 @@ const WRITTEN: &[&str] = &[
 pub struct Outer(OwnedFd);
 
 impl Outer {
-    /// The ring for a bundle of the instance in this directory. `None`: this kernel has no Landlock.
+    /// The ring for a bundle. `None`: this kernel has no Landlock.
     ///
     /// # Errors
     /// [`SandboxError::Kernel`].
-    pub fn new(instance: &Path, may: &May) -> Result<Option<Outer>, SandboxError> {
+    pub fn new(may: &May) -> Result<Option<Outer>, SandboxError> {
         let mut rules = Rules::new(may.network)?.allow("/", reading())?;
         for path in WRITTEN {
             rules = rules.allow(path, everything())?;
-        }
-        // Where a generation's files are not in shared memory. Not the directory itself: what says which broker is
-        // the one to join lies there.
-        let generations = std::fs::read_dir(instance).into_iter().flatten().flatten();
-        for generation in generations.filter(|it| it.path().is_dir()) {
-            rules = rules.allow(generation.path(), everything())?;
         }
         for path in &may.write {
             rules = rules.allow(path, everything())?;

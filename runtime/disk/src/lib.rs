@@ -1,14 +1,24 @@
 //! Writing files so that nobody ever sees half of one: results, reports, manifests, and what a bundle
 //! that is run by itself writes. The broker sweeps what writers that were killed have left.
+//!
+//! Reading files that others may write, without being held up by them: [`foreign`]. And whether what lies
+//! somewhere may be believed: [`trust`].
 
-use std::fs::{File, Metadata};
+pub mod foreign;
+pub mod trust;
+
+use std::collections::HashSet;
+use std::fs::{DirEntry, File, Metadata};
 use std::io::{self, Write};
-use std::os::unix::fs::MetadataExt;
-use std::path::Path;
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+use std::sync::{LazyLock, Mutex, PoisonError};
 
+use rustix::fs::{FlockOperation, flock};
 use tempfile::{NamedTempFile, TempPath};
 
-/// Temporary names begin with this and the id of the process that writes.
+/// Temporary names begin with this, the id of the process that writes, and when it was started. As long
+/// as it writes, it has a lock on the file: the id says nothing to whoever is in another container.
 const PREFIX: &str = ".qcbus-";
 /// And end like this.
 const SUFFIX: &str = ".tmp";
@@ -129,17 +139,56 @@ fn write_aside(path: &Path, content: &[u8]) -> io::Result<NamedTempFile> {
         Some(directory) if !directory.as_os_str().is_empty() => directory,
         _ => Path::new("."),
     };
-    std::fs::create_dir_all(directory)?;
+    make_directory(directory)?;
+    sweep_once(directory);
     // For whoever the umask lets read it, unlike most temporary files.
     let readable = std::os::unix::fs::PermissionsExt::from_mode(0o666);
     let mut file = tempfile::Builder::new()
-        .prefix(&format!("{PREFIX}{}-", std::process::id()))
+        .prefix(OWN_PREFIX.as_str())
         .suffix(SUFFIX)
         .permissions(readable)
         .tempfile_in(directory)
         .map_err(without_path)?;
+    // Some file systems have no locks; there the name has to do.
+    let _ = flock(file.as_file(), FlockOperation::NonBlockingLockExclusive);
     file.as_file_mut().write_all(content)?;
     Ok(file)
+}
+
+/// Makes a directory with those above it, unless it is there.
+fn make_directory(directory: &Path) -> io::Result<()> {
+    match std::fs::create_dir_all(directory) {
+        // It is there already, and std could not tell whether it is a directory: what kept it from
+        // looking may pass, so that is the error, and not that something is in the way.
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+            let is_directory = std::fs::metadata(directory)?.is_dir();
+            if is_directory { Ok(()) } else { Err(error) }
+        }
+        made => made,
+    }
+}
+
+static OWN_PREFIX: LazyLock<String> = LazyLock::new(|| {
+    let pid = std::process::id();
+    let started = start_time(pid).unwrap_or(0);
+    format!("{PREFIX}{pid}.{started}-")
+});
+
+/// Directories that this process has swept.
+static SWEPT: Mutex<Option<HashSet<PathBuf>>> = Mutex::new(None);
+
+/// Before a process first writes into a directory, it removes what others have left there that were
+/// killed.
+fn sweep_once(directory: &Path) {
+    let mut swept = SWEPT.lock().unwrap_or_else(PoisonError::into_inner);
+    let swept = swept.get_or_insert_default();
+    if swept.contains(directory) {
+        return;
+    }
+    swept.insert(directory.to_path_buf());
+    for entry in std::fs::read_dir(directory).into_iter().flatten().flatten() {
+        sweep_entry(&entry, &|writer| !writer.is_own() && writer.is_dead());
+    }
 }
 
 /// The error alone: the temporary name in it says nothing to anybody, and differs every time.
@@ -179,42 +228,89 @@ pub fn is_for_good(error: &io::Error) -> bool {
 /// Removes what processes that were killed left half-written below a directory. To be called
 /// before this process writes: it may have been given the id of a dead one.
 pub fn sweep(directory: &Path) {
-    sweep_where(directory, &|pid| pid == std::process::id() || is_dead(pid));
+    sweep_where(directory, &|writer| writer.is_own() || writer.is_dead());
 }
 
 /// As [`sweep`], while this process may be writing.
 pub fn sweep_dead(directory: &Path) {
-    sweep_where(directory, &|pid| pid != std::process::id() && is_dead(pid));
+    sweep_where(directory, &|writer| !writer.is_own() && writer.is_dead());
 }
 
-fn sweep_where(directory: &Path, is_over: &dyn Fn(u32) -> bool) {
+fn sweep_where(directory: &Path, is_over: &dyn Fn(Writer) -> bool) {
     // A directory that is not there yet, or cannot be read, has nothing to sweep.
     let Ok(entries) = std::fs::read_dir(directory) else {
         return;
     };
     for entry in entries.flatten() {
-        let name = entry.file_name();
-        let writer = writer_of(&name.to_string_lossy());
         match entry.file_type() {
             Ok(kind) if kind.is_dir() => sweep_where(&entry.path(), is_over),
-            Ok(kind) if kind.is_file() && writer.is_some_and(is_over) => {
-                if let Err(error) = remove(&entry.path()) {
-                    tracing::warn!("cannot remove {}: {error}", entry.path().display());
-                }
-            }
-            _ => {}
+            _ => sweep_entry(&entry, is_over),
         }
     }
 }
 
-fn writer_of(name: &str) -> Option<u32> {
-    let rest = name.strip_prefix(PREFIX)?.strip_suffix(SUFFIX)?;
-    rest.split_once('-')?.0.parse().ok()
+fn sweep_entry(entry: &DirEntry, is_over: &dyn Fn(Writer) -> bool) {
+    let Some(writer) = Writer::of(&entry.file_name().to_string_lossy()) else {
+        return;
+    };
+    let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+    let path = entry.path();
+    if !is_file || !is_over(writer) || is_locked(&path) {
+        return;
+    }
+    if let Err(error) = remove(&path) {
+        tracing::warn!("cannot remove {}: {error}", path.display());
+    }
 }
 
-/// Whether a process cannot be writing any more.
-fn is_dead(pid: u32) -> bool {
-    !Path::new("/proc").join(pid.to_string()).exists()
+/// Who writes a file, by its temporary name.
+#[derive(Debug, Clone, Copy)]
+struct Writer {
+    pid: u32,
+    /// When the process was started, in clock ticks since the machine was.
+    started: u64,
+}
+
+impl Writer {
+    fn of(name: &str) -> Option<Writer> {
+        let rest = name.strip_prefix(PREFIX)?.strip_suffix(SUFFIX)?;
+        let (pid, started) = rest.split_once('-')?.0.split_once('.')?;
+        Some(Writer {
+            pid: pid.parse().ok()?,
+            started: started.parse().ok()?,
+        })
+    }
+
+    fn is_own(self) -> bool {
+        self.pid == std::process::id()
+    }
+
+    /// Whether it cannot be writing any more: its id is free, or another's by now.
+    fn is_dead(self) -> bool {
+        match start_time(self.pid) {
+            Some(started) => started != self.started,
+            None => !Path::new("/proc").join(self.pid.to_string()).exists(),
+        }
+    }
+}
+
+/// Whether somebody writes to the file, perhaps in another container.
+fn is_locked(path: &Path) -> bool {
+    let mut how = File::options();
+    let how = how
+        .read(true)
+        .custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK);
+    how.open(path).is_ok_and(|file| {
+        flock(&file, FlockOperation::NonBlockingLockShared) == Err(rustix::io::Errno::WOULDBLOCK)
+    })
+}
+
+/// When a process was started (proc(5): the 22nd field; the second is a name in parentheses that may
+/// contain anything).
+fn start_time(pid: u32) -> Option<u64> {
+    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
+    let (_, rest) = stat.rsplit_once(')')?;
+    rest.split_whitespace().nth(19)?.parse().ok()
 }
 
 #[cfg(test)]
@@ -251,15 +347,37 @@ mod tests {
         let below = dir.path().join("maps");
         std::fs::create_dir(&below).unwrap();
         let parent = rustix::process::getppid().unwrap().as_raw_nonzero();
-        let dead = below.join(".qcbus-4194999-a1b2c3.tmp");
-        let living = below.join(format!(".qcbus-{parent}-a1b2c3.tmp"));
+        let parent = u32::try_from(parent.get()).unwrap();
+        let started = start_time(parent).unwrap();
+        let dead = below.join(".qcbus-4194999.1-a1b2c3.tmp");
+        let former = below.join(format!(".qcbus-{parent}.1-a1b2c3.tmp"));
+        let living = below.join(format!(".qcbus-{parent}.{started}-a1b2c3.tmp"));
+        // As that of a process in another container is.
+        let locked = below.join(".qcbus-4194999.1-d4e5f6.tmp");
         let result = below.join("a.xodr.xqar");
-        for path in [&dead, &living, &result] {
+        for path in [&dead, &former, &living, &locked, &result] {
             std::fs::write(path, "half").unwrap();
         }
+        let writer = File::open(&locked).unwrap();
+        flock(&writer, FlockOperation::NonBlockingLockExclusive).unwrap();
         sweep(dir.path());
+        assert!(!dead.exists() && !former.exists());
+        assert!(living.exists() && locked.exists() && result.exists());
+        drop(writer);
+        sweep_dead(dir.path());
+        assert!(!locked.exists());
+    }
+
+    #[test]
+    fn who_writes_first_into_a_directory_removes_what_the_dead_left_there() {
+        let dir = tempfile::tempdir().unwrap();
+        let dead = dir.path().join(".qcbus-4194999.1-a1b2c3.tmp");
+        std::fs::write(&dead, "half").unwrap();
+        let ahead = write_ahead(&dir.path().join("later"), b"whole", false).unwrap();
         assert!(!dead.exists());
-        assert!(living.exists() && result.exists());
+        write_whole(&dir.path().join("a"), b"whole", false).unwrap();
+        sweep_dead(dir.path());
+        assert!(ahead.exists(), "it is this process', and not renamed yet");
     }
 
     #[test]

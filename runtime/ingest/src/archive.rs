@@ -4,6 +4,7 @@ use std::collections::HashSet;
 use std::io::{Cursor, Read};
 use std::sync::Arc;
 
+use qcbus_messages::shown;
 use zip::ZipArchive;
 use zip::result::ZipError;
 
@@ -172,7 +173,10 @@ fn check_directory(
             let entry = archive.by_index_raw(index).ok()?;
             let name = entry.name().ok()?.into_owned();
             match entry.is_symlink() {
-                true => Some(format!("the member `{}` is a symbolic link", shown(&name))),
+                true => Some(format!(
+                    "the member `{}` is a symbolic link",
+                    shown::line(&name)
+                )),
                 false => (!stays_inside(&name)).then(|| refused(&name)),
             }
         })
@@ -187,7 +191,7 @@ fn check_directory(
 
 /// What is wrong with the name of a member.
 fn refused(name: &str) -> String {
-    let name_shown = shown(name);
+    let name_shown = shown::line(name);
     match has_only_backslashes(name) {
         true => {
             format!(
@@ -196,15 +200,6 @@ fn refused(name: &str) -> String {
         }
         false => format!("the member `{name_shown}` leads out of the archive"),
     }
-}
-
-/// A name as people read it: control characters cannot be shown as they are.
-fn shown(name: &str) -> String {
-    let shown = |c: char| match c.is_control() {
-        true => c.escape_default().to_string(),
-        false => c.to_string(),
-    };
-    name.chars().map(shown).collect()
 }
 
 /// Most members that are named for one fault of an archive.

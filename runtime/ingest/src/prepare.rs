@@ -5,6 +5,7 @@ use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Component, Path, PathBuf};
 
+use qcbus_disk::foreign;
 use qcbus_document::{FaultCode, FileKind, Suffix};
 use qcbus_messages::path_text::end_of_archive;
 
@@ -340,7 +341,7 @@ impl Includes<'_> {
         if !is_map {
             return splices;
         }
-        if let Ok(root) = self.texts[0].path.canonicalize() {
+        if let Ok(root) = foreign::canonicalize(&self.texts[0].path) {
             self.known.insert(root, 0);
         }
         let mut number = 0;
@@ -382,7 +383,7 @@ impl Includes<'_> {
             .unwrap_or(Path::new(""))
             .to_path_buf();
         let path = normal(&folder.join(written));
-        let path = if !path.exists() && written.contains('\\') {
+        let path = if !is_there(&path) && written.contains('\\') {
             normal(&folder.join(written.replace('\\', "/")))
         } else {
             path
@@ -399,10 +400,10 @@ impl Includes<'_> {
     }
 
     fn load(&mut self, path: PathBuf, boundary: &Path, written: &str) -> Result<usize, Refusal> {
-        let canonical = path.canonicalize().unwrap_or_else(|_| path.clone());
-        if let Ok(boundary) = boundary.canonicalize() {
+        let canonical = foreign::canonicalize(&path).unwrap_or_else(|_| path.clone());
+        if let Ok(boundary) = foreign::canonicalize(boundary) {
             // A symbolic link inside may still lead out.
-            if path.exists() {
+            if is_there(&path) {
                 inside(&canonical, &boundary, written)?;
             }
         }
@@ -431,6 +432,10 @@ impl Includes<'_> {
             }
         }
     }
+}
+
+fn is_there(path: &Path) -> bool {
+    foreign::metadata(path).is_ok()
 }
 
 fn inside(path: &Path, boundary: &Path, written: &str) -> Result<(), Refusal> {

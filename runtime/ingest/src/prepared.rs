@@ -100,12 +100,12 @@ impl Prepared {
     /// file is, there is an image; its faults say what it lacks.
     ///
     /// # Errors
-    /// [`BuildError::SmallBuffer`] when `out` is too short. That can happen with a buffer of
-    /// [`Prepared::upper_bound`] bytes too, when a text holds uncommonly many values that have to
-    /// be resolved; the error's `needed` is exact then and enough for the next attempt.
+    /// [`BuildError::SmallBuffer`] when `out` is too short; the error's `needed` is exact then and
+    /// enough for the next attempt. It may be less than [`Prepared::upper_bound`], and it may be
+    /// more, when a text holds uncommonly many values that have to be resolved.
     pub fn build_into(&self, out: &mut [u8]) -> Result<usize, BuildError> {
         match self.attempt(out, &self.capacities) {
-            Err(BuildError::NoRoom { .. }) => match self.exact() {
+            Err(BuildError::NoRoom { .. } | BuildError::SmallBuffer { .. }) => match self.exact() {
                 Ok(exact) => self.attempt(out, &exact),
                 Err(_) => self.attempt_refused(out),
             },

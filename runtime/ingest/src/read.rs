@@ -1,9 +1,10 @@
 //! Bytes from disk, and a stamp that says which bytes they were.
 
-use std::fs::{self, File, Metadata};
-use std::io::{self, Read};
+use std::fs::{File, Metadata};
+use std::io;
 use std::path::{Path, PathBuf};
 
+use qcbus_disk::foreign::{self, Refused};
 use sha2::{Digest, Sha256};
 
 use crate::error::IngestError;
@@ -42,7 +43,6 @@ pub struct Stat {
     pub changed_ns: i128,
 }
 
-#[cfg(unix)]
 impl Stat {
     /// What the metadata says.
     pub fn of(metadata: &Metadata) -> Stat {
@@ -53,26 +53,6 @@ impl Stat {
             inode: metadata.ino(),
             modified_ns: nanoseconds(metadata.mtime(), metadata.mtime_nsec()),
             changed_ns: nanoseconds(metadata.ctime(), metadata.ctime_nsec()),
-        }
-    }
-}
-
-#[cfg(not(unix))]
-impl Stat {
-    /// What the metadata says, where there are neither inodes nor times of change.
-    pub fn of(metadata: &Metadata) -> Stat {
-        use std::time::UNIX_EPOCH;
-        let modified_ns = metadata.modified().map_or(0, |time| {
-            let since = |time: Result<std::time::Duration, _>| {
-                time.map(|it| i128::try_from(it.as_nanos()).unwrap_or(i128::MAX))
-            };
-            since(time.duration_since(UNIX_EPOCH))
-                .unwrap_or_else(|_| since(UNIX_EPOCH.duration_since(time)).map_or(0, |it| -it))
-        });
-        Stat {
-            inode: 0,
-            modified_ns,
-            changed_ns: 0,
         }
     }
 }
@@ -93,7 +73,7 @@ pub(crate) fn read_file(path: &Path, limits: &Limits) -> Result<RawFile, IngestE
     let mut outcome = "changed";
     for _ in 0..ATTEMPTS {
         match read_once(&path, limits, |file, bytes, cap| {
-            file.take(cap).read_to_end(bytes)
+            foreign::read_on(&path, file, cap, bytes)
         })? {
             Attempt::Stable(raw) => return Ok(raw),
             Attempt::Changed => outcome = "changed",
@@ -134,14 +114,10 @@ enum Attempt {
 fn read_once(
     path: &Path,
     limits: &Limits,
-    fill: impl FnOnce(&mut File, &mut Vec<u8>, u64) -> io::Result<usize>,
+    fill: impl FnOnce(&mut File, &mut Vec<u8>, u64) -> io::Result<()>,
 ) -> Result<Attempt, IngestError> {
     let fail = |source| unreadable(path, source);
-    // Looked at before it is opened: opening a named pipe would wait for its writer.
-    regular(path, &fs::metadata(path).map_err(fail)?)?;
-    let mut file = File::open(path).map_err(fail)?;
-    let before = file.metadata().map_err(fail)?;
-    regular(path, &before)?;
+    let (mut file, before) = foreign::open(path).map_err(|it| refused(path, it))?;
     let too_large = |exceeded| IngestError::TooLarge {
         path: path.to_path_buf(),
         exceeded,
@@ -157,7 +133,7 @@ fn read_once(
         limits.max_file,
     )
     .map_err(too_large)?;
-    let after = match fs::metadata(path) {
+    let after = match foreign::metadata(path) {
         Ok(after) => after,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Attempt::Removed),
         Err(error) => return Err(fail(error)),
@@ -177,16 +153,16 @@ fn read_once(
     Ok(Attempt::Stable(RawFile { bytes, stamp }))
 }
 
-fn regular(path: &Path, metadata: &Metadata) -> Result<(), IngestError> {
-    let what = match metadata.file_type() {
-        kind if kind.is_file() => return Ok(()),
-        kind if kind.is_dir() => crate::error::DIRECTORY,
-        _ => "a device, pipe or socket",
+fn refused(path: &Path, refused: Refused) -> IngestError {
+    let what = match refused {
+        Refused::Directory => crate::error::DIRECTORY,
+        Refused::Special(what) => what,
+        Refused::System(source) => return unreadable(path, source),
     };
-    Err(IngestError::NotAFile {
+    IngestError::NotAFile {
         path: path.to_path_buf(),
         what,
-    })
+    }
 }
 
 fn unreadable(path: &Path, source: io::Error) -> IngestError {
@@ -197,27 +173,22 @@ fn unreadable(path: &Path, source: io::Error) -> IngestError {
     }
 }
 
-#[cfg(unix)]
 fn same_file(before: &Metadata, after: &Metadata) -> bool {
     use std::os::unix::fs::MetadataExt;
     let key = |m: &Metadata| (m.dev(), m.size());
     key(before) == key(after) && Stat::of(before) == Stat::of(after)
 }
 
-#[cfg(not(unix))]
-fn same_file(before: &Metadata, after: &Metadata) -> bool {
-    before.len() == after.len() && Stat::of(before) == Stat::of(after)
-}
-
 #[cfg(test)]
 mod tests {
+    use std::fs;
     use std::io::Write;
 
     use super::*;
 
     fn read_while(path: &Path, meanwhile: impl FnOnce(&Path)) -> Result<Attempt, IngestError> {
         read_once(path, &Limits::default(), |file, bytes, cap| {
-            let read = file.take(cap).read_to_end(bytes);
+            let read = foreign::read_on(path, file, cap, bytes);
             meanwhile(path);
             read
         })

@@ -1,9 +1,11 @@
 //! What other files a scenario refers to: its map, its catalogs, the scenarios it is built from.
 
 use std::collections::HashMap;
+use std::fs::DirEntry;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use qcbus_disk::foreign;
 use qcbus_document::{Document, Node};
 use qcbus_messages::path_text::from_text;
 use qcbus_messages::{Absence, DocumentRole};
@@ -216,18 +218,19 @@ fn places(from: &Path, text: &str) -> Vec<PathBuf> {
 
 /// The `.xosc` files of a folder by name, and what is said of those that are too many.
 fn catalogs(folder: &Path) -> Result<(Vec<PathBuf>, Option<Absence>), Absence> {
-    if folder.is_file() {
+    if foreign::metadata(folder).is_ok_and(|data| data.is_file()) {
         // Some tools write the catalog's own path.
         return Ok((vec![folder.to_path_buf()], None));
     }
-    let entries = std::fs::read_dir(folder).map_err(|error| unlisted(folder, &error))?;
+    let entries = foreign::list(folder).map_err(|error| unlisted(folder, &error))?;
     let mut catalogs: Vec<PathBuf> = entries
-        .filter_map(|entry| Some(entry.ok()?.path()))
+        .iter()
+        .map(DirEntry::path)
         .filter(|path| {
             path.extension()
                 .is_some_and(|ext| ext.eq_ignore_ascii_case("xosc"))
         })
-        .filter(|path| !path.is_dir())
+        .filter(|path| !foreign::metadata(path).is_ok_and(|data| data.is_dir()))
         .collect();
     catalogs.sort();
     let left_out = (catalogs.len() > MAX_CATALOGS).then_some(Absence::TooMany {
@@ -240,7 +243,7 @@ fn catalogs(folder: &Path) -> Result<(Vec<PathBuf>, Option<Absence>), Absence> {
 fn unlisted(folder: &Path, error: &io::Error) -> Absence {
     match error.kind() {
         io::ErrorKind::NotFound => Absence::NotThere,
-        io::ErrorKind::NotADirectory if folder.exists() => Absence::NotAFile,
+        io::ErrorKind::NotADirectory if foreign::metadata(folder).is_ok() => Absence::NotAFile,
         io::ErrorKind::NotADirectory => Absence::NotThere,
         _ => Absence::Unreadable {
             why: error.to_string(),

@@ -1,10 +1,11 @@
 //! What all animals have in common: joining the bus, hearing, and how a job is properly answered.
 
 use std::collections::VecDeque;
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use qcbus_bus::{Instance, JoinError, Peer, PeerEvent, PeerOptions};
+use qcbus_bus::{Claims, Instance, JoinError, Peer, PeerEvent, PeerOptions};
 use qcbus_confine::{After, Fenced, Orders};
 use qcbus_document::FileKind;
 use qcbus_formats::manifest::May;
@@ -24,8 +25,8 @@ pub struct Animal {
     pub name: &'static str,
     /// Bundle or reporter.
     pub role: Role,
-    /// The version of the messages that it claims to speak.
-    pub protocol: u32,
+    /// What it claims: the version of the messages that it speaks, who it is.
+    pub claims: Claims,
     /// How it behaves.
     pub manners: Manners,
 }
@@ -52,11 +53,17 @@ pub enum Mood {
     Die,
 }
 
+/// What is true.
+pub const HONEST: Claims = Claims {
+    protocol: PROTOCOL_VERSION,
+    proves: true,
+};
+
 /// An animal with good manners, to begin with.
 pub const GOOD: Animal = Animal {
     name: "",
     role: Role::Bundle,
-    protocol: PROTOCOL_VERSION,
+    claims: HONEST,
     manners: Manners {
         welcomed: introduce,
         job: check,
@@ -105,7 +112,8 @@ pub fn checker_done(peer: &mut Peer, job: JobId, checker: u32) {
 /// Checkers of every animal.
 pub const CHECKERS: u32 = 2;
 
-fn catalogue() -> Catalogue {
+/// What it checks.
+pub fn catalogue() -> Catalogue {
     let checker = |number: u32| CheckerInfo {
         id: format!("check_zoo_{number}"),
         description: "looks at nothing".to_owned(),
@@ -205,7 +213,7 @@ async fn live(animal: &'static Animal, args: &Args, hello: Hello, stand: &Stand<
         patience: [usual.patience, usual.grace][usize::from(stand.number > 0)],
         ..usual
     };
-    let joined = Peer::join_claiming(animal.protocol, stand.instance, hello, options);
+    let joined = Peer::join_claiming(animal.claims, stand.instance, hello, options);
     let peer = match joined.await {
         Ok(peer) => peer,
         Err(error @ JoinError::NoBroker { .. }) => return ended(&error.to_string(), 4),
@@ -213,7 +221,7 @@ async fn live(animal: &'static Animal, args: &Args, hello: Hello, stand: &Stand<
     };
     if let Some(may) = stand.may {
         let fenced = Fenced {
-            instance: Some(stand.instance.dir()),
+            memory: peer.memory().map(Path::to_path_buf),
             may: may.clone(),
             reads: Vec::new(),
         };

@@ -17,6 +17,7 @@ use qcbus_messages::{
 use tokio::sync::mpsc;
 
 use super::Exit;
+use super::batches::batches;
 use super::file::complain;
 use super::module::configured;
 use super::stand::{Ended, Fence, Stand, sandboxed};
@@ -61,8 +62,6 @@ const CAPACITY: u16 = 8;
 const HEARTBEAT: Duration = Duration::from_secs(1);
 /// How long a broker may take to tell its configuration after the welcome.
 const CONFIGURED_WITHIN: Duration = Duration::from_secs(2);
-/// Issues per message: large enough to be cheap, small enough to interleave with other traffic.
-const BATCH: usize = 64;
 
 pub(super) fn run(bundle: &'static Bundle, options: BusOptions, given: Option<UserFiles>) -> Exit {
     if options.die_with_parent && !follow_parent() {
@@ -168,7 +167,7 @@ async fn serve(
     };
     // Before the first thread is started: threads that there are already would stay outside.
     let heard = until_configured(&mut peer).await;
-    let fence = stand.confine(|| files_of(bundle, given.as_ref(), &peer));
+    let fence = stand.confine(peer.memory(), || files_of(bundle, given.as_ref(), &peer));
     let (sender, mut progress) = mpsc::unbounded_channel();
     let works = match worker::start(KeptModels::default(), sender) {
         Ok(works) => works,
@@ -521,9 +520,7 @@ impl Daemon {
     }
 
     fn send_outcome(&mut self, job: JobId, checker: u32, issues: Vec<Issue>, outcome: Outcome) {
-        let mut rest = issues.into_iter().peekable();
-        while rest.peek().is_some() {
-            let issues = rest.by_ref().take(BATCH).collect();
+        for issues in batches(issues) {
             self.peer.send(&FromPeer::Issues {
                 job,
                 checker,

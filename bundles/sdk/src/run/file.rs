@@ -10,6 +10,8 @@ use qcbus_formats::pool::{
 };
 use qcbus_formats::verdict::Verdict;
 use qcbus_formats::xqar::{Checker, CheckerBundle, Issue, Level, Location};
+use qcbus_messages::path_text::to_text;
+use qcbus_messages::shown;
 
 use super::{Exit, Timings};
 use crate::pages::level_name;
@@ -55,7 +57,7 @@ pub(super) fn run(
         complain(&format!(
             "{} does not check {}\n",
             bundle.name,
-            path.display()
+            to_text(path)
         ));
         return Exit::Usage;
     }
@@ -74,11 +76,17 @@ pub(super) fn run(
     if timings {
         complain(&took.to_string());
     }
-    print(&match format {
+    let printed = print(&match format {
         Format::Text => as_text(path, &pooled),
         Format::Json => as_json(path, bundle, &pooled, &reasons),
     });
-    pooled.verdict().into()
+    match printed {
+        Ok(()) => pooled.verdict().into(),
+        Err(error) => {
+            complain(&format!("cannot write to stdout: {error}\n"));
+            Exit::Internal
+        }
+    }
 }
 
 /// What a plan finds in a loaded file, a line each as `bundle run` prints them, from a level on, and the
@@ -118,7 +126,7 @@ fn judge(plan: &Plan, loaded: &Loaded) -> Result<Judged, crate::LoadError> {
         .collect();
     let bundles = vec![outcome];
     let input = PoolInput {
-        input_file: &loaded.path().display().to_string(),
+        input_file: &to_text(loaded.path()),
         config: None,
         remarks: loaded.remarks(&bundles)?,
         bundles,
@@ -226,12 +234,12 @@ fn as_text(path: &Path, pooled: &Pooled) -> String {
             .unwrap_or_default();
         let level = level_name(issue.level);
         let text = format!(
-            "{}:{row}:{column}: {level}: {}{place} [{}]\n",
-            path.display(),
+            "{}:{row}:{column}: {level}: {}{place} [{}]",
+            to_text(path),
             issue.description,
             issue.rule_uid
         );
-        lines.push((row, column, text));
+        lines.push((row, column, format!("{}\n", shown::line(&text))));
     }
     lines.sort();
     let open = pooled.open().map(|it| {
@@ -239,8 +247,9 @@ fn as_text(path: &Path, pooled: &Pooled) -> String {
             Ending::Failed { .. } => "failed",
             _ => "could not look",
         };
-        let (path, why) = (path.display(), it.ending.reason());
-        format!("{path}: {} {what}: {why}\n", it.checker)
+        let (path, why) = (to_text(path), it.ending.reason());
+        let text = format!("{path}: {} {what}: {why}", it.checker);
+        format!("{}\n", shown::line(&text))
     });
     let lines = lines.into_iter().map(|(_, _, line)| line);
     lines.chain(open).collect()
@@ -265,7 +274,7 @@ fn as_json(
         })
     });
     let whole = serde_json::json!({
-        "file": path.display().to_string(),
+        "file": to_text(path),
         "bundle": bundle.name,
         "version": bundle.version,
         "verdict": pooled.verdict().as_str(),
@@ -291,11 +300,15 @@ fn row_column(issue: &Issue) -> Option<(u64, u64)> {
 }
 
 /// Results go to stdout; a closed pipe is nobody's business.
-pub(super) fn print(text: &str) {
-    let _ = io::stdout().lock().write_all(text.as_bytes());
+pub(super) fn print(text: &str) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        done => done,
+    }
 }
 
 /// What a person must know goes to stderr, also when nobody has set up logging.
 pub(crate) fn complain(text: &str) {
-    let _ = io::stderr().lock().write_all(text.as_bytes());
+    let _ = io::stderr().lock().write_all(shown::lines(text).as_bytes());
 }

@@ -1,6 +1,7 @@
 //! The three ways in which a bundle runs: on the bus, on one file, as a module of ASAM's framework.
 
 mod args;
+mod batches;
 mod bus;
 mod exit;
 mod file;
@@ -82,7 +83,8 @@ pub fn run(bundle: &'static Bundle, mode: Mode) -> Exit {
             module::run(bundle, &config, given)
         }),
         Mode::Help => {
-            file::print(USAGE);
+            // Whoever asked for it sees that it is not there.
+            let _ = file::print(USAGE);
             Exit::Accepted
         }
     }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use qcbus_formats::config::Config;
 use qcbus_formats::pool::{PoolInput, Scope, pool};
 use qcbus_formats::xqar::{self, Dialect};
+use qcbus_messages::path_text::to_text;
 
 use super::Exit;
 use super::file::{complain, examine};
@@ -16,7 +17,7 @@ const RESULT_PARAMS: [&str; 2] = ["strResultFile", "resultFile"];
 /// Why a module run fails; reads well after "failed to ".
 #[derive(Debug, thiserror::Error)]
 enum ModuleError {
-    #[error("read the configuration {}: {source}", path.display())]
+    #[error("read the configuration {}: {source}", to_text(path))]
     Unreadable {
         path: PathBuf,
         source: std::io::Error,
@@ -30,7 +31,7 @@ enum ModuleError {
     NoInput,
     #[error(transparent)]
     Load(#[from] crate::LoadError),
-    #[error("write the result {}: {source}", path.display())]
+    #[error("write the result {}: {source}", to_text(path))]
     Write {
         path: PathBuf,
         source: std::io::Error,

@@ -44,10 +44,14 @@ impl Stand<'_> {
     }
 
     /// Confines this process, which may then read what `reads` gives. `None`: it is not to be confined.
-    pub(super) fn confine(&self, reads: impl FnOnce() -> Vec<PathBuf>) -> Option<Fence> {
+    pub(super) fn confine(
+        &self,
+        memory: Option<&Path>,
+        reads: impl FnOnce() -> Vec<PathBuf>,
+    ) -> Option<Fence> {
         let may = self.may?;
         let fenced = Fenced {
-            instance: Some(self.instance.dir()),
+            memory: memory.map(Path::to_path_buf),
             reads: reads(),
             may: may.clone(),
         };

@@ -143,7 +143,7 @@ fn hint_line(hint: &str) -> String {
     if hint.is_empty() {
         String::new()
     } else {
-        format!("\n  hint: {hint}")
+        format!(" (hint: {hint})")
     }
 }
 

@@ -32,6 +32,9 @@ impl State {
             let text = format!("the configuration demands {name}, which has not joined");
             return (!self.child_is_coming(name)).then_some(text);
         };
+        if let Some(why) = self.is_restless(name, bundle) {
+            return Some(why);
+        }
         let away = self.away_for(bundle)?;
         let note = &bundle.note;
         if let Some(why) = self.child_cannot_start(name) {

@@ -67,12 +67,10 @@ pub enum Action {
         /// What to start.
         spec: ChildSpec,
     },
-    /// Kill a process that does not answer.
+    /// Kill a child that does not answer.
     Kill {
-        /// The child's start, if it is one of ours.
-        launch: Option<Launch>,
-        /// Its process id.
-        pid: u32,
+        /// Which start.
+        launch: Launch,
     },
     /// Kill what former brokers of this instance started and what has not come to this one.
     KillFormer {
@@ -184,9 +182,6 @@ pub enum Action {
 impl Action {
     /// Kill a process that has not joined: there is nothing that it could finish.
     pub(super) fn kill_unjoined(launch: Launch) -> Action {
-        Action::Kill {
-            launch: Some(launch),
-            pid: 0,
-        }
+        Action::Kill { launch }
     }
 }

@@ -1,12 +1,14 @@
 //! Bundles: who is there, what they say, and what happens when one dies.
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
-use qcbus_messages::{Catalogue, FromPeer, Hello, JobId, Role, ToPeer};
+use qcbus_messages::shown::moves;
+use qcbus_messages::{Catalogue, DocId, FromPeer, Hello, JobId, Role, ToPeer};
 
 use super::action::Action;
+use super::announcing::Announced;
 use super::jury::{Mark, Member, Origin};
 use super::leaving::LEAVE_LIMIT;
 use super::notice::Notice;
@@ -22,6 +24,12 @@ pub(super) struct Bundle {
     pub pid: u32,
     pub launch: Option<Launch>,
     pub catalogue: Option<Arc<Catalogue>>,
+    /// What it says that it is, while it is not believed.
+    pub announced: Option<Announced>,
+    /// What was started when it was believed last.
+    pub believed: Option<u64>,
+    /// Documents that it lacked, and when it said so last.
+    pub lacks: BTreeMap<DocId, Duration>,
     /// What brought it onto the roster; `None`: it is not on it, and nobody misses it.
     pub origin: Option<Origin>,
     /// Of the version and the catalogue that it is on the roster with.
@@ -72,6 +80,11 @@ enum Word {
     /// It was never given such a job.
     Lie,
 }
+
+/// Bytes of a peer's version.
+const MOST_OF_A_VERSION: usize = 128;
+/// Bundles on the roster, and reporters that results were given to.
+const MOST_NAMES: usize = 256;
 
 /// Lies about jobs and checkers beyond which a bundle is not believed any more.
 const LIES_FORGIVEN: u32 = 64;
@@ -153,6 +166,13 @@ impl State {
     fn turn_away(&self, hello: &Hello) -> Option<String> {
         let ours = qcbus_messages::PROTOCOL_VERSION;
         let good = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
+        let known = || match hello.role {
+            Role::Bundle => (self.bundles.contains_key(&hello.name), self.bundles.len()),
+            Role::Reporter => (
+                self.reporter_named(&hello.name).is_some(),
+                self.reporters.len(),
+            ),
+        };
         if hello.protocol != ours {
             Some(format!(
                 "{} {} speaks protocol {}, this broker speaks protocol {ours}: use a build of the \
@@ -164,13 +184,33 @@ impl State {
                 "`{}` is no name for a peer: 1 to 64 of A-Z a-z 0-9 . _ -",
                 hello.name
             ))
+        } else if hello.version.len() > MOST_OF_A_VERSION || hello.version.chars().any(moves) {
+            Some(format!(
+                "the version of `{}` has control characters or more than {MOST_OF_A_VERSION} bytes",
+                hello.name
+            ))
+        } else if let (false, MOST_NAMES..) = known() {
+            Some(format!(
+                "there is no room for `{}`: {MOST_NAMES} names are known already; `qcbus bundle \
+                 remove` takes off those that need not judge any more",
+                hello.name
+            ))
         } else {
             self.taken(hello)
         }
     }
 
-    /// A name is taken while another live process bears it, unless the newcomer replaces it.
+    /// A name is taken while another live process bears it, unless the newcomer replaces it. Children
+    /// have theirs whether they run or not: nobody else may judge in their place.
     fn taken(&self, hello: &Hello) -> Option<String> {
+        if hello.launch.is_none() && self.children.contains_key(&hello.name) {
+            return Some(format!(
+                "the broker itself starts `{}`, from a manifest or because it comes with qcbus, and no other \
+                 process may take its place: give this one another name (to run bundles that come with qcbus \
+                 by hand, start the broker with --no-standard-bundles)",
+                hello.name
+            ));
+        }
         let (incarnation, pid) = match hello.role {
             Role::Bundle => {
                 let bundle = self.bundles.get(&hello.name)?;
@@ -186,7 +226,9 @@ impl State {
         let replaces = hello
             .launch
             .is_some_and(|launch| self.is_successor(&hello.name, Launch(launch)));
-        (incarnation != hello.incarnation && pid != hello.pid && !replaces)
+        // A process that cannot be seen from here has no number.
+        let same = incarnation == hello.incarnation || (pid == hello.pid && pid != 0);
+        (!same && !replaces)
             .then(|| format!("`{}` has already joined, as process {pid}", hello.name))
     }
 
@@ -197,7 +239,7 @@ impl State {
             .get(&hello.name)
             .filter(|it| it.session.is_some());
         if let Some(old) = there {
-            let same_process = old.pid == hello.pid;
+            let same_process = old.pid == hello.pid && old.pid != 0;
             self.replace_session(&hello.name, same_process, actions);
         }
         self.child_joined(&hello.name, launch, &hello.version, actions);
@@ -209,6 +251,8 @@ impl State {
         bundle.pid = hello.pid;
         bundle.launch = launch;
         bundle.ready = false;
+        bundle.announced = None;
+        bundle.lacks.clear();
         bundle.capacity = usize::from(hello.capacity).clamp(1, 64);
         bundle.fresh_process = true;
         bundle.proved = false;
@@ -232,13 +276,13 @@ impl State {
         let Some(old) = bundle.session.take() else {
             return;
         };
-        let (launch, pid) = (bundle.launch, bundle.pid);
+        let launch = bundle.launch;
         self.sessions.remove(&old);
         self.take_back(name, false);
         if same_process {
             actions.push(Action::Disconnect { session: old });
         } else {
-            self.retire(old, launch, pid);
+            self.retire(old, launch);
             actions.push(Action::Send {
                 session: old,
                 message: ToPeer::Drain,
@@ -303,24 +347,6 @@ impl State {
         }
     }
 
-    fn catalogue(&mut self, name: &str, catalogue: Catalogue, actions: &mut Actions) {
-        let mut ids = BTreeSet::new();
-        let sound = catalogue.checkers.len() <= 4096
-            && catalogue
-                .checkers
-                .iter()
-                .all(|it| !it.id.is_empty() && ids.insert(it.id.as_str()));
-        if !sound {
-            let why = "its catalogue names a checker twice or not at all";
-            return self.bundle_fails(name, why, actions);
-        }
-        if let Some(bundle) = self.bundles.get_mut(name) {
-            bundle.catalogue = Some(Arc::new(catalogue));
-            bundle.ready = true;
-            self.enrol(name, actions);
-        }
-    }
-
     /// A bundle says that it goes.
     fn bundle_left(&mut self, name: &str, actions: &mut Actions) {
         let Some(bundle) = self.bundles.get_mut(name) else {
@@ -359,12 +385,8 @@ impl State {
         let Some(bundle) = self.bundles.get(name) else {
             return;
         };
-        if let Some(launch) = bundle.launch {
-            actions.push(Action::Kill {
-                launch: Some(launch),
-                pid: bundle.pid,
-            });
-        }
+        let launch = bundle.launch;
+        actions.extend(launch.map(|launch| Action::Kill { launch }));
         let notice = Notice::killed(name, why);
         self.bundle_is_down(name, notice, actions);
     }
@@ -407,6 +429,9 @@ impl State {
         let still = since(bundle.moved);
         if bundle.leaving && bundle.active.is_empty() && still > LEAVE_LIMIT {
             return Some("it was told to go and did not".to_owned());
+        }
+        if bundle.announced.is_some() {
+            return None;
         }
         if !bundle.ready {
             let late = since(bundle.joined) > silence;

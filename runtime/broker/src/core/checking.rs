@@ -1,10 +1,15 @@
 //! Checking: shares of jobs are given out to bundles, and come to their end.
 
+use std::time::Duration;
+
 use qcbus_messages::{DocId, JobId, ToPeer};
 
 use super::action::Action;
 use super::jobs::{ActiveJob, JobStage, ShareState};
 use super::{Actions, State};
+
+/// How soon a bundle may lack the same document again: each time, it is published.
+const LACK_PAUSE: Duration = Duration::from_millis(250);
 
 impl State {
     /// Calls the jury of a job that is read and gives it out.
@@ -77,14 +82,20 @@ impl State {
 
     /// A bundle lacks a document of a job that it has.
     pub(super) fn need_document(&mut self, name: &str, doc: DocId, actions: &mut Actions) {
-        let Some(bundle) = self.bundles.get(name) else {
+        let now = self.now;
+        let Some(bundle) = self.bundles.get_mut(name) else {
             return;
         };
         let has = |id: &&JobId| {
             let prepared = self.jobs.get(id).and_then(|job| job.prepared.as_ref());
             prepared.is_some_and(|it| it.documents.iter().any(|document| document.doc == doc))
         };
-        if let Some(job) = bundle.active.keys().find(has) {
+        let Some(job) = bundle.active.keys().find(has) else {
+            return;
+        };
+        bundle.lacks.retain(|_, then| now < *then + LACK_PAUSE);
+        if let std::collections::btree_map::Entry::Vacant(e) = bundle.lacks.entry(doc) {
+            e.insert(now);
             actions.push(Action::PublishAgain { job: *job, doc });
         }
     }

@@ -164,7 +164,7 @@ impl State {
         } else if child.state != ChildState::Joined {
             let as_wanted = child.spec.version.as_deref().is_none_or(|it| it == version);
             let former = |it: Launch| it < first && it.is_of(&child.spec) && as_wanted;
-            let goes_on = launch.is_none_or(former);
+            let goes_on = launch.is_some_and(former);
             if goes_on {
                 actions.extend(starting.map(|(launch, _)| Action::kill_unjoined(launch)));
             }

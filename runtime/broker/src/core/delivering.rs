@@ -7,6 +7,7 @@ use qcbus_messages::{JobId, PeerReport, Role};
 use super::action::Action;
 use super::files::FileId;
 use super::notice::Notice;
+use super::outcome::clip_text;
 use super::types::{Delivery, Reported, SessionId};
 use super::{Actions, State};
 
@@ -110,7 +111,7 @@ impl State {
         report: PeerReport,
         actions: &mut Actions,
     ) {
-        let now = self.now;
+        let (now, max_text) = (self.now, self.settings.max_text);
         let Some(reporter) = self.reporters.get_mut(index as usize) else {
             return;
         };
@@ -120,7 +121,8 @@ impl State {
         reporter.moved = now;
         reporter.done += 1;
         let name = reporter.name.clone();
-        if let PeerReport::Failed(why) = report {
+        if let PeerReport::Failed(mut why) = report {
+            clip_text(&mut why, max_text);
             reporter.failed += 1;
             reporter.note.clone_from(&why);
             let why = format!("could not report: {why}");
@@ -147,7 +149,7 @@ impl State {
         report: PeerReport,
         actions: &mut Actions,
     ) {
-        let now = self.now;
+        let (now, max_text) = (self.now, self.settings.max_text);
         let Some(reporter) = self.reporters.get_mut(index as usize) else {
             return;
         };
@@ -157,7 +159,8 @@ impl State {
         reporter.moved = now;
         let again = reporter.void.contains(&path);
         let name = reporter.name.clone();
-        if let PeerReport::Failed(why) = report {
+        if let PeerReport::Failed(mut why) = report {
+            clip_text(&mut why, max_text);
             reporter.failed += 1;
             reporter.note.clone_from(&why);
             let why = format!("could not withdraw: {why}");

@@ -78,16 +78,11 @@ impl State {
     /// Kills what a broker started and what does not leave.
     fn kill_ours(&self, actions: &mut Actions) {
         for (role, name) in self.sessions.values() {
-            let process = match role {
-                Role::Bundle => self.bundles.get(name).map(|it| (it.launch, it.pid)),
-                Role::Reporter => self.reporter_named(name).map(|it| (it.launch, it.pid)),
+            let launch = match role {
+                Role::Bundle => self.bundles.get(name).and_then(|it| it.launch),
+                Role::Reporter => self.reporter_named(name).and_then(|it| it.launch),
             };
-            if let Some((Some(launch), pid)) = process {
-                actions.push(Action::Kill {
-                    launch: Some(launch),
-                    pid,
-                });
-            }
+            actions.extend(launch.map(|launch| Action::Kill { launch }));
         }
     }
 

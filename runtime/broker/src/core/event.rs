@@ -122,6 +122,11 @@ pub enum Event {
         /// When to give up.
         timeout: Option<Duration>,
     },
+    /// A client that waited has left without its answer.
+    ClientLeft {
+        /// The client.
+        ticket: Ticket,
+    },
     /// Somebody wants a bundle off the roster that is there by joining.
     RemoveBundle {
         /// The client.

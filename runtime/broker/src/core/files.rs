@@ -57,6 +57,8 @@ pub struct FileEntry {
     pub shut: bool,
     /// Not before then, after something failed for want of room or disk.
     pub not_before: Duration,
+    /// How often in a row something that passes kept it from being read.
+    pub hindered: u32,
     /// Its result says something that is so no more, though nothing that its verdict depends on has
     /// changed: it is checked again even if it is read as before.
     pub anew: bool,
@@ -168,6 +170,7 @@ impl Files {
                 shut: false,
                 anew: false,
                 not_before: Duration::ZERO,
+                hindered: 0,
                 asked: Duration::ZERO,
                 judged: None,
                 depends_on: Vec::new(),

@@ -16,7 +16,7 @@ use super::staging::Staged;
 use super::types::{Input, Judged, PrepareFailure, PreparedJob, Reading};
 use super::{Actions, State};
 
-/// Between two notices that there is no room.
+/// Between two notices that there is no room, or that files cannot be read for now.
 const ROOM_NOTICE_PAUSE: Duration = Duration::from_secs(10);
 
 /// A job in flight.
@@ -199,7 +199,10 @@ impl State {
         }
         self.preparing -= 1;
         match result {
-            Ok(prepared) => self.read(id, &Arc::new(*prepared), actions),
+            Ok(prepared) => {
+                self.stuck_since = None;
+                self.read(id, &Arc::new(*prepared), actions);
+            }
             Err(PrepareFailure::Vanished) => {
                 let file = self.jobs.get(&id).map(|job| job.file);
                 self.end_job(id, actions);
@@ -211,15 +214,63 @@ impl State {
                 // Every file in the queue would say the same and push out all other notices.
                 if self.now >= self.mute_room_until {
                     self.mute_room_until = self.now + ROOM_NOTICE_PAUSE;
-                    self.notice(Notice::NoRoom(why), actions);
+                    self.notice(Notice::NoRoom(why.clone()), actions);
                 }
-                self.requeue_later(id, self.settings.retry_after, actions);
+                self.wait_for_room(id, why, self.settings.retry_after, actions);
             }
             Err(PrepareFailure::Busy) => {
-                self.requeue_later(id, self.settings.busy_pause, actions);
+                let why = "as many documents as the bus carries at once are in use".to_owned();
+                self.wait_for_room(id, why, self.settings.busy_pause, actions);
             }
             Err(PrepareFailure::Unreadable(reason)) => self.not_read(id, reason, actions),
+            Err(PrepareFailure::Moment(reason)) => self.hindered(id, reason, actions),
         }
+    }
+
+    /// Something kept the file from being read that will pass. It is tried again and again, with growing
+    /// pauses; then its verdict says so, and it is tried as everything that could not be read is.
+    fn hindered(&mut self, id: JobId, reason: String, actions: &mut Actions) {
+        let file = self.jobs.get(&id).map(|job| job.file);
+        let Some(entry) = file.and_then(|file| self.files.get_mut(file)) else {
+            return;
+        };
+        let pause = self.settings.moment_pause * 2_u32.saturating_pow(entry.hindered);
+        if pause > self.settings.moment_pause_max {
+            return self.not_read(id, reason, actions);
+        }
+        entry.hindered += 1;
+        if self.now >= self.mute_hindered_until {
+            self.mute_hindered_until = self.now + ROOM_NOTICE_PAUSE;
+            let what = format!("{reason}; it is tried again");
+            self.notice(Notice::NotRead(what), actions);
+        }
+        self.requeue_later(id, pause, actions);
+    }
+
+    /// There is no room for the file now. As long as anything moves there will be, so it waits; when
+    /// nothing has for long enough, it is undetermined. A verdict that it has stays meanwhile.
+    fn wait_for_room(&mut self, id: JobId, why: String, pause: Duration, actions: &mut Actions) {
+        let moves = |job: &ActiveJob| job.stage != JobStage::Preparing && job.unreadable.is_none();
+        if self.jobs.values().any(moves) {
+            self.stuck_since = None;
+            return self.requeue_later(id, pause, actions);
+        }
+        let since = *self.stuck_since.get_or_insert(self.now);
+        let limit = self.settings.room_limit;
+        if self.now.saturating_sub(since) < limit || self.has_verdict_on_these_bytes(id) {
+            return self.requeue_later(id, pause, actions);
+        }
+        let reason = format!("{why}; nothing became free for {} seconds", limit.as_secs());
+        self.not_read(id, reason, actions);
+    }
+
+    /// Whether the file was read as it is now, and judged.
+    fn has_verdict_on_these_bytes(&self, id: JobId) -> bool {
+        let entry = self.jobs.get(&id).and_then(|job| self.files.get(job.file));
+        entry.filter(|entry| !entry.shut).is_some_and(|entry| {
+            let judged = entry.judged.as_ref().and_then(|it| it.inputs.first());
+            judged.and_then(|root| root.content.stamp()) == Some(entry.stamp)
+        })
     }
 
     /// The file cannot be read. That may be known, and said.
@@ -274,6 +325,7 @@ impl State {
         if let Some((stamp, _)) = prepared.root() {
             entry.stamp = stamp;
         }
+        entry.hindered = 0;
         entry.doubted |= entry.touched && prepared.racy;
         if entry.doubted || !entry.present {
             self.end_job(id, actions);

@@ -13,7 +13,6 @@ use super::{Actions, State};
 #[derive(Debug)]
 pub(super) struct Retired {
     pub launch: Option<Launch>,
-    pub pid: u32,
     pub since: Duration,
 }
 
@@ -47,9 +46,9 @@ impl State {
             return;
         }
         let reporter = self.reporter_named(name);
-        let process = reporter.and_then(|it| Some((it.session?, it.launch, it.pid)));
-        if let Some((session, launch, pid)) = process {
-            self.retire(session, launch, pid);
+        let process = reporter.and_then(|it| Some((it.session?, it.launch)));
+        if let Some((session, launch)) = process {
+            self.retire(session, launch);
             actions.push(Action::Send {
                 session,
                 message: ToPeer::Drain,
@@ -70,12 +69,11 @@ impl State {
     }
 
     /// A process that should go: it is killed when it does not.
-    pub(super) fn retire(&mut self, session: SessionId, launch: Option<Launch>, pid: u32) {
+    pub(super) fn retire(&mut self, session: SessionId, launch: Option<Launch>) {
         self.retired.insert(
             session,
             Retired {
                 launch,
-                pid,
                 since: self.now,
             },
         );
@@ -103,8 +101,8 @@ impl State {
             .into_iter()
             .partition(|(_, retired)| overdue(retired));
         self.retired = rest;
-        for (session, Retired { launch, pid, .. }) in over {
-            actions.push(Action::Kill { launch, pid });
+        for (session, Retired { launch, .. }) in over {
+            actions.extend(launch.map(|launch| Action::Kill { launch }));
             self.retired_has_gone(session, actions);
         }
     }

@@ -6,6 +6,7 @@
 
 mod absent;
 mod action;
+mod announcing;
 mod bundles;
 mod changes;
 mod checking;
@@ -48,10 +49,11 @@ pub use action::Action;
 pub use event::Event;
 pub use jury::{Epoch, Juror, Jury, Mark, Member, Origin};
 pub use notice::Notice;
-pub(crate) use outcome::weight;
+pub(crate) use outcome::{facts_weight, weight};
 pub use settings::Settings;
 pub use types::*;
 
+use announcing::Unrest;
 use bundles::Bundle;
 use children::Child;
 use files::Files;
@@ -74,6 +76,8 @@ pub struct State {
     jobs: BTreeMap<JobId, ActiveJob>,
     bundles: BTreeMap<String, Bundle>,
     reporters: Vec<Reporter>,
+    /// By name, how often bundles have changed lately.
+    unrest: BTreeMap<String, Unrest>,
     sessions: BTreeMap<SessionId, (Role, String)>,
     children: BTreeMap<String, Child>,
     retired: BTreeMap<SessionId, Retired>,
@@ -99,6 +103,9 @@ pub struct State {
     judged_once: bool,
     /// Until then nobody need be told again that there is no room.
     mute_room_until: Duration,
+    mute_hindered_until: Duration,
+    /// Since when there has been no room for anything while nothing moved.
+    stuck_since: Option<Duration>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -127,6 +134,7 @@ impl State {
             jobs: BTreeMap::new(),
             bundles: BTreeMap::new(),
             reporters: Vec::new(),
+            unrest: BTreeMap::new(),
             sessions: BTreeMap::new(),
             children: BTreeMap::new(),
             retired: BTreeMap::new(),
@@ -148,6 +156,8 @@ impl State {
             rate: Rate::default(),
             judged_once: false,
             mute_room_until: Duration::ZERO,
+            mute_hindered_until: Duration::ZERO,
+            stuck_since: None,
         };
         state.begin_epoch();
         state
@@ -213,6 +223,7 @@ impl State {
             } => {
                 self.wait(ticket, &path, stamp, unwatched, timeout, &mut actions);
             }
+            Event::ClientLeft { ticket } => self.waiters.retain(|it| it.ticket() != ticket),
             Event::RemoveBundle { ticket, name } => {
                 self.removal(ticket, &name, &mut actions);
             }
@@ -301,6 +312,7 @@ impl State {
     fn tick(&mut self, actions: &mut Actions) {
         self.watch_children(actions);
         self.kill_what_did_not_return(actions);
+        self.believe_announced(actions);
         self.watch_bundles(actions);
         self.watch_reporters(actions);
         self.fail_absent();

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use qcbus_messages::control::Unseen;
+use qcbus_messages::shown;
 
 /// Something that a person should read.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -23,6 +24,13 @@ pub enum Notice {
         /// What it did wrong.
         why: String,
     },
+    /// A bundle changes what it is all the time, and is not believed for a while.
+    Restless {
+        /// Its name.
+        name: String,
+        /// How often, and until when.
+        why: String,
+    },
     /// A child failed too often and is left alone for a while.
     GaveUp {
         /// Its name.
@@ -39,6 +47,8 @@ pub enum Notice {
     },
     /// There is no room for a file's image.
     NoRoom(String),
+    /// A file cannot be read for now.
+    NotRead(String),
     /// A result could not be written.
     NotWritten(String),
     /// A result could not be read back for a reporter.
@@ -50,6 +60,8 @@ pub enum Notice {
         /// Why.
         why: String,
     },
+    /// What the system allows is less than may be needed.
+    Limited(String),
     /// Of the directories that are watched.
     Watching(String),
     /// Of the configuration and the manifests.
@@ -84,12 +96,15 @@ impl Notice {
             Notice::TurnedAway(_) => "turned-away",
             Notice::Ended { .. } => "ended",
             Notice::Killed { .. } => "killed",
+            Notice::Restless { .. } => "restless",
             Notice::GaveUp { .. } => "gave-up",
             Notice::NotUpgraded { .. } => "not-upgraded",
             Notice::NoRoom(_) => "no-room",
+            Notice::NotRead(_) => "not-read",
             Notice::NotWritten(_) => "not-written",
             Notice::NotDelivered(_) => "not-delivered",
             Notice::NotReported { .. } => "not-reported",
+            Notice::Limited(_) => "limited",
             Notice::Watching(_) => "watching",
             Notice::Loading(_) => "loading",
             Notice::HeldBack(_) => "held-back",
@@ -103,6 +118,7 @@ impl Notice {
         match self {
             Notice::Ended { name, .. }
             | Notice::Killed { name, .. }
+            | Notice::Restless { name, .. }
             | Notice::GaveUp { name, .. }
             | Notice::NotUpgraded { name, .. }
             | Notice::NotReported { name, .. } => Some(name),
@@ -115,6 +131,7 @@ impl Notice {
         match self {
             Notice::Ended { why, .. }
             | Notice::Killed { why, .. }
+            | Notice::Restless { why, .. }
             | Notice::GaveUp { why, .. }
             | Notice::NotUpgraded { why, .. }
             | Notice::NotReported { why, .. } => why.clone(),
@@ -124,28 +141,34 @@ impl Notice {
 }
 
 impl fmt::Display for Notice {
+    /// On one line, whoever has chosen the names and reasons in it.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&shown::line(&self.text()))
+    }
+}
+
+impl Notice {
+    fn text(&self) -> String {
         match self {
-            Notice::TurnedAway(reason) => write!(f, "turned away: {reason}"),
-            Notice::Ended { name, why } | Notice::Killed { name, why } => {
-                write!(f, "{name}: {why}")
-            }
-            Notice::GaveUp { name, why } => write!(f, "{name} {why}"),
+            Notice::TurnedAway(reason) => format!("turned away: {reason}"),
+            Notice::Ended { name, why }
+            | Notice::Killed { name, why }
+            | Notice::Restless { name, why } => format!("{name}: {why}"),
+            Notice::GaveUp { name, why } => format!("{name} {why}"),
             Notice::NotUpgraded { name, why } => {
-                write!(
-                    f,
-                    "{name} is not upgraded, the process before goes on: {why}"
-                )
+                format!("{name} is not upgraded, the process before goes on: {why}")
             }
-            Notice::NotReported { name, why } => write!(f, "{name} {why}"),
+            Notice::NotReported { name, why } => format!("{name} {why}"),
             Notice::NoRoom(text)
+            | Notice::NotRead(text)
             | Notice::NotWritten(text)
             | Notice::NotDelivered(text)
+            | Notice::Limited(text)
             | Notice::Watching(text)
             | Notice::Loading(text)
             | Notice::HeldBack(text)
-            | Notice::Storing(text) => f.write_str(text),
-            Notice::Unseen(unseen) => unseen.fmt(f),
+            | Notice::Storing(text) => text.clone(),
+            Notice::Unseen(unseen) => unseen.to_string(),
         }
     }
 }

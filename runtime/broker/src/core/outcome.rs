@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use qcbus_document::FileKind;
 use qcbus_formats::pool::{Asked, BundleOutcome, CheckerOutcome, Ending, in_the_answer};
-use qcbus_formats::xqar::{DomainInfo, InfoElement, Issue, Location, Locations};
+use qcbus_formats::xqar::{DomainInfo, InfoElement, Issue, Location, Locations, Metadata, Param};
 use qcbus_messages::{Catalogue, CheckerInfo};
 
 use super::jobs::{Share, ShareState};
@@ -156,6 +156,11 @@ fn said(offered: &CheckerInfo, staged: Option<&Staged>, failure: Option<&str>) -
 pub(crate) fn weight(issue: &Issue) -> usize {
     let place = |place: &Location| match place {
         Location::Xml { xpath } => 64 + xpath.len(),
+        Location::Road { road_id, .. } => 64 + road_id.len(),
+        Location::Message { channel, field, .. } => {
+            let length = |it: &Option<String>| it.as_ref().map_or(0, String::len);
+            64 + length(channel) + length(field)
+        }
         _ => 64,
     };
     let places = |it: &Locations| {
@@ -171,6 +176,15 @@ pub(crate) fn weight(issue: &Issue) -> usize {
         + issue.rule_uid.len()
         + issue.locations.iter().map(places).sum::<usize>()
         + issue.domain_info.iter().map(infos).sum::<usize>()
+}
+
+/// Roughly the memory that what a checker says of its run holds.
+pub(crate) fn facts_weight(params: &[Param], metadata: &[Metadata]) -> usize {
+    let params = params.iter().map(|it| 48 + it.name.len() + it.value.len());
+    let metadata = metadata
+        .iter()
+        .map(|it| 72 + it.key.len() + it.value.len() + it.description.len());
+    params.sum::<usize>() + metadata.sum::<usize>()
 }
 
 fn info_weight(element: &InfoElement) -> usize {
@@ -189,11 +203,11 @@ fn info_weight(element: &InfoElement) -> usize {
 pub(super) fn clip(issue: &mut Issue, max: usize) {
     clip_text(&mut issue.description, max);
     clip_text(&mut issue.rule_uid, 512);
-    issue.locations.truncate(64);
-    issue.domain_info.truncate(16);
+    clip_list(&mut issue.locations, 64);
+    clip_list(&mut issue.domain_info, 16);
     for place in &mut issue.locations {
         clip_text(&mut place.description, max);
-        place.places.truncate(16);
+        clip_list(&mut place.places, 16);
         if let Some(elsewhere) = &mut place.elsewhere {
             clip_text(&mut elsewhere.path, max);
             elsewhere
@@ -204,7 +218,15 @@ pub(super) fn clip(issue: &mut Issue, max: usize) {
     }
 }
 
-/// Cuts a text at a character.
+/// Cuts a list, and gives back the memory of the rest.
+fn clip_list<T>(list: &mut Vec<T>, max: usize) {
+    if list.len() > max {
+        list.truncate(max);
+        list.shrink_to_fit();
+    }
+}
+
+/// Cuts a text at a character, and gives back the memory of the rest.
 pub(super) fn clip_text(text: &mut String, max: usize) {
     if text.len() > max {
         let end = (0..=max)
@@ -213,6 +235,8 @@ pub(super) fn clip_text(text: &mut String, max: usize) {
             .unwrap_or(0);
         text.truncate(end);
         text.push('…');
+        // What is only cut keeps all the memory that it had.
+        text.shrink_to_fit();
     }
 }
 

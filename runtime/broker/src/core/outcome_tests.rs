@@ -52,6 +52,7 @@ fn a_result_has_what_a_checker_said_and_what_is_known_of_it() {
     let staged = Staged {
         issues: Vec::new(),
         withheld: 0,
+        done_bytes: 0,
         done: Some((Ending::Completed, vec![param.clone()], vec![fact.clone()])),
     };
     let outcome = outcome("Bundle", &share(BTreeMap::from([(0, staged)])));
@@ -90,6 +91,7 @@ fn in_the_result(ending: Ending, issues: Vec<Issue>) -> (Status, String, Vec<Str
     let staged = Staged {
         issues,
         withheld: 0,
+        done_bytes: 0,
         done: Some((ending, Vec::new(), Vec::new())),
     };
     let outcome = outcome("Bundle", &share(BTreeMap::from([(0, staged)])));
@@ -210,6 +212,49 @@ fn a_text_is_cut_at_a_character_and_says_so() {
     assert_eq!(cut("aäö", 3), "aä…");
     assert_eq!(cut("aäö", 5), "aäö");
     assert_eq!(cut("ä", 0), "…");
+}
+
+/// A text that is only cut keeps all the memory that it had: a few bytes are kept, and megabytes held.
+#[test]
+fn what_is_cut_gives_its_memory_back() {
+    let mut text = "x".repeat(1 << 20);
+    clip_text(&mut text, 100);
+    assert!(text.capacity() < 200, "{}", text.capacity());
+    let mut issue = an_issue("short");
+    issue.locations = vec![Locations::default(); 10_000];
+    clip(&mut issue, 100);
+    assert_eq!(issue.locations.len(), 64);
+    assert!(issue.locations.capacity() < 100);
+}
+
+#[test]
+fn roads_and_messages_weigh_what_they_are_called() {
+    let called = |text: &str, which: usize| {
+        let at = |number: usize| if which == number { text } else { "" }.to_owned();
+        let road = Location::Road {
+            road_id: at(0),
+            s: 0.0,
+            t: 0.0,
+        };
+        let message = Location::Message {
+            index: 0,
+            channel: Some(at(1)),
+            field: Some(at(2)),
+            time: None,
+        };
+        let places = vec![road, message];
+        Issue {
+            locations: vec![Locations {
+                places,
+                ..Locations::default()
+            }],
+            ..an_issue("")
+        }
+    };
+    for which in 0..3 {
+        let grown = weight(&called(&"x".repeat(1000), which));
+        assert_eq!(grown, weight(&called("", which)) + 1000, "text {which}");
+    }
 }
 
 #[test]

@@ -197,12 +197,26 @@ fn a_result_under_way_is_not_sent_after_its_file_has_gone() {
 #[test]
 fn what_a_former_broker_sent_unheard_is_taken_back_too() {
     let mut desk = Desk::new(false);
-    desk.event(Event::Children {
-        specs: vec![spec(1)],
-    });
+    let launch = desk.wants(1);
     desk.vanish();
-    let (_, actions) = desk.join();
+    let (_, actions) = desk.join_as(Some(launch.0));
     assert!(is_told(&actions), "{actions:?}");
+}
+
+#[test]
+fn nobody_joins_by_hand_as_a_child() {
+    let mut desk = Desk::new(false);
+    let launch = desk.wants(1);
+    let is_refused = |actions: &[Action]| {
+        let mut actions = actions.iter();
+        actions.any(|it| matches!(it, Action::Refuse { .. }))
+    };
+    assert!(is_refused(&desk.join().1), "it is just being started");
+    let (session, actions) = desk.join_as(Some(launch.0));
+    assert!(!is_refused(&actions), "{actions:?}");
+    assert!(is_refused(&desk.join().1), "it runs");
+    desk.event(Event::Gone { session });
+    assert!(is_refused(&desk.join().1), "it has died");
 }
 
 #[test]
@@ -358,7 +372,7 @@ fn a_reporter_that_does_not_leave_at_the_end_is_killed() {
     desk.event(Event::Drain);
     desk.event(Event::Tick);
     let late = desk.state.handle(Duration::from_secs(5), Event::Tick);
-    let killed = |it: &Action| matches!(it, Action::Kill { launch: of, .. } if *of == Some(launch));
+    let killed = |it: &Action| matches!(it, Action::Kill { launch: of } if *of == launch);
     assert!(late.iter().any(killed), "{late:?}");
     assert!(late.iter().any(|it| matches!(it, Action::Stop)));
 }
@@ -487,7 +501,7 @@ fn waited(owes: bool, beats: bool, limit: fn(&Settings) -> Duration) -> Vec<bool
         };
         desk.state.handle(now, Event::Message { session, message });
     }
-    let killed = |it: &Action| matches!(it, Action::Kill { launch: of, .. } if *of == Some(launch));
+    let killed = |it: &Action| matches!(it, Action::Kill { launch: of } if *of == launch);
     let ended = |now| desk.state.handle(now, Event::Tick).iter().any(killed);
     [end, end + Duration::from_millis(1)].map(ended).into()
 }

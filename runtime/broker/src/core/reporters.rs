@@ -102,7 +102,8 @@ impl State {
             return;
         };
         let old = reporter.session.replace(session);
-        let old = old.map(|old| (old, reporter.launch, reporter.pid));
+        let old = old.map(|old| (old, reporter.launch));
+        let same_process = reporter.pid == hello.pid && hello.pid != 0;
         reporter.version.clone_from(&hello.version);
         reporter.incarnation = hello.incarnation;
         reporter.pid = hello.pid;
@@ -111,8 +112,8 @@ impl State {
         reporter.heard = now;
         reporter.moved = now;
         reporter.note.clear();
-        if let Some((old, launch, pid)) = old {
-            self.reporter_is_replaced(index, (old, launch, pid), hello.pid, actions);
+        if let Some(old) = old {
+            self.reporter_is_replaced(index, old, same_process, actions);
         }
         self.sessions
             .insert(session, (Role::Reporter, hello.name.clone()));
@@ -127,12 +128,12 @@ impl State {
     fn reporter_is_replaced(
         &mut self,
         index: u32,
-        (old, launch, pid): (SessionId, Option<Launch>, u32),
-        newer: u32,
+        (old, launch): (SessionId, Option<Launch>),
+        same_process: bool,
         actions: &mut Actions,
     ) {
         self.sessions.remove(&old);
-        if pid == newer {
+        if same_process {
             actions.push(Action::Disconnect { session: old });
             return;
         }
@@ -140,7 +141,7 @@ impl State {
             let begun = reporter.active.values().map(|sent| sent.file).collect();
             reporter.finishing.insert(old, begun);
         }
-        self.retire(old, launch, pid);
+        self.retire(old, launch);
         let message = ToPeer::Drain;
         actions.push(Action::Send {
             session: old,
@@ -265,13 +266,11 @@ impl State {
             let moved = self.now.saturating_sub(reporter.moved);
             let heard = self.now.saturating_sub(reporter.heard);
             if moved > limit || heard.min(moved) > silence {
-                failing.push((reporter.name.clone(), reporter.launch, reporter.pid));
+                failing.push((reporter.name.clone(), reporter.launch));
             }
         }
-        for (name, launch, pid) in failing {
-            if launch.is_some() {
-                actions.push(Action::Kill { launch, pid });
-            }
+        for (name, launch) in failing {
+            actions.extend(launch.map(|launch| Action::Kill { launch }));
             let notice = Notice::killed(&name, "it does not acknowledge results");
             self.reporter_is_down(&name, notice, actions);
         }

@@ -13,7 +13,7 @@ use super::bundles::Bundle;
 use super::files::Priority;
 use super::jobs::{JobStage, Share, ShareState};
 use super::jury::{Epoch, Juror, Jury, Mark, Member, Origin, Seat};
-use super::types::{Judged, Launch};
+use super::types::Judged;
 use super::{Actions, State};
 
 /// The seats by kind of file, made anew with every epoch.
@@ -89,21 +89,25 @@ impl State {
         bundle.leaving = false;
         bundle.ready = false;
         bundle.away_since = Some(now);
-        let (session, launch, pid) = (bundle.session.take(), bundle.launch, bundle.pid);
+        let (session, launch) = (bundle.session.take(), bundle.launch);
         self.take_back(name, false);
         if let Some(session) = session {
             self.sessions.remove(&session);
-            self.retire(session, launch, pid);
+            self.retire(session, launch);
         }
     }
 
     /// A bundle has said what it offers: from now on it must judge, until it leaves.
     pub(super) fn enrol(&mut self, name: &str, actions: &mut Actions) {
         let supervised = self.children.contains_key(name);
-        let Some(bundle) = self.bundles.get_mut(name) else {
+        let Some(bundle) = self.bundles.get(name) else {
             return;
         };
         let Some(catalogue) = &bundle.catalogue else {
+            return;
+        };
+        let mark = self.mark_of(name, bundle, catalogue);
+        let Some(bundle) = self.bundles.get_mut(name) else {
             return;
         };
         let origin = if supervised {
@@ -111,8 +115,6 @@ impl State {
         } else {
             Origin::Joined
         };
-        let launch = bundle.launch.filter(|_| supervised);
-        let mark = Mark::of(&bundle.version, catalogue, launch.map(Launch::started));
         let known = bundle.mark.replace(mark) == Some(mark) && bundle.origin == Some(origin);
         if bundle.leaving {
             return;

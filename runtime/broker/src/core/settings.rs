@@ -33,9 +33,19 @@ pub struct Settings {
     pub max_restarts: u32,
     /// See `max_restarts`.
     pub restart_window: Duration,
+    /// Changes of what a bundle is or checks, by its own will, that are believed at once.
+    pub changes_forgiven: u32,
+    /// Pause before the first change beyond them is believed; doubles up to `disbelief_max`.
+    pub disbelief: Duration,
+    /// Longest such pause.
+    pub disbelief_max: Duration,
+    /// After this long without a change, earlier ones are forgotten.
+    pub calm_after: Duration,
     /// Issues kept per checker and job.
     pub max_issues: usize,
-    /// Bytes of texts kept per bundle and job.
+    /// Bytes of parameters and metadata kept per checker and job.
+    pub max_facts: usize,
+    /// Bytes of all that is kept per bundle and job.
     pub max_staged_bytes: usize,
     /// Bytes of findings of all jobs that are not stored yet, beyond which no further job is given
     /// out: what a bundle that reports far too much can make the broker hold.
@@ -44,8 +54,16 @@ pub struct Settings {
     pub max_text: usize,
     /// Pause before something that failed for want of room or disk is tried again.
     pub retry_after: Duration,
+    /// A file for which there is no room is waited for so long without anything moving; then it is
+    /// undetermined, and tried again as what cannot be read is.
+    pub room_limit: Duration,
     /// Pause before a file is tried again for which the bus had no place.
     pub busy_pause: Duration,
+    /// First pause before a file is read again that something which passes kept from being read; it
+    /// doubles up to the pause after which a verdict says so.
+    pub moment_pause: Duration,
+    /// See `moment_pause`.
+    pub moment_pause_max: Duration,
     /// How often what could not be read is tried again though nothing tells of a change.
     pub read_again_after: Duration,
     /// Drain limit after which unfinished work is given up.
@@ -71,12 +89,20 @@ impl Default for Settings {
             healthy_after: Duration::from_secs(10),
             max_restarts: 20,
             restart_window: Duration::from_secs(60),
+            changes_forgiven: 8,
+            disbelief: Duration::from_secs(2),
+            disbelief_max: Duration::from_secs(300),
+            calm_after: Duration::from_secs(600),
             max_issues: 10_000,
+            max_facts: 64 << 10,
             max_staged_bytes: 16 << 20,
             max_findings_bytes: 16 << 20,
             max_text: 8 << 10,
             retry_after: Duration::from_secs(1),
+            room_limit: Duration::from_secs(60),
             busy_pause: Duration::from_millis(20),
+            moment_pause: Duration::from_millis(125),
+            moment_pause_max: Duration::from_secs(4),
             read_again_after: Duration::from_secs(60),
             drain_limit: Duration::from_secs(30),
             once: false,

@@ -7,16 +7,20 @@ use qcbus_messages::JobId;
 use super::State;
 use super::bundles::Bundle;
 use super::jobs::{JobStage, Share, ShareState};
-use super::outcome::{clip, clip_text, weight};
+use super::outcome::{clip, clip_text, facts_weight, weight};
 
 /// More checkers need not be named as those in the way of one.
 const MOST_IN_THE_WAY: usize = 64;
+/// Bytes of the identifier of a checker that is in the way.
+const MOST_OF_AN_ID: usize = 512;
 
 /// What one checker has said so far.
 #[derive(Debug, Default)]
 pub(super) struct Staged {
     pub issues: Vec<Issue>,
     pub withheld: u64,
+    /// Bytes that what it said of its end takes of its share's.
+    pub done_bytes: usize,
     pub done: Option<(Ending, Vec<Param>, Vec<Metadata>)>,
 }
 
@@ -85,7 +89,11 @@ impl State {
         mut ending: Ending,
         (params, metadata): (Vec<Param>, Vec<Metadata>),
     ) -> bool {
-        let max_text = self.settings.max_text;
+        let (max_text, max_facts, max_bytes) = (
+            self.settings.max_text,
+            self.settings.max_facts,
+            self.settings.max_staged_bytes,
+        );
         let Some(share) = self.sent_share(name, id, checker) else {
             return false;
         };
@@ -94,9 +102,22 @@ impl State {
         }
         if let Ending::Blocked { by, .. } = &mut ending {
             by.truncate(MOST_IN_THE_WAY);
-            by.iter_mut().for_each(|id| clip_text(id, max_text));
+            by.iter_mut().for_each(|id| clip_text(id, MOST_OF_AN_ID));
+            by.shrink_to_fit();
         }
-        share.staged.entry(checker).or_default().done = Some((ending, params, metadata));
+        let staged = share.staged.entry(checker).or_default();
+        // What it says of its end a second time is said in the place of the first.
+        let others = share.staged_bytes - staged.done_bytes;
+        let facts = facts_weight(&params, &metadata);
+        let mut done = (ending, params, metadata);
+        let mut bytes = facts + ending_weight(&done.0);
+        if facts > max_facts || others + bytes > max_bytes {
+            let reason = said_too_much(facts, max_facts, max_bytes);
+            done = (Ending::Failed { reason }, Vec::new(), Vec::new());
+            bytes = 0;
+        }
+        (staged.done, staged.done_bytes) = (Some(done), bytes);
+        share.staged_bytes = others + bytes;
         true
     }
 
@@ -106,6 +127,25 @@ impl State {
         let known = usize::try_from(checker).is_ok_and(|index| index < offered);
         (known && matches!(share.state, ShareState::Sent { .. })).then_some(share)
     }
+}
+
+/// Bytes of what a checker says of its end, besides facts: nothing where there is nothing to say.
+fn ending_weight(ending: &Ending) -> usize {
+    let by = match ending {
+        Ending::Blocked { by, .. } => by.iter().map(|id| 24 + id.len()).sum(),
+        _ => 0,
+    };
+    by + ending.reason().len()
+}
+
+/// Why a checker failed that has more to say of its run than is kept. As with findings: whoever says
+/// more than can be kept has not answered.
+fn said_too_much(facts: usize, max_facts: usize, max_bytes: usize) -> String {
+    format!(
+        "more than is kept of what it says beside its findings: its parameters and metadata take \
+         {facts} bytes; {max_facts} of a checker, and {max_bytes} of all that a bundle says about a \
+         file, are kept"
+    )
 }
 
 impl Bundle {

@@ -23,6 +23,7 @@ mod maps;
 mod membership;
 mod processes;
 mod reporting;
+mod restless;
 mod things;
 mod words;
 mod world;

@@ -158,6 +158,9 @@ pub enum PrepareFailure {
     Vanished,
     /// It is there and cannot be checked; the reason is for a person.
     Unreadable(String),
+    /// Something that passes kept it, or what it refers to, from being read: no descriptors, a disk that
+    /// did not answer. Worth other tries, with growing pauses; the reason is for a person.
+    Moment(String),
     /// No room for its image now; worth another try later.
     NoRoom(String),
     /// As many documents as the bus carries are in use; worth another try at once.

@@ -24,6 +24,12 @@ pub(super) struct Waiter {
     seen: bool,
 }
 
+impl Waiter {
+    pub fn ticket(&self) -> Ticket {
+        self.ticket
+    }
+}
+
 impl State {
     /// A client asks. The stamp is of now, so a file that was written a moment ago and whose
     /// change nobody has reported yet is judged anew before the answer.

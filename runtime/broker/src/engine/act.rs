@@ -4,10 +4,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use qcbus_messages::path_text::to_text;
 use qcbus_messages::{JobId, ToPeer};
 
 use super::{Announcement, Broker, Ready, Told};
-use crate::core::{Action, Delivery, Event, FinishedJob, Judged, Notice, SessionId};
+use crate::core::{
+    Action, Delivery, Event, FinishedJob, Judged, Notice, PrepareFailure, SessionId,
+};
 use crate::journal::Entry;
 use crate::stages::reached;
 use crate::writers::Order;
@@ -24,7 +27,7 @@ impl Broker {
                 tokio::task::spawn_blocking(move || intake.publish_again(job, doc));
             }
             Action::Spawn { launch, spec } => self.children.spawn(launch, &spec),
-            Action::Kill { launch, pid } => self.children.kill(launch, pid),
+            Action::Kill { launch } => self.children.kill(launch),
             Action::KillFormer { joined } => self.kill_former(joined),
             Action::Store(job) => self.order_store(job),
             Action::Withdraw { ref path, .. } => {
@@ -189,9 +192,20 @@ impl Broker {
         let now = Instant::now();
         let asked = now.checked_sub(waited).unwrap_or(now);
         let (intake, events) = (self.intake.clone(), self.inbox.events_in.clone());
+        let lookout = self.lookout.clone();
         tokio::task::spawn_blocking(move || {
             reached("taken", &path);
-            let result = intake.prepare(job, &path, asked);
+            let attendance = lookout.attend(job.0);
+            let mut result = intake.prepare(job, &path, asked);
+            if attendance.was_given_up() {
+                // The job has ended meanwhile.
+                return intake.release(job);
+            }
+            // Whatever was made of it: a disk that did not answer is no file that is missing.
+            if let Some((at, why)) = attendance.moment() {
+                let reason = format!("read {}: {why}", to_text(&at));
+                result = Err(PrepareFailure::Moment(reason));
+            }
             // After the end of the loop nobody waits for this.
             let _ = events.send(Event::Prepared { job, result });
         });

@@ -1,34 +1,45 @@
 //! What commands ask, and what a change of configuration or manifests sets off.
 
-use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
 use qcbus_messages::control::{Request, Response, Status, Unseen};
-use qcbus_messages::path_text::to_text;
 use tokio::sync::oneshot;
 
 use super::Broker;
+use super::looks::{Look, Sighted};
 use super::start::in_force;
 use crate::control::Asked;
 use crate::core::{Event, Notice, Stamp, Ticket};
 use crate::gate::Gate;
 use crate::reload::{Fingerprint, LoadError, differences};
-use crate::stamp::{stamp_of, stamp_through_links};
 
 /// Most that is told of what could not be looked at.
 const UNSEEN_SHOWN: usize = 100;
 
 impl Broker {
     pub(super) fn asked(&mut self, asked: Asked) -> bool {
+        let only_tells = matches!(asked.request, Request::Status | Request::Wait { .. });
+        if only_tells && asked.answer.is_closed() {
+            // Nobody is there to be told.
+            return true;
+        }
         match asked.request {
             Request::Status => {
                 let status = self.status();
                 let _ = asked.answer.send(Response::Status(Box::new(status)));
                 true
             }
-            Request::Wait { file, timeout_ms } => self.wait(&file, timeout_ms, asked.answer),
+            Request::Wait { file, timeout_ms } => {
+                let look = Look {
+                    file,
+                    timeout_ms,
+                    answer: asked.answer,
+                    is_led: false,
+                };
+                self.look_at(look)
+            }
             Request::Down => {
                 self.downs.push(asked.answer);
                 self.notify_stopping();
@@ -56,6 +67,17 @@ impl Broker {
         }
     }
 
+    /// Forgets clients that have left without their answer.
+    pub(super) fn forget_clients(&mut self) {
+        self.downs.retain(|it| !it.is_closed());
+        let left = self.tickets.iter().filter(|(_, it)| it.is_closed());
+        let left: Vec<Ticket> = left.map(|(ticket, _)| *ticket).collect();
+        for ticket in left {
+            self.tickets.remove(&ticket);
+            self.handle(Event::ClientLeft { ticket });
+        }
+    }
+
     /// Keeps what somebody waits for until the state machine answers.
     fn ticket(&mut self, answer: oneshot::Sender<Response>) -> Ticket {
         self.next_ticket += 1;
@@ -64,17 +86,17 @@ impl Broker {
         ticket
     }
 
-    pub(super) fn wait(
-        &mut self,
-        file: &Path,
-        timeout_ms: Option<u64>,
-        answer: oneshot::Sender<Response>,
-    ) -> bool {
-        let file = &*self.as_watched(file);
-        let ticket = self.ticket(answer);
-        self.look_at_inputs(file);
-        let stamp: Option<Stamp> = stamp_of(file).ok().flatten();
-        let unwatched = self.why_unwatched(file, stamp);
+    /// A client waits for the verdict on a file that has just been looked at.
+    pub(super) fn wait(&mut self, look: Look, seen: Sighted) -> bool {
+        let Sighted {
+            file,
+            stamp,
+            inputs,
+            unwatched,
+        } = seen;
+        let (file, timeout_ms) = (&*file, look.timeout_ms);
+        let ticket = self.ticket(look.answer);
+        self.take_in(inputs);
         if let (Some(stamp), None, Some(watcher)) = (stamp, &unwatched, &self.watcher) {
             // The watcher may not have come to it, and must tell when it goes.
             watcher.learn(file.into(), stamp);
@@ -89,50 +111,15 @@ impl Broker {
         })
     }
 
-    /// A link from elsewhere to a watched file means that file.
-    fn as_watched<'f>(&self, file: &'f Path) -> Cow<'f, Path> {
-        if self.store.places.contains(file) {
-            return Cow::Borrowed(file);
-        }
-        let real = file.canonicalize().ok();
-        let watched = real.filter(|real| self.store.places.contains(real));
-        watched.map_or(Cow::Borrowed(file), Cow::Owned)
-    }
-
     /// A client that asks must not be told what was true a moment ago: changes of dependencies
     /// that the watcher has not come to yet are seen here.
-    pub(super) fn look_at_inputs(&mut self, file: &Path) {
-        for input in self.state.inputs_of(file).into_iter().skip(1) {
-            let stamp = stamp_through_links(&input.path);
-            if stamp == input.content.stamp() {
-                continue;
-            }
-            let path = input.path;
+    fn take_in(&mut self, moved: Vec<(Arc<Path>, Option<Stamp>)>) {
+        for (path, stamp) in moved {
             let event = match stamp {
                 Some(stamp) => Event::Touched { path, stamp },
                 None => Event::Vanished { path },
             };
             self.handle(event);
-        }
-    }
-
-    pub(super) fn why_unwatched(&self, file: &Path, stamp: Option<Stamp>) -> Option<String> {
-        let shown = to_text(file);
-        if qcbus_document::FileKind::of_path(file).is_none() {
-            Some(format!(
-                "{shown} is no file that qcbus checks ({})",
-                qcbus_document::Suffix::list()
-            ))
-        } else if !self.store.places.contains(file) {
-            Some(format!("{shown} lies outside the watched directories"))
-        } else if stamp.is_some() && crate::watch::is_left_alone(&self.options.roots, file) {
-            Some(format!("{shown} is ignored (by its name or a .qcignore)"))
-        } else if stamp.is_some() && !crate::watch::is_looked_at(&self.options.roots, file) {
-            Some(format!(
-                "{shown} lies behind a symbolic link to a directory, and such links are not followed"
-            ))
-        } else {
-            None
         }
     }
 
@@ -210,6 +197,11 @@ impl Broker {
             why: why.clone(),
         };
         // Whoever asks wants to see where to look, and no answer of any length.
-        self.unseen.iter().take(UNSEEN_SHOWN).map(unseen).collect()
+        let unseen = self.unseen.iter().take(UNSEEN_SHOWN).map(unseen);
+        self.looking
+            .takes_long()
+            .into_iter()
+            .chain(unseen)
+            .collect()
     }
 }

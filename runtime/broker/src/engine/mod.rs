@@ -2,6 +2,7 @@
 
 mod act;
 mod asked;
+mod looks;
 mod start;
 mod systemd;
 
@@ -11,9 +12,12 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use qcbus_bus::{Host, HostEvent, PeerId, StartError as BusError};
+use looks::{Look, Looked};
+use qcbus_bus::{Host, HostEvent, PeerId, Process, StartError as BusError};
+use qcbus_disk::foreign::Lookout;
 use qcbus_messages::control::{Response, Unseen};
-use qcbus_messages::{JobId, ToPeer};
+use qcbus_messages::path_text::to_text;
+use qcbus_messages::{Hello, JobId, ToPeer};
 use tokio::sync::{mpsc, oneshot};
 
 use crate::control::{Asked, ControlSocket};
@@ -25,10 +29,11 @@ use crate::intake::Intake;
 use crate::journal::JournalError;
 use crate::options::Options;
 use crate::reload::{LoadError, Loaded, Sources};
+use crate::scouts::Scouts;
 use crate::stages::reached;
 use crate::store::Store;
-use crate::supervise::{Children, is_there};
-use crate::watch::{Seen, Watcher};
+use crate::supervise::Children;
+use crate::watch::{Looking, Seen, Watcher};
 use crate::writers::Writers;
 
 /// Why a broker cannot start.
@@ -108,9 +113,19 @@ pub struct Broker {
     loaded: Loaded,
     in_force: Arc<InForce>,
     watcher: Option<Watcher>,
+    looking: Arc<Looking>,
+    /// Where a look takes long, as it was said.
+    takes_long: Option<PathBuf>,
     watch_mode: String,
     /// What could not be looked at, and why.
     unseen: BTreeMap<PathBuf, String>,
+    /// Sees who waits for which file.
+    lookout: Arc<Lookout>,
+    scouts: Scouts,
+    /// Files that did not answer when they were last asked for.
+    hanging: BTreeSet<PathBuf>,
+    /// Who waits for a look at a file, by the number of the scout.
+    looks: HashMap<u64, Look>,
     sessions: Sessions,
     tickets: HashMap<Ticket, oneshot::Sender<Response>>,
     downs: Vec<oneshot::Sender<Response>>,
@@ -144,6 +159,8 @@ struct Inbox {
     asked: mpsc::UnboundedReceiver<Asked>,
     notices: mpsc::UnboundedReceiver<Notice>,
     notices_in: mpsc::UnboundedSender<Notice>,
+    looked: mpsc::UnboundedReceiver<Looked>,
+    looked_in: mpsc::UnboundedSender<Looked>,
     deliveries: mpsc::UnboundedReceiver<Ready>,
     deliveries_in: mpsc::UnboundedSender<Ready>,
 }
@@ -246,7 +263,8 @@ impl Broker {
                     Stop::Drain => { self.notify_stopping(); self.handle(Event::Drain) }
                     Stop::Quit => { quit = true; false }
                 },
-                _ = tick.tick() => self.handle(Event::Tick),
+                Some(looked) = self.inbox.looked.recv() => self.looked(looked),
+                _ = tick.tick() => { self.give_up_the_overdue(); self.handle(Event::Tick) }
             };
             if !go_on {
                 break;
@@ -254,6 +272,8 @@ impl Broker {
             if Instant::now() >= next_reload {
                 next_reload = Instant::now() + RELOAD_INTERVAL;
                 self.reload_if_changed(&mut fingerprint);
+                self.forget_clients();
+                self.say_what_takes_long();
                 self.notify_watchdog();
                 self.children.look_for_orphans();
             }
@@ -273,11 +293,15 @@ impl Broker {
     async fn end(mut self, quit: bool) {
         self.watcher = None;
         self.children.kill_all();
-        if let Some(former) = self.children.former() {
-            former.kill_but(&BTreeSet::new());
-        }
+        self.children.kill_what_they_started();
+        self.children.forget_launches();
         if !quit {
-            self.writers.finish();
+            // A disk that does not answer must not keep anybody from stopping.
+            for writer in self.writers.finish(self.options.settings.drain_limit) {
+                let what =
+                    format!("{writer} hangs; what it did not write is made good at the next start");
+                (self.tell)(Told::Notice(Notice::Storing(what)));
+            }
         }
         for down in self.downs.drain(..) {
             // A client that has left needs no answer.
@@ -347,15 +371,15 @@ impl Broker {
     fn bus_event(&mut self, event: HostEvent) -> bool {
         let known = |peer, sessions: &Sessions| sessions.sessions.get(&peer).copied();
         match event {
-            // A child is a process of this machine. One that has died since it said hello would be
-            // taken for one of another container, and keep its name from the next.
-            HostEvent::Hello { peer, hello } if hello.launch.is_some() && !is_there(hello.pid) => {
-                self.host.disconnect(peer);
+            HostEvent::Hello {
+                peer,
+                hello,
+                process,
+                launch,
+            } => self.peer_says_hello(peer, hello, process.as_ref(), &launch),
+            HostEvent::TurnedAway { why } => {
+                self.say(Notice::TurnedAway(why));
                 true
-            }
-            HostEvent::Hello { peer, hello } => {
-                let session = self.sessions.add(peer);
-                self.handle(Event::Hello { session, hello })
             }
             HostEvent::Message { peer, message } => match known(peer, &self.sessions) {
                 Some(session) => self.handle(Event::Message { session, message }),
@@ -374,6 +398,30 @@ impl Broker {
                 None => true,
             },
         }
+    }
+
+    /// Somebody who has proven which process it is wants to take part. `proof` is of who has started it.
+    fn peer_says_hello(
+        &mut self,
+        peer: PeerId,
+        hello: Hello,
+        process: Option<&Process>,
+        proof: &str,
+    ) -> bool {
+        if let Some(launch) = hello.launch.map(Launch) {
+            // One that has died since it said hello would keep its name from the next.
+            if process.is_some_and(|it| !it.is_alive()) {
+                self.host.disconnect(peer);
+                return true;
+            }
+            if let Err(why) = self.children.joined(launch, &hello.name, process, proof) {
+                self.host.refuse(peer, &why);
+                self.say(Notice::TurnedAway(why));
+                return true;
+            }
+        }
+        let session = self.sessions.add(peer);
+        self.handle(Event::Hello { session, hello })
     }
 
     fn seen(&mut self, seen: Seen) -> bool {
@@ -415,6 +463,19 @@ impl Broker {
         self.say(Notice::Unseen(unseen));
     }
 
+    /// A look that does not end is said once, and by every status while it lasts.
+    fn say_what_takes_long(&mut self) {
+        let now = self.looking.takes_long();
+        if let Some(it) = now
+            .as_ref()
+            .filter(|it| Some(&it.path) != self.takes_long.as_ref())
+        {
+            let path = to_text(&it.path);
+            self.say(Notice::Watching(format!("{path}: {}", it.why)));
+        }
+        self.takes_long = now.map(|it| it.path);
+    }
+
     fn say(&mut self, notice: Notice) {
         self.state.remark(notice.clone());
         (self.tell)(Told::Notice(notice));
@@ -433,6 +494,7 @@ impl Inbox {
         let (seen_in, seen) = mpsc::unbounded_channel();
         let (asked_in, asked) = mpsc::unbounded_channel();
         let (notices_in, notices) = mpsc::unbounded_channel();
+        let (looked_in, looked) = mpsc::unbounded_channel();
         let (deliveries_in, deliveries) = mpsc::unbounded_channel();
         let inbox = Inbox {
             events,
@@ -441,6 +503,8 @@ impl Inbox {
             asked,
             notices,
             notices_in: notices_in.clone(),
+            looked,
+            looked_in,
             deliveries,
             deliveries_in,
         };

@@ -1,13 +1,13 @@
 //! How a broker starts: the instance, the journal, the configuration, the first look.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-use qcbus_bus::Host;
+use qcbus_bus::{Host, HostOptions};
 use qcbus_formats::config::Config;
 use qcbus_ingest::modular::SearchPath;
 use qcbus_messages::Role;
@@ -18,18 +18,22 @@ use super::{AttendedTime, Broker, Inbox, Sessions, StartError, Told};
 use crate::control::ControlSocket;
 use crate::core::{Member, Notice, Stamp, State};
 use crate::demand::InForce;
+use crate::descriptors::Descriptors;
 use crate::directory_lock::{DirectoryLock, LockError, Purpose};
 use crate::gate::{Gate, GateError, GateOptions};
 use crate::intake::Intake;
 use crate::journal::{Journal, JournalError, Void};
+use crate::launches::Launches;
 use crate::options::Options;
 use crate::reload::{LoadError, Loaded, Sources};
 use crate::result_paths::ResultPaths;
+use crate::scouts::{PATIENCE, Scouts};
 use crate::stamp::stamp_of;
 use crate::store::{Reconciled, Store, remove_earlier_results};
 use crate::supervise::{Children, Surroundings};
-use crate::watch::{Seen, WatchOptions, Watcher, is_looked_at, scan_directory};
+use crate::watch::{Looking, Seen, WatchOptions, Watcher, is_looked_at, scan_directory};
 use crate::writers::{Order, Writers};
+use qcbus_disk::foreign::Lookout;
 use qcbus_disk::sweep;
 
 impl Broker {
@@ -44,7 +48,10 @@ impl Broker {
     ) -> Result<Broker, StartError> {
         let sources = sources_of(&options);
         let loaded = sources.load()?;
-        let mut host = Host::start(&options.instance, options.host)?;
+        let descriptors = Descriptors::take();
+        let (peers, limited) = descriptors.peers(options.host.max_peers);
+        options.host.max_peers = peers;
+        let mut host = Host::start(&options.instance, shape(&options, &loaded))?;
         options.settings.generation = host.generation();
         let journal = journal_of(&options)?;
         let results = results_of(&options)?;
@@ -55,13 +62,15 @@ impl Broker {
         let (inbox, senders) = Inbox::new();
         let control = ControlSocket::listen(options.instance.dir(), senders.asked)
             .map_err(|source| system("listen for commands", source))?;
-        let store = Arc::new(store(&options, journal, &senders.notices)?);
+        let lookout = Arc::new(Lookout::default());
+        let scouts = Scouts::new(lookout.clone(), PATIENCE);
+        let store = Arc::new(store(&options, journal, scouts.clone(), &senders.notices)?);
         let reconciled = reconcile(&options, &loaded, &store)?;
         let voids = store.voids()?;
         let writers = writers(&options, &store, &inbox, &senders.notices)?;
         let intake = intake(&options, &host);
         intake.search_in(in_force.search.clone());
-        let children = children(&options, &inbox);
+        let children = children(&options, descriptors, &inbox)?;
         let mut broker = Broker {
             started: Instant::now(),
             clock: AttendedTime::new(),
@@ -75,8 +84,14 @@ impl Broker {
             loaded,
             in_force,
             watcher: None,
+            looking: Arc::default(),
+            takes_long: None,
             watch_mode: "once".to_owned(),
             unseen: BTreeMap::new(),
+            lookout,
+            scouts,
+            hanging: BTreeSet::new(),
+            looks: HashMap::new(),
             sessions: Sessions::default(),
             tickets: HashMap::new(),
             downs: Vec::new(),
@@ -91,9 +106,10 @@ impl Broker {
             options,
         };
         broker.take_up(members, voids);
-        for said in &reconciled.said {
-            let _ = senders.notices.send(Notice::Storing(said.clone()));
+        if let Some(limited) = limited {
+            let _ = senders.notices.send(Notice::Limited(limited));
         }
+        tell_what_was_put_right(&reconciled, &senders.notices);
         let dependencies = broker.remember(reconciled);
         broker.look(dependencies, senders.seen)?;
         Ok(broker)
@@ -147,7 +163,7 @@ impl Broker {
                 poll: self.options.poll,
                 rescan: self.options.rescan,
             };
-            let watcher = Watcher::start(options, move |what| {
+            let watcher = Watcher::start(options, self.looking.clone(), move |what| {
                 // After the end of the loop nobody listens.
                 let _ = seen.send(what);
             });
@@ -157,14 +173,23 @@ impl Broker {
             return Ok(());
         }
         let (roots, files) = (self.options.roots.clone(), self.options.files.clone());
-        tokio::task::spawn_blocking(move || look_once(&roots, &files, &seen));
+        let looking = self.looking.clone();
+        tokio::task::spawn_blocking(move || look_once(&roots, &files, &looking, &seen));
         Ok(())
+    }
+}
+
+fn tell_what_was_put_right(reconciled: &Reconciled, notices: &mpsc::UnboundedSender<Notice>) {
+    for said in &reconciled.said {
+        // The loop that listens has not ended before it began.
+        let _ = notices.send(Notice::Storing(said.clone()));
     }
 }
 
 fn sources_of(options: &Options) -> Sources {
     Sources {
         config: options.config.clone(),
+        lasting: options.watch,
         bundles_d: options.bundles_d.clone(),
         standard: options.standard.clone(),
         reporters: options.reporters.clone(),
@@ -208,6 +233,7 @@ fn results_of(options: &Options) -> Result<DirectoryLock, LockError> {
 fn store(
     options: &Options,
     journal: Journal,
+    scouts: Scouts,
     notices: &mpsc::UnboundedSender<Notice>,
 ) -> Result<Store, GateError> {
     let (out, roots) = (options.out.clone(), options.roots.clone());
@@ -217,7 +243,10 @@ fn store(
     };
     places.single.clone_from(&options.single_result);
     let gate = options.gate.as_ref();
-    let gate = gate.map(|directory| gate_of(options, directory, &places, notices.clone()));
+    let gate = gate.map(|directory| {
+        let (scouts, notices) = (scouts.clone(), notices.clone());
+        gate_of(options, directory, &places, scouts, notices)
+    });
     Ok(Store {
         places,
         dialect: options.dialect,
@@ -225,6 +254,7 @@ fn store(
         verdict_files: options.verdict_files,
         retries: options.watch,
         gate: gate.transpose()?,
+        scouts,
         journal: Mutex::new(journal),
         epoch: AtomicU64::new(0),
     })
@@ -245,10 +275,13 @@ fn gate_of(
     options: &Options,
     directory: &Path,
     paths: &ResultPaths,
+    scouts: Scouts,
     notices: mpsc::UnboundedSender<Notice>,
 ) -> Result<Gate, GateError> {
     let roots = options.roots.clone();
     let gate = GateOptions {
+        max_file: options.limits.max_file,
+        scouts,
         directory: directory.to_path_buf(),
         paths: paths.clone(),
         durable: options.durable,
@@ -279,6 +312,21 @@ fn reconcile(options: &Options, loaded: &Loaded, store: &Store) -> Result<Reconc
     Ok(store.reconcile(remembered, &reporters)?)
 }
 
+/// The bus is made for those who are expected. Nobody else joins what ends by itself; a newer process
+/// may stand beside each that was started.
+fn shape(options: &Options, loaded: &Loaded) -> HostOptions {
+    let expected_peers = loaded.children.len();
+    let most = match options.watch {
+        true => options.host.max_peers,
+        false => 2 * expected_peers + 1,
+    };
+    HostOptions {
+        expected_peers,
+        max_peers: options.host.max_peers.min(most),
+        ..options.host
+    }
+}
+
 fn intake(options: &Options, host: &Host) -> Arc<Intake> {
     let roots = options.roots.clone();
     Arc::new(Intake::new(
@@ -289,22 +337,35 @@ fn intake(options: &Options, host: &Host) -> Arc<Intake> {
     ))
 }
 
-fn children(options: &Options, inbox: &Inbox) -> Children {
+fn children(
+    options: &Options,
+    descriptors: Descriptors,
+    inbox: &Inbox,
+) -> Result<Children, StartError> {
     let surroundings = Surroundings {
+        descriptors: descriptors.before,
         instance_dir: options.instance.dir().to_path_buf(),
         die_with_broker: options.die_with_broker,
         sandbox: options.sandbox,
         memory_limit: options.memory_limit,
     };
     let generation = options.settings.generation;
-    Children::new(surroundings, generation, inbox.events_in.clone())
+    let launches = Launches::of(options.instance.dir())
+        .map_err(|source| system("write to the runtime directory", source))?;
+    let events = inbox.events_in.clone();
+    Ok(Children::new(surroundings, launches, generation, events))
 }
 
-fn look_once(roots: &[PathBuf], files: &[PathBuf], seen: &mpsc::UnboundedSender<Seen>) {
+fn look_once(
+    roots: &[PathBuf],
+    files: &[PathBuf],
+    looking: &Looking,
+    seen: &mpsc::UnboundedSender<Seen>,
+) {
     // The loop may have been told to quit meanwhile; then nobody listens.
     let tell = |what| drop(seen.send(what));
     for root in roots {
-        let found = scan_directory(root, roots);
+        let found = scan_directory(root, roots, looking);
         for unseen in found.unseen {
             tell(Seen::Unseen(unseen));
         }
@@ -314,7 +375,7 @@ fn look_once(roots: &[PathBuf], files: &[PathBuf], seen: &mpsc::UnboundedSender<
     }
     for file in files {
         let path = file.clone();
-        let why = match stamp_of(file) {
+        let why = match looking.at(file, || stamp_of(file)) {
             Ok(Some(stamp)) => {
                 tell(Seen::Settled(path.into(), stamp));
                 continue;

@@ -17,6 +17,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use qcbus_messages::Digest;
 use qcbus_messages::control::{GateStatus, HeldBack};
 use qcbus_messages::path_text::to_text;
 
@@ -24,9 +25,10 @@ use crate::core::{Input, Judged, Reading};
 use crate::directory_lock::{DirectoryLock, Purpose};
 use crate::journal::Remembered;
 use crate::result_paths::ResultPaths;
+use crate::scouts::Scouts;
 use crate::stamp::is_listing;
 use crate::store::digest_of;
-use qcbus_disk::{is_for_good, write_ahead};
+use qcbus_disk::{foreign, is_for_good, write_ahead};
 
 use claims::{Claim, Claims, Copies, Need, Plan, Standing};
 pub use contents::GateError;
@@ -57,6 +59,10 @@ pub struct GateOptions {
     pub durable: bool,
     /// What depends on files outside.
     pub outside: Outside,
+    /// Most bytes of a file; one that has more is not what was accepted.
+    pub max_file: u64,
+    /// Who looks at files.
+    pub scouts: Scouts,
     /// Whether a file gets a verdict of its own.
     pub is_judged: IsJudged,
     /// Tells a person.
@@ -303,21 +309,27 @@ impl Gate {
         }
     }
 
+    /// The bytes of a file, if they are those that were accepted.
+    fn accepted(&self, path: &Arc<Path>, digest: Digest) -> io::Result<Option<Vec<u8>>> {
+        let (path, most) = (path.clone(), self.options.max_file);
+        let read = move || foreign::read(&path, most);
+        let read = self.options.scouts.within(read).and_then(|read| read);
+        match read {
+            Ok(bytes) => Ok((digest_of(&bytes) == digest).then_some(bytes)),
+            // Something else lies there.
+            Err(error) if is_of_the_path(&error) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
     /// The very bytes that were accepted; `None` when others are there by now. They get a verdict
     /// of their own.
     fn copy(&self, plan: &Plan) -> io::Result<Option<Copies>> {
         let mut copies = Copies::new();
         for (path, digest) in &plan.lacking {
-            let bytes = match std::fs::read(path) {
-                Ok(bytes) => bytes,
-                Err(error) if error.kind() == io::ErrorKind::NotFound || is_for_good(&error) => {
-                    return Ok(None);
-                }
-                Err(error) => return Err(error),
-            };
-            if digest_of(&bytes) != *digest {
+            let Some(bytes) = self.accepted(path, *digest)? else {
                 return Ok(None);
-            }
+            };
             // A copy, not a link: a hard link would follow a writer who changes the file in place.
             let place = self.claims().place(path);
             let copy = write_ahead(&place, &bytes, self.options.durable)?;
@@ -386,6 +398,11 @@ impl Gate {
 
 /// Files that are named where there may be thousands.
 const SHOWN: usize = 10;
+
+fn is_of_the_path(error: &io::Error) -> bool {
+    let gone = [io::ErrorKind::NotFound, io::ErrorKind::FileTooLarge];
+    gone.contains(&error.kind()) || is_for_good(error)
+}
 
 fn size_of_root(judged: &Judged) -> u64 {
     let root = judged.inputs.first();

@@ -103,6 +103,8 @@ impl Bench {
 fn open(dir: &Path, outside: Outside, said: &Arc<Mutex<Vec<String>>>) -> Gate {
     let said = said.clone();
     let options = GateOptions {
+        max_file: 1 << 20,
+        scouts: Scouts::default(),
         directory: dir.join("gate"),
         paths: ResultPaths::of_watched(dir.join("out"), vec![dir.join("farm")]),
         durable: false,

@@ -32,6 +32,11 @@ impl Failure {
                 why: "it does not fit on the bus".to_owned(),
             }),
             Failure::Loan(LoanError::Busy) => Err(PrepareFailure::Busy),
+            Failure::Loan(
+                error @ (LoanError::NeverFits { .. } | LoanError::AddressSpace { .. }),
+            ) => Ok(Absence::TooLarge {
+                why: error.to_string(),
+            }),
             Failure::Loan(error) => Err(unpublished(path, &error)),
             Failure::Publish(error) => Err(unpublished(path, &error)),
             // It is written to this very moment: the whole is read again shortly.
@@ -72,6 +77,11 @@ pub(super) fn explained(failure: Failure, path: &Path) -> PrepareFailure {
             unreadable(path, format!("{} is too large for the bus", to_text(path)))
         }
         Failure::Loan(LoanError::Busy) => PrepareFailure::Busy,
+        // No waiting helps, unless somebody makes the memory larger: it is tried again as what cannot
+        // be read is.
+        Failure::Loan(error @ (LoanError::NeverFits { .. } | LoanError::AddressSpace { .. })) => {
+            unreadable(path, format!("cannot publish {}: {error}", to_text(path)))
+        }
         Failure::Loan(error) => unpublished(path, &error),
         Failure::Publish(error) => unpublished(path, &error),
     }
@@ -110,6 +120,30 @@ mod tests {
         assert_eq!(of(missing.into()), Ok(Absence::NotThere));
         let large = of(LoanError::TooLarge(1).into());
         assert!(matches!(large, Ok(Absence::TooLarge { .. })), "{large:?}");
+    }
+
+    #[test]
+    fn what_never_fits_is_not_waited_for() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let never = || {
+            Failure::Loan(LoanError::NeverFits {
+                needed: 70 << 20,
+                size: 64 << 20,
+                kept: 9 << 20,
+                advised: 158,
+            })
+        };
+        let linked = never().of_linked(path);
+        let says_size = |why: &str| why.contains("--shm-size=158m");
+        assert!(
+            matches!(&linked, Ok(Absence::TooLarge { why }) if says_size(why)),
+            "{linked:?}"
+        );
+        let root = explained(never(), path);
+        assert!(
+            matches!(&root, PrepareFailure::Unreadable(why) if says_size(why)),
+            "{root:?}"
+        );
     }
 
     #[test]

@@ -2,11 +2,11 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use qcbus_bus::Held;
+use qcbus_disk::foreign;
 use qcbus_ingest::modular::ExpandedImage;
 use qcbus_ingest::{Found, Limits, Look, Prepared, Reader, Source};
 use qcbus_messages::path_text::to_text;
@@ -252,9 +252,7 @@ pub(super) fn inputs_of(prepared: &Prepared, limits: &Limits) -> Vec<Input> {
 /// taken for missing, as it was; that it has come is noticed before the result is stored.
 fn unreadable_now(path: &Path, limits: &Limits) -> Option<Stamp> {
     let stamp = stamp_through_links(path)?;
-    let is_readable = std::fs::metadata(path).is_ok_and(|data| data.is_file())
-        && stamp.size <= limits.max_file
-        && File::open(path).is_ok();
+    let is_readable = stamp.size <= limits.max_file && foreign::open(path).is_ok();
     (!is_readable).then_some(stamp)
 }
 

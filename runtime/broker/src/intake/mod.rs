@@ -290,12 +290,22 @@ impl Intake {
         })
     }
 
-    /// Parses straight into shared memory. The bound is an estimate that many resolved entities
-    /// can exceed; then the builder says how much it takes.
+    /// Parses straight into shared memory. The bound is an estimate: it is often too large, which
+    /// counts only where there is little room, and many resolved entities can exceed it. Then the
+    /// builder says how much it takes.
     fn build(&self, prepared: &Prepared) -> Result<(Loan, usize), Failure> {
         let mut room = prepared.upper_bound();
         loop {
-            let mut loan = self.loan(room)?;
+            let mut loan = match self.loan(room) {
+                Ok(loan) => loan,
+                Err(error) => match exact(prepared, &error).filter(|exact| *exact < room) {
+                    Some(exact) => {
+                        room = exact;
+                        continue;
+                    }
+                    None => return Err(error.into()),
+                },
+            };
             match prepared.build_into(&mut loan) {
                 Ok(used) => return Ok((loan, used)),
                 Err(BuildError::SmallBuffer { needed, .. }) if needed > room => room = needed,
@@ -326,6 +336,20 @@ impl Intake {
         let root = self.roots.iter().filter(|root| path.starts_with(root));
         root.max_by_key(|root| root.as_os_str().len())
             .map_or_else(|| path.parent().unwrap_or(path), PathBuf::as_path)
+    }
+}
+
+/// How long an image is, where that may make a difference.
+fn exact(prepared: &Prepared, error: &LoanError) -> Option<usize> {
+    if !matches!(
+        error,
+        LoanError::NoSpace { .. } | LoanError::NeverFits { .. }
+    ) {
+        return None;
+    }
+    match prepared.build_into(&mut []) {
+        Err(BuildError::SmallBuffer { needed, .. }) => Some(needed),
+        _ => None,
     }
 }
 

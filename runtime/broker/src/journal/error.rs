@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use qcbus_disk::trust::TrustError;
+
 use super::SCHEMA_VERSION;
 use crate::directory_lock::LockError;
 
@@ -49,6 +51,11 @@ pub enum JournalError {
         /// Its schema.
         found: i64,
     },
+    /// Somebody else decides what is in it.
+    #[error(
+        "the state is not in this broker's hands alone: {0}; or choose another directory with --out or --state"
+    )]
+    Foreign(TrustError),
     /// Its directory cannot be made.
     #[error("cannot make the state directory {path}: {source}; choose another with --state")]
     Directory {
@@ -57,6 +64,15 @@ pub enum JournalError {
         /// What the system says.
         source: std::io::Error,
     },
+}
+
+impl From<TrustError> for JournalError {
+    fn from(error: TrustError) -> Self {
+        match error {
+            TrustError::Io { path, source } => JournalError::Directory { path, source },
+            foreign @ TrustError::Foreign { .. } => JournalError::Foreign(foreign),
+        }
+    }
 }
 
 /// What SQLite says, as what it means for the journal.

@@ -11,7 +11,7 @@ use rusqlite::{Connection, OpenFlags, params};
 
 use crate::core::{Judged, Member, Origin, Reported};
 use crate::directory_lock::{DirectoryLock, Purpose};
-use qcbus_disk::FileMark;
+use qcbus_disk::{FileMark, trust};
 
 mod error;
 mod rows;
@@ -138,12 +138,21 @@ impl Journal {
     /// # Errors
     /// See [`JournalError`]; each says what to do.
     pub fn open(state: &Path, instance: &str) -> Result<Journal, JournalError> {
-        std::fs::create_dir_all(state).map_err(|source| JournalError::Directory {
-            path: state.to_path_buf(),
-            source,
-        })?;
-        let lock = DirectoryLock::take(state, Purpose::State, instance)?;
+        trust::make_directory(state)?;
         let path = state.join("journal.sqlite");
+        // What was put there while others still could.
+        for name in [
+            "lock",
+            "journal.sqlite",
+            "journal.sqlite-wal",
+            "journal.sqlite-shm",
+        ] {
+            match trust::look_at_file(&state.join(name)) {
+                Err(error) if !error.is_absent() => return Err(error.into()),
+                _ => {}
+            }
+        }
+        let lock = DirectoryLock::take(state, Purpose::State, instance)?;
         let fail = |source| classify(&path, source);
         let connection = Connection::open(&path).map_err(fail)?;
         connection

@@ -3,28 +3,38 @@
 
 mod differences;
 mod modules;
+mod programs;
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
+use qcbus_disk::trust::{self, TrustError};
 use qcbus_formats::config::{
     Config, Known, KnownBundle, Oddity, Parsed, reporter_for, same_bundle,
 };
 use qcbus_messages::Role;
+use qcbus_messages::path_text::to_text;
 
 use crate::core::{ChildSpec, Stamp};
 use crate::stamp::stamp_through_links;
 
 pub use differences::differences;
 use modules::{add_module, read_manifest};
+pub use programs::ready;
+
+/// Largest configuration or manifest, in bytes.
+const MAX_FILE: u64 = 16 << 20;
 
 /// Where the configuration and the children come from.
 #[derive(Debug, Clone)]
 pub struct Sources {
     /// The configuration file.
     pub config: Option<PathBuf>,
+    /// Whether the configuration stays in force while others are about: then it must be ours alone, as
+    /// manifests must.
+    pub lasting: bool,
     /// Directory of manifests.
     pub bundles_d: Option<PathBuf>,
     /// The children that come with the program.
@@ -85,12 +95,16 @@ impl Sources {
         let parsed = match &self.config {
             Some(path) => {
                 note(&mut loaded, path);
-                Some((path, read_config(path)?))
+                Some((path, self.read_config(path)?))
             }
             None => None,
         };
         if let Some((_, parsed)) = &parsed {
             self.add_reporters(&parsed.config, &mut loaded);
+        }
+        if let Some(directory) = &self.bundles_d {
+            // Who may write to it is no file's stamp.
+            note(&mut loaded, directory);
         }
         let manifests = self.manifests(&mut loaded.notices)?;
         loaded.manifests = self
@@ -112,6 +126,18 @@ impl Sources {
             loaded.config = Some(parsed.config);
         }
         Ok(loaded)
+    }
+
+    fn read_config(&self, path: &Path) -> Result<Parsed, LoadError> {
+        if !self.lasting {
+            return read_config(path);
+        }
+        let cannot = |error: TrustError| match error {
+            TrustError::Io { source, .. } => format!("cannot read {}: {source}", path.display()),
+            foreign @ TrustError::Foreign { .. } => foreign.to_string(),
+        };
+        let bytes = trust::read(path, MAX_FILE).map_err(cannot);
+        parse(path, &bytes.map_err(LoadError::Config)?)
     }
 
     /// What there is to be named: what comes with the program, and what manifests bring.
@@ -149,13 +175,19 @@ impl Sources {
             return Ok(Vec::new());
         };
         let cannot_look = |error: &std::io::Error| {
-            LoadError::Manifest(format!("cannot look into {}: {error}", directory.display()))
+            LoadError::Manifest(format!("cannot look into {}: {error}", to_text(directory)))
         };
-        let entries = match std::fs::read_dir(directory) {
-            Ok(entries) => entries,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-            Err(error) => return Err(cannot_look(&error)),
-        };
+        match trust::directory(directory) {
+            Ok(_) => {}
+            Err(error) if error.is_absent() => return Ok(Vec::new()),
+            Err(error) => {
+                return Err(LoadError::Manifest(format!(
+                    "{error}; or choose another place with --out, --state or --bundles-d"
+                )));
+            }
+        }
+        // Nobody else can put another in its place.
+        let entries = std::fs::read_dir(directory).map_err(|error| cannot_look(&error))?;
         let all: Result<Vec<PathBuf>, LoadError> = entries
             .map(|entry| {
                 entry
@@ -172,7 +204,7 @@ impl Sources {
         let (mut paths, mut others): (Vec<PathBuf>, Vec<PathBuf>) = all.partition(is_manifest);
         others.sort();
         notices.extend(others.iter().map(|path| {
-            let shown = path.display();
+            let shown = to_text(path);
             format!("{shown}: is no manifest, those are files of this directory that end in .json")
         }));
         paths.sort();
@@ -213,7 +245,7 @@ impl Sources {
         if !is_away {
             return Ok(());
         }
-        let shown = directory.display();
+        let shown = to_text(directory);
         Err(LoadError::Manifest(format!(
             "{shown} is not the directory that it was, and there is no manifest in it; its bundles stay \
              demanded until it is back (to do without them, start the broker anew)"
@@ -231,7 +263,7 @@ fn unasked(path: &Path, config: &Config, loaded: &Loaded) -> Vec<String> {
     let brought = bundles.filter_map(|it| Some((&it.name, loaded.brought.get(&it.name)?)));
     let unasked = brought.filter(|(name, _)| !config.bundles.is_empty() && !named(name));
     let (shown, note) = (
-        path.display(),
+        to_text(path),
         "it judges nothing, unless it is named by its short name",
     );
     unasked
@@ -245,8 +277,12 @@ fn unasked(path: &Path, config: &Config, loaded: &Loaded) -> Vec<String> {
 /// [`LoadError::Config`] with path, row and column.
 pub fn read_config(path: &Path) -> Result<Parsed, LoadError> {
     let bytes = std::fs::read(path)
-        .map_err(|error| LoadError::Config(format!("cannot read {}: {error}", path.display())))?;
-    Config::parse(&bytes).map_err(|error| LoadError::Config(format!("{}:{error}", path.display())))
+        .map_err(|error| LoadError::Config(format!("cannot read {}: {error}", to_text(path))))?;
+    parse(path, &bytes)
+}
+
+fn parse(path: &Path, bytes: &[u8]) -> Result<Parsed, LoadError> {
+    Config::parse(bytes).map_err(|error| LoadError::Config(format!("{}:{error}", to_text(path))))
 }
 
 #[cfg(test)]

@@ -2,11 +2,13 @@
 
 use std::path::Path;
 
+use qcbus_disk::trust;
 use qcbus_formats::manifest::{self, Mode, Module, ModuleType};
 use qcbus_formats::pool::OWN_BUNDLE;
 use qcbus_messages::Role;
+use qcbus_messages::path_text::to_text;
 
-use super::{LoadError, Loaded};
+use super::{LoadError, Loaded, MAX_FILE, programs};
 use crate::core::{ChildSpec, Restart};
 
 /// The modules of a manifest; every file that is read for it is told to `note` first.
@@ -14,7 +16,7 @@ pub(super) fn read_manifest(path: &Path, note: &dyn Fn(&Path)) -> Result<Vec<Mod
     let sources = manifest::Sources {
         read: &|path| {
             note(path);
-            std::fs::read(path).map_err(|error| error.to_string())
+            trust::read(path, MAX_FILE).map_err(|error| error.to_string())
         },
         variable: &|name| std::env::var(name).ok(),
     };
@@ -26,7 +28,7 @@ pub(super) fn read_manifest(path: &Path, note: &dyn Fn(&Path)) -> Result<Vec<Mod
 /// # Errors
 /// [`LoadError::Manifest`] when its name is taken, or it would have to judge and cannot be asked.
 pub(super) fn add_module(module: Module, loaded: &mut Loaded) -> Result<(), LoadError> {
-    let manifest = module.manifest.display().to_string();
+    let manifest = to_text(&module.manifest);
     let role = match module.module_type {
         ModuleType::CheckerBundle => Role::Bundle,
         ModuleType::ReportModule => Role::Reporter,
@@ -53,6 +55,9 @@ pub(super) fn add_module(module: Module, loaded: &mut Loaded) -> Result<(), Load
              without the bundles that come with qcbus, start it with --no-standard-bundles)"
         )));
     }
+    programs::look_at(&module.exec_command).map_err(|why| {
+        LoadError::Manifest(format!("{manifest}: `{name}` is not started: {why}"))
+    })?;
     loaded.brought.insert(name, manifest);
     loaded.children.push(spec_of(module, role));
     Ok(())
@@ -60,7 +65,7 @@ pub(super) fn add_module(module: Module, loaded: &mut Loaded) -> Result<(), Load
 
 /// Nobody misses a reporter that is not started. A bundle would have to judge.
 fn not_on_the_bus(module: &Module, role: Role, loaded: &mut Loaded) -> Result<(), LoadError> {
-    let (manifest, name) = (module.manifest.display(), &module.name);
+    let (manifest, name) = (to_text(&module.manifest), &module.name);
     if role == Role::Bundle {
         return Err(LoadError::Manifest(format!(
             "{manifest}: `{name}` has no \"mode\": \"bus\", so it cannot be asked, and what it would reject \
@@ -85,13 +90,7 @@ fn spec_of(module: Module, role: Role) -> ChildSpec {
     };
     ChildSpec {
         version: extra("version").map(str::to_owned),
-        // As ASAM's framework does, the command is the shell's to take apart.
-        command: vec![
-            "sh".into(),
-            "-c".into(),
-            format!("exec {} \"$@\"", module.exec_command),
-            "sh".into(),
-        ],
+        command: programs::shell_command(&module.exec_command),
         name: module.name,
         role,
         restart,

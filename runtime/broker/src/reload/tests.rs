@@ -6,6 +6,7 @@ use crate::core::Restart;
 fn sources(directory: &Path) -> Sources {
     Sources {
         config: Some(directory.join("config.xml")),
+        lasting: true,
         bundles_d: Some(directory.join("bundles.d")),
         standard: vec![child("xodrBundle")],
         reporters: vec![child("qc-report-text")],

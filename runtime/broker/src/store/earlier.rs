@@ -9,7 +9,7 @@ use serde::Deserialize;
 
 use super::leftovers::{input_of, named_by_result, walk};
 use crate::result_paths::ResultPaths;
-use qcbus_disk::remove;
+use qcbus_disk::{foreign, remove};
 
 /// Removes the results of earlier runs that are about the files and directories of this one, with
 /// the reports beside them: of files that are no more, and of those to be checked now, because a
@@ -48,13 +48,16 @@ fn may_be_ours(paths: &ResultPaths, xqar: &Path) -> bool {
     !paths.roots.is_empty() || given.any(|file| file.file_name() == xqar.file_stem())
 }
 
+/// A report says as much as its result does; one of ours is shorter.
+const MOST_OF_A_REPORT: u64 = 1 << 30;
+
 /// Removes the standard reports beside a result, if they are about it.
 fn remove_reports(xqar: &Path) -> io::Result<()> {
     let (json, text) = (xqar.with_extension("json"), xqar.with_extension("txt"));
-    if std::fs::read(&json).is_ok_and(|report| is_json_of(&report, xqar)) {
+    if foreign::read(&json, MOST_OF_A_REPORT).is_ok_and(|report| is_json_of(&report, xqar)) {
         remove(&json)?;
     }
-    if std::fs::read_to_string(&text).is_ok_and(|report| is_text_of(&report, xqar)) {
+    if foreign::read(&text, MOST_OF_A_REPORT).is_ok_and(|report| is_text_of(&report, xqar)) {
         remove(&text)?;
     }
     Ok(())
@@ -78,7 +81,10 @@ fn is_json_of(report: &[u8], xqar: &Path) -> bool {
 }
 
 /// A report as text says the verdict in a line of its own.
-fn is_text_of(report: &str, xqar: &Path) -> bool {
+fn is_text_of(report: &[u8], xqar: &Path) -> bool {
+    let Ok(report) = std::str::from_utf8(report) else {
+        return false;
+    };
     let name = xqar.file_stem().unwrap_or_default().to_string_lossy();
     let verdicts = [Verdict::Accepted, Verdict::Rejected, Verdict::Undetermined];
     report.lines().any(|line| {

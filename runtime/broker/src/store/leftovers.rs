@@ -1,11 +1,10 @@
 //! Results of ours that nobody remembers.
 
 use std::collections::HashSet;
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use qcbus_disk::foreign;
 use qcbus_messages::path_text::from_text;
 use serde::Deserialize;
 
@@ -82,7 +81,7 @@ struct About {
 
 /// The file that the verdict file beside a result is about, if it is ours.
 fn named_by_verdict(xqar: &Path) -> Option<PathBuf> {
-    let text = std::fs::read(verdict_beside(xqar)?).ok()?;
+    let text = foreign::read(&verdict_beside(xqar)?, MOST_OF_A_VERDICT).ok()?;
     let about: About = serde_json::from_slice(&text).ok()?;
     (about.format == FORMAT && from_text(&about.result) == xqar)
         .then(|| from_text(&about.input_file))
@@ -98,10 +97,13 @@ pub(super) fn named_by_result(xqar: &Path) -> Option<PathBuf> {
 /// The first `InputFile` of a result. It stands near the beginning, so that the rest is not read.
 pub(super) fn input_of(xqar: &Path) -> Option<PathBuf> {
     let mut head = Vec::new();
-    let file = File::open(xqar).ok()?;
-    file.take(HEAD).read_to_end(&mut head).ok()?;
+    let (mut file, _) = foreign::open(xqar).ok()?;
+    foreign::read_on(xqar, &mut file, HEAD, &mut head).ok()?;
     qcbus_formats::xqar::input_file(&head).map(|it| from_text(&it))
 }
+
+/// A verdict file names every file that its verdict depends on, and nothing else that is long.
+const MOST_OF_A_VERDICT: u64 = 64 << 20;
 
 /// Bytes that hold the beginning of a result.
 const HEAD: u64 = 16 << 10;

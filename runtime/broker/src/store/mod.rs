@@ -22,8 +22,9 @@ use crate::core::{FinishedJob, Judged, StoreOutcome};
 use crate::gate::Gate;
 use crate::journal::{Entry, History, Journal, JournalError, Remembered, Void};
 use crate::result_paths::ResultPaths;
+use crate::scouts::Scouts;
 use crate::stages::reached;
-use crate::stamp::stamp_through_links;
+use crate::stamp::stamp_of;
 use crate::verdict_file;
 use qcbus_disk::{FileMark, is_for_good, write_both, write_whole};
 
@@ -31,7 +32,7 @@ pub use earlier::remove_earlier_results;
 use pooling::{reasons, taken};
 pub use reconcile::Reconciled;
 pub use refresh::digest_of;
-use refresh::refresh;
+use refresh::refreshed;
 
 /// Writes results. Shared by the threads that do so.
 #[derive(Debug)]
@@ -48,6 +49,8 @@ pub struct Store {
     pub retries: bool,
     /// Where accepted files are published.
     pub gate: Option<Gate>,
+    /// Who looks at files.
+    pub scouts: Scouts,
     /// What is remembered.
     pub journal: Mutex<Journal>,
     /// The epoch of who must judge: what was judged in an earlier one is not stored.
@@ -62,8 +65,10 @@ impl Store {
         config: Option<&Config>,
         root: Option<&[u8]>,
     ) -> StoreOutcome {
-        if !refresh(job) {
-            return StoreOutcome::Stale;
+        match self.refresh(job) {
+            Ok(true) => {}
+            Ok(false) => return StoreOutcome::Stale,
+            Err(error) => return StoreOutcome::Failed(unlooked(&job.path, &error)),
         }
         let outcomes: Vec<BundleOutcome> = job.bundles.iter_mut().map(taken).collect();
         let pooled = self.pool(job, outcomes, config, root);
@@ -79,7 +84,7 @@ impl Store {
             return self.not_written(job, judged, failed);
         }
         // The file may have gone between the look and the rename: nothing may lie there then.
-        if stamp_through_links(&job.path).is_none() {
+        if self.has_gone(&job.path) {
             let _ = self.withdraw_files(&job.path);
             return StoreOutcome::Stale;
         }
@@ -94,7 +99,7 @@ impl Store {
         mut judged: Judged,
         failed: Unwritten,
     ) -> StoreOutcome {
-        if !refresh(job) {
+        if matches!(self.refresh(job), Ok(false)) {
             return StoreOutcome::Stale;
         }
         if self.retries && !failed.for_good {
@@ -106,6 +111,36 @@ impl Store {
         judged.why.insert(0, failed.what);
         judged.xqar = None;
         StoreOutcome::Stored(Box::new(judged))
+    }
+
+    /// Whether everything that the verdict depends on is what it was when it was read. Stamps that
+    /// moved although the bytes are the same (another link to the file, other rights) are taken over.
+    ///
+    /// # Errors
+    /// When the system does not answer.
+    fn refresh(&self, job: &mut FinishedJob) -> io::Result<bool> {
+        let Some(prepared) = &mut job.prepared else {
+            return Ok(true);
+        };
+        let read = prepared.clone();
+        let now = move || refreshed(&read.inputs);
+        let Some(now) = self.scouts.within(now)? else {
+            return Ok(false);
+        };
+        if let Some(moved) = now {
+            let prepared = Arc::make_mut(prepared);
+            prepared.inputs = moved;
+            // They moved a moment ago, and may move again without telling.
+            prepared.racy = true;
+        }
+        Ok(true)
+    }
+
+    /// Whether a file certainly is no more. One that does not answer is there.
+    fn has_gone(&self, path: &Arc<Path>) -> bool {
+        let path = path.clone();
+        let stamp = self.scouts.within(move || stamp_of(&path));
+        matches!(stamp, Ok(Ok(None)))
     }
 
     fn write(&self, job: &FinishedJob, pooled: &Pooled, judged: &Judged) -> Result<(), Unwritten> {
@@ -257,6 +292,11 @@ impl Trouble {
             concerns_all: true,
         }
     }
+}
+
+fn unlooked(path: &Path, error: &io::Error) -> String {
+    let path = to_text(path);
+    format!("cannot tell whether {path} is still what was checked: {error}; it is tried again")
 }
 
 /// Why a result is not there.

@@ -1,30 +1,16 @@
 //! Is what a verdict rests on still what was read?
 
-use std::sync::Arc;
-
+use qcbus_disk::foreign;
 use qcbus_messages::Digest;
 
-use crate::core::{FinishedJob, Input, Reading};
+use crate::core::{Input, Reading};
 use crate::stamp::stamp_through_links;
 
-/// Whether everything that the verdict depends on is what it was when it was read. Stamps that
-/// moved although the bytes are the same (another link to the file, other rights) are taken over.
-pub(super) fn refresh(job: &mut FinishedJob) -> bool {
-    let Some(prepared) = &mut job.prepared else {
-        return true;
-    };
-    let inputs = &prepared.inputs;
-    let now: Option<Vec<Input>> = inputs.iter().map(as_it_is).collect();
-    let Some(now) = now else {
-        return false;
-    };
-    if now != *inputs {
-        let prepared = Arc::make_mut(prepared);
-        prepared.inputs = now;
-        // They moved a moment ago, and may move again without telling.
-        prepared.racy = true;
-    }
-    true
+/// Whether inputs still have the bytes that were read: `None` if one has not, else those with their
+/// present stamps if one has moved.
+pub(super) fn refreshed(inputs: &[Input]) -> Option<Option<Vec<Input>>> {
+    let now: Vec<Input> = inputs.iter().map(as_it_is).collect::<Option<_>>()?;
+    Some((now != *inputs).then_some(now))
 }
 
 /// The input with its present stamp, if it still has the bytes that were read.
@@ -36,7 +22,7 @@ pub(super) fn as_it_is(input: &Input) -> Option<Input> {
     let now = now?;
     let same = now == read
         || (now.differs_in_ctime_only(&read)
-            && std::fs::read(&input.path).is_ok_and(|bytes| digest_of(&bytes) == digest));
+            && foreign::read(&input.path, now.size).is_ok_and(|it| digest_of(&it) == digest));
     same.then(|| Input {
         path: input.path.clone(),
         content: Reading::Read(now, digest),

@@ -5,10 +5,12 @@
 use std::collections::BTreeMap;
 use std::ops::Bound;
 use std::os::unix::fs::MetadataExt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
+use super::looking::Looking;
+use super::tree::below;
 use crate::core::Stamp;
 use crate::stamp::stamp_through_links;
 
@@ -27,6 +29,8 @@ pub struct Dependencies {
     told: BTreeMap<Arc<Path>, Option<Stamp>>,
     /// The last of `told` that was looked at: the others have their turn after it.
     last: Option<Arc<Path>>,
+    /// Says where the look is: they may lie anywhere.
+    looking: Arc<Looking>,
 }
 
 #[derive(Debug)]
@@ -40,6 +44,14 @@ struct Polled {
 pub type Changed = (Arc<Path>, Option<Stamp>);
 
 impl Dependencies {
+    /// None yet; `looking` says where the look at them is.
+    pub fn new(looking: Arc<Looking>) -> Dependencies {
+        Dependencies {
+            looking,
+            ..Dependencies::default()
+        }
+    }
+
     /// Adds files, each with the stamp under which it was read: a change since then is one, too.
     pub fn add(&mut self, files: Vec<(Arc<Path>, Option<Stamp>)>) {
         for (path, stamp) in files {
@@ -68,17 +80,16 @@ impl Dependencies {
         let polled = self.polled.remove_entry(path);
         let polled = polled.map(|(path, polled)| (path, polled.stamp));
         let (path, seen) = polled.or_else(|| self.told.remove_entry(path))?;
-        let stamp = stamp_through_links(&path);
+        let stamp = self.looking.at(&path, || stamp_through_links(&path));
         self.poll(path.clone(), stamp);
         (stamp != seen).then_some((path, stamp))
     }
 
     /// The files below a directory that came or went as a whole.
     pub fn below(&self, directory: &Path) -> Vec<Arc<Path>> {
-        let all = self.polled.keys().chain(self.told.keys());
-        all.filter(|path| path.starts_with(directory))
-            .cloned()
-            .collect()
+        let polled = below(&self.polled, directory).map(|(path, _)| path);
+        let told = below(&self.told, directory).map(|(path, _)| path);
+        polled.chain(told).cloned().collect()
     }
 
     /// No events come any more, or some were lost.
@@ -105,7 +116,7 @@ impl Dependencies {
                     told.push(path.clone());
                 }
             }
-            let stamp = stamp_through_links(path);
+            let stamp = self.looking.at(path, || stamp_through_links(path));
             if stamp != polled.stamp {
                 polled.stamp = stamp;
                 polled.asked = false;
@@ -132,7 +143,7 @@ impl Dependencies {
             .collect();
         self.last = due.last().map(|(path, _)| path.clone());
         let look = |(path, seen): Changed| {
-            let stamp = stamp_through_links(&path);
+            let stamp = self.looking.at(&path, || stamp_through_links(&path));
             (stamp != seen).then_some((path, stamp))
         };
         let changed: Vec<Changed> = due.into_iter().filter_map(look).collect();
@@ -149,45 +160,20 @@ impl Dependencies {
     }
 }
 
-/// Whether the kernel tells of every change of a file in the watched directories `roots`. It does
-/// not of what lies behind a symbolic link, of what is written under another name of the same file,
-/// nor of what is in a directory by that directory's own name.
-pub fn events_tell(path: &Path, roots: &[PathBuf], real: &mut RealDirectories) -> bool {
-    if !roots.iter().any(|root| path.starts_with(root)) {
-        return false;
-    }
-    let is_real = path.parent().is_some_and(|it| real.is_real(it));
-    is_real
-        && match std::fs::symlink_metadata(path) {
-            Ok(data) => data.is_file() && data.nlink() == 1,
-            Err(error) => error.kind() == std::io::ErrorKind::NotFound,
-        }
-}
-
-/// Which directories are reached without a symbolic link, asked once each.
-#[derive(Debug, Default)]
-pub struct RealDirectories(BTreeMap<PathBuf, bool>);
-
-impl RealDirectories {
-    /// Whether a path leads through a symbolic link to a directory.
-    pub fn is_behind_a_link(&mut self, path: &Path) -> bool {
-        let above = path.parent().filter(|it| it.is_dir());
-        above.is_some_and(|it| !self.is_real(it))
-    }
-
-    fn is_real(&mut self, directory: &Path) -> bool {
-        if let Some(known) = self.0.get(directory) {
-            return *known;
-        }
-        let is_real = directory.canonicalize().is_ok_and(|real| real == directory);
-        self.0.insert(directory.to_path_buf(), is_real);
-        is_real
+/// Whether the kernel tells of every change of a file whose directory is watched. It does not of
+/// what lies behind a symbolic link, of what is written under another name of the same file, nor of
+/// what is in a directory by that directory's own name.
+pub fn events_tell(path: &Path) -> bool {
+    match std::fs::symlink_metadata(path) {
+        Ok(data) => data.is_file() && data.nlink() == 1,
+        Err(error) => error.kind() == std::io::ErrorKind::NotFound,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use std::os::unix::fs::symlink;
+    use std::path::PathBuf;
 
     use super::*;
 
@@ -205,21 +191,21 @@ mod tests {
     #[test]
     fn events_tell_of_plain_files_alone() {
         let ((_dir, root), (_other, outside)) = (farm(), farm());
-        let roots = [root.clone()];
-        let tells = |path: &Path| events_tell(path, &roots, &mut RealDirectories::default());
         std::fs::write(root.join("view.xml"), "").unwrap();
         std::fs::write(outside.join("map.xodr"), "").unwrap();
-        assert!(tells(&root.join("view.xml")));
-        assert!(tells(&root.join("to_come.xodr")));
-        assert!(!tells(&outside.join("map.xodr")), "nobody watches there");
-        assert!(!tells(&root.join("none/to_come.xodr")), "what would tell?");
-        assert!(!tells(&root), "a catalog directory is known by its names");
+        assert!(events_tell(&root.join("view.xml")));
+        assert!(events_tell(&root.join("to_come.xodr")));
+        assert!(
+            !events_tell(&root),
+            "a catalog directory is known by its names"
+        );
         symlink(outside.join("map.xodr"), root.join("map.xodr")).unwrap();
-        assert!(!tells(&root.join("map.xodr")), "it is written elsewhere");
-        symlink(&outside, root.join("maps")).unwrap();
-        assert!(!tells(&root.join("maps/map.xodr")), "so is this");
+        assert!(
+            !events_tell(&root.join("map.xodr")),
+            "it is written elsewhere"
+        );
         std::fs::hard_link(root.join("view.xml"), outside.join("view.xml")).unwrap();
-        assert!(!tells(&root.join("view.xml")), "it has another name");
+        assert!(!events_tell(&root.join("view.xml")), "it has another name");
     }
 
     #[test]

@@ -1,176 +1,251 @@
 //! Events from the kernel, and what is done where they cannot be had.
 
-use std::path::{Path, PathBuf};
-use std::sync::mpsc::Sender;
+use std::io;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
-use notify::event::{
-    AccessKind, AccessMode, CreateKind, EventKind, ModifyKind, RemoveKind, RenameMode,
-};
-use notify::{Config, RecommendedWatcher, RecursiveMode, Watcher as _};
 use qcbus_document::FileKind;
+use rustix::fs::inotify::ReadFlags;
 
-use super::ignore::{IGNORE_FILE, is_ignored_file};
+use super::Seen;
+use super::ignore::{IGNORE_FILE, is_ignored_directory, is_ignored_file};
 use super::looker::Looker;
 use super::sight::{Sight, look_at};
-use super::{Order, Seen};
+use super::tree::{Told, Unwatched};
 use crate::stamp::stamp_of;
+
+/// How often what no event tells of is looked through.
+const EVERY: Duration = Duration::from_secs(2);
+
+/// So much longer for each directory, so that very many do not take all the time.
+const FOR_EACH: Duration = Duration::from_micros(100);
+
+/// How often it is said that events were lost.
+const SAY_AGAIN: Duration = Duration::from_secs(60);
+
+/// What is looked at because no event tells of it.
+#[derive(Debug, Default)]
+pub struct Polling {
+    /// Why no events can be had at all.
+    without: Option<String>,
+    /// The kernel gave no watch; it is asked again with the next look through everything.
+    none_left: bool,
+    /// That was said.
+    is_said: bool,
+    /// When directories without a watch were last looked through.
+    last: Option<Instant>,
+    /// When it was last said that events were lost.
+    lost_events: Option<Instant>,
+    /// How changes are noticed, as it was last told.
+    mode: String,
+}
 
 impl Looker {
     /// Asks the kernel for events; where it refuses, says so and looks around instead.
-    pub(super) fn watch(&mut self, events: &Sender<Order>) {
-        if let Some(every) = self.options.poll {
-            (self.tell)(Seen::Mode(format!(
-                "poll every {} s, as asked",
-                every.as_secs_f64()
-            )));
-            return;
-        }
-        let events = events.clone();
-        let tell = move |event| {
-            // After the end nobody listens any more.
-            let _ = events.send(Order::Event(event));
-        };
-        // Through a link to it a directory would have its events told under the link's path alone.
-        let config = Config::default().with_follow_symlinks(false);
-        let watcher = RecommendedWatcher::new(tell, config);
-        let mut watcher = match watcher {
-            Ok(watcher) => watcher,
-            Err(error) => return self.fall_back(&error.to_string()),
-        };
-        for root in self.options.roots.clone() {
-            if let Err(error) = watcher.watch(&root, RecursiveMode::Recursive) {
-                if root.is_dir() {
-                    return self.fall_back(&format!("{}: {error}", root.display()));
-                }
-                self.lose_root(&root);
+    pub(super) fn ask_for_events(&mut self) {
+        if self.options.poll.is_none() && !self.tree.is_open() {
+            match self.tree.open() {
+                Ok(()) => self.polling.without = None,
+                Err(error) => self.do_without_events(&error),
             }
         }
-        self.watcher = Some(watcher);
-        (self.tell)(Seen::Mode("events".to_owned()));
+        self.tell_mode();
     }
 
-    fn fall_back(&mut self, why: &str) {
-        let every = Duration::from_secs(2);
-        self.polling = Some(every);
-        self.watcher = None;
+    fn do_without_events(&mut self, error: &io::Error) {
+        let first = self.polling.without.is_none();
+        self.polling.without = Some(error.to_string());
         self.dependencies.poll_all();
-        (self.tell)(Seen::Mode(format!(
-            "poll every 2 s, because events cannot be had: {why}"
-        )));
-        (self.tell)(Seen::Notice(format!(
-            "cannot watch by events ({why}); looking around every 2 s instead. \
-             On Linux, `sysctl fs.inotify.max_user_watches` is the usual limit."
-        )));
-    }
-
-    pub(super) fn lose_root(&mut self, root: &Path) {
-        if self.lost_roots.insert(root.to_path_buf()) {
-            self.dependencies.poll_all();
+        if first {
             (self.tell)(Seen::Notice(format!(
-                "the watched directory {} is gone; its results are kept, and it is watched again \
-                 when it comes back",
-                root.display()
+                "cannot watch by events ({error}); looking around every {} s instead. The usual limits \
+                 are `sysctl fs.inotify.max_user_instances` and `ulimit -n`; once there is room, events \
+                 are used again.",
+                EVERY.as_secs()
             )));
         }
     }
 
-    pub(super) fn recover_roots(&mut self, events: &Sender<Order>) {
-        let back: Vec<PathBuf> = self
-            .lost_roots
-            .iter()
-            .filter(|root| root.is_dir())
-            .cloned()
-            .collect();
-        if back.is_empty() {
+    /// How often everything is looked through.
+    pub(super) fn pass_interval(&self) -> Duration {
+        let without = self.polling.without.is_some().then_some(EVERY);
+        let interval = self.options.poll.or(without);
+        interval.unwrap_or(self.options.rescan).min(A_YEAR)
+    }
+
+    /// With a look through everything what could not be watched is tried again.
+    pub(super) fn begin_to_watch_again(&mut self) {
+        self.polling.none_left = false;
+        if self.polling.without.is_some() {
+            self.ask_for_events();
+        }
+    }
+
+    /// Has a directory watched, or kept in mind as one of which nothing is told.
+    pub(super) fn watch_directory(&mut self, directory: &Path) -> Result<(), Unwatched> {
+        if !self.tree.is_open() || (self.polling.none_left && !self.tree.tells_of(directory)) {
+            self.tree.keep_unwatched(directory);
+            return Ok(());
+        }
+        let watched = self.tree.watch(directory);
+        match &watched {
+            Ok(()) | Err(Unwatched::Gone) => {}
+            Err(Unwatched::NoneLeft) => {
+                self.polling.none_left = true;
+                self.tree.keep_unwatched(directory);
+                self.say_that_none_are_left();
+            }
+            // What cannot be read is said so by who tries. A watched directory has to be known.
+            Err(Unwatched::Closed) => {
+                if self.options.roots.iter().any(|root| root == directory) {
+                    self.tree.keep_unwatched(directory);
+                }
+            }
+            Err(Unwatched::Refused(error)) => {
+                tracing::debug!(path = %directory.display(), %error, "no watch");
+                self.tree.keep_unwatched(directory);
+            }
+        }
+        watched
+    }
+
+    fn say_that_none_are_left(&mut self) {
+        if std::mem::replace(&mut self.polling.is_said, true) {
             return;
         }
-        for root in back {
-            self.lost_roots.remove(&root);
-            self.tell_again_below(&root);
-            (self.tell)(Seen::Notice(format!(
-                "the watched directory {} is back",
-                root.display()
-            )));
+        let limit = std::fs::read_to_string("/proc/sys/fs/inotify/max_user_watches");
+        let limit = limit.map_or_else(|_| String::new(), |it| format!(", now {}", it.trim()));
+        (self.tell)(Seen::Notice(format!(
+            "the kernel has no more watches for this user (`sysctl fs.inotify.max_user_watches`{limit}): \
+             directories beyond that are looked through every {} s or less often, the others are \
+             watched as ever. Raise the limit; it is tried again by itself.",
+            EVERY.as_secs()
+        )));
+    }
+
+    /// Looks through the directories of which no event tells.
+    pub(super) fn poll_what_is_not_watched(&mut self) {
+        self.tell_mode();
+        let (_, without) = self.tree.counts();
+        if !self.tree.is_open() || without == 0 {
+            return;
         }
-        if self.options.poll.is_none() {
-            self.watcher = None;
-            self.watch(events);
+        let every = EVERY + FOR_EACH * u32::try_from(without).unwrap_or(u32::MAX);
+        if self.polling.last.is_some_and(|last| last.elapsed() < every) {
+            return;
+        }
+        self.polling.last = Some(Instant::now());
+        for directory in self.tree.unwatched() {
+            self.due.push(&directory);
         }
     }
 
-    pub(super) fn event(&mut self, event: notify::Result<notify::Event>) {
-        let event = match event {
-            Ok(event) => event,
+    fn tell_mode(&mut self) {
+        let (_, without) = self.tree.counts();
+        let mode = match (self.options.poll, &self.polling.without) {
+            (Some(every), _) => format!("poll every {} s, as asked", every.as_secs_f64()),
+            (None, Some(why)) => format!(
+                "poll every {} s, because events cannot be had: {why}",
+                EVERY.as_secs()
+            ),
+            (None, None) if without == 0 => "events".to_owned(),
+            (None, None) => format!(
+                "events; {without} directories every {} s or less often, which cannot be watched",
+                EVERY.as_secs()
+            ),
+        };
+        if mode != self.polling.mode {
+            self.polling.mode.clone_from(&mode);
+            (self.tell)(Seen::Mode(mode));
+        }
+    }
+
+    /// Takes what the kernel has told until now, some hundreds of events at most.
+    pub(super) fn take_events(&mut self) {
+        let events = match self.tree.events() {
+            Ok(events) => events,
             Err(error) => {
-                if matches!(error.kind, notify::ErrorKind::MaxFilesWatch) {
-                    self.fall_back(&error.to_string());
-                } else {
-                    (self.tell)(Seen::Notice(format!("watching: {error}")));
-                }
-                return;
+                tracing::warn!(%error, "events cannot be read");
+                return self.have_lost_events();
             }
         };
-        if event.need_rescan() {
+        for told in events {
+            if told.what.contains(ReadFlags::QUEUE_OVERFLOW) {
+                self.have_lost_events();
+            }
+            for directory in self.tree.places(&told) {
+                self.event(&directory, &told);
+            }
+        }
+    }
+
+    fn have_lost_events(&mut self) {
+        let last = self.polling.lost_events;
+        if last.is_none_or(|last| last.elapsed() >= SAY_AGAIN) {
+            self.polling.lost_events = Some(Instant::now());
             (self.tell)(Seen::Notice(
                 "the kernel dropped file events; everything is looked through again".to_owned(),
             ));
-            self.scan_all(false);
-            self.dependencies.poll_all();
-            self.look_at_dependencies();
-            return;
         }
-        for path in &event.paths {
-            self.path_event(event.kind, path);
+        self.dependencies.poll_all();
+        self.due.pass_at(Instant::now());
+    }
+
+    fn event(&mut self, directory: &Path, told: &Told) {
+        let is_root = |path: &Path| self.options.roots.iter().any(|root| root == path);
+        let Some(name) = &told.name else {
+            return self.event_of_itself(directory, told.what);
+        };
+        let path = directory.join(name);
+        if name == IGNORE_FILE {
+            self.due.pass_at(Instant::now());
+        } else if is_root(&path) {
+            self.check_roots();
+        } else if told.what.contains(ReadFlags::ISDIR) {
+            self.directory_event(&path, told.what);
+        } else if told.what.intersects(
+            ReadFlags::CLOSE_WRITE
+                | ReadFlags::MOVED_TO
+                | ReadFlags::MOVED_FROM
+                | ReadFlags::DELETE,
+        ) {
+            self.finished(&path);
+        } else {
+            self.touched(&path);
         }
     }
 
-    fn path_event(&mut self, kind: EventKind, path: &Path) {
-        if is_only_reading(kind) {
+    /// What happens to a directory is told by the one above it, unless that is not watched.
+    fn event_of_itself(&mut self, directory: &Path, what: ReadFlags) {
+        if self.options.roots.iter().any(|root| root == directory) {
+            self.check_roots();
+        } else if what.intersects(ReadFlags::UNMOUNT | ReadFlags::IGNORED) {
+            self.due.push(directory);
+        }
+    }
+
+    fn directory_event(&mut self, path: &Path, what: ReadFlags) {
+        if is_ignored_directory(path) {
             return;
         }
-        if path.file_name().is_some_and(|name| name == IGNORE_FILE) {
-            return self.scan_all(false);
-        }
-        if self.options.roots.iter().any(|root| root == path) {
-            if matches!(
-                kind,
-                EventKind::Remove(_) | EventKind::Modify(ModifyKind::Name(_))
-            ) && !path.is_dir()
-            {
-                self.lose_root(path);
-            }
-            return;
-        }
-        match kind {
-            EventKind::Access(AccessKind::Close(AccessMode::Write))
-            | EventKind::Modify(ModifyKind::Name(
-                RenameMode::To | RenameMode::Both | RenameMode::Any,
-            )) => {
-                self.finished(path);
-            }
-            EventKind::Create(CreateKind::Folder) => self.scan_below(path),
-            EventKind::Remove(RemoveKind::Folder) => self.gone_below(path),
-            EventKind::Remove(_) | EventKind::Modify(ModifyKind::Name(RenameMode::From)) => {
-                self.finished(path);
-            }
-            EventKind::Create(_) | EventKind::Modify(_) | EventKind::Any | EventKind::Other => {
-                self.touched(path);
-            }
-            EventKind::Access(_) => {}
+        if what.intersects(ReadFlags::CREATE | ReadFlags::MOVED_TO) {
+            // Another one may have lain there.
+            self.tree.remove_below(path);
+            self.forget_rules_below(path);
+            self.due.push(path);
+        } else if what.intersects(ReadFlags::DELETE | ReadFlags::MOVED_FROM) {
+            self.gone(path);
+        } else if !self.tree.tells_of(path) {
+            // It may be read now.
+            self.due.push(path);
         }
     }
 
     /// Closed, renamed or removed: look at once.
     fn finished(&mut self, path: &Path) {
         self.settling.done(path);
-        if path.is_dir() && !path.is_symlink() {
-            return self.scan_below(path);
-        }
         if self.known.contains_key(path) || self.cares_about(path) {
             self.look(path);
-        } else if FileKind::of_path(path).is_none() && !path.exists() {
-            self.gone_below(path);
         }
         self.look_for_a_link(path);
     }
@@ -183,13 +258,21 @@ impl Looker {
         self.look_for_a_link(path);
     }
 
-    /// Whether a link came that hides a directory; one to a file is looked at as that file.
+    /// Whether a link came that hides a directory, or no longer does; one whose name promises a
+    /// file is looked at as that file.
     fn look_for_a_link(&mut self, path: &Path) {
-        if !path.is_symlink() || self.ignored(path, true) {
+        if !path.is_symlink() {
+            if self.unseen.contains_key(path) {
+                self.look(path);
+            }
+            return;
+        }
+        if self.ignored(path, false) || self.ignored(path, true) {
             return;
         }
         match look_at(path, &self.options.roots) {
             Sight::NoFile(what) if what.hides_more() => self.unseen(path, what.to_string()),
+            _ if FileKind::of_path(path).is_none() => self.seen_again(path),
             _ => {}
         }
     }
@@ -201,29 +284,5 @@ impl Looker {
     }
 }
 
-/// Whether somebody has only looked at the file, as the watcher itself does with a `.qcignore`.
-fn is_only_reading(kind: EventKind) -> bool {
-    matches!(kind, EventKind::Access(access) if access != AccessKind::Close(AccessMode::Write))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn reading_a_file_is_no_change_of_it() {
-        use AccessKind::{Close, Open, Read};
-        for access in [
-            Read,
-            Open(AccessMode::Any),
-            Open(AccessMode::Write),
-            Close(AccessMode::Read),
-        ] {
-            assert!(is_only_reading(EventKind::Access(access)), "{access:?}");
-        }
-        assert!(!is_only_reading(EventKind::Access(Close(
-            AccessMode::Write
-        ))));
-        assert!(!is_only_reading(EventKind::Create(CreateKind::File)));
-    }
-}
+/// Longer than anything runs; more cannot be added to every point in time.
+const A_YEAR: Duration = Duration::from_secs(365 * 86_400);

@@ -1,11 +1,15 @@
 //! Which files are looked at: the names that editors and copy tools leave behind are not, nor is
 //! what a `.qcignore` names (the grammar of `.gitignore`).
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::ffi::OsStr;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use ignore::gitignore::{Gitignore, GitignoreBuilder};
+use qcbus_disk::foreign;
+
+use super::tree::below;
 
 /// Name of the file in which a directory's owner says what is not to be checked.
 pub const IGNORE_FILE: &str = ".qcignore";
@@ -16,7 +20,7 @@ const SUFFIXES: [&str; 4] = ["~", ".tmp", ".part", ".swp"];
 #[derive(Debug)]
 pub struct IgnoreRules {
     root: PathBuf,
-    by_directory: HashMap<PathBuf, Option<Gitignore>>,
+    by_directory: BTreeMap<PathBuf, Option<Gitignore>>,
 }
 
 impl IgnoreRules {
@@ -24,7 +28,7 @@ impl IgnoreRules {
     pub fn new(root: &Path) -> IgnoreRules {
         IgnoreRules {
             root: root.to_path_buf(),
-            by_directory: HashMap::new(),
+            by_directory: BTreeMap::new(),
         }
     }
 
@@ -35,7 +39,10 @@ impl IgnoreRules {
 
     /// Forgets what was read in a directory and below it, because it came or went as a whole.
     pub fn forget_below(&mut self, directory: &Path) {
-        self.by_directory.retain(|at, _| !at.starts_with(directory));
+        let below = below(&self.by_directory, directory).map(|(at, _)| at.clone());
+        for at in below.collect::<Vec<_>>() {
+            self.by_directory.remove(&at);
+        }
     }
 
     /// Whether a path below the root is left alone.
@@ -54,11 +61,10 @@ impl IgnoreRules {
         // The nearest rule file that says anything decides.
         let mut directory = path.parent();
         while let Some(at) = directory.filter(|at| at.starts_with(&self.root)) {
-            let rules = self
-                .by_directory
-                .entry(at.to_path_buf())
-                .or_insert_with(|| read(at));
-            if let Some(rules) = rules {
+            if !self.by_directory.contains_key(at) {
+                self.by_directory.insert(at.to_path_buf(), read(at));
+            }
+            if let Some(Some(rules)) = self.by_directory.get(at) {
                 let matched = rules.matched_path_or_any_parents(path, is_dir);
                 if matched.is_ignore() {
                     return true;
@@ -80,20 +86,30 @@ pub fn is_ignored_file(name: &OsStr) -> bool {
 }
 
 /// Directories that hold no work of people: git's, and our own state.
-fn is_ignored_directory(path: &Path) -> bool {
+pub fn is_ignored_directory(path: &Path) -> bool {
     path.file_name()
         .is_some_and(|name| name == ".git" || name == ".qcbus")
 }
 
+/// People write these by hand.
+const MOST_OF_RULES: u64 = 1 << 20;
+
 fn read(directory: &Path) -> Option<Gitignore> {
     let file = directory.join(IGNORE_FILE);
-    if !file.is_file() {
-        return None;
-    }
+    let bytes = match foreign::read(&file, MOST_OF_RULES) {
+        Ok(bytes) => bytes,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return None,
+        Err(error) => {
+            tracing::warn!("{}: {error}", file.display());
+            return None;
+        }
+    };
     let mut builder = GitignoreBuilder::new(directory);
-    // A line that cannot be understood is passed over; the others count.
-    if let Some(error) = builder.add(&file) {
-        tracing::warn!("{}: {error}", file.display());
+    for line in String::from_utf8_lossy(&bytes).lines() {
+        // A line that cannot be understood is passed over; the others count.
+        if let Err(error) = builder.add_line(Some(file.clone()), line) {
+            tracing::warn!("{}: {error}", file.display());
+        }
     }
     builder.build().ok()
 }

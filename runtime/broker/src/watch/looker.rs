@@ -1,116 +1,157 @@
 //! The thread that looks: what it knows of every file, and what it tells.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Bound;
+use std::os::fd::{AsFd, OwnedFd};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
+use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 
-use notify::RecommendedWatcher;
 use qcbus_document::FileKind;
 use qcbus_messages::control::Unseen;
+use rustix::event::{PollFd, PollFlags, Timespec};
 
-use super::dependencies::{self, Changed, Dependencies, RealDirectories, events_tell};
+use super::dependencies::{self, Changed, Dependencies, events_tell};
+use super::due::Due;
 use super::ignore::IgnoreRules;
-use super::scan::{Scan, scan};
-use super::settle::{QUIET, Settling};
+use super::looking::Looking;
+use super::roots::Roots;
+use super::scan::{MORE_UNSEEN, MOST_UNSEEN};
+use super::settle::Settling;
 use super::sight::{Sight, look_at};
+use super::tree::{Tree, below};
 use super::{Order, Seen, WatchOptions};
 use crate::core::Stamp;
-use crate::stamp::{is_younger, stamp_of};
+use crate::stamp::stamp_of;
+
+/// How long directories are looked through before events and orders have their turn.
+const SLICE: Duration = Duration::from_millis(20);
+
+/// Links behind which is looked in every interval; of more, each has its turn.
+const LINKS_AT_ONCE: usize = 5_000;
 
 pub(super) struct Looker {
     pub options: WatchOptions,
     pub tell: Box<dyn FnMut(Seen) + Send>,
     pub rules: Vec<IgnoreRules>,
     /// What was last said of every file that is there.
-    pub known: HashMap<Arc<Path>, Stamp>,
+    pub known: BTreeMap<Arc<Path>, Stamp>,
     /// Symbolic links whose names promise a file: no event tells of what happens behind them.
-    links: BTreeSet<PathBuf>,
+    pub links: BTreeSet<PathBuf>,
+    /// The last of them that was looked behind.
+    last_link: Option<PathBuf>,
     /// What could not be looked at, and why; it has been said.
-    unseen: BTreeMap<PathBuf, String>,
+    pub unseen: BTreeMap<PathBuf, String>,
+    /// There is more of it than is said.
+    is_more_unseen: bool,
     pub settling: Settling,
     pub dependencies: Dependencies,
-    pub lost_roots: BTreeSet<PathBuf>,
-    pub polling: Option<Duration>,
-    pub watcher: Option<RecommendedWatcher>,
+    pub roots: Roots,
+    pub tree: Tree,
+    pub due: Due,
+    pub polling: super::events::Polling,
+    pub looking: Arc<Looking>,
 }
 
 impl Looker {
-    pub fn new(options: WatchOptions, tell: Box<dyn FnMut(Seen) + Send>) -> Looker {
+    pub fn new(
+        options: WatchOptions,
+        looking: Arc<Looking>,
+        tell: Box<dyn FnMut(Seen) + Send>,
+    ) -> Looker {
         let rules = options
             .roots
             .iter()
             .map(|root| IgnoreRules::new(root))
             .collect();
-        let polling = options.poll;
         Looker {
             options,
             tell,
             rules,
-            known: HashMap::new(),
+            known: BTreeMap::new(),
             links: BTreeSet::new(),
+            last_link: None,
             unseen: BTreeMap::new(),
+            is_more_unseen: false,
             settling: Settling::default(),
-            dependencies: Dependencies::default(),
-            lost_roots: BTreeSet::new(),
-            polling,
-            watcher: None,
+            dependencies: Dependencies::new(looking.clone()),
+            roots: Roots::default(),
+            tree: Tree::default(),
+            due: Due::new(Instant::now()),
+            polling: super::events::Polling::default(),
+            looking,
         }
     }
 
-    pub fn run(mut self, inbox: &Receiver<Order>, events: &Sender<Order>) {
-        self.watch(events);
-        self.scan_all(true);
-        (self.tell)(Seen::Scanned);
-        let mut next_scan = Instant::now() + self.scan_interval();
-        let mut next_dependencies = Instant::now() + dependencies::INTERVAL;
-        loop {
+    pub fn run(mut self, inbox: &Receiver<Order>, bell: &OwnedFd) {
+        self.ask_for_events();
+        self.check_roots();
+        self.begin_pass(true);
+        let mut next_look = Instant::now() + dependencies::INTERVAL;
+        while self.take_orders(inbox) {
+            self.take_events();
+            let stamp = |path: &Path| stamp_of(path).ok().flatten();
+            for path in self.settling.settled(Instant::now(), stamp) {
+                self.look(&path);
+            }
+            if Instant::now() >= next_look {
+                self.look_around();
+                next_look = Instant::now() + dependencies::INTERVAL;
+            }
             let now = Instant::now();
-            let due = self
-                .settling
-                .next_due()
-                .map_or(next_scan, |due| due.min(next_scan));
-            let due = due.min(next_dependencies);
-            match inbox.recv_timeout(due.saturating_duration_since(now)) {
-                Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => return,
+            if self.due.next_pass().is_some_and(|at| at <= now) {
+                self.begin_pass(false);
+            }
+            self.look_through_what_is_due(SLICE);
+            self.wait(bell, next_look);
+        }
+    }
+
+    /// What no event tells of.
+    fn look_around(&mut self) {
+        self.check_roots();
+        self.poll_what_is_not_watched();
+        self.look_at_dependencies();
+        self.look_behind_links();
+    }
+
+    /// `false`: it is over.
+    fn take_orders(&mut self, inbox: &Receiver<Order>) -> bool {
+        loop {
+            match inbox.try_recv() {
+                Ok(Order::Stop) | Err(TryRecvError::Disconnected) => return false,
                 Ok(Order::Depend(files)) => self.dependencies.add(files),
                 Ok(Order::Undepend(paths)) => self.dependencies.remove(&paths),
                 Ok(Order::Forget(path)) => self.forget(&path),
                 Ok(Order::Learn(path, stamp)) => drop(self.known.entry(path).or_insert(stamp)),
-                Ok(Order::Event(event)) => self.event(event),
-                Err(RecvTimeoutError::Timeout) => {}
-            }
-            let now = Instant::now();
-            // A directory may have gone since the next look was fixed.
-            next_scan = next_scan.min(now + self.scan_interval());
-            for path in self
-                .settling
-                .settled(now, |path| stamp_of(path).ok().flatten())
-            {
-                self.look(&path);
-            }
-            if now >= next_scan {
-                self.recover_roots(events);
-                self.scan_all(false);
-                next_scan = Instant::now() + self.scan_interval();
-            }
-            if now >= next_dependencies {
-                self.look_at_dependencies();
-                self.look_behind_links();
-                next_dependencies = Instant::now() + dependencies::INTERVAL;
+                Err(TryRecvError::Empty) => return true,
             }
         }
     }
 
-    fn scan_interval(&self) -> Duration {
-        let wish = self.polling.unwrap_or(self.options.rescan);
-        // A directory that has gone is looked for more often than all is looked through.
-        if self.lost_roots.is_empty() {
-            wish
+    /// Waits for events, orders, or the time to look again.
+    fn wait(&self, bell: &OwnedFd, next_look: Instant) {
+        let now = Instant::now();
+        let times = [self.settling.next_due(), self.due.next_pass()];
+        let until = times.into_iter().flatten().fold(next_look, Instant::min);
+        let idle = self.due.is_empty();
+        let rest = if idle {
+            until.saturating_duration_since(now)
         } else {
-            wish.min(Duration::from_secs(1))
+            Duration::ZERO
+        };
+        let timeout = Timespec::try_from(rest).unwrap_or_default();
+        let mut descriptors = vec![PollFd::new(bell, PollFlags::IN)];
+        let kernel = self.tree.descriptor();
+        descriptors.extend(kernel.map(|it| PollFd::from_borrowed_fd(it, PollFlags::IN)));
+        match rustix::event::poll(&mut descriptors, Some(&timeout)) {
+            Ok(_) | Err(rustix::io::Errno::INTR) => {}
+            // There is no other way to wait; that it does not spin is enough.
+            Err(_) => std::thread::sleep(rest.min(SLICE)),
         }
+        // Rung or not: what was ordered is looked for anyway.
+        let _ = rustix::io::read(bell.as_fd(), &mut [0_u8; 8]);
     }
 
     pub fn ignored(&mut self, path: &Path, is_dir: bool) -> bool {
@@ -121,25 +162,23 @@ impl Looker {
 
     /// Compares a path with what was last said of it, and says what is new.
     pub fn look(&mut self, path: &Path) {
-        if self.is_away(path) {
+        if self.roots.is_away(path) {
             return;
         }
-        let sight = look_at(path, &self.options.roots);
+        let looking = self.looking.clone();
+        let sight = looking.at(path, || look_at(path, &self.options.roots));
+        if sight == Sight::Nothing && self.is_root_gone(path) {
+            return;
+        }
         let is_checkable = FileKind::of_path(path).is_some() && !self.ignored(path, false);
-        if is_checkable && path.is_symlink() {
+        if is_checkable && path.is_symlink() && sight != Sight::Nothing {
             self.links.insert(path.to_path_buf());
         } else {
             self.links.remove(path);
         }
         let changed = self.dependencies.look(path);
         match sight {
-            Sight::File(stamp) if !is_checkable => {
-                self.seen_again(path);
-                if self.dependencies.contains(path) {
-                    (self.tell)(Seen::Touched(path.into(), stamp));
-                }
-                return;
-            }
+            Sight::File(stamp) if !is_checkable => return self.no_file_to_check(path, stamp),
             Sight::File(stamp) => {
                 self.seen_again(path);
                 let path: Arc<Path> = path.into();
@@ -161,19 +200,25 @@ impl Looker {
         }
     }
 
-    fn tell_changed(&mut self, (path, stamp): Changed) {
-        if stamp.is_none() && self.is_away(&path) {
+    /// It may have been one before somebody had it ignored, and others may depend on it.
+    fn no_file_to_check(&mut self, path: &Path, stamp: Stamp) {
+        self.seen_again(path);
+        if self.known.remove(path).is_some() {
+            (self.tell)(Seen::Vanished(path.into()));
+        }
+        if self.dependencies.contains(path) {
+            (self.tell)(Seen::Touched(path.into(), stamp));
+        }
+    }
+
+    pub fn tell_changed(&mut self, (path, stamp): Changed) {
+        if stamp.is_none() && self.roots.is_away(&path) {
             return;
         }
         (self.tell)(match stamp {
             Some(stamp) => Seen::Touched(path, stamp),
             None => Seen::Vanished(path),
         });
-    }
-
-    /// What lies in a watched directory that has gone as a whole is kept until it is back.
-    fn is_away(&self, path: &Path) -> bool {
-        self.lost_roots.iter().any(|root| path.starts_with(root))
     }
 
     /// The broker found a file gone, of which no event told, and knows nothing of it any more.
@@ -183,178 +228,77 @@ impl Looker {
         }
     }
 
-    /// What was said of the files below may not count any more: the next scan says it again.
+    /// What was said of the files below may not count any more: the next look says it again.
     pub fn tell_again_below(&mut self, directory: &Path) {
-        let below = self
-            .known
-            .iter_mut()
-            .filter(|(path, _)| path.starts_with(directory));
-        below.for_each(|(_, stamp)| *stamp = Stamp::default());
+        let below: Vec<Arc<Path>> = below(&self.known, directory)
+            .map(|(path, _)| path.clone())
+            .collect();
+        for path in below {
+            self.known.insert(path, Stamp::default());
+        }
     }
 
-    /// Says that something cannot be looked at, once.
+    /// Says that something cannot be looked at, once; of too many things no more than the first.
     pub fn unseen(&mut self, path: &Path, why: String) {
-        let before = self.unseen.insert(path.to_path_buf(), why.clone());
-        if before.as_ref() != Some(&why) {
-            let path = path.to_path_buf();
+        if self.unseen.get(path) == Some(&why) {
+            return;
+        }
+        let path = path.to_path_buf();
+        if self.unseen.len() < MOST_UNSEEN || self.unseen.contains_key(&path) {
+            self.unseen.insert(path.clone(), why.clone());
+            (self.tell)(Seen::Unseen(Unseen { path, why }));
+        } else if !self.is_more_unseen {
+            self.is_more_unseen = true;
+            let (path, why) = (self.options.roots[0].clone(), MORE_UNSEEN.to_owned());
             (self.tell)(Seen::Unseen(Unseen { path, why }));
         }
     }
 
-    fn seen_again(&mut self, path: &Path) {
+    pub fn seen_again(&mut self, path: &Path) {
         if self.unseen.remove(path).is_some() {
             (self.tell)(Seen::SeenAgain(path.to_path_buf()));
         }
     }
 
-    /// A directory came as a whole, or what is in it is not known for another reason.
-    pub fn scan_below(&mut self, directory: &Path) {
-        self.forget_rules_below(directory);
-        for index in 0..self.rules.len() {
-            if !directory.starts_with(&self.options.roots[index])
-                || self.rules[index].ignores(directory, true)
-            {
-                continue;
-            }
-            let found = self.scan(directory, index);
-            for (path, stamp) in found.files {
-                if self.known.get(path.as_path()) != Some(&stamp) {
-                    self.settling.seen(&path, stamp, Instant::now());
-                }
-            }
-            for it in found.unseen {
-                self.unseen(&it.path, it.why);
-            }
+    /// After a look through everything with which all that is unseen has been named.
+    pub fn is_all_unseen_said(&mut self) {
+        if self.is_more_unseen && self.unseen.len() < MOST_UNSEEN {
+            self.is_more_unseen = false;
+            (self.tell)(Seen::SeenAgain(self.options.roots[0].clone()));
         }
-        self.look_at_dependencies_below(directory);
-    }
-
-    fn scan(&mut self, directory: &Path, index: usize) -> Scan {
-        let found = scan(directory, &self.options.roots, &mut self.rules[index]);
-        self.links.extend(found.links.iter().cloned());
-        found
-    }
-
-    fn forget_rules_below(&mut self, directory: &Path) {
-        for rules in &mut self.rules {
-            rules.forget_below(directory);
-        }
-    }
-
-    /// A directory went as a whole.
-    pub fn gone_below(&mut self, directory: &Path) {
-        self.forget_rules_below(directory);
-        let below = |path: &&Path| path.starts_with(directory);
-        let known = self.known.keys().map(|path| &**path).filter(below);
-        let unseen = self.unseen.keys().map(PathBuf::as_path).filter(below);
-        let gone: BTreeSet<PathBuf> = known.chain(unseen).map(Path::to_path_buf).collect();
-        for path in gone {
-            self.look(&path);
-        }
-        self.look_at_dependencies_below(directory);
-    }
-
-    fn look_at_dependencies_below(&mut self, directory: &Path) {
-        for path in self.dependencies.below(directory) {
-            // What is checked itself has been looked at as such.
-            if !self.known.contains_key(&path)
-                && let Some(changed) = self.dependencies.look(&path)
-            {
-                self.tell_changed(changed);
-            }
-        }
-    }
-
-    /// Looks through everything. What is new since the last look may still be written to, unless
-    /// this is the first look and it is older than the quiet time.
-    pub fn scan_all(&mut self, first: bool) {
-        // Events may have been lost, those of rule files, too.
-        self.rules.iter_mut().for_each(IgnoreRules::forget);
-        let (mut present, mut unseen) = (BTreeSet::new(), BTreeSet::new());
-        for index in 0..self.options.roots.len() {
-            let root = self.options.roots[index].clone();
-            if !root.is_dir() {
-                self.lose_root(&root);
-                let below = |path: &&Arc<Path>| path.starts_with(&root);
-                present.extend(self.known.keys().filter(below).cloned());
-                unseen.extend(
-                    self.unseen
-                        .keys()
-                        .filter(|it| it.starts_with(&root))
-                        .cloned(),
-                );
-                continue;
-            }
-            let found = self.scan(&root, index);
-            for it in found.unseen {
-                self.unseen(&it.path, it.why);
-                unseen.insert(it.path);
-            }
-            for (path, stamp) in found.files {
-                present.insert(Arc::from(path.as_path()));
-                self.seen_in_scan(&path, stamp, first);
-            }
-        }
-        self.drop_what_is_gone(&present);
-        let seen = self.unseen.keys().filter(|path| !unseen.contains(*path));
-        for path in seen.cloned().collect::<Vec<_>>() {
-            self.seen_again(&path);
-        }
-    }
-
-    fn drop_what_is_gone(&mut self, present: &BTreeSet<Arc<Path>>) {
-        let missed = self.known.keys().filter(|path| !present.contains(*path));
-        let mut real = RealDirectories::default();
-        for path in missed.cloned().collect::<Vec<_>>() {
-            // One that cannot be looked at may still be there, but not behind a link to a directory.
-            let is_gone = matches!(stamp_of(&path), Ok(None)) || real.is_behind_a_link(&path);
-            if is_gone || self.ignored(&path, false) {
-                self.known.remove(&path);
-                (self.tell)(Seen::Vanished(path));
-            }
-        }
-    }
-
-    fn seen_in_scan(&mut self, path: &Path, stamp: Stamp, first: bool) {
-        if self.known.get(path) == Some(&stamp) {
-            return;
-        }
-        if first && !is_younger(stamp, QUIET) {
-            let path: Arc<Path> = path.into();
-            self.known.insert(path.clone(), stamp);
-            (self.tell)(Seen::Settled(path, stamp));
-            return;
-        }
-        if first {
-            // Or what is remembered of it would be taken back when the scan is over.
-            (self.tell)(Seen::Present(path.into()));
-            // And should it go before it has settled, that is told.
-            self.known.insert(path.into(), Stamp::default());
-        }
-        self.settling.seen(path, stamp, Instant::now());
     }
 
     pub fn look_at_dependencies(&mut self) {
-        let is_watched =
-            |root: &&PathBuf| self.watcher.is_some() && !self.lost_roots.contains(*root);
-        let roots: Vec<PathBuf> = self
-            .options
-            .roots
-            .iter()
-            .filter(is_watched)
-            .cloned()
-            .collect();
-        let mut real = RealDirectories::default();
-        let tells = |path: &Path| events_tell(path, &roots, &mut real);
-        for changed in self.dependencies.changed(tells) {
+        let Looker {
+            tree,
+            dependencies,
+            roots,
+            ..
+        } = self;
+        let tells = |path: &Path| {
+            let directory = path.parent();
+            let told = directory.is_some_and(|it| tree.tells_of(it) && !roots.is_away(it));
+            told && events_tell(path)
+        };
+        for changed in dependencies.changed(tells) {
             self.tell_changed(changed);
         }
     }
 
     /// What lies behind a link changes without an event of the link.
     pub fn look_behind_links(&mut self) {
-        for path in self.links.iter().cloned().collect::<Vec<_>>() {
-            match look_at(&path, &self.options.roots) {
+        let begin = self
+            .last_link
+            .take()
+            .map_or(Bound::Unbounded, Bound::Excluded);
+        let rest = self.links.range((begin, Bound::Unbounded));
+        let turn: Vec<PathBuf> = rest.take(LINKS_AT_ONCE).cloned().collect();
+        if turn.len() == LINKS_AT_ONCE {
+            self.last_link = turn.last().cloned();
+        }
+        for path in turn {
+            let looking = self.looking.clone();
+            match looking.at(&path, || look_at(&path, &self.options.roots)) {
                 Sight::File(stamp) if self.known.get(path.as_path()) == Some(&stamp) => {}
                 // It may still be written to.
                 Sight::File(stamp) => self.settling.seen(&path, stamp, Instant::now()),

@@ -1,19 +1,27 @@
 //! Watching directories: events from the kernel where they can be had, looking around at
 //! intervals where they cannot, and both with the same outcome.
 //!
-//! The raw watcher of `notify` is used, not its debouncer: a debouncer holds every event back for
-//! its whole window, and a file that was closed or renamed into place is to be checked at once.
+//! One thread looks, and takes the events itself: the kernel keeps those that wait, as many as it
+//! likes, and not the broker. Every directory is watched by itself and looked through right after, so
+//! that one that has just come is seen as a whole, and one that cannot be watched costs itself.
+//! Symbolic links to directories are never followed.
 
 mod dependencies;
+mod due;
 mod events;
 mod ignore;
 mod looker;
+mod looking;
+mod roots;
 mod scan;
 mod settle;
 mod sight;
 #[cfg(test)]
 mod tests;
+mod through;
+mod tree;
 
+use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Sender, channel};
@@ -21,18 +29,21 @@ use std::time::Duration;
 
 use qcbus_document::FileKind;
 use qcbus_messages::control::Unseen;
+use rustix::event::EventfdFlags;
 
 use self::ignore::IgnoreRules;
 use self::looker::Looker;
 use self::scan::scan;
 use crate::core::Stamp;
 
+pub use self::looking::Looking;
 pub use self::scan::Scan;
+pub use self::sight::is_behind_a_link;
 
 /// Every checkable file below a directory, once. `roots` are all the directories that are looked
-/// at, without symbolic links.
-pub fn scan_directory(directory: &Path, roots: &[PathBuf]) -> Scan {
-    scan(directory, roots, &mut IgnoreRules::new(directory))
+/// at, without symbolic links; `looking` says where the look is.
+pub fn scan_directory(directory: &Path, roots: &[PathBuf], looking: &Looking) -> Scan {
+    scan(directory, roots, &mut IgnoreRules::new(directory), looking)
 }
 
 /// Whether a file below one of the roots is ignored, by its name or a `.qcignore`.
@@ -47,15 +58,10 @@ pub fn is_left_alone(roots: &[PathBuf], file: &Path) -> bool {
 /// Whether a file is one that a look through the roots finds: of a kind that is checked, not
 /// ignored, and not behind a link to a directory.
 pub fn is_looked_at(roots: &[PathBuf], file: &Path) -> bool {
-    let reached = |root: &PathBuf| {
-        let directories = file
-            .ancestors()
-            .skip(1)
-            .take_while(|it| it.starts_with(root));
-        let mut below = directories.filter(|it| it != root);
-        file.starts_with(root) && !below.any(Path::is_symlink)
-    };
-    FileKind::of_path(file).is_some() && roots.iter().any(reached) && !is_left_alone(roots, file)
+    FileKind::of_path(file).is_some()
+        && roots.iter().any(|root| file.starts_with(root))
+        && !is_behind_a_link(file, roots)
+        && !is_left_alone(roots, file)
 }
 
 /// What the watcher has to say.
@@ -96,6 +102,8 @@ pub struct WatchOptions {
 #[derive(Debug)]
 pub struct Watcher {
     orders: Sender<Order>,
+    /// Wakes the thread that waits for events.
+    bell: Arc<OwnedFd>,
 }
 
 enum Order {
@@ -103,56 +111,62 @@ enum Order {
     Undepend(Vec<Arc<Path>>),
     Forget(Arc<Path>),
     Learn(Arc<Path>, Stamp),
-    Event(notify::Result<notify::Event>),
     Stop,
 }
 
 impl Drop for Watcher {
     fn drop(&mut self) {
-        // The thread may have ended already; then there is nobody to tell.
-        let _ = self.orders.send(Order::Stop);
+        self.order(Order::Stop);
     }
 }
 
 impl Watcher {
-    /// Starts watching on a thread of its own; `tell` is called from there.
+    /// Starts watching on a thread of its own; `tell` is called from there, and `looking`
+    /// says where it looks.
     ///
     /// # Errors
-    /// When no thread can be started.
+    /// When no thread can be started, or there is no descriptor left to wake it.
     pub fn start(
         options: WatchOptions,
+        looking: Arc<Looking>,
         tell: impl FnMut(Seen) + Send + 'static,
     ) -> std::io::Result<Watcher> {
         let (orders, inbox) = channel();
-        let events = orders.clone();
+        let flags = EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK;
+        let bell = Arc::new(rustix::event::eventfd(0, flags)?);
+        let looker = Looker::new(options, looking, Box::new(tell));
+        let rung = bell.clone();
         std::thread::Builder::new()
             .name("watch".to_owned())
-            .spawn(move || Looker::new(options, Box::new(tell)).run(&inbox, &events))?;
-        Ok(Watcher { orders })
+            .spawn(move || looker.run(&inbox, &rung))?;
+        Ok(Watcher { orders, bell })
+    }
+
+    fn order(&self, order: Order) {
+        // The thread only ends when this is dropped.
+        let _ = self.orders.send(order);
+        // A bell that has rung too often for one more has been heard.
+        let _ = rustix::io::write(&self.bell, &1_u64.to_ne_bytes());
     }
 
     /// Keeps an eye on files on which verdicts depend, wherever they are.
     /// A change since the given stamp is told like any other.
     pub fn depend(&self, files: Vec<(Arc<Path>, Option<Stamp>)>) {
-        // The thread only ends when this is dropped.
-        let _ = self.orders.send(Order::Depend(files));
+        self.order(Order::Depend(files));
     }
 
     /// The broker has let go of a file that it found gone. Should it be there again, that is told.
     pub fn forget(&self, path: Arc<Path>) {
-        // The thread only ends when this is dropped.
-        let _ = self.orders.send(Order::Forget(path));
+        self.order(Order::Forget(path));
     }
 
     /// The broker has heard of a file from somebody else: when it goes, that is told.
     pub fn learn(&self, path: Arc<Path>, stamp: Stamp) {
-        // The thread only ends when this is dropped.
-        let _ = self.orders.send(Order::Learn(path, stamp));
+        self.order(Order::Learn(path, stamp));
     }
 
     /// Lets go of files on which no verdict depends any more.
     pub fn undepend(&self, paths: Vec<Arc<Path>>) {
-        // The thread only ends when this is dropped.
-        let _ = self.orders.send(Order::Undepend(paths));
+        self.order(Order::Undepend(paths));
     }
 }

@@ -1,100 +1,220 @@
-//! Looking through a whole directory.
+//! Looking through directories.
 
+use std::collections::VecDeque;
+use std::ffi::OsStr;
 use std::io;
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
 use qcbus_document::FileKind;
 use qcbus_messages::control::Unseen;
+use rustix::fs::{AtFlags, Dir, FileType};
 
-use super::ignore::IgnoreRules;
-use super::sight::{Sight, look_at};
+use super::ignore::{IgnoreRules, is_ignored_directory};
+use super::looking::Looking;
+use super::sight::{Sight, look_at, open_directory};
 use crate::core::Stamp;
-use crate::stamp::from_metadata;
+use crate::stamp::from_statat;
+
+/// Directories in each other that are looked into, from a root on: more than people make, and few
+/// enough for a path to name what lies there.
+pub const DEEPEST: usize = 128;
+
+/// Directories that are looked into in all.
+pub const MOST_DIRECTORIES: usize = 500_000;
+
+/// Things that cannot be looked at and are named, each by itself.
+pub const MOST_UNSEEN: usize = 1_000;
+
+/// What is said in place of all others.
+pub const MORE_UNSEEN: &str =
+    "more than a thousand things below cannot be looked at; the first of them are named";
 
 /// What a scan saw.
 #[derive(Debug, Default)]
 pub struct Scan {
     /// Files to check, in the order of their paths; a symbolic link to a file is one.
     pub files: Vec<(PathBuf, Stamp)>,
-    /// Symbolic links whose names promise a file to check, whatever lies behind them.
-    pub links: Vec<PathBuf>,
-    /// What could not be looked at.
+    /// What could not be looked at; of too many the first, and one that stands for the rest.
     pub unseen: Vec<Unseen>,
 }
 
 /// Every checkable file below `directory`. Symbolic links to directories are not followed: one
 /// that leads to where is looked anyway adds nothing, any other is said to be unseen. `roots` are
 /// all the directories that are looked at.
-pub fn scan(directory: &Path, roots: &[PathBuf], rules: &mut IgnoreRules) -> Scan {
+pub fn scan(
+    directory: &Path,
+    roots: &[PathBuf],
+    rules: &mut IgnoreRules,
+    looking: &Looking,
+) -> Scan {
     let mut scan = Scan::default();
-    let mut directories = vec![directory.to_path_buf()];
-    while let Some(directory) = directories.pop() {
-        let entries = match std::fs::read_dir(&directory) {
-            Ok(entries) => entries,
-            Err(error) => {
-                scan.unseen_directory(directory, &error);
-                continue;
-            }
-        };
-        for entry in entries {
-            match entry {
-                Ok(entry) => directories.extend(scan.entry(&entry, roots, rules)),
-                Err(error) => scan.unseen_directory(directory.clone(), &error),
-            }
+    let mut directories = VecDeque::from([directory.to_path_buf()]);
+    let mut number = 0;
+    while let Some(at) = directories.pop_front() {
+        number += 1;
+        if let Some(why) = is_too_much(&at, roots, number) {
+            scan.unseen.push(Unseen { path: at, why });
+            continue;
         }
+        let mut ignores = |path: &Path, is_dir| rules.ignores(path, is_dir);
+        let found = looking.at(&at, || list(&at, roots, &mut ignores));
+        let mut inner = found.directories;
+        inner.retain(|it| !rules.ignores(it, true));
+        directories.extend(inner);
+        scan.files.extend(found.files);
+        let why = found.broken.and_then(|error| cannot_look_into(&error));
+        let broken = why.map(|why| Unseen { path: at, why });
+        scan.unseen.extend(found.unseen.into_iter().chain(broken));
+        scan.unseen.truncate(MOST_UNSEEN + 1);
+    }
+    if let Some(one_too_many) = scan.unseen.get_mut(MOST_UNSEEN) {
+        let (path, why) = (directory.to_path_buf(), MORE_UNSEEN.to_owned());
+        *one_too_many = Unseen { path, why };
     }
     scan.files.sort();
     scan
 }
 
-impl Scan {
-    /// One entry; a directory that is to be looked into is returned.
-    fn entry(
+/// Why a directory is not looked into that could be; `number` is how many there are with it.
+pub fn is_too_much(directory: &Path, roots: &[PathBuf], number: usize) -> Option<String> {
+    let inside = roots
+        .iter()
+        .filter_map(|root| directory.strip_prefix(root).ok());
+    let depth = inside.map(|below| below.components().count()).min();
+    if depth.is_some_and(|depth| depth > DEEPEST) {
+        Some(format!(
+            "it lies more than {DEEPEST} directories deep, and such are not looked into"
+        ))
+    } else if number > MOST_DIRECTORIES {
+        Some(format!(
+            "there are more than {MOST_DIRECTORIES} directories, and no more are looked into"
+        ))
+    } else {
+        None
+    }
+}
+
+/// What is to be said of a directory that cannot be read. One that was removed since its name was
+/// read, or has become a link, holds nothing.
+pub fn cannot_look_into(error: &io::Error) -> Option<String> {
+    let is_gone = matches!(
+        error.kind(),
+        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory
+    );
+    let is_link = error.raw_os_error() == Some(libc::ELOOP);
+    (!is_gone && !is_link).then(|| format!("cannot look into this directory: {error}"))
+}
+
+/// What lies in one directory.
+#[derive(Debug, Default)]
+pub struct Listing {
+    /// Files to check, in the order of their names.
+    pub files: Vec<(PathBuf, Stamp)>,
+    /// Symbolic links whose names promise a file to check, whatever lies behind them.
+    pub links: Vec<PathBuf>,
+    /// Directories to look into, ignored ones, too.
+    pub directories: Vec<PathBuf>,
+    /// What could not be looked at.
+    pub unseen: Vec<Unseen>,
+    /// Why there may be more.
+    pub broken: Option<io::Error>,
+}
+
+/// Looks through one directory, and through none to which its path has become a link.
+pub fn list(
+    directory: &Path,
+    roots: &[PathBuf],
+    ignores: &mut impl FnMut(&Path, bool) -> bool,
+) -> Listing {
+    let mut listing = Listing::default();
+    match open_directory(directory, roots).and_then(|opened| Ok(Dir::new(opened)?)) {
+        Ok(mut opened) => listing.read(directory, &mut opened, roots, ignores),
+        Err(error) => listing.broken = Some(error),
+    }
+    listing.files.sort();
+    listing
+}
+
+impl Listing {
+    fn read(
         &mut self,
-        entry: &std::fs::DirEntry,
+        directory: &Path,
+        opened: &mut Dir,
         roots: &[PathBuf],
-        rules: &mut IgnoreRules,
-    ) -> Option<PathBuf> {
-        let path = entry.path();
-        let kind = entry.file_type().ok();
-        if rules.ignores(&path, kind.is_some_and(|kind| kind.is_dir())) {
-            return None;
-        }
-        let is_checkable = FileKind::of_path(&path).is_some();
-        match kind {
-            Some(kind) if kind.is_dir() => return Some(path),
-            // Most entries of most directories; nothing more is asked about them.
-            Some(kind) if kind.is_file() && !is_checkable => return None,
-            Some(kind) if kind.is_file() => {
-                if let Ok(data) = entry.metadata() {
-                    self.files.push((path, from_metadata(&data)));
-                    return None;
+        ignores: &mut impl FnMut(&Path, bool) -> bool,
+    ) {
+        while let Some(entry) = opened.read() {
+            let entry = match entry {
+                Ok(entry) => entry,
+                Err(error) => {
+                    self.broken = Some(error.into());
+                    return;
                 }
+            };
+            let name = OsStr::from_bytes(entry.file_name().to_bytes());
+            if name == "." || name == ".." {
+                continue;
             }
-            Some(kind) if kind.is_symlink() && is_checkable => self.links.push(path.clone()),
-            _ => {}
+            let path = directory.join(name);
+            let is_checkable = FileKind::of_path(&path).is_some();
+            match entry.file_type() {
+                // Most entries of most directories; nothing more is asked about them.
+                FileType::RegularFile if !is_checkable => {}
+                FileType::RegularFile => {
+                    let data = opened.fd().and_then(|fd| {
+                        rustix::fs::statat(fd, entry.file_name(), AtFlags::SYMLINK_NOFOLLOW)
+                    });
+                    match data {
+                        Ok(data) if FileType::from_raw_mode(data.st_mode).is_file() => {
+                            self.file(path, from_statat(&data), ignores);
+                        }
+                        // It has become another thing since.
+                        _ => self.other(path, is_checkable, roots, ignores),
+                    }
+                }
+                FileType::Directory => self.directory(path),
+                _ => self.other(path, is_checkable, roots, ignores),
+            }
+        }
+    }
+
+    fn file(&mut self, path: PathBuf, stamp: Stamp, ignores: &mut impl FnMut(&Path, bool) -> bool) {
+        if !ignores(&path, false) {
+            self.files.push((path, stamp));
+        }
+    }
+
+    fn directory(&mut self, path: PathBuf) {
+        if !is_ignored_directory(&path) {
+            self.directories.push(path);
+        }
+    }
+
+    /// A link, or something of which only a look at it tells what it is.
+    fn other(
+        &mut self,
+        path: PathBuf,
+        is_checkable: bool,
+        roots: &[PathBuf],
+        ignores: &mut impl FnMut(&Path, bool) -> bool,
+    ) {
+        // What ends in a slash in a `.qcignore` is meant for a directory behind a link, too.
+        if ignores(&path, false) || ignores(&path, true) {
+            return;
+        }
+        if is_checkable {
+            self.links.push(path.clone());
         }
         match look_at(&path, roots) {
-            Sight::Directory => return Some(path),
+            Sight::Directory => self.directory(path),
             Sight::File(stamp) if is_checkable => self.files.push((path, stamp)),
             Sight::NoFile(what) if is_checkable || what.hides_more() => {
-                // What ends in a slash in a `.qcignore` is meant for a directory behind a link, too.
-                if !rules.ignores(&path, true) {
-                    let why = what.to_string();
-                    self.unseen.push(Unseen { path, why });
-                }
+                let why = what.to_string();
+                self.unseen.push(Unseen { path, why });
             }
             Sight::Hidden(why) => self.unseen.push(Unseen { path, why }),
             Sight::File(_) | Sight::Known | Sight::Nothing | Sight::NoFile(_) => {}
-        }
-        None
-    }
-
-    fn unseen_directory(&mut self, path: PathBuf, error: &io::Error) {
-        // One that was removed since its name was read holds nothing.
-        if error.kind() != io::ErrorKind::NotFound {
-            let why = format!("cannot look into this directory: {error}");
-            self.unseen.push(Unseen { path, why });
         }
     }
 }

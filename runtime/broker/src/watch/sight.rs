@@ -1,7 +1,11 @@
 //! What lies at a path: a file, perhaps behind a symbolic link, or why there is none to be seen.
 
 use std::io;
+use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
+
+use rustix::fs::{CWD, Mode, OFlags, ResolveFlags};
+use rustix::io::Errno;
 
 use crate::core::Stamp;
 use crate::stamp::from_metadata;
@@ -66,8 +70,18 @@ impl std::fmt::Display for NoFile {
     }
 }
 
-/// Looks at a path. `roots` are the directories that are looked at, without symbolic links.
+/// Looks at a path. `roots` are the directories that are looked at, without symbolic links. What lies
+/// behind a symbolic link to a directory is not looked at: there is nothing.
 pub fn look_at(path: &Path, roots: &[PathBuf]) -> Sight {
+    if is_behind_a_link(path, roots) {
+        return match std::fs::metadata(path) {
+            // Of what is behind a link to itself nobody knows whether it has gone.
+            Err(error) if !is_absent(&error) => {
+                Sight::Hidden(format!("cannot look at it: {error}"))
+            }
+            _ => Sight::Nothing,
+        };
+    }
     match std::fs::symlink_metadata(path) {
         Ok(data) if data.is_file() => Sight::File(from_metadata(&data)),
         Ok(data) if data.is_dir() => Sight::Directory,
@@ -95,6 +109,64 @@ fn behind(link: &Path, roots: &[PathBuf]) -> Sight {
         Err(error) if error.raw_os_error() == Some(libc::ELOOP) => Sight::NoFile(NoFile::Loop),
         Err(error) => Sight::Hidden(format!("cannot look behind this link: {error}")),
     }
+}
+
+/// Whether a path below a root leads through a symbolic link to a directory. What lies there is not
+/// looked at under this path.
+pub fn is_behind_a_link(path: &Path, roots: &[PathBuf]) -> bool {
+    let Some(directory) = path.parent() else {
+        return false;
+    };
+    let mut inside = roots
+        .iter()
+        .filter(|root| directory.starts_with(root))
+        .peekable();
+    inside.peek().is_some()
+        && inside.all(|root| {
+            let opened = open_below(root, directory, OFlags::PATH);
+            opened.is_err_and(|error| error.raw_os_error() == Some(libc::ELOOP))
+        })
+}
+
+/// Opens a directory to read it, if no symbolic link leads there from its root.
+///
+/// # Errors
+/// What the system says; `ELOOP` when there is a link on the way.
+pub fn open_directory(directory: &Path, roots: &[PathBuf]) -> io::Result<OwnedFd> {
+    let inside = roots.iter().filter(|root| directory.starts_with(root));
+    // The nearest one: fewer links can lie between.
+    match inside.max_by_key(|root| root.as_os_str().len()) {
+        Some(root) => open_below(root, directory, OFlags::RDONLY),
+        None => open_below(directory, directory, OFlags::RDONLY),
+    }
+}
+
+fn open_below(root: &Path, directory: &Path, how: OFlags) -> io::Result<OwnedFd> {
+    let how = how | OFlags::DIRECTORY | OFlags::CLOEXEC;
+    let below = directory.strip_prefix(root).unwrap_or(directory);
+    if below.as_os_str().is_empty() {
+        return Ok(rustix::fs::openat(CWD, root, how, Mode::empty())?);
+    }
+    let top = OFlags::PATH | OFlags::DIRECTORY | OFlags::CLOEXEC;
+    let top = rustix::fs::openat(CWD, root, top, Mode::empty())?;
+    let no_links = ResolveFlags::NO_SYMLINKS | ResolveFlags::NO_MAGICLINKS;
+    match rustix::fs::openat2(&top, below, how, Mode::empty(), no_links) {
+        // A kernel before 5.6, or a container that does not know of this call.
+        Err(Errno::NOSYS | Errno::PERM) if has_link(root, directory) => Err(Errno::LOOP.into()),
+        Err(Errno::NOSYS | Errno::PERM) => Ok(rustix::fs::openat(
+            &top,
+            below,
+            how | OFlags::NOFOLLOW,
+            Mode::empty(),
+        )?),
+        opened => Ok(opened?),
+    }
+}
+
+fn has_link(root: &Path, directory: &Path) -> bool {
+    let below = directory.ancestors().take_while(|it| *it != root);
+    let mut below = below.filter(|it| it.starts_with(root));
+    below.any(Path::is_symlink)
 }
 
 fn is_absent(error: &io::Error) -> bool {
@@ -143,6 +215,22 @@ mod tests {
         assert_eq!(null, Sight::NoFile(NoFile::Special));
         assert_eq!(look_at(&root.join("maps"), &roots), Sight::Directory);
         assert_eq!(look_at(&root.join("none"), &roots), Sight::Nothing);
+        // What lies behind a link to a directory has another path, or is nobody's to look at.
+        std::fs::write(root.join("maps/c.xodr"), "").unwrap();
+        assert!(matches!(
+            look_at(&root.join("maps/c.xodr"), &roots),
+            Sight::File(_)
+        ));
+        for link in ["inner/c.xodr", "outer/a.xodr"] {
+            assert_eq!(look_at(&root.join(link), &roots), Sight::Nothing);
+            assert!(is_behind_a_link(&root.join(link), &roots));
+        }
+        assert!(open_directory(&root.join("maps"), &roots).is_ok());
+        for link in ["inner", "outer"] {
+            assert!(open_directory(&root.join(link), &roots).is_err());
+            assert!(has_link(&root, &root.join(link)));
+        }
+        assert!(!has_link(&root, &root.join("maps")));
         // What lies below a link that leads nowhere may be there.
         let below = look_at(&root.join("self/c.xodr"), &roots);
         assert!(matches!(below, Sight::Hidden(_)), "{below:?}");

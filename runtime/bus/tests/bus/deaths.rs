@@ -7,7 +7,7 @@ use qcbus_messages::{FromPeer, ToPeer};
 
 use crate::helper::{Helper, job_with};
 use crate::support::{
-    Site, files_of, identity_of, join, join_with, numbered_job, run, shared_memory_named,
+    Site, WATCHDOG, files_of, identity_of, join, join_with, numbered_job, run, shared_memory_named,
     shared_memory_of, watched, welcome,
 };
 
@@ -37,7 +37,7 @@ fn a_killed_peer_is_gone_and_leaves_nothing() {
         let identity = identity_of(&site.instance);
         let helper = Helper::start("answers_jobs", &site.instance);
         let id = loop {
-            if let HostEvent::Hello { peer, hello } = host.next().await {
+            if let HostEvent::Hello { peer, hello, .. } = host.next().await {
                 assert_eq!(hello.pid, helper.pid());
                 let welcome = welcome(&host);
                 host.accept(peer, &welcome);
@@ -149,6 +149,8 @@ fn without_a_new_broker_a_peer_gives_up() {
         let site = Site::new();
         let mut host = site.host();
         let options = PeerOptions {
+            // A busy machine may take its time to join.
+            patience: WATCHDOG,
             grace: Duration::from_millis(100),
             ..PeerOptions::default()
         };

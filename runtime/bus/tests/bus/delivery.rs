@@ -207,11 +207,13 @@ fn a_process_has_one_session_at_a_time() {
         let site = Site::new();
         let mut host = site.host();
         let (id, mut peer) = join(&mut host, &site, "returner").await;
-        // The peer loses its session without a word, while the broker still has it: the file
-        // that names the generation is away for as long as the peer takes to notice.
+        // The peer loses its session without a word, while the broker still has it: the file that names
+        // the generation names a dead broker for as long as the peer takes to notice.
         let current = site.instance.dir().join("current");
-        let text = std::fs::read(&current).unwrap();
-        std::fs::remove_file(&current).unwrap();
+        let text = std::fs::read_to_string(&current).unwrap();
+        let dead = text.replace("\"pid_started\":", "\"pid_started\":1");
+        assert_ne!(dead, text);
+        std::fs::write(&current, &dead).unwrap();
         let mut gone = false;
         let mut looked = 0;
         loop {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
+use std::os::unix::fs::FileExt;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
@@ -127,9 +128,13 @@ fn other_process() {
             "holds_documents" => holds_documents(&instance).await,
             "reads_and_weighs_itself" => reads_and_weighs_itself(&instance).await,
             "lives_in_a_small_memory" => lives_in_a_small_memory(&instance).await,
+            "speaks_in_a_full_memory" => speaks_in_a_full_memory(&instance).await,
+            "asks_for_too_much" => asks_for_too_much(&instance),
+            "many_take_at_once" => many_take_at_once(&instance),
             "answers_jobs" => answers_jobs(&instance).await,
             "writes_into_a_document" => writes_into_a_document(&instance).await,
             "serves" => serves(&instance).await,
+            "rewrites_images" => rewrite_images(&instance),
             other => panic!("no role {other}"),
         }
     });
@@ -216,6 +221,121 @@ async fn lives_in_a_small_memory(instance: &Instance) {
     say(&format!("40 documents, {} refusals", refused.min(1)));
 }
 
+/// Takes all that is left of the shared memory, to the last page, as somebody else may.
+fn fill_memory() -> std::path::PathBuf {
+    let path = std::path::PathBuf::from("/dev/shm/filler");
+    let filler = std::fs::File::create(&path).unwrap();
+    let mut had = 0;
+    for step in [1 << 20, 4096] {
+        let none = rustix::fs::FallocateFlags::empty();
+        while rustix::fs::fallocate(&filler, none, had, step).is_ok() {
+            had += step;
+        }
+    }
+    path
+}
+
+/// Broker and peer in one: the shared memory is full while the peer has much to say.
+async fn speaks_in_a_full_memory(instance: &Instance) {
+    let site = crate::support::Site::at(instance);
+    let mut host = site.host();
+    let (_, mut peer) = crate::support::join(&mut host, &site, "speaker").await;
+    let filler = fill_memory();
+    for number in 0..500 {
+        peer.send(&crate::support::numbered(number, 15_000));
+    }
+    // As long as they go around in the frames that there are, or wait for more.
+    let mut heard = Vec::new();
+    for _ in 0..50 {
+        tokio::select! {
+            event = host.next() => heard.push(event),
+            _ = peer.next() => {}
+            () = tokio::time::sleep(Duration::from_millis(2)) => {}
+        }
+    }
+    say("full");
+    std::fs::remove_file(filler).unwrap();
+    while heard.len() < 500 {
+        tokio::select! {
+            event = host.next() => heard.push(event),
+            event = peer.next() => panic!("{event:?}"),
+        }
+    }
+    for (number, event) in heard.into_iter().enumerate() {
+        let HostEvent::Message { message, .. } = event else {
+            panic!("{event:?}")
+        };
+        let expected = crate::support::numbered(number as u64, 15_000);
+        assert_eq!(message, expected);
+    }
+    say("500 messages, in order");
+}
+
+/// Says why there is no room for an image that is too large for the memory, and why for one that is
+/// too large for now.
+fn asks_for_too_much(instance: &Instance) {
+    let host = Host::start(instance, HostOptions::default()).unwrap();
+    let documents = host.documents();
+    let never = documents.loan(60 << 20).err();
+    assert!(
+        matches!(never, Some(LoanError::NeverFits { .. })),
+        "{never:?}"
+    );
+    say(&never.unwrap().to_string());
+    let others = documents.loan(40 << 20).unwrap();
+    let later = documents.loan(40 << 20).err();
+    assert!(
+        matches!(later, Some(LoanError::NoSpace { .. })),
+        "{later:?}"
+    );
+    say(&later.unwrap().to_string());
+    drop(others);
+}
+
+/// Several brokers want more at once than there is. Who loses is refused, and what stays free for
+/// the rest of the bus stays free.
+fn many_take_at_once(instance: &Instance) {
+    let memory = || qcbus_bus::SharedMemory::now().unwrap();
+    let options = HostOptions {
+        max_peers: 2,
+        ..HostOptions::default()
+    };
+    let hosts: Vec<Host> = (0..6)
+        .map(|number| {
+            let place = instance.dir().with_file_name(format!("broker-{number}"));
+            Host::start(&Instance::at(place), options).unwrap()
+        })
+        .collect();
+    let all: Vec<_> = hosts.iter().map(Host::documents).collect();
+    let reserve = memory().size / 8;
+    let least = std::thread::scope(|scope| {
+        let takers = all.iter().map(|documents| {
+            scope.spawn(move || {
+                let mut least = u64::MAX;
+                for _ in 0..40 {
+                    match documents.loan(25 << 20) {
+                        Ok(mut loan) => {
+                            least = least.min(memory().free);
+                            loan.fill(1);
+                        }
+                        Err(LoanError::NoSpace { .. }) => {}
+                        Err(other) => panic!("{other}"),
+                    }
+                }
+                least
+            })
+        });
+        let takers: Vec<_> = takers.collect();
+        takers.into_iter().map(|it| it.join().unwrap()).min()
+    });
+    // A page or two go for what stands before a slot.
+    assert!(
+        least.unwrap() + (64 << 10) >= reserve,
+        "{least:?} of {reserve}"
+    );
+    say("no page of the reserve was taken");
+}
+
 /// Memory of this process that it shares with nobody, in KiB (proc(5), `smaps_rollup`).
 fn private_memory() -> u64 {
     std::fs::read_to_string("/proc/self/smaps_rollup")
@@ -290,6 +410,74 @@ async fn writes_into_a_document(instance: &Instance) {
     }
 }
 
+/// Opens the segment in which the first image lies for writing, as any program of the same user may
+/// that nothing confines, and rewrites it at random until it is killed. What it writes is ASCII: a
+/// text that ceases to be UTF-8 while it is borrowed is beyond what any accessor can be asked for.
+fn rewrite_images(instance: &Instance) {
+    let (segment, at) = segments_of(instance)
+        .into_iter()
+        .find_map(|path| {
+            let file = std::fs::File::options().read(true).write(true).open(path);
+            let file = file.ok()?;
+            let at = find_image(&file)?;
+            Some((file, at))
+        })
+        .expect("there is an image");
+    let mut random = qcbus_document::fuzzing::Random(crate::support::fresh_number());
+    let mut sound = vec![0; IMAGE_AT_MOST];
+    let len = segment.read_at(&mut sound, at).unwrap();
+    sound.truncate(len);
+    say("rewrites");
+    loop {
+        let mut spoilt = sound.clone();
+        for _ in 0..20 {
+            qcbus_document::fuzzing::corrupt(&mut spoilt, &mut random);
+            spoilt.resize(sound.len(), 0);
+            for (byte, whole) in spoilt.iter_mut().zip(&sound) {
+                *byte = if byte == whole { *byte } else { *byte & 0x7F };
+            }
+            // What says where the text is stays: it may not come to lie over numbers.
+            segment
+                .write_all_at(&spoilt[HEADER..], at + HEADER as u64)
+                .unwrap();
+        }
+        segment.write_all_at(&sound, at).unwrap();
+    }
+}
+
+/// No image of a test that is rewritten is larger.
+const IMAGE_AT_MOST: usize = 4 << 10;
+
+/// Bytes of an image before its sections.
+const HEADER: usize = 256;
+
+fn segments_of(instance: &Instance) -> Vec<std::path::PathBuf> {
+    let identity = crate::support::identity_of(instance);
+    let mut found: Vec<std::path::PathBuf> = crate::support::shared_memory_named(&identity)
+        .iter()
+        .flat_map(|root| std::fs::read_dir(format!("/dev/shm/{root}")).unwrap())
+        .map(|entry| entry.unwrap().path())
+        .collect();
+    found.retain(|path| path.extension().is_some_and(|it| it == "data"));
+    found
+}
+
+/// Where a segment has an image, if it has one.
+fn find_image(segment: &std::fs::File) -> Option<u64> {
+    const WINDOW: usize = 1 << 20;
+    let mut from = rustix::fs::seek(segment, rustix::fs::SeekFrom::Data(0)).ok()?;
+    loop {
+        let mut bytes = vec![0; WINDOW];
+        let len = segment.read_at(&mut bytes, from).ok()?;
+        let magic = bytes[..len].windows(8).position(|it| it == b"qcbusDOC");
+        if let Some(place) = magic {
+            return Some(from + place as u64);
+        }
+        let next = from + WINDOW as u64;
+        from = rustix::fs::seek(segment, rustix::fs::SeekFrom::Data(next)).ok()?;
+    }
+}
+
 /// Jobs that a peer of [`serves`] has before it.
 const IN_FLIGHT: u64 = 8;
 
@@ -335,7 +523,7 @@ async fn serves(instance: &Instance) {
                 _ => {}
             },
             HostEvent::Garbage { what, .. } => say(&format!("wrong: garbage, {what}")),
-            HostEvent::Gone { .. } => {}
+            HostEvent::Gone { .. } | HostEvent::TurnedAway { .. } => {}
         }
     }
 }

@@ -11,7 +11,13 @@
 mod helper;
 mod support;
 
+mod cleaned;
 mod deaths;
 mod delivery;
 mod documents;
+mod fuzz;
+mod hostile;
+mod liars;
+mod memory;
+mod privacy;
 mod torture;

@@ -2,8 +2,8 @@
 
 use std::os::unix::process::CommandExt;
 
-use qcbus_messages::Exit;
 use qcbus_messages::control::{Request, Response};
+use qcbus_messages::{Exit, shown};
 use qcbus_sdk::run::Mode;
 
 use crate::args::{BundleRunArgs, StatusArgs};
@@ -56,9 +56,9 @@ pub fn list(args: &StatusArgs) -> Exit {
         talk::print(&format!("{}\n", serde_json::Value::from(list)));
     } else {
         for [name, version, checkers, state, about] in rows {
-            talk::print(&format!(
-                "{name:<16} {version:<8} {checkers:>4} checkers  {state:<12} {about}\n"
-            ));
+            let row =
+                format!("{name:<16} {version:<8} {checkers:>4} checkers  {state:<12} {about}");
+            talk::print(&format!("{}\n", shown::line(&row)));
         }
     }
     Exit::Accepted
@@ -73,7 +73,8 @@ pub fn run(args: BundleRunArgs) -> Exit {
     match Mode::parse(args.arguments) {
         Ok(mode) => qcbus_sdk::run::run(bundle, mode),
         Err(error) => {
-            talk::fail(&format!("{error}\n\n{}", qcbus_sdk::run::USAGE));
+            talk::fail(&error.to_string());
+            talk::say_lines(&format!("\n{}", qcbus_sdk::run::USAGE));
             Exit::Usage
         }
     }

@@ -2,17 +2,18 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use qcbus_broker::{Broker, Options, Outside, ResultPaths, StartError, Told};
-use qcbus_broker::{Delivery, Judged, Notice, Settings};
-use qcbus_bus::{HostOptions, Instance};
+use qcbus_broker::{Delivery, Judged, Notice, Settings, Stop};
+use qcbus_bus::{HostOptions, Instance, SharedMemory};
 use qcbus_document::{FileKind, Suffix};
 use qcbus_formats::config::Config;
 use qcbus_messages::path_text::{from_text, to_text};
 use qcbus_messages::{Exit, Verdict};
 use qcbus_reporter_sdk::FileSources;
+use tokio::sync::mpsc;
 
 use super::settings::{
     absolute, dialect, limits, manifest_directory, memory_limit, named, program, settings,
@@ -128,7 +129,7 @@ fn writable(out: &Path) -> Result<(), Refusal> {
         Err(rustix::io::Errno::NOTDIR)
     };
     refused.map_err(|error| {
-        let (out, there) = (out.display(), there.display());
+        let (out, there) = (to_text(out), to_text(there));
         usage(format!(
             "cannot write results into {out}: {there}: {error}; choose another directory with --out"
         ))
@@ -258,6 +259,8 @@ fn check(args: &CheckArgs, prepared: Prepared) -> Exit {
         verdicts: Vec::new(),
         unwritten: 0,
         unseen: 0,
+        interrupted: false,
+        scanned: false,
         notices: BTreeSet::new(),
     };
     let directory = prepared.options.instance.dir().to_path_buf();
@@ -265,7 +268,7 @@ fn check(args: &CheckArgs, prepared: Prepared) -> Exit {
     let exit = drive(prepared.options, &printer);
     // Private to this run; what is left of it is of no use to anybody.
     let _ = std::fs::remove_dir_all(directory);
-    let mut printer = printer.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut printer = lock(&printer);
     match exit {
         Err((exit, why)) => {
             talk::fail(&why);
@@ -282,25 +285,80 @@ fn drive(options: Options, printer: &Arc<Mutex<Printer>>) -> Result<(), Refusal>
         .build()
         .map_err(|error| internal(format!("cannot start: {error}")))?;
     runtime.block_on(async {
-        let printer = printer.clone();
-        let tell = move |told| {
-            printer
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .told(told);
-        };
-        let broker = Broker::start(options, tell).map_err(|error| match error {
-            StartError::Load(_) | StartError::Results(_) => usage(error.to_string()),
-            _ => internal(error.to_string()),
-        })?;
         let stops = super::stops::listen().map_err(|error| internal(error.to_string()))?;
-        broker.run(stops).await;
+        let mut stops = noted(stops, printer.clone());
+        if let Some(broker) = start(options, printer, &mut stops).await? {
+            broker.run(stops).await;
+        }
         Ok(())
     })?;
     // Threads that still read a file must not hold up the end.
     runtime.shutdown_background();
     Ok(())
 }
+
+/// Passes wishes to stop on, and remembers that there was one.
+fn noted(mut stops: mpsc::Receiver<Stop>, printer: Arc<Mutex<Printer>>) -> mpsc::Receiver<Stop> {
+    let (sender, receiver) = mpsc::channel(4);
+    tokio::spawn(async move {
+        while let Some(stop) = stops.recv().await {
+            lock(&printer).interrupted = true;
+            if sender.send(stop).await.is_err() {
+                return;
+            }
+        }
+    });
+    receiver
+}
+
+/// How often a start is tried again for which there is no shared memory.
+const START_AGAIN: Duration = Duration::from_millis(50);
+
+/// Starts the broker, when others have let go of shared memory if need be. `None`: somebody wanted it
+/// to stop before.
+async fn start(
+    options: Options,
+    printer: &Arc<Mutex<Printer>>,
+    stops: &mut mpsc::Receiver<Stop>,
+) -> Result<Option<Broker>, Refusal> {
+    let (mut moved, mut most_free) = (Instant::now(), 0);
+    let limit = options.settings.room_limit;
+    loop {
+        let listener = printer.clone();
+        let tell = move |told| lock(&listener).told(told);
+        let error = match Broker::start(options.clone(), tell) {
+            Ok(broker) => return Ok(Some(broker)),
+            Err(error) => error,
+        };
+        match &error {
+            StartError::Load(_) | StartError::Results(_) => return Err(usage(error.to_string())),
+            StartError::Bus(why) if why.may_pass() => {}
+            _ => return Err((Exit::Internal, error.to_string())),
+        }
+        // What becomes free goes to others, who end, too: that is progress.
+        let free = SharedMemory::now().map_or(0, |memory| memory.free);
+        if free != most_free {
+            (moved, most_free) = (Instant::now(), free);
+        }
+        if moved.elapsed() >= limit {
+            let waited = limit.as_secs();
+            let why = format!("{error} (waited until nothing had moved for {waited} seconds)");
+            return Err((Exit::Internal, why));
+        }
+        lock(printer).wait("waiting for shared memory, which others use at the moment");
+        tokio::select! {
+            _ = stops.recv() => return Ok(None),
+            () = tokio::time::sleep(START_AGAIN) => {}
+        }
+    }
+}
+
+fn lock(printer: &Mutex<Printer>) -> MutexGuard<'_, Printer> {
+    printer.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// So many files that were not judged are named.
+const NAMED: usize = 10;
 
 /// Prints results in the order of their paths, each as soon as those before it are there.
 struct Printer {
@@ -317,6 +375,10 @@ struct Printer {
     unwritten: usize,
     /// What could not be looked at: nobody knows what lies there.
     unseen: usize,
+    /// Somebody wanted it to stop.
+    interrupted: bool,
+    /// Everything that is to be checked is known.
+    scanned: bool,
     notices: BTreeSet<String>,
 }
 
@@ -334,12 +396,21 @@ impl Printer {
             }
             Told::Scanned { files } => {
                 self.expected = files;
+                self.scanned = true;
                 self.print_ready();
             }
             Told::Verdict(verdict) => {
                 self.judged.insert(verdict.path, verdict.judged);
                 self.print_ready();
             }
+        }
+    }
+
+    /// Says once what is waited for.
+    fn wait(&mut self, text: &str) {
+        if self.notices.insert(text.to_owned()) {
+            self.progress.clear();
+            talk::say(&format!("note: {text}"));
         }
     }
 
@@ -403,14 +474,55 @@ impl Printer {
         }
     }
 
+    /// The files without a verdict, apart from those that are still to be printed.
+    fn unjudged(&self, rest: &[(Arc<Path>, Arc<Judged>)]) -> Vec<Arc<Path>> {
+        let left = self.expected.iter().skip(self.printed);
+        let waiting = left.filter(|path| !rest.iter().any(|(it, _)| it == *path));
+        waiting.cloned().collect()
+    }
+
+    /// Says what was not looked at.
+    fn say_unjudged(&self, missing: &[Arc<Path>]) {
+        let why = match self.interrupted {
+            true => "ended by a signal",
+            false => "not there any more",
+        };
+        if self.interrupted && !self.scanned {
+            talk::fail(&format!(
+                "{why} before it was known what is to be checked: nothing was looked at"
+            ));
+        }
+        if missing.is_empty() {
+            return;
+        }
+        let files = match missing.len() {
+            1 => "1 file was".to_owned(),
+            many => format!("{many} files were"),
+        };
+        talk::fail(&format!("{files} not judged: {why}"));
+        for path in missing.iter().take(NAMED) {
+            let shown = self.places.display(path);
+            talk::say(&format!("  {}", to_text(&shown)));
+        }
+        if missing.len() > NAMED {
+            talk::say(&format!("  and {} more", missing.len() - NAMED));
+        }
+    }
+
     fn finish(&mut self) -> Exit {
         self.progress.clear();
         let rest: Vec<_> = std::mem::take(&mut self.judged).into_iter().collect();
+        let missing = self.unjudged(&rest);
         for (path, judged) in rest {
             self.print(&path, judged);
         }
         let count = |verdict| self.verdicts.iter().filter(|it| **it == verdict).count();
         let total = self.verdicts.len();
+        self.say_unjudged(&missing);
+        let interrupted = self.interrupted && (!self.scanned || !missing.is_empty());
+        if total == 0 && interrupted {
+            return Exit::Undetermined;
+        }
         if total == 0 && self.unseen > 0 {
             talk::fail("nothing was checked: what there may be could not be looked at");
             return Exit::Undetermined;
@@ -421,12 +533,6 @@ impl Printer {
                 Suffix::list()
             ));
             return Exit::Usage;
-        }
-        if total < self.expected.len() {
-            let missing = self.expected.len() - total;
-            talk::say(&format!(
-                "note: {missing} files were not judged (removed meanwhile, or interrupted)"
-            ));
         }
         let files = if total == 1 { "file" } else { "files" };
         let unseen = match self.unseen {
@@ -439,13 +545,14 @@ impl Printer {
                 count(Verdict::Accepted),
                 count(Verdict::Rejected),
                 count(Verdict::Undetermined),
-                self.places.out.display()
+                to_text(&self.places.out)
             ));
         }
         let exit = Exit::of_verdicts(self.verdicts.iter().copied());
         if self.unwritten > 0 {
             Exit::Internal
-        } else if exit == Exit::Accepted && (total < self.expected.len() || self.unseen > 0) {
+        } else if exit == Exit::Accepted && (!missing.is_empty() || interrupted || self.unseen > 0)
+        {
             Exit::Undetermined
         } else {
             exit

@@ -5,7 +5,8 @@ use std::path::Path;
 use qcbus_broker::reload::{Loaded, Sources};
 use qcbus_formats::config::Oddity;
 use qcbus_formats::xqar::Level;
-use qcbus_messages::Exit;
+use qcbus_messages::path_text::to_text;
+use qcbus_messages::{Exit, shown};
 
 use super::settings::manifest_directory;
 use crate::{standard, talk};
@@ -25,6 +26,7 @@ pub fn check(file: &Path, bundles_d: Option<&Path>) -> Exit {
 fn load(file: &Path, bundles_d: Option<&Path>) -> Result<Loaded, String> {
     let sources = Sources {
         config: Some(file.to_path_buf()),
+        lasting: false,
         bundles_d: bundles_d.map(manifest_directory).transpose()?,
         standard: Vec::new(),
         reporters: Vec::new(),
@@ -37,9 +39,9 @@ fn load(file: &Path, bundles_d: Option<&Path>) -> Result<Loaded, String> {
 /// whoever looks at it beforehand, perhaps a script, must hear of it.
 fn tell(file: &Path, loaded: &Loaded) -> Exit {
     for line in &loaded.notices {
-        talk::print(&format!("{line}\n"));
+        talk::print(&format!("{}\n", shown::line(line)));
     }
-    let shown = file.display();
+    let shown = to_text(file);
     let is_warning = |oddity: &&Oddity| oddity.level <= Level::Warning;
     let warnings = loaded.oddities.iter().filter(is_warning).count();
     if warnings == 0 {

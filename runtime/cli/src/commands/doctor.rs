@@ -4,12 +4,14 @@ use std::path::Path;
 
 use qcbus_broker::control::ask_broker;
 use qcbus_broker::journal::Journal;
+use qcbus_bus::{HostOptions, SharedMemory};
 use qcbus_messages::control::{Request, Response};
-use qcbus_messages::{Exit, PROTOCOL_VERSION};
+use qcbus_messages::path_text::to_text;
+use qcbus_messages::{Exit, PROTOCOL_VERSION, shown};
 
 use super::settings::{absolute, instance};
 use crate::args::DoctorArgs;
-use crate::talk;
+use crate::{standard, talk};
 
 /// What is said of one thing that was looked at.
 struct Remark {
@@ -21,7 +23,13 @@ struct Remark {
 
 /// Runs the command.
 pub fn run(args: &DoctorArgs) -> Exit {
-    let mut remarks = vec![shared_memory(), watches(), open_files(), versions()];
+    let mut remarks = vec![
+        shared_memory(),
+        addresses(),
+        watches(),
+        open_files(),
+        versions(),
+    ];
     remarks.push(match instance(&args.instance) {
         Ok(instance) => runtime_directory(instance.dir()),
         Err(why) => bad(
@@ -37,7 +45,8 @@ pub fn run(args: &DoctorArgs) -> Exit {
     remarks.push(journal(&absolute(&args.state)));
     for remark in &remarks {
         let mark = if remark.ok { "ok  " } else { "FIX " };
-        talk::print(&format!("{mark} {:<18} {}\n", remark.what, remark.text));
+        let text = shown::line(&remark.text);
+        talk::print(&format!("{mark} {:<18} {text}\n", remark.what));
         if !remark.ok {
             talk::print(&format!("     {:<18} {}\n", "", remark.advice));
         }
@@ -73,10 +82,15 @@ const SHM_WANTED: u64 = 512 << 20;
 fn shared_memory() -> Remark {
     let what = "shared memory";
     let advice = "mount /dev/shm larger (`mount -o remount,size=2G /dev/shm`; containers: --shm-size=2g), or remove what others left there";
-    match rustix::fs::statvfs("/dev/shm") {
-        Ok(stat) => {
-            let (free, size) = (stat.f_bavail * stat.f_frsize, stat.f_blocks * stat.f_frsize);
-            let text = format!("{} MiB of {} MiB free in /dev/shm", free >> 20, size >> 20);
+    match SharedMemory::now() {
+        Ok(memory) => {
+            let (free, size) = (memory.free, memory.size);
+            let text = format!(
+                "{} MiB of {} MiB free in /dev/shm: room for images of {} MiB beside the bus",
+                free >> 20,
+                size >> 20,
+                room_for_images(&memory) >> 20
+            );
             if free >= SHM_WANTED {
                 good(what, text)
             } else {
@@ -84,6 +98,36 @@ fn shared_memory() -> Remark {
             }
         }
         Err(error) => bad(what, format!("/dev/shm: {error}"), advice),
+    }
+}
+
+/// Bytes that images may take now, beside what a broker with the standard bundles takes for the bus.
+fn room_for_images(memory: &SharedMemory) -> u64 {
+    let host = HostOptions {
+        expected_peers: standard::BUNDLES.len() + 1,
+        ..HostOptions::default()
+    };
+    memory.free.saturating_sub(host.shared_memory_bytes())
+}
+
+/// Segments are mapped in full, whether they are used or not.
+fn addresses() -> Remark {
+    let what = "address space";
+    let limit = rustix::process::getrlimit(rustix::process::Resource::As).current;
+    let (least, all) = HostOptions::default().address_bytes();
+    match limit {
+        None => good(what, "no limit on it".to_owned()),
+        Some(limit) if limit >= all => good(what, format!("limited to {} MiB", limit >> 20)),
+        Some(limit) => bad(
+            what,
+            format!(
+                "limited to {} MiB: a broker needs {} MiB, or {} MiB for small files alone",
+                limit >> 20,
+                all >> 20,
+                least >> 20
+            ),
+            "raise it (`ulimit -v unlimited`; systemd: LimitAS=infinity)",
+        ),
     }
 }
 
@@ -136,7 +180,7 @@ fn versions() -> Remark {
 fn runtime_directory(directory: &Path) -> Remark {
     let what = "runtime directory";
     let probe = directory.join(".doctor");
-    let text = directory.display().to_string();
+    let text = to_text(directory);
     match std::fs::create_dir_all(directory).and_then(|()| std::fs::write(&probe, b"")) {
         Ok(()) => {
             // Only just made; if it stays, it harms nobody.

@@ -3,7 +3,7 @@
 use std::io::Write as _;
 use std::path::Path;
 
-use qcbus_messages::path_text::{from_text, split_archive};
+use qcbus_messages::path_text::{from_text, split_archive, to_text};
 use qcbus_messages::{Absence, DocumentRole, Exit, Verdict};
 use qcbus_sdk::modular::{Expansion, SearchPath};
 use qcbus_sdk::{Level, Loaded, Plan};
@@ -26,7 +26,7 @@ pub(super) type Failed = (Exit, String);
 
 fn expanded(args: &ExpandArgs) -> Result<Exit, Failed> {
     if let Some(output) = args.output.as_deref().filter(|output| output.is_dir()) {
-        let text = format!("{} is a directory; name a file", output.display());
+        let text = format!("{} is a directory; name a file", to_text(output));
         return Err((Exit::Usage, text));
     }
     let loaded = load(&args.file)?;
@@ -35,7 +35,7 @@ fn expanded(args: &ExpandArgs) -> Result<Exit, Failed> {
         .subject(&qcbus_modular::BUNDLE)
         .map_err(|error| internal(&error))?;
     let expansion = subject.expansion();
-    let name = args.file.display();
+    let name = to_text(&args.file);
     if let Some(why) = in_the_way(&expansion) {
         // What has just been said with its place is not said again.
         let why = match said.contains(&why.text) {
@@ -55,12 +55,12 @@ fn expanded(args: &ExpandArgs) -> Result<Exit, Failed> {
         return written_out(&text);
     };
     if let Some(source) = source_at(&expansion, output) {
-        let output = output.display();
+        let output = to_text(output);
         let text = format!("{output} is not written: the scenario is made of it ({source})");
         return Err((Exit::Usage, text));
     }
     qcbus_disk::write_named(output, text.as_bytes(), false).map_err(|error| {
-        let text = format!("cannot write {}: {error}", output.display());
+        let text = format!("cannot write {}: {error}", to_text(output));
         (Exit::Internal, text)
     })?;
     Ok(Exit::Accepted)
@@ -89,7 +89,7 @@ fn load(path: &Path) -> Result<Loaded, Failed> {
     }
     let text = format!(
         "{} is no scenario: its name ends in neither .xosc nor .mosc",
-        path.display()
+        to_text(path)
     );
     Err((Exit::Usage, text))
 }
@@ -101,7 +101,7 @@ pub(super) fn say_findings(loaded: &Loaded) -> Result<(String, Verdict), Failed>
     let (text, verdict) =
         qcbus_sdk::findings(&plan, loaded, Level::Warning).map_err(|error| internal(&error))?;
     if !text.is_empty() {
-        talk::say(text.trim_end());
+        talk::say_lines(text.trim_end());
     }
     Ok((text, verdict))
 }
@@ -133,8 +133,8 @@ fn say_moved(expansion: &Expansion<'_>, args: &ExpandArgs) {
     for path in paths.filter(is_relative) {
         talk::say(&format!(
             "warning: `{path}` starts where a scenario lies, and {} is in another directory than {}",
-            output.display(),
-            args.file.display()
+            to_text(output),
+            to_text(&args.file)
         ));
     }
 }

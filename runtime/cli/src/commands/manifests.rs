@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use qcbus_broker::control::{AskError, ask_broker};
 use qcbus_bus::Instance;
 use qcbus_disk::write_whole;
-use qcbus_messages::Exit;
 use qcbus_messages::control::{Request, Response};
+use qcbus_messages::path_text::to_text;
+use qcbus_messages::{Exit, shown};
 use rustix::fs::{Access, access};
 
 use super::settings::{absolute, instance, real};
@@ -34,7 +35,7 @@ pub fn remove(args: &BundleRemoveArgs) -> Exit {
 fn said(done: Result<String, Refusal>) -> Exit {
     match done {
         Ok(text) => {
-            talk::say(&text);
+            talk::say_lines(&text);
             Exit::Accepted
         }
         Err((exit, why)) => {
@@ -56,7 +57,7 @@ fn try_add(args: &BundleAddArgs) -> Result<String, Refusal> {
     let home = Home::find(&args.manifests)?;
     let path = home.manifest(name);
     let before = std::fs::read(&path).ok();
-    let shown = path.display();
+    let shown = to_text(&path);
     write_whole(&path, text.as_bytes(), true).map_err(|error| {
         let why = format!("cannot write {shown}: {error}; nothing was added");
         (Exit::Internal, why)
@@ -65,7 +66,7 @@ fn try_add(args: &BundleAddArgs) -> Result<String, Refusal> {
         Ok(Some(notices)) => {
             let about = format!("`{name}`");
             let about = notices.iter().filter(|it| it.contains(&about));
-            let said: Vec<String> = about.map(|it| format!("\n{it}")).collect();
+            let said: Vec<String> = about.map(|it| format!("\n{}", shown::line(it))).collect();
             let said = said.concat();
             Ok(format!(
                 "{shown} written; the broker starts the bundle{said}"
@@ -82,7 +83,7 @@ fn try_add(args: &BundleAddArgs) -> Result<String, Refusal> {
 fn try_remove(args: &BundleRemoveArgs) -> Result<String, Refusal> {
     let home = Home::find(&args.manifests)?;
     let path = home.manifest(&args.name);
-    let shown = path.display();
+    let shown = to_text(&path);
     let before = match std::fs::read(&path) {
         Ok(before) => before,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
@@ -109,7 +110,7 @@ fn put_back(path: &Path, before: Option<&[u8]>) {
         None => std::fs::remove_file(path),
     };
     if let Err(error) = done {
-        talk::fail(&format!("cannot put back {}: {error}", path.display()));
+        talk::fail(&format!("cannot put back {}: {error}", to_text(path)));
     }
 }
 
@@ -167,7 +168,7 @@ impl Home {
         if given.is_some_and(|given| real(given) != real(&watched)) {
             return Err(usage(format!(
                 "the broker of instance `{name}` watches {}",
-                watched.display()
+                to_text(&watched)
             )));
         }
         Ok(Home {
@@ -196,7 +197,7 @@ impl Home {
 
     /// Removes a bundle that no manifest here names.
     fn forget(&self, name: &str, path: &Path) -> Result<String, Refusal> {
-        let missing = format!("there is no {}", path.display());
+        let missing = format!("there is no {}", to_text(path));
         let Some(broker) = &self.broker else {
             let unwatched = &self.unwatched;
             return Err(usage(format!(
@@ -226,7 +227,7 @@ fn manifest(name: &str, command: &[String]) -> Result<String, Refusal> {
     };
     let program = find_program(program).map_err(usage)?;
     let Some(program) = program.to_str() else {
-        let shown = program.display();
+        let shown = to_text(&program);
         return Err(usage(format!("{shown}: a manifest takes UTF-8 only")));
     };
     let words = std::iter::once(program).chain(arguments.iter().map(String::as_str));
@@ -247,7 +248,7 @@ fn find_program(program: &str) -> Result<PathBuf, String> {
         let path = absolute(Path::new(program));
         return match executable(&path) {
             Ok(()) => Ok(path),
-            Err(why) => Err(format!("cannot run {}: {why}", path.display())),
+            Err(why) => Err(format!("cannot run {}: {why}", to_text(&path))),
         };
     }
     let paths = std::env::var_os("PATH").unwrap_or_default();

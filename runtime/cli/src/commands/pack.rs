@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use qcbus_document::FileKind;
 use qcbus_ingest::Limits;
+use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Exit, Verdict};
 use qcbus_sdk::Loaded;
 use qcbus_sdk::modular::pack;
@@ -29,7 +30,7 @@ fn packed(args: &PackArgs) -> Result<Exit, Failed> {
     let usage = |text: String| (Exit::Usage, text);
     let output = &args.output;
     if FileKind::of_path(output) != Some(FileKind::Mosc) {
-        let text = format!("{}: the name of an archive ends in .mosc", output.display());
+        let text = format!("{}: the name of an archive ends in .mosc", to_text(output));
         return Err(usage(text));
     }
     let members = members(&args.files).map_err(usage)?;
@@ -42,7 +43,7 @@ fn packed(args: &PackArgs) -> Result<Exit, Failed> {
         if is_output {
             return Err(usage(format!(
                 "{} cannot be packed into itself",
-                path.display()
+                to_text(&path)
             )));
         }
         files.push((name, read(&path).map_err(usage)?));
@@ -51,7 +52,7 @@ fn packed(args: &PackArgs) -> Result<Exit, Failed> {
     qcbus_disk::write_named(output, &archive, false).map_err(|error| {
         (
             Exit::Internal,
-            format!("cannot write {}: {error}", output.display()),
+            format!("cannot write {}: {error}", to_text(output)),
         )
     })?;
     let folder = output.parent().filter(|it| !it.as_os_str().is_empty());
@@ -67,13 +68,13 @@ fn packed(args: &PackArgs) -> Result<Exit, Failed> {
 /// A file that an archive can hold; what is no file has no end.
 fn read(path: &Path) -> Result<Vec<u8>, String> {
     let most = Limits::default().max_archive;
-    let failed = |error: std::io::Error| format!("cannot read {}: {error}", path.display());
+    let failed = |error: std::io::Error| format!("cannot read {}: {error}", to_text(path));
     let data = std::fs::metadata(path).map_err(failed)?;
     if !data.is_file() {
-        return Err(format!("cannot read {}: it is no file", path.display()));
+        return Err(format!("cannot read {}: it is no file", to_text(path)));
     }
     if data.len() > most {
-        let (path, found) = (path.display(), data.len());
+        let (path, found) = (to_text(path), data.len());
         return Err(format!(
             "{path} has {found} bytes; an archive holds {most} in all"
         ));
@@ -89,7 +90,7 @@ fn members(files: &[PathBuf]) -> Result<Vec<(String, PathBuf)>, String> {
     if FileKind::of_path(main) != Some(FileKind::Xosc) {
         return Err(format!(
             "{}: the main scenario comes first, and its name ends in .xosc",
-            main.display()
+            to_text(main)
         ));
     }
     let folder = absolute(main).parent().map(Path::to_path_buf);
@@ -102,12 +103,12 @@ fn members(files: &[PathBuf]) -> Result<Vec<(String, PathBuf)>, String> {
         let name = below.or_else(|| whole.file_name().map(Path::new));
         let name = name
             .and_then(Path::to_str)
-            .ok_or_else(|| format!("{}: names in archives are UTF-8", path.display()))?;
+            .ok_or_else(|| format!("{}: names in archives are UTF-8", to_text(path)))?;
         if let Some((_, other)) = members.iter().find(|(other, _)| other == name) {
             return Err(format!(
                 "{} and {} would both be called {name} in the archive",
-                other.display(),
-                path.display()
+                to_text(other),
+                to_text(path)
             ));
         }
         members.push((name.to_owned(), path.clone()));

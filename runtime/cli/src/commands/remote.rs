@@ -4,6 +4,7 @@ use qcbus_broker::control::{AskError, ask_broker};
 use qcbus_messages::Exit;
 use qcbus_messages::control::{FileVerdict, Request, Response};
 use qcbus_messages::path_text::to_text;
+use qcbus_messages::shown;
 
 use super::settings::{instance, named};
 use crate::args::{InstanceArgs, WaitArgs};
@@ -46,7 +47,9 @@ pub fn reload(args: &InstanceArgs) -> Exit {
             if changes.is_empty() {
                 talk::print("nothing changed\n");
             } else {
-                talk::print(&format!("{}\n", changes.join("\n")));
+                for change in changes {
+                    talk::print(&format!("{}\n", shown::line(&change)));
+                }
             }
             Exit::Accepted
         }
@@ -73,6 +76,11 @@ pub fn wait(args: &WaitArgs) -> Exit {
                 "no verdict on {} in time{why}",
                 to_text(&args.file)
             ));
+            Exit::Undetermined
+        }
+        Ok(Response::Unanswered { reason }) => {
+            let file = to_text(&args.file);
+            talk::fail(&format!("no verdict on {file}: {reason}"));
             Exit::Undetermined
         }
         Ok(Response::Unwatched { reason }) => {
@@ -104,7 +112,7 @@ fn tell(args: &WaitArgs, verdict: &FileVerdict) -> Exit {
             }
         ));
         for why in &verdict.why {
-            talk::print(&format!("  {why}\n"));
+            talk::print(&format!("  {}\n", shown::line(why)));
         }
     }
     Exit::of_verdicts([verdict.verdict])

@@ -61,10 +61,8 @@ fn show(id: &str, format: Format) -> Exit {
         }
         several => {
             let names: Vec<&str> = several.iter().map(|(_, it)| it.facts.id).collect();
-            talk::fail(&format!(
-                "`{id}` may mean any of:\n  {}",
-                names.join("\n  ")
-            ));
+            talk::fail(&format!("`{id}` may mean any of:"));
+            talk::say_lines(&format!("  {}", names.join("\n  ")));
             Exit::Usage
         }
     }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use qcbus_document::Document;
 use qcbus_ingest::{Limits, prepare_bytes};
 use qcbus_messages::Exit;
+use qcbus_messages::path_text::to_text;
 
 use crate::talk;
 
@@ -12,12 +13,12 @@ use crate::talk;
 pub fn compile(path: &Path, output: &Path) -> Exit {
     let files = match schema_files(path) {
         Ok(files) if files.is_empty() => {
-            talk::fail(&format!("there is no .xsd file in {}", path.display()));
+            talk::fail(&format!("there is no .xsd file in {}", to_text(path)));
             return Exit::Usage;
         }
         Ok(files) => files,
         Err(error) => {
-            talk::fail(&format!("cannot look into {}: {error}", path.display()));
+            talk::fail(&format!("cannot look into {}: {error}", to_text(path)));
             return Exit::Usage;
         }
     };
@@ -51,7 +52,7 @@ fn tables(path: &Path, files: &[PathBuf]) -> Result<String, String> {
     let mut images = Vec::new();
     for file in files {
         let bytes = std::fs::read(file)
-            .map_err(|error| format!("cannot read {}: {error}", file.display()))?;
+            .map_err(|error| format!("cannot read {}: {error}", to_text(file)))?;
         images.push(prepare_bytes(file, bytes, &Limits::default()).build());
     }
     let mut documents = Vec::new();
@@ -61,7 +62,7 @@ fn tables(path: &Path, files: &[PathBuf]) -> Result<String, String> {
             let at = document.position(fault.offset);
             return Err(format!(
                 "{}:{}:{}: {}",
-                file.display(),
+                to_text(file),
                 at.row,
                 at.column,
                 fault.text
@@ -96,12 +97,12 @@ fn write(output: &Path, text: &str, files: usize) -> Exit {
             };
             talk::say(&format!(
                 "{files} compiled to {output}, to be used by --schema-dir {output}",
-                output = output.display()
+                output = to_text(output)
             ));
             Exit::Accepted
         }
         Err(error) => {
-            talk::fail(&format!("cannot write {}: {error}", output.display()));
+            talk::fail(&format!("cannot write {}: {error}", to_text(output)));
             Exit::Internal
         }
     }

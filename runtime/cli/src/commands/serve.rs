@@ -25,6 +25,8 @@ pub fn run(args: &ServeArgs) -> Exit {
             return Exit::Usage;
         }
     };
+    // What killed checks hold of the shared memory may be what is missing.
+    qcbus_bus::sweep_private_instances();
     let runtime = match tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()
@@ -49,7 +51,9 @@ async fn serve(options: Options) -> Exit {
             return match error {
                 StartError::Load(_)
                 | StartError::Bus(BusError::AlreadyRunning { .. })
-                | StartError::Journal(JournalError::State(LockError::Held { .. }))
+                | StartError::Journal(
+                    JournalError::State(LockError::Held { .. }) | JournalError::Foreign(_),
+                )
                 | StartError::Results(LockError::Held { .. } | LockError::Shared { .. })
                 | StartError::Gate(GateError::Lock(_) | GateError::Foreign { .. }) => Exit::Usage,
                 _ => Exit::Internal,

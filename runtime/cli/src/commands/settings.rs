@@ -6,6 +6,7 @@ use qcbus_broker::Settings;
 use qcbus_bus::Instance;
 use qcbus_formats::xqar::Dialect;
 use qcbus_ingest::Limits;
+use qcbus_messages::path_text::to_text;
 
 use crate::args::{DialectArg, InstanceArgs, LimitArgs};
 
@@ -56,7 +57,7 @@ pub fn manifest_directory(named: &Path) -> Result<PathBuf, String> {
         Ok(_) => Ok(path),
         Err(error) => Err(format!(
             "cannot take bundles from --bundles-d {}: {error}",
-            path.display()
+            to_text(&path)
         )),
     }
 }
@@ -97,6 +98,7 @@ pub fn settings(args: &LimitArgs) -> Settings {
     settings.job_deadline = args.job_deadline.unwrap_or(settings.job_deadline);
     settings.silence_limit = args.silence_limit.unwrap_or(settings.silence_limit);
     settings.absence_limit = args.absence_limit.unwrap_or(settings.absence_limit);
+    settings.room_limit = args.room_limit.unwrap_or(settings.room_limit);
     settings.max_restarts = args.max_restarts.unwrap_or(settings.max_restarts);
     settings
 }

@@ -4,6 +4,8 @@ use std::fmt::Write;
 
 use qcbus_messages::Exit;
 use qcbus_messages::control::{GateStatus, PeerStatus, Request, Response, Status};
+use qcbus_messages::path_text::to_text;
+use qcbus_messages::shown;
 
 use super::remote::ask;
 use crate::args::StatusArgs;
@@ -40,7 +42,7 @@ pub fn render(status: &Status) -> String {
     let queue = &status.queue;
     let mut line = |what: &str, value: String| {
         // Writing to a string cannot fail.
-        let _ = writeln!(text, "{what:<10} {value}");
+        let _ = writeln!(text, "{what:<10} {}", shown::line(&value));
     };
     line(
         "broker",
@@ -58,15 +60,15 @@ pub fn render(status: &Status) -> String {
         } else {
             String::new()
         };
-        line("watching", format!("{}{mode}", directory.display()));
+        line("watching", format!("{}{mode}", to_text(directory)));
     }
-    line("results", status.out.display().to_string());
+    line("results", to_text(&status.out));
     if let Some(gate) = &status.gate {
         line("gate", gate_line(gate));
         for held in &gate.examples {
             line(
                 "held back",
-                format!("{}: {}", held.file.display(), held.why),
+                format!("{}: {}", to_text(&held.file), held.why),
             );
         }
     }
@@ -83,7 +85,7 @@ pub fn render(status: &Status) -> String {
     );
     line("queue", queue_line(queue));
     for peer in &status.peers {
-        line(&peer.role, peer_line(peer));
+        line(&shown::line(&peer.role), peer_line(peer));
     }
     for unseen in status.unseen.iter().take(5) {
         line("note", unseen.to_string());
@@ -100,7 +102,7 @@ pub fn render(status: &Status) -> String {
 }
 
 fn gate_line(gate: &GateStatus) -> String {
-    let mut line = format!("{}: {} published", gate.directory.display(), gate.published);
+    let mut line = format!("{}: {} published", to_text(&gate.directory), gate.published);
     if gate.held_back > 0 {
         let _ = write!(line, ", {} accepted and held back", gate.held_back);
     }

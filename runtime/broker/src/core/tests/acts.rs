@@ -29,12 +29,9 @@ impl World {
                     version: spec.version.and_then(|it| it.parse().ok()).unwrap_or(1),
                 });
             }
-            Action::Kill { launch, .. } => {
-                self.killed.extend(launch);
-                let killed = self
-                    .launched
-                    .iter()
-                    .position(|it| Some(it.launch) == launch);
+            Action::Kill { launch } => {
+                self.killed.push(launch);
+                let killed = self.launched.iter().position(|it| it.launch == launch);
                 let killed = killed.map(|at| self.launched.remove(at));
                 self.dying.extend(killed.filter(|it| it.name == CHILD));
             }

@@ -1,5 +1,10 @@
 //! How long a bundle is waited for, how much it may say, and that it is no moment or word less.
 
+use qcbus_document::FileKind;
+use qcbus_formats::pool::Ending;
+use qcbus_formats::xqar::Metadata;
+use qcbus_messages::Catalogue;
+
 use super::*;
 
 /// A world in which a bundle has one job.
@@ -181,4 +186,176 @@ fn what_a_bundle_has_done_is_counted() {
     let status = world.state.status();
     let first = status.peers.iter().find(|it| it.name == "First").unwrap();
     assert_eq!(first.done, 2);
+}
+
+fn done(job: JobId, checker: u32, value: &str, facts: usize) -> FromPeer {
+    let fact = Metadata {
+        key: "key".to_owned(),
+        value: value.to_owned(),
+        description: String::new(),
+    };
+    FromPeer::CheckerDone {
+        job,
+        checker,
+        ending: Ending::Completed,
+        params: Vec::new(),
+        metadata: vec![fact; facts],
+    }
+}
+
+/// What a checker's share came to: its ending and how many facts of its run are kept.
+fn kept(world: &World, job: JobId, checker: u32) -> (Ending, usize) {
+    let staged = &world.state.jobs[&job].shares["First"].staged[&checker];
+    let (ending, params, metadata) = staged.done.clone().unwrap();
+    (ending, params.len() + metadata.len())
+}
+
+#[test]
+fn a_checker_with_more_to_say_of_its_run_than_is_kept_has_failed() {
+    let one = facts_weight(&[], &[Metadata::default()]) + "key".len();
+    for (text, facts, is_kept) in [
+        ("", 0, true),
+        ("", 10, true),
+        ("", 11, false),
+        (&*"x".repeat(10 * one), 1, false),
+        (&*"x".repeat(9 * one), 1, true),
+    ] {
+        let (mut world, session, job) = busy();
+        world.state.settings.max_facts = 10 * one;
+        world.say(session, done(job, 0, text, facts));
+        let (ending, left) = kept(&world, job, 0);
+        assert_eq!(
+            (ending.is_open(), left),
+            if is_kept { (false, facts) } else { (true, 0) }
+        );
+        assert!(
+            is_kept || ending.reason().contains("metadata"),
+            "{ending:?}"
+        );
+        // It is the checker that failed, and nobody else.
+        world.say(session, done(job, 1, "", 0));
+        assert_eq!(kept(&world, job, 1).0, Ending::Completed);
+    }
+}
+
+#[test]
+fn what_all_checkers_say_of_their_end_is_bounded_with_the_findings() {
+    let (mut world, session, job) = busy();
+    let fact = facts_weight(&[], &[Metadata::default()]) + "key".len();
+    world.state.settings.max_staged_bytes = 3 * fact;
+    world.say(session, done(job, 0, "", 2));
+    assert_eq!(
+        world.state.jobs[&job].shares["First"].staged_bytes,
+        2 * fact
+    );
+    world.say(session, done(job, 1, "", 2));
+    assert!(kept(&world, job, 1).0.is_open(), "there is no room for it");
+    // What is said again takes the place of what was said.
+    world.say(session, done(job, 0, "", 1));
+    world.say(session, done(job, 1, "", 2));
+    assert_eq!(kept(&world, job, 1), (Ending::Completed, 2));
+    assert_eq!(
+        world.state.jobs[&job].shares["First"].staged_bytes,
+        3 * fact
+    );
+}
+
+#[test]
+fn reasons_and_who_is_in_the_way_count_too() {
+    let (mut world, session, job) = busy();
+    world.state.settings.max_staged_bytes = 100_000;
+    for by in [vec!["x".repeat(4000); 60], vec!["x".repeat(4000); 6000]] {
+        let ending = Ending::Blocked {
+            by,
+            reason: "y".repeat(1 << 20),
+        };
+        world.say(
+            session,
+            FromPeer::CheckerDone {
+                job,
+                checker: 0,
+                ending,
+                params: Vec::new(),
+                metadata: Vec::new(),
+            },
+        );
+        let share = &world.state.jobs[&job].shares["First"];
+        assert!((30_000..60_000).contains(&share.staged_bytes));
+        assert!(kept(&world, job, 0).0.is_open());
+    }
+}
+
+#[test]
+fn a_document_that_is_asked_for_all_the_time_is_published_now_and_then() {
+    let (mut world, session, job) = busy();
+    let doc = qcbus_messages::DocId(job.0);
+    let mut published = 0;
+    let second = Duration::from_secs(1);
+    for _ in 0..1000 {
+        world.now += second / 1000;
+        let message = FromPeer::NeedDocument { doc };
+        let actions = world
+            .state
+            .handle(world.now, Event::Message { session, message });
+        let again = |it: &&Action| matches!(it, Action::PublishAgain { .. });
+        published += actions.iter().filter(again).count();
+    }
+    assert_eq!(published, 4);
+}
+
+#[test]
+fn a_catalogue_beyond_all_bounds_is_no_catalogue() {
+    type Change = fn(&mut Catalogue);
+    let changes: [(&str, Change); 9] = [
+        ("names", |it| {
+            it.checkers[0].id = "a\nimportant.xodr: accepted".into();
+        }),
+        ("names", |it| {
+            it.checkers[0].rule_uids = vec!["\u{1b}[2K".into()];
+        }),
+        ("names", |it| it.alias = "\u{202e}".into()),
+        ("names", |it| it.build_date = "x".repeat(257)),
+        ("bytes", |it| it.description = "x".repeat(1 << 20)),
+        ("bytes", |it| it.kinds = vec![FileKind::Xodr; (1 << 20) + 1]),
+        ("bytes", |it| {
+            it.checkers[0].rule_uids = vec![String::new(); 50_000];
+        }),
+        ("checkers", |it| {
+            it.checkers = vec![it.checkers[0].clone(); 4097];
+        }),
+        ("twice", |it| it.checkers[1].id = it.checkers[0].id.clone()),
+    ];
+    for (word, change) in changes {
+        let mut world = World::new();
+        world.join("First");
+        let session = world.nth_peer(0).unwrap();
+        let mut said = catalogue("First");
+        change(&mut said);
+        world.say(session, FromPeer::Catalogue(Box::new(said)));
+        assert!(!world.peers.contains_key(&session), "{word}");
+        let why = world.state.notices.back().unwrap().to_string();
+        assert!(why.contains(word), "{why}");
+        assert!(!why.chars().any(qcbus_messages::shown::moves), "{why:?}");
+    }
+}
+
+#[test]
+fn there_is_an_end_to_the_names_that_are_known() {
+    let mut world = World::new();
+    let mut is_refused = |name: &str, role: Role| {
+        let session = SessionId(99);
+        let hello = qcbus_messages::Hello {
+            role,
+            ..hello(session, name, 1, None)
+        };
+        let actions = world
+            .state
+            .handle(world.now, Event::Hello { session, hello });
+        actions.iter().any(|it| matches!(it, Action::Refuse { .. }))
+    };
+    for role in [Role::Bundle, Role::Reporter] {
+        let refused = (0..300).filter(|it| is_refused(&format!("{role:?}{it}"), role));
+        assert_eq!(refused.count(), 300 - 256);
+        assert!(!is_refused(&format!("{role:?}0"), role), "it is known");
+    }
 }

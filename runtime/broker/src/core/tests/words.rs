@@ -49,6 +49,23 @@ fn who_cannot_take_part_is_turned_away() {
 }
 
 #[test]
+fn processes_that_cannot_be_seen_from_here_are_not_the_same() {
+    let mut world = World::new();
+    for (session, refused) in [(98, false), (99, true)] {
+        let session = SessionId(session);
+        let hello = Hello {
+            incarnation: session.0,
+            pid: 0,
+            ..a_hello("far")
+        };
+        let actions = world
+            .state
+            .handle(world.now, Event::Hello { session, hello });
+        assert_eq!(is_refused(&actions), refused, "{actions:?}");
+    }
+}
+
+#[test]
 fn a_process_that_says_hello_again_takes_its_own_place() {
     let mut world = World::new();
     world.join("First");
@@ -164,6 +181,90 @@ fn a_file_without_room_on_the_bus_is_tried_again_after_a_pause() {
         world.pass(moment);
         assert_eq!(world.preparing.len(), 1);
     }
+}
+
+#[test]
+fn what_a_moment_hinders_is_tried_again_with_growing_pauses_and_then_said() {
+    let mut world = World::new();
+    world.join("First");
+    world.write(0);
+    let hinder = |world: &mut World| {
+        let (job, _) = world.preparing.remove(0);
+        let result = Err(PrepareFailure::Moment("too many open files".to_owned()));
+        world.event(Event::Prepared { job, result });
+    };
+    let settings = world.state.settings.clone();
+    let mut pause = settings.moment_pause;
+    let tick = Duration::from_millis(1);
+    while pause <= settings.moment_pause_max {
+        hinder(&mut world);
+        world.pass(pause - tick);
+        assert!(world.preparing.is_empty(), "not yet");
+        assert!(world.storing.is_empty(), "nothing is said of it");
+        world.pass(tick);
+        pause *= 2;
+    }
+    hinder(&mut world);
+    assert!(world.preparing.is_empty());
+    let finished = &world.storing[0];
+    assert_eq!(finished.unreadable.as_deref(), Some("too many open files"));
+    // When it is read the next time, and can be, nothing of this is left.
+    let job = world.storing.remove(0).job;
+    let outcome = StoreOutcome::Stale;
+    world.event(Event::Stored { job, outcome });
+    world.prepare(0, true);
+    world.answer(0);
+    assert_eq!(world.storing.len(), 1);
+    assert_eq!(world.storing[0].unreadable, None);
+}
+
+#[test]
+fn a_file_without_room_is_undetermined_when_nothing_moves_for_long() {
+    let mut world = World::new();
+    world.join("First");
+    world.write(0);
+    world.write(4);
+    let no_room = || Err(PrepareFailure::NoRoom("full".to_owned()));
+    let limit = world.state.settings.room_limit;
+    let begun = world.now;
+    while world.storing.is_empty() {
+        assert!(world.now <= begun + limit + 2 * world.state.settings.retry_after);
+        match world.preparing.pop() {
+            Some((job, _)) => world.event(Event::Prepared {
+                job,
+                result: no_room(),
+            }),
+            None => world.pass(world.state.settings.retry_after),
+        }
+    }
+    assert!(world.now >= begun + limit);
+    let why = "full; nothing became free for 60 seconds";
+    assert_eq!(world.storing[0].unreadable.as_deref(), Some(why));
+    // What waited as long does not wait as long again.
+    let (job, _) = world.preparing.pop().unwrap();
+    world.event(Event::Prepared {
+        job,
+        result: no_room(),
+    });
+    assert_eq!(world.storing.len(), 2);
+}
+
+#[test]
+fn a_file_without_room_waits_while_another_is_checked() {
+    let mut world = World::new();
+    world.join("First");
+    world.write(0);
+    world.prepare(0, true);
+    world.write(4);
+    let begun = world.now;
+    while world.now < begun + world.state.settings.room_limit / 2 {
+        if let Some((job, _)) = world.preparing.pop() {
+            let result = Err(PrepareFailure::NoRoom("full".to_owned()));
+            world.event(Event::Prepared { job, result });
+        }
+        world.pass(world.state.settings.retry_after);
+    }
+    assert!(world.storing.is_empty() && world.state.stuck_since.is_none());
 }
 
 #[test]

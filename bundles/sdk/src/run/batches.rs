@@ -1,0 +1,191 @@
+//! Findings on their way to the broker: in messages of which none is larger than a broker takes.
+
+use qcbus_formats::xqar::{InfoElement, Issue, Location, Locations};
+use qcbus_messages::codec::MAX_FROM_PEER;
+
+/// Issues per message: large enough to be cheap, small enough to interleave with other traffic.
+const BATCH: usize = 64;
+/// Bytes of the issues of one message. One that is larger is cut and travels alone.
+const BATCH_BYTES: usize = MAX_FROM_PEER / 4;
+/// Bytes that stay of each text of an issue that is cut; a broker keeps no more.
+const TEXT: usize = 8 << 10;
+/// Places that stay of an issue that is cut; a broker keeps no more.
+const PLACES: usize = 64;
+
+/// The findings in order, in batches.
+pub(super) fn batches(issues: Vec<Issue>) -> Vec<Vec<Issue>> {
+    let mut batches = Vec::new();
+    let (mut batch, mut bytes) = (Vec::new(), 0);
+    for mut issue in issues {
+        if size(&issue) > BATCH_BYTES {
+            cut(&mut issue);
+        }
+        let more = size(&issue);
+        if !batch.is_empty() && (batch.len() == BATCH || bytes + more > BATCH_BYTES) {
+            batches.push(std::mem::take(&mut batch));
+            bytes = 0;
+        }
+        bytes += more;
+        batch.push(issue);
+    }
+    if !batch.is_empty() {
+        batches.push(batch);
+    }
+    batches
+}
+
+/// At least the bytes of an issue in a message.
+fn size(issue: &Issue) -> usize {
+    const NUMBERS: usize = 64;
+    let place = |it: &Location| {
+        let texts = match it {
+            Location::Xml { xpath } => xpath.len(),
+            Location::Road { road_id, .. } => road_id.len(),
+            Location::Message { channel, field, .. } => {
+                let texts = [channel, field].into_iter().flatten();
+                texts.map(String::len).sum()
+            }
+            _ => 0,
+        };
+        NUMBERS + texts
+    };
+    let places = |it: &Locations| {
+        let elsewhere = it.elsewhere.as_ref().map_or(0, |it| {
+            NUMBERS + it.path.len() + it.xpath.as_ref().map_or(0, String::len)
+        });
+        let here: usize = it.places.iter().map(place).sum();
+        NUMBERS + it.description.len() + elsewhere + here
+    };
+    let locations: usize = issue.locations.iter().map(places).sum();
+    let infos = issue.domain_info.iter();
+    let infos =
+        infos.map(|it| NUMBERS + it.name.len() + it.content.iter().map(tree).sum::<usize>());
+    NUMBERS + issue.description.len() + issue.rule_uid.len() + locations + infos.sum::<usize>()
+}
+
+fn tree(element: &InfoElement) -> usize {
+    let attributes = element.attributes.iter();
+    let attributes: usize = attributes
+        .map(|(name, value)| 16 + name.len() + value.len())
+        .sum();
+    let children: usize = element.children.iter().map(tree).sum();
+    32 + element.name.len() + element.text.len() + attributes + children
+}
+
+/// Leaves of an issue what a broker would keep of it: a text of a file may be as long as the file.
+fn cut(issue: &mut Issue) {
+    shorten(&mut issue.description);
+    shorten(&mut issue.rule_uid);
+    issue.domain_info.clear();
+    issue.locations.truncate(PLACES);
+    for it in &mut issue.locations {
+        shorten(&mut it.description);
+        // The ways to say where go by the longest text: one is enough.
+        it.places.truncate(1);
+        it.places.iter_mut().for_each(shorten_place);
+        if let Some(elsewhere) = &mut it.elsewhere {
+            shorten(&mut elsewhere.path);
+            elsewhere.xpath.iter_mut().for_each(shorten);
+        }
+    }
+    while size(issue) > BATCH_BYTES && issue.locations.pop().is_some() {}
+}
+
+fn shorten_place(place: &mut Location) {
+    match place {
+        Location::Xml { xpath } => shorten(xpath),
+        Location::Road { road_id, .. } => shorten(road_id),
+        Location::Message { channel, field, .. } => {
+            [channel, field].into_iter().flatten().for_each(shorten);
+        }
+        _ => {}
+    }
+}
+
+fn shorten(text: &mut String) {
+    if text.len() > TEXT {
+        let end = text.floor_char_boundary(TEXT);
+        text.truncate(end);
+        text.push('…');
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use qcbus_formats::xqar::{DomainInfo, Level};
+    use qcbus_messages::{FromPeer, JobId, codec};
+
+    use super::*;
+
+    fn saying(bytes: usize) -> Issue {
+        Issue {
+            id: 0,
+            description: "ä".repeat(bytes / 2),
+            level: Level::Error,
+            rule_uid: "uid".to_owned(),
+            locations: Vec::new(),
+            domain_info: Vec::new(),
+        }
+    }
+
+    fn encoded(issues: Vec<Issue>) -> usize {
+        let (job, checker) = (JobId(1), 0);
+        let message = FromPeer::Issues {
+            job,
+            checker,
+            issues,
+        };
+        codec::encode(&message).unwrap().len()
+    }
+
+    #[test]
+    fn small_findings_go_by_number_and_large_ones_by_size() {
+        let lengths = |issues| batches(issues).iter().map(Vec::len).collect::<Vec<_>>();
+        assert_eq!(lengths(Vec::new()), [0; 0]);
+        assert_eq!(lengths(vec![saying(100); 130]), [64, 64, 2]);
+        assert_eq!(lengths(vec![saying(400 << 10); 5]), [2, 2, 1]);
+        let mixed = vec![
+            saying(100),
+            saying(900 << 10),
+            saying(900 << 10),
+            saying(100),
+        ];
+        assert_eq!(lengths(mixed), [2, 2]);
+    }
+
+    #[test]
+    fn a_finding_about_a_huge_text_arrives_and_is_as_severe() {
+        let huge = "x".repeat(MAX_FROM_PEER);
+        let place = Locations {
+            description: huge.clone(),
+            elsewhere: None,
+            places: vec![
+                Location::Xml {
+                    xpath: huge.clone()
+                };
+                3
+            ],
+        };
+        let element = InfoElement {
+            name: huge.clone(),
+            ..InfoElement::default()
+        };
+        let everywhere = Issue {
+            description: huge,
+            locations: vec![place; 100],
+            domain_info: vec![DomainInfo {
+                name: String::new(),
+                content: vec![element],
+            }],
+            ..saying(0)
+        };
+        for issue in [saying(MAX_FROM_PEER * 2), everywhere] {
+            let mut batches = batches(vec![issue]);
+            let batch = batches.pop().unwrap();
+            assert_eq!((batches.len(), batch.len()), (0, 1));
+            assert_eq!(batch[0].level, Level::Error);
+            assert!(batch[0].description.ends_with('…'));
+            assert!(encoded(batch) < MAX_FROM_PEER);
+        }
+    }
+}

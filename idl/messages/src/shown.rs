@@ -1,0 +1,83 @@
+//! Text of others, made safe to show to people and to programs that read line by line.
+//!
+//! Names, reasons, descriptions and source lines come from files and processes that nobody has to
+//! trust. Printed as they are, an escape sequence could recolour or rewrite a terminal, a bidirectional
+//! override could show another text than there is, and a line break could pass for a line of ours.
+//! Paths have a form of their own, which leads back to the path: [`crate::path_text`]. JSON, results and
+//! the journal hold texts as they are.
+
+use std::borrow::Cow;
+
+/// Whether a terminal or a reader line by line takes this for more than a character: control
+/// characters, line and paragraph separators, changes of the direction of writing.
+pub fn moves(c: char) -> bool {
+    let directed = ['\u{202a}'..='\u{202e}', '\u{2066}'..='\u{2069}'];
+    c.is_control()
+        || matches!(c, '\u{2028}' | '\u{2029}')
+        || directed.iter().any(|it| it.contains(&c))
+}
+
+/// The text on one line: whatever [`moves`] is written as `\n`, `\u{1b}` and so on.
+pub fn line(text: &str) -> Cow<'_, str> {
+    escaped(text, moves)
+}
+
+/// The text with its own lines and tabs; whatever else [`moves`] is written as by [`line()`].
+pub fn lines(text: &str) -> Cow<'_, str> {
+    escaped(text, |c| moves(c) && c != '\n' && c != '\t')
+}
+
+fn escaped(text: &str, unsafe_to_show: impl Fn(char) -> bool) -> Cow<'_, str> {
+    if !text.chars().any(&unsafe_to_show) {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::with_capacity(text.len() + 16);
+    for c in text.chars() {
+        if unsafe_to_show(c) {
+            shown.extend(c.escape_default());
+        } else {
+            shown.push(c);
+        }
+    }
+    Cow::Owned(shown)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn what_moves_is_written_out_and_the_rest_stays() {
+        let cases = [
+            ("straße \\ 100 %", "straße \\ 100 %", "straße \\ 100 %"),
+            ("a\nb: accepted", "a\\nb: accepted", "a\nb: accepted"),
+            ("a\r\n\tb", "a\\r\\n\\tb", "a\\r\n\tb"),
+            ("\u{1b}[2Ka", "\\u{1b}[2Ka", "\\u{1b}[2Ka"),
+            ("\u{9b}2K", "\\u{9b}2K", "\\u{9b}2K"),
+            (
+                "a\u{202e}b\u{2069}",
+                "a\\u{202e}b\\u{2069}",
+                "a\\u{202e}b\\u{2069}",
+            ),
+            (
+                "a\u{2028}b\u{85}",
+                "a\\u{2028}b\\u{85}",
+                "a\\u{2028}b\\u{85}",
+            ),
+            ("\0\u{7f}", "\\u{0}\\u{7f}", "\\u{0}\\u{7f}"),
+        ];
+        for (text, one, several) in cases {
+            assert_eq!((&*line(text), &*lines(text)), (one, several));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn nothing_shown_moves(text in any::<String>()) {
+            prop_assert!(!line(&text).chars().any(moves));
+            prop_assert!(!lines(&text).chars().any(|c| moves(c) && c != '\n' && c != '\t'));
+        }
+    }
+}

@@ -1,0 +1,209 @@
+use std::path::PathBuf;
+
+use tokio::sync::mpsc::UnboundedReceiver;
+
+use super::*;
+
+/// A socket whose broker answers `status`, and keeps everybody waiting who asks for a verdict.
+struct Socket {
+    dir: tempfile::TempDir,
+    clients: Arc<Clients>,
+    asked: UnboundedReceiver<Asked>,
+    kept: Vec<Asked>,
+}
+
+const SHORT: Duration = Duration::from_millis(100);
+
+impl Socket {
+    fn new(bounds: Bounds) -> Socket {
+        let dir = tempfile::tempdir().unwrap();
+        let listener = UnixListener::bind(dir.path().join("socket")).unwrap();
+        let (inbox, asked) = mpsc::unbounded_channel();
+        let clients = Clients::new(bounds, inbox);
+        tokio::spawn(clients.clone().accept(listener));
+        Socket {
+            dir,
+            clients,
+            asked,
+            kept: Vec::new(),
+        }
+    }
+
+    fn path(&self) -> PathBuf {
+        self.dir.path().join("socket")
+    }
+
+    async fn connect(&self, said: &str) -> UnixStream {
+        let mut stream = UnixStream::connect(self.path()).await.unwrap();
+        let _ = stream.write_all(said.as_bytes()).await;
+        stream
+    }
+
+    /// What comes back, up to the end of a line or of everything.
+    async fn hear(&mut self, stream: &mut UnixStream) -> String {
+        let mut line = Vec::new();
+        let mut reader = BufReader::new(stream);
+        let reading = reader.read_until(b'\n', &mut line);
+        tokio::pin!(reading);
+        let watchdog = tokio::time::sleep(Duration::from_secs(60));
+        tokio::pin!(watchdog);
+        loop {
+            tokio::select! {
+                read = &mut reading => { let _ = read; break }
+                Some(asked) = self.asked.recv() => match asked.request {
+                    Request::Wait { .. } => self.kept.push(asked),
+                    _ => {
+                        let _ = asked.answer.send(Response::TimedOut);
+                    }
+                },
+                () = &mut watchdog => panic!("the watchdog: nothing was answered"),
+            }
+        }
+        String::from_utf8(line).unwrap()
+    }
+
+    async fn until_kept(&mut self, count: usize) {
+        while self.kept.len() < count {
+            let asked = timeout(Duration::from_secs(60), self.asked.recv()).await;
+            self.kept.push(asked.expect("the watchdog").unwrap());
+        }
+    }
+}
+
+fn bounds(clients: usize, waiting: usize) -> Bounds {
+    Bounds {
+        clients,
+        waiting,
+        request_within: Duration::from_secs(3600),
+        answer_within: Duration::from_secs(3600),
+    }
+}
+
+const STATUS: &str = "{\"request\":\"status\"}\n";
+const WAIT: &str = "{\"request\":\"wait\",\"file\":\"/x.xodr\",\"timeout_ms\":null}\n";
+
+#[tokio::test]
+async fn the_length_of_a_request_is_bounded_and_their_number_is_not() {
+    let mut socket = Socket::new(bounds(8, 4));
+    let mut client = socket.connect("").await;
+    let padded = format!("{}{STATUS}", " ".repeat(MAX_REQUEST - STATUS.len()));
+    for _ in 0..5 {
+        client.write_all(padded.as_bytes()).await.unwrap();
+        assert!(socket.hear(&mut client).await.contains("timed-out"));
+    }
+    let mut client = socket.connect(&" ".repeat(MAX_REQUEST + 1)).await;
+    let said = socket.hear(&mut client).await;
+    assert!(said.contains("at most 65536 bytes"), "{said}");
+    assert_eq!(socket.hear(&mut client).await, "", "it was closed");
+    let mut client = socket.connect("what?\n").await;
+    let said = socket.hear(&mut client).await;
+    assert!(said.contains("not a request"), "{said}");
+    // As `echo … | nc -U` does.
+    let mut client = socket.connect(STATUS.trim()).await;
+    client.shutdown().await.unwrap();
+    assert!(socket.hear(&mut client).await.contains("timed-out"));
+}
+
+#[tokio::test]
+async fn who_says_nothing_or_half_of_it_is_not_waited_for() {
+    let mut socket = Socket::new(Bounds {
+        request_within: SHORT,
+        ..bounds(8, 4)
+    });
+    for said in ["", "{\"request\"", "{\"request\":\"status\"}"] {
+        let mut client = socket.connect(said).await;
+        let heard = socket.hear(&mut client).await;
+        assert!(heard.contains("no request came"), "{said}: {heard}");
+        assert_eq!(socket.hear(&mut client).await, "", "it was closed");
+    }
+    // Having been answered is no licence to stay.
+    let mut client = socket.connect(STATUS).await;
+    assert!(socket.hear(&mut client).await.contains("timed-out"));
+    assert!(socket.hear(&mut client).await.contains("no request came"));
+}
+
+#[tokio::test]
+async fn who_does_not_read_is_not_waited_for() {
+    let mut socket = Socket::new(Bounds {
+        answer_within: SHORT,
+        ..bounds(8, 4)
+    });
+    let _client = socket.connect(STATUS).await;
+    let asked = timeout(Duration::from_secs(60), socket.asked.recv()).await;
+    let reason = "long ".repeat(1 << 20);
+    let answered = asked
+        .unwrap()
+        .unwrap()
+        .answer
+        .send(Response::Failed { reason });
+    answered.unwrap();
+    while !socket.clients.there().is_empty() {
+        tokio::task::yield_now().await;
+    }
+}
+
+#[tokio::test]
+async fn the_silent_make_room_and_those_who_wait_stay() {
+    let mut socket = Socket::new(bounds(8, 4));
+    let mut waiting = Vec::new();
+    for count in 1..=4 {
+        waiting.push(socket.connect(WAIT).await);
+        socket.until_kept(count).await;
+    }
+    let mut refused = socket.connect(WAIT).await;
+    let said = socket.hear(&mut refused).await;
+    assert!(
+        said.contains("4 clients wait for verdicts already"),
+        "{said}"
+    );
+    let mut silent = Vec::new();
+    for _ in 0..40 {
+        silent.push(socket.connect("").await);
+        let mut honest = socket.connect(STATUS).await;
+        assert!(socket.hear(&mut honest).await.contains("timed-out"));
+    }
+    let said = socket.hear(&mut silent[0]).await;
+    assert!(said.contains("whoever says nothing makes room"), "{said}");
+    for asked in std::mem::take(&mut socket.kept) {
+        asked.answer.send(Response::Stopped).unwrap();
+    }
+    for mut client in waiting {
+        assert!(socket.hear(&mut client).await.contains("stopped"));
+    }
+}
+
+#[tokio::test]
+async fn of_a_client_that_has_left_nothing_stays() {
+    let mut socket = Socket::new(bounds(8, 4));
+    let waiting = socket.connect(WAIT).await;
+    // It has nothing more to say, and waits all the same.
+    let mut patient = socket.connect(WAIT).await;
+    patient.shutdown().await.unwrap();
+    socket.until_kept(2).await;
+    drop(waiting);
+    let closed = |asked: &&mut Asked| asked.answer.is_closed();
+    while socket.kept.iter_mut().filter(closed).count() == 0 {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    // The next look has found the other one as well, had it left.
+    tokio::time::sleep(LOOK + SHORT).await;
+    assert_eq!(socket.kept.iter_mut().filter(closed).count(), 1);
+    socket.kept.retain(|it| !it.answer.is_closed());
+    let asked = socket.kept.pop().unwrap();
+    asked.answer.send(Response::Stopped).unwrap();
+    assert!(socket.hear(&mut patient).await.contains("stopped"));
+    drop(patient);
+    while !socket.clients.there().is_empty() {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+}
+
+#[tokio::test]
+async fn where_everybody_is_busy_the_next_is_told_so() {
+    let mut socket = Socket::new(bounds(2, 2));
+    let _waiting = [socket.connect(WAIT).await, socket.connect(WAIT).await];
+    socket.until_kept(2).await;
+    let mut refused = socket.connect(STATUS).await;
+    let said = socket.hear(&mut refused).await;
+    assert!(said.contains("serves 2 clients already"), "{said}");
+}

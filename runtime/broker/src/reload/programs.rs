@@ -1,0 +1,264 @@
+//! The programs of manifests: what a command runs must be in the broker's hands alone.
+
+use std::path::{Path, PathBuf};
+use std::str::CharIndices;
+
+use qcbus_disk::trust::{self, TrustError};
+
+/// What a command of a manifest becomes, so that it is the shell's to take apart, as in ASAM's framework.
+const BEFORE: &str = "exec ";
+const BEHIND: &str = " \"$@\"";
+
+/// The words that start a command of a manifest.
+pub(super) fn shell_command(command: &str) -> Vec<String> {
+    let line = format!("{BEFORE}{command}{BEHIND}");
+    ["sh", "-c", &line, "sh"].map(str::to_owned).to_vec()
+}
+
+/// Looks at what the command of a manifest runs: its program, and the first file that it gives it, which
+/// is an interpreter's script. What those read themselves is their own.
+///
+/// # Errors
+/// What somebody else decides, or what the shell would have to work out first. That something is missing is
+/// found out by whoever starts it.
+pub(super) fn look_at(command: &str) -> Result<(), String> {
+    resolve(command).map(drop)
+}
+
+/// The words that start a child, after a last look at a manifest's program: it is named by where it was
+/// found, so that nothing is looked for between the look and the start.
+///
+/// # Errors
+/// As [`look_at`], and when there is no such program.
+pub fn ready(words: &[String]) -> Result<Vec<String>, String> {
+    let [shell, flag, line, name] = words else {
+        return Ok(words.to_vec());
+    };
+    let inner = line.strip_prefix(BEFORE);
+    let Some(command) = inner.and_then(|it| it.strip_suffix(BEHIND)) else {
+        return Ok(words.to_vec());
+    };
+    let Some((program, rest)) = resolve(command)? else {
+        let program = first_word(command);
+        return Err(format!(
+            "its command was not found ({program}); see its manifest"
+        ));
+    };
+    let line = format!("{BEFORE}{}{rest}{BEHIND}", quoted(&program));
+    Ok([shell, flag, &line, name].map(Clone::clone).to_vec())
+}
+
+fn first_word(command: &str) -> &str {
+    command.split_whitespace().next().unwrap_or_default()
+}
+
+/// In single quotes, for the shell.
+fn quoted(path: &str) -> String {
+    format!("'{}'", path.replace('\'', "'\\''"))
+}
+
+/// The program of a command, from the root, and what of the command follows its name. `None`: there is no
+/// such program.
+fn resolve(command: &str) -> Result<Option<(String, &str)>, String> {
+    let mut words = Words { rest: command };
+    let program = words.next_word();
+    let rest = words.rest;
+    let Some(program) = program.filter(|it| !it.is_empty()) else {
+        return Err(format!(
+            "`{}`: the shell would have to work out what it runs; begin the command with the path of the \
+             program",
+            first_word(command)
+        ));
+    };
+    let Some(found) = find(&program) else {
+        return Ok(None);
+    };
+    believe(&found)?;
+    let options = |word: &String| word.starts_with('-');
+    let script = std::iter::from_fn(|| words.next_word()).find(|word| !options(word));
+    let script = script.map(|it| absolute(Path::new(&it)));
+    if let Some(script) = script.filter(|it| it.is_file()) {
+        believe(&script)?;
+    }
+    let found = found.into_os_string().into_string();
+    let found = found.map_err(|it| format!("{}: its name is no UTF-8", it.display()))?;
+    Ok(Some((found, rest)))
+}
+
+fn believe(file: &Path) -> Result<(), String> {
+    match trust::look_at_file(file) {
+        Err(error @ TrustError::Foreign { .. }) => Err(error.to_string()),
+        // It is missing, or nobody can get at it: so will whoever starts it find.
+        Ok(()) | Err(TrustError::Io { .. }) => Ok(()),
+    }
+}
+
+fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf())
+}
+
+/// Where the shell finds a program.
+fn find(program: &str) -> Option<PathBuf> {
+    let is_program = |path: &PathBuf| {
+        path.is_file() && rustix::fs::access(path, rustix::fs::Access::EXEC_OK).is_ok()
+    };
+    if program.contains('/') {
+        return Some(absolute(Path::new(program))).filter(is_program);
+    }
+    let path = std::env::var_os("PATH").unwrap_or_else(|| "/usr/local/bin:/usr/bin:/bin".into());
+    let places = std::env::split_paths(&path).map(|place| absolute(&place.join(program)));
+    places.into_iter().find(is_program)
+}
+
+/// The words of a command, as the shell sees them: up to the first that it would have to work out.
+struct Words<'c> {
+    rest: &'c str,
+}
+
+impl Words<'_> {
+    fn next_word(&mut self) -> Option<String> {
+        let start = self.rest.trim_start();
+        let mut word = String::new();
+        let mut letters = start.char_indices();
+        let mut any = false;
+        let end = loop {
+            let Some((at, letter)) = letters.next() else {
+                break start.len();
+            };
+            match letter {
+                ' ' | '\t' => break at,
+                '\'' => quote(&mut letters, &mut word, '\'')?,
+                '"' => quote(&mut letters, &mut word, '"')?,
+                '\\' => word.push(letters.next()?.1),
+                '$' => word.push_str(&variable(&mut letters)?),
+                '~' if !any => return None,
+                c if SPECIAL.contains(c) => return None,
+                c => word.push(c),
+            }
+            any = true;
+        };
+        self.rest = &start[end..];
+        any.then_some(word)
+    }
+}
+
+/// What means something to the shell where it stands outside of quotes.
+const SPECIAL: &str = "`*?[;&|<>(){}#!\n";
+
+/// The value of the variable whose name follows, as a child sees it, too. `None`: it is not set, or the
+/// shell would take it apart.
+fn variable(letters: &mut CharIndices<'_>) -> Option<String> {
+    let rest = letters.as_str();
+    let (name, length) = match rest.strip_prefix('{') {
+        Some(inner) => inner
+            .split_once('}')
+            .map(|(name, _)| (name, name.len() + 2))?,
+        None => {
+            let end = rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
+            let name = &rest[..end.unwrap_or(rest.len())];
+            (name, name.len())
+        }
+    };
+    let is_name = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    if name.is_empty() || !name.chars().all(is_name) {
+        return None;
+    }
+    let value = std::env::var(name).ok()?;
+    let plain = |c: char| !c.is_whitespace() && !SPECIAL.contains(c);
+    // The name is letters of one byte each.
+    letters.nth(length - 1);
+    value.chars().all(plain).then_some(value)
+}
+
+/// Takes what stands in quotes. `None`: they are not closed, or the shell would work something out.
+fn quote(letters: &mut CharIndices<'_>, word: &mut String, mark: char) -> Option<()> {
+    loop {
+        match letters.next()?.1 {
+            c if c == mark => return Some(()),
+            '`' if mark == '"' => return None,
+            '$' if mark == '"' => word.push_str(&variable(letters)?),
+            '\\' if mark == '"' => word.push(letters.next()?.1),
+            c => word.push(c),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(command: &str) -> Vec<String> {
+        let mut words = Words { rest: command };
+        std::iter::from_fn(|| words.next_word()).collect()
+    }
+
+    #[test]
+    fn words_are_the_shells() {
+        let list: &[(&str, &[&str])] = &[
+            ("/opt/run --x 7", &["/opt/run", "--x", "7"]),
+            (" '/opt/my run' \"a b\"c\\ d ", &["/opt/my run", "a bc d"]),
+            ("run 2>/dev/null more", &["run"]),
+            (
+                "$CARGO_PKG_NAME/run ${CARGO_PKG_NAME}x",
+                &["qcbus-broker/run", "qcbus-brokerx"],
+            ),
+            ("\"$CARGO_PKG_NAME\"", &["qcbus-broker"]),
+            ("$no_such_variable_here/run", &[]),
+            ("${CARGO_PKG_NAME:-x}", &[]),
+            ("$1 x", &[]),
+            ("~/run", &[]),
+            ("\"$(evil)\" x", &[]),
+            ("'$(name)'", &["$(name)"]),
+            ("'open", &[]),
+            ("", &[]),
+            ("''", &[""]),
+        ];
+        for (command, expected) in list {
+            assert_eq!(words(command), *expected, "{command}");
+        }
+    }
+
+    #[test]
+    fn a_program_is_started_from_where_it_was_found() {
+        let ready = |command: &str| ready(&shell_command(command));
+        let shell = find("sh").unwrap();
+        let words = ready("sh -c 'exit 3' x").unwrap();
+        assert_eq!(
+            words[2],
+            format!("exec '{}' -c 'exit 3' x \"$@\"", shell.display())
+        );
+        let missing = ready("/nowhere/at/all x").unwrap_err();
+        assert!(
+            missing.contains("was not found (/nowhere/at/all)"),
+            "{missing}"
+        );
+        let unclear = ready("$(cat x)").unwrap_err();
+        assert!(unclear.contains("path of the program"), "{unclear}");
+        let other = ["program".to_owned(), "x".to_owned()];
+        assert_eq!(super::ready(&other).unwrap(), other);
+    }
+
+    #[test]
+    fn a_program_or_script_that_others_may_write_is_not_started() {
+        use std::os::unix::fs::PermissionsExt;
+        let dir = tempfile::tempdir().unwrap();
+        let script = dir.path().join("it's a script");
+        std::fs::write(&script, "#!/bin/sh\n").unwrap();
+        let mode = |mode| {
+            let mode = std::fs::Permissions::from_mode(mode);
+            std::fs::set_permissions(&script, mode).unwrap();
+        };
+        let alone = quoted(&script.to_string_lossy());
+        let commands = [alone.clone(), format!("sh -e {alone} --more")];
+        mode(0o755);
+        for command in &commands {
+            look_at(command).unwrap();
+        }
+        mode(0o777);
+        for command in &commands {
+            let said = look_at(command).unwrap_err();
+            assert!(said.contains("chmod o-w"), "{command}: {said}");
+            assert_eq!(ready(&shell_command(command)).unwrap_err(), said);
+        }
+    }
+}

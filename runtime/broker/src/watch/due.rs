@@ -1,0 +1,181 @@
+//! Directories that are to be looked through: those of which an event told, and all of them at
+//! intervals. Each waits its turn, once: who makes much of the one waits behind the others.
+
+use std::collections::{HashSet, VecDeque};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// A look through everything begins no sooner after the last than this...
+const PAUSE: Duration = Duration::from_millis(100);
+
+/// ...and than so many times as long as that one took.
+const SHARE: u32 = 4;
+
+/// A directory whose turn it is.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Turn {
+    /// Something happened in it, or may have.
+    Told(PathBuf),
+    /// All are looked through, and this is the next.
+    Passed {
+        /// The directory.
+        directory: PathBuf,
+        /// Whether nothing was looked at before.
+        first: bool,
+    },
+}
+
+/// A look through everything.
+#[derive(Debug)]
+struct Pass {
+    first: bool,
+    began: Instant,
+    directories: VecDeque<PathBuf>,
+}
+
+/// The directories that wait for their turn.
+#[derive(Debug)]
+pub struct Due {
+    told: VecDeque<PathBuf>,
+    queued: HashSet<PathBuf>,
+    pass: Option<Pass>,
+    is_passed_next: bool,
+    next_pass: Instant,
+    /// Before this no pass begins.
+    rest: Instant,
+}
+
+impl Due {
+    /// Nothing is due but the first look at everything, now.
+    pub fn new(now: Instant) -> Due {
+        Due {
+            told: VecDeque::new(),
+            queued: HashSet::new(),
+            pass: None,
+            is_passed_next: false,
+            next_pass: now,
+            rest: now,
+        }
+    }
+
+    /// A directory is to be looked through.
+    pub fn push(&mut self, directory: &Path) {
+        if !self.queued.contains(directory) {
+            self.queued.insert(directory.to_path_buf());
+            self.told.push_back(directory.to_path_buf());
+        }
+    }
+
+    /// A directory was found in a look through everything.
+    pub fn pass_on(&mut self, directory: PathBuf) {
+        if let Some(pass) = &mut self.pass {
+            pass.directories.push_back(directory);
+        }
+    }
+
+    /// Whether a directory will be looked through without anything else to happen.
+    pub fn covers(&self, directory: &Path) -> bool {
+        self.pass.is_some() || self.queued.contains(directory)
+    }
+
+    /// Whether there is nothing to do at once.
+    pub fn is_empty(&self) -> bool {
+        self.told.is_empty() && self.pass.is_none()
+    }
+
+    /// Begins to look through everything.
+    pub fn begin_pass(&mut self, roots: &[PathBuf], first: bool, now: Instant) {
+        self.pass = Some(Pass {
+            first,
+            began: now,
+            directories: roots.iter().cloned().collect(),
+        });
+        self.next_pass = now + Duration::from_secs(u64::from(u32::MAX));
+    }
+
+    /// When everything is to be looked through again; `None` while that is being done.
+    pub fn next_pass(&self) -> Option<Instant> {
+        self.pass.is_none().then_some(self.next_pass.max(self.rest))
+    }
+
+    /// Everything is to be looked through at that time at the latest.
+    pub fn pass_at(&mut self, at: Instant) {
+        self.next_pass = self.next_pass.min(at);
+    }
+
+    /// Whose turn it is: those of which events told and those of a pass take turns.
+    pub fn next(&mut self) -> Option<Turn> {
+        self.is_passed_next = !self.is_passed_next;
+        if self.is_passed_next {
+            self.next_passed().or_else(|| self.next_told())
+        } else {
+            self.next_told().or_else(|| self.next_passed())
+        }
+    }
+
+    fn next_told(&mut self) -> Option<Turn> {
+        let directory = self.told.pop_front()?;
+        self.queued.remove(&directory);
+        Some(Turn::Told(directory))
+    }
+
+    fn next_passed(&mut self) -> Option<Turn> {
+        let pass = self.pass.as_mut()?;
+        let (directory, first) = (pass.directories.pop_front()?, pass.first);
+        Some(Turn::Passed { directory, first })
+    }
+
+    /// Whether a look through everything has just come to its end, and whether it was the first.
+    pub fn ended_pass(&mut self, now: Instant) -> Option<bool> {
+        let pass = self.pass.take_if(|pass| pass.directories.is_empty())?;
+        let took = now.saturating_duration_since(pass.began);
+        self.rest = now + PAUSE.max(took * SHARE);
+        Some(pass.first)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(name: &str) -> Option<Turn> {
+        Some(Turn::Told(name.into()))
+    }
+
+    #[test]
+    fn who_comes_again_and_again_waits_behind_the_others() {
+        let mut due = Due::new(Instant::now());
+        for name in ["a", "b", "a", "a", "c"] {
+            due.push(Path::new(name));
+        }
+        assert_eq!(due.next(), told("a"));
+        due.push(Path::new("a"));
+        assert_eq!(
+            [due.next(), due.next(), due.next()],
+            ["b", "c", "a"].map(told)
+        );
+        assert!(due.next().is_none() && due.is_empty());
+    }
+
+    #[test]
+    fn a_pass_and_what_events_tell_take_turns() {
+        let now = Instant::now();
+        let mut due = Due::new(now);
+        assert_eq!(due.next_pass(), Some(now));
+        due.begin_pass(&["r".into()], true, now);
+        assert_eq!(due.next_pass(), None);
+        due.pass_on("s".into());
+        due.push(Path::new("a"));
+        due.push(Path::new("b"));
+        let turns: Vec<Turn> = std::iter::from_fn(|| due.next()).collect();
+        let names = turns.iter().map(|turn| match turn {
+            Turn::Told(directory) | Turn::Passed { directory, .. } => directory.to_str().unwrap(),
+        });
+        assert_eq!(names.collect::<Vec<_>>(), ["r", "a", "s", "b"]);
+        assert_eq!(due.ended_pass(now + PAUSE), Some(true));
+        assert_eq!(due.ended_pass(now + PAUSE), None);
+        // However often it is wished for.
+        due.pass_at(now);
+        assert_eq!(due.next_pass(), Some(now + PAUSE + PAUSE * SHARE));
+    }
+}

@@ -1,0 +1,117 @@
+//! The watched directories themselves: they may go, come back, and be replaced by others.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+use qcbus_messages::path_text::to_text;
+
+use super::Seen;
+use super::looker::Looker;
+
+/// Device and inode of a directory.
+type Identity = (u64, u64);
+
+/// What is known of the watched directories.
+#[derive(Debug, Default)]
+pub struct Roots {
+    /// Those that are away.
+    lost: BTreeSet<PathBuf>,
+    /// Which directory each was when it was last there.
+    seen: BTreeMap<PathBuf, Identity>,
+}
+
+impl Roots {
+    /// What lies in a watched directory that has gone as a whole is kept until it is back.
+    pub fn is_away(&self, path: &Path) -> bool {
+        !self.lost.is_empty() && self.lost.iter().any(|root| path.starts_with(root))
+    }
+}
+
+impl Looker {
+    /// Looks whether each watched directory is there, and is the one that it was.
+    pub fn check_roots(&mut self) {
+        for root in self.options.roots.clone() {
+            self.check_root(&root);
+        }
+    }
+
+    fn check_root(&mut self, root: &Path) {
+        let looking = self.looking.clone();
+        let Ok(now) = looking.at(root, || identity(root)) else {
+            return self.lose_root(root, "is gone");
+        };
+        let before = self.roots.seen.get(root).copied();
+        if before.is_some_and(|before| is_unmounted(root, before, now)) {
+            return self.lose_root(
+                root,
+                "is empty and on another file system than before, as after an unmount",
+            );
+        }
+        let was_lost = self.roots.lost.remove(root);
+        // One that was made anew may have the number of the former.
+        let is_watched = self.tree.contains(root) || self.due.covers(root);
+        let what = match before {
+            _ if was_lost => "is back",
+            Some(before) if before != now || !is_watched => {
+                "is another one than before, and is looked through again"
+            }
+            Some(_) => return,
+            None => {
+                self.roots.seen.insert(root.to_path_buf(), now);
+                return;
+            }
+        };
+        self.roots.seen.insert(root.to_path_buf(), now);
+        self.tree.remove_below(root);
+        self.forget_rules_below(root);
+        self.dependencies.poll_all();
+        self.tell_again_below(root);
+        self.due.push(root);
+        self.say_of_root(root, what);
+    }
+
+    fn say_of_root(&mut self, root: &Path, what: &str) {
+        let root = to_text(root);
+        (self.tell)(Seen::Notice(format!("the watched directory {root} {what}")));
+    }
+
+    fn lose_root(&mut self, root: &Path, how: &str) {
+        if self.roots.lost.insert(root.to_path_buf()) {
+            self.tree.remove_below(root);
+            self.dependencies.poll_all();
+            self.say_of_root(
+                root,
+                &format!("{how}; its results are kept, and it is watched again when it comes back"),
+            );
+        }
+    }
+
+    /// Whether something is not there because its watched directory is not.
+    pub fn is_root_gone(&mut self, path: &Path) -> bool {
+        let inside = |root: &&PathBuf| path.starts_with(root);
+        let roots: Vec<PathBuf> = self.options.roots.iter().filter(inside).cloned().collect();
+        for root in roots {
+            if identity(&root).is_err() {
+                self.lose_root(&root, "is gone");
+            }
+        }
+        self.roots.is_away(path)
+    }
+}
+
+fn identity(root: &Path) -> io::Result<Identity> {
+    let data = std::fs::metadata(root)?;
+    if data.is_dir() {
+        Ok((data.dev(), data.ino()))
+    } else {
+        Err(io::ErrorKind::NotADirectory.into())
+    }
+}
+
+/// Whether what lies there is the place where something was mounted.
+fn is_unmounted(root: &Path, before: Identity, now: Identity) -> bool {
+    let is_empty = || std::fs::read_dir(root).is_ok_and(|mut it| it.next().is_none());
+    before.0 != now.0 && is_empty()
+}

@@ -1,0 +1,434 @@
+//! The watcher as it runs, over directories that others work in. Nothing is looked through at
+//! intervals: what is told here was told by an event, or by what the watcher makes of one.
+
+use std::collections::BTreeSet;
+use std::ffi::OsStr;
+use std::fs;
+use std::os::fd::OwnedFd;
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::Duration;
+
+use rustix::fs::{CWD, Mode, OFlags, RenameFlags};
+
+use super::farm;
+use crate::watch::{Looking, Seen, WatchOptions, Watcher};
+
+const NEVER: Duration = Duration::from_secs(86_400);
+
+/// What is said of a directory from its first look on.
+struct Watched {
+    told: Receiver<Seen>,
+    /// Everything that was said so far, in words.
+    said: Vec<String>,
+    root: PathBuf,
+    _watcher: Watcher,
+}
+
+impl Watched {
+    fn start(root: &Path) -> Watched {
+        let (tell, told) = channel();
+        let options = WatchOptions {
+            roots: vec![root.to_path_buf()],
+            poll: None,
+            rescan: NEVER,
+        };
+        let tell = move |seen| drop(tell.send(seen));
+        let mut watched = Watched {
+            told,
+            said: Vec::new(),
+            root: root.to_path_buf(),
+            _watcher: Watcher::start(options, Arc::default(), tell).unwrap(),
+        };
+        watched.until("Scanned");
+        watched
+    }
+
+    fn word(&self, seen: &Seen) -> String {
+        let name = |path: &Path| {
+            let below = path.strip_prefix(&self.root).unwrap_or(path);
+            below.display().to_string()
+        };
+        match seen {
+            Seen::Settled(path, _) => format!("settled {}", name(path)),
+            Seen::Present(path) => format!("present {}", name(path)),
+            Seen::Touched(path, _) => format!("touched {}", name(path)),
+            Seen::Vanished(path) => format!("vanished {}", name(path)),
+            Seen::Unseen(it) => format!("unseen {}", name(&it.path)),
+            Seen::SeenAgain(path) => format!("seen again {}", name(path)),
+            Seen::Scanned => "Scanned".to_owned(),
+            Seen::Mode(mode) => format!("mode {mode}"),
+            Seen::Notice(notice) => format!("notice {notice}"),
+        }
+    }
+
+    /// Waits until all this has been said, whatever else is.
+    fn until_all(&mut self, words: impl IntoIterator<Item = String>) {
+        let mut missing: BTreeSet<String> = words.into_iter().collect();
+        while !missing.is_empty() {
+            match self.told.recv_timeout(Duration::from_secs(30)) {
+                Ok(seen) => {
+                    let word = self.word(&seen);
+                    missing.remove(&word);
+                    self.said.push(word);
+                }
+                Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
+                    let some: Vec<&String> = missing.iter().take(5).collect();
+                    panic!("{} not told, such as {some:?}", missing.len());
+                }
+            }
+        }
+    }
+
+    fn until(&mut self, word: &str) {
+        self.until_all([word.to_owned()]);
+    }
+
+    fn has_said(&self, word: &str) -> bool {
+        self.said.iter().any(|it| it == word)
+    }
+}
+
+/// Written aside and renamed into place.
+fn put(path: &Path) {
+    let aside = path.with_extension("tmp");
+    fs::write(&aside, "<OpenDRIVE/>").unwrap();
+    fs::rename(aside, path).unwrap();
+}
+
+#[test]
+fn files_in_directories_that_have_just_come_are_all_told() {
+    let ((_dir, root), (_other, aside)) = (farm(), farm());
+    let mut watched = Watched::start(&root);
+    for round in 0..100 {
+        let at = |name: &str| format!("{name}{round}");
+        // As `mkdir` and `cp` do it.
+        fs::create_dir(root.join(at("plain"))).unwrap();
+        put(&root.join(at("plain")).join("a.xodr"));
+        // As `tar x` and `unzip` do it.
+        let deep = root.join(at("deep")).join("1/2/3/4");
+        fs::create_dir_all(&deep).unwrap();
+        put(&deep.join("a.xodr"));
+        // As `rsync --delay-updates` and `mv` do it, and renamed once more at once.
+        fs::create_dir_all(aside.join(at("moved")).join("1/2")).unwrap();
+        put(&aside.join(at("moved")).join("1/2/a.xodr"));
+        fs::rename(aside.join(at("moved")), root.join(at("first"))).unwrap();
+        fs::rename(root.join(at("first")), root.join(at("then"))).unwrap();
+        put(&root.join(at("then")).join("1/2/b.xodr"));
+        // The place of another that has gone.
+        fs::create_dir(root.join(at("twice"))).unwrap();
+        fs::remove_dir(root.join(at("twice"))).unwrap();
+        fs::create_dir(root.join(at("twice"))).unwrap();
+        put(&root.join(at("twice")).join("a.xodr"));
+        watched.until_all([
+            format!("settled plain{round}/a.xodr"),
+            format!("settled deep{round}/1/2/3/4/a.xodr"),
+            format!("settled then{round}/1/2/a.xodr"),
+            format!("settled then{round}/1/2/b.xodr"),
+            format!("settled twice{round}/a.xodr"),
+        ]);
+    }
+}
+
+#[test]
+fn a_tree_that_is_written_by_many_at_once_is_told_as_a_whole() {
+    let (_dir, root) = farm();
+    let mut watched = Watched::start(&root);
+    let names: Vec<PathBuf> = (0..2_000)
+        .map(|it| PathBuf::from(format!("{}/{}/{it}/a.xodr", it % 7, it % 31)))
+        .collect();
+    std::thread::scope(|scope| {
+        for part in names.chunks(500) {
+            let root = &root;
+            scope.spawn(move || {
+                for name in part {
+                    let path = root.join(name);
+                    fs::create_dir_all(path.parent().unwrap()).unwrap();
+                    put(&path);
+                }
+            });
+        }
+    });
+    watched.until_all(names.iter().map(|it| format!("settled {}", it.display())));
+}
+
+#[test]
+fn a_root_that_is_replaced_is_watched_anew() {
+    let (_dir, base) = farm();
+    let root = base.join("above/inbox");
+    fs::create_dir_all(&root).unwrap();
+    put(&root.join("old.xodr"));
+    let mut watched = Watched::start(&root);
+
+    // Removed and made again.
+    fs::remove_dir_all(&root).unwrap();
+    fs::create_dir(&root).unwrap();
+    put(&root.join("a.xodr"));
+    watched.until_all(["settled a.xodr".to_owned(), "vanished old.xodr".to_owned()]);
+    fs::create_dir(root.join("maps")).unwrap();
+    put(&root.join("maps/b.xodr"));
+    watched.until("settled maps/b.xodr");
+
+    // Another in its place.
+    let new = base.join("above/new");
+    fs::create_dir_all(new.join("maps")).unwrap();
+    put(&new.join("maps/c.xodr"));
+    rustix::fs::renameat_with(CWD, &new, CWD, &root, RenameFlags::EXCHANGE).unwrap();
+    fs::rename(&new, base.join("above/aside")).unwrap();
+    watched.until_all(["settled maps/c.xodr", "vanished maps/b.xodr"].map(str::to_owned));
+    put(&root.join("maps/d.xodr"));
+    watched.until("settled maps/d.xodr");
+    // What happens in the former one is no business of ours.
+    put(&base.join("above/aside/e.xodr"));
+
+    // What is above goes, and comes back.
+    let whole = watched.said.len();
+    fs::rename(base.join("above"), base.join("away")).unwrap();
+    put(&base.join("away/inbox/maps/f.xodr"));
+    fs::rename(base.join("away"), base.join("above")).unwrap();
+    watched.until("settled maps/f.xodr");
+    put(&root.join("maps/g.xodr"));
+    watched.until("settled maps/g.xodr");
+    assert!(!watched.has_said("settled e.xodr"));
+    let taken = |it: &&String| it.starts_with("vanished");
+    let taken: Vec<&String> = watched.said[whole..].iter().filter(taken).collect();
+    assert!(taken.is_empty(), "{taken:?}");
+}
+
+#[test]
+fn what_is_above_a_root_may_be_away_for_long() {
+    let (_dir, base) = farm();
+    let root = base.join("above/inbox");
+    fs::create_dir_all(root.join("maps")).unwrap();
+    put(&root.join("maps/a.xodr"));
+    let mut watched = Watched::start(&root);
+    fs::rename(base.join("above"), base.join("away")).unwrap();
+    while !watched.said.iter().any(|it| it.contains("is gone")) {
+        let seen = watched.told.recv_timeout(Duration::from_secs(30)).unwrap();
+        watched.said.push(watched.word(&seen));
+    }
+    put(&base.join("away/inbox/maps/b.xodr"));
+    fs::rename(base.join("away"), base.join("above")).unwrap();
+    watched.until("settled maps/b.xodr");
+    put(&root.join("maps/c.xodr"));
+    watched.until("settled maps/c.xodr");
+    let said = &watched.said;
+    assert!(
+        !said.iter().any(|it| it.starts_with("vanished")),
+        "{said:?}"
+    );
+}
+
+/// A directory outside with a file, to which links may lead.
+fn outside() -> (tempfile::TempDir, PathBuf) {
+    let (dir, outside) = farm();
+    fs::create_dir(outside.join("deep")).unwrap();
+    put(&outside.join("behind.xodr"));
+    put(&outside.join("deep/behind.xodr"));
+    (dir, outside)
+}
+
+/// What lies behind a link to a directory is not looked at, whenever the link came and whatever
+/// happens there.
+#[test]
+fn links_to_directories_are_never_followed_however_they_came() {
+    let ((_dir, root), (_other, outside)) = (farm(), outside());
+    fs::create_dir(root.join("2026-11-20")).unwrap();
+    put(&root.join("2026-11-20/a.xodr"));
+    symlink(&outside, root.join("before")).unwrap();
+    symlink("2026-11-20", root.join("latest")).unwrap();
+    let mut watched = Watched::start(&root);
+    assert!(watched.has_said("unseen before"));
+    watched.until("settled 2026-11-20/a.xodr");
+
+    symlink(&outside, root.join("created")).unwrap();
+    symlink(&outside, root.join("link.tmp")).unwrap();
+    fs::rename(root.join("link.tmp"), root.join("renamed")).unwrap();
+    watched.until_all(["unseen created".to_owned(), "unseen renamed".to_owned()]);
+    // One that comes with its directory.
+    fs::create_dir(root.join("new")).unwrap();
+    symlink(&outside, root.join("new/inner")).unwrap();
+    watched.until("unseen new/inner");
+    // Retargeted, and back.
+    let retarget = |to: &Path| {
+        symlink(to, root.join("next")).unwrap();
+        fs::rename(root.join("next"), root.join("latest")).unwrap();
+    };
+    retarget(&outside);
+    watched.until("unseen latest");
+    retarget(Path::new("2026-11-20"));
+    watched.until("seen again latest");
+
+    for behind in ["", "deep"] {
+        put(&outside.join(behind).join("new.xodr"));
+        fs::create_dir(outside.join(behind).join("just")).unwrap();
+        put(&outside.join(behind).join("just/come.xodr"));
+    }
+    put(&root.join("2026-11-20/b.xodr"));
+    put(&root.join("last.xodr"));
+    let told = ["settled 2026-11-20/b.xodr", "settled last.xodr"];
+    watched.until_all(told.map(str::to_owned));
+    let settled: BTreeSet<&str> = watched
+        .said
+        .iter()
+        .filter_map(|it| it.strip_prefix("settled "))
+        .collect();
+    let expected = ["2026-11-20/a.xodr", "2026-11-20/b.xodr", "last.xodr"];
+    assert_eq!(settled, BTreeSet::from(expected));
+}
+
+/// A directory gives way to a link to another while something happens in it, over and over.
+#[test]
+fn a_directory_that_flips_to_a_link_is_not_followed_in_between() {
+    let ((_dir, root), (_other, outside)) = (farm(), outside());
+    let mut watched = Watched::start(&root);
+    let (maps, aside) = (root.join("maps"), root.join("aside"));
+    for _ in 0..300 {
+        fs::create_dir(&maps).unwrap();
+        fs::write(maps.join("behind.xodr"), "<OpenDRIVE/>").unwrap();
+        fs::rename(&maps, &aside).unwrap();
+        symlink(&outside, &maps).unwrap();
+        fs::remove_file(&maps).unwrap();
+        fs::remove_dir_all(&aside).unwrap();
+    }
+    symlink(&outside, &maps).unwrap();
+    put(&root.join("last.xodr"));
+    watched.until_all(["settled last.xodr".to_owned(), "unseen maps".to_owned()]);
+    // The last word on what it held while it was a directory.
+    let words = |it: &&String| it.ends_with(" maps/behind.xodr");
+    let last = watched.said.iter().rev().find(words);
+    assert!(
+        last.is_none_or(|it| it == "vanished maps/behind.xodr"),
+        "{last:?}"
+    );
+}
+
+#[test]
+fn a_directory_that_is_closed_and_a_link_to_everything_cost_themselves() {
+    let (_dir, root) = farm();
+    symlink("/", root.join("everything")).unwrap();
+    symlink("/proc/self/cwd", root.join("magic")).unwrap();
+    symlink("..", root.join("up")).unwrap();
+    fs::create_dir(root.join("maps")).unwrap();
+    let mut watched = Watched::start(&root);
+    assert!(watched.has_said("mode events"), "{:?}", watched.said);
+    assert!(watched.has_said("unseen everything"));
+    put(&root.join("maps/a.xodr"));
+    watched.until("settled maps/a.xodr");
+}
+
+fn storm(root: &Path, is_over: &AtomicBool) {
+    let (here, there) = (root.join("here"), root.join("there"));
+    while !is_over.load(Ordering::Relaxed) {
+        // In circles, with all that is in it.
+        for (from, to) in [("here", "there"), ("there", "third"), ("third", "here")] {
+            fs::rename(root.join(from), root.join(to)).unwrap();
+        }
+        symlink("/", root.join("flips")).unwrap();
+        fs::remove_file(root.join("flips")).unwrap();
+        symlink(&here, root.join("flips.xodr")).unwrap();
+        fs::remove_file(root.join("flips.xodr")).unwrap();
+        fs::create_dir(&there).unwrap();
+        fs::remove_dir(&there).unwrap();
+        fs::write(root.join(super::IGNORE_FILE), "x").unwrap();
+    }
+}
+
+#[test]
+fn who_storms_in_one_place_keeps_no_other_from_being_told() {
+    let (_dir, root) = farm();
+    let wide = root.join("here/wide");
+    for number in 0..1_500 {
+        fs::create_dir_all(wide.join(format!("{number:0>250}"))).unwrap();
+    }
+    fs::create_dir(root.join("maps")).unwrap();
+    let mut watched = Watched::start(&root);
+    let is_over = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        scope.spawn(|| storm(&root, &is_over));
+        for number in 0..5 {
+            put(&root.join(format!("maps/{number}.xodr")));
+            watched.until(&format!("settled maps/{number}.xodr"));
+            fs::create_dir(root.join(format!("maps/{number}"))).unwrap();
+            put(&root.join(format!("maps/{number}/a.xodr")));
+            watched.until(&format!("settled maps/{number}/a.xodr"));
+        }
+        is_over.store(true, Ordering::Relaxed);
+    });
+    let notices = |it: &&String| it.starts_with("notice");
+    let notices: Vec<&String> = watched.said.iter().filter(notices).collect();
+    assert!(notices.len() < 20, "{notices:#?}");
+    // And nothing was lost in it.
+    put(&root.join("here/wide/last.xodr"));
+    watched.until("settled here/wide/last.xodr");
+}
+
+/// Directories in each other, deeper than any path can name, with a file in the last.
+fn dig(root: &Path, depth: usize) {
+    let flags = OFlags::DIRECTORY | OFlags::CLOEXEC;
+    let mut at: OwnedFd = rustix::fs::openat(CWD, root, flags, Mode::empty()).unwrap();
+    let name = "d".repeat(200);
+    for _ in 0..depth {
+        rustix::fs::mkdirat(&at, &name, Mode::RWXU).unwrap();
+        at = rustix::fs::openat(&at, &name, flags, Mode::empty()).unwrap();
+    }
+    let flags = OFlags::CREATE | OFlags::WRONLY;
+    rustix::fs::openat(&at, "deepest.xodr", flags, Mode::RWXU).unwrap();
+}
+
+/// `remove_dir_all` goes by descriptors, too, and needs one for each level.
+fn fill_up(root: &Path) {
+    dig(root, 300);
+}
+
+#[test]
+fn what_lies_too_deep_is_said_and_the_rest_is_told() {
+    let (_dir, root) = farm();
+    fill_up(&root);
+    put(&root.join("a.xodr"));
+    let mut watched = Watched::start(&root);
+    let settled = |it: &String| it.starts_with("settled") || it.starts_with("present");
+    assert!(watched.said.iter().any(settled), "{:?}", watched.said);
+    let unseen = |it: &&String| it.starts_with("unseen");
+    assert_eq!(watched.said.iter().filter(unseen).count(), 1);
+    put(&root.join("b.xodr"));
+    watched.until("settled b.xodr");
+    let above = root.join("d".repeat(200));
+    put(&above.join("c.xodr"));
+    let name = above.join("c.xodr");
+    let name = name.strip_prefix(&root).unwrap().display().to_string();
+    watched.until(&format!("settled {name}"));
+}
+
+#[test]
+fn many_things_that_cannot_be_looked_at_are_not_each_said() {
+    let (_dir, root) = farm();
+    for number in 0..3_000 {
+        symlink("nowhere", root.join(format!("{number}.xodr"))).unwrap();
+    }
+    let mut watched = Watched::start(&root);
+    let said = watched.said.iter().filter(|it| it.starts_with("unseen"));
+    let said = said.count();
+    assert!((100..=1_001).contains(&said), "{said}");
+    let found =
+        crate::watch::scan_directory(&root, std::slice::from_ref(&root), &Looking::default());
+    assert!((100..=1_001).contains(&found.unseen.len()));
+    put(&root.join("a.xodr"));
+    watched.until("settled a.xodr");
+}
+
+#[test]
+fn names_of_the_longest_kind_are_told() {
+    let (_dir, root) = farm();
+    let mut watched = Watched::start(&root);
+    let directory = "m".repeat(255);
+    let file = format!("{}.xodr", "f".repeat(250));
+    fs::create_dir(root.join(&directory)).unwrap();
+    let path = root.join(&directory).join(OsStr::new(&file));
+    fs::write(root.join("x"), "").unwrap();
+    fs::rename(root.join("x"), path).unwrap();
+    watched.until(&format!("settled {directory}/{file}"));
+}

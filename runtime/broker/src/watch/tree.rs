@@ -1,0 +1,315 @@
+//! The directories that are looked at, each with the kernel's watch on it.
+//!
+//! The kernel watches single directories. Here each one is asked for by itself, before it is looked
+//! through: so nothing falls between the look and the watch, and what cannot be watched costs that
+//! directory and no other. A crate that watches trees does both in the other order, or as a whole.
+
+use std::borrow::Borrow;
+use std::collections::{BTreeMap, HashMap};
+use std::ffi::{OsStr, OsString};
+use std::io;
+use std::mem::MaybeUninit;
+use std::ops::Bound;
+use std::os::fd::{BorrowedFd, OwnedFd};
+use std::os::unix::ffi::OsStrExt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use rustix::fs::inotify::{self, CreateFlags, ReadFlags, Reader, WatchFlags};
+use rustix::io::Errno;
+use std::os::fd::AsFd;
+
+/// Bytes of events that are taken at once: some hundreds of events.
+const AT_ONCE: usize = 64 * 1024;
+
+/// What is worth an event. Who only opens or reads a file, as we do ourselves, is not.
+fn worth() -> WatchFlags {
+    WatchFlags::ONLYDIR
+        | WatchFlags::DONT_FOLLOW
+        | WatchFlags::ATTRIB
+        | WatchFlags::CREATE
+        | WatchFlags::DELETE
+        | WatchFlags::DELETE_SELF
+        | WatchFlags::CLOSE_WRITE
+        | WatchFlags::MODIFY
+        | WatchFlags::MOVED_FROM
+        | WatchFlags::MOVED_TO
+        | WatchFlags::MOVE_SELF
+}
+
+/// An event as the kernel tells it.
+#[derive(Debug)]
+pub struct Told {
+    /// Number of the watch.
+    watch: i32,
+    /// What happened.
+    pub what: ReadFlags,
+    /// To what in the directory; `None`: to itself.
+    pub name: Option<OsString>,
+}
+
+/// Why a directory has no watch.
+#[derive(Debug)]
+pub enum Unwatched {
+    /// It is not there any more, or no directory.
+    Gone,
+    /// The kernel gives no more watches to this user.
+    NoneLeft,
+    /// It may not be read.
+    Closed,
+    /// Whatever else the system says.
+    Refused(io::Error),
+}
+
+/// The directories that are looked at.
+#[derive(Debug, Default)]
+pub struct Tree {
+    kernel: Option<OwnedFd>,
+    /// Each with the number of its watch, if it has one.
+    directories: BTreeMap<Arc<Path>, Option<i32>>,
+    /// A directory may have several paths, by mounts.
+    watches: HashMap<i32, Vec<Arc<Path>>>,
+    /// How many have no watch.
+    unwatched: usize,
+}
+
+impl Tree {
+    /// Begins to ask the kernel for events.
+    ///
+    /// # Errors
+    /// When it gives none.
+    pub fn open(&mut self) -> io::Result<()> {
+        let flags = CreateFlags::CLOEXEC | CreateFlags::NONBLOCK;
+        self.kernel = Some(inotify::init(flags)?);
+        Ok(())
+    }
+
+    /// Whether the kernel is asked at all.
+    pub fn is_open(&self) -> bool {
+        self.kernel.is_some()
+    }
+
+    /// Becomes readable when there are events.
+    pub fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        self.kernel.as_ref().map(AsFd::as_fd)
+    }
+
+    /// How many directories there are, and how many of them have no watch.
+    pub fn counts(&self) -> (usize, usize) {
+        (self.directories.len(), self.unwatched)
+    }
+
+    /// Whether a directory is one of them.
+    pub fn contains(&self, directory: &Path) -> bool {
+        self.directories.contains_key(directory)
+    }
+
+    /// Whether the kernel tells what happens in a directory.
+    pub fn tells_of(&self, directory: &Path) -> bool {
+        matches!(self.directories.get(directory), Some(Some(_)))
+    }
+
+    /// Those without a watch.
+    pub fn unwatched(&self) -> Vec<Arc<Path>> {
+        let without = self.directories.iter().filter(|(_, watch)| watch.is_none());
+        without.map(|(path, _)| path.clone()).collect()
+    }
+
+    /// The directories in this one.
+    pub fn children(&self, directory: &Path) -> Vec<PathBuf> {
+        children(&self.directories, directory)
+    }
+
+    /// Asks for the events of a directory. To ask again costs little, and finds the watch of
+    /// another directory that has come to lie under this path.
+    ///
+    /// # Errors
+    /// When there is no watch on it.
+    pub fn watch(&mut self, directory: &Path) -> Result<(), Unwatched> {
+        let Some(kernel) = &self.kernel else {
+            return Err(Unwatched::Refused(io::ErrorKind::Unsupported.into()));
+        };
+        match inotify::add_watch(kernel, directory, worth()) {
+            Ok(watch) => {
+                self.put(directory, Some(watch));
+                Ok(())
+            }
+            Err(Errno::NOENT | Errno::NOTDIR | Errno::LOOP) => Err(Unwatched::Gone),
+            Err(Errno::NOSPC | Errno::NOMEM) => Err(Unwatched::NoneLeft),
+            Err(Errno::ACCESS | Errno::PERM) => Err(Unwatched::Closed),
+            Err(error) => Err(Unwatched::Refused(error.into())),
+        }
+    }
+
+    /// Keeps a directory of which no event tells, or none any more.
+    pub fn keep_unwatched(&mut self, directory: &Path) {
+        self.put(directory, None);
+    }
+
+    fn put(&mut self, directory: &Path, watch: Option<i32>) {
+        let known = self.directories.get(directory).copied();
+        if known == Some(watch) {
+            return;
+        }
+        let path: Arc<Path> = directory.into();
+        if let Some(before) = known {
+            self.let_go(&path, before);
+        }
+        match watch {
+            Some(watch) => self.watches.entry(watch).or_default().push(path.clone()),
+            None => self.unwatched += 1,
+        }
+        self.directories.insert(path, watch);
+    }
+
+    /// Forgets a directory and all below it.
+    pub fn remove_below(&mut self, directory: &Path) {
+        let below: Vec<Arc<Path>> = below(&self.directories, directory)
+            .map(|(path, _)| path.clone())
+            .collect();
+        for path in below {
+            if let Some(watch) = self.directories.remove(&path) {
+                self.let_go(&path, watch);
+            }
+        }
+    }
+
+    fn let_go(&mut self, path: &Arc<Path>, watch: Option<i32>) {
+        let Some(watch) = watch else {
+            self.unwatched -= 1;
+            return;
+        };
+        let Some(paths) = self.watches.get_mut(&watch) else {
+            return;
+        };
+        paths.retain(|it| it != path);
+        if paths.is_empty() {
+            self.watches.remove(&watch);
+            if let Some(kernel) = &self.kernel {
+                // The directory may have gone, and its watch with it.
+                let _ = inotify::remove_watch(kernel, watch);
+            }
+        }
+    }
+
+    /// The paths of the directory in which something happened. The last word on one that has gone
+    /// ends its watch.
+    pub fn places(&mut self, told: &Told) -> Vec<Arc<Path>> {
+        if !told.what.contains(ReadFlags::IGNORED) {
+            return self.watches.get(&told.watch).cloned().unwrap_or_default();
+        }
+        let paths = self.watches.remove(&told.watch).unwrap_or_default();
+        for path in &paths {
+            self.directories.remove(path);
+        }
+        paths
+    }
+
+    /// The events that are there now, some hundreds at most.
+    ///
+    /// # Errors
+    /// What the system says when it gives none that are there.
+    pub fn events(&self) -> io::Result<Vec<Told>> {
+        let Some(kernel) = &self.kernel else {
+            return Ok(Vec::new());
+        };
+        let mut buffer = vec![MaybeUninit::uninit(); AT_ONCE];
+        let mut reader = Reader::new(kernel, &mut buffer);
+        let mut events = Vec::new();
+        loop {
+            match reader.next() {
+                Ok(event) => events.push(Told {
+                    watch: event.wd(),
+                    what: event.events(),
+                    name: event
+                        .file_name()
+                        .map(|name| OsStr::from_bytes(name.to_bytes()).to_owned()),
+                }),
+                Err(Errno::AGAIN) => return Ok(events),
+                Err(Errno::INTR) => {}
+                Err(error) => return Err(error.into()),
+            }
+            if reader.is_buffer_empty() {
+                return Ok(events);
+            }
+        }
+    }
+}
+
+/// What lies at a path and below it. Paths are in the order of their components, so all of it lies
+/// together.
+pub fn below<'m, K: Borrow<Path> + Ord, V>(
+    map: &'m BTreeMap<K, V>,
+    path: &'m Path,
+) -> impl Iterator<Item = (&'m K, &'m V)> {
+    map.range::<Path, _>((Bound::Included(path), Bound::Unbounded))
+        .take_while(move |(key, _)| (*key).borrow().starts_with(path))
+}
+
+/// What lies directly in a directory, once each, however much lies below it.
+pub fn children<K: Borrow<Path> + Ord, V>(map: &BTreeMap<K, V>, directory: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut from = Bound::Excluded(directory.to_path_buf());
+    loop {
+        let next = map
+            .range::<Path, _>((from.as_ref().map(PathBuf::as_path), Bound::Unbounded))
+            .next();
+        let below = next.and_then(|(key, _)| key.borrow().strip_prefix(directory).ok());
+        let Some(name) = below.and_then(|it| it.components().next()) else {
+            return found;
+        };
+        found.push(directory.join(name));
+        // The least name behind this one; no name has such a byte.
+        let mut behind = name.as_os_str().to_owned();
+        behind.push("\0");
+        from = Bound::Included(directory.join(behind));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn children_are_found_once_however_much_lies_below_them() {
+        let paths = [
+            "a", "a/b", "a/b/c", "a/b/d/e", "a/bc", "a/b-", "a/c/d/e", "b/c", "ab/c",
+        ];
+        let map: BTreeMap<PathBuf, ()> = paths.iter().map(|it| (it.into(), ())).collect();
+        let found: BTreeSet<PathBuf> = children(&map, Path::new("a")).into_iter().collect();
+        let expected = ["a/b", "a/b-", "a/bc", "a/c"].map(PathBuf::from);
+        assert_eq!(found, BTreeSet::from(expected));
+        assert_eq!(children(&map, Path::new("a")).len(), 4);
+        assert_eq!(below(&map, Path::new("a/b")).count(), 3);
+        assert_eq!(children(&map, Path::new("c")), Vec::<PathBuf>::new());
+    }
+
+    #[test]
+    fn a_directory_may_have_two_paths_and_loses_them_one_by_one() {
+        let dir = tempfile::tempdir().unwrap();
+        let (one, two) = (dir.path().join("one"), dir.path().join("two"));
+        std::fs::create_dir(&one).unwrap();
+        let mut tree = Tree::default();
+        tree.open().unwrap();
+        tree.watch(&one).unwrap();
+        // The same directory under another name.
+        std::fs::rename(&one, &two).unwrap();
+        tree.watch(&two).unwrap();
+        tree.remove_below(&one);
+        std::fs::write(two.join("a.xodr"), "").unwrap();
+        let events = tree.events().unwrap();
+        let named = events.iter().filter(|it| it.name.is_some());
+        let places: Vec<Arc<Path>> = named
+            .flat_map(|it| tree.watches[&it.watch].clone())
+            .collect();
+        assert!(
+            !places.is_empty() && places.iter().all(|it| **it == *two),
+            "{places:?}"
+        );
+        tree.remove_below(&two);
+        assert_eq!(tree.counts(), (0, 0));
+        assert!(tree.watches.is_empty());
+    }
+}

@@ -1,0 +1,195 @@
+//! A peer without manners, with which a broker's end of the bus is tried. For tests only.
+
+use std::collections::VecDeque;
+use std::os::unix::net::UnixStream;
+use std::sync::{Mutex, PoisonError};
+
+use qcbus_messages::services::{Growth, Services, Topic};
+
+use crate::entrance::introduce;
+use crate::generation::Generation;
+use crate::host::HelloHeader;
+use crate::instance::Instance;
+use crate::link::{FrameHeader, SessionKey};
+use crate::ports::{self, Access, Hub, Pub, Sub, WakeNotifier};
+
+/// What goes before a frame, to be filled with anything.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Header {
+    /// As in `current`.
+    pub generation: u64,
+    /// As in the introduction.
+    pub incarnation: u64,
+    /// As in the introduction.
+    pub attempt: u64,
+    /// Number of the frame; the first is 1.
+    pub seq: u64,
+    /// Last frame that arrived.
+    pub ack: u64,
+    /// 1 data, 2 acknowledgement, 3 farewell.
+    pub kind: u32,
+    /// Whether an acknowledgement is asked for.
+    pub urgent: u32,
+}
+
+/// Both ends of a session's channels, as far as they are open.
+struct Channels {
+    from: Pub<u8, FrameHeader>,
+    to: Option<Sub<u8, FrameHeader>>,
+}
+
+/// Somebody on the bus who says what he likes.
+pub struct Rogue {
+    services: Services,
+    generation: u64,
+    channels: Option<Channels>,
+    hello: Pub<u8, HelloHeader>,
+    wake: WakeNotifier,
+    hub: Hub,
+    instance: Instance,
+    /// What says which process this is, the latest.
+    proofs: Mutex<VecDeque<UnixStream>>,
+}
+
+/// Proofs that are kept; whoever has more sessions at once has none of the first.
+const PROOFS: usize = 64;
+
+impl Rogue {
+    /// Gets onto the bus of an instance, unannounced.
+    ///
+    /// # Errors
+    /// In words, when there is no broker or the bus refuses.
+    pub fn new(instance: &Instance) -> Result<Rogue, String> {
+        let generation = Generation::current(instance).ok_or("no broker")?;
+        let services = Services::new(&generation.limits);
+        let hub = Hub::new(&generation.root, Access::Open).map_err(|error| in_words(&error))?;
+        let greetings = hub
+            .topic(&services.hello, "")
+            .map_err(|error| in_words(&error))?;
+        let wake = hub
+            .wake(&services.wake_broker, "")
+            .map_err(|error| in_words(&error))?;
+        Ok(Rogue {
+            channels: None,
+            hello: ports::publisher(&greetings, &growing(services.hello))
+                .map_err(|error| in_words(&error))?,
+            wake: ports::notifier(&wake).map_err(|error| in_words(&error))?,
+            generation: generation.number,
+            services,
+            hub,
+            instance: instance.clone(),
+            proofs: Mutex::default(),
+        })
+    }
+
+    /// Number of the broker's generation.
+    pub fn generation(&self) -> u64 {
+        self.generation
+    }
+
+    /// Says hello, in whatever bytes, and lets the kernel say which process does. `false`: it was not taken.
+    pub fn introduce(&self, incarnation: u64, attempt: u64, bytes: &[u8]) -> bool {
+        self.prove(incarnation, attempt);
+        let header = HelloHeader {
+            incarnation,
+            attempt,
+        };
+        let Ok(mut sample) = self.hello.loan_slice_uninit(bytes.len()) else {
+            return false;
+        };
+        *sample.user_header_mut() = header;
+        let sent = sample.write_from_slice(bytes).send();
+        self.ring();
+        matches!(sent, Ok(recipients) if recipients > 0)
+    }
+
+    fn prove(&self, incarnation: u64, attempt: u64) {
+        let key = SessionKey {
+            generation: self.generation,
+            incarnation,
+            attempt,
+        };
+        let mut proofs = self.proofs.lock().unwrap_or_else(PoisonError::into_inner);
+        // The broker bounds how many it listens to; then there is none.
+        proofs.extend(introduce(&self.instance, key));
+        while proofs.len() > PROOFS {
+            proofs.pop_front();
+        }
+    }
+
+    /// Opens the channels of a session, if the broker has made them; with `reads`, also the one that
+    /// the broker writes to, without which no broker thinks that anybody is there.
+    pub fn connect(&mut self, incarnation: u64, attempt: u64, reads: bool) -> bool {
+        let key = SessionKey {
+            generation: self.generation,
+            incarnation,
+            attempt,
+        };
+        let suffix = key.suffix();
+        let (to_row, from_row) = (self.services.to_peer, growing(self.services.from_peer));
+        let open = || -> Result<Channels, ports::PortError> {
+            let to = self.hub.topic(&to_row, &suffix)?;
+            let from = self.hub.topic(&self.services.from_peer, &suffix)?;
+            let to = reads.then(|| ports::subscriber(&to, &to_row)).transpose()?;
+            let from = ports::publisher(&from, &from_row)?;
+            Ok(Channels { from, to })
+        };
+        let opened = open();
+        let connected = opened.is_ok();
+        if let Ok(channels) = opened {
+            self.channels = Some(channels);
+        }
+        connected
+    }
+
+    /// Puts a frame into the broker's buffer. `false`: it is full, or there is none.
+    pub fn send(&self, header: Header, bytes: &[u8]) -> bool {
+        let Some(channels) = &self.channels else {
+            return false;
+        };
+        let Ok(mut sample) = channels.from.loan_slice_uninit(bytes.len()) else {
+            return false;
+        };
+        *sample.user_header_mut() = FrameHeader {
+            generation: header.generation,
+            incarnation: header.incarnation,
+            attempt: header.attempt,
+            seq: header.seq,
+            ack: header.ack,
+            kind: header.kind,
+            urgent: header.urgent,
+        };
+        let sent = sample.write_from_slice(bytes).send();
+        matches!(sent, Ok(recipients) if recipients > 0)
+    }
+
+    /// Reads one frame of the broker: its number.
+    pub fn receive(&self) -> Option<u64> {
+        let receiver = self.channels.as_ref()?.to.as_ref()?;
+        let sample = receiver.receive().ok()??;
+        Some(sample.user_header().seq)
+    }
+
+    /// Wakes the broker.
+    pub fn ring(&self) {
+        // A broker that has gone needs no waking.
+        let _ = self.wake.notify();
+    }
+
+    /// Closes the session's channels without a word.
+    pub fn hang_up(&mut self) {
+        self.channels = None;
+    }
+}
+
+/// A publisher's slots are its own business: no service says how large they may be.
+fn growing(row: Topic) -> Topic {
+    Topic {
+        growth: Growth::PowerOfTwo,
+        ..row
+    }
+}
+
+fn in_words(error: &ports::PortError) -> String {
+    error.to_string()
+}

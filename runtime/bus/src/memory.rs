@@ -1,0 +1,242 @@
+//! Shared memory: how much there is, and how it is taken.
+//!
+//! The first write to a page of /dev/shm that cannot be had is a SIGBUS. So nothing is written that
+//! was not had before. Whoever takes much looks at what is free, and takes it, while no other
+//! process of the same user does; what a broker's peers will need is had before they come, in a file
+//! of which each takes its part; and the slots of a stream are had a few ahead of those in use.
+
+use std::fs::{self, File, OpenOptions};
+use std::io;
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use qcbus_messages::services::STREAM_STEP_BYTES;
+use rustix::fs::{FallocateFlags, FlockOperation, fallocate, flock};
+
+use crate::instance::Instance;
+
+/// Where it is.
+pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
+
+/// A turn takes milliseconds, and many processes may stand in line on a busy machine. Whoever waits
+/// longer waits for a process that was stopped in its turn.
+const IN_LINE: Duration = Duration::from_secs(10);
+
+/// The shared memory of this system.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SharedMemory {
+    /// Bytes in all.
+    pub size: u64,
+    /// Bytes that an ordinary user may still take.
+    pub free: u64,
+}
+
+impl SharedMemory {
+    /// As it is now.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn now() -> io::Result<SharedMemory> {
+        let stat = rustix::fs::statvfs(SHARED_MEMORY)?;
+        Ok(SharedMemory {
+            size: stat.f_blocks.saturating_mul(stat.f_frsize),
+            free: stat.f_bavail.saturating_mul(stat.f_frsize),
+        })
+    }
+}
+
+/// Bytes that an ordinary user may still take in /dev/shm.
+pub(crate) fn free_shared_memory() -> u64 {
+    SharedMemory::now().map_or(0, |memory| memory.free)
+}
+
+/// The reserve asked for, but not more than an eighth of a small /dev/shm. A memory without a limit
+/// (of size 0) has room for any.
+pub(crate) fn fitting_reserve(wanted: u64) -> u64 {
+    match SharedMemory::now() {
+        Ok(memory) => wanted.min(memory.size / 8),
+        Err(_) => wanted,
+    }
+}
+
+/// Sees to it that of all processes of this user one at a time takes shared memory.
+pub(crate) struct Turns(Mutex<Option<File>>);
+
+impl Turns {
+    /// Where the lock cannot be had, every process goes by what is free alone.
+    pub(crate) fn new() -> Turns {
+        let open = || -> Option<File> {
+            let path = Instance::base_dir().ok()?.join(".memory");
+            let mut how = OpenOptions::new();
+            how.read(true).write(true).create(true).truncate(false);
+            how.mode(0o600).custom_flags(libc::O_NOFOLLOW);
+            // A bundle that the broker has started may write nothing there, and needs not: a lock is all.
+            let read = || {
+                let mut how = OpenOptions::new();
+                how.read(true).custom_flags(libc::O_NOFOLLOW).open(&path)
+            };
+            how.open(&path).or_else(|_| read()).ok()
+        };
+        Turns(Mutex::new(open()))
+    }
+
+    /// Waits for a turn, but not for ever: whoever was stopped in its turn must not stop the others.
+    pub(crate) fn take(&self) -> Turn<'_> {
+        let file = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let until = Instant::now() + IN_LINE;
+        let mut locked = false;
+        while let (false, Some(file)) = (locked, file.as_ref()) {
+            match flock(file, FlockOperation::NonBlockingLockExclusive) {
+                Ok(()) => locked = true,
+                Err(_) if Instant::now() >= until => break,
+                Err(_) => std::thread::sleep(Duration::from_millis(1)),
+            }
+        }
+        Turn { file, locked }
+    }
+}
+
+/// Nobody else takes shared memory meanwhile.
+pub(crate) struct Turn<'t> {
+    file: MutexGuard<'t, Option<File>>,
+    locked: bool,
+}
+
+impl Drop for Turn<'_> {
+    fn drop(&mut self) {
+        if let (true, Some(file)) = (self.locked, self.file.as_ref()) {
+            let _ = flock(file, FlockOperation::Unlock);
+        }
+    }
+}
+
+/// Has shared memory for those who will join a generation: a file of that size.
+///
+/// # Errors
+/// When it cannot be had; then nothing of it is kept.
+pub(crate) fn keep_room(root: &Path, bytes: u64) -> io::Result<()> {
+    let path = room(root);
+    let mut how = OpenOptions::new();
+    let file = how.write(true).create_new(true).mode(0o600).open(&path)?;
+    fallocate(&file, FallocateFlags::empty(), 0, bytes.max(1)).map_err(|error| {
+        let _ = fs::remove_file(&path);
+        error.into()
+    })
+}
+
+/// Gives back a part of what was kept for those who join. `false`: there is not so much left.
+pub(crate) fn take_room(root: &Path, bytes: u64) -> bool {
+    let mut how = OpenOptions::new();
+    let file = how.write(true).custom_flags(libc::O_NOFOLLOW);
+    let Ok(file) = file.open(room(root)) else {
+        return false;
+    };
+    let left = file
+        .metadata()
+        .ok()
+        .and_then(|data| data.len().checked_sub(bytes));
+    left.is_some_and(|left| file.set_len(left).is_ok())
+}
+
+fn room(root: &Path) -> PathBuf {
+    root.join("room")
+}
+
+/// The memory of one publisher's slots of a fixed size. It is had some slots ahead of those in use:
+/// slots are used for the first time one after the other, and most never are.
+pub(crate) struct Backing {
+    file: Option<File>,
+    /// Bytes of the segment.
+    len: u64,
+    /// Bytes from its beginning that are had.
+    had: u64,
+    /// Address of the first slot that was lent, and the highest end of all that were, seen from there.
+    first: Option<usize>,
+    used: u64,
+}
+
+impl Backing {
+    /// That of the publisher with this id, which has lent nothing yet.
+    ///
+    /// # Errors
+    /// When there is no room.
+    pub(crate) fn of(root: &Path, publisher: u128) -> io::Result<Backing> {
+        let mut backing = Backing {
+            file: segment(root, publisher),
+            len: 0,
+            had: 0,
+            first: None,
+            used: 0,
+        };
+        match &backing.file {
+            Some(file) => backing.len = file.metadata()?.len(),
+            None => tracing::debug!(publisher, "the memory of a publisher is not to be found"),
+        }
+        match backing.is_ahead() {
+            true => Ok(backing),
+            false => Err(io::ErrorKind::StorageFull.into()),
+        }
+    }
+
+    /// All of it at once.
+    ///
+    /// # Errors
+    /// When there is no room.
+    pub(crate) fn whole(root: &Path, publisher: u128) -> io::Result<()> {
+        let mut backing = Backing::of(root, publisher)?;
+        match backing.reach(u64::MAX) {
+            true => Ok(()),
+            false => Err(io::ErrorKind::StorageFull.into()),
+        }
+    }
+
+    /// Whether the next slot may be lent. To be asked before every loan.
+    pub(crate) fn is_ahead(&mut self) -> bool {
+        self.reach(self.used + STREAM_STEP_BYTES / 2) || self.had >= self.len
+    }
+
+    /// A slot of so many bytes was lent at this address.
+    pub(crate) fn lent(&mut self, address: usize, bytes: usize) {
+        let first = *self.first.get_or_insert(address);
+        self.used = match address.checked_sub(first) {
+            Some(offset) => self.used.max((offset + bytes) as u64),
+            // Not in the order that is expected: all may be used.
+            None => self.len,
+        };
+    }
+
+    fn reach(&mut self, wanted: u64) -> bool {
+        let Some(file) = self.file.as_ref() else {
+            return true;
+        };
+        if wanted <= self.had || self.had >= self.len {
+            return true;
+        }
+        let until = wanted.saturating_add(STREAM_STEP_BYTES / 2).min(self.len);
+        let done = fallocate(file, FallocateFlags::KEEP_SIZE, self.had, until - self.had);
+        match done {
+            Ok(()) => self.had = until,
+            // A file system without it: there the reserve alone has to do.
+            Err(rustix::io::Errno::OPNOTSUPP) => self.had = self.len,
+            Err(error) => tracing::debug!(%error, "no shared memory for further frames"),
+        }
+        wanted.min(self.len) <= self.had
+    }
+}
+
+/// The segment of a publisher: its name ends with the publisher's number, which nobody else has.
+fn segment(root: &Path, publisher: u128) -> Option<File> {
+    let end = format!("_{publisher}.data");
+    let mut entries = fs::read_dir(root).ok()?.flatten();
+    let found = entries.find(|entry| {
+        entry
+            .file_name()
+            .as_encoded_bytes()
+            .ends_with(end.as_bytes())
+    })?;
+    let mut how = OpenOptions::new();
+    let how = how.read(true).write(true).custom_flags(libc::O_NOFOLLOW);
+    how.open(found.path()).ok()
+}

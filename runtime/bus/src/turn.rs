@@ -1,0 +1,127 @@
+//! How much the broker takes from its peers before everybody else has a turn.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use crate::host::HostEvent;
+
+/// Bytes of frames read in one turn.
+const TURN_BYTES: usize = 1 << 20;
+/// How long a turn reads.
+const TURN_TIME: Duration = Duration::from_millis(2);
+/// What a frame costs besides its bytes, so that empty ones are not for free.
+const FRAME_COSTS: usize = 1 << 10;
+/// Events that wait to be fetched before reading pauses.
+const MAX_WAITING: usize = 512;
+/// Bytes of messages that wait to be fetched before reading pauses.
+const MAX_WAITING_BYTES: usize = 8 << 20;
+/// Events that one peer adds before it is the next one's turn. (A frame is read to its end.)
+const MAX_IN_A_ROW: usize = 128;
+
+/// What is left of a turn.
+#[derive(Debug)]
+pub(crate) struct Budget {
+    bytes: usize,
+    until: Instant,
+}
+
+impl Budget {
+    pub(crate) fn new(now: Instant) -> Budget {
+        Budget {
+            bytes: TURN_BYTES,
+            until: now + TURN_TIME,
+        }
+    }
+
+    /// Frames were read.
+    pub(crate) fn spend(&mut self, frames: usize, bytes: usize) {
+        let costs = bytes.saturating_add(frames.saturating_mul(FRAME_COSTS));
+        self.bytes = self.bytes.saturating_sub(costs);
+    }
+
+    pub(crate) fn is_spent(&self) -> bool {
+        self.bytes == 0 || Instant::now() >= self.until
+    }
+}
+
+/// Events that were read and not yet fetched.
+#[derive(Debug, Default)]
+pub(crate) struct Waiting {
+    events: VecDeque<(HostEvent, usize)>,
+    bytes: usize,
+}
+
+impl Waiting {
+    /// An event that was `bytes` long when it was a message.
+    pub(crate) fn push(&mut self, event: HostEvent, bytes: usize) {
+        self.bytes += bytes;
+        self.events.push_back((event, bytes));
+    }
+
+    pub(crate) fn pop(&mut self) -> Option<HostEvent> {
+        let (event, bytes) = self.events.pop_front()?;
+        self.bytes -= bytes;
+        Some(event)
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.events.len()
+    }
+
+    pub(crate) fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.events.is_empty()
+    }
+
+    /// Whether reading has to pause.
+    pub(crate) fn is_full(&self) -> bool {
+        self.events.len() >= MAX_WAITING || self.bytes >= MAX_WAITING_BYTES
+    }
+
+    /// Whether one peer has added enough since there were `before`.
+    pub(crate) fn is_enough_since(&self, before: usize) -> bool {
+        self.is_full() || self.events.len() >= before + MAX_IN_A_ROW
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::host::PeerId;
+
+    fn gone() -> HostEvent {
+        HostEvent::Gone { peer: PeerId(1) }
+    }
+
+    #[test]
+    fn many_small_or_few_large_events_are_enough() {
+        let mut waiting = Waiting::default();
+        for _ in 0..MAX_WAITING {
+            assert!(!waiting.is_full());
+            waiting.push(gone(), 10);
+        }
+        assert!(waiting.is_full());
+        while waiting.pop().is_some() {}
+        assert!(!waiting.is_full() && waiting.is_empty() && waiting.bytes == 0);
+        waiting.push(gone(), MAX_WAITING_BYTES);
+        assert!(waiting.is_full());
+    }
+
+    #[test]
+    fn a_turn_ends_by_frames_by_bytes_and_by_time() {
+        let now = Instant::now() + Duration::from_secs(3600);
+        let mut budget = Budget::new(now);
+        budget.spend(1, TURN_BYTES / 2);
+        assert!(!budget.is_spent());
+        budget.spend(1, TURN_BYTES / 2);
+        assert!(budget.is_spent());
+        let mut budget = Budget::new(now);
+        budget.spend(usize::MAX, 0);
+        assert!(budget.is_spent());
+        let long_ago = Instant::now().checked_sub(TURN_TIME).unwrap_or(now);
+        assert!(Budget::new(long_ago).is_spent());
+    }
+}

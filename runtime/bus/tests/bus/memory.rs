@@ -1,0 +1,149 @@
+//! Shared memory: that it is had before it is written to, and how much of it the bus takes.
+
+use std::os::unix::fs::MetadataExt;
+use std::path::Path;
+
+use qcbus_bus::{Host, HostOptions, StartError};
+use qcbus_messages::services::{Limits, Services};
+
+use crate::helper::Helper;
+use crate::support::{Site, join, run, shared_memory_of};
+
+/// Bytes that the segments of this instance have, without what is kept for those who join.
+fn taken(site: &Site) -> u64 {
+    let all = shared_memory_of(&site.instance).into_iter();
+    let segments = all.filter(|name| !name.ends_with("room"));
+    let bytes = |name: String| {
+        let path = Path::new("/dev/shm").join(name);
+        let below = std::fs::read_dir(&path).map_or(0, |_| tree(&path));
+        std::fs::metadata(&path).map_or(0, |data| data.blocks() * 512 + below)
+    };
+    segments.map(bytes).sum()
+}
+
+fn tree(directory: &Path) -> u64 {
+    let Ok(entries) = std::fs::read_dir(directory) else {
+        return 0;
+    };
+    let bytes = entries.flatten().map(|entry| match entry.metadata() {
+        Ok(data) if data.is_dir() => tree(&entry.path()),
+        Ok(data) => data.blocks() * 512,
+        Err(_) => 0,
+    });
+    bytes.sum()
+}
+
+#[test]
+fn the_table_says_how_much_the_bus_takes() {
+    for (peers, documents) in [(1, 64), (3, 64), (32, 64), (100, 16)] {
+        run(async move {
+            let site = Site::new();
+            let options = HostOptions {
+                max_peers: peers,
+                active_documents: documents,
+                ..HostOptions::default()
+            };
+            let limits = Limits {
+                peers,
+                small_active: documents,
+                small_held: documents + documents / 2 + 2,
+                large_held: 14,
+                ..Limits::default()
+            };
+            let services = Services::new(&limits);
+            let mut host = Host::start(&site.instance, options).unwrap();
+            let alone = taken(&site);
+            let said = services.broker_bytes();
+            assert!(alone <= said, "{peers}: {alone} of {said} bytes");
+            assert!(alone * 2 > said, "{peers}: {alone} of {said} bytes");
+            let (_, _peer) = join(&mut host, &site, "peer").await;
+            let with_one = taken(&site) - alone;
+            let said = services.peer_bytes();
+            println!("{peers} peers: {alone} bytes, and {with_one} of {said} for each");
+            assert!(with_one <= said, "{peers}: {with_one} of {said} bytes");
+            assert!(with_one * 2 > said, "{peers}: {with_one} of {said} bytes");
+        });
+    }
+}
+
+#[test]
+fn there_is_room_for_who_is_expected() {
+    run(async {
+        let site = Site::new();
+        let options = HostOptions {
+            max_peers: 3,
+            expected_peers: 2,
+            ..HostOptions::default()
+        };
+        let mut host = Host::start(&site.instance, options).unwrap();
+        let names = shared_memory_of(&site.instance);
+        let room = names.iter().find(|name| name.ends_with("room")).unwrap();
+        let room = Path::new("/dev/shm").join(room);
+        let kept = || std::fs::metadata(&room).unwrap().blocks() * 512;
+        let both = kept();
+        assert!(both > 0);
+        let (_, _first) = join(&mut host, &site, "first").await;
+        assert!(kept() <= both / 2 + 4096, "{} of {both}", kept());
+        let (_, _second) = join(&mut host, &site, "second").await;
+        assert!(kept() <= 4096, "{} of {both}", kept());
+        let (_, _third) = join(&mut host, &site, "not expected").await;
+        drop(host);
+        assert!(!room.exists());
+    });
+}
+
+#[test]
+fn what_never_fits_is_told_from_what_may_fit_later() {
+    let site = Site::new();
+    let role = "asks_for_too_much";
+    let Some(mut helper) = Helper::start_in_small_memory(role, &site.instance) else {
+        println!("skipped: mounting a small /dev/shm is not allowed here");
+        return;
+    };
+    let never = helper.line();
+    assert!(never.contains("`mount -o remount,size="), "{never}");
+    assert!(never.contains("`docker run --shm-size="), "{never}");
+    let later = helper.line();
+    assert!(later.starts_with("not enough shared memory: "), "{later}");
+    assert!(helper.end().success());
+}
+
+#[test]
+fn a_full_memory_kills_nobody_and_loses_no_message() {
+    let site = Site::new();
+    let role = "speaks_in_a_full_memory";
+    let Some(mut helper) = Helper::start_in_small_memory(role, &site.instance) else {
+        println!("skipped: mounting a small /dev/shm is not allowed here");
+        return;
+    };
+    assert_eq!(helper.line(), "full");
+    assert_eq!(helper.line(), "500 messages, in order");
+    assert!(helper.end().success());
+}
+
+#[test]
+fn many_who_take_at_once_are_refused_and_not_killed() {
+    let site = Site::new();
+    let role = "many_take_at_once";
+    let Some(mut helper) = Helper::start_in_small_memory(role, &site.instance) else {
+        println!("skipped: mounting a small /dev/shm is not allowed here");
+        return;
+    };
+    assert_eq!(helper.line(), "no page of the reserve was taken");
+    assert!(helper.end().success());
+}
+
+#[test]
+fn a_start_without_room_says_what_would_do() {
+    let refused = |size, needed| StartError::NoSharedMemory {
+        size,
+        free: 0,
+        needed,
+    };
+    let later = refused(64 << 20, 8 << 20);
+    assert!(later.may_pass());
+    let never = refused(4 << 20, 8 << 20);
+    assert!(!never.may_pass());
+    let text = never.to_string();
+    assert!(text.ends_with("docker run --shm-size=16m`"), "{text}");
+}

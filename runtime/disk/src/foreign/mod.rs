@@ -1,0 +1,274 @@
+//! Files that others may write: whoever puts one there may put a pipe, a device or a file of the kernel
+//! there instead, may swap it while it is opened, and may have it on a disk that does not answer.
+//!
+//! Everything here opens regular files only, never waits for a writer or a lease, and reads no more than
+//! it was told to. What it waits for is written down where a [`Lookout`] sees it.
+
+mod lookout;
+
+use std::fs::{DirEntry, File, Metadata};
+use std::io::{self, Read};
+use std::os::fd::AsRawFd;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+use rustix::fs::{Mode, OFlags};
+use rustix::io::{Errno, retry_on_intr};
+
+pub use lookout::{Attendance, Lookout, Overdue};
+use lookout::{Visit, note};
+
+/// Why a path was not opened.
+#[derive(Debug, thiserror::Error)]
+pub enum Refused {
+    /// It is a directory.
+    #[error("it is a directory, not a file")]
+    Directory,
+    /// It is a device, a pipe, a socket, or a file that the kernel makes up.
+    #[error("it is {0}, not a file")]
+    Special(&'static str),
+    /// The system says so.
+    #[error(transparent)]
+    System(#[from] io::Error),
+}
+
+impl From<Refused> for io::Error {
+    fn from(refused: Refused) -> io::Error {
+        match refused {
+            Refused::System(error) => error,
+            Refused::Directory => io::Error::new(io::ErrorKind::IsADirectory, refused),
+            // Of the path itself, as [`crate::is_for_good`] has it: no waiting makes it a file.
+            Refused::Special(_) => io::Error::new(io::ErrorKind::InvalidInput, refused),
+        }
+    }
+}
+
+/// Opens a regular file for reading, through links, and says what was opened.
+///
+/// What lies there is looked at before it is opened, and the very thing that was looked at is opened: a
+/// device that comes there meanwhile is not touched.
+///
+/// # Errors
+/// See [`Refused`]. While somebody has a lease on the file, the system says that it would block.
+pub fn open(path: &Path) -> Result<(File, Metadata), Refused> {
+    let _visit = Visit::begin(path)?;
+    noted(path, open_regular(path))
+}
+
+/// The whole content of a regular file, if it has no more than `most` bytes.
+///
+/// # Errors
+/// As [`open`], and [`io::ErrorKind::FileTooLarge`].
+pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    let visit = Visit::begin(path)?;
+    noted(path, read_regular(path, most, &visit))
+}
+
+/// Reads what is left of a file, but no more than `most` bytes. `path` is its own, for the lookout.
+///
+/// # Errors
+/// Whatever the system says.
+pub fn read_on(path: &Path, file: &mut File, most: u64, bytes: &mut Vec<u8>) -> io::Result<()> {
+    let visit = Visit::begin(path)?;
+    noted(path, read_pieces(file, most, bytes, &visit))
+}
+
+/// What [`std::fs::metadata`] says.
+///
+/// # Errors
+/// Whatever the system says.
+pub fn metadata(path: &Path) -> io::Result<Metadata> {
+    let _visit = Visit::begin(path)?;
+    noted(path, std::fs::metadata(path))
+}
+
+/// What [`std::fs::canonicalize`] says.
+///
+/// # Errors
+/// Whatever the system says.
+pub fn canonicalize(path: &Path) -> io::Result<PathBuf> {
+    let _visit = Visit::begin(path)?;
+    noted(path, std::fs::canonicalize(path))
+}
+
+/// The entries of a directory, those left out that cannot be had.
+///
+/// # Errors
+/// Whatever the system says.
+pub fn list(directory: &Path) -> io::Result<Vec<DirEntry>> {
+    let _visit = Visit::begin(directory)?;
+    let entries = noted(directory, std::fs::read_dir(directory))?;
+    Ok(entries
+        .filter_map(|entry| noted(directory, entry).ok())
+        .collect())
+}
+
+/// Does something else with a file of others that the system may not answer.
+///
+/// # Errors
+/// Whatever `work` says.
+pub fn visit<T>(path: &Path, work: impl FnOnce() -> io::Result<T>) -> io::Result<T> {
+    let _visit = Visit::begin(path)?;
+    noted(path, work())
+}
+
+/// Whether an error is of the moment and not of the file: there are no descriptors or no memory, a disk
+/// or a server did not answer. The same may be done again later.
+pub fn is_of_the_moment(error: &io::Error) -> bool {
+    const OF_THE_MOMENT: &[Errno] = &[
+        Errno::AGAIN,
+        Errno::BUSY,
+        Errno::COMM,
+        Errno::CONNABORTED,
+        Errno::CONNREFUSED,
+        Errno::CONNRESET,
+        Errno::HOSTDOWN,
+        Errno::HOSTUNREACH,
+        Errno::INTR,
+        Errno::IO,
+        Errno::MFILE,
+        Errno::NETDOWN,
+        Errno::NETUNREACH,
+        Errno::NFILE,
+        Errno::NOBUFS,
+        Errno::NOLCK,
+        Errno::NOLINK,
+        Errno::NOMEM,
+        Errno::NOTCONN,
+        Errno::REMOTEIO,
+        Errno::STALE,
+        Errno::TIMEDOUT,
+    ];
+    match error.raw_os_error() {
+        Some(code) => OF_THE_MOMENT.contains(&Errno::from_raw_os_error(code)),
+        None => matches!(
+            error.kind(),
+            io::ErrorKind::TimedOut | io::ErrorKind::OutOfMemory
+        ),
+    }
+}
+
+/// Writes an error of the moment down for who attends this thread.
+fn noted<T, E: OfTheSystem>(path: &Path, result: Result<T, E>) -> Result<T, E> {
+    if let Some(error) = result.as_ref().err().and_then(OfTheSystem::of_the_system)
+        && is_of_the_moment(error)
+    {
+        note(path, error);
+    }
+    result
+}
+
+trait OfTheSystem {
+    fn of_the_system(&self) -> Option<&io::Error>;
+}
+
+impl OfTheSystem for io::Error {
+    fn of_the_system(&self) -> Option<&io::Error> {
+        Some(self)
+    }
+}
+
+impl OfTheSystem for Refused {
+    fn of_the_system(&self) -> Option<&io::Error> {
+        match self {
+            Refused::System(error) => Some(error),
+            Refused::Directory | Refused::Special(_) => None,
+        }
+    }
+}
+
+fn open_regular(path: &Path) -> Result<(File, Metadata), Refused> {
+    let flags = OFlags::PATH | OFlags::CLOEXEC;
+    let handle = retry_on_intr(|| rustix::fs::open(path, flags, Mode::empty()));
+    let handle = File::from(handle.map_err(io::Error::from)?);
+    regular(&handle)?;
+    let file = match reopen(&format!("/proc/self/fd/{}", handle.as_raw_fd())) {
+        // Without /proc it is opened by its name once more.
+        Err(error) if error.kind() == io::ErrorKind::NotFound => reopen(path)?,
+        file => file?,
+    };
+    let found = regular(&file)?;
+    Ok((file, found))
+}
+
+fn reopen(path: impl rustix::path::Arg + Copy) -> io::Result<File> {
+    // Without waiting: not for the holder of a lease either.
+    let flags = OFlags::RDONLY | OFlags::NONBLOCK | OFlags::NOCTTY | OFlags::CLOEXEC;
+    let file = retry_on_intr(|| rustix::fs::open(path, flags, Mode::empty()))?;
+    Ok(File::from(file))
+}
+
+fn regular(file: &File) -> Result<Metadata, Refused> {
+    let data = file.metadata()?;
+    if data.is_dir() {
+        return Err(Refused::Directory);
+    }
+    if !data.is_file() {
+        return Err(Refused::Special("a device, pipe or socket"));
+    }
+    // File systems without a disk have no major number. Only there the kernel makes files up.
+    if rustix::fs::major(data.dev()) == 0 {
+        let system = retry_on_intr(|| rustix::fs::fstatfs(file)).map_err(io::Error::from)?;
+        // Its type differs between machines; the numbers all fit.
+        if u32::try_from(system.f_type).is_ok_and(|kind| MADE_UP.contains(&kind)) {
+            return Err(Refused::Special("a file that the kernel makes up"));
+        }
+    }
+    Ok(data)
+}
+
+/// File systems on which reading a file asks the kernel something, may take away what it says, and may
+/// wait for it to happen (`linux/magic.h`): proc, sysfs, debugfs, tracefs, securityfs, cgroup and cgroup2,
+/// configfs, bpf, pstore, efivarfs, binfmt_misc, devpts, mqueue, selinuxfs, smackfs, nsfs, fusectl,
+/// resctrl.
+const MADE_UP: &[u32] = &[
+    0x9fa0,
+    0x6265_6572,
+    0x6462_6720,
+    0x7472_6163,
+    0x7363_6673,
+    0x0027_e0eb,
+    0x6367_7270,
+    0x6265_6570,
+    0xcafe_4a11,
+    0x6165_676c,
+    0xde5e_81e4,
+    0x4249_4e4d,
+    0x1cd1,
+    0x1980_0202,
+    0xf97c_ff8c,
+    0x4341_5d53,
+    0x6e73_6673,
+    0x6573_5543,
+    0x0765_5821,
+];
+
+fn read_regular(path: &Path, most: u64, visit: &Visit) -> io::Result<Vec<u8>> {
+    let (mut file, data) = open_regular(path)?;
+    let mut bytes = Vec::with_capacity(usize::try_from(data.len().min(most)).unwrap_or(0) + 1);
+    read_pieces(&mut file, most.saturating_add(1), &mut bytes, visit)?;
+    if bytes.len() as u64 > most {
+        let why = format!("it has more than {most} bytes");
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, why));
+    }
+    Ok(bytes)
+}
+
+/// In one go a slow disk would look like one that hangs.
+const PIECE: u64 = 4 << 20;
+
+fn read_pieces(file: &mut File, most: u64, bytes: &mut Vec<u8>, visit: &Visit) -> io::Result<()> {
+    let mut left = most;
+    while left > 0 {
+        let read = file.take(PIECE.min(left)).read_to_end(bytes)? as u64;
+        visit.goes_on();
+        left -= read;
+        if read < PIECE {
+            break;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

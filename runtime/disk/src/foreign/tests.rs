@@ -1,0 +1,217 @@
+use std::os::unix::fs::symlink;
+use std::os::unix::net::UnixListener;
+use std::process::Command;
+use std::sync::Arc;
+use std::sync::mpsc::channel;
+use std::time::Duration;
+
+use super::*;
+
+const WATCHDOG: Duration = Duration::from_secs(60);
+
+/// Does it on a thread of its own, because it might never end.
+fn in_time<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
+    let (done, wait) = channel();
+    std::thread::spawn(move || done.send(work()));
+    wait.recv_timeout(WATCHDOG)
+        .expect("the watchdog: it waits for ever")
+}
+
+fn fifo(path: &Path) {
+    let made = Command::new("mkfifo").arg(path).status().unwrap();
+    assert!(made.success());
+}
+
+#[test]
+fn nothing_but_files_is_opened_and_nobody_waits() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    fifo(&at("pipe.xodr"));
+    symlink("pipe.xodr", at("link.xodr")).unwrap();
+    let _socket = UnixListener::bind(at("socket.xodr")).unwrap();
+    std::fs::create_dir(at("directory.xodr")).unwrap();
+    let special = ["pipe.xodr", "link.xodr", "socket.xodr"].map(at);
+    let kernels = ["/dev/zero", "/dev/tty", "/proc/self/status", "/proc/kmsg"].map(PathBuf::from);
+    for path in special.into_iter().chain(kernels) {
+        let opened = in_time({
+            let path = path.clone();
+            move || open(&path).map(|_| ())
+        });
+        // What only root may look at, others may not even open.
+        let refused = matches!(&opened, Err(Refused::Special(_)));
+        assert!(refused, "{}: {opened:?}", path.display());
+        let read = in_time(move || read(&path, 10)).unwrap_err();
+        assert!(crate::is_for_good(&read), "no waiting helps: {read:?}");
+        assert!(!is_of_the_moment(&read));
+    }
+    assert!(matches!(
+        open(&at("directory.xodr")),
+        Err(Refused::Directory)
+    ));
+    let nothing = open(&at("nothing.xodr")).map(|_| ());
+    let is_missing = |it: &io::Error| it.kind() == io::ErrorKind::NotFound;
+    assert!(
+        matches!(&nothing, Err(Refused::System(it)) if is_missing(it)),
+        "{nothing:?}"
+    );
+}
+
+#[test]
+fn a_file_is_read_as_far_as_allowed() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.xodr");
+    let bytes: Vec<u8> = (0..9 << 20).map(|at: u32| at as u8).collect();
+    std::fs::write(&path, &bytes).unwrap();
+    let len = bytes.len() as u64;
+    assert!(read(&path, len).unwrap() == bytes);
+    let too_large = read(&path, len - 1).unwrap_err();
+    assert_eq!(too_large.kind(), io::ErrorKind::FileTooLarge);
+    assert_eq!(too_large.to_string(), "it has more than 9437183 bytes");
+    let (mut file, data) = open(&path).unwrap();
+    assert_eq!(data.len(), len);
+    let mut some = Vec::new();
+    read_on(&path, &mut file, 5 << 20, &mut some).unwrap();
+    assert!(some == bytes[..5 << 20]);
+}
+
+#[test]
+fn errors_of_the_moment_are_told_from_those_of_the_file() {
+    let of = |error: Errno| is_of_the_moment(&error.into());
+    for error in [
+        Errno::MFILE,
+        Errno::IO,
+        Errno::STALE,
+        Errno::AGAIN,
+        Errno::NOTCONN,
+    ] {
+        assert!(of(error), "{error:?}");
+    }
+    for error in [
+        Errno::ACCESS,
+        Errno::NOENT,
+        Errno::LOOP,
+        Errno::NAMETOOLONG,
+        Errno::ISDIR,
+    ] {
+        assert!(!of(error), "{error:?}");
+    }
+    assert!(is_of_the_moment(&io::ErrorKind::TimedOut.into()));
+}
+
+/// A visit that goes on until `end` is dropped.
+fn hang(lookout: &Arc<Lookout>, owner: u64, path: &Path) -> Hanging {
+    let ((end, ended), (begun, begins)) = (channel::<()>(), channel());
+    let (lookout, path) = (lookout.clone(), path.to_path_buf());
+    let thread = std::thread::spawn(move || {
+        let attendance = lookout.attend(owner);
+        let visit = Visit::begin(&path).unwrap();
+        begun.send(()).unwrap();
+        let _ = ended.recv();
+        drop(visit);
+        let further = metadata(Path::new("/")).map(|_| ()).map_err(|it| it.kind());
+        (attendance.was_given_up(), further)
+    });
+    begins.recv_timeout(WATCHDOG).unwrap();
+    Hanging { end, thread }
+}
+
+struct Hanging {
+    end: std::sync::mpsc::Sender<()>,
+    thread: std::thread::JoinHandle<(bool, Result<(), io::ErrorKind>)>,
+}
+
+impl Hanging {
+    fn end(self) -> (bool, Result<(), io::ErrorKind>) {
+        drop(self.end);
+        self.thread.join().unwrap()
+    }
+}
+
+#[test]
+fn who_waits_for_too_long_is_named_and_nobody_follows() {
+    let lookout = Arc::new(Lookout::default());
+    let path = Path::new("/farm/hung/map.xodr");
+    let patient = hang(&lookout, 7, path);
+    assert_eq!(lookout.overdue(Duration::from_secs(3600)), []);
+    let overdue = lookout.overdue(Duration::ZERO);
+    assert_eq!(overdue.len(), 1);
+    assert_eq!((overdue[0].owner, &*overdue[0].path), (7, path));
+    assert_eq!(lookout.overdue(Duration::ZERO), [], "it is said once");
+    assert_eq!(lookout.hanging(), [path]);
+
+    let attendance = lookout.attend(8);
+    assert_eq!(metadata(path).unwrap_err().kind(), io::ErrorKind::TimedOut);
+    assert!(
+        attendance.moment().is_some(),
+        "what was read does not count"
+    );
+    assert!(metadata(Path::new("/")).is_ok(), "others are looked at");
+    assert!(!attendance.was_given_up());
+    drop(attendance);
+    assert!(
+        metadata(Path::new("/")).is_ok(),
+        "nobody attends this thread any more"
+    );
+
+    let (was_given_up, further) = patient.end();
+    assert!(was_given_up);
+    assert_eq!(further, Err(io::ErrorKind::TimedOut), "it goes no further");
+    assert!(lookout.hanging().is_empty(), "it has answered");
+    let _attendance = lookout.attend(9);
+    let answer = metadata(path).unwrap_err();
+    assert_eq!(
+        answer.kind(),
+        io::ErrorKind::NotFound,
+        "it may be asked again"
+    );
+}
+
+#[test]
+fn a_directory_that_hangs_takes_few_threads() {
+    let lookout = Arc::new(Lookout::default());
+    let at = |number: usize| PathBuf::from(format!("/farm/hung/{number}.xodr"));
+    let hanging: Vec<_> = (0..lookout::PER_DIRECTORY)
+        .map(|number| hang(&lookout, 1, &at(number)))
+        .collect();
+    assert_eq!(
+        lookout.overdue(Duration::ZERO).len(),
+        lookout::PER_DIRECTORY
+    );
+    let attendance = lookout.attend(2);
+    let refused = metadata(&at(99)).unwrap_err();
+    assert_eq!(refused.kind(), io::ErrorKind::TimedOut);
+    let beside = metadata(Path::new("/farm/nothing.xodr")).unwrap_err();
+    assert_eq!(beside.kind(), io::ErrorKind::NotFound);
+    drop(attendance);
+    for one in hanging {
+        let _ = one.end();
+    }
+    assert!(lookout.hanging().is_empty());
+}
+
+#[test]
+fn a_disk_that_is_slow_is_not_overdue() {
+    let lookout = Arc::new(Lookout::default());
+    let attendance = lookout.attend(1);
+    let visit = Visit::begin(Path::new("/farm/large.xodr")).unwrap();
+    let begun = attendance.waits_since().unwrap();
+    visit.goes_on();
+    assert!(attendance.waits_since().unwrap() > begun);
+    drop(visit);
+    assert_eq!(attendance.waits_since(), None);
+}
+
+#[test]
+fn what_went_wrong_for_now_is_remembered_as_long_as_somebody_attends() {
+    let lookout = Arc::new(Lookout::default());
+    let attendance = lookout.attend(1);
+    let meet =
+        |path: &str, error: Errno| noted::<(), io::Error>(Path::new(path), Err(error.into()));
+    assert!(meet("a", Errno::NOENT).is_err());
+    assert_eq!(attendance.moment(), None);
+    assert!(meet("b", Errno::MFILE).is_err());
+    assert!(meet("c", Errno::IO).is_err());
+    let (path, why) = attendance.moment().unwrap();
+    assert_eq!(path, Path::new("b"));
+    assert!(why.starts_with("Too many open files"), "{why}");
+}

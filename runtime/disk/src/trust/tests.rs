@@ -1,0 +1,192 @@
+use std::os::unix::fs::{PermissionsExt, chown, symlink};
+
+use super::*;
+
+/// A user who is neither root nor the one who runs the tests.
+const STRANGER: u32 = 12_345;
+
+fn mode(path: &Path, mode: u32) {
+    std::fs::set_permissions(path, std::fs::Permissions::from_mode(mode)).unwrap();
+}
+
+fn mode_of(path: &Path) -> u32 {
+    std::fs::metadata(path).unwrap().permissions().mode() & 0o7777
+}
+
+/// A directory that only we can write to, with a file in it.
+fn place() -> (tempfile::TempDir, PathBuf) {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("file");
+    std::fs::write(&file, "ours").unwrap();
+    mode(&file, 0o644);
+    (dir, file)
+}
+
+fn why(result: Result<Vec<u8>, TrustError>) -> (PathBuf, Foreign) {
+    match result {
+        Err(TrustError::Foreign { at, why, .. }) => (at, why),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Whether files can be given to somebody else here.
+fn may_give_away() -> bool {
+    let is_root = rustix::process::geteuid().is_root();
+    if !is_root {
+        eprintln!("SKIPPED: only root can make files of another user");
+    }
+    is_root
+}
+
+#[test]
+fn what_is_ours_alone_is_read() {
+    let (dir, file) = place();
+    assert_eq!(read(&file, 4).unwrap(), b"ours");
+    let too_large = read(&file, 3).unwrap_err();
+    assert!(
+        matches!(too_large, TrustError::Io { source, .. } if source.kind() == io::ErrorKind::FileTooLarge)
+    );
+    symlink("file", dir.path().join("link")).unwrap();
+    symlink(dir.path(), dir.path().join("around")).unwrap();
+    for way in ["link", "around/link", "around/around/../", "./around/file"] {
+        let path = dir.path().join(way);
+        let end = match way.ends_with("../") {
+            // Out of the directory and into it again.
+            true => path.join(dir.path().file_name().unwrap()).join("file"),
+            false => path,
+        };
+        assert_eq!(read(&end, 100).unwrap(), b"ours", "{way}");
+    }
+    look_at_file(&file).unwrap();
+    directory(dir.path()).unwrap();
+    directory(Path::new("/")).unwrap();
+    assert!(read(&dir.path().join("none"), 100).unwrap_err().is_absent());
+    assert!(read(&file.join("below"), 100).is_err());
+    symlink("circle", dir.path().join("circle")).unwrap();
+    assert!(read(&dir.path().join("circle"), 100).is_err());
+}
+
+#[test]
+fn what_others_may_write_to_is_not_believed() {
+    let (dir, file) = place();
+    mode(&file, 0o666);
+    assert_eq!(why(read(&file, 100)), (file.clone(), Foreign::World(0o666)));
+    assert!(look_at_file(&file).is_err());
+    mode(&file, 0o644);
+    mode(dir.path(), 0o777);
+    let (at, reason) = why(read(&file, 100));
+    assert_eq!((&*at, reason), (dir.path(), Foreign::World(0o777)));
+    assert!(directory(dir.path()).is_err());
+    // In such a directory what is ours stays ours, but others can put something beside it.
+    mode(dir.path(), 0o1777);
+    assert_eq!(read(&file, 100).unwrap(), b"ours");
+    assert!(directory(dir.path()).is_err(), "what is in it counts");
+    assert!(directory(&dir.path().join(".")).is_err());
+}
+
+#[test]
+fn what_is_no_file_is_not_opened() {
+    let (dir, _) = place();
+    let pipe = dir.path().join("pipe");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.unwrap().success());
+    assert_eq!(why(read(&pipe, 100)), (pipe, Foreign::Special));
+    assert!(read(dir.path(), 100).is_err());
+}
+
+#[test]
+fn only_a_private_group_may_write() {
+    let (dir, file) = place();
+    mode(&file, 0o664);
+    let us = rustix::process::geteuid().as_raw();
+    let group = std::os::unix::fs::MetadataExt::gid(&std::fs::metadata(&file).unwrap());
+    let is_private = group == 0 || group == us;
+    assert_eq!(read(&file, 100).is_ok(), is_private, "group {group}");
+    if may_give_away() {
+        chown(&file, None, Some(STRANGER)).unwrap();
+        let wrong = Foreign::Group(0o664, STRANGER);
+        assert_eq!(why(read(&file, 100)), (file.clone(), wrong));
+        chown(dir.path(), None, Some(STRANGER)).unwrap();
+        mode(&file, 0o644);
+        mode(dir.path(), 0o2770);
+        assert_eq!(why(read(&file, 100)).0, dir.path());
+        mode(dir.path(), 0o3770);
+        assert_eq!(read(&file, 100).unwrap(), b"ours");
+    }
+}
+
+#[test]
+fn what_belongs_to_somebody_else_is_not_believed() {
+    if !may_give_away() {
+        return;
+    }
+    let (dir, file) = place();
+    let theirs = Foreign::Owner(STRANGER);
+    chown(&file, Some(STRANGER), None).unwrap();
+    assert_eq!(why(read(&file, 100)), (file.clone(), theirs));
+    chown(&file, Some(0), None).unwrap();
+    // A link of theirs leads to what is ours, and will lead elsewhere tomorrow.
+    let link = dir.path().join("link");
+    symlink(&file, &link).unwrap();
+    std::os::unix::fs::lchown(&link, Some(STRANGER), None).unwrap();
+    assert_eq!(why(read(&link, 100)), (link, theirs));
+    // A link of ours leads to what is theirs.
+    let below = dir.path().join("below");
+    std::fs::create_dir(&below).unwrap();
+    chown(&below, Some(STRANGER), None).unwrap();
+    std::fs::write(below.join("file"), "ours").unwrap();
+    let ours = dir.path().join("ours");
+    symlink("below/file", &ours).unwrap();
+    assert_eq!(why(read(&ours, 100)), (below.clone(), theirs));
+    let said = read(&ours, 100).unwrap_err().to_string();
+    assert!(
+        said.contains("chown 0") && said.contains("docker run --user 12345"),
+        "{said}"
+    );
+    // In a directory of everybody what is theirs stays theirs.
+    mode(dir.path(), 0o1777);
+    assert!(make_directory(&below.join("more")).is_err());
+    assert!(!below.join("more").exists(), "nothing is made in it");
+}
+
+#[test]
+fn what_is_missing_is_made_and_nobody_else_can_write_to_it() {
+    let (dir, _) = place();
+    symlink("behind", dir.path().join("link")).unwrap();
+    let deep = dir.path().join("link/a/b");
+    make_directory(&deep).unwrap();
+    assert!(dir.path().join("behind/a/b").is_dir());
+    make_directory(&deep).unwrap();
+    assert_eq!(mode_of(&deep) & 0o022, 0);
+    assert!(make_directory(&dir.path().join("file")).is_err());
+}
+
+#[test]
+fn a_private_directory_is_ours_and_closed() {
+    let (dir, _) = place();
+    let fresh = dir.path().join("run/one");
+    make_private_directory(&fresh).unwrap();
+    assert_eq!(mode_of(&fresh), 0o700);
+    mode(&fresh, 0o755);
+    make_private_directory(&fresh).unwrap();
+    assert_eq!(mode_of(&fresh), 0o700, "it is closed");
+    if !may_give_away() {
+        return;
+    }
+    // As somebody else plants it: a link to what is not ours.
+    mode(dir.path(), 0o1777);
+    let (target, link) = (dir.path().join("target"), dir.path().join("link"));
+    std::fs::create_dir(&target).unwrap();
+    mode(&target, 0o755);
+    symlink(&target, &link).unwrap();
+    std::os::unix::fs::lchown(&link, Some(STRANGER), None).unwrap();
+    assert!(make_private_directory(&link).is_err());
+    assert_eq!(
+        mode_of(&target),
+        0o755,
+        "nothing was changed behind the link"
+    );
+    chown(&target, Some(STRANGER), None).unwrap();
+    assert!(make_private_directory(&target).is_err());
+    assert_eq!(mode_of(&target), 0o755, "what is not ours stays as it is");
+}

@@ -1,0 +1,227 @@
+//! Hostile clients of the control socket: whatever they do, an honest `status` is answered beside them, and
+//! when they have gone nothing of them is left. `QCBUS_FUZZ_SECONDS` is how long they go on.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::io::{Read, Write};
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use qcbus_broker::control::ask_broker;
+use qcbus_messages::Verdict;
+use qcbus_messages::control::{Request, Response};
+use support::broker::Broker;
+use support::content::Content;
+use support::dice::{Dice, seed};
+use support::farm::{Farm, tail};
+use support::watchdog::{pause, until_or};
+
+/// Descriptors that most machines give a process.
+const USUAL: u64 = 1024;
+
+/// A broker with as many descriptors as are usual.
+fn serve(farm: &Farm) -> Broker {
+    let plain = farm.serve_command();
+    let mut command = Command::new("sh");
+    command.args(["-c", &format!("ulimit -n {USUAL}; exec \"$@\""), "sh"]);
+    command.arg(plain.get_program()).args(plain.get_args());
+    let broker = Broker::start(&mut command, &farm.log_path());
+    until_or(
+        "the broker answers",
+        || farm.status().map(drop),
+        || farm.log(),
+    );
+    broker
+}
+
+/// This process needs more descriptors than those whom it attacks.
+fn be_many() {
+    use rustix::process::{Resource, getrlimit, setrlimit};
+    let mut limit = getrlimit(Resource::Nofile);
+    limit.current = limit.maximum.map(|it| it.min(16_384)).or(Some(16_384));
+    setrlimit(Resource::Nofile, limit).unwrap();
+}
+
+fn descriptors(broker: &Broker) -> usize {
+    let path = PathBuf::from(format!("/proc/{}/fd", broker.pid()));
+    std::fs::read_dir(path).unwrap().count()
+}
+
+fn socket(farm: &Farm) -> PathBuf {
+    farm.instance().join("control.sock")
+}
+
+#[test]
+fn two_thousand_idle_connections_stop_nothing() {
+    be_many();
+    let farm = Farm::new();
+    let broker = serve(&farm);
+    farm.write("early.xodr", &Content::Good(0).bytes());
+    assert_eq!(farm.verdict("early.xodr").verdict, Verdict::Accepted);
+    let before = descriptors(&broker);
+    let idle: Vec<UnixStream> = (0..2000)
+        .map(|_| UnixStream::connect(socket(&farm)).unwrap())
+        .collect();
+    assert!(farm.status().is_some(), "status is answered");
+    farm.write("good.xodr", &Content::Good(1).bytes());
+    assert_eq!(farm.verdict("good.xodr").verdict, Verdict::Accepted);
+    assert!(
+        descriptors(&broker) < 700,
+        "half of them are the broker's own"
+    );
+    drop(idle);
+    until_or(
+        "nothing is left of them",
+        || (descriptors(&broker) < before + 16).then_some(()),
+        || format!("{before} before, {} now", descriptors(&broker)),
+    );
+}
+
+#[test]
+fn who_waits_and_vanishes_makes_room_for_others() {
+    be_many();
+    let farm = Farm::new();
+    let broker = serve(&farm);
+    farm.write("early.xodr", &Content::Good(0).bytes());
+    assert_eq!(farm.verdict("early.xodr").verdict, Verdict::Accepted);
+    let before = descriptors(&broker);
+    let file = farm.root().join("never.xodr");
+    let wait = Request::Wait {
+        file,
+        timeout_ms: None,
+    };
+    let mut line = serde_json::to_vec(&wait).unwrap();
+    line.push(b'\n');
+    let mut told = 0;
+    for _ in 0..2 {
+        let mut clients: Vec<UnixStream> = Vec::new();
+        for _ in 0..600 {
+            let mut client = UnixStream::connect(socket(&farm)).unwrap();
+            client.write_all(&line).unwrap();
+            clients.push(client);
+        }
+        assert!(farm.status().is_some(), "status is answered beside them");
+        for client in &mut clients {
+            client.set_nonblocking(true).unwrap();
+            let mut said = [0; 512];
+            if let Ok(read @ 1..) = client.read(&mut said) {
+                let said = String::from_utf8_lossy(&said[..read]);
+                assert!(said.contains("clients wait for verdicts already"), "{said}");
+                told += 1;
+            }
+        }
+        drop(clients);
+        until_or(
+            "nothing is left of them",
+            || (descriptors(&broker) < before + 16).then_some(()),
+            || format!("{before} before, {} now", descriptors(&broker)),
+        );
+    }
+    assert!(
+        told > 100,
+        "those for whom there is no room are told so: {told}"
+    );
+    // And who waits rightly is told the verdict.
+    farm.write("never.xodr", &Content::Good(1).bytes());
+    assert_eq!(farm.verdict("never.xodr").verdict, Verdict::Accepted);
+}
+
+fn bytes(dice: &mut Dice, count: usize) -> Vec<u8> {
+    (0..count).map(|_| dice.roll().to_le_bytes()[0]).collect()
+}
+
+/// What one hostile client does.
+fn attack(dice: &mut Dice, socket: &Path, kept: &mut Vec<UnixStream>) {
+    let Ok(mut client) = UnixStream::connect(socket) else {
+        return;
+    };
+    let limit = Some(Duration::from_millis(5));
+    client.set_write_timeout(limit).unwrap();
+    let status = b"{\"request\":\"status\"}\n";
+    // A client that was sent away cannot say any more; that is as it should be.
+    let _ = match dice.below(8) {
+        0 => client.write_all(&bytes(dice, 300)),
+        1 => client.write_all(&vec![b'['; 200_000]),
+        2 => client.write_all(&status[..status.len() / 2]),
+        3 => client.write_all(&status.repeat(400)),
+        4 => client
+            .write_all(&bytes(dice, 20))
+            .and_then(|()| client.write_all(b"\n")),
+        5 => client.write_all(b"{\"request\":\"wait\",\"file\":\"/x.xodr\",\"timeout_ms\":null}\n"),
+        6 => client.write_all(b"{\"request\":\"remove-bundle\",\"name\":\"\\u0000\\n\"}\n"),
+        _ => Ok(()),
+    };
+    if dice.below(4) > 0 {
+        // It neither reads nor goes.
+        kept.push(client);
+    }
+    if kept.len() > 700 {
+        kept.drain(..usize::try_from(dice.below(700)).unwrap());
+    }
+}
+
+#[test]
+fn an_honest_client_is_answered_beside_hostile_ones() {
+    be_many();
+    let farm = Farm::with(&["--no-standard-bundles"]);
+    let mut broker = serve(&farm);
+    let before = descriptors(&broker);
+    let seconds = std::env::var("QCBUS_FUZZ_SECONDS")
+        .ok()
+        .and_then(|it| it.parse().ok());
+    let seed = seed();
+    eprintln!("seed {seed}");
+    let end = Instant::now() + Duration::from_secs(seconds.unwrap_or(4));
+    let (over, attacks) = (AtomicBool::new(false), AtomicUsize::new(0));
+    let answered = std::thread::scope(|scope| {
+        for thread in 0..3 {
+            let (socket, over, attacks) = (socket(&farm), &over, &attacks);
+            scope.spawn(move || {
+                let mut dice = Dice::new(seed.wrapping_add(thread));
+                let mut kept = Vec::new();
+                while !over.load(Ordering::Relaxed) {
+                    attack(&mut dice, &socket, &mut kept);
+                    attacks.fetch_add(1, Ordering::Relaxed);
+                }
+            });
+        }
+        let mut answered = 0;
+        while Instant::now() < end {
+            match ask_broker(&farm.instance(), &Request::Status) {
+                Ok(Response::Status(_)) => answered += 1,
+                other => {
+                    over.store(true, Ordering::Relaxed);
+                    panic!(
+                        "seed {seed}, after {answered} answers: {other:?}\n{}",
+                        tail(&farm.log())
+                    );
+                }
+            }
+            pause(Duration::from_millis(5));
+        }
+        over.store(true, Ordering::Relaxed);
+        answered
+    });
+    let attacks = attacks.into_inner();
+    eprintln!("{attacks} attacks, {answered} honest answers");
+    assert!(
+        answered > 0 && attacks > 100,
+        "{answered} answers, {attacks} attacks"
+    );
+    until_or(
+        "nothing is left of them",
+        || (descriptors(&broker) < before + 16).then_some(()),
+        || format!("{before} before, {} now", descriptors(&broker)),
+    );
+    assert!(farm.qcbus(&["down"]).status.success());
+    assert!(broker.wait().success());
+}

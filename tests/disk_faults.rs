@@ -1,0 +1,290 @@
+//! The system gives the broker other answers than it should: no descriptors, no room, a disk that fails,
+//! a server that forgot a file, an interruption, a single byte, or no answer at all. While it is so nothing
+//! false is said, and when it is over everything is right without anybody doing anything.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::time::{Duration, Instant};
+
+use nix::errno::Errno;
+use qcbus_messages::Verdict;
+use qcbus_messages::control::{Request, Response};
+use support::content::{CATALOG, Content, Mark};
+use support::farm::{Farm, tail};
+use support::inside::skip;
+use support::judge::{Files, judge};
+use support::tracer::{Answer, Kind, Traced, Trouble, no_other_answers};
+use support::watchdog::{pause, until_or};
+
+/// A farm whose broker gets other answers.
+struct Victim {
+    farm: Farm,
+    broker: Traced,
+    files: Files,
+}
+
+impl Victim {
+    /// `None` where nobody can be given other answers; that is said.
+    fn new(test: &str) -> Option<Victim> {
+        if let Some(why) = no_other_answers() {
+            skip(test, &why);
+            return None;
+        }
+        let mut farm = Farm::new();
+        let gate = farm.gate().to_string_lossy().into_owned();
+        farm.arguments = vec!["--gate".to_owned(), gate];
+        std::fs::create_dir(farm.root().join("catalogs")).unwrap();
+        let broker = Traced::start(farm.serve_command(), &farm.log_path(), &[], None);
+        let mut victim = Victim {
+            farm,
+            broker,
+            files: Files::new(),
+        };
+        victim.put(CATALOG, Content::Catalog(1, Mark::Clean));
+        victim.put("map.xodr", Content::Good(1));
+        victim.put("old.xosc", Content::Scenario(1, "map.xodr".to_owned()));
+        victim.settles("before anything goes wrong");
+        Some(victim)
+    }
+
+    fn put(&mut self, name: &str, content: Content) {
+        self.farm.write(name, &content.bytes());
+        self.files.insert(name.to_owned(), content);
+    }
+
+    /// Files of every kind of fate, all of which have to do with what lies there already.
+    fn work(&mut self, round: u64) {
+        self.put("good.xodr", Content::Good(100 + round));
+        self.put("bad.xodr", Content::NoHeader(100 + round));
+        self.put(CATALOG, Content::Catalog(100 + round, Mark::Clean));
+        self.put("map.xodr", Content::Good(200 + round));
+        let map = "map.xodr".to_owned();
+        self.put("new.xosc", Content::Scenario(100 + round, map));
+    }
+
+    fn explain(&self) -> String {
+        format!("{:#?}\n{}", self.farm.status(), tail(&self.farm.log()))
+    }
+
+    /// Everything gets the verdict that it must have, and lies where it belongs.
+    fn settles(&self, what: &str) {
+        let total = u64::try_from(self.files.len()).unwrap();
+        let quiet = || {
+            assert_eq!(
+                self.broker.ended(),
+                None,
+                "{what}: the broker has ended\n{}",
+                self.explain()
+            );
+            let status = self.farm.status()?;
+            let queue = status.queue;
+            let quiet = queue.waiting + queue.background + queue.active == 0;
+            (quiet && status.files.judged == total).then_some(())
+        };
+        let complaints = || {
+            let mut judgement = judge(&self.farm, &self.files, &[]);
+            judgement.gate(&self.farm, &self.files, &Files::new(), &self.farm.gate());
+            judgement.complaints
+        };
+        until_or(
+            what,
+            || quiet().filter(|()| complaints().is_empty()),
+            || format!("{:#?}\n{}", complaints(), self.explain()),
+        );
+    }
+
+    /// Nothing that is said at this moment is false: a verdict is the right one, or none.
+    fn says_nothing_false(&self, what: &str) {
+        for (name, content) in &self.files {
+            let file = self.farm.root().join(name);
+            let ask = Request::Wait {
+                file,
+                timeout_ms: Some(20),
+            };
+            if let Some(Response::Verdict(told)) = self.farm.ask(&ask) {
+                let right = [content.verdict(), Verdict::Undetermined];
+                assert!(
+                    right.contains(&told.verdict),
+                    "{what}: {told:?}\n{}",
+                    self.explain()
+                );
+            }
+        }
+    }
+
+    /// While this goes wrong, files come and change.
+    fn through(&mut self, what: &str, trouble: &Trouble, enough: usize, lasts: Duration) {
+        self.broker.trouble(Some(trouble.clone()));
+        let begun = Instant::now();
+        let mut round = 0;
+        while self.broker.troubled() < enough || begun.elapsed() < lasts {
+            round += 1;
+            self.work(round);
+            self.says_nothing_false(what);
+            pause(Duration::from_millis(50));
+            let limit = *support::watchdog::LONG;
+            assert!(
+                begun.elapsed() < limit,
+                "{what}: it never goes wrong\n{}",
+                self.explain()
+            );
+        }
+        let times = self.broker.trouble(None);
+        println!("{what}: {times} times in {round} rounds");
+        self.settles(what);
+    }
+}
+
+const ANY_READING: &[Kind] = &[Kind::Look, Kind::Read];
+const ANYTHING: &[Kind] = &[Kind::Look, Kind::Read, Kind::Deed];
+
+fn error(
+    below: std::path::PathBuf,
+    kinds: &'static [Kind],
+    error: Errno,
+    one_in: usize,
+) -> Trouble {
+    Trouble {
+        below,
+        kinds,
+        answer: Answer::Error(error),
+        one_in,
+    }
+}
+
+#[test]
+fn errors_of_a_moment_pass_when_the_moment_does() {
+    let Some(mut victim) = Victim::new("errors_of_a_moment_pass_when_the_moment_does") else {
+        return;
+    };
+    let root = victim.farm.root();
+    let lasts = Duration::from_millis(2500);
+    for (code, one_in) in [
+        (Errno::EMFILE, 1),
+        (Errno::EIO, 2),
+        (Errno::ESTALE, 1),
+        (Errno::ENOMEM, 3),
+    ] {
+        let trouble = error(root.clone(), ANY_READING, code, one_in);
+        victim.through(&format!("{code} for a while"), &trouble, 20, lasts);
+    }
+}
+
+#[test]
+fn interruptions_and_short_reads_change_nothing() {
+    let Some(mut victim) = Victim::new("interruptions_and_short_reads_change_nothing") else {
+        return;
+    };
+    let base = victim.farm.base().to_path_buf();
+    let interrupted = error(base.clone(), &[Kind::Look, Kind::Read], Errno::EINTR, 3);
+    victim.through("interruptions", &interrupted, 50, Duration::ZERO);
+    let short = Trouble {
+        below: victim.farm.root(),
+        kinds: &[Kind::Read],
+        answer: Answer::Short,
+        one_in: 2,
+    };
+    victim.through("short reads", &short, 50, Duration::ZERO);
+}
+
+#[test]
+fn a_disk_without_room_costs_no_verdict() {
+    let Some(mut victim) = Victim::new("a_disk_without_room_costs_no_verdict") else {
+        return;
+    };
+    let (out, gate) = (victim.farm.out(), victim.farm.gate());
+    for (below, one_in) in [
+        (out.clone(), 1),
+        (out.join(".qcbus"), 2),
+        (gate, 1),
+        (out, 3),
+    ] {
+        let what = format!("no room in {}", below.display());
+        let full = error(below.clone(), &[Kind::Deed], Errno::ENOSPC, one_in);
+        victim.through(&what, &full, 10, Duration::from_secs(1));
+        let broken = error(below, ANYTHING, Errno::EIO, 5);
+        victim.through(
+            &format!("{what}, and it fails"),
+            &broken,
+            10,
+            Duration::from_secs(1),
+        );
+    }
+}
+
+/// A server that is gone: whoever asks for its files never gets an answer.
+#[test]
+fn a_file_that_never_answers_is_named_and_holds_up_nobody() {
+    let test = "a_file_that_never_answers_is_named_and_holds_up_nobody";
+    let Some(mut victim) = Victim::new(test) else {
+        return;
+    };
+    for (round, kinds) in [(1, &[Kind::Look][..]), (2, &[Kind::Read])] {
+        let map = victim.farm.root().join("map.xodr");
+        victim.broker.trouble(Some(Trouble {
+            below: map.clone(),
+            kinds,
+            answer: Answer::Never,
+            one_in: 1,
+        }));
+        victim.work(round);
+        let named = || {
+            let status = victim.farm.status()?;
+            status.unseen.iter().any(|it| it.path == map).then_some(())
+        };
+        until_or("it is named", named, || victim.explain());
+        for number in 0..20 {
+            let name = format!("honest-{round}-{number}.xodr");
+            victim.put(&name, Content::Good(1000 * round + number));
+            assert_eq!(victim.farm.verdict(&name).verdict, Verdict::Accepted);
+        }
+        let ask = Request::Wait {
+            file: map,
+            timeout_ms: Some(60_000),
+        };
+        let said = victim.farm.ask(&ask);
+        let is_no_verdict = match &said {
+            Some(Response::Unanswered { .. } | Response::TimedOut) => true,
+            Some(Response::Verdict(it)) => it.verdict == Verdict::Undetermined,
+            _ => false,
+        };
+        assert!(is_no_verdict, "{said:?}");
+        victim.says_nothing_false("a file does not answer");
+        victim.broker.trouble(None);
+        victim.settles("it answers again");
+        let unseen = victim.farm.status().unwrap().unseen;
+        assert!(unseen.is_empty(), "{unseen:?}");
+    }
+}
+
+#[test]
+fn a_broker_ends_though_a_file_never_answers() {
+    let Some(mut victim) = Victim::new("a_broker_ends_though_a_file_never_answers") else {
+        return;
+    };
+    victim.broker.trouble(Some(Trouble {
+        below: victim.farm.root().join("map.xodr"),
+        kinds: ANY_READING,
+        answer: Answer::Never,
+        one_in: 1,
+    }));
+    victim.work(1);
+    until_or(
+        "somebody waits in vain",
+        || (victim.broker.troubled() > 0).then_some(()),
+        || victim.explain(),
+    );
+    let _ = victim.farm.ask(&Request::Down);
+    let ended = until_or(
+        "the broker ends",
+        || victim.broker.ended(),
+        || victim.explain(),
+    );
+    assert!(ended.success(), "{ended}");
+}

@@ -1,0 +1,249 @@
+//! Who writes into the watched directory puts there whatever the system has: pipes, devices, files of the
+//! kernel, files on which somebody has a lease, and swaps one for the other all the time. The files of
+//! others are judged as ever, and the broker stops when it is told to. So it does with few descriptors, and
+//! with a clock that jumps.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::fs::File;
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use nix::libc;
+use qcbus_messages::Verdict;
+use qcbus_messages::control::{NoticeStatus, Request, Response};
+use support::broker::Broker;
+use support::content::Content;
+use support::farm::Farm;
+use support::inside::skip;
+use support::watchdog::until_or;
+
+fn fifo(path: &Path) {
+    let made = Command::new("mkfifo").arg(path).status().unwrap();
+    assert!(made.success());
+}
+
+fn is_judged(farm: &Farm, name: &str, content: &Content) {
+    farm.write(name, &content.bytes());
+    assert_eq!(farm.verdict(name).verdict, content.verdict(), "{name}");
+}
+
+#[test]
+fn files_that_turn_into_pipes_hold_up_nobody() {
+    const NAMES: usize = 16;
+    const ROUNDS: usize = 150;
+    let farm = Farm::new();
+    let mut broker = farm.serve_ready();
+    let pipes = farm.base().join("pipes");
+    std::fs::create_dir(&pipes).unwrap();
+    let bytes = Content::Good(1).bytes();
+    let ended = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let swapping = scope.spawn(|| {
+            for round in 0..ROUNDS {
+                for name in 0..NAMES {
+                    let (pipe, file) = (pipes.join("pipe"), pipes.join("file"));
+                    let at = farm.root().join(format!("{name}.xodr"));
+                    std::fs::write(&file, &bytes).unwrap();
+                    std::fs::rename(&file, &at).unwrap();
+                    if (name + round) % 2 == 0 {
+                        fifo(&pipe);
+                        std::fs::rename(&pipe, &at).unwrap();
+                    }
+                }
+            }
+            ended.store(true, Ordering::Release);
+        });
+        let mut number = 100;
+        while !ended.load(Ordering::Acquire) && !swapping.is_finished() {
+            number += 1;
+            is_judged(
+                &farm,
+                &format!("honest-{number}.xodr"),
+                &Content::Good(number),
+            );
+        }
+    });
+    is_judged(&farm, "last.xodr", &Content::NoHeader(9));
+    for name in 0..NAMES {
+        let name = format!("{name}.xodr");
+        std::fs::remove_file(farm.root().join(&name)).unwrap();
+        is_judged(&farm, &name, &Content::Good(2));
+    }
+    assert_eq!(farm.qcbus(&["down"]).status.code(), Some(0));
+    assert!(broker.wait().success());
+}
+
+#[test]
+fn maps_that_the_kernel_makes_up_hold_up_nobody() {
+    let farm = Farm::new();
+    let mut broker = farm.serve_ready();
+    let maps = ["/proc/kmsg", "/dev/zero", "/dev/tty", "/proc/self/maps"];
+    for (number, map) in maps.iter().enumerate() {
+        for copy in 0..4 {
+            farm.write(
+                &format!("{number}-{copy}.xosc"),
+                &Content::Scenario(copy, (*map).to_owned()).bytes(),
+            );
+        }
+    }
+    is_judged(&farm, "honest.xodr", &Content::Good(1));
+    for number in 0..maps.len() {
+        let verdict = farm.verdict(&format!("{number}-0.xosc"));
+        assert_ne!(
+            verdict.verdict,
+            Verdict::Accepted,
+            "nobody has seen the map"
+        );
+    }
+    symlink("/dev/zero", farm.root().join("zero.xodr")).unwrap();
+    symlink("/proc/kmsg", farm.root().join("kernel.xodr")).unwrap();
+    is_judged(&farm, "another.xodr", &Content::Good(2));
+    assert_eq!(farm.qcbus(&["down"]).status.code(), Some(0));
+    assert!(broker.wait().success());
+}
+
+/// Somebody has asked to be told before others read the file, and does not answer.
+#[expect(unsafe_code, reason = "no crate wraps leases")]
+fn lease(file: &File) -> bool {
+    use std::os::fd::AsRawFd;
+    // SAFETY: a bare system call on a descriptor that is open.
+    unsafe { libc::fcntl(file.as_raw_fd(), libc::F_SETLEASE, libc::F_WRLCK) == 0 }
+}
+
+#[test]
+fn leases_hold_up_nobody() {
+    // The kernel asks for the lease back by this signal, which would end the process.
+    #[expect(unsafe_code, reason = "no other call keeps the default action away")]
+    // SAFETY: nothing is called when the signal comes.
+    unsafe {
+        libc::signal(libc::SIGIO, libc::SIG_IGN);
+    }
+    let farm = Farm::new();
+    let aside = farm.base().join("aside");
+    std::fs::create_dir(&aside).unwrap();
+    let mut leased = Vec::new();
+    for number in 0..8 {
+        let path = aside.join(format!("{number}.xodr"));
+        std::fs::write(&path, Content::Good(number).bytes()).unwrap();
+        let file = File::options().read(true).write(true).open(&path).unwrap();
+        if !lease(&file) {
+            let why = std::io::Error::last_os_error();
+            return skip(
+                "leases_hold_up_nobody",
+                &format!("no lease is given: {why}"),
+            );
+        }
+        leased.push(file);
+    }
+    let mut broker = farm.serve_ready();
+    for number in 0..8 {
+        let name = format!("{number}.xodr");
+        std::fs::rename(aside.join(&name), farm.root().join(&name)).unwrap();
+    }
+    for number in 20..40 {
+        is_judged(&farm, &format!("{number}.xodr"), &Content::Good(number));
+    }
+    drop(leased);
+    for number in 0..8 {
+        let name = format!("{number}.xodr");
+        let verdict = || {
+            let request = Request::Wait {
+                file: farm.root().join(&name),
+                timeout_ms: Some(1_000),
+            };
+            match farm.ask(&request)? {
+                Response::Verdict(it) => (it.verdict == Verdict::Accepted).then_some(()),
+                _ => None,
+            }
+        };
+        until_or("what was leased is judged", verdict, || farm.log());
+    }
+    assert_eq!(farm.qcbus(&["down"]).status.code(), Some(0));
+    assert!(broker.wait().success());
+}
+
+#[test]
+fn few_descriptors_are_said_and_enough_for_every_file() {
+    let farm = Farm::new();
+    let serve = farm.serve_command();
+    let mut limited = Command::new("sh");
+    limited.args(["-c", "ulimit -n 256 && exec \"$@\"", "sh"]);
+    limited.arg(serve.get_program()).args(serve.get_args());
+    let _broker = Broker::start(&mut limited, &farm.log_path());
+    for number in 0..200 {
+        farm.write(&format!("{number}.xodr"), &Content::Good(number).bytes());
+    }
+    let status = farm.settle(200);
+    assert_eq!(status.files.accepted, 200);
+    let said = |it: &NoticeStatus| it.kind == "limited" && it.text.contains("LimitNOFILE=");
+    assert!(status.notices.iter().any(said), "{:#?}", status.notices);
+}
+
+/// Builds what makes the clock jump; `None`, and said, where that cannot be.
+fn clock(farm: &Farm) -> Option<PathBuf> {
+    let library = farm.base().join("libclock.so");
+    let compiler = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+    let source = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/clock/clock.rs");
+    let mut build = Command::new(compiler);
+    build.args(["--edition", "2024", "--crate-type", "cdylib", "-O", "-o"]);
+    let built = build.arg(&library).arg(source).output();
+    let why = match built {
+        Ok(built) if built.status.success() => return Some(library),
+        Ok(built) => String::from_utf8_lossy(&built.stderr).into_owned(),
+        Err(error) => error.to_string(),
+    };
+    skip("a_clock_that_jumps_costs_no_verdict", &why);
+    None
+}
+
+#[test]
+fn a_clock_that_jumps_costs_no_verdict() {
+    const YEAR: i64 = 366 * 24 * 3600;
+    let farm = Farm::new();
+    let Some(library) = clock(&farm) else { return };
+    let offset = farm.base().join("offset");
+    let jump = |seconds: i64| {
+        let aside = farm.base().join("offset.new");
+        std::fs::write(&aside, seconds.to_string()).unwrap();
+        std::fs::rename(aside, &offset).unwrap();
+    };
+    jump(0);
+    let serve = || {
+        let mut command = farm.serve_command();
+        command
+            .env("LD_PRELOAD", &library)
+            .env("QCBUS_TEST_CLOCK", &offset);
+        Broker::start(&mut command, &farm.log_path())
+    };
+    let mut broker = serve();
+    is_judged(&farm, "map.xodr", &Content::Good(1));
+    is_judged(&farm, "stays.xodr", &Content::NoHeader(1));
+    for (round, seconds) in (1..).zip([YEAR, -YEAR, 3600, -3600, -20 * YEAR, 2, 0]) {
+        jump(seconds);
+        is_judged(&farm, "map.xodr", &Content::Good(10 + round));
+        is_judged(&farm, "map.xodr", &Content::NoHeader(10 + round));
+        is_judged(
+            &farm,
+            &format!("new-{round}.xodr"),
+            &Content::Good(20 + round),
+        );
+        assert_eq!(farm.verdict("stays.xodr").verdict, Verdict::Rejected);
+        if round % 3 == 0 {
+            broker.kill();
+            broker = serve();
+        }
+    }
+    let status = farm.settle(2 + 7);
+    assert_eq!((status.files.accepted, status.files.rejected), (7, 2));
+    assert_eq!(farm.qcbus(&["down"]).status.code(), Some(0));
+    assert!(broker.wait().success());
+}

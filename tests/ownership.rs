@@ -1,0 +1,367 @@
+//! What another user of the host puts where a broker looks: it is not run, not believed and not changed.
+//! The broker is root here, as whoever plants things hopes; or a user whom a third one wants to fool.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stderr,
+    reason = "a test that cannot go on fails where it stands, and one that is skipped says so"
+)]
+
+mod support;
+
+use std::os::unix::fs::{PermissionsExt, chown, lchown, symlink};
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use support::broker::Broker;
+use support::farm::Farm;
+use support::watchdog::{until_or, until_so};
+
+/// Who plants things.
+const NEIGHBOUR: u32 = 12_345;
+/// A user who is not root.
+const NOBODY: u32 = 65_534;
+
+/// Whether there can be a neighbour here.
+fn is_root() -> bool {
+    let is_root = rustix::process::geteuid().is_root();
+    if !is_root {
+        eprintln!("SKIPPED: only root can act as several users");
+    }
+    is_root
+}
+
+fn mode(path: &Path, mode: u32) {
+    std::fs::set_permissions(path, std::fs::Permissions::from_mode(mode)).unwrap();
+}
+
+fn give(path: &Path, user: u32) {
+    chown(path, Some(user), Some(user)).unwrap();
+}
+
+/// A manifest whose program leaves a trace.
+fn evil(trace: &Path) -> String {
+    let command = format!("/bin/sh -c 'touch {}'", trace.display());
+    manifest(&command)
+}
+
+fn manifest(command: &str) -> String {
+    serde_json::json!({ "module": [{
+        "name": "evil",
+        "exec_type": "executable",
+        "module_type": "checker_bundle",
+        "exec_command": command,
+        "mode": "bus",
+    }]})
+    .to_string()
+}
+
+/// An inbox into which everybody may write, and what a command there says.
+struct Inbox {
+    dir: tempfile::TempDir,
+}
+
+impl Inbox {
+    fn new(inbox_mode: u32) -> Inbox {
+        let dir = tempfile::TempDir::with_prefix("qcbus-test-").unwrap();
+        mode(dir.path(), 0o755);
+        let inbox = Inbox { dir };
+        std::fs::create_dir(inbox.path()).unwrap();
+        mode(&inbox.path(), inbox_mode);
+        std::fs::create_dir(inbox.run()).unwrap();
+        inbox
+    }
+
+    fn path(&self) -> PathBuf {
+        self.dir.path().join("inbox")
+    }
+
+    fn run(&self) -> PathBuf {
+        self.dir.path().join("run")
+    }
+
+    fn trace(&self) -> PathBuf {
+        self.dir.path().join("trace")
+    }
+
+    /// What the neighbour puts there.
+    fn plant(&self, name: &str, content: &str) -> PathBuf {
+        let path = self.path().join(name);
+        for parent in Path::new(name)
+            .ancestors()
+            .skip(1)
+            .collect::<Vec<_>>()
+            .iter()
+            .rev()
+        {
+            let parent = self.path().join(parent);
+            if !parent.exists() {
+                std::fs::create_dir(&parent).unwrap();
+                give(&parent, NEIGHBOUR);
+            }
+        }
+        std::fs::write(&path, content).unwrap();
+        give(&path, NEIGHBOUR);
+        path
+    }
+
+    /// `cd inbox && qcbus serve .`
+    fn serve_command(&self, more: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+        command
+            .args(["serve", ".", "--no-standard-bundles"])
+            .args(more)
+            .current_dir(self.path())
+            .env("XDG_RUNTIME_DIR", self.run())
+            .env("NO_COLOR", "1");
+        command
+    }
+
+    fn is_refused(&self, more: &[&str], because: &[&str]) {
+        let log = self.dir.path().join("log");
+        let mut broker = Broker::start(&mut self.serve_command(more), &log);
+        let said = || std::fs::read_to_string(&log).unwrap();
+        // One that is not refused runs, and what it must not run leaves its trace.
+        until_or(
+            "the broker refuses to start",
+            || {
+                assert!(!self.trace().exists(), "the neighbour's program was run");
+                (!broker.is_alive()).then_some(())
+            },
+            said,
+        );
+        assert_eq!(broker.wait().code(), Some(2), "{}", said());
+        for part in because {
+            assert!(said().contains(part), "no `{part}` in: {}", said());
+        }
+    }
+}
+
+#[test]
+fn a_manifest_planted_in_the_inbox_is_not_run() {
+    if !is_root() {
+        return;
+    }
+    for inbox_mode in [0o777, 0o1777] {
+        let inbox = Inbox::new(inbox_mode);
+        inbox.plant(
+            "qcbus-out/.qcbus/bundles.d/evil.json",
+            &evil(&inbox.trace()),
+        );
+        let because = match inbox_mode {
+            0o777 => "everybody may write to",
+            _ => "qcbus-out belongs to user 12345",
+        };
+        inbox.is_refused(&[], &[because, "qcbus-out/.qcbus/bundles.d", "--state"]);
+    }
+}
+
+#[test]
+fn a_state_directory_that_others_can_replace_is_refused() {
+    if !is_root() {
+        return;
+    }
+    let open = Inbox::new(0o777);
+    open.is_refused(&[], &["inbox (mode 0777)", "chmod +t", "--state"]);
+    assert!(
+        !open.path().join("qcbus-out").exists(),
+        "nothing is left there"
+    );
+    let planted = Inbox::new(0o1777);
+    planted.plant("qcbus-out/note", "");
+    planted.is_refused(&[], &["qcbus-out belongs to user 12345", "--state"]);
+    let team = Inbox::new(0o2775);
+    chown(team.path(), None, Some(NEIGHBOUR)).unwrap();
+    mode(&team.path(), 0o2775);
+    team.is_refused(&[], &["group 12345 may write", "chmod g-w", "--state"]);
+}
+
+#[test]
+fn an_inbox_of_everybody_is_served_where_entries_stay_their_owners() {
+    if !is_root() {
+        return;
+    }
+    let inbox = Inbox::new(0o1777);
+    let log = inbox.dir.path().join("log");
+    let _broker = Broker::start(&mut inbox.serve_command(&[]), &log);
+    until_or(
+        "the broker answers",
+        || {
+            let asked = Command::new(env!("CARGO_BIN_EXE_qcbus"))
+                .arg("status")
+                .env("XDG_RUNTIME_DIR", inbox.run())
+                .output();
+            asked.unwrap().status.success().then_some(())
+        },
+        || std::fs::read_to_string(&log).unwrap(),
+    );
+}
+
+#[test]
+fn a_configuration_or_program_of_somebody_else_is_refused() {
+    if !is_root() {
+        return;
+    }
+    let inbox = Inbox::new(0o755);
+    let own = inbox.dir.path().join("own.d");
+    std::fs::create_dir(&own).unwrap();
+    let config = inbox.plant("config.xml", "<Config/>");
+    inbox.is_refused(
+        &["-c", config.to_str().unwrap()],
+        &["config.xml belongs to user 12345"],
+    );
+    let script = inbox.plant(
+        "run.sh",
+        &format!("#!/bin/sh\ntouch {}\n", inbox.trace().display()),
+    );
+    mode(&script, 0o755);
+    let shown = script.display();
+    for command in [
+        format!("{shown} --x"),
+        format!("sh -e {shown}"),
+        "./run.sh".to_owned(),
+    ] {
+        std::fs::write(own.join("evil.json"), manifest(&command)).unwrap();
+        inbox.is_refused(
+            &["--bundles-d", own.to_str().unwrap()],
+            &[
+                "evil.json: `evil` is not started",
+                "run.sh belongs to user 12345",
+            ],
+        );
+    }
+}
+
+#[test]
+fn what_is_planted_later_is_said_and_not_run() {
+    if !is_root() {
+        return;
+    }
+    let farm = Farm::with(&["--no-standard-bundles"]);
+    let _broker = farm.serve();
+    until_so("the broker answers", || farm.status().is_some());
+    let trace = farm.base().join("trace");
+    let path = farm.bundles_d().join("evil.json");
+    std::fs::write(farm.base().join("evil"), evil(&trace)).unwrap();
+    give(&farm.base().join("evil"), NEIGHBOUR);
+    std::fs::rename(farm.base().join("evil"), &path).unwrap();
+    let is_said = |text: &str| {
+        let said = |notices: &[qcbus_messages::control::NoticeStatus]| {
+            let mut notices = notices.iter();
+            notices.any(|it| it.kind == "loading" && it.text.contains(text))
+        };
+        until_or(
+            "the neighbour's manifest is said",
+            || {
+                farm.status()
+                    .filter(|status| said(&status.notices))
+                    .map(drop)
+            },
+            || format!("no `{text}` in {}", farm.log()),
+        );
+    };
+    is_said("evil.json belongs to user 12345");
+    std::fs::remove_file(&path).unwrap();
+    // A directory that everybody may write to from now on.
+    mode(&farm.bundles_d(), 0o777);
+    is_said("everybody may write to");
+    std::fs::write(&path, evil(&trace)).unwrap();
+    let reload = farm.qcbus(&["reload"]);
+    assert!(!reload.status.success(), "{reload:?}");
+    assert!(!trace.exists(), "the neighbour's program was run");
+}
+
+#[test]
+fn a_program_that_others_may_write_to_is_not_started_again() {
+    let farm = Farm::with(&["--no-standard-bundles"]);
+    let (program, trace) = (farm.base().join("program"), farm.base().join("trace"));
+    std::fs::write(&program, "#!/bin/sh\nexit 1\n").unwrap();
+    mode(&program, 0o755);
+    std::fs::write(
+        farm.bundles_d().join("evil.json"),
+        manifest(program.to_str().unwrap()),
+    )
+    .unwrap();
+    let _broker = farm.serve();
+    let note = |text: &str| {
+        let mut notices = farm.status()?.notices.into_iter();
+        notices.any(|it| it.text.contains(text)).then_some(())
+    };
+    let explain = || format!("{:#?}\n{}", farm.status(), farm.log());
+    until_or("it has failed", || note("exit code 1"), explain);
+    mode(&program, 0o777);
+    std::fs::write(&program, format!("#!/bin/sh\ntouch {}\n", trace.display())).unwrap();
+    until_or(
+        "it is not started",
+        || note("everybody may write to"),
+        explain,
+    );
+    assert!(!trace.exists(), "it was started");
+}
+
+fn status_as(user: u32, runtime: &[(&str, &Path)]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+    command
+        .arg("status")
+        .env_remove("XDG_RUNTIME_DIR")
+        .uid(user)
+        .gid(user);
+    command.envs(runtime.iter().copied()).output().unwrap()
+}
+
+fn mode_of(path: &Path) -> u32 {
+    std::fs::metadata(path).unwrap().permissions().mode() & 0o7777
+}
+
+#[test]
+fn a_runtime_directory_that_a_neighbour_has_planted_is_left_as_it_is() {
+    if !is_root() {
+        return;
+    }
+    let dir = tempfile::TempDir::with_prefix("qcbus-test-").unwrap();
+    mode(dir.path(), 0o1777);
+    for user in [0, NOBODY] {
+        let target = dir.path().join(format!("target-{user}"));
+        std::fs::create_dir(&target).unwrap();
+        give(&target, user);
+        mode(&target, 0o755);
+        let link = dir.path().join(format!("qcbus-{user}"));
+        symlink(&target, &link).unwrap();
+        lchown(&link, Some(NEIGHBOUR), Some(NEIGHBOUR)).unwrap();
+        let said = status_as(user, &[("TMPDIR", dir.path())]);
+        let text = String::from_utf8_lossy(&said.stderr).into_owned();
+        assert_eq!(said.status.code(), Some(2), "{text}");
+        assert!(text.contains("belongs to user 12345"), "{text}");
+        assert!(text.contains("set XDG_RUNTIME_DIR"), "{text}");
+        assert_eq!(
+            mode_of(&target),
+            0o755,
+            "what the link leads to was changed"
+        );
+        assert_eq!(std::fs::read_dir(&target).unwrap().count(), 0);
+        // As somebody keeps XDG_RUNTIME_DIR who becomes another user with `su`.
+        let theirs = dir.path().join(format!("theirs-{user}"));
+        std::fs::create_dir(&theirs).unwrap();
+        give(&theirs, NEIGHBOUR);
+        mode(&theirs, 0o777);
+        let said = status_as(user, &[("XDG_RUNTIME_DIR", &theirs)]);
+        assert_eq!(said.status.code(), Some(2), "{said:?}");
+        assert_eq!(mode_of(&theirs), 0o777);
+        assert_eq!(std::fs::read_dir(&theirs).unwrap().count(), 0);
+    }
+}
+
+#[test]
+fn a_user_without_rights_has_a_runtime_directory() {
+    if !is_root() {
+        return;
+    }
+    let dir = tempfile::TempDir::with_prefix("qcbus-test-").unwrap();
+    mode(dir.path(), 0o1777);
+    let said = status_as(NOBODY, &[("TMPDIR", dir.path())]);
+    let text = String::from_utf8_lossy(&said.stderr).into_owned();
+    assert!(text.contains("no broker runs"), "{text}");
+    assert_eq!(mode_of(&dir.path().join("qcbus-65534")), 0o700);
+}
