@@ -136,7 +136,7 @@ impl Victim {
             );
         }
         let times = self.broker.trouble(None);
-        println!("{what}: {times} times in {round} rounds");
+        assert!(times >= enough, "{what}: {times} times");
         self.settles(what);
     }
 }

@@ -125,7 +125,7 @@ pub fn look_at_file(path: &Path) -> Result<(), TrustError> {
 /// # Errors
 /// [`TrustError`].
 pub fn directory(path: &Path) -> Result<OwnedFd, TrustError> {
-    open_directory(path, walk(path, None)?)
+    open_directory(path, &walk(path, None)?)
 }
 
 /// As [`directory`], and makes it where it is missing, with all that is missing on the way to it.
@@ -134,7 +134,7 @@ pub fn directory(path: &Path) -> Result<OwnedFd, TrustError> {
 /// [`TrustError`].
 pub fn make_directory(path: &Path) -> Result<OwnedFd, TrustError> {
     let mode = Mode::from_raw_mode(0o755);
-    open_directory(path, walk(path, Some(mode))?)
+    open_directory(path, &walk(path, Some(mode))?)
 }
 
 /// A directory that only this user can read, made where it is missing. One of ours that others can look
@@ -157,7 +157,7 @@ pub fn make_private_directory(path: &Path) -> Result<OwnedFd, TrustError> {
     Ok(opened)
 }
 
-fn open_directory(path: &Path, found: Found) -> Result<OwnedFd, TrustError> {
+fn open_directory(path: &Path, found: &Found) -> Result<OwnedFd, TrustError> {
     if found.kind() != FileType::Directory {
         return Err(failed(path, Errno::NOTDIR.into()));
     }

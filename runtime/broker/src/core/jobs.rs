@@ -216,10 +216,10 @@ impl State {
                     self.mute_room_until = self.now + ROOM_NOTICE_PAUSE;
                     self.notice(Notice::NoRoom(why.clone()), actions);
                 }
-                self.wait_for_room(id, why, self.settings.retry_after, actions);
+                self.wait_for_room(id, &why, self.settings.retry_after, actions);
             }
             Err(PrepareFailure::Busy) => {
-                let why = "as many documents as the bus carries at once are in use".to_owned();
+                let why = "as many documents as the bus carries at once are in use";
                 self.wait_for_room(id, why, self.settings.busy_pause, actions);
             }
             Err(PrepareFailure::Unreadable(reason)) => self.not_read(id, reason, actions),
@@ -249,7 +249,7 @@ impl State {
 
     /// There is no room for the file now. As long as anything moves there will be, so it waits; when
     /// nothing has for long enough, it is undetermined. A verdict that it has stays meanwhile.
-    fn wait_for_room(&mut self, id: JobId, why: String, pause: Duration, actions: &mut Actions) {
+    fn wait_for_room(&mut self, id: JobId, why: &str, pause: Duration, actions: &mut Actions) {
         let moves = |job: &ActiveJob| job.stage != JobStage::Preparing && job.unreadable.is_none();
         if self.jobs.values().any(moves) {
             self.stuck_since = None;

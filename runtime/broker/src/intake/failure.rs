@@ -124,7 +124,7 @@ mod tests {
 
     #[test]
     fn what_never_fits_is_not_waited_for() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"));
         let never = || {
             Failure::Loan(LoanError::NeverFits {
                 needed: 70 << 20,

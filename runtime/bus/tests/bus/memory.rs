@@ -11,8 +11,7 @@ use crate::support::{Site, join, run, shared_memory_of};
 
 /// Bytes that the segments of this instance have, without what is kept for those who join.
 fn taken(site: &Site) -> u64 {
-    let all = shared_memory_of(&site.instance).into_iter();
-    let segments = all.filter(|name| !name.ends_with("room"));
+    let segments = shared_memory_of(&site.instance).into_iter();
     let bytes = |name: String| {
         let path = Path::new("/dev/shm").join(name);
         let below = std::fs::read_dir(&path).map_or(0, |_| tree(&path));
@@ -25,7 +24,10 @@ fn tree(directory: &Path) -> u64 {
     let Ok(entries) = std::fs::read_dir(directory) else {
         return 0;
     };
-    let bytes = entries.flatten().map(|entry| match entry.metadata() {
+    let segments = entries
+        .flatten()
+        .filter(|entry| entry.file_name() != "room");
+    let bytes = segments.map(|entry| match entry.metadata() {
         Ok(data) if data.is_dir() => tree(&entry.path()),
         Ok(data) => data.blocks() * 512,
         Err(_) => 0,
@@ -77,8 +79,10 @@ fn there_is_room_for_who_is_expected() {
         };
         let mut host = Host::start(&site.instance, options).unwrap();
         let names = shared_memory_of(&site.instance);
-        let room = names.iter().find(|name| name.ends_with("room")).unwrap();
-        let room = Path::new("/dev/shm").join(room);
+        let [root] = names.as_slice() else {
+            panic!("{names:?}");
+        };
+        let room = Path::new("/dev/shm").join(root).join("room");
         let kept = || std::fs::metadata(&room).unwrap().blocks() * 512;
         let both = kept();
         assert!(both > 0);
