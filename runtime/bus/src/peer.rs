@@ -36,7 +36,8 @@ pub struct PeerOptions {
     /// How long to survive the loss of the broker.
     pub grace: Duration,
     /// Whether a session that is lost is followed by another one. A process that can open nothing any more has
-    /// no second one: it is closed at once.
+    /// no second one: it is closed at once. Nor can it take down what the first one has made, so that stays until
+    /// the process ends, which it is to do soon after.
     pub rejoins: bool,
 }
 
@@ -362,7 +363,16 @@ impl Peer {
     }
 
     fn close(&mut self, reason: String) {
-        self.state = State::Closed(reason);
+        self.change(State::Closed(reason));
+    }
+
+    /// What a session has made is taken down, unless this process may not do so any more: then the broker's janitor
+    /// does, when the process has ended.
+    fn change(&mut self, state: State) {
+        let former = std::mem::replace(&mut self.state, state);
+        if self.joined_before && !self.options.rejoins {
+            std::mem::forget(former);
+        }
     }
 
     /// Does as much as can be done without waiting.
@@ -403,11 +413,11 @@ impl Peer {
     }
 
     fn lose(&mut self, now: Instant) {
-        self.state = if self.joined_before && !self.options.rejoins {
+        self.change(if self.joined_before && !self.options.rejoins {
             State::Closed(LOST.to_owned())
         } else {
             State::Seeking
-        };
+        });
         // What was not fetched belongs to the session that is over.
         self.events.clear();
         self.lost.get_or_insert(now);
@@ -459,6 +469,12 @@ impl Peer {
             let seconds = self.options.grace.as_secs_f32();
             self.close(format!("the broker has been gone for {seconds} s"));
         }
+    }
+}
+
+impl Drop for Peer {
+    fn drop(&mut self) {
+        self.change(State::Seeking);
     }
 }
 
