@@ -25,6 +25,7 @@ const MAY_KNOW: &[(&str, Option<&[&str]>)] = &[
     ("qcbus-formats", Some(&[])),
     ("qcbus-messages", Some(&[])),
     ("qcbus-bus", Some(&["qcbus-disk"])),
+    ("qcbus-confine", Some(&[])),
     ("qcbus-disk", Some(&[])),
     ("qcbus-ingest", Some(&["qcbus-disk"])),
     ("qcbus-broker", Some(PROCESS)),
@@ -50,7 +51,7 @@ const MAY_KNOW: &[(&str, Option<&[&str]>)] = &[
 ];
 
 /// What every kind of process is made of.
-const PROCESS: &[&str] = &["qcbus-bus", "qcbus-disk", "qcbus-ingest"];
+const PROCESS: &[&str] = &["qcbus-bus", "qcbus-confine", "qcbus-disk", "qcbus-ingest"];
 
 /// What a bundle may link: its sdk, the models and the schema rule.
 const BUNDLE: &[&str] = &[

@@ -1,6 +1,6 @@
 //! Which checkers run, and with which parameters.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use qcbus_formats::pool::Asked;
 
@@ -115,6 +115,14 @@ impl Plan {
     /// Whether a file that a parameter names has changed since it was read.
     pub(crate) fn is_outdated(&self) -> bool {
         self.seen.iter().any(Seen::is_outdated)
+    }
+
+    /// Files and directories that parameters name, which were read and are looked at again.
+    pub(crate) fn files(&self) -> Vec<PathBuf> {
+        self.seen
+            .iter()
+            .map(|seen| seen.path().to_owned())
+            .collect()
     }
 
     /// How many checkers are demanded, and of how many; what is off by default is left out by nobody.

@@ -43,6 +43,10 @@ impl Seen {
         }
     }
 
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Whether what was read should be read again.
     pub(crate) fn is_outdated(&self) -> bool {
         self.racy || stamps(self.resource, &self.path) != self.files

@@ -6,6 +6,7 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use crate::distance::{closest, did_you_mean};
@@ -21,6 +22,8 @@ pub struct Module {
     pub exec_command: String,
     /// How it takes part.
     pub mode: Mode,
+    /// What it may do besides checking.
+    pub may: May,
     /// Keys that begin with `qcbus`, for whoever knows them; texts, numbers and truth values as
     /// text, in the order of their names.
     pub extra: Vec<(String, String)>,
@@ -47,6 +50,19 @@ pub enum Mode {
     Once,
     /// A daemon that joins the bus: `"mode": "bus"`.
     Bus,
+}
+
+/// What a module may do although it is confined: the key `may`.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+pub struct May {
+    /// Files and directories that it reads.
+    pub read: Vec<PathBuf>,
+    /// Files and directories that it writes.
+    pub write: Vec<PathBuf>,
+    /// Whether it uses the network.
+    pub network: bool,
+    /// Whether it starts programs.
+    pub programs: bool,
 }
 
 /// A manifest that cannot be used. The text names the file and the key.
@@ -284,6 +300,7 @@ fn module(path: &Path, index: usize, value: &Value) -> Result<Module, ManifestEr
         module_type,
         exec_command: keys.text("exec_command")?,
         mode,
+        may: keys.may()?,
         extra: extra(object),
         manifest: path.to_owned(),
     })
@@ -320,6 +337,47 @@ impl Keys<'_> {
         ))
     }
 
+    /// What is not understood is no right, and is said: whoever writes `"netwrok"` means something by it.
+    fn may(&self) -> Result<May, ManifestError> {
+        let rights = match self.object.get("may") {
+            None => return Ok(May::default()),
+            Some(Value::Object(rights)) => rights,
+            Some(_) => return Err(self.wrong("may", "is not an object")),
+        };
+        let mut may = May::default();
+        for (key, value) in rights {
+            match key.as_str() {
+                "read" => may.read = self.paths("may.read", value)?,
+                "write" => may.write = self.paths("may.write", value)?,
+                "network" => may.network = self.truth("may.network", value)?,
+                "programs" => may.programs = self.truth("may.programs", value)?,
+                other => {
+                    let known = MAY_KEYS.join(", ");
+                    let hint = did_you_mean(other, MAY_KEYS.iter().copied());
+                    let reason = format!("is none of {known}{hint}");
+                    return Err(self.wrong(&format!("may.{other}"), &reason));
+                }
+            }
+        }
+        Ok(may)
+    }
+
+    fn paths(&self, name: &str, value: &Value) -> Result<Vec<PathBuf>, ManifestError> {
+        let Value::Array(list) = value else {
+            return Err(self.wrong(name, "is not a list of paths"));
+        };
+        let path = |(i, value): (usize, &Value)| match value.as_str().map(Path::new) {
+            Some(path) if path.is_absolute() => Ok(path.to_owned()),
+            _ => Err(self.wrong(&format!("{name}[{i}]"), "is not an absolute path")),
+        };
+        list.iter().enumerate().map(path).collect()
+    }
+
+    fn truth(&self, name: &str, value: &Value) -> Result<bool, ManifestError> {
+        let wrong = || self.wrong(name, "is neither true nor false");
+        value.as_bool().ok_or_else(wrong)
+    }
+
     fn wrong(&self, name: &str, reason: &str) -> ManifestError {
         wrong(self.path, format!("module[{}].{name}", self.index), reason)
     }
@@ -336,7 +394,17 @@ fn misspelt<'k>(name: &str, written: impl Iterator<Item = &'k str>) -> String {
 /// Keys of ours beside `mode`, handed on as they are.
 const OWN_KEYS: [&str; 2] = ["version", "restart"];
 
-const MODULE_KEYS: [&str; 5] = ["name", "exec_type", "module_type", "exec_command", "mode"];
+const MODULE_KEYS: [&str; 6] = [
+    "name",
+    "exec_type",
+    "module_type",
+    "exec_command",
+    "mode",
+    "may",
+];
+
+/// What stands in `may`.
+const MAY_KEYS: [&str; 4] = ["read", "write", "network", "programs"];
 
 /// The keys of an object that have no meaning here: candidates for a mistyped one.
 fn others(object: &Map<String, Value>) -> impl Iterator<Item = &str> {

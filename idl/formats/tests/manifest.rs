@@ -3,7 +3,9 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use qcbus_formats::manifest::{Mode, Module, ModuleType, Sources, expand, load, parse_modules};
+use qcbus_formats::manifest::{
+    May, Mode, Module, ModuleType, Sources, expand, load, parse_modules,
+};
 
 const MODULE: &str = r#"{ "module": [
   { "name": "mine", "exec_type": "executable", "module_type": "checker_bundle",
@@ -120,4 +122,39 @@ fn a_byte_order_mark_does_no_harm() {
             .len(),
         2
     );
+}
+
+#[test]
+fn what_a_module_may_do_is_read_or_refused() {
+    let of = |may: &str| {
+        let text = format!(
+            r#"{{"module": [{{"name": "a", "exec_type": "executable", "module_type": "checker_bundle",
+                "exec_command": "x"{may}}}]}}"#
+        );
+        let loaded = load_from(&[("m.json", &text)], "m.json");
+        loaded.map(|mut modules| modules.remove(0).may)
+    };
+    assert_eq!(of(""), Ok(May::default()));
+    let all =
+        r#", "may": {"read": ["/a", "/b"], "write": ["/c"], "network": true, "programs": true}"#;
+    let may = of(all).unwrap();
+    assert_eq!(may.read, [Path::new("/a"), Path::new("/b")]);
+    assert_eq!(may.write, [Path::new("/c")]);
+    assert!(may.network && may.programs);
+    for (wrong, reason) in [
+        (r#""may": true"#, "`module[0].may` is not an object"),
+        (
+            r#""may": {"netwrok": true}"#,
+            "`module[0].may.netwrok` is none of",
+        ),
+        (r#""may": {"network": "yes"}"#, "is neither true nor false"),
+        (r#""may": {"read": "/a"}"#, "is not a list of paths"),
+        (
+            r#""may": {"write": ["a"]}"#,
+            "`module[0].may.write[0]` is not an absolute path",
+        ),
+    ] {
+        let error = of(&format!(", {wrong}")).unwrap_err();
+        assert!(error.contains(reason), "{wrong}: {error}");
+    }
 }

@@ -254,4 +254,16 @@ pub struct PeerStatus {
     pub restarts: u64,
     /// Remarks: why it is down, that it is slow.
     pub note: String,
+    /// How far it is confined; nothing where nobody can tell, and for reporters.
+    #[serde(default)]
+    pub sandbox: Option<SandboxStatus>,
+}
+
+/// How far a bundle is confined, as the broker sees it.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct SandboxStatus {
+    /// `confined`, `partly` or `open`.
+    pub state: String,
+    /// Why not wholly; empty when it is.
+    pub why: String,
 }

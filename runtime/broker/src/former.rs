@@ -5,7 +5,7 @@ use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt as _;
 use std::path::{Path, PathBuf};
 
-use qcbus_bus::{LAUNCH, Process};
+use qcbus_bus::Process;
 
 use crate::core::Launch;
 use crate::launches::Launches;
@@ -25,34 +25,33 @@ impl Former {
         Former { launches, before }
     }
 
+    /// Kills those of this start.
+    pub fn kill_those_of(&self, launch: Launch) {
+        self.kill(|it| it == launch);
+    }
+
     /// Kills those that are of none of these starts. Returns their process ids and programs.
     pub fn kill_but(&self, joined: &BTreeSet<Launch>) -> Vec<(u32, String)> {
+        self.kill(|launch| launch < self.before && !joined.contains(&launch))
+    }
+
+    fn kill(&self, is_meant: impl Fn(Launch) -> bool) -> Vec<(u32, String)> {
         let mut killed = Vec::new();
         for id in processes() {
             // The handle first: what is read afterwards is of this process or of none.
             let Some(process) = Process::open(id, None) else {
                 continue;
             };
-            let Some(launch) = self.launch_of(id) else {
+            let Some(launch) = self.launches.of_process(id) else {
                 continue;
             };
-            if launch < self.before && !joined.contains(&launch) && process.is_alive() {
+            if is_meant(launch) && process.is_alive() {
                 let program = program(id);
                 process.kill();
                 killed.push((id, program));
             }
         }
         killed
-    }
-
-    /// Which start of a broker of this instance a process belongs to, if it belongs to one.
-    fn launch_of(&self, id: u32) -> Option<Launch> {
-        let environment = std::fs::read(of_process(id).join("environ")).ok()?;
-        let mut variables = environment.split(|byte| *byte == 0);
-        let proof =
-            variables.find_map(|it| it.strip_prefix(LAUNCH.as_bytes())?.strip_prefix(b"="))?;
-        let (launch, _) = self.launches.proven(std::str::from_utf8(proof).ok()?)?;
-        Some(launch)
     }
 }
 
@@ -76,6 +75,8 @@ fn program(id: u32) -> String {
 mod tests {
     use std::os::unix::process::CommandExt as _;
     use std::process::{Child, Command};
+
+    use qcbus_bus::LAUNCH;
 
     use super::*;
 

@@ -7,6 +7,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use qcbus_bus::LAUNCH;
 use qcbus_disk::trust;
 use sha2::{Digest, Sha256};
 
@@ -80,6 +81,17 @@ impl Launches {
         let differs = expected.bytes().zip(proof.bytes()).map(differing);
         let differs = differs.fold(0, |all, it| all | it);
         (expected.len() == proof.len() && differs == 0).then_some((launch, name))
+    }
+
+    /// The start that a process of this machine belongs to, by its environment; `None` where that proves none.
+    pub fn of_process(&self, id: u32) -> Option<Launch> {
+        let environment = Path::new("/proc").join(id.to_string()).join("environ");
+        let environment = std::fs::read(environment).ok()?;
+        let mut variables = environment.split(|byte| *byte == 0);
+        let proof =
+            variables.find_map(|it| it.strip_prefix(LAUNCH.as_bytes())?.strip_prefix(b"="))?;
+        let (launch, _) = self.proven(std::str::from_utf8(proof).ok()?)?;
+        Some(launch)
     }
 
     /// Removes the secret: nothing that could prove anything with it is left.

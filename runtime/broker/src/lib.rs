@@ -20,6 +20,7 @@ pub mod journal;
 mod launches;
 pub mod memory;
 mod options;
+mod orphans;
 pub mod reload;
 mod result_paths;
 mod scouts;

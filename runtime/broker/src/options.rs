@@ -59,6 +59,8 @@ pub struct Options {
     pub known: Known,
     /// Whether children die with the broker at once.
     pub die_with_broker: bool,
+    /// Whether bundles are confined.
+    pub sandbox: bool,
     /// Most private memory of a child, in bytes.
     pub memory_limit: Option<u64>,
     /// Caps on what is read.

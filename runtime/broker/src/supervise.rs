@@ -3,8 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::process::Stdio;
+use std::time::Duration;
 
 use qcbus_bus::{LAUNCH, Process};
+use qcbus_confine::{Looks, Orders, Outer, SandboxError, kernel_level, looks};
+use qcbus_messages::Role;
+use qcbus_messages::control::{PeerStatus, SandboxStatus};
 use rustix::process::{Resource, Rlimit, setrlimit};
 use tokio::process::{Child, Command};
 use tokio::sync::mpsc::UnboundedSender;
@@ -12,7 +16,11 @@ use tokio::sync::mpsc::UnboundedSender;
 use crate::core::{ChildEnd, ChildSpec, Event, Launch};
 use crate::former::Former;
 use crate::launches::Launches;
+use crate::orphans::{self, Strangers};
 use crate::reload::ready;
+
+/// Looks for orphans at the end, two milliseconds apart.
+const ORPHANS_AT_MOST: u32 = 500;
 
 /// What every child is given.
 #[derive(Debug, Clone)]
@@ -22,6 +30,8 @@ pub struct Surroundings {
     /// Whether children die with the broker at once (a private instance), or may outlive it and
     /// join the next one.
     pub die_with_broker: bool,
+    /// Whether bundles are confined.
+    pub sandbox: bool,
     /// Most private memory (data segment and anonymous mappings) of a child, in bytes. The shared
     /// segment does not count: it is mapped from a file.
     pub memory_limit: Option<u64>,
@@ -39,6 +49,7 @@ pub struct Children {
     own: BTreeMap<Launch, (String, Option<Process>)>,
     /// What former brokers have started and has joined this one.
     adopted: BTreeMap<Launch, Process>,
+    strangers: Strangers,
     events: UnboundedSender<Event>,
 }
 
@@ -51,6 +62,7 @@ impl Children {
         events: UnboundedSender<Event>,
     ) -> Children {
         Children {
+            strangers: orphans::adopt(),
             surroundings,
             launches,
             first: Launch::first_of(generation),
@@ -97,14 +109,75 @@ impl Children {
             command.arg("--die-with-parent");
         }
         restrict(&mut command, &self.surroundings);
+        if spec.role == Role::Bundle {
+            self.confine(&mut command, spec)
+                .map_err(|error| format!("cannot confine it: {error}"))?;
+        }
         command
             .spawn()
             .map_err(|error| format!("cannot start {program}: {error}"))
     }
 
+    /// Reporters write files where they are told to, and are ours; bundles are not.
+    fn confine(&self, command: &mut Command, spec: &ChildSpec) -> Result<(), SandboxError> {
+        let command = command.as_std_mut();
+        if !self.surroundings.sandbox {
+            return Orders::Off.give(command);
+        }
+        Orders::On(spec.may.clone()).give(command)?;
+        if let Some(outer) = Outer::new(&spec.may)? {
+            outer.surround(command);
+        }
+        Ok(())
+    }
+
+    /// How far a bundle is confined, by what the kernel says of its process: it is not asked itself.
+    pub fn sandbox_of(&self, peer: &PeerStatus) -> Option<SandboxStatus> {
+        let there = peer.role == "bundle" && peer.pid != 0 && peer.state != "down";
+        if !there || peer.state == "starting" {
+            return None;
+        }
+        let mut own = self.own.values().filter_map(|(_, it)| it.as_ref());
+        let is_ours = own.any(|it| it.id() == peer.pid || orphans::is_below(peer.pid, it.id()));
+        let surrounded = self.surroundings.sandbox && is_ours;
+        let (state, why) = match (looks(peer.pid), kernel_level()) {
+            (Looks::Unknown, _) => return None,
+            (Looks::Filtered, 1..) => ("confined", ""),
+            (Looks::Filtered, 0) => ("partly", "this kernel has no Landlock"),
+            (Looks::Open, _) if !self.surroundings.sandbox => ("open", "--no-sandbox"),
+            (Looks::Open, 1..) if surrounded => {
+                ("partly", "it has not confined itself after it joined")
+            }
+            (Looks::Open, 0) if is_ours => ("open", "this kernel has no Landlock"),
+            (Looks::Open, _) => ("open", "it has not confined itself after it joined"),
+        };
+        Some(SandboxStatus {
+            state: state.to_owned(),
+            why: why.to_owned(),
+        })
+    }
+
     /// Forgets a child that has ended.
     pub fn ended(&mut self, launch: Launch) {
         self.own.remove(&launch);
+        self.sweep();
+    }
+
+    /// Kills and buries what children that have ended, or hidden it, have left. Meant to be called now and then:
+    /// where the kernel keeps no list of children it is left to the next end of a child, for looking through all
+    /// processes takes too long.
+    pub fn look_for_orphans(&self) {
+        if orphans::are_listed() {
+            self.sweep();
+        }
+    }
+
+    fn sweep(&self) {
+        let id = |(launch, (_, process)): (&Launch, &(String, Option<Process>))| {
+            (*launch, process.as_ref().map(Process::id))
+        };
+        let ours = self.own.iter().map(id).collect();
+        orphans::sweep(&ours, &self.strangers, &self.launches);
     }
 
     /// A process has joined as a child: is it the one that a broker of this instance has started, under
@@ -145,7 +218,14 @@ impl Children {
     pub fn kill(&self, launch: Launch) {
         let own = self.own.get(&launch).and_then(|(_, it)| it.as_ref());
         if let Some(process) = own.or(self.adopted.get(&launch)) {
+            if process.is_alive() {
+                orphans::kill_below(process);
+            }
             process.kill();
+        }
+        if self.adopted.contains_key(&launch) {
+            // The process that has joined need not be the first of those that were started.
+            Former::of(&self.launches, Launch(u64::MAX)).kill_those_of(launch);
         }
     }
 
@@ -155,10 +235,18 @@ impl Children {
         may_be.then(|| Former::of(&self.launches, self.first))
     }
 
-    /// Kills whatever is left.
+    /// Kills whatever is left, also what it has started.
     pub fn kill_all(&self) {
         for launch in self.own.keys() {
             self.kill(*launch);
+        }
+        // One that ends hands over what it has started; hence more than one look, but not for ever.
+        let nobody = BTreeMap::new();
+        for _ in 0..ORPHANS_AT_MOST {
+            if orphans::sweep(&nobody, &self.strangers, &self.launches) == 0 {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(2));
         }
     }
 
@@ -245,13 +333,10 @@ fn restrict(command: &mut Command, surroundings: &Surroundings) {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
     use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
 
     use super::*;
     use crate::core::Restart;
-    use qcbus_messages::Role;
 
     fn children() -> (Children, UnboundedReceiver<Event>) {
         let (events, inbox) = unbounded_channel();
@@ -259,6 +344,7 @@ mod tests {
         let surroundings = Surroundings {
             instance_dir: "/nowhere".into(),
             die_with_broker: true,
+            sandbox: false,
             memory_limit: None,
             descriptors: None,
         };
@@ -273,6 +359,7 @@ mod tests {
             version: None,
             command: command.iter().map(|it| (*it).to_owned()).collect(),
             restart: Restart::Never,
+            may: Default::default(),
         }
     }
 

@@ -1,11 +1,11 @@
 //! The broker's side of the document topics: lending slots, publishing, holding.
 
+use std::collections::BTreeMap;
 use std::ops::{Deref, DerefMut};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use iceoryx2::port::update_connections::UpdateConnections;
-use iceoryx2::prelude::PortFactory;
 use iceoryx2::sample_mut::SampleMut;
 use qcbus_document::FileKind;
 use qcbus_messages::services::{BLOCK_BYTES, Topic};
@@ -88,8 +88,10 @@ pub enum PublishError {
 /// One size class.
 struct Class {
     row: Topic,
-    service: TopicService<Block, DocumentHeader>,
+    _service: TopicService<Block, DocumentHeader>,
     publisher: RwLock<Pub<Block, DocumentHeader>>,
+    /// Slots that were written since their memory was given back: where each begins, and bytes written at most.
+    slots: Mutex<BTreeMap<usize, usize>>,
     /// Whether something was published since the publisher was made.
     used: AtomicBool,
     /// Our own subscriber: through it the broker holds what it has published. It is locked from
@@ -104,8 +106,9 @@ impl Class {
         let service = hub.topic::<Block, DocumentHeader>(&row, "")?;
         let own = ports::subscriber(&service, &row)?;
         Ok(Class {
-            publisher: RwLock::new(ports::publisher(&service, &row)?),
-            service,
+            publisher: RwLock::new(ports::lending_publisher(&service, &row)?),
+            slots: Mutex::default(),
+            _service: service,
             used: AtomicBool::new(false),
             own: Mutex::new(own),
             row,
@@ -114,44 +117,65 @@ impl Class {
         })
     }
 
-    /// Bytes of shared memory that another publisher takes, with a connection to everybody who reads.
-    fn renewal_bytes(&self) -> u64 {
-        let readers = self.service.dynamic_config().number_of_subscribers() as u64;
-        self.row.publisher_bytes() + readers * self.row.connection_bytes()
+    /// Bytes of shared memory that it may take to push everything out: what leads a slot, and its first block, may
+    /// lie on either side of a page's end.
+    fn letting_go_bytes(&self) -> u64 {
+        let slots = self.row.history.max(self.row.buffer);
+        (2 * rustix::param::page_size() * slots) as u64
     }
 
-    /// Replaces the publisher, and with it the history and every slot that was ever used: their
-    /// memory comes back when the last reader has let go. Without it a small /dev/shm would stay
-    /// full of documents that nobody needs, because only publishing pushes them out of the
-    /// history. To be called with a ticket to lend; does nothing when others have one, because
-    /// what was lent by the old publisher could not be published any more.
-    fn renew(&self, turns: &Turns) {
+    /// Gives back the memory of every slot that nobody has in hand. Without it a small /dev/shm would stay
+    /// full of documents that nobody needs, because only publishing pushes them out of the history. To be
+    /// called with a ticket to lend; does nothing when others have one.
+    ///
+    /// The publisher stays the same: a confined peer could not connect to another one.
+    fn empty(&self, turns: &Turns) {
         let _turn = turns.take();
-        if free_shared_memory() < self.renewal_bytes() {
-            return;
-        }
-        let mut publisher = self
+        let publisher = self
             .publisher
             .write()
             .unwrap_or_else(PoisonError::into_inner);
-        let alone = self.lent.load(Ordering::Acquire) == 1;
-        if !alone || !self.used.swap(false, Ordering::AcqRel) {
+        if self.lent.load(Ordering::Acquire) != 1 {
             return;
         }
-        match ports::publisher(&self.service, &self.row) {
-            Ok(fresh) => drop(std::mem::replace(&mut *publisher, fresh)),
-            Err(error) => tracing::warn!(%error, "cannot give shared memory back"),
+        if free_shared_memory() >= self.letting_go_bytes()
+            && self.used.swap(false, Ordering::AcqRel)
+        {
+            self.push_everything_out(&publisher);
         }
-        if let Ok(mut sample) = publisher.loan_slice_uninit(1) {
-            sample.user_header_mut().doc = LET_GO;
-            let sent = initialised(sample).send();
-            tracing::debug!(?sent, topic = self.row.name, "asked for shared memory back");
+        let mut used = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut free = Vec::new();
+        // The slot that was given back last is lent first: those never used come behind all others.
+        for _ in 0..used.len() {
+            let Ok(mut sample) = publisher.loan_slice_uninit(1) else {
+                break;
+            };
+            let start = sample.payload_mut().as_mut_ptr();
+            let Some(len) = used.remove(&start.addr()) else {
+                break;
+            };
+            take_memory_from(start.cast(), len);
+            free.push(sample);
         }
-        drop(publisher);
+    }
+
+    fn remember(&self, slot: &mut [std::mem::MaybeUninit<Block>]) {
+        let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
+        let longest = slots.entry(slot.as_mut_ptr().addr()).or_default();
+        *longest = size_of_val(slot).max(*longest);
+    }
+
+    /// Nobody is sent anything more from the history, and nobody has anything waiting.
+    fn push_everything_out(&self, publisher: &Pub<Block, DocumentHeader>) {
         let own = self.own.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Err(why) = own.update_connections() {
-            tracing::debug!(?why, "cannot let go of a former publisher");
+        for _ in 0..self.row.history.max(self.row.buffer) {
+            if let Ok(mut sample) = publisher.loan_slice_uninit(1) {
+                sample.user_header_mut().doc = LET_GO;
+                let sent = initialised(sample).send();
+                tracing::trace!(?sent, topic = self.row.name, "asked for shared memory back");
+            }
         }
+        while let Ok(Some(_)) = own.receive() {}
     }
 }
 
@@ -254,6 +278,7 @@ impl Documents {
                 other => limited_addresses(bytes).unwrap_or(LoanError::Bus(format!("{other:?}"))),
             })?;
         drop(publisher);
+        class.remember(sample.payload_mut());
         match back_with_memory(sample.payload_mut()) {
             Ok(()) => Ok(sample),
             Err(()) => Err(self.no_space(bytes)),
@@ -331,7 +356,7 @@ impl Documents {
     fn give_back(&self, ours: usize) {
         for (index, class) in self.shared.classes.iter().enumerate() {
             let ticket = (index != ours).then(|| Ticket::take(&class.lent, class.row.loans));
-            class.renew(&self.shared.turns);
+            class.empty(&self.shared.turns);
             drop(ticket);
         }
         self.shared.again.notify_one();
@@ -367,19 +392,26 @@ fn back_with_memory<T>(blocks: &mut [T]) -> Result<(), ()> {
     }
 }
 
-/// Gives back what was had of a slot that is too large: the pages that are the slot's alone.
+/// Gives back what was had of a slot that is too large.
 fn give_up<T>(blocks: &mut [T]) {
+    take_memory_from(blocks.as_mut_ptr().cast(), size_of_val(blocks));
+}
+
+/// Has the kernel take the pages that are a slot's alone; they read as zeroes until they are written again.
+fn take_memory_from(start: *mut u8, len: usize) {
     let page = rustix::param::page_size();
-    let start = blocks.as_mut_ptr().addr();
-    let lead = start.next_multiple_of(page) - start;
-    let len = size_of_val(blocks).saturating_sub(lead) / page * page;
-    let first: *mut std::ffi::c_void = blocks.as_mut_ptr().cast::<u8>().wrapping_add(lead).cast();
+    let lead = start.addr().next_multiple_of(page) - start.addr();
+    let whole = len.saturating_sub(lead) / page * page;
+    if whole == 0 {
+        return;
+    }
+    let first: *mut std::ffi::c_void = start.wrapping_add(lead).cast();
     #[expect(unsafe_code, reason = "madvise takes raw pointers")]
-    // SAFETY: the range is whole pages inside of the lent slot, which nobody else reads and whose
-    // content does not matter; what is read of it later is zero.
-    let done = unsafe { rustix::mm::madvise(first, len, rustix::mm::Advice::LinuxRemove) };
+    // SAFETY: the pages lie wholly in a slot that is lent to us, of which at least this much was asked for before;
+    // nobody else reads or writes it. The kernel zeroes them, which is a valid value of every block.
+    let done = unsafe { rustix::mm::madvise(first, whole, rustix::mm::Advice::LinuxRemove) };
     if let Err(error) = done {
-        tracing::debug!(%error, "shared memory cannot be given back");
+        tracing::warn!(%error, "cannot give shared memory back");
     }
 }
 

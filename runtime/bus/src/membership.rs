@@ -142,6 +142,11 @@ impl Membership {
         })
     }
 
+    /// Where everything of the generation lies.
+    pub(crate) fn root(&self) -> &Path {
+        &self.generation.root
+    }
+
     pub(crate) fn library(&self) -> &Library {
         &self.library
     }

@@ -1,6 +1,7 @@
 //! A bundle's or reporter's end of the bus.
 
 use std::collections::VecDeque;
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -24,6 +25,9 @@ const LEAVE_WITHIN: Duration = Duration::from_secs(3);
 /// Events that wait to be fetched before reading pauses.
 const MAX_WAITING: usize = 256;
 
+/// Why a session is closed that no other one follows.
+const LOST: &str = "the session was lost";
+
 /// How patient a peer is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PeerOptions {
@@ -31,6 +35,10 @@ pub struct PeerOptions {
     pub patience: Duration,
     /// How long to survive the loss of the broker.
     pub grace: Duration,
+    /// Whether a session that is lost is followed by another one. A process that can open nothing any more has
+    /// no second one: it is closed at once. Nor can it take down what the first one has made, so that stays until
+    /// the process ends, which it is to do soon after.
+    pub rejoins: bool,
 }
 
 impl Default for PeerOptions {
@@ -38,6 +46,7 @@ impl Default for PeerOptions {
         PeerOptions {
             patience: Duration::from_secs(2),
             grace: Duration::from_secs(10),
+            rejoins: true,
         }
     }
 }
@@ -188,7 +197,8 @@ impl Peer {
             },
             proves: claims.proves,
             options,
-            attempts: 0,
+            // Processes that follow each other may bear the same incarnation.
+            attempts: u64::from(std::process::id()) << 32,
             state: State::Seeking,
             lost: Some(Instant::now()),
             joined_before: false,
@@ -324,6 +334,20 @@ impl Peer {
         }
     }
 
+    /// The directory in which everything of its generation lies: whoever may read the files there needs nothing
+    /// besides to take part. `None`: it is in no session.
+    pub fn memory(&self) -> Option<&Path> {
+        match &self.state {
+            State::Member(membership) => Some(membership.root()),
+            _ => None,
+        }
+    }
+
+    /// Whether it is closed because its session was lost and it does not rejoin (see [`PeerOptions::rejoins`]).
+    pub fn has_lost_its_session(&self) -> bool {
+        matches!(&self.state, State::Closed(reason) if reason == LOST)
+    }
+
     fn no_broker(&self) -> JoinError {
         JoinError::NoBroker {
             instance: self.instance.name().to_owned(),
@@ -339,7 +363,16 @@ impl Peer {
     }
 
     fn close(&mut self, reason: String) {
-        self.state = State::Closed(reason);
+        self.change(State::Closed(reason));
+    }
+
+    /// What a session has made is taken down, unless this process may not do so any more: then the broker's janitor
+    /// does, when the process has ended.
+    fn change(&mut self, state: State) {
+        let former = std::mem::replace(&mut self.state, state);
+        if self.joined_before && !self.options.rejoins {
+            std::mem::forget(former);
+        }
     }
 
     /// Does as much as can be done without waiting.
@@ -380,7 +413,11 @@ impl Peer {
     }
 
     fn lose(&mut self, now: Instant) {
-        self.state = State::Seeking;
+        self.change(if self.joined_before && !self.options.rejoins {
+            State::Closed(LOST.to_owned())
+        } else {
+            State::Seeking
+        });
         // What was not fetched belongs to the session that is over.
         self.events.clear();
         self.lost.get_or_insert(now);
@@ -432,6 +469,12 @@ impl Peer {
             let seconds = self.options.grace.as_secs_f32();
             self.close(format!("the broker has been gone for {seconds} s"));
         }
+    }
+}
+
+impl Drop for Peer {
+    fn drop(&mut self) {
+        self.change(State::Seeking);
     }
 }
 

@@ -242,6 +242,30 @@ where
     T: Debug + ZeroCopySend + 'static,
     H: Debug + ZeroCopySend + 'static,
 {
+    publisher_lending(service, row, row.loans)
+}
+
+/// A publisher as its row wants it that may lend all its slots at once: whoever does so counts by himself.
+pub(crate) fn lending_publisher<T, H>(
+    service: &TopicService<T, H>,
+    row: &Topic,
+) -> Result<Pub<T, H>, PortError>
+where
+    T: Debug + ZeroCopySend + 'static,
+    H: Debug + ZeroCopySend + 'static,
+{
+    publisher_lending(service, row, row.slots())
+}
+
+fn publisher_lending<T, H>(
+    service: &TopicService<T, H>,
+    row: &Topic,
+    loans: usize,
+) -> Result<Pub<T, H>, PortError>
+where
+    T: Debug + ZeroCopySend + 'static,
+    H: Debug + ZeroCopySend + 'static,
+{
     let slots = row.slots();
     service
         .publisher_builder()
@@ -250,7 +274,7 @@ where
             Growth::Fixed => AllocationStrategy::Static,
             Growth::PowerOfTwo => AllocationStrategy::PowerOfTwo,
         })
-        .max_loaned_samples(row.loans)
+        .max_loaned_samples(loans)
         .override_sample_preallocation(move |_| slots)
         // Nothing on this bus ever blocks a sender: it is told, and keeps what was not taken.
         .backpressure_strategy(BackpressureStrategy::DiscardData)

@@ -158,6 +158,9 @@ pub struct CheckArgs {
     /// Directory of XML schemas (.xsd, .tbl) to use instead of those that come with qcbus
     #[arg(long, value_name = "DIR")]
     pub schema_dir: Option<PathBuf>,
+    /// Do not confine bundles: they may write, connect and signal as you may
+    #[arg(long, hide_short_help = true)]
+    pub no_sandbox: bool,
     /// Caps.
     #[command(flatten)]
     pub limits: LimitArgs,
@@ -220,6 +223,9 @@ pub struct ServeArgs {
     /// Do not start the standard bundles
     #[arg(long, hide_short_help = true)]
     pub no_standard_bundles: bool,
+    /// Do not confine bundles: they may write, connect and signal as you may
+    #[arg(long, hide_short_help = true)]
+    pub no_sandbox: bool,
     /// Caps.
     #[command(flatten)]
     pub limits: LimitArgs,
@@ -281,6 +287,7 @@ pub enum BundleCommand {
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "Arguments of a bundle:\n  \
 [--instance NAME | --instance-dir DIR]  join the bus of a running broker\n  \
+[--no-sandbox]                          with it: do not confine the bundle\n  \
 [--format text|json] [--timings] FILE   check one file, print what was found (and timings)\n  \
 -c CONFIG                               run as a module of ASAM's framework\n  \
 [--schema-dir DIR]                      with each of them: schemas to use instead of the known ones")]

@@ -112,6 +112,7 @@ fn spec(program: &Path, command: &str, alias: &str, name: &str, role: Role) -> C
             alias.to_owned(),
         ],
         restart: Restart::Always,
+        may: Default::default(),
     }
 }
 

@@ -1,11 +1,14 @@
 //! What all animals have in common: joining the bus, hearing, and how a job is properly answered.
 
 use std::collections::VecDeque;
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use qcbus_bus::{Claims, Instance, JoinError, Peer, PeerEvent, PeerOptions};
+use qcbus_confine::{After, Fenced, Orders};
 use qcbus_document::FileKind;
+use qcbus_formats::manifest::May;
 use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::Level;
 use qcbus_messages::{
@@ -144,24 +147,88 @@ pub fn keep(animal: &'static Animal, args: &Args) -> ExitCode {
         Some(dir) => Ok(Instance::at(dir.clone())),
         None => Instance::named(&args.instance),
     };
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build();
-    match (instance, runtime) {
-        (Ok(instance), Ok(runtime)) => runtime.block_on(live(animal, args, &instance)),
-        (Err(error), _) => fail(&error.to_string(), 2),
-        (_, Err(error)) => fail(&error.to_string(), 5),
+    let instance = match instance {
+        Ok(instance) => instance,
+        Err(error) => return fail(&error.to_string(), 2),
+    };
+    let may = match Orders::given() {
+        Ok(Orders::On(may)) if animal.role == Role::Bundle => may,
+        Ok(_) => return outside(animal, args, &instance),
+        Err(error) => return fail(&error.to_string(), 2),
+    };
+    let supervised = args.launch.is_some() || args.die_with_parent;
+    let hello = hello(animal, args);
+    let kept = qcbus_confine::keep(!supervised, |number| {
+        let stand = Stand {
+            instance: &instance,
+            may: Some(&may),
+            number,
+        };
+        session(animal, args, hello.clone(), &stand)
+    });
+    match kept {
+        Ok(kept) => kept.end(),
+        Err(error) => {
+            complain(&format!("not confined: {error}"));
+            outside(animal, args, &instance)
+        }
     }
 }
 
-async fn live(animal: &'static Animal, args: &Args, instance: &Instance) -> ExitCode {
-    let hello = hello(animal, args);
-    let joined = Peer::join_claiming(animal.claims, instance, hello, PeerOptions::default());
+/// As bundles run that are not to be confined.
+fn outside(animal: &'static Animal, args: &Args, instance: &Instance) -> ExitCode {
+    let stand = Stand {
+        instance,
+        may: None,
+        number: 0,
+    };
+    match session(animal, args, hello(animal, args), &stand) {
+        After::End(code) => ExitCode::from(code),
+        After::Again => ExitCode::from(4),
+    }
+}
+
+/// Where a session takes place.
+struct Stand<'a> {
+    instance: &'a Instance,
+    /// What its manifest declares; `None`: it is not confined.
+    may: Option<&'a May>,
+    number: u32,
+}
+
+fn session(animal: &'static Animal, args: &Args, hello: Hello, stand: &Stand<'_>) -> After {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build();
+    match runtime {
+        Ok(runtime) => runtime.block_on(live(animal, args, hello, stand)),
+        Err(error) => ended(&error.to_string(), 5),
+    }
+}
+
+async fn live(animal: &'static Animal, args: &Args, hello: Hello, stand: &Stand<'_>) -> After {
+    let usual = PeerOptions::default();
+    let options = PeerOptions {
+        rejoins: stand.may.is_none(),
+        patience: [usual.patience, usual.grace][usize::from(stand.number > 0)],
+        ..usual
+    };
+    let joined = Peer::join_claiming(animal.claims, stand.instance, hello, options);
     let peer = match joined.await {
         Ok(peer) => peer,
-        Err(error @ JoinError::NoBroker { .. }) => return fail(&error.to_string(), 4),
-        Err(error) => return fail(&error.to_string(), 5),
+        Err(error @ JoinError::NoBroker { .. }) => return ended(&error.to_string(), 4),
+        Err(error) => return ended(&error.to_string(), 5),
     };
+    if let Some(may) = stand.may {
+        let fenced = Fenced {
+            memory: peer.memory().map(Path::to_path_buf),
+            may: may.clone(),
+            reads: Vec::new(),
+        };
+        if let Err(error) = qcbus_confine::confine(&fenced) {
+            complain(&format!("not wholly confined: {error}"));
+        }
+    }
     let mut cage = Cage {
         animal,
         takes: args.takes.unwrap_or_default(),
@@ -177,7 +244,8 @@ async fn live(animal: &'static Animal, args: &Args, instance: &Instance) -> Exit
         let mood = tokio::select! {
             event = cage.peer.next() => match cage.hear(event) {
                 Ok(mood) => mood,
-                Err(code) => return code,
+                Err(_) if cage.peer.has_lost_its_session() => return After::Again,
+                Err(why) => return ended(&why, 4),
             },
             _ = beat.tick() => cage.beat(),
             () = tokio::time::sleep(pause.unwrap_or_default()), if pause.is_some() => cage.work(),
@@ -193,7 +261,7 @@ async fn live(animal: &'static Animal, args: &Args, instance: &Instance) -> Exit
         if cage.draining && cage.jobs.is_empty() {
             cage.peer.send(&FromPeer::Leaving);
             cage.peer.leave().await;
-            return ExitCode::SUCCESS;
+            return After::End(0);
         }
     }
 }
@@ -222,14 +290,14 @@ struct Cage {
 }
 
 impl Cage {
-    fn hear(&mut self, event: PeerEvent) -> Result<Mood, ExitCode> {
+    fn hear(&mut self, event: PeerEvent) -> Result<Mood, String> {
         let message = match event {
             PeerEvent::Message(message) => message,
             PeerEvent::Rejoined => {
                 self.jobs.clear();
                 return Ok(Mood::GoOn);
             }
-            PeerEvent::Closed { reason } => return Err(fail(&reason, 4)),
+            PeerEvent::Closed { reason } => return Err(reason),
             PeerEvent::Document(_) | PeerEvent::LetGo | PeerEvent::Config(_) => {
                 return Ok(Mood::GoOn);
             }
@@ -306,4 +374,9 @@ impl Cage {
 fn fail(why: &str, code: u8) -> ExitCode {
     complain(why);
     ExitCode::from(code)
+}
+
+fn ended(why: &str, code: u8) -> After {
+    complain(why);
+    After::End(code)
 }

@@ -11,7 +11,8 @@ use super::{BusOptions, Format, Mode};
 pub const USAGE: &str = "\
 usage:
   BUNDLE [--instance NAME | --instance-dir DIR] [--launch N] [--die-with-parent]
-         run on the bus of an instance (`default` unless named)
+         [--no-sandbox]
+         run on the bus of an instance (`default` unless named), confined unless told otherwise
   BUNDLE [--format text|json] [--timings] FILE
          check one file and print what was found; with --timings, on stderr, what every checker took
   BUNDLE -c CONFIG
@@ -60,6 +61,7 @@ pub(super) fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Mode, U
             Long("instance-dir") => bus.instance_dir = Some(PathBuf::from(parser.value()?)),
             Long("launch") => bus.launch = Some(parser.value()?.parse()?),
             Long("schema-dir") => schema_dir = Some(PathBuf::from(parser.value()?)),
+            Long("no-sandbox") => bus.no_sandbox = true,
             Long("die-with-parent") => bus.die_with_parent = true,
             Value(_) if file.is_some() => {
                 return Err(UsageError::Conflict("FILE", "a second FILE"));
@@ -124,6 +126,9 @@ mod tests {
             panic!("the bus was meant")
         };
         assert_eq!((options.launch, options.die_with_parent), (Some(7), true));
+        assert!(!options.no_sandbox, "confined unless told otherwise");
+        let open = of(&["--no-sandbox"]);
+        assert!(matches!(open, Ok(Mode::Bus(options)) if options.no_sandbox));
     }
 
     #[test]

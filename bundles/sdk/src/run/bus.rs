@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use qcbus_bus::{Instance, JoinError, Peer, PeerEvent, PeerOptions};
+use qcbus_bus::{Instance, JoinError, Peer, PeerEvent};
 use qcbus_document::Image;
 use qcbus_formats::config::Config;
 use qcbus_formats::pool::Ending;
@@ -20,6 +20,7 @@ use super::Exit;
 use super::batches::batches;
 use super::file::complain;
 use super::module::configured;
+use super::stand::{Ended, Fence, Stand, sandboxed};
 use super::worker::{self, CheckerAtWork, Order, Progress, Work};
 use crate::kept::KeptModels;
 use crate::subject::LinkedImage;
@@ -38,6 +39,8 @@ pub struct BusOptions {
     pub die_with_parent: bool,
     /// Schemas of the user.
     pub schema_dir: Option<PathBuf>,
+    /// Do not confine it.
+    pub no_sandbox: bool,
 }
 
 impl Default for BusOptions {
@@ -48,6 +51,7 @@ impl Default for BusOptions {
             launch: None,
             die_with_parent: false,
             schema_dir: None,
+            no_sandbox: false,
         }
     }
 }
@@ -56,8 +60,10 @@ impl Default for BusOptions {
 const CAPACITY: u16 = 8;
 /// How often a sign of life is given, and missing documents are asked for again.
 const HEARTBEAT: Duration = Duration::from_secs(1);
+/// How long a broker may take to tell its configuration after the welcome.
+const CONFIGURED_WITHIN: Duration = Duration::from_secs(2);
 
-pub(super) fn run(bundle: &'static Bundle, options: BusOptions, given: Option<UserFiles>) -> Exit {
+pub(super) fn run(bundle: &'static Bundle, options: BusOptions, given: Option<&UserFiles>) -> Exit {
     if options.die_with_parent && !follow_parent() {
         return Exit::Accepted;
     }
@@ -69,23 +75,23 @@ pub(super) fn run(bundle: &'static Bundle, options: BusOptions, given: Option<Us
         Ok(instance) => instance,
         Err(error) => return fail(&error.to_string(), Exit::Usage),
     };
-    let runtime = match tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-    {
-        Ok(runtime) => runtime,
-        Err(error) => return fail(&format!("failed to start: {error}"), Exit::Internal),
-    };
     let supervised = options.launch.is_some() || options.die_with_parent;
-    runtime.block_on(async {
-        let stops = Stops::listen(supervised);
-        serve(
-            (bundle, given),
-            &instance,
-            hello(bundle, options.launch),
-            stops,
-        )
-        .await
+    let hello = hello(bundle, options.launch);
+    sandboxed(&instance, options.no_sandbox, supervised, |stand| {
+        // A bundle is confined before its first thread is started, so the runtime must not start any.
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build();
+        let runtime = match runtime {
+            Ok(runtime) => runtime,
+            Err(error) => {
+                return Ended::With(fail(&format!("failed to start: {error}"), Exit::Internal));
+            }
+        };
+        runtime.block_on(async {
+            let stops = Stops::listen(supervised);
+            serve((bundle, given.cloned()), &stand, hello.clone(), stops).await
+        })
     })
 }
 
@@ -148,23 +154,26 @@ impl Stops {
 
 async fn serve(
     (bundle, given): (&'static Bundle, Option<UserFiles>),
-    instance: &Instance,
+    stand: &Stand<'_>,
     hello: Hello,
     mut stops: Stops,
-) -> Exit {
-    let peer = match Peer::join(instance, hello, PeerOptions::default()).await {
+) -> Ended {
+    let mut peer = match Peer::join(stand.instance, hello, stand.options()).await {
         Ok(peer) => peer,
-        Err(error @ JoinError::NoBroker { .. }) => return fail(&error.to_string(), Exit::NoBroker),
-        Err(error) => return fail(&error.to_string(), Exit::Internal),
+        Err(error @ JoinError::NoBroker { .. }) => {
+            return Ended::With(fail(&error.to_string(), Exit::NoBroker));
+        }
+        Err(error) => return Ended::With(fail(&error.to_string(), Exit::Internal)),
     };
+    // Before the first thread is started: threads that there are already would stay outside.
+    let heard = until_configured(&mut peer).await;
+    let fence = stand.confine(peer.memory(), || files_of(bundle, given.as_ref(), &peer));
     let (sender, mut progress) = mpsc::unbounded_channel();
     let works = match worker::start(KeptModels::default(), sender) {
         Ok(works) => works,
         Err(error) => {
-            return fail(
-                &format!("failed to start a thread: {error}"),
-                Exit::Internal,
-            );
+            let why = format!("failed to start a thread: {error}");
+            return Ended::With(fail(&why, Exit::Internal));
         }
     };
     let mut daemon = Daemon {
@@ -177,7 +186,14 @@ async fn serve(
         running: None,
         draining: false,
         stopped: false,
+        fence,
+        outgrown: false,
     };
+    for event in heard {
+        if let Some(ended) = daemon.hear(event) {
+            return ended;
+        }
+    }
     let mut ticks = tokio::time::interval(HEARTBEAT);
     ticks.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
     loop {
@@ -187,16 +203,44 @@ async fn serve(
             _ = ticks.tick() => { daemon.tick(); None }
             () = stops.next() => daemon.stop(),
         };
-        if let Some(exit) = ended {
-            return exit;
+        if let Some(ended) = ended {
+            return ended;
         }
         daemon.start_next();
+        if daemon.outgrown {
+            return Ended::Again;
+        }
         if daemon.draining && daemon.is_idle() {
             daemon.peer.send(&FromPeer::Leaving);
             daemon.peer.leave().await;
-            return Exit::Accepted;
+            return Ended::With(Exit::Accepted);
         }
     }
+}
+
+/// What is heard until the configuration is there, which may name files. Nothing can be checked before.
+async fn until_configured(peer: &mut Peer) -> Vec<PeerEvent> {
+    let mut heard = Vec::new();
+    let configured = async {
+        while peer.config().is_none() {
+            heard.push(peer.next().await);
+            if matches!(heard.last(), Some(PeerEvent::Closed { .. })) {
+                return;
+            }
+        }
+    };
+    // A broker without one is not known; should there be, jobs will tell.
+    let _ = tokio::time::timeout(CONFIGURED_WITHIN, configured).await;
+    heard
+}
+
+/// Files and directories that the configuration in force names, and those of the user.
+fn files_of(bundle: &'static Bundle, given: Option<&UserFiles>, peer: &Peer) -> Vec<PathBuf> {
+    let config = peer
+        .config()
+        .and_then(|(_, bytes)| codec::decode(&bytes).ok());
+    let config: Option<Config> = config.flatten();
+    configured(bundle, config.as_ref(), given).files()
 }
 
 struct Daemon {
@@ -211,6 +255,10 @@ struct Daemon {
     draining: bool,
     /// Told to stop by a person.
     stopped: bool,
+    /// What it may read, when it is confined.
+    fence: Option<Fence>,
+    /// The configuration names files that this process cannot read any more.
+    outgrown: bool,
 }
 
 struct Running {
@@ -222,7 +270,7 @@ struct Running {
 
 impl Daemon {
     /// What comes from the bus. `Some`: it is over.
-    fn hear(&mut self, event: PeerEvent) -> Option<Exit> {
+    fn hear(&mut self, event: PeerEvent) -> Option<Ended> {
         match event {
             PeerEvent::Message(message) => self.obey(message),
             PeerEvent::Rejoined => self.forget_everything(),
@@ -231,10 +279,10 @@ impl Daemon {
             PeerEvent::Closed { reason } => {
                 tracing::info!(reason, "the session has ended");
                 // Told to go, or no broker came back: a supervisor reads the difference.
-                return Some(if self.draining {
-                    Exit::Accepted
-                } else {
-                    Exit::NoBroker
+                return Some(match (self.draining, self.peer.has_lost_its_session()) {
+                    (true, _) => Ended::With(Exit::Accepted),
+                    (false, true) => Ended::Again,
+                    (false, false) => Ended::With(Exit::NoBroker),
                 });
             }
         }
@@ -276,9 +324,9 @@ impl Daemon {
 
     /// A person wants it to go: what is being checked is finished, what waits is not begun.
     /// Asked twice it goes at once.
-    fn stop(&mut self) -> Option<Exit> {
+    fn stop(&mut self) -> Option<Ended> {
         if self.stopped {
-            return Some(Exit::Accepted);
+            return Some(Ended::With(Exit::Accepted));
         }
         self.stopped = true;
         self.draining = true;
@@ -411,6 +459,14 @@ impl Daemon {
             config.as_ref(),
             self.given.as_ref(),
         ));
+        if let Some(fence) = &self.fence
+            && let Some(outside) = plan.files().iter().find(|it| fence.keeps_out(it))
+        {
+            let file = outside.display();
+            tracing::info!(%file, "the configuration names files that only a fresh process may read");
+            self.outgrown = true;
+            return None;
+        }
         self.plans.insert(digest, (config, plan.clone()));
         Some(plan)
     }

@@ -115,6 +115,7 @@ fn spec(version: u8) -> ChildSpec {
         version: Some(version.to_string()),
         command: vec!["text".to_owned()],
         restart: Restart::OnFailure,
+        may: Default::default(),
     }
 }
 

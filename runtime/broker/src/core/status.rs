@@ -152,6 +152,7 @@ impl State {
             } else {
                 it.note.clone()
             },
+            sandbox: None,
         });
         let starting = self.children.iter().filter(|(name, _)| {
             let reporter = self.reporter_named(name).is_some();
@@ -210,6 +211,7 @@ impl State {
             done: bundle.done,
             restarts: self.restarts(name),
             note,
+            sandbox: None,
         }
     }
 

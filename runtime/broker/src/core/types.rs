@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use qcbus_document::FileKind;
+use qcbus_formats::manifest::May;
 use qcbus_formats::pool::BundleOutcome;
 use qcbus_messages::control::FileVerdict;
 use qcbus_messages::{Catalogue, Digest, Job, JobDocument, JobId, MissingDocument, Role, Verdict};
@@ -304,6 +305,8 @@ pub struct ChildSpec {
     pub command: Vec<String>,
     /// When to start it again.
     pub restart: Restart,
+    /// What it may do although it is confined.
+    pub may: May,
 }
 
 impl ChildSpec {
@@ -311,6 +314,9 @@ impl ChildSpec {
     pub fn digest(&self) -> u64 {
         let mut hash = Sha256::new();
         hash.update(format!("{:?}{:?}", self.version, self.command));
+        if self.may != May::default() {
+            hash.update(format!("{:?}", self.may));
+        }
         let digest = hash.finalize();
         let first = digest.iter().take(8);
         first.fold(0, |number, byte| (number << 8) + u64::from(*byte)) >> (u64::BITS - SPEC_BITS)

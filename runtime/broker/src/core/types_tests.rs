@@ -8,6 +8,7 @@ fn spec(command: &str) -> ChildSpec {
         version: Some("1".to_owned()),
         command: vec![command.to_owned()],
         restart: Restart::Always,
+        may: Default::default(),
     }
 }
 

@@ -177,6 +177,10 @@ impl Broker {
     }
 
     pub(super) fn status(&self) -> Status {
+        let mut status = self.state.status();
+        for peer in &mut status.peers {
+            peer.sandbox = self.children.sandbox_of(peer);
+        }
         Status {
             instance: self.options.instance.name().to_owned(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -188,7 +192,7 @@ impl Broker {
             unseen: self.all_unseen(),
             bundles_d: self.options.bundles_d.clone(),
             gate: self.store.gate.as_ref().map(Gate::status),
-            ..self.state.status()
+            ..status
         }
     }
     fn all_unseen(&self) -> Vec<Unseen> {

@@ -272,6 +272,7 @@ impl Broker {
                 self.forget_clients();
                 self.say_what_takes_long();
                 self.notify_watchdog();
+                self.children.look_for_orphans();
             }
             if now() >= next_prune {
                 next_prune = now() + PRUNE_INTERVAL;

@@ -357,6 +357,7 @@ fn children(
         descriptors: descriptors.before,
         instance_dir: options.instance.dir().to_path_buf(),
         die_with_broker: options.die_with_broker,
+        sandbox: options.sandbox,
         memory_limit: options.memory_limit,
     };
     let generation = options.settings.generation;

@@ -94,5 +94,6 @@ fn spec_of(module: Module, role: Role) -> ChildSpec {
         name: module.name,
         role,
         restart,
+        may: module.may,
     }
 }

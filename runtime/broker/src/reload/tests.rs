@@ -21,6 +21,7 @@ fn child(name: &str) -> ChildSpec {
         version: None,
         command: vec!["program".to_owned()],
         restart: Restart::Always,
+        may: Default::default(),
     }
 }
 

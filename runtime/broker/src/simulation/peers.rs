@@ -5,6 +5,7 @@ use std::path::Path;
 
 use qcbus_bus::{Held, HostEvent, PeerId};
 use qcbus_document::FileKind;
+use qcbus_formats::manifest::May;
 use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::{Issue, Level};
 use qcbus_messages::{
@@ -31,6 +32,7 @@ pub fn children() -> Vec<ChildSpec> {
         version: (role == Role::Bundle).then(|| "1".to_owned()),
         command: vec![name.to_owned()],
         restart: Restart::Always,
+        may: May::default(),
     };
     vec![child(FIRST, Role::Bundle), child(REPORTER, Role::Reporter)]
 }

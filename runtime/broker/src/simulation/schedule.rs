@@ -92,6 +92,7 @@ pub fn play(stage: &Stage, seed: u64, verbose: bool) -> Result<(Figures, Vec<Str
 
 fn options(dir: &Path) -> Options {
     Options {
+        sandbox: false,
         instance: Instance::at(dir.join("i")),
         roots: vec![dir.join("farm")],
         files: Vec::new(),

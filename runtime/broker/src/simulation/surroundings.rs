@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use qcbus_bus::{Documents, HostEvent, HostOptions, Instance, PeerId, Process, StartError};
+use qcbus_messages::control::{PeerStatus, SandboxStatus};
 use qcbus_messages::{Digest, FromPeer, ToPeer};
 use tokio::sync::mpsc::UnboundedSender;
 
@@ -169,6 +170,19 @@ impl Children {
     pub fn former(&self) -> Option<Former> {
         match self {
             Children::Real(real) => real.former(),
+            Children::Simulated(_) => None,
+        }
+    }
+
+    pub fn look_for_orphans(&self) {
+        if let Children::Real(real) = self {
+            real.look_for_orphans();
+        }
+    }
+
+    pub fn sandbox_of(&self, peer: &PeerStatus) -> Option<SandboxStatus> {
+        match self {
+            Children::Real(real) => real.sandbox_of(peer),
             Children::Simulated(_) => None,
         }
     }

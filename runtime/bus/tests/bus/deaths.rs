@@ -152,6 +152,7 @@ fn without_a_new_broker_a_peer_gives_up() {
             // A busy machine may take its time to join.
             patience: WATCHDOG,
             grace: Duration::from_millis(100),
+            ..PeerOptions::default()
         };
         let (_, mut peer) = join_with(&mut host, &site, "orphan", options).await;
         drop(host);

@@ -391,6 +391,7 @@ async fn join_among_the_late(table: &mut Table, site: &Site) {
     let options = qcbus_bus::PeerOptions {
         patience: Duration::from_secs(60),
         grace: Duration::from_secs(60),
+        ..qcbus_bus::PeerOptions::default()
     };
     let joining = Peer::join(&site.instance, hello("late"), options);
     tokio::pin!(joining);

@@ -144,6 +144,7 @@ async fn member(instance: &Instance, name: &str) -> Result<Peer, JoinError> {
     let options = PeerOptions {
         patience: Duration::from_secs(30),
         grace: Duration::from_secs(30),
+        ..PeerOptions::default()
     };
     Peer::join(instance, hello(name), options).await
 }

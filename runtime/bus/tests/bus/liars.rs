@@ -10,6 +10,7 @@ use crate::support::{Site, hello, watched, welcome};
 const PATIENT: PeerOptions = PeerOptions {
     patience: Duration::from_secs(60),
     grace: Duration::from_secs(60),
+    rejoins: true,
 };
 
 #[tokio::test]

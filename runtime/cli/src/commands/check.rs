@@ -96,6 +96,7 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         reporters: standard::reporter_specs(&program),
         known: standard::known(),
         die_with_broker: true,
+        sandbox: !args.no_sandbox,
         memory_limit: memory_limit(&args.limits),
         limits: limits(&args.limits),
         host: HostOptions::default(),

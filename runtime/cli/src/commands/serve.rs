@@ -223,6 +223,7 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         reporters,
         known: standard::known(),
         die_with_broker: false,
+        sandbox: !args.no_sandbox,
         memory_limit: memory_limit(&args.limits),
         limits: limits(&args.limits),
         host: HostOptions::default(),

@@ -132,6 +132,13 @@ fn peer_line(peer: &PeerStatus) -> String {
     if peer.restarts > 0 {
         let _ = write!(line, ", started again {} times", peer.restarts);
     }
+    if let Some(sandbox) = &peer.sandbox {
+        let _ = match sandbox.state.as_str() {
+            "confined" => write!(line, ", confined"),
+            "partly" => write!(line, ", not wholly confined: {}", sandbox.why),
+            _ => write!(line, ", not confined: {}", sandbox.why),
+        };
+    }
     if !peer.note.is_empty() {
         let _ = write!(line, " ({})", peer.note);
     }
@@ -151,7 +158,7 @@ fn span(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use qcbus_messages::control::{FileCounts, NoticeStatus, QueueStatus, Unseen};
+    use qcbus_messages::control::{FileCounts, NoticeStatus, QueueStatus, SandboxStatus, Unseen};
 
     #[test]
     fn a_busy_broker_as_a_person_sees_it() {
@@ -189,6 +196,10 @@ mod tests {
                 done: 99,
                 restarts: 1,
                 note: "slow: 16 jobs wait for it and for nobody else".into(),
+                sandbox: Some(SandboxStatus {
+                    state: "partly".into(),
+                    why: "this kernel has no Landlock".into(),
+                }),
             }],
             epoch: (3 << 32) + 2,
             notices: vec![NoticeStatus {

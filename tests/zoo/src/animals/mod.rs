@@ -10,10 +10,12 @@ mod hangs_after_hello;
 mod hangs_in_a_job;
 mod judges_strictly;
 mod lies_about_job_id;
+mod meddles;
 mod never_acknowledges;
 mod never_the_same;
 mod proves_nothing;
 mod reporter_never_acknowledges;
+mod scribbles_on_others;
 mod sends_garbage;
 mod slow;
 mod speaks_another_protocol;
@@ -39,10 +41,12 @@ pub static ANIMALS: &[Animal] = &[
     hangs_in_a_job::ANIMAL,
     judges_strictly::ANIMAL,
     lies_about_job_id::ANIMAL,
+    meddles::ANIMAL,
     never_acknowledges::ANIMAL,
     never_the_same::ANIMAL,
     proves_nothing::ANIMAL,
     reporter_never_acknowledges::ANIMAL,
+    scribbles_on_others::ANIMAL,
     sends_garbage::ANIMAL,
     slow::ANIMAL,
     speaks_another_protocol::ANIMAL,

@@ -39,6 +39,7 @@ pub fn reporter() -> ChildSpec {
         version: None,
         command: vec!["text".to_owned()],
         restart: Restart::Always,
+        may: Default::default(),
     }
 }
 

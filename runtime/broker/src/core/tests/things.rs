@@ -37,6 +37,7 @@ pub fn child(version: u8) -> ChildSpec {
         version: Some(version.to_string()),
         command: vec!["child".to_owned()],
         restart: Restart::Always,
+        may: Default::default(),
     }
 }
 

@@ -1,0 +1,129 @@
+//! Where a bundle stands while it is on the bus: inside its sandbox, if there is one.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use qcbus_bus::{Instance, PeerOptions};
+use qcbus_confine::{After, Fenced, Orders, keep};
+use qcbus_formats::manifest::May;
+
+use super::Exit;
+use super::file::complain;
+
+/// What follows a session.
+pub(super) enum Ended {
+    /// Nothing.
+    With(Exit),
+    /// Another one, in a fresh process: this one may not do what joining takes.
+    Again,
+}
+
+/// Where one session takes place.
+pub(super) struct Stand<'a> {
+    pub instance: &'a Instance,
+    /// How many sessions there were before.
+    number: u32,
+    /// What its manifest declares. `None`: it is not to be confined.
+    may: Option<&'a May>,
+}
+
+impl Stand<'_> {
+    /// How patient it is. After a session was lost, another broker is waited for.
+    pub(super) fn options(&self) -> PeerOptions {
+        let usual = PeerOptions::default();
+        let patience: Duration = if self.number == 0 {
+            usual.patience
+        } else {
+            usual.grace
+        };
+        PeerOptions {
+            patience,
+            rejoins: self.may.is_none(),
+            ..usual
+        }
+    }
+
+    /// Confines this process, which may then read what `reads` gives. `None`: it is not to be confined.
+    pub(super) fn confine(
+        &self,
+        memory: Option<&Path>,
+        reads: impl FnOnce() -> Vec<PathBuf>,
+    ) -> Option<Fence> {
+        let may = self.may?;
+        let fenced = Fenced {
+            memory: memory.map(Path::to_path_buf),
+            reads: reads(),
+            may: may.clone(),
+        };
+        // Before: what comes in between is taken for something else, and a fresh process reads it.
+        let fence = Fence::around(&fenced.reads);
+        if let Err(error) = qcbus_confine::confine(&fenced) {
+            tracing::warn!(%error, "this bundle is not wholly confined");
+        }
+        Some(fence)
+    }
+}
+
+/// Files and directories that a confined process may read, as they were when it was confined.
+pub(super) struct Fence(Vec<(PathBuf, Identity)>);
+
+/// Device and inode.
+type Identity = (u64, u64);
+
+impl Fence {
+    fn around(paths: &[PathBuf]) -> Fence {
+        let known = |path: &PathBuf| Some((path.clone(), identity(path)?));
+        Fence(paths.iter().filter_map(known).collect())
+    }
+
+    /// Whether something lies at the path now that only a fresh process may read. Looking is never forbidden.
+    pub(super) fn keeps_out(&self, path: &Path) -> bool {
+        let known = self.0.iter().find(|(known, _)| known == path);
+        identity(path).is_some_and(|now| known.is_none_or(|(_, then)| *then != now))
+    }
+}
+
+fn identity(path: &Path) -> Option<Identity> {
+    use std::os::unix::fs::MetadataExt as _;
+    let found = std::fs::metadata(path).ok()?;
+    Some((found.dev(), found.ino()))
+}
+
+/// Runs sessions: each in a process of its own, where bundles are confined, else all of them in this one.
+pub(super) fn sandboxed(
+    instance: &Instance,
+    unwanted: bool,
+    supervised: bool,
+    session: impl Fn(Stand<'_>) -> Ended,
+) -> Exit {
+    let orders = match Orders::given() {
+        Ok(Orders::On(may)) if !unwanted => Some(may),
+        Ok(_) => None,
+        Err(error) => {
+            complain(&format!("{error}\n"));
+            return Exit::Usage;
+        }
+    };
+    let stand = |number, may| Stand {
+        instance,
+        number,
+        may,
+    };
+    if let Some(may) = &orders {
+        let kept = keep(!supervised, |number| {
+            match session(stand(number, Some(may))) {
+                Ended::With(exit) => After::End(exit.code()),
+                Ended::Again => After::Again,
+            }
+        });
+        match kept {
+            Ok(kept) => kept.end(),
+            Err(error) => tracing::warn!(%error, "this bundle is not confined"),
+        }
+    }
+    match session(stand(0, None)) {
+        Ended::With(exit) => exit,
+        // Only a confined process asks for another one.
+        Ended::Again => Exit::NoBroker,
+    }
+}

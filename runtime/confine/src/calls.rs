@@ -1,0 +1,294 @@
+//! System calls that are taken away, for what Landlock does not know.
+
+use std::collections::BTreeMap;
+
+use qcbus_formats::manifest::May;
+use seccompiler::{
+    BpfProgram, SeccompAction, SeccompCmpArgLen, SeccompCmpOp, SeccompCondition, SeccompFilter,
+    SeccompRule, TargetArch, apply_filter,
+};
+
+use crate::SandboxError;
+
+/// On x86-64 the same calls are there a second time, for programs with short pointers.
+const SHORT_POINTERS: i64 = if cfg!(target_arch = "x86_64") {
+    0x4000_0000
+} else {
+    0
+};
+
+/// Changes to files that need no open one: names, rights, owners, times, attributes. Landlock leaves some of
+/// them to the owner, and all segments have the same.
+const FILES: &[i64] = &[
+    libc::SYS_fchmod,
+    libc::SYS_fchmodat,
+    SYS_FCHMODAT2,
+    libc::SYS_fchown,
+    libc::SYS_fchownat,
+    libc::SYS_utimensat,
+    libc::SYS_setxattr,
+    libc::SYS_lsetxattr,
+    libc::SYS_fsetxattr,
+    libc::SYS_removexattr,
+    libc::SYS_lremovexattr,
+    libc::SYS_fremovexattr,
+    // A lock on a file that is only read is one, too.
+    libc::SYS_flock,
+    #[cfg(target_arch = "x86_64")]
+    libc::SYS_chmod,
+    #[cfg(target_arch = "x86_64")]
+    libc::SYS_chown,
+    #[cfg(target_arch = "x86_64")]
+    libc::SYS_lchown,
+    #[cfg(target_arch = "x86_64")]
+    libc::SYS_utime,
+    #[cfg(target_arch = "x86_64")]
+    libc::SYS_utimes,
+    #[cfg(target_arch = "x86_64")]
+    libc::SYS_futimesat,
+];
+
+/// Other processes, other ways past a filter, and the kernel's tools for its administrators.
+const OTHERS: &[i64] = &[
+    libc::SYS_ptrace,
+    libc::SYS_process_vm_readv,
+    libc::SYS_process_vm_writev,
+    libc::SYS_process_madvise,
+    libc::SYS_pidfd_getfd,
+    libc::SYS_kcmp,
+    libc::SYS_move_pages,
+    libc::SYS_migrate_pages,
+    libc::SYS_setpriority,
+    libc::SYS_ioprio_set,
+    libc::SYS_sched_setparam,
+    libc::SYS_sched_setscheduler,
+    libc::SYS_sched_setattr,
+    libc::SYS_io_uring_setup,
+    libc::SYS_io_uring_enter,
+    libc::SYS_io_uring_register,
+    libc::SYS_bpf,
+    libc::SYS_perf_event_open,
+    libc::SYS_userfaultfd,
+    libc::SYS_keyctl,
+    libc::SYS_add_key,
+    libc::SYS_request_key,
+    libc::SYS_unshare,
+    libc::SYS_setns,
+    libc::SYS_mount,
+    libc::SYS_umount2,
+    libc::SYS_chroot,
+    libc::SYS_pivot_root,
+    libc::SYS_open_by_handle_at,
+    libc::SYS_quotactl,
+    libc::SYS_swapon,
+    libc::SYS_swapoff,
+    libc::SYS_reboot,
+    libc::SYS_acct,
+    libc::SYS_settimeofday,
+    libc::SYS_clock_settime,
+    libc::SYS_adjtimex,
+    libc::SYS_clock_adjtime,
+    libc::SYS_sethostname,
+    libc::SYS_setdomainname,
+    libc::SYS_init_module,
+    libc::SYS_finit_module,
+    libc::SYS_delete_module,
+    libc::SYS_kexec_load,
+    libc::SYS_mq_open,
+    libc::SYS_mq_unlink,
+    libc::SYS_shmget,
+    libc::SYS_shmat,
+    libc::SYS_shmctl,
+    libc::SYS_semget,
+    libc::SYS_semctl,
+    libc::SYS_msgget,
+    libc::SYS_msgctl,
+];
+
+/// Sockets of every family: Landlock knows two kinds. Those that are there are connected and stay so.
+const SOCKETS: &[i64] = &[
+    libc::SYS_socket,
+    libc::SYS_connect,
+    libc::SYS_bind,
+    libc::SYS_listen,
+    libc::SYS_accept,
+    libc::SYS_accept4,
+    // They name the receiver in memory, where no filter can look.
+    libc::SYS_sendmsg,
+    libc::SYS_sendmmsg,
+];
+
+/// Programs. Threads are made by the same calls as processes, see [`fresh_processes`].
+const PROGRAMS: &[i64] = &[
+    libc::SYS_execve,
+    libc::SYS_execveat,
+    #[cfg(target_arch = "x86_64")]
+    libc::SYS_fork,
+    #[cfg(target_arch = "x86_64")]
+    libc::SYS_vfork,
+];
+
+/// Not in every version of the C library's headers.
+const SYS_FCHMODAT2: i64 = 452;
+
+type Calls = BTreeMap<i64, Vec<SeccompRule>>;
+
+/// Takes them from the calling thread and everything that it starts.
+pub(crate) fn forbid(may: &May) -> Result<(), SandboxError> {
+    let filters = filters(may)?;
+    for filter in filters.iter().filter(|filter| !filter.is_empty()) {
+        apply_filter(filter).map_err(|why| SandboxError::kernel("seccomp", why))?;
+    }
+    Ok(())
+}
+
+/// One for calls that are to look as if there were none, one for calls that are refused.
+fn filters(may: &May) -> Result<[BpfProgram; 2], SandboxError> {
+    let mut unknown = BpfProgram::new();
+    if !may.programs {
+        // What it is to do lies in memory, where no filter can look. "There is no such call" makes the C library
+        // take the older one.
+        let mut newer = Calls::new();
+        add(&mut newer, libc::SYS_clone3, Vec::new());
+        unknown = program(newer, libc::ENOSYS)?;
+    }
+    let refused = refused(may).map_err(|why| SandboxError::kernel("seccomp", why))?;
+    Ok([unknown, program(refused, libc::EPERM)?])
+}
+
+fn refused(may: &May) -> Result<Calls, seccompiler::BackendError> {
+    let mut calls = Calls::new();
+    for call in FILES.iter().chain(OTHERS) {
+        add(&mut calls, *call, Vec::new());
+    }
+    signals(&mut calls)?;
+    terminals(&mut calls)?;
+    if !may.network {
+        for call in SOCKETS {
+            add(&mut calls, *call, Vec::new());
+        }
+        addressed(&mut calls)?;
+    }
+    if !may.programs {
+        for call in PROGRAMS {
+            add(&mut calls, *call, Vec::new());
+        }
+        fresh_processes(&mut calls)?;
+    }
+    Ok(calls)
+}
+
+fn program(calls: Calls, errno: i32) -> Result<BpfProgram, SandboxError> {
+    let wrong = |why: String| SandboxError::kernel("seccomp", why);
+    let arch = TargetArch::try_from(std::env::consts::ARCH).map_err(|it| wrong(it.to_string()))?;
+    let refused = SeccompAction::Errno(errno.unsigned_abs());
+    let filter = SeccompFilter::new(calls, SeccompAction::Allow, refused, arch);
+    let filter = filter.map_err(|it| wrong(it.to_string()))?;
+    BpfProgram::try_from(filter).map_err(|it| wrong(it.to_string()))
+}
+
+fn add(calls: &mut Calls, call: i64, rules: Vec<SeccompRule>) {
+    calls.insert(call | SHORT_POINTERS, rules.clone());
+    calls.insert(call, rules);
+}
+
+type Made = Result<(), seccompiler::BackendError>;
+
+/// A rule holds when all its conditions do; one call may have several.
+fn when(conditions: Vec<SeccompCondition>) -> Result<SeccompRule, seccompiler::BackendError> {
+    SeccompRule::new(conditions)
+}
+
+fn is(
+    argument: u8,
+    operator: SeccompCmpOp,
+    value: u64,
+) -> Result<SeccompCondition, seccompiler::BackendError> {
+    SeccompCondition::new(argument, SeccompCmpArgLen::Dword, operator, value)
+}
+
+fn is_long(
+    argument: u8,
+    operator: SeccompCmpOp,
+    value: u64,
+) -> Result<SeccompCondition, seccompiler::BackendError> {
+    SeccompCondition::new(argument, SeccompCmpArgLen::Qword, operator, value)
+}
+
+/// Signals and limits: for itself only. Landlock scopes signals since Linux 6.12 only, limits never.
+fn signals(calls: &mut Calls) -> Made {
+    let own = u64::from(std::process::id());
+    let foreign = |argument| when(vec![is(argument, SeccompCmpOp::Ne, own)?]);
+    let to_others = [
+        libc::SYS_kill,
+        libc::SYS_tgkill,
+        libc::SYS_rt_sigqueueinfo,
+        libc::SYS_rt_tgsigqueueinfo,
+    ];
+    for call in to_others {
+        add(calls, call, vec![foreign(0)?]);
+    }
+    // A thread's number tells nothing of its process, a descriptor nothing at all.
+    add(calls, libc::SYS_tkill, Vec::new());
+    add(calls, libc::SYS_pidfd_send_signal, Vec::new());
+    let others = when(vec![
+        is(0, SeccompCmpOp::Ne, own)?,
+        is(0, SeccompCmpOp::Ne, 0)?,
+    ])?;
+    add(calls, libc::SYS_prlimit64, vec![others.clone()]);
+    add(calls, libc::SYS_sched_setaffinity, vec![others]);
+    // Whom a descriptor's owner is, the kernel tells by a signal.
+    let owner = |command: i32| when(vec![is(1, SeccompCmpOp::Eq, command as u64)?]);
+    let owners = vec![owner(libc::F_SETOWN)?, owner(F_SETOWN_EX)?];
+    add(calls, libc::SYS_fcntl, owners);
+    Ok(())
+}
+
+const F_SETOWN_EX: i32 = 15;
+
+/// Typing into somebody's terminal.
+fn terminals(calls: &mut Calls) -> Made {
+    const TIOCLINUX: u64 = 0x541C;
+    let typing = when(vec![is(1, SeccompCmpOp::Eq, libc::TIOCSTI)?])?;
+    let pasting = when(vec![is(1, SeccompCmpOp::Eq, TIOCLINUX)?])?;
+    add(calls, libc::SYS_ioctl, vec![typing, pasting]);
+    Ok(())
+}
+
+/// Words to somebody else than the one who is connected.
+fn addressed(calls: &mut Calls) -> Made {
+    let named = when(vec![is_long(4, SeccompCmpOp::Ne, 0)?])?;
+    add(calls, libc::SYS_sendto, vec![named]);
+    Ok(())
+}
+
+/// Whatever is started and is no thread of this process.
+fn fresh_processes(calls: &mut Calls) -> Made {
+    let thread = libc::CLONE_THREAD as u64;
+    let process = when(vec![is(0, SeccompCmpOp::MaskedEq(thread), 0)?])?;
+    add(calls, libc::SYS_clone, vec![process]);
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn there_is_a_filter_for_whatever_is_declared() {
+        for (network, programs) in [(false, false), (true, false), (false, true), (true, true)] {
+            let may = May {
+                network,
+                programs,
+                ..May::default()
+            };
+            let [unknown, refused] = filters(&may).unwrap();
+            assert!(!refused.is_empty());
+            assert_eq!(
+                unknown.is_empty(),
+                programs,
+                "only programs have a call that is to be unknown"
+            );
+        }
+    }
+}

@@ -1,0 +1,286 @@
+//! Bundles that do what is no business of theirs, inside the sandbox and without it.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    missing_docs,
+    reason = "all of this is test code, also what is no `#[test]` itself"
+)]
+
+mod support;
+
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+use qcbus_messages::Verdict;
+use qcbus_messages::control::SandboxStatus;
+use support::broker::Broker;
+use support::content::Content;
+use support::farm::{Farm, tail, zoo};
+use support::judge::{Files, judge};
+use support::watchdog::{until, until_or};
+
+/// Without Landlock there is nothing to test but that it is said.
+fn landlock_is_missing() -> bool {
+    let missing = qcbus_confine::kernel_level() == 0;
+    if missing {
+        println!("SKIPPED: this kernel has no Landlock, so nothing is confined here");
+    }
+    missing
+}
+
+fn sandbox_of(farm: &Farm, bundle: &str) -> SandboxStatus {
+    until_or(
+        "its sandbox is told",
+        || {
+            let mut peers = farm.status()?.peers.into_iter();
+            let found = peers.find(|it| it.name == bundle && it.checkers > 0)?;
+            found.sandbox
+        },
+        || tail(&farm.log()),
+    )
+}
+
+fn line_of(farm: &Farm, bundle: &str) -> String {
+    let said = farm.qcbus(&["status"]);
+    let text = String::from_utf8(said.stdout).unwrap();
+    let mut lines = text.lines();
+    let line = lines.find(|it| it.contains(bundle));
+    line.unwrap_or_else(|| panic!("{text}")).to_owned()
+}
+
+/// What the animal said last, once it has had a job.
+fn words(farm: &Farm, what: &str) -> String {
+    until_or(
+        "the animal has had a job",
+        || farm.log().contains(what).then(|| farm.log()),
+        || tail(&farm.log()),
+    )
+}
+
+fn sound_files(farm: &Farm) -> Files {
+    let mut files = Files::new();
+    for number in 0..30 {
+        let (name, content) = (format!("{number}.xodr"), Content::Good(number));
+        farm.write(&name, &content.bytes());
+        files.insert(name, content);
+    }
+    files
+}
+
+#[test]
+fn nobody_scribbles_on_what_others_read() {
+    if landlock_is_missing() {
+        return;
+    }
+    let farm = Farm::new();
+    let _broker = farm.serve_ready();
+    farm.let_in("scribbles_on_others", "");
+    sandbox_of(&farm, "scribbles_on_others");
+    let files = sound_files(&farm);
+    farm.settle(files.len());
+    for name in files.keys() {
+        assert_eq!(farm.verdict(name).verdict, Verdict::Accepted, "{name}");
+    }
+    judge(&farm, &files, &[]).demand(&tail(&farm.log()));
+    let log = words(&farm, "it saw ");
+    let said: Vec<&str> = log.lines().filter(|it| it.contains("it saw ")).collect();
+    assert!(
+        said.iter().all(|it| it.contains("opened 0 for writing")),
+        "{said:#?}"
+    );
+    assert!(
+        said.iter().any(|it| !it.contains("it saw 0,")),
+        "it looks at something: {said:#?}"
+    );
+}
+
+#[test]
+fn without_a_sandbox_anybody_can_and_that_is_said() {
+    let farm = Farm::with(&["--no-sandbox"]);
+    let _broker = farm.serve_ready();
+    farm.let_in("scribbles_on_others", "");
+    for bundle in ["scribbles_on_others", "xodrBundle"] {
+        let sandbox = sandbox_of(&farm, bundle);
+        assert_eq!(
+            (sandbox.state.as_str(), sandbox.why.as_str()),
+            ("open", "--no-sandbox")
+        );
+        assert!(line_of(&farm, bundle).contains(", not confined: --no-sandbox"));
+    }
+    farm.write("a.xodr", &Content::Good(1).bytes());
+    let log = words(&farm, "it saw ");
+    let said = log.lines().find(|it| it.contains("it saw ")).unwrap();
+    assert!(!said.contains("opened 0 for writing"), "{said}");
+}
+
+#[test]
+fn standard_bundles_are_confined_and_that_is_said() {
+    if landlock_is_missing() {
+        return;
+    }
+    let farm = Farm::new();
+    let _broker = farm.serve_ready();
+    for bundle in ["xodrBundle", "xoscBundle", "modularBundle"] {
+        let sandbox = sandbox_of(&farm, bundle);
+        assert_eq!(
+            (sandbox.state.as_str(), sandbox.why.as_str()),
+            ("confined", "")
+        );
+        assert!(
+            line_of(&farm, bundle).contains(", confined"),
+            "{}",
+            line_of(&farm, bundle)
+        );
+    }
+}
+
+/// What the animal meddles with.
+struct Victims {
+    file: PathBuf,
+    listener: TcpListener,
+    process: Child,
+    /// How long what it starts would sleep: by that it is found.
+    sleep: String,
+}
+
+impl Victims {
+    fn new(farm: &Farm) -> Victims {
+        let process = Command::new("sleep")
+            .arg("1000")
+            .stdin(Stdio::null())
+            .spawn();
+        let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
+        listener.set_nonblocking(true).unwrap();
+        let process = process.unwrap();
+        Victims {
+            file: farm.base().join("meddled"),
+            sleep: format!("4000.{}", process.id()),
+            listener,
+            process,
+        }
+    }
+
+    /// The command line of the animal that is told of them. The shell takes it apart.
+    fn animal(&self) -> PathBuf {
+        let port = self.listener.local_addr().unwrap().port();
+        let (file, victim, sleep) = (self.file.display(), self.process.id(), &self.sleep);
+        PathBuf::from(format!(
+            "env ZOO_FILE={file} ZOO_PORT={port} ZOO_VICTIM={victim} ZOO_SLEEP={sleep} {}",
+            zoo().display()
+        ))
+    }
+
+    fn lives(&mut self) -> bool {
+        self.process.try_wait().unwrap().is_none()
+    }
+
+    /// Processes that the animal has started, wherever they have placed themselves.
+    fn sleepers(&self) -> usize {
+        let entries = std::fs::read_dir("/proc").unwrap().flatten();
+        let lines = entries.filter_map(|it| std::fs::read(it.path().join("cmdline")).ok());
+        let words = format!("sleep\0{}\0", self.sleep);
+        lines.filter(|line| line == words.as_bytes()).count()
+    }
+}
+
+impl Drop for Victims {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+fn with_a_meddler(
+    arguments: &[&str],
+    may: Option<serde_json::Value>,
+) -> (Farm, Broker, Victims, String) {
+    let farm = Farm::with(arguments);
+    let broker = farm.serve_ready();
+    let victims = Victims::new(&farm);
+    match may {
+        None => farm.let_in_by(&victims.animal(), "meddles", ""),
+        Some(may) => declare(&farm, &victims.animal(), may),
+    }
+    sandbox_of(&farm, "meddles");
+    farm.write("a.xodr", &Content::Good(1).bytes());
+    assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Accepted);
+    let log = words(&farm, "it has tried everything");
+    (farm, broker, victims, log)
+}
+
+/// A manifest that declares something.
+fn declare(farm: &Farm, program: &Path, may: serde_json::Value) {
+    let manifest = serde_json::json!({ "module": [{
+        "name": "meddles",
+        "exec_type": "executable",
+        "module_type": "checker_bundle",
+        "exec_command": format!("{} meddles", program.display()),
+        "mode": "bus",
+        "may": may,
+    }]});
+    let unfinished = farm.bundles_d().join(".meddles");
+    std::fs::write(&unfinished, manifest.to_string()).unwrap();
+    std::fs::rename(&unfinished, farm.bundles_d().join("meddles.json")).unwrap();
+}
+
+fn meddlings(log: &str) -> Vec<&str> {
+    let mut said: Vec<&str> = log
+        .lines()
+        .filter_map(|line| line.split("it meddled: ").nth(1))
+        .collect();
+    said.sort_unstable();
+    said.dedup();
+    said
+}
+
+#[test]
+fn nobody_meddles_with_what_is_not_his() {
+    if landlock_is_missing() {
+        return;
+    }
+    let (_farm, _broker, mut victims, log) = with_a_meddler(&[], None);
+    assert_eq!(meddlings(&log), Vec::<&str>::new());
+    assert!(!victims.file.exists());
+    assert!(victims.lives());
+    assert!(victims.listener.accept().is_err(), "nobody has connected");
+    assert_eq!(victims.sleepers(), 0);
+}
+
+#[test]
+fn what_a_manifest_declares_is_allowed_and_nothing_else() {
+    if landlock_is_missing() {
+        return;
+    }
+    let may = serde_json::json!({ "read": ["/etc/passwd"], "network": true });
+    let (_farm, _broker, mut victims, log) = with_a_meddler(&[], Some(may));
+    assert_eq!(
+        meddlings(&log),
+        ["connected", "read a file", "sent a datagram"]
+    );
+    assert!(victims.lives() && !victims.file.exists());
+}
+
+#[test]
+fn what_a_bundle_leaves_behind_does_not_outlive_down() {
+    let (farm, _broker, victims, log) = with_a_meddler(&["--no-sandbox"], None);
+    let all = meddlings(&log);
+    assert_eq!(all.len(), 7, "each of them is possible: {all:?}");
+    until("what it has started sleeps", || {
+        (victims.sleepers() > 0).then_some(())
+    });
+    assert!(farm.qcbus(&["down"]).status.success());
+    assert_eq!(victims.sleepers(), 0);
+}
+
+#[test]
+fn what_a_bundle_leaves_behind_goes_with_it() {
+    let (farm, _broker, victims, _) = with_a_meddler(&["--no-sandbox"], None);
+    until("what it has started sleeps", || {
+        (victims.sleepers() > 0).then_some(())
+    });
+    farm.send_away("meddles");
+    until("it goes", || (victims.sleepers() == 0).then_some(()));
+}

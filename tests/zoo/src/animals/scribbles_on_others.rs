@@ -1,0 +1,85 @@
+//! Opens whatever lies in shared memory for writing and scribbles on it: images that others read, and their words.
+//! It tries the ways round a refusal, too: other rights, another name for an open file, cutting it off.
+
+use std::fs::OpenOptions;
+use std::os::unix::fs::{FileExt as _, PermissionsExt as _};
+use std::path::{Path, PathBuf};
+
+use qcbus_bus::Peer;
+use qcbus_messages::Job;
+
+use crate::complain;
+use crate::keeper::{Animal, GOOD, Manners, Mood, answer};
+
+pub(super) const ANIMAL: Animal = Animal {
+    name: "scribbles_on_others",
+    manners: Manners {
+        job,
+        ..GOOD.manners
+    },
+    ..GOOD
+};
+
+/// What it writes over whatever is there.
+const SCRIBBLE: [u8; 4096] = [0xA5; 4096];
+
+fn job(peer: &mut Peer, job: &Job) -> Mood {
+    let segments = segments(Path::new("/dev/shm"));
+    let opened = segments.iter().filter(|it| scribble(it)).count();
+    let again = segments_at_hand().iter().filter(|it| scribble(it)).count();
+    complain(&format!(
+        "it saw {}, opened {} for writing",
+        segments.len(),
+        opened + again
+    ));
+    answer(peer, job.job);
+    Mood::GoOn
+}
+
+/// Data segments that it has mapped to read them: what its broker and others of its instance publish. (It leaves
+/// alone what lies there of other instances: other tests run at the same time.)
+fn segments(directory: &Path) -> Vec<PathBuf> {
+    let maps = std::fs::read_to_string("/proc/self/maps").unwrap_or_default();
+    let mapped = maps
+        .lines()
+        .filter_map(|line| line.split_whitespace().nth(5));
+    let mut data: Vec<_> = mapped
+        .map(PathBuf::from)
+        .filter(|path| path.starts_with(directory) && is_data(path))
+        .collect();
+    data.sort();
+    data.dedup();
+    data
+}
+
+fn is_data(path: &Path) -> bool {
+    path.extension().is_some_and(|it| it == "data")
+}
+
+/// The same by the descriptors under which it has them open already.
+fn segments_at_hand() -> Vec<PathBuf> {
+    let open = std::fs::read_dir("/proc/self/fd")
+        .into_iter()
+        .flatten()
+        .flatten();
+    let is_segment = |path: &PathBuf| std::fs::read_link(path).is_ok_and(|it| is_data(&it));
+    open.map(|entry| entry.path()).filter(is_segment).collect()
+}
+
+fn scribble(segment: &Path) -> bool {
+    let _ = std::fs::set_permissions(segment, std::fs::Permissions::from_mode(0o666));
+    let Ok(file) = OpenOptions::new().read(true).write(true).open(segment) else {
+        return false;
+    };
+    // Large segments are mostly holes, which are not to be filled.
+    let len = file.metadata().map_or(0, |it| it.len()).min(8 << 20);
+    for at in (0..len).step_by(SCRIBBLE.len()) {
+        let mut there = SCRIBBLE;
+        let is_written =
+            file.read_at(&mut there, at).is_ok() && there.iter().any(|byte| *byte != 0);
+        if is_written && file.write_at(&SCRIBBLE, at).is_err() {
+            break;
+        }
+    }
+    true
+}
