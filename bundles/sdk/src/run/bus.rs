@@ -63,7 +63,7 @@ const HEARTBEAT: Duration = Duration::from_secs(1);
 /// How long a broker may take to tell its configuration after the welcome.
 const CONFIGURED_WITHIN: Duration = Duration::from_secs(2);
 
-pub(super) fn run(bundle: &'static Bundle, options: BusOptions, given: Option<UserFiles>) -> Exit {
+pub(super) fn run(bundle: &'static Bundle, options: BusOptions, given: Option<&UserFiles>) -> Exit {
     if options.die_with_parent && !follow_parent() {
         return Exit::Accepted;
     }
@@ -90,7 +90,7 @@ pub(super) fn run(bundle: &'static Bundle, options: BusOptions, given: Option<Us
         };
         runtime.block_on(async {
             let stops = Stops::listen(supervised);
-            serve((bundle, given.clone()), &stand, hello.clone(), stops).await
+            serve((bundle, given.cloned()), &stand, hello.clone(), stops).await
         })
     })
 }

@@ -68,7 +68,7 @@ pub fn run(bundle: &'static Bundle, mode: Mode) -> Exit {
         Mode::Bus(options) => {
             let schema_dir = options.schema_dir.clone();
             with_files(bundle, schema_dir.as_deref(), |given| {
-                bus::run(bundle, options, given.cloned())
+                bus::run(bundle, options, given)
             })
         }
         Mode::File {
