@@ -19,6 +19,7 @@ use qcbus_messages::control::SandboxStatus;
 use support::broker::Broker;
 use support::content::Content;
 use support::farm::{Farm, tail, zoo};
+use support::inside::skip;
 use support::judge::{Files, judge};
 use support::watchdog::{until, until_or};
 
@@ -26,7 +27,7 @@ use support::watchdog::{until, until_or};
 fn landlock_is_missing() -> bool {
     let missing = qcbus_confine::kernel_level() == 0;
     if missing {
-        println!("SKIPPED: this kernel has no Landlock, so nothing is confined here");
+        skip("a bundle that is confined", "this kernel has no Landlock");
     }
     missing
 }
@@ -202,7 +203,7 @@ fn with_a_meddler(
     let victims = Victims::new(&farm);
     match may {
         None => farm.let_in_by(&victims.animal(), "meddles", ""),
-        Some(may) => declare(&farm, &victims.animal(), may),
+        Some(may) => declare(&farm, &victims.animal(), &may),
     }
     sandbox_of(&farm, "meddles");
     farm.write("a.xodr", &Content::Good(1).bytes());
@@ -212,7 +213,7 @@ fn with_a_meddler(
 }
 
 /// A manifest that declares something.
-fn declare(farm: &Farm, program: &Path, may: serde_json::Value) {
+fn declare(farm: &Farm, program: &Path, may: &serde_json::Value) {
     let manifest = serde_json::json!({ "module": [{
         "name": "meddles",
         "exec_type": "executable",

@@ -21,8 +21,11 @@ pub(super) const ANIMAL: Animal = Animal {
     ..GOOD
 };
 
+/// Something that must not succeed; what it gives when it does.
+type Try = fn() -> Option<()>;
+
 fn job(peer: &mut Peer, job: &Job) -> Mood {
-    let tries: [(&str, fn() -> Option<()>); 7] = [
+    let tries: [(&str, Try); 7] = [
         ("wrote a file", write),
         ("read a file", read),
         ("connected", connect),
