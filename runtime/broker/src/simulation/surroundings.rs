@@ -97,7 +97,7 @@ impl ControlSocket {
 
 /// The processes that the broker starts.
 pub enum Children {
-    Real(supervise::Children),
+    Real(Box<supervise::Children>),
     Simulated(Arc<Simulation>),
 }
 
@@ -110,7 +110,7 @@ impl Children {
     ) -> Children {
         let Some(here) = here() else {
             let real = supervise::Children::new(surroundings, launches, generation, events);
-            return Children::Real(real);
+            return Children::Real(Box::new(real));
         };
         here.simulation.world().peers.exits = Some(events);
         Children::Simulated(here.simulation)
