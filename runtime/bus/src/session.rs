@@ -41,12 +41,15 @@ impl Session {
         let suffix = key.suffix();
         let wake = hub.wake(&services.wake_peer, &suffix)?;
         let from = hub.topic(&services.from_peer, &suffix)?;
+        // Before the peer can have its end: it connects to whoever is there when it makes it, and not to
+        // anybody later once it is confined.
+        let receiver = ports::subscriber(&from, &services.from_peer)?;
         // Last: the peer opens this one first, and then finds the others.
         let to = hub.topic(&services.to_peer, &suffix)?;
         let link = Link::new(
             key,
             hub.stream_publisher(&to, &services.to_peer)?,
-            ports::subscriber(&from, &services.from_peer)?,
+            receiver,
             ports::notifier(&wake)?,
             codec::MAX_FROM_PEER,
         );
