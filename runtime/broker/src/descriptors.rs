@@ -57,6 +57,14 @@ impl Descriptors {
         }
     }
 
+    /// As many as may be had; peers that there are none for are not let in, and what is to be said then.
+    pub fn for_peers(most: &mut usize) -> (Descriptors, Option<String>) {
+        let descriptors = Descriptors::take();
+        let (peers, limited) = descriptors.peers(*most);
+        *most = peers;
+        (descriptors, limited)
+    }
+
     /// For how many peers they are enough, of so many that are wanted, and what is to be said when these
     /// are fewer.
     pub fn peers(&self, wanted: usize) -> (usize, Option<String>) {

@@ -48,7 +48,7 @@ impl Broker {
     ) -> Result<Broker, StartError> {
         let sources = sources_of(&options);
         let loaded = sources.load()?;
-        let (descriptors, limited) = take_descriptors(&mut options);
+        let (descriptors, limited) = Descriptors::for_peers(&mut options.host.max_peers);
         let mut host = Host::start(&options.instance, shape(&options, &loaded))?;
         options.settings.generation = host.generation();
         let journal = journal_of(&options)?;
@@ -338,14 +338,6 @@ fn intake(options: &Options, host: &Host, in_force: &InForce) -> Arc<Intake> {
     );
     intake.search_in(in_force.search.clone());
     Arc::new(intake)
-}
-
-/// As many as may be had; peers that there are none for are not let in, and what is to be said then.
-fn take_descriptors(options: &mut Options) -> (Descriptors, Option<String>) {
-    let descriptors = Descriptors::take();
-    let (peers, limited) = descriptors.peers(options.host.max_peers);
-    options.host.max_peers = peers;
-    (descriptors, limited)
 }
 
 fn children(
