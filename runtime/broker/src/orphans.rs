@@ -65,6 +65,10 @@ fn listed(pid: i32) -> Option<Listed> {
 
 /// Kills what a process has started, and what that has started. It is to be stopped or killed itself at once after.
 pub fn kill_below(process: &Process) {
+    // It must not come to an end of its own, with a code that says something else, when it misses its children.
+    if let Some(pid) = Pid::from_raw(process.id().cast_signed()) {
+        let _ = kill_process(pid, Signal::STOP);
+    }
     // What is started while we look is found by looking again; a hostile one may go on for as long as it likes,
     // so not for ever.
     for _ in 0..8 {
