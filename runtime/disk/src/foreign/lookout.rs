@@ -27,7 +27,8 @@ pub struct Lookout {
 /// What one thread does.
 #[derive(Debug)]
 struct Post {
-    owner: u64,
+    /// None: its work is nobody else's, so nobody can give it up.
+    owner: Option<u64>,
     state: Mutex<State>,
 }
 
@@ -51,8 +52,8 @@ struct Waiting {
 /// A thread that has waited for too long.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Overdue {
-    /// Whose work it does, as given to [`Lookout::attend`].
-    pub owner: u64,
+    /// Whose work it does, as given to [`Lookout::attend`]. None: it waits on, see [`Lookout::attend_for_good`].
+    pub owner: Option<u64>,
     /// What it waits for.
     pub path: PathBuf,
     /// For how long.
@@ -63,6 +64,16 @@ impl Lookout {
     /// From now on everything that this thread does with files of others is seen, until the attendance
     /// is dropped on the same thread.
     pub fn attend(self: &Arc<Lookout>, owner: u64) -> Attendance {
+        self.post(Some(owner))
+    }
+
+    /// As [`Lookout::attend`] for a thread that nobody can replace: when it waits for too long that is seen, others
+    /// do not go there, and it goes on once the system answers.
+    pub fn attend_for_good(self: &Arc<Lookout>) -> Attendance {
+        self.post(None)
+    }
+
+    fn post(self: &Arc<Lookout>, owner: Option<u64>) -> Attendance {
         let post = Arc::new(Post {
             owner,
             state: Mutex::default(),
@@ -81,7 +92,7 @@ impl Lookout {
     }
 
     /// The threads that have waited for one file for longer than `limit`, each of them once. From now on
-    /// their work counts as given up.
+    /// their work counts as given up, unless they were attended for good.
     pub fn overdue(&self, limit: Duration) -> Vec<Overdue> {
         let posts = lock(&self.posts);
         posts
@@ -93,7 +104,7 @@ impl Lookout {
     /// As [`Lookout::overdue`] for the threads of one owner.
     pub fn is_given_up(&self, owner: u64, limit: Duration) -> bool {
         let posts = lock(&self.posts);
-        let mut own = posts.iter().filter(|post| post.owner == owner);
+        let mut own = posts.iter().filter(|post| post.owner == Some(owner));
         own.any(|post| self.give_up(post, limit).is_some() || lock(&post.state).lost)
     }
 
@@ -106,7 +117,7 @@ impl Lookout {
         }
         waiting.overdue = true;
         let path = waiting.path.clone();
-        state.lost = true;
+        state.lost = post.owner.is_some();
         *lock(&self.lost).entry(path.clone()).or_default() += 1;
         self.losses.fetch_add(1, Ordering::AcqRel);
         Some(Overdue {

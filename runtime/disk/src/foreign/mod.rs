@@ -4,6 +4,7 @@
 //! Everything here opens regular files only, never waits for a writer or a lease, and reads no more than
 //! it was told to. What it waits for is written down where a [`Lookout`] sees it.
 
+mod behalf;
 mod lookout;
 
 use std::fs::{DirEntry, File, Metadata};
@@ -15,6 +16,7 @@ use std::path::{Path, PathBuf};
 use rustix::fs::{Mode, OFlags};
 use rustix::io::{Errno, retry_on_intr};
 
+pub use behalf::{Behalf, Reader, on_behalf_of, reader};
 pub use lookout::{Attendance, Lookout, Overdue};
 use lookout::{Visit, note};
 
@@ -97,6 +99,8 @@ pub fn canonicalize(path: &Path) -> io::Result<PathBuf> {
 /// Whatever the system says.
 pub fn list(directory: &Path) -> io::Result<Vec<DirEntry>> {
     let _visit = Visit::begin(directory)?;
+    let data = noted(directory, std::fs::metadata(directory))?;
+    behalf::may_read(&data)?;
     let entries = noted(directory, std::fs::read_dir(directory))?;
     Ok(entries
         .filter_map(|entry| noted(directory, entry).ok())
@@ -181,13 +185,14 @@ fn open_regular(path: &Path) -> Result<(File, Metadata), Refused> {
     let flags = OFlags::PATH | OFlags::CLOEXEC;
     let handle = retry_on_intr(|| rustix::fs::open(path, flags, Mode::empty()));
     let handle = File::from(handle.map_err(io::Error::from)?);
-    regular(&handle)?;
+    behalf::may_read(&regular(&handle)?)?;
     let file = match reopen(&format!("/proc/self/fd/{}", handle.as_raw_fd())) {
         // Without /proc it is opened by its name once more.
         Err(error) if error.kind() == io::ErrorKind::NotFound => reopen(path)?,
         file => file?,
     };
     let found = regular(&file)?;
+    behalf::may_read(&found)?;
     Ok((file, found))
 }
 

@@ -99,11 +99,14 @@ fn errors_of_the_moment_are_told_from_those_of_the_file() {
 }
 
 /// A visit that goes on until `end` is dropped.
-fn hang(lookout: &Arc<Lookout>, owner: u64, path: &Path) -> Hanging {
+fn hang(lookout: &Arc<Lookout>, owner: Option<u64>, path: &Path) -> Hanging {
     let ((end, ended), (begun, begins)) = (channel::<()>(), channel());
     let (lookout, path) = (lookout.clone(), path.to_path_buf());
     let thread = std::thread::spawn(move || {
-        let attendance = lookout.attend(owner);
+        let attendance = match owner {
+            Some(owner) => lookout.attend(owner),
+            None => lookout.attend_for_good(),
+        };
         let visit = Visit::begin(&path).unwrap();
         begun.send(()).unwrap();
         let _ = ended.recv();
@@ -128,14 +131,32 @@ impl Hanging {
 }
 
 #[test]
+fn who_cannot_be_replaced_is_named_and_goes_on_when_there_is_an_answer() {
+    let lookout = Arc::new(Lookout::default());
+    let path = Path::new("/farm/hung");
+    let watcher = hang(&lookout, None, path);
+    let overdue = lookout.overdue(Duration::ZERO);
+    assert_eq!((overdue[0].owner, &*overdue[0].path), (None, path));
+    assert_eq!(lookout.hanging(), [path]);
+    let attendance = lookout.attend(8);
+    assert_eq!(metadata(path).unwrap_err().kind(), io::ErrorKind::TimedOut);
+    drop(attendance);
+
+    let (was_given_up, further) = watcher.end();
+    assert!(!was_given_up);
+    assert_eq!(further, Ok(()), "it looks at others as ever");
+    assert!(lookout.hanging().is_empty());
+}
+
+#[test]
 fn who_waits_for_too_long_is_named_and_nobody_follows() {
     let lookout = Arc::new(Lookout::default());
     let path = Path::new("/farm/hung/map.xodr");
-    let patient = hang(&lookout, 7, path);
+    let patient = hang(&lookout, Some(7), path);
     assert_eq!(lookout.overdue(Duration::from_secs(3600)), []);
     let overdue = lookout.overdue(Duration::ZERO);
     assert_eq!(overdue.len(), 1);
-    assert_eq!((overdue[0].owner, &*overdue[0].path), (7, path));
+    assert_eq!((overdue[0].owner, &*overdue[0].path), (Some(7), path));
     assert_eq!(lookout.overdue(Duration::ZERO), [], "it is said once");
     assert_eq!(lookout.hanging(), [path]);
 
@@ -171,7 +192,7 @@ fn a_directory_that_hangs_takes_few_threads() {
     let lookout = Arc::new(Lookout::default());
     let at = |number: usize| PathBuf::from(format!("/farm/hung/{number}.xodr"));
     let hanging: Vec<_> = (0..lookout::PER_DIRECTORY)
-        .map(|number| hang(&lookout, 1, &at(number)))
+        .map(|number| hang(&lookout, Some(1), &at(number)))
         .collect();
     assert_eq!(
         lookout.overdue(Duration::ZERO).len(),

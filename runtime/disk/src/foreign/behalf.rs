@@ -1,0 +1,133 @@
+//! Who may read a file for whom: what a file of one user leads to is read with the rights of this process, and
+//! what was found in it is told to everybody who reads results.
+
+use std::cell::Cell;
+use std::fs::Metadata;
+use std::io;
+use std::os::unix::fs::MetadataExt;
+use std::path::Path;
+
+use nix::unistd::{Gid, Uid, User, getgrouplist};
+
+/// Somebody for whom files are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Reader {
+    user: u32,
+    /// The group of his file, which he need not be in: whoever shared the one shared the other.
+    group: u32,
+}
+
+thread_local! {
+    static READER: Cell<Option<Reader>> = const { Cell::new(None) };
+}
+
+/// As long as it lives this thread reads on behalf of somebody.
+#[must_use]
+#[derive(Debug)]
+pub struct Behalf(Option<Reader>);
+
+impl Drop for Behalf {
+    fn drop(&mut self) {
+        READER.set(self.0);
+    }
+}
+
+/// From now on this thread opens and lists, for its content, only what the owner of this file may read: where it is
+/// a symbolic link, the owner of the link. Files of this user or of root lead anywhere.
+pub fn on_behalf_of(path: &Path) -> Behalf {
+    let before = READER.get();
+    let data = std::fs::symlink_metadata(path).ok();
+    let trusted = |user| user == 0 || user == rustix::process::geteuid().as_raw();
+    let reader = data.filter(|it| !trusted(it.uid())).map(|it| Reader {
+        user: it.uid(),
+        group: it.gid(),
+    });
+    READER.set(reader);
+    Behalf(before)
+}
+
+/// For whom this thread reads, if it is not for itself.
+pub fn reader() -> Option<Reader> {
+    READER.get()
+}
+
+/// # Errors
+/// [`io::ErrorKind::PermissionDenied`] with the reason.
+pub(super) fn may_read(data: &Metadata) -> io::Result<()> {
+    match READER.get() {
+        Some(reader) if !reader.may_read(data) => {
+            let why = format!(
+                "it may not be read by the user with the number {}, to whom the file belongs that leads here",
+                reader.user
+            );
+            Err(io::Error::new(io::ErrorKind::PermissionDenied, why))
+        }
+        _ => Ok(()),
+    }
+}
+
+impl Reader {
+    fn may_read(self, data: &Metadata) -> bool {
+        let allows = |bits: u32| data.mode() & bits != 0;
+        data.uid() == self.user
+            || allows(0o004)
+            || (allows(0o040) && (data.gid() == self.group || self.is_in(data.gid())))
+    }
+
+    fn is_in(self, group: u32) -> bool {
+        let user = User::from_uid(Uid::from_raw(self.user)).ok().flatten();
+        let Some(user) = user else { return false };
+        let name = std::ffi::CString::new(user.name).ok();
+        let groups = name.and_then(|name| getgrouplist(&name, user.gid).ok());
+        groups.is_some_and(|all| all.contains(&Gid::from_raw(group)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::fs::{PermissionsExt, lchown};
+
+    use super::super::{list, open, read};
+    use super::*;
+
+    const STRANGER: u32 = 65_534;
+
+    fn is_denied<T>(result: io::Result<T>) -> bool {
+        result.is_err_and(|it| it.kind() == io::ErrorKind::PermissionDenied)
+    }
+
+    #[test]
+    fn a_file_leads_nowhere_where_its_owner_may_not_look() {
+        if !rustix::process::geteuid().is_root() {
+            eprintln!("skipped: only root can give files away");
+            return;
+        }
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        for (name, mode) in [("open", 0o644), ("private", 0o600), ("shared", 0o640)] {
+            std::fs::write(at(name), name).unwrap();
+            std::fs::set_permissions(at(name), PermissionsExt::from_mode(mode)).unwrap();
+        }
+        std::fs::create_dir(at("closed")).unwrap();
+        std::fs::set_permissions(at("closed"), PermissionsExt::from_mode(0o700)).unwrap();
+        std::os::unix::fs::symlink(at("private"), at("link")).unwrap();
+
+        let own = on_behalf_of(&at("link"));
+        assert!(read(&at("link"), 100).is_ok(), "root's own link");
+        drop(own);
+        lchown(at("link"), Some(STRANGER), Some(STRANGER)).unwrap();
+        let behalf = on_behalf_of(&at("link"));
+        assert!(is_denied(open(&at("link")).map_err(io::Error::from)));
+        assert!(is_denied(read(&at("private"), 100)));
+        assert!(is_denied(read(&at("shared"), 100)));
+        assert!(is_denied(list(&at("closed"))));
+        assert!(read(&at("open"), 100).is_ok());
+        lchown(at("shared"), None, Some(STRANGER)).unwrap();
+        assert!(read(&at("shared"), 100).is_ok(), "his group's");
+        lchown(at("private"), Some(STRANGER), None).unwrap();
+        assert!(read(&at("private"), 100).is_ok(), "his own");
+        lchown(at("private"), Some(0), None).unwrap();
+        drop(behalf);
+        assert!(read(&at("private"), 100).is_ok(), "on nobody's behalf");
+    }
+}
