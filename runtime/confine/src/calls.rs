@@ -5,17 +5,14 @@ use std::collections::BTreeMap;
 use qcbus_formats::manifest::May;
 use seccompiler::{
     BpfProgram, SeccompAction, SeccompCmpArgLen, SeccompCmpOp, SeccompCondition, SeccompFilter,
-    SeccompRule, TargetArch, apply_filter,
+    SeccompRule, TargetArch, apply_filter, sock_filter,
 };
 
 use crate::SandboxError;
 
-/// On x86-64 the same calls are there a second time, for programs with short pointers.
-const SHORT_POINTERS: i64 = if cfg!(target_arch = "x86_64") {
-    0x4000_0000
-} else {
-    0
-};
+/// On x86-64 the same calls are there a second time from here on, for programs with short pointers. No library
+/// makes them, and most kernels do not have them.
+const SHORT_POINTERS: u32 = 0x4000_0000;
 
 /// Changes to files that need no open one: names, rights, owners, times, attributes. Landlock leaves some of
 /// them to the owner, and all segments have the same.
@@ -133,6 +130,37 @@ const SYS_FCHMODAT2: i64 = 452;
 
 type Calls = BTreeMap<i64, Vec<SeccompRule>>;
 
+/// What is taken away before a program begins. It is to join yet, so it keeps more than [`forbid`] leaves: what it
+/// does with its own files, and sockets of this host.
+pub(crate) fn beforehand(may: &May) -> Result<[BpfProgram; 2], SandboxError> {
+    let refused = refused_beforehand(may).map_err(|why| SandboxError::kernel("seccomp", why))?;
+    Ok([second_calls(), program(refused, libc::EPERM)?])
+}
+
+fn refused_beforehand(may: &May) -> Result<Calls, seccompiler::BackendError> {
+    let mut calls = Calls::new();
+    let others = |argument| when(vec![is(argument, SeccompCmpOp::Ne, 0)?]);
+    // Landlock knows neither limits nor turns; the process's own number is not known yet, and 0 stands for it.
+    add(&mut calls, libc::SYS_prlimit64, vec![others(0)?]);
+    add(&mut calls, libc::SYS_sched_setaffinity, vec![others(0)?]);
+    add(&mut calls, libc::SYS_setpriority, vec![others(1)?]);
+    terminals(&mut calls)?;
+    if may.write.is_empty() {
+        // It may change the mode of what it has open: that is how segments are made.
+        let named = FILES
+            .iter()
+            .filter(|it| **it != libc::SYS_fchmod && **it != libc::SYS_flock);
+        for call in named {
+            add(&mut calls, *call, Vec::new());
+        }
+    }
+    if !may.network {
+        let elsewhere = when(vec![is(0, SeccompCmpOp::Ne, libc::AF_UNIX as u64)?])?;
+        add(&mut calls, libc::SYS_socket, vec![elsewhere]);
+    }
+    Ok(calls)
+}
+
 /// Takes them from the calling thread and everything that it starts.
 pub(crate) fn forbid(may: &May) -> Result<(), SandboxError> {
     let filters = filters(may)?;
@@ -142,8 +170,8 @@ pub(crate) fn forbid(may: &May) -> Result<(), SandboxError> {
     Ok(())
 }
 
-/// One for calls that are to look as if there were none, one for calls that are refused.
-fn filters(may: &May) -> Result<[BpfProgram; 2], SandboxError> {
+/// Two for calls that are to look as if there were none, one for calls that are refused.
+fn filters(may: &May) -> Result<[BpfProgram; 3], SandboxError> {
     let mut unknown = BpfProgram::new();
     if !may.programs {
         // What it is to do lies in memory, where no filter can look. "There is no such call" makes the C library
@@ -153,7 +181,38 @@ fn filters(may: &May) -> Result<[BpfProgram; 2], SandboxError> {
         unknown = program(newer, libc::ENOSYS)?;
     }
     let refused = refused(may).map_err(|why| SandboxError::kernel("seccomp", why))?;
-    Ok([unknown, program(refused, libc::EPERM)?])
+    Ok([second_calls(), unknown, program(refused, libc::EPERM)?])
+}
+
+/// Written out, because every call would stand in the other filters twice: the kernel goes through a filter once for
+/// each call there is, when it takes it.
+fn second_calls() -> BpfProgram {
+    if !cfg!(target_arch = "x86_64") {
+        return BpfProgram::new();
+    }
+    let step = |code: u32, jt, jf, k| sock_filter {
+        code: code as u16,
+        jt,
+        jf,
+        k,
+    };
+    let number = 0;
+    vec![
+        step(libc::BPF_LD | libc::BPF_W | libc::BPF_ABS, 0, 0, number),
+        step(
+            libc::BPF_JMP | libc::BPF_JGE | libc::BPF_K,
+            0,
+            1,
+            SHORT_POINTERS,
+        ),
+        step(
+            libc::BPF_RET | libc::BPF_K,
+            0,
+            0,
+            libc::SECCOMP_RET_ERRNO | libc::ENOSYS.unsigned_abs(),
+        ),
+        step(libc::BPF_RET | libc::BPF_K, 0, 0, libc::SECCOMP_RET_ALLOW),
+    ]
 }
 
 fn refused(may: &May) -> Result<Calls, seccompiler::BackendError> {
@@ -188,7 +247,6 @@ fn program(calls: Calls, errno: i32) -> Result<BpfProgram, SandboxError> {
 }
 
 fn add(calls: &mut Calls, call: i64, rules: Vec<SeccompRule>) {
-    calls.insert(call | SHORT_POINTERS, rules.clone());
     calls.insert(call, rules);
 }
 
@@ -282,7 +340,8 @@ mod tests {
                 programs,
                 ..May::default()
             };
-            let [unknown, refused] = filters(&may).unwrap();
+            let [second, unknown, refused] = filters(&may).unwrap();
+            assert_eq!(second.is_empty(), !cfg!(target_arch = "x86_64"));
             assert!(!refused.is_empty());
             assert_eq!(
                 unknown.is_empty(),

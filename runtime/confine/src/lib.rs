@@ -22,7 +22,7 @@ mod rules;
 
 pub use inner::{Fenced, confine};
 pub use keep::{After, Kept, keep};
-pub use looks::{Looks, looks};
+pub use looks::{Looks, looks, own_filters};
 pub use orders::{Orders, SandboxError};
 pub use outer::Outer;
 

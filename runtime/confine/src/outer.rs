@@ -5,8 +5,10 @@ use std::os::unix::process::CommandExt as _;
 use std::process::Command;
 
 use qcbus_formats::manifest::May;
+use seccompiler::BpfProgram;
 
 use crate::SandboxError;
+use crate::calls;
 use crate::rules::{Rules, everything, reading};
 
 /// What a bundle writes to while it joins. Devices that take everything and keep nothing are harmless.
@@ -20,14 +22,18 @@ const WRITTEN: &[&str] = &[
 
 /// A ring to be drawn around one process.
 #[derive(Debug)]
-pub struct Outer(OwnedFd);
+pub struct Outer {
+    /// None: this kernel has no Landlock.
+    files: Option<OwnedFd>,
+    calls: [BpfProgram; 2],
+}
 
 impl Outer {
-    /// The ring for a bundle. `None`: this kernel has no Landlock.
+    /// The ring for a bundle.
     ///
     /// # Errors
     /// [`SandboxError::Kernel`].
-    pub fn new(may: &May) -> Result<Option<Outer>, SandboxError> {
+    pub fn new(may: &May) -> Result<Outer, SandboxError> {
         let mut rules = Rules::new(may.network)?.allow("/", reading())?;
         for path in WRITTEN {
             rules = rules.allow(path, everything())?;
@@ -35,8 +41,14 @@ impl Outer {
         for path in &may.write {
             rules = rules.allow(path, everything())?;
         }
-        Ok(rules.into_descriptor().map(Outer))
+        Ok(Outer {
+            files: rules.into_descriptor(),
+            calls: calls::beforehand(may)?,
+        })
     }
+
+    /// How many filters of system calls a process is given by it.
+    pub const FILTERS: usize = if cfg!(target_arch = "x86_64") { 2 } else { 1 };
 
     /// Has a process begin its life inside.
     #[expect(
@@ -44,9 +56,8 @@ impl Outer {
         reason = "only the new process itself can step into the ring, between fork and exec"
     )]
     pub fn surround(self, command: &mut Command) {
-        let ring = self.0;
-        // SAFETY: between fork and exec only two system calls are made; nothing is allocated and no lock is taken.
-        // The descriptor belongs to the closure, which lives as long as the command.
+        // SAFETY: between fork and exec only system calls are made; nothing is allocated and no lock is taken. The
+        // descriptor and the filters belong to the closure, which lives as long as the command.
         unsafe {
             command.pre_exec(move || {
                 let set = libc::prctl(libc::PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
@@ -54,11 +65,73 @@ impl Outer {
                 if set != 0 {
                     return failed();
                 }
-                match libc::syscall(libc::SYS_landlock_restrict_self, ring.as_raw_fd(), 0) {
-                    0 => Ok(()),
-                    _ => failed(),
+                if let Some(files) = &self.files
+                    && libc::syscall(libc::SYS_landlock_restrict_self, files.as_raw_fd(), 0) != 0
+                {
+                    return failed();
                 }
+                for filter in self.calls.iter().filter(|it| !it.is_empty()) {
+                    // Where the kernel takes none, the process looks open, and that is said.
+                    let _ = seccompiler::apply_filter(filter);
+                }
+                Ok(())
             });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::fs::PermissionsExt;
+    use std::path::Path;
+
+    use super::*;
+    use crate::{Looks, looks, own_filters};
+
+    /// Runs a line of a shell inside, before anything has joined anything; gives whether it went well.
+    fn inside(may: &May, line: &str, file: &Path) -> bool {
+        let mut command = Command::new("sh");
+        command.args(["-c", line]).arg(file);
+        Outer::new(may).unwrap().surround(&mut command);
+        command.output().unwrap().status.success()
+    }
+
+    #[test]
+    fn who_only_has_this_ring_does_not_look_confined() {
+        let mut command = Command::new("sleep");
+        command.arg("60");
+        Outer::new(&May::default()).unwrap().surround(&mut command);
+        let mut child = command.spawn().unwrap();
+        let given = own_filters() + Outer::FILTERS;
+        assert_eq!(looks(child.id(), given), Looks::Open);
+        assert_eq!(looks(child.id(), given - 1), Looks::Filtered);
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+
+    #[test]
+    fn a_program_changes_nothing_of_others_before_it_has_joined() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let may = May::default();
+        assert!(inside(&may, "cat \"$0\"", file.path()));
+        assert!(inside(&may, "ulimit -n 20", file.path()), "its own limits");
+        let before = file.as_file().metadata().unwrap().permissions().mode();
+        for line in [
+            "chmod 777 \"$0\"",
+            "touch -d 2000-01-01 \"$0\"",
+            "echo x > \"$0\"",
+        ] {
+            assert!(!inside(&may, line, file.path()), "{line}");
+        }
+        let after = file.as_file().metadata().unwrap();
+        assert_eq!((after.permissions().mode(), after.len()), (before, 0));
+        let may = May {
+            write: vec![file.path().to_path_buf()],
+            ..May::default()
+        };
+        assert!(
+            inside(&may, "chmod 600 \"$0\" && echo x > \"$0\"", file.path()),
+            "declared"
+        );
     }
 }
