@@ -106,7 +106,7 @@ impl Class {
         let service = hub.topic::<Block, DocumentHeader>(&row, "")?;
         let own = ports::subscriber(&service, &row)?;
         Ok(Class {
-            publisher: RwLock::new(ports::lending_publisher(&service, &row)?),
+            publisher: RwLock::new(ports::publisher(&service, &row, row.slots())?),
             slots: Mutex::default(),
             _service: service,
             used: AtomicBool::new(false),
@@ -226,6 +226,11 @@ impl Documents {
     /// # Errors
     /// See [`LoanError`].
     pub fn loan(&self, len: usize) -> Result<Loan, LoanError> {
+        // More than a subscriber's buffer takes would be lost on one that is slow.
+        self.lend(len, |row| row.buffer)
+    }
+
+    fn lend(&self, len: usize, most_held: impl FnOnce(&Topic) -> usize) -> Result<Loan, LoanError> {
         if len > MAX_IMAGE {
             return Err(LoanError::TooLarge(len));
         }
@@ -234,8 +239,7 @@ impl Documents {
         }
         let index = usize::from(len > self.shared.classes[0].row.slot_bytes());
         let class = &self.shared.classes[index];
-        // One less than a subscriber may hold, because receiving needs a hand free.
-        let held = Ticket::take(&class.held, class.row.borrowed - 1).ok_or(LoanError::Busy)?;
+        let held = Ticket::take(&class.held, most_held(&class.row)).ok_or(LoanError::Busy)?;
         let lent = Ticket::take(&class.lent, class.row.loans).ok_or(LoanError::Busy)?;
         let blocks = len.div_ceil(BLOCK_BYTES).max(1);
         let bytes = (blocks * BLOCK_BYTES) as u64;
@@ -322,7 +326,8 @@ impl Documents {
     /// # Errors
     /// See [`LoanError`].
     pub fn publish_again(&self, held: &Held) -> Result<(), LoanError> {
-        let mut loan = self.loan(held.len())?;
+        // Beside all that jobs need. One less than a subscriber may hold: receiving needs a hand free.
+        let mut loan = self.lend(held.len(), |row| row.borrowed - 1)?;
         loan.copy_from_slice(held);
         loan.publish(held.doc(), held.len(), held.digest(), held.kind())
             .map_err(|error| LoanError::Bus(error.to_string()))?;

@@ -66,12 +66,13 @@ impl Rogue {
         let greetings = hub
             .topic(&services.hello, "")
             .map_err(|error| in_words(&error))?;
+        let hello = growing(services.hello);
         let wake = hub
             .wake(&services.wake_broker, "")
             .map_err(|error| in_words(&error))?;
         Ok(Rogue {
             channels: None,
-            hello: ports::publisher(&greetings, &growing(services.hello))
+            hello: ports::publisher(&greetings, &hello, hello.loans)
                 .map_err(|error| in_words(&error))?,
             wake: ports::notifier(&wake).map_err(|error| in_words(&error))?,
             generation: generation.number,
@@ -131,7 +132,7 @@ impl Rogue {
             let to = self.hub.topic(&to_row, &suffix)?;
             let from = self.hub.topic(&self.services.from_peer, &suffix)?;
             let to = reads.then(|| ports::subscriber(&to, &to_row)).transpose()?;
-            let from = ports::publisher(&from, &from_row)?;
+            let from = ports::publisher(&from, &from_row, from_row.loans)?;
             Ok(Channels { from, to })
         };
         let opened = open();

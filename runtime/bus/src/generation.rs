@@ -82,7 +82,7 @@ impl Generation {
     /// Makes this the generation in force.
     pub(crate) fn announce(&self, instance: &Instance) -> io::Result<()> {
         let mut file = tempfile::NamedTempFile::new_in(instance.dir())?;
-        serde_json::to_writer(&mut file, self)?;
+        file.write_all(&serde_json::to_vec(self)?)?;
         file.flush()?;
         file.persist(instance.dir().join(CURRENT))?;
         Ok(())

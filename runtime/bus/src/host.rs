@@ -657,5 +657,5 @@ fn subscribe(hub: &Hub, row: &Topic) -> Result<Sub<u8, HelloHeader>, PortError> 
 }
 
 fn publish(hub: &Hub, row: &Topic) -> Result<Pub<u8, ConfigHeader>, PortError> {
-    ports::publisher(&hub.topic(row, "")?, row)
+    ports::publisher(&hub.topic(row, "")?, row, row.loans)
 }

@@ -1,6 +1,6 @@
 //! A peer's side of the document topics: what it holds, and what it lets go first.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
 
@@ -15,6 +15,8 @@ struct Shelf {
     subscriber: Sub<Block, DocumentHeader>,
     out: Arc<AtomicUsize>,
     books: BTreeMap<DocId, Book>,
+    /// Those that a job was given out for which the peer has not finished with, here or not.
+    wanted: BTreeSet<DocId>,
 }
 
 struct Book {
@@ -90,8 +92,16 @@ impl Library {
             .map(|book| book.held.clone())
     }
 
+    /// A job needs this document: it stays, as long as there is another that may go.
+    pub(crate) fn want(&mut self, doc: DocId) {
+        for shelf in &mut self.shelves {
+            shelf.wanted.insert(doc);
+        }
+    }
+
     pub(crate) fn forget(&mut self, doc: DocId) {
         for shelf in &mut self.shelves {
+            shelf.wanted.remove(&doc);
             if let Some(book) = shelf.books.get_mut(&doc) {
                 self.clock += 1;
                 book.released = true;
@@ -110,6 +120,7 @@ impl Shelf {
             row,
             out: Arc::default(),
             books: BTreeMap::new(),
+            wanted: BTreeSet::new(),
         })
     }
 
@@ -145,12 +156,11 @@ impl Shelf {
             if let Some(ticket) = Ticket::take(&self.out, self.row.borrowed - 1) {
                 return Some(ticket);
             }
-            let least = self
-                .books
-                .iter()
-                .filter(|(_, book)| book.held.is_unused())
-                .min_by_key(|(_, book)| (!book.released, book.used_at))
-                .map(|(doc, _)| *doc)?;
+            let unused = self.books.iter().filter(|(_, it)| it.held.is_unused());
+            let need = |(doc, book): &(&DocId, &Book)| {
+                (self.wanted.contains(doc), !book.released, book.used_at)
+            };
+            let least = unused.min_by_key(need).map(|(doc, _)| *doc)?;
             self.books.remove(&least);
         }
     }

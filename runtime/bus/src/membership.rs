@@ -284,6 +284,10 @@ impl Membership {
         match message {
             Ok(ToPeer::Refused { reason }) => self.refused = Some(reason),
             Ok(message) => {
+                if let ToPeer::Job(job) = &message {
+                    let documents = job.documents.iter();
+                    documents.for_each(|it| self.library.want(it.doc));
+                }
                 self.welcome |= matches!(message, ToPeer::Welcome { .. });
                 events.push_back(PeerEvent::Message(message));
             }

@@ -148,7 +148,7 @@ impl Hub {
     where
         H: Debug + ZeroCopySend + 'static,
     {
-        let publisher = publisher(service, row)?;
+        let publisher = publisher(service, row, row.loans)?;
         let backing = Backing::of(&self.root, publisher.id().value());
         let backing = backing.map_err(|why| PortError::memory(row, &why))?;
         Ok((publisher, backing))
@@ -163,7 +163,7 @@ impl Hub {
     where
         H: Debug + ZeroCopySend + 'static,
     {
-        let publisher = publisher(service, row)?;
+        let publisher = publisher(service, row, row.loans)?;
         Backing::whole(&self.root, publisher.id().value())
             .map_err(|why| PortError::memory(row, &why))?;
         Ok(publisher)
@@ -233,31 +233,9 @@ fn service_name(name: &str, key: &str) -> Result<ServiceName, PortError> {
     ServiceName::new(&full).explain(full)
 }
 
-/// A publisher as its row wants it.
+/// A publisher as its row wants it that lends so many slots at once: those of the row, or all that there
+/// are, if whoever borrows counts by himself.
 pub(crate) fn publisher<T, H>(
-    service: &TopicService<T, H>,
-    row: &Topic,
-) -> Result<Pub<T, H>, PortError>
-where
-    T: Debug + ZeroCopySend + 'static,
-    H: Debug + ZeroCopySend + 'static,
-{
-    publisher_lending(service, row, row.loans)
-}
-
-/// A publisher as its row wants it that may lend all its slots at once: whoever does so counts by himself.
-pub(crate) fn lending_publisher<T, H>(
-    service: &TopicService<T, H>,
-    row: &Topic,
-) -> Result<Pub<T, H>, PortError>
-where
-    T: Debug + ZeroCopySend + 'static,
-    H: Debug + ZeroCopySend + 'static,
-{
-    publisher_lending(service, row, row.slots())
-}
-
-fn publisher_lending<T, H>(
     service: &TopicService<T, H>,
     row: &Topic,
     loans: usize,

@@ -7,7 +7,7 @@ use qcbus_bus::{Documents, Held, Host, HostEvent, HostOptions, LoanError, Peer};
 use qcbus_document::FileKind;
 use qcbus_messages::{Digest, DocId, FromPeer};
 
-use crate::helper::Helper;
+use crate::helper::{Helper, job_with};
 use crate::support::{Site, has_room, is_uniform, join, run, welcome};
 
 fn publish(documents: &Documents, doc: u64, len: usize) -> Held {
@@ -216,6 +216,55 @@ fn a_reader_never_runs_out_of_hands() {
         for (doc, held) in kept {
             check(&held, doc, 100);
         }
+    });
+}
+
+#[test]
+fn what_a_job_needs_stays_until_it_is_finished_with() {
+    run(async {
+        let site = Site::new();
+        let mut host = site.host();
+        let (id, mut peer) = join(&mut host, &site, "busy").await;
+        let documents = host.documents();
+        drop(publish(&documents, 1, 100));
+        arrival(&mut host, &mut peer, 1).await;
+        host.send(id, &job_with(1, DocId(1)));
+        // Many that no job here is about, as of another kind; nobody has finished with any of them.
+        for doc in 2..=400 {
+            drop(publish(&documents, doc, 100));
+            arrival(&mut host, &mut peer, doc).await;
+        }
+        assert!(peer.document(DocId(1)).is_some());
+        peer.forget(DocId(1));
+        for doc in 401..=800 {
+            drop(publish(&documents, doc, 100));
+            arrival(&mut host, &mut peer, doc).await;
+        }
+        assert!(peer.document(DocId(1)).is_none());
+    });
+}
+
+#[test]
+fn no_more_is_held_than_the_slowest_reader_takes() {
+    run(async {
+        let site = Site::new();
+        let mut host = site.host();
+        let (_, mut peer) = join(&mut host, &site, "slow").await;
+        let documents = host.documents();
+        // Large ones: of these the fewest are carried at once.
+        let len = 600_000;
+        let mut held = Vec::new();
+        while let Ok(loan) = documents.loan(len) {
+            drop(loan);
+            held.push(publish(&documents, held.len() as u64 + 1, len));
+        }
+        assert_eq!(documents.loan(len).err(), Some(LoanError::Busy));
+        assert!(held.len() > 1);
+        for doc in &held {
+            arrival(&mut host, &mut peer, doc.doc().0).await;
+        }
+        // And if it had lost one all the same, there would be a place for it.
+        documents.publish_again(&held[0]).unwrap();
     });
 }
 
