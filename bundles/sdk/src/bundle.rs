@@ -146,9 +146,6 @@ pub const BACKPORT_SUFFIX: &str = "_backport";
 
 fn checkers_of(rule: &'static dyn AnyRule) -> Vec<Checker> {
     let facts = rule.facts();
-    let summary = Page::parse(facts.page)
-        .map(|page| page.summary)
-        .unwrap_or_default();
     let plain = Checker {
         id: facts.id.to_owned(),
         rule,
@@ -158,7 +155,7 @@ fn checkers_of(rule: &'static dyn AnyRule) -> Vec<Checker> {
             .versions
             .parse()
             .map_err(|error: crate::VersionError| error.to_string()),
-        description: summary,
+        description: Page::head(facts.page).summary,
     };
     if !facts.backport.is_separate() {
         return vec![plain];

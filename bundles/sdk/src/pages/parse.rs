@@ -62,7 +62,7 @@ impl Page {
     /// [`PageError`] when the title or the summary is missing, a block is not closed, or the words
     /// behind the fence of an example are not known.
     pub fn parse(text: &str) -> Result<Page, PageError> {
-        let mut page = Page::default();
+        let mut page = Page::head(text);
         let lines: Vec<&str> = text.lines().collect();
         let mut at = 0;
         while let Some(line) = lines.get(at) {
@@ -72,7 +72,6 @@ impl Page {
                 page.block(info, content, at, close)?;
                 at = close + 1;
             } else {
-                page.prose(line, lines.get(at.wrapping_sub(1)).copied());
                 at += 1;
             }
         }
@@ -89,19 +88,24 @@ impl Page {
         }
     }
 
-    fn prose(&mut self, line: &str, before: Option<&str>) {
-        let line = line.trim();
-        if let Some(title) = line.strip_prefix("# ").filter(|_| self.title.is_empty()) {
-            title.trim().clone_into(&mut self.title);
-        } else if line.is_empty() || line.starts_with('#') || self.title.is_empty() {
-        } else if self.summary.is_empty() {
-            line.clone_into(&mut self.summary);
-        } else if before.is_some_and(|before| {
-            self.summary.ends_with(before.trim()) && !before.trim().is_empty()
-        }) {
-            self.summary.push(' ');
-            self.summary.push_str(line);
+    /// Title and summary alone, empty when there are none: every start of a bundle needs those of all its rules.
+    pub fn head(text: &str) -> Page {
+        let mut page = Page::default();
+        for line in text.lines().map(str::trim) {
+            let is_over = line.is_empty() || line.starts_with('#');
+            if line.starts_with("```") || (is_over && !page.summary.is_empty()) {
+                break;
+            }
+            match line.strip_prefix("# ") {
+                Some(title) if page.title.is_empty() => title.trim().clone_into(&mut page.title),
+                _ if is_over || page.title.is_empty() => {}
+                _ => {
+                    let gap = if page.summary.is_empty() { "" } else { " " };
+                    page.summary.extend([gap, line]);
+                }
+            }
         }
+        page
     }
 
     fn block(
@@ -249,6 +253,19 @@ mod tests {
         assert_eq!(bad.files[1].name.as_deref(), Some("c.xodr"));
         assert_eq!(bad.expected.as_deref(), Some("error 1:1 /b: no\n"));
         assert_eq!(bad.expected_lines, 21..24);
+    }
+
+    #[test]
+    fn a_summary_ends_with_its_paragraph() {
+        let of = |text: &str| Page::head(text).summary;
+        assert_eq!(of(PAGE), "One sentence on two lines.");
+        assert_eq!(
+            of("\n\n  # T  \n\n\n  One  \n two\n\ntwo\nthree\n"),
+            "One two"
+        );
+        assert_eq!(of("# T\n\nS\n```xml good\n<a/>\n```\nS\nafter it\n"), "S");
+        assert_eq!(of("# T\nS\n## Next\nnot S\n"), "S");
+        assert_eq!(of("no title"), "");
     }
 
     #[test]

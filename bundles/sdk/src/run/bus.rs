@@ -20,7 +20,7 @@ use super::Exit;
 use super::batches::batches;
 use super::file::complain;
 use super::module::configured;
-use super::stand::{Ended, Fence, Stand, sandboxed};
+use super::stand::{Ended, Fence, Sessions, Stand, sandboxed};
 use super::worker::{self, CheckerAtWork, Order, Progress, Work};
 use crate::kept::KeptModels;
 use crate::subject::LinkedImage;
@@ -76,8 +76,13 @@ pub(super) fn run(bundle: &'static Bundle, options: BusOptions, given: Option<&U
         Err(error) => return fail(&error.to_string(), Exit::Usage),
     };
     let supervised = options.launch.is_some() || options.die_with_parent;
+    let sessions = Sessions {
+        only_one: options.die_with_parent,
+        supervised,
+        unfenced: options.no_sandbox,
+    };
     let hello = hello(bundle, options.launch);
-    sandboxed(&instance, options.no_sandbox, supervised, |stand| {
+    sandboxed(&instance, &sessions, |stand| {
         // A bundle is confined before its first thread is started, so the runtime must not start any.
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
@@ -184,6 +189,7 @@ async fn serve(
         plans: BTreeMap::new(),
         waiting: VecDeque::new(),
         running: None,
+        asked_for: None,
         draining: false,
         stopped: false,
         fence,
@@ -252,6 +258,8 @@ struct Daemon {
     plans: BTreeMap<Digest, (Option<Config>, Arc<Plan>)>,
     waiting: VecDeque<Job>,
     running: Option<Running>,
+    /// The job for which missing documents were asked for since the last heartbeat, for want of another.
+    asked_for: Option<JobId>,
     draining: bool,
     /// Told to stop by a person.
     stopped: bool,
@@ -306,7 +314,10 @@ impl Daemon {
                 self.waiting.push_back(job);
             }
             ToPeer::Cancel { job } => {
-                self.waiting.retain(|waiting| waiting.job != job);
+                let cancelled = self.waiting.iter().position(|it| it.job == job);
+                if let Some(job) = cancelled.and_then(|at| self.waiting.remove(at)) {
+                    self.finished_with(&job);
+                }
                 if let Some(running) = self
                     .running
                     .as_ref()
@@ -355,7 +366,15 @@ impl Daemon {
             job: running.map(|running| running.job.job),
             checker: running.and_then(|running| running.checker.get()),
         });
-        if let Some(job) = self.waiting.front() {
+        self.asked_for = None;
+    }
+
+    /// Nothing can be begun: what the first job lacks has got lost on the way, or had to make room here.
+    fn ask_for_what_the_first_lacks(&mut self) {
+        let Some(job) = self.waiting.front() else {
+            return;
+        };
+        if self.asked_for.replace(job.job) != Some(job.job) {
             let missing = self.missing_documents(job);
             self.ask_for(&missing);
         }
@@ -408,6 +427,7 @@ impl Daemon {
             }
             return;
         }
+        self.ask_for_what_the_first_lacks();
     }
 
     /// The work of a job, once its configuration and all its documents are here.
@@ -563,16 +583,19 @@ impl Daemon {
 
     /// The job is over: its documents may go, unless another job waits for them.
     fn let_go(&mut self) {
-        let Some(running) = self.running.take() else {
-            return;
-        };
-        let needed: BTreeSet<DocId> = self
-            .waiting
-            .iter()
+        if let Some(running) = self.running.take() {
+            self.finished_with(&running.job);
+        }
+    }
+
+    fn finished_with(&mut self, job: &Job) {
+        let running = self.running.iter().map(|running| &running.job);
+        let others = self.waiting.iter().chain(running);
+        let needed: BTreeSet<DocId> = others
             .flat_map(|job| &job.documents)
             .map(|document| document.doc)
             .collect();
-        for document in running.job.documents {
+        for document in &job.documents {
             if !needed.contains(&document.doc) {
                 self.peer.forget(document.doc);
             }

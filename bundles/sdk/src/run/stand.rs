@@ -89,15 +89,25 @@ fn identity(path: &Path) -> Option<Identity> {
     Some((found.dev(), found.ino()))
 }
 
-/// Runs sessions: each in a process of its own, where bundles are confined, else all of them in this one.
+/// How many sessions there may be, and who ends them.
+pub(super) struct Sessions {
+    /// There is no broker after this one.
+    pub only_one: bool,
+    /// A broker ends them, and not a person.
+    pub supervised: bool,
+    /// It is not to be confined.
+    pub unfenced: bool,
+}
+
+/// Runs sessions: each in a process of its own where bundles are confined and there may be more than one, else all
+/// of them in this one.
 pub(super) fn sandboxed(
     instance: &Instance,
-    unwanted: bool,
-    supervised: bool,
+    sessions: &Sessions,
     session: impl Fn(Stand<'_>) -> Ended,
 ) -> Exit {
     let orders = match Orders::given() {
-        Ok(Orders::On(may)) if !unwanted => Some(may),
+        Ok(Orders::On(may)) if !sessions.unfenced => Some(may),
         Ok(_) => None,
         Err(error) => {
             complain(&format!("{error}\n"));
@@ -109,21 +119,26 @@ pub(super) fn sandboxed(
         number,
         may,
     };
-    if let Some(may) = &orders {
-        let kept = keep(!supervised, |number| {
-            match session(stand(number, Some(may))) {
-                Ended::With(exit) => After::End(exit.code()),
-                Ended::Again => After::Again,
-            }
-        });
-        match kept {
-            Ok(kept) => kept.end(),
-            Err(error) => tracing::warn!(%error, "this bundle is not confined"),
-        }
-    }
-    match session(stand(0, None)) {
+    let once = |may| match session(stand(0, may)) {
         Ended::With(exit) => exit,
-        // Only a confined process asks for another one.
+        // It cannot have another one here. A supervisor starts it anew.
         Ended::Again => Exit::NoBroker,
+    };
+    let Some(may) = &orders else {
+        return once(None);
+    };
+    if sessions.only_one {
+        return once(Some(may));
     }
+    let kept = keep(!sessions.supervised, |number| {
+        match session(stand(number, Some(may))) {
+            Ended::With(exit) => After::End(exit.code()),
+            Ended::Again => After::Again,
+        }
+    });
+    match kept {
+        Ok(kept) => kept.end(),
+        Err(error) => tracing::warn!(%error, "this bundle is not confined"),
+    }
+    once(None)
 }
