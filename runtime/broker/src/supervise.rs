@@ -1,12 +1,13 @@
 //! Starting and killing child processes. When to do so is the state machine's business.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::os::fd::AsFd as _;
 use std::path::PathBuf;
 use std::process::Stdio;
 use std::time::Duration;
 
 use qcbus_bus::{LAUNCH, Process};
-use qcbus_confine::{Looks, Orders, Outer, SandboxError, kernel_level, looks};
+use qcbus_confine::{Looks, Orders, Outer, SandboxError, kernel_level, looks, own_filters};
 use qcbus_messages::Role;
 use qcbus_messages::control::{PeerStatus, SandboxStatus};
 use rustix::process::{Resource, Rlimit, setrlimit};
@@ -112,6 +113,9 @@ impl Children {
         if spec.role == Role::Bundle {
             self.confine(&mut command, spec)
                 .map_err(|error| format!("cannot confine it: {error}"))?;
+            // What this program prints are verdicts; no bundle prints any.
+            let said = std::io::stderr().as_fd().try_clone_to_owned();
+            command.stdout(said.map_or_else(|_| Stdio::null(), Stdio::from));
         }
         command
             .spawn()
@@ -125,9 +129,7 @@ impl Children {
             return Orders::Off.give(command);
         }
         Orders::On(spec.may.clone()).give(command)?;
-        if let Some(outer) = Outer::new(&spec.may)? {
-            outer.surround(command);
-        }
+        Outer::new(&spec.may)?.surround(command);
         Ok(())
     }
 
@@ -140,7 +142,14 @@ impl Children {
         let mut own = self.own.values().filter_map(|(_, it)| it.as_ref());
         let is_ours = own.any(|it| it.id() == peer.pid || orphans::is_below(peer.pid, it.id()));
         let surrounded = self.surroundings.sandbox && is_ours;
-        let (state, why) = match (looks(peer.pid), kernel_level()) {
+        // One that a former broker has started has them, too; one that was started by hand confines itself to nothing.
+        let ring = if self.surroundings.sandbox {
+            Outer::FILTERS
+        } else {
+            0
+        };
+        let given = own_filters() + ring;
+        let (state, why) = match (looks(peer.pid, given), kernel_level()) {
             (Looks::Unknown, _) => return None,
             (Looks::Filtered, 1..) => ("confined", ""),
             (Looks::Filtered, 0) => ("partly", "this kernel has no Landlock"),
@@ -301,10 +310,17 @@ fn restrict(command: &mut Command, surroundings: &Surroundings) {
     let descriptors = surroundings.descriptors;
     let with_broker = surroundings.die_with_broker;
     let broker = std::process::id();
-    // SAFETY: between fork and exec only async-signal-safe functions are called: setrlimit, prctl
-    // and getppid; nothing is allocated and no lock is taken.
+    // SAFETY: between fork and exec only async-signal-safe functions are called: close_range, setrlimit,
+    // prctl and getppid; nothing is allocated and no lock is taken.
     unsafe {
         command.pre_exec(move || {
+            // What this program was given by whoever started it is nobody else's.
+            libc::syscall(
+                libc::SYS_close_range,
+                3,
+                u32::MAX,
+                libc::CLOSE_RANGE_CLOEXEC,
+            );
             if let Some(bytes) = memory {
                 let limit = libc::rlimit {
                     rlim_cur: bytes,

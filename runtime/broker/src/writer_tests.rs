@@ -3,23 +3,27 @@
 use std::path::Path;
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use qcbus_document::FileKind;
 use qcbus_formats::xqar::Dialect;
-use qcbus_messages::{Digest, JobId};
+use qcbus_messages::{Digest, JobId, Verdict};
+use tokio::sync::mpsc::unbounded_channel;
 
-use crate::core::{Epoch, FinishedJob, Input, Jury, PreparedJob, Reading, StoreOutcome};
-use crate::journal::Journal;
+use crate::core::{Epoch, FinishedJob, Input, Judged, Jury, PreparedJob, Reading, StoreOutcome};
+use crate::gate::{Gate, GateOptions, Outside};
+use crate::journal::{Entry, Journal};
 use crate::result_paths::ResultPaths;
+use crate::scouts::Scouts;
 use crate::stamp::stamp_through_links;
 use crate::store::{Store, digest_of};
+use crate::writers::{Order, Writers};
 
 const NOW: u64 = (3 << 32) + 5;
 
 fn store_in(dir: &Path) -> Store {
     Store {
-        scouts: crate::scouts::Scouts::default(),
+        scouts: Scouts::default(),
         places: ResultPaths::of_watched(dir.join("out"), vec![dir.join("farm")]),
         dialect: Dialect::default(),
         durable: false,
@@ -90,6 +94,64 @@ fn what_has_changed_since_it_was_read_is_not_written() {
     let outcome = store.store(&mut job, None, None);
     assert_eq!(outcome, StoreOutcome::Stale);
     assert!(walk(&dir.path().join("out")).is_empty());
+}
+
+/// Somebody else has the journal, so that nothing can be recorded.
+#[test]
+fn what_must_not_lie_behind_the_gate_waits_for_no_journal() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut store = store_in(dir.path());
+    let gate = GateOptions {
+        directory: dir.path().join("gate"),
+        paths: store.places.clone(),
+        durable: false,
+        outside: Outside::default(),
+        max_file: u64::MAX,
+        scouts: Scouts::default(),
+        is_judged: Box::new(|_| true),
+        say: Box::new(|_| {}),
+    };
+    let gate = store.gate.insert(Gate::open(gate, "test").unwrap());
+    let job = finished(dir.path(), NOW);
+    let path = job.path.clone();
+    gate.accept(&path, &accepted(&job)).unwrap();
+    let published = walk(&dir.path().join("gate"));
+    let published = published.iter().find(|it| it.ends_with("a.xodr")).unwrap();
+
+    let journal = rusqlite::Connection::open(dir.path().join("state/journal.sqlite")).unwrap();
+    journal.execute_batch("BEGIN EXCLUSIVE").unwrap();
+    let ((events, _events), (notices, mut told)) = (unbounded_channel(), unbounded_channel());
+    let writers = Writers::start(1, &Arc::new(store), &events, &notices).unwrap();
+    let name = "Nobody".to_owned();
+    writers.order(&path, Order::Record(Entry::Struck { name }));
+    writers.order(&path, Order::CloseGate { path: path.clone() });
+    let begun = Instant::now();
+    while published.exists() {
+        assert!(begun.elapsed() < Duration::from_secs(60), "the watchdog");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let said = format!("{:?}", told.try_recv());
+    assert!(said.contains("it is tried again"), "{said}");
+    journal.execute_batch("ROLLBACK").unwrap();
+    assert!(writers.finish(Duration::from_secs(60)).is_empty());
+}
+
+fn accepted(job: &FinishedJob) -> Judged {
+    let inputs = job.prepared.as_ref().unwrap().inputs.clone();
+    Judged {
+        job: job.job,
+        verdict: Verdict::Accepted,
+        digest: inputs[0].digest().unwrap(),
+        basis: Digest::default(),
+        config: Digest::default(),
+        jury: Arc::default(),
+        epoch: job.epoch,
+        inputs,
+        racy: false,
+        counts: [0; 3],
+        why: Vec::new(),
+        xqar: None,
+    }
 }
 
 fn walk(dir: &Path) -> Vec<std::path::PathBuf> {

@@ -219,8 +219,19 @@ impl Writer {
                 Err(trouble) => self.hold_up(&trouble),
             }
         }
+        self.shut_early(&order);
         self.held_up.extend(order.path().cloned());
         self.waiting.push_back(order);
+    }
+
+    /// What must not lie behind the gate goes at once, whatever has to wait for a disk or the journal. When its turn
+    /// comes it goes again: an order before it may have brought it back.
+    fn shut_early(&mut self, order: &Order) {
+        if let Order::CloseGate { path } | Order::Withdraw { path, .. } = order
+            && let Err(trouble) = self.store.close_gate(path)
+        {
+            self.hold_up(&trouble);
+        }
     }
 
     fn hold_up(&mut self, trouble: &Trouble) {
@@ -254,7 +265,12 @@ impl Writer {
                 self.tell(job, outcome);
                 return Ok(published.then_some(Order::Follow { path }));
             }
-            Order::Withdraw { path, reporters } => self.store.withdraw(path, reporters)?,
+            Order::Withdraw { path, reporters } => {
+                self.store.withdraw(path, reporters)?;
+                let path = path.clone();
+                // After the end of the loop nobody tells reporters of it; the journal knows whom to.
+                let _ = self.events.send(Event::Withdrawn { path });
+            }
             Order::Restamp { path, judged } => {
                 let entry = Entry::Judged {
                     path: path.clone(),

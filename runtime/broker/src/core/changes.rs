@@ -154,12 +154,23 @@ impl State {
         let reporters = self.void_reports(id);
         self.files.remove(id);
         self.forget_dependencies(actions);
+        *self.withdrawing.entry(path.clone()).or_default() += 1;
         actions.push(Action::Withdraw {
             path: path.clone(),
             reporters,
         });
-        self.deliver_everything(actions);
         self.answer_gone(&path, actions);
+    }
+
+    /// It is in the journal that a file has gone.
+    pub(super) fn withdrawn(&mut self, path: &Path, actions: &mut Actions) {
+        if let Some(times) = self.withdrawing.get_mut(path) {
+            *times -= 1;
+            if *times == 0 {
+                self.withdrawing.remove(path);
+                self.deliver_everything(actions);
+            }
+        }
     }
 
     /// The first scan is complete: what the journal knew and the scan did not see has gone.

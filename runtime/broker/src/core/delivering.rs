@@ -1,6 +1,7 @@
 //! Delivering: every result reaches every reporter at least once, and none can hold up a verdict.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use qcbus_messages::{JobId, PeerReport, Role};
 
@@ -59,7 +60,10 @@ impl State {
                 return;
             }
             // Before any result: a file that is there again has its new report written after this.
-            if let Some(path) = reporter.void.pop_first() {
+            let recorded = |path: &&Arc<Path>| !self.withdrawing.contains_key(*path);
+            let gone = reporter.void.iter().find(recorded).cloned();
+            if let Some(path) = gone {
+                reporter.void.remove(&path);
                 reporter.voiding.insert(path.clone());
                 reporter.moved = self.now;
                 actions.push(Action::Void {
@@ -69,7 +73,7 @@ impl State {
                 });
                 continue;
             }
-            let Some(file) = reporter.next_in_queue() else {
+            let Some(file) = reporter.next_in_queue(&self.files) else {
                 return;
             };
             let Some(entry) = self.files.get(file) else {

@@ -55,6 +55,11 @@ pub enum Event {
         /// What it gave.
         outcome: StoreOutcome,
     },
+    /// That a file has gone is in the journal, with who is to take back a report about it.
+    Withdrawn {
+        /// Its path.
+        path: Arc<Path>,
+    },
     /// A peer says hello.
     Hello {
         /// Its session.

@@ -57,11 +57,15 @@ pub struct FileEntry {
     pub shut: bool,
     /// Not before then, after something failed for want of room or disk.
     pub not_before: Duration,
+    /// The bus had no place for it, and it waits for one.
+    pub in_line: bool,
     /// How often in a row something that passes kept it from being read.
     pub hindered: u32,
     /// Its result says something that is so no more, though nothing that its verdict depends on has
     /// changed: it is checked again even if it is read as before.
     pub anew: bool,
+    /// Writing a result has failed since the last verdict, so one of other bytes may lie in its place.
+    pub half_written: bool,
     /// When something last made it wait, or somebody asked for it while it did: what is read for its
     /// verdict must not be older.
     pub asked: Duration,
@@ -169,7 +173,9 @@ impl Files {
                 touched: false,
                 shut: false,
                 anew: false,
+                half_written: false,
                 not_before: Duration::ZERO,
+                in_line: false,
                 hindered: 0,
                 asked: Duration::ZERO,
                 judged: None,

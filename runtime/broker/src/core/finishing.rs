@@ -127,6 +127,9 @@ impl State {
             // What was found counts for nothing under another configuration.
             StoreOutcome::Outdated => self.begin_anew(id, actions),
             StoreOutcome::Failed(why) => {
+                if let Some(entry) = self.files.get_mut(file) {
+                    entry.half_written = true;
+                }
                 job.stage = JobStage::Finished(self.now + self.settings.retry_after);
                 let same = job.config == self.config;
                 self.notice(Notice::NotWritten(why), actions);
@@ -143,7 +146,7 @@ impl State {
         self.rate.note(self.now);
         if let Some(entry) = self.files.get_mut(file) {
             let before = entry.judged.replace(judged.clone());
-            entry.shut = false;
+            (entry.shut, entry.half_written) = (false, false);
             let (path, fresh) = (entry.path.clone(), true);
             let doubted = entry.doubted && judged.verdict == Verdict::Accepted;
             let (gated, told, now) = (path.clone(), judged.clone(), judged);
@@ -182,6 +185,9 @@ impl State {
             JobStage::Checking => self.cancel_shares(id, &job, actions),
         }
         actions.push(Action::Release { job: id });
+        if job.prepared.is_some() {
+            self.let_one_in();
+        }
         self.files.set_stage(job.file, Stage::Idle);
         self.map_is_over(job.file);
         let Some(entry) = self.files.get(job.file) else {

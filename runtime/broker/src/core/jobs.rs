@@ -19,6 +19,9 @@ use super::{Actions, State};
 /// Between two notices that there is no room, or that files cannot be read for now.
 const ROOM_NOTICE_PAUSE: Duration = Duration::from_secs(10);
 
+/// Files without a place on the bus of which each is tried again in every pause.
+const TRIED_AT_ONCE: usize = 8;
+
 /// A job in flight.
 #[derive(Debug)]
 pub(super) struct ActiveJob {
@@ -154,7 +157,7 @@ impl State {
         if let Some(judged) = &entry.judged {
             let known = judged.inputs.first().and_then(|root| root.content.stamp());
             let same_bytes = !judged.racy && !entry.doubted && known == Some(entry.stamp);
-            if same_bytes && self.stands(entry.kind, judged) {
+            if same_bytes && !entry.half_written && self.stands(entry.kind, judged) {
                 let judged = judged.clone();
                 self.confirm(id, &judged, actions);
                 self.settle_waits(id, actions);
@@ -222,7 +225,8 @@ impl State {
             }
             Err(PrepareFailure::Busy) => {
                 let why = "as many documents as the bus carries at once are in use";
-                self.wait_for_room(id, why, self.settings.busy_pause, actions);
+                let pause = self.settings.busy_pause * self.stand_in_line(id);
+                self.wait_for_room(id, why, pause, actions);
             }
             Err(PrepareFailure::Unreadable(reason)) => self.not_read(id, reason, actions),
             Err(PrepareFailure::Moment(reason)) => self.hindered(id, reason, actions),
@@ -264,6 +268,32 @@ impl State {
         }
         let reason = format!("{why}; nothing became free for {} seconds", limit.as_secs());
         self.not_read(id, reason, actions);
+    }
+
+    /// The file is tried again when a place on the bus becomes free, one file for each; gives the pauses
+    /// after which it is tried anyway, more the longer the line is, because to try is to read.
+    fn stand_in_line(&mut self, id: JobId) -> u32 {
+        let file = self.jobs.get(&id).map(|job| job.file);
+        if let Some((file, entry)) = file.and_then(|id| Some((id, self.files.get_mut(id)?)))
+            && !std::mem::replace(&mut entry.in_line, true)
+        {
+            self.crowded.push_back(file);
+        }
+        u32::try_from(self.crowded.len() / TRIED_AT_ONCE + 1).unwrap_or(u32::MAX)
+    }
+
+    /// A place on the bus has become free.
+    pub(super) fn let_one_in(&mut self) {
+        while let Some(id) = self.crowded.pop_front() {
+            let Some(entry) = self.files.get_mut(id) else {
+                continue;
+            };
+            entry.in_line = false;
+            if matches!(entry.stage(), Stage::Waiting(..)) && entry.not_before > self.now {
+                entry.not_before = self.now;
+                return;
+            }
+        }
     }
 
     /// Whether the file was read as it is now, and judged.
@@ -333,7 +363,7 @@ impl State {
             self.end_job(id, actions);
             return;
         }
-        let (old, anew) = (entry.judged.clone(), entry.anew);
+        let (old, anew) = (entry.judged.clone(), entry.anew || entry.half_written);
         self.depend(file, &prepared.inputs, actions);
         let same = |judged: &Judged| judged.basis == prepared.basis && !anew;
         match old {

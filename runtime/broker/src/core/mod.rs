@@ -104,6 +104,11 @@ pub struct State {
     /// Until then nobody need be told again that there is no room.
     mute_room_until: Duration,
     mute_hindered_until: Duration,
+    /// Files for which the bus had no place, in their order: with each job that ends one is tried again.
+    crowded: VecDeque<files::FileId>,
+    /// Files that have gone, and how often that is to be written to the journal: until it is, no reporter takes back
+    /// what the journal knows him to have said.
+    withdrawing: BTreeMap<Arc<Path>, u32>,
     /// Since when there has been no room for anything while nothing moved.
     stuck_since: Option<Duration>,
 }
@@ -157,6 +162,8 @@ impl State {
             judged_once: false,
             mute_room_until: Duration::ZERO,
             mute_hindered_until: Duration::ZERO,
+            crowded: VecDeque::new(),
+            withdrawing: BTreeMap::new(),
             stuck_since: None,
         };
         state.begin_epoch();
@@ -200,6 +207,7 @@ impl State {
             Event::Scanned => self.scanned(&mut actions),
             Event::Prepared { job, result } => self.prepared(job, result, &mut actions),
             Event::Stored { job, outcome } => self.stored(job, outcome, &mut actions),
+            Event::Withdrawn { path } => self.withdrawn(&path, &mut actions),
             Event::Hello { session, hello } => self.hello(session, &hello, &mut actions),
             Event::Message { session, message } => match self.sessions.get(&session).cloned() {
                 Some((Role::Bundle, name)) => self.bundle_says(&name, message, &mut actions),
@@ -320,13 +328,18 @@ impl State {
         self.expire_waits(actions);
     }
 
-    /// Everything that the verdict on a file depends on, as it was read.
+    /// Everything that the verdict on a file depends on, as it was read: the one that is on its way, or the last.
     pub fn inputs_of(&self, path: &Path) -> Vec<Input> {
-        let entry = self.files.id(path).and_then(|id| self.files.get(id));
-        let judged = entry.and_then(|entry| entry.judged.as_ref());
-        judged
-            .map(|judged| judged.inputs.clone())
-            .unwrap_or_default()
+        let Some(entry) = self.files.id(path).and_then(|id| self.files.get(id)) else {
+            return Vec::new();
+        };
+        let job = match entry.stage() {
+            files::Stage::Active(job) => self.jobs.get(job),
+            _ => None,
+        };
+        let coming = job.and_then(|job| Some(&job.prepared.as_ref()?.inputs));
+        let last = entry.judged.as_ref().map(|judged| &judged.inputs);
+        coming.or(last).cloned().unwrap_or_default()
     }
 
     fn notice(&mut self, notice: Notice, actions: &mut Actions) {

@@ -81,6 +81,14 @@ impl Desk {
     }
 
     fn vanish(&mut self) -> Vec<Action> {
+        let mut actions = self.vanish_unrecorded();
+        let path = self.path.clone();
+        actions.extend(self.event(Event::Withdrawn { path }));
+        actions
+    }
+
+    /// It has gone, and the journal does not know it yet.
+    fn vanish_unrecorded(&mut self) -> Vec<Action> {
         let path = self.path.clone();
         self.event(Event::Vanished { path })
     }
@@ -148,6 +156,33 @@ fn a_reporter_that_is_there_is_told_at_once() {
     assert!(actions.iter().any(named), "the journal knows: {actions:?}");
     assert!(is_over(&desk.say(session, withdrawn())));
     assert!(!is_over(&desk.say(session, withdrawn())), "only once");
+}
+
+/// Were the broker killed in between, the next one would take the report for there.
+#[test]
+fn nothing_is_taken_back_that_the_journal_knows_to_be_there() {
+    let mut desk = Desk::new(true);
+    let (session, _) = desk.join();
+    let actions = desk.vanish_unrecorded();
+    assert!(!is_told(&actions), "{actions:?}");
+    // It comes back, and goes again.
+    let path = desk.path.clone();
+    let stamp = Stamp::default();
+    let actions = desk.event(Event::Settled { path, stamp });
+    let [Action::Prepare { job, .. }] = actions[..] else {
+        panic!("{actions:?}");
+    };
+    desk.vanish_unrecorded();
+    let result = Err(PrepareFailure::Vanished);
+    desk.event(Event::Prepared { job, result });
+    let path = desk.path.clone();
+    let once = desk.event(Event::Withdrawn { path: path.clone() });
+    assert!(
+        !is_told(&once),
+        "the second time may still be lost: {once:?}"
+    );
+    assert!(is_told(&desk.event(Event::Withdrawn { path })));
+    assert!(is_over(&desk.say(session, withdrawn())));
 }
 
 #[test]

@@ -10,7 +10,7 @@ use qcbus_messages::{FromPeer, Hello, JobId, Role, ToPeer};
 
 use super::action::Action;
 use super::delivering::Sent;
-use super::files::FileId;
+use super::files::{FileId, Files};
 use super::notice::Notice;
 use super::types::{Launch, Reported, SessionId};
 use super::{Actions, State};
@@ -49,11 +49,15 @@ impl Reporter {
     }
 
     /// Takes the next file out of the queue. A file of which a result is under way waits for its
-    /// turn: results are read back side by side, and the older one must not come last.
-    pub fn next_in_queue(&mut self) -> Option<FileId> {
+    /// turn: results are read back side by side, and the older one must not come last. So does one whose former
+    /// report is still to be taken back.
+    pub fn next_in_queue(&mut self, files: &Files) -> Option<FileId> {
         let under_way = |file: &FileId| {
             self.active.values().any(|sent| sent.file == *file)
                 || self.finishing.values().any(|begun| begun.contains(file))
+                || files
+                    .get(*file)
+                    .is_some_and(|it| self.void.contains(&it.path))
         };
         let at = self.queue.iter().position(|file| !under_way(file))?;
         self.queue.remove(at)

@@ -57,7 +57,7 @@ pub struct Settings {
     /// A file for which there is no room is waited for so long without anything moving; then it is
     /// undetermined, and tried again as what cannot be read is.
     pub room_limit: Duration,
-    /// Pause before a file is tried again for which the bus had no place.
+    /// Pause before a file is tried again for which the bus had no place, unless a place becomes free before.
     pub busy_pause: Duration,
     /// First pause before a file is read again that something which passes kept from being read; it
     /// doubles up to the pause after which a verdict says so.
@@ -100,7 +100,7 @@ impl Default for Settings {
             max_text: 8 << 10,
             retry_after: Duration::from_secs(1),
             room_limit: Duration::from_secs(60),
-            busy_pause: Duration::from_millis(20),
+            busy_pause: Duration::from_millis(250),
             moment_pause: Duration::from_millis(125),
             moment_pause_max: Duration::from_secs(4),
             read_again_after: Duration::from_secs(60),

@@ -117,7 +117,7 @@ impl Broker {
 
     /// A client that asks must not be told what was true a moment ago: changes of dependencies
     /// that the watcher has not come to yet are seen here.
-    fn take_in(&mut self, moved: Vec<(Arc<Path>, Option<Stamp>)>) {
+    pub(super) fn take_in(&mut self, moved: Vec<(Arc<Path>, Option<Stamp>)>) {
         for (path, stamp) in moved {
             let event = match stamp {
                 Some(stamp) => Event::Touched { path, stamp },
@@ -201,11 +201,6 @@ impl Broker {
             why: why.clone(),
         };
         // Whoever asks wants to see where to look, and no answer of any length.
-        let unseen = self.unseen.iter().take(UNSEEN_SHOWN).map(unseen);
-        self.looking
-            .takes_long()
-            .into_iter()
-            .chain(unseen)
-            .collect()
+        self.unseen.iter().take(UNSEEN_SHOWN).map(unseen).collect()
     }
 }

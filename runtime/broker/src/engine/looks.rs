@@ -25,6 +25,8 @@ pub(super) struct Looks {
     scouts: Scouts,
     /// Files that did not answer when they were last asked for.
     hanging: BTreeSet<PathBuf>,
+    /// Where the one who looks for changes waits.
+    keeps_waiting: Option<PathBuf>,
     /// Who waits for a look at a file, by the number of the scout.
     pending: HashMap<u64, Look>,
     /// Files that have gone while somebody waits for them, which are looked at once more.
@@ -38,6 +40,7 @@ impl Default for Looks {
             scouts: Scouts::new(lookout.clone(), PATIENCE),
             lookout,
             hanging: BTreeSet::new(),
+            keeps_waiting: None,
             pending: HashMap::new(),
             missed: HashMap::new(),
         }
@@ -64,13 +67,16 @@ pub(super) struct Look {
     pub is_led: bool,
 }
 
+/// A file that is not what it was; `None` when it has gone.
+type Changed = (Arc<Path>, Option<Stamp>);
+
 /// What a scout has seen.
 pub(super) struct Sighted {
     /// The file as it is watched: a link from elsewhere to a watched file means that file.
     pub file: PathBuf,
     pub stamp: Option<Stamp>,
     /// Those of the files that its verdict depends on which are not what they were.
-    pub inputs: Vec<(Arc<Path>, Option<Stamp>)>,
+    pub inputs: Vec<Changed>,
     /// Why nobody watches it.
     pub unwatched: Option<String>,
 }
@@ -85,8 +91,11 @@ enum Seen {
     /// The path means another file.
     Elsewhere(PathBuf),
     Sighted(Sighted),
-    /// What there is of a file that was missed.
-    Again(Option<Stamp>),
+    /// What there is of a file that was missed, and what its verdict depends on that is not what it was.
+    Again {
+        stamp: Option<Stamp>,
+        inputs: Vec<Changed>,
+    },
 }
 
 impl Broker {
@@ -115,9 +124,12 @@ impl Broker {
     /// that it has gone.
     pub(super) fn look_whether_it_is_back(&mut self, path: Arc<Path>) -> bool {
         let (at, roots) = (path.clone(), self.options.roots.clone());
+        let inputs = self.state.inputs_of(&path).into_iter().skip(1).collect();
         let scout = self.scout(move || {
             let stamp = stamp_of(&at).ok().flatten();
-            Seen::Again(stamp.filter(|_| is_looked_at(&roots, &at)))
+            let stamp = stamp.filter(|_| is_looked_at(&roots, &at));
+            let inputs = moved(inputs);
+            Seen::Again { stamp, inputs }
         });
         match scout {
             Ok(scout) => {
@@ -171,8 +183,9 @@ impl Broker {
     }
 
     pub(super) fn looked(&mut self, looked: Looked) -> bool {
-        if let Seen::Again(stamp) = looked.seen {
+        if let Seen::Again { stamp, inputs } = looked.seen {
             let path = self.looks.missed.remove(&looked.scout);
+            self.take_in(inputs);
             return path.is_none_or(|path| self.missed(path, stamp));
         }
         // Given up, and answered, if it is not there.
@@ -189,7 +202,7 @@ impl Broker {
                 })
             }
             Seen::Sighted(seen) => self.wait(look, seen),
-            Seen::Again(_) => true,
+            Seen::Again { .. } => true,
         }
     }
 
@@ -204,13 +217,19 @@ impl Broker {
         }
         let before = std::mem::take(&mut self.looks.hanging);
         self.looks.hanging.extend(hanging);
+        let hanging = &self.looks.hanging;
+        self.looks.keeps_waiting.take_if(|it| !hanging.contains(it));
         for path in before.difference(&self.looks.hanging) {
             self.unseen.remove(path);
         }
         for path in self.looks.hanging.clone().difference(&before) {
             let seconds = PATIENCE.as_secs();
+            let further = match self.looks.keeps_waiting.as_ref() == Some(path) {
+                true => "; what else changes is not noticed until it answers or is unmounted",
+                false => "",
+            };
             let why = format!(
-                "the system has not answered for {seconds} s; is its disk or server there?"
+                "the system has not answered for {seconds} s; is its disk or server there?{further}"
             );
             let path = path.clone();
             self.unseen(Unseen { path, why });
@@ -218,19 +237,23 @@ impl Broker {
     }
 
     fn give_up(&mut self, overdue: &Overdue) {
+        let Some(owner) = overdue.owner else {
+            self.looks.keeps_waiting = Some(overdue.path.clone());
+            return;
+        };
         let (path, seconds) = (to_text(&overdue.path), overdue.waited.as_secs());
         let reason = format!("read {path}: the system has not answered for {seconds} s");
-        if let Some(look) = self.looks.pending.remove(&overdue.owner) {
+        if let Some(look) = self.looks.pending.remove(&owner) {
             // As when no verdict came in time: there is none, and nothing of the question is wrong.
             let _ = look.answer.send(Response::Unanswered { reason });
             return;
         }
-        if let Some(path) = self.looks.missed.remove(&overdue.owner) {
+        if let Some(path) = self.looks.missed.remove(&owner) {
             self.missed(path, None);
             return;
         }
         self.handle(Event::Prepared {
-            job: JobId(overdue.owner),
+            job: JobId(owner),
             result: Err(PrepareFailure::Moment(reason)),
         });
     }
@@ -251,7 +274,7 @@ fn meant(file: &Path, places: &ResultPaths, roots: &[PathBuf]) -> Option<PathBuf
     is_looked_at(roots, &real).then_some(real)
 }
 
-fn moved(inputs: Vec<Input>) -> Vec<(Arc<Path>, Option<Stamp>)> {
+fn moved(inputs: Vec<Input>) -> Vec<Changed> {
     let now = inputs.into_iter().map(|input| {
         let now = stamp_through_links(&input.path);
         (now != input.content.stamp()).then_some((input.path, now))

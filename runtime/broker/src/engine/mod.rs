@@ -20,7 +20,6 @@ use std::time::{Duration, Instant};
 use looks::{Looked, Looks};
 use qcbus_bus::{HostEvent, PeerId, Process, StartError as BusError};
 use qcbus_messages::control::{Response, Unseen};
-use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Hello, JobId, ToPeer};
 use tokio::sync::{mpsc, oneshot};
 
@@ -36,7 +35,7 @@ use crate::reload::{LoadError, Loaded, Sources};
 use crate::seams::{Children, ControlSocket, Host, now, spawn_blocking};
 use crate::stages::reached;
 use crate::store::Store;
-use crate::watch::{Looking, Seen, Watcher};
+use crate::watch::{Seen, Watcher};
 use crate::writers::Writers;
 
 /// Why a broker cannot start.
@@ -116,9 +115,6 @@ pub struct Broker {
     loaded: Loaded,
     in_force: Arc<InForce>,
     watcher: Option<Watcher>,
-    looking: Arc<Looking>,
-    /// Where a look takes long, as it was said.
-    takes_long: Option<PathBuf>,
     watch_mode: String,
     /// What could not be looked at, and why.
     unseen: BTreeMap<PathBuf, String>,
@@ -270,7 +266,6 @@ impl Broker {
                 next_reload = now() + RELOAD_INTERVAL;
                 self.reload_if_changed(&mut fingerprint);
                 self.forget_clients();
-                self.say_what_takes_long();
                 self.notify_watchdog();
                 self.children.look_for_orphans();
             }
@@ -461,19 +456,6 @@ impl Broker {
     fn unseen(&mut self, unseen: Unseen) {
         self.unseen.insert(unseen.path.clone(), unseen.why.clone());
         self.say(Notice::Unseen(unseen));
-    }
-
-    /// A look that does not end is said once, and by every status while it lasts.
-    fn say_what_takes_long(&mut self) {
-        let now = self.looking.takes_long();
-        if let Some(it) = now
-            .as_ref()
-            .filter(|it| Some(&it.path) != self.takes_long.as_ref())
-        {
-            let path = to_text(&it.path);
-            self.say(Notice::Watching(format!("{path}: {}", it.why)));
-        }
-        self.takes_long = now.map(|it| it.path);
     }
 
     fn say(&mut self, notice: Notice) {

@@ -32,7 +32,7 @@ use crate::seams::{Children, ControlSocket, Host, now, spawn_blocking};
 use crate::stamp::stamp_of;
 use crate::store::{Reconciled, Store, remove_earlier_results};
 use crate::supervise::Surroundings;
-use crate::watch::{Looking, Seen, WatchOptions, Watcher, is_looked_at, scan_directory};
+use crate::watch::{Seen, WatchOptions, Watcher, is_looked_at, scan_directory};
 use crate::writers::{Order, Writers};
 use qcbus_disk::sweep;
 
@@ -78,8 +78,6 @@ impl Broker {
             loaded,
             in_force,
             watcher: None,
-            looking: Arc::default(),
-            takes_long: None,
             watch_mode: "once".to_owned(),
             unseen: BTreeMap::new(),
             looks,
@@ -151,7 +149,7 @@ impl Broker {
                 poll: self.options.poll,
                 rescan: self.options.rescan,
             };
-            let watcher = Watcher::start(options, self.looking.clone(), move |what| {
+            let watcher = Watcher::start(options, self.looks.lookout(), move |what| {
                 // After the end of the loop nobody listens.
                 let _ = seen.send(what);
             });
@@ -161,8 +159,11 @@ impl Broker {
             return Ok(());
         }
         let (roots, files) = (self.options.roots.clone(), self.options.files.clone());
-        let looking = self.looking.clone();
-        spawn_blocking(move || look_once(&roots, &files, &looking, &seen));
+        let lookout = self.looks.lookout();
+        spawn_blocking(move || {
+            let _attendance = lookout.attend_for_good();
+            look_once(&roots, &files, &seen);
+        });
         Ok(())
     }
 }
@@ -359,16 +360,11 @@ fn children(
     Ok(Children::new(surroundings, launches, generation, events))
 }
 
-fn look_once(
-    roots: &[PathBuf],
-    files: &[PathBuf],
-    looking: &Looking,
-    seen: &mpsc::UnboundedSender<Seen>,
-) {
+fn look_once(roots: &[PathBuf], files: &[PathBuf], seen: &mpsc::UnboundedSender<Seen>) {
     // The loop may have been told to quit meanwhile; then nobody listens.
     let tell = |what| drop(seen.send(what));
     for root in roots {
-        let found = scan_directory(root, roots, looking);
+        let found = scan_directory(root, roots);
         for unseen in found.unseen {
             tell(Seen::Unseen(unseen));
         }
@@ -378,7 +374,7 @@ fn look_once(
     }
     for file in files {
         let path = file.clone();
-        let why = match looking.at(file, || stamp_of(file)) {
+        let why = match stamp_of(file) {
             Ok(Some(stamp)) => {
                 tell(Seen::Settled(path.into(), stamp));
                 continue;

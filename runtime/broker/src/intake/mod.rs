@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use qcbus_bus::{Documents, Held, Loan, LoanError};
+use qcbus_disk::foreign;
 use qcbus_document::{Document, FileKind};
 use qcbus_ingest::modular::{ExpandedImage, SearchPath};
 use qcbus_ingest::{BuildError, Limits, Prepared, Reader, Walking};
@@ -98,6 +99,7 @@ impl Intake {
         path: &Path,
         asked: Instant,
     ) -> Result<Box<PreparedJob>, PrepareFailure> {
+        let _behalf = foreign::on_behalf_of(path);
         let reader = RefCell::new(Reader::new(self.limits));
         let root = self
             .publish_fresh(&reader, path)

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
+use qcbus_disk::foreign;
 use qcbus_messages::DocId;
 
 use crate::seams::now;
@@ -24,11 +25,14 @@ const LARGE: usize = 512 << 10;
 #[derive(Debug, Default)]
 pub(super) struct Shared(Mutex<Slots>);
 
+/// A document as somebody may see it: what it includes may be open to the one and not to the other.
+type Key = (Option<foreign::Reader>, PathBuf);
+
 #[derive(Debug, Default)]
 struct Slots {
-    by_path: HashMap<PathBuf, Arc<Slot>>,
+    by_path: HashMap<Key, Arc<Slot>>,
     /// Those that are kept, by size; the one that was asked for last is at the end.
-    order: [VecDeque<PathBuf>; 2],
+    order: [VecDeque<Key>; 2],
 }
 
 /// A document's place. It is locked while the document is read, so that whoever wants the same one
@@ -64,10 +68,11 @@ impl Shared {
         asked: Instant,
         read: impl FnOnce(Option<&Published>) -> Result<Published, E>,
     ) -> Result<Published, E> {
-        let slot = lock(&self.0).slot(path);
+        let key = &(foreign::reader(), path.to_path_buf());
+        let slot = lock(&self.0).slot(key);
         let mut kept = lock(&slot);
         if let Some(kept) = kept.as_ref().filter(|kept| kept.counts(asked)) {
-            lock(&self.0).keep(path, &slot, &kept.published);
+            lock(&self.0).keep(key, &slot, &kept.published);
             return Ok(kept.published.clone());
         }
         let begun = now();
@@ -76,13 +81,13 @@ impl Shared {
         let published = read(before.as_ref().map(|before| &before.published));
         match &published {
             Ok(published) => {
-                lock(&self.0).keep(path, &slot, published);
+                lock(&self.0).keep(key, &slot, published);
                 *kept = Some(Kept {
                     published: published.clone(),
                     begun,
                 });
             }
-            Err(_) => lock(&self.0).remove(path),
+            Err(_) => lock(&self.0).remove(key),
         }
         published
     }
@@ -91,49 +96,52 @@ impl Shared {
     /// `false`: there is none.
     pub(super) fn make_room(&self, is_used: impl Fn(DocId) -> bool) -> bool {
         let mut slots = lock(&self.0);
-        let unused = slots.order.iter().flatten().find(|path| {
+        let unused = slots.order.iter().flatten().find(|key| {
             // One that is locked is being read, perhaps by who asks for room. Nobody may be waited for
             // here: whoever has the lock may be waiting for the slots. Who asks for it after this reads
             // it anew.
-            let slot = slots.by_path.get(*path);
+            let slot = slots.by_path.get(*key);
             let Some(mut kept) = slot.and_then(|slot| slot.try_lock().ok()) else {
                 return false;
             };
             kept.take_if(|kept| !is_used(kept.published.doc)).is_some()
         });
-        let Some(path) = unused.cloned() else {
+        let Some(key) = unused.cloned() else {
             return false;
         };
-        slots.remove(&path);
+        slots.remove(&key);
         true
     }
 
     /// When the bytes of a document that is kept were last begun to be read.
     #[cfg(test)]
     pub(super) fn begun(&self, path: &Path) -> Option<Instant> {
-        let slot = lock(&self.0).by_path.get(path).cloned()?;
+        let slot = lock(&self.0)
+            .by_path
+            .get(&(None, path.to_path_buf()))
+            .cloned()?;
         let kept = lock(&slot);
         kept.as_ref().map(|kept| kept.begun)
     }
 }
 
 impl Slots {
-    fn slot(&mut self, path: &Path) -> Arc<Slot> {
-        if let Some(slot) = self.by_path.get(path) {
+    fn slot(&mut self, key: &Key) -> Arc<Slot> {
+        if let Some(slot) = self.by_path.get(key) {
             return slot.clone();
         }
         let slot = Arc::new(Slot::default());
-        self.by_path.insert(path.to_path_buf(), slot.clone());
+        self.by_path.insert(key.clone(), slot.clone());
         slot
     }
 
     /// Remembers that a document was asked for, and lets go of those that were not for longest.
-    fn keep(&mut self, path: &Path, slot: &Arc<Slot>, published: &Published) {
-        self.forget_order(path);
+    fn keep(&mut self, key: &Key, slot: &Arc<Slot>, published: &Published) {
+        self.forget_order(key);
         // It may have been pushed out while it was read.
-        self.by_path.insert(path.to_path_buf(), slot.clone());
+        self.by_path.insert(key.clone(), slot.clone());
         let class = usize::from(published.held.len() > LARGE);
-        self.order[class].push_back(path.to_path_buf());
+        self.order[class].push_back(key.clone());
         while self.order[class].len() > KEPT[class] {
             if let Some(oldest) = self.order[class].pop_front() {
                 self.by_path.remove(&oldest);
@@ -141,14 +149,14 @@ impl Slots {
         }
     }
 
-    fn remove(&mut self, path: &Path) {
-        self.forget_order(path);
-        self.by_path.remove(path);
+    fn remove(&mut self, key: &Key) {
+        self.forget_order(key);
+        self.by_path.remove(key);
     }
 
-    fn forget_order(&mut self, path: &Path) {
+    fn forget_order(&mut self, key: &Key) {
         for order in &mut self.order {
-            order.retain(|other| other != path);
+            order.retain(|other| other != key);
         }
     }
 }

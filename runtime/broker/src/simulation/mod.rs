@@ -97,6 +97,16 @@ impl Simulation {
         }
     }
 
+    /// Whether the disk does not do what it is told to this time. While a broker starts it does.
+    pub fn disk_breaks(&self) -> bool {
+        let mut world = self.world();
+        let breaks = world.meddles && world.serving.is_some() && world.rng.u32(0..40) == 0;
+        if breaks {
+            world.say(|| "  the disk does not answer".to_owned());
+        }
+        breaks
+    }
+
     pub fn images(&self, job: JobId) -> Vec<(DocId, Held)> {
         let intake = self.world().serving.as_ref().map(|it| it.intake.clone());
         intake.map(|it| it.images(job)).unwrap_or_default()

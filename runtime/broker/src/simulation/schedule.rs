@@ -37,6 +37,10 @@ pub struct Figures {
     pub virtual_seconds: f64,
 }
 
+/// Half seconds until everything has settled, at most. A look through everything during which the clock jumped by a
+/// minute or two is followed by the next one after four times as long.
+const ROUNDS: usize = 1_200;
+
 /// Steps to rest, at most: beyond that nothing comes to rest.
 const MOST_STEPS: usize = 30_000;
 
@@ -409,7 +413,7 @@ impl Play {
             self.start();
         }
         let mut last = Ok(());
-        for round in 0..240 {
+        for round in 0..ROUNDS {
             self.come_to_rest()?;
             // It must stay so for a while, and to look costs more than to wait.
             if round > 3 {

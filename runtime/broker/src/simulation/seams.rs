@@ -1,6 +1,7 @@
 //! What the broker takes from the system, taken from the simulation where one runs: tests without one
 //! have the system's.
 
+use std::io;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -55,6 +56,15 @@ pub fn step(what: &'static str, path: &Path) {
     } else {
         task.stop(State::Ready);
         here.simulation.goes_on(what, path);
+    }
+}
+
+/// What the disk answers to who is about to write: now and then that it is broken.
+pub fn disk() -> io::Result<()> {
+    let is_broken = here().is_some_and(|it| it.task.is_some() && it.simulation.disk_breaks());
+    match is_broken {
+        true => Err(io::Error::from(rustix::io::Errno::IO)),
+        false => Ok(()),
     }
 }
 

@@ -23,7 +23,7 @@ use crate::gate::Gate;
 use crate::journal::{Entry, History, Journal, JournalError, Remembered, Void};
 use crate::result_paths::ResultPaths;
 use crate::scouts::Scouts;
-use crate::seams::step;
+use crate::seams::{disk, step};
 use crate::stages::reached;
 use crate::stamp::stamp_of;
 use crate::verdict_file;
@@ -186,6 +186,7 @@ impl Store {
         let text = xqar::write(&pooled.results, self.dialect);
         let xqar = self.places.xqar(&job.path);
         let result = (&*xqar, text.as_bytes());
+        disk().map_err(|error| unwritten(&xqar, &error))?;
         if !self.verdict_files {
             let written = write_whole(result.0, result.1, self.durable);
             written.map_err(|error| unwritten(&xqar, &error))?;
@@ -239,6 +240,7 @@ impl Store {
     /// # Errors
     /// What a person should know; the entries are not written then.
     pub fn record(&self, entries: &[Entry]) -> Result<(), String> {
+        disk().map_err(|error| format!("the journal cannot be written: {error}"))?;
         let written = self.journal().write(entries);
         written.map_err(|error| error.to_string())
     }

@@ -8,7 +8,7 @@ use qcbus_messages::path_text::to_text;
 
 use super::{Store, Trouble};
 use crate::journal::Entry;
-use crate::seams::step;
+use crate::seams::{disk, step};
 use qcbus_disk::remove;
 
 impl Store {
@@ -36,8 +36,10 @@ impl Store {
             gate.forget(path)?;
             step("closed", path);
         }
+        disk()?;
         remove(&self.places.xqar(path))?;
         step("half withdrawn", path);
+        disk()?;
         remove(&self.places.verdict(path))
     }
 }

@@ -9,7 +9,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::looking::Looking;
+use qcbus_disk::foreign;
+
 use super::tree::below;
 use crate::core::Stamp;
 use crate::stamp::stamp_through_links;
@@ -29,8 +30,6 @@ pub struct Dependencies {
     told: BTreeMap<Arc<Path>, Option<Stamp>>,
     /// The last of `told` that was looked at: the others have their turn after it.
     last: Option<Arc<Path>>,
-    /// Says where the look is: they may lie anywhere.
-    looking: Arc<Looking>,
 }
 
 #[derive(Debug)]
@@ -44,21 +43,30 @@ struct Polled {
 pub type Changed = (Arc<Path>, Option<Stamp>);
 
 impl Dependencies {
-    /// None yet; `looking` says where the look at them is.
-    pub fn new(looking: Arc<Looking>) -> Dependencies {
-        Dependencies {
-            looking,
-            ..Dependencies::default()
-        }
-    }
-
-    /// Adds files, each with the stamp under which it was read: a change since then is one, too.
-    pub fn add(&mut self, files: Vec<(Arc<Path>, Option<Stamp>)>) {
+    /// Adds files, each with the stamp under which it was read: a change since then is one, too. Returns what to tell
+    /// of those that are there already and were read as something else than was last seen of them: it may have come
+    /// and gone since, so that a look finds nothing new, and whoever read it earlier may not have been told.
+    pub fn add(&mut self, files: Vec<(Arc<Path>, Option<Stamp>)>) -> Vec<Changed> {
+        let mut changed = Vec::new();
         for (path, stamp) in files {
-            if !self.contains(&path) {
-                self.poll(path, stamp);
+            match self.seen(&path) {
+                None => self.poll(path, stamp),
+                Some(seen) if seen == stamp => {}
+                Some(seen) => {
+                    let now = look_through(&path, seen);
+                    self.remove(std::slice::from_ref(&path));
+                    self.poll(path.clone(), now);
+                    changed.push((path, now));
+                }
             }
         }
+        changed
+    }
+
+    /// The stamp that was last seen of a file; the outer `None`: nothing depends on it.
+    fn seen(&self, path: &Path) -> Option<Option<Stamp>> {
+        let polled = self.polled.get(path).map(|polled| polled.stamp);
+        polled.or_else(|| self.told.get(path).copied())
     }
 
     /// Forgets files on which nothing depends any more.
@@ -71,7 +79,7 @@ impl Dependencies {
 
     /// Whether some verdict depends on it.
     pub fn contains(&self, path: &Path) -> bool {
-        self.polled.contains_key(path) || self.told.contains_key(path)
+        self.seen(path).is_some()
     }
 
     /// Looks at a file out of turn, because of an event; `None` when it is what it was, or nothing
@@ -80,7 +88,7 @@ impl Dependencies {
         let polled = self.polled.remove_entry(path);
         let polled = polled.map(|(path, polled)| (path, polled.stamp));
         let (path, seen) = polled.or_else(|| self.told.remove_entry(path))?;
-        let stamp = self.looking.at(&path, || stamp_through_links(&path));
+        let stamp = look_through(&path, seen);
         self.poll(path.clone(), stamp);
         (stamp != seen).then_some((path, stamp))
     }
@@ -116,7 +124,7 @@ impl Dependencies {
                     told.push(path.clone());
                 }
             }
-            let stamp = self.looking.at(path, || stamp_through_links(path));
+            let stamp = look_through(path, polled.stamp);
             if stamp != polled.stamp {
                 polled.stamp = stamp;
                 polled.asked = false;
@@ -143,7 +151,7 @@ impl Dependencies {
             .collect();
         self.last = due.last().map(|(path, _)| path.clone());
         let look = |(path, seen): Changed| {
-            let stamp = self.looking.at(&path, || stamp_through_links(&path));
+            let stamp = look_through(&path, seen);
             (stamp != seen).then_some((path, stamp))
         };
         let changed: Vec<Changed> = due.into_iter().filter_map(look).collect();
@@ -158,6 +166,12 @@ impl Dependencies {
     fn counts(&self) -> [usize; 2] {
         [self.polled.len(), self.told.len()]
     }
+}
+
+/// The stamp as it is now; as it was, where others wait for an answer in vain.
+fn look_through(path: &Path, seen: Option<Stamp>) -> Option<Stamp> {
+    let stamp = foreign::visit(path, || Ok(stamp_through_links(path)));
+    stamp.unwrap_or(seen)
 }
 
 /// Whether the kernel tells of every change of a file whose directory is watched. It does not of
@@ -186,6 +200,22 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let root = dir.path().canonicalize().unwrap();
         (dir, root)
+    }
+
+    #[test]
+    fn what_came_was_read_and_went_before_it_was_looked_at_is_told() {
+        let (_dir, root) = farm();
+        let part = shared(&root.join("part.xml"));
+        let mut all = Dependencies::default();
+        assert_eq!(all.add(vec![(part.clone(), None)]), []);
+        assert_eq!(all.changed(|_| false), []);
+        std::fs::write(&part, "1").unwrap();
+        let read = stamp_through_links(&part);
+        std::fs::remove_file(&part).unwrap();
+        // Who read it rests on what is not there, and a look finds what it found before.
+        assert_eq!(all.add(vec![(part.clone(), read)]), [(part.clone(), None)]);
+        assert_eq!(all.changed(|_| false), []);
+        assert_eq!(all.counts(), [1, 0]);
     }
 
     #[test]

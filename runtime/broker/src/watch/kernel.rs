@@ -2,7 +2,6 @@
 
 use std::ffi::{OsStr, OsString};
 use std::io;
-use std::mem::MaybeUninit;
 use std::os::fd::OwnedFd;
 use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
@@ -77,7 +76,7 @@ impl Kernel {
     /// # Errors
     /// What the system says when it gives none that are there.
     pub fn events(&self) -> io::Result<Vec<Told>> {
-        let mut buffer = vec![MaybeUninit::uninit(); AT_ONCE];
+        let mut buffer = Box::new_uninit_slice(AT_ONCE);
         let mut reader = Reader::new(&self.0, &mut buffer);
         let mut events = Vec::new();
         loop {

@@ -13,7 +13,6 @@ use qcbus_messages::control::Unseen;
 use super::dependencies::{self, Changed, Dependencies, events_tell};
 use super::due::Due;
 use super::ignore::IgnoreRules;
-use super::looking::Looking;
 use super::roots::Roots;
 use super::scan::{MORE_UNSEEN, MOST_UNSEEN};
 use super::settle::Settling;
@@ -50,15 +49,10 @@ pub(super) struct Looker {
     pub tree: Tree,
     pub due: Due,
     pub polling: super::events::Polling,
-    pub looking: Arc<Looking>,
 }
 
 impl Looker {
-    pub fn new(
-        options: WatchOptions,
-        looking: Arc<Looking>,
-        tell: Box<dyn FnMut(Seen) + Send>,
-    ) -> Looker {
+    pub fn new(options: WatchOptions, tell: Box<dyn FnMut(Seen) + Send>) -> Looker {
         let rules = options
             .roots
             .iter()
@@ -74,12 +68,11 @@ impl Looker {
             unseen: BTreeMap::new(),
             is_more_unseen: false,
             settling: Settling::default(),
-            dependencies: Dependencies::new(looking.clone()),
+            dependencies: Dependencies::default(),
             roots: Roots::default(),
             tree: Tree::default(),
             due: Due::new(now()),
             polling: super::events::Polling::default(),
-            looking,
         }
     }
 
@@ -119,7 +112,7 @@ impl Looker {
         loop {
             match inbox.try_recv() {
                 Ok(Order::Stop) | Err(TryRecvError::Disconnected) => return false,
-                Ok(Order::Depend(files)) => self.dependencies.add(files),
+                Ok(Order::Depend(files)) => self.depend(files),
                 Ok(Order::Undepend(paths)) => self.dependencies.remove(&paths),
                 Ok(Order::Forget(path)) => self.forget(&path),
                 Ok(Order::Learn(path, stamp)) => drop(self.known.entry(path).or_insert(stamp)),
@@ -154,8 +147,7 @@ impl Looker {
         if self.roots.is_away(path) {
             return;
         }
-        let looking = self.looking.clone();
-        let sight = looking.at(path, || look_at(path, &self.options.roots));
+        let sight = look_at(path, &self.options.roots);
         step("looked", path);
         if sight == Sight::Nothing && self.is_root_gone(path) {
             return;
@@ -198,6 +190,12 @@ impl Looker {
         }
         if self.dependencies.contains(path) {
             (self.tell)(Seen::Touched(path.into(), stamp));
+        }
+    }
+
+    fn depend(&mut self, files: Vec<(Arc<Path>, Option<Stamp>)>) {
+        for changed in self.dependencies.add(files) {
+            self.tell_changed(changed);
         }
     }
 
@@ -287,8 +285,7 @@ impl Looker {
             self.last_link = turn.last().cloned();
         }
         for path in turn {
-            let looking = self.looking.clone();
-            match looking.at(&path, || look_at(&path, &self.options.roots)) {
+            match look_at(&path, &self.options.roots) {
                 Sight::File(stamp) if self.known.get(path.as_path()) == Some(&stamp) => {}
                 // It may still be written to.
                 Sight::File(stamp) => self.settling.seen(&path, stamp, now()),

@@ -12,7 +12,6 @@ mod events;
 mod ignore;
 pub mod kernel;
 mod looker;
-mod looking;
 mod roots;
 mod scan;
 mod settle;
@@ -26,6 +25,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
+use qcbus_disk::foreign::Lookout;
 use qcbus_document::FileKind;
 use qcbus_messages::control::Unseen;
 
@@ -35,14 +35,13 @@ use self::scan::scan;
 use crate::core::Stamp;
 use crate::seams::{Bell, Sender, channel, thread};
 
-pub use self::looking::Looking;
 pub use self::scan::Scan;
 pub use self::sight::is_behind_a_link;
 
 /// Every checkable file below a directory, once. `roots` are all the directories that are looked
-/// at, without symbolic links; `looking` says where the look is.
-pub fn scan_directory(directory: &Path, roots: &[PathBuf], looking: &Looking) -> Scan {
-    scan(directory, roots, &mut IgnoreRules::new(directory), looking)
+/// at, without symbolic links.
+pub fn scan_directory(directory: &Path, roots: &[PathBuf]) -> Scan {
+    scan(directory, roots, &mut IgnoreRules::new(directory))
 }
 
 /// Whether a file below one of the roots is ignored, by its name or a `.qcignore`.
@@ -121,23 +120,26 @@ impl Drop for Watcher {
 }
 
 impl Watcher {
-    /// Starts watching on a thread of its own; `tell` is called from there, and `looking`
-    /// says where it looks.
+    /// Starts watching on a thread of its own; `tell` is called from there, and `lookout`
+    /// sees where it waits.
     ///
     /// # Errors
     /// When no thread can be started, or there is no descriptor left to wake it.
     pub fn start(
         options: WatchOptions,
-        looking: Arc<Looking>,
+        lookout: Arc<Lookout>,
         tell: impl FnMut(Seen) + Send + 'static,
     ) -> std::io::Result<Watcher> {
         let (orders, inbox) = channel();
         let bell = Arc::new(Bell::new()?);
-        let looker = Looker::new(options, looking, Box::new(tell));
+        let looker = Looker::new(options, Box::new(tell));
         let rung = bell.clone();
         thread::Builder::new()
             .name("watch".to_owned())
-            .spawn(move || looker.run(&inbox, &rung))?;
+            .spawn(move || {
+                let _attendance = lookout.attend_for_good();
+                looker.run(&inbox, &rung);
+            })?;
         Ok(Watcher { orders, bell })
     }
 

@@ -5,6 +5,7 @@ use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
+use qcbus_disk::foreign;
 use qcbus_messages::path_text::to_text;
 
 use super::Seen;
@@ -38,9 +39,12 @@ impl Looker {
     }
 
     fn check_root(&mut self, root: &Path) {
-        let looking = self.looking.clone();
-        let Ok(now) = looking.at(root, || identity(root)) else {
-            return self.lose_root(root, "is gone");
+        let now = match foreign::visit(root, || identity(root)) {
+            Ok(now) => now,
+            Err(error) if error.kind() == io::ErrorKind::TimedOut => {
+                return self.lose_root(root, "does not answer");
+            }
+            Err(_) => return self.lose_root(root, "is gone"),
         };
         let before = self.roots.seen.get(root).copied();
         if before.is_some_and(|before| is_unmounted(root, before, now)) {

@@ -6,12 +6,12 @@ use std::io;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
+use qcbus_disk::foreign;
 use qcbus_document::FileKind;
 use qcbus_messages::control::Unseen;
 use rustix::fs::{AtFlags, Dir, FileType};
 
 use super::ignore::{IgnoreRules, is_ignored_directory};
-use super::looking::Looking;
 use super::sight::{Sight, look_at, open_directory};
 use crate::core::Stamp;
 use crate::stamp::from_statat;
@@ -42,12 +42,7 @@ pub struct Scan {
 /// Every checkable file below `directory`. Symbolic links to directories are not followed: one
 /// that leads to where is looked anyway adds nothing, any other is said to be unseen. `roots` are
 /// all the directories that are looked at.
-pub fn scan(
-    directory: &Path,
-    roots: &[PathBuf],
-    rules: &mut IgnoreRules,
-    looking: &Looking,
-) -> Scan {
+pub fn scan(directory: &Path, roots: &[PathBuf], rules: &mut IgnoreRules) -> Scan {
     let mut scan = Scan::default();
     let mut directories = VecDeque::from([directory.to_path_buf()]);
     let mut number = 0;
@@ -58,7 +53,7 @@ pub fn scan(
             continue;
         }
         let mut ignores = |path: &Path, is_dir| rules.ignores(path, is_dir);
-        let found = looking.at(&at, || list(&at, roots, &mut ignores));
+        let found = list(&at, roots, &mut ignores);
         let mut inner = found.directories;
         inner.retain(|it| !rules.ignores(it, true));
         directories.extend(inner);
@@ -128,10 +123,12 @@ pub fn list(
     ignores: &mut impl FnMut(&Path, bool) -> bool,
 ) -> Listing {
     let mut listing = Listing::default();
-    match open_directory(directory, roots).and_then(|opened| Ok(Dir::new(opened)?)) {
-        Ok(mut opened) => listing.read(directory, &mut opened, roots, ignores),
-        Err(error) => listing.broken = Some(error),
-    }
+    let read = foreign::visit(directory, || {
+        let mut opened = Dir::new(open_directory(directory, roots)?)?;
+        listing.read(directory, &mut opened, roots, ignores);
+        Ok(())
+    });
+    listing.broken = read.err().or(listing.broken);
     listing.files.sort();
     listing
 }

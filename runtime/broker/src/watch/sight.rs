@@ -4,6 +4,7 @@ use std::io;
 use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 
+use qcbus_disk::foreign;
 use rustix::fs::{CWD, Mode, OFlags, ResolveFlags};
 use rustix::io::Errno;
 
@@ -73,6 +74,11 @@ impl std::fmt::Display for NoFile {
 /// Looks at a path. `roots` are the directories that are looked at, without symbolic links. What lies
 /// behind a symbolic link to a directory is not looked at: there is nothing.
 pub fn look_at(path: &Path, roots: &[PathBuf]) -> Sight {
+    let looked = foreign::visit(path, || Ok(look(path, roots)));
+    looked.unwrap_or_else(|error| Sight::Hidden(format!("cannot look at it: {error}")))
+}
+
+fn look(path: &Path, roots: &[PathBuf]) -> Sight {
     if is_behind_a_link(path, roots) {
         return match std::fs::metadata(path) {
             // Of what is behind a link to itself nobody knows whether it has gone.

@@ -2,7 +2,6 @@
 
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
@@ -23,7 +22,7 @@ fn looker(root: &Path) -> (Looker, Receiver<Seen>) {
         rescan: Duration::MAX,
     };
     let tell = Box::new(move |seen| tell.send(seen).unwrap());
-    (Looker::new(options, Arc::default(), tell), told)
+    (Looker::new(options, tell), told)
 }
 
 /// A directory without links in its path.

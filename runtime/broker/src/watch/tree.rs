@@ -11,6 +11,7 @@ use std::ops::Bound;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use qcbus_disk::foreign;
 use rustix::fs::inotify::ReadFlags;
 use rustix::io::Errno;
 
@@ -98,15 +99,17 @@ impl Tree {
         let Some(kernel) = &self.kernel else {
             return Err(Unwatched::Refused(io::ErrorKind::Unsupported.into()));
         };
-        match kernel.watch(directory) {
+        match foreign::visit(directory, || Ok(kernel.watch(directory)?)) {
             Ok(watch) => {
                 self.put(directory, Some(watch));
                 Ok(())
             }
-            Err(Errno::NOENT | Errno::NOTDIR | Errno::LOOP) => Err(Unwatched::Gone),
-            Err(Errno::NOSPC | Errno::NOMEM) => Err(Unwatched::NoneLeft),
-            Err(Errno::ACCESS | Errno::PERM) => Err(Unwatched::Closed),
-            Err(error) => Err(Unwatched::Refused(error.into())),
+            Err(error) => Err(match Errno::from_io_error(&error) {
+                Some(Errno::NOENT | Errno::NOTDIR | Errno::LOOP) => Unwatched::Gone,
+                Some(Errno::NOSPC | Errno::NOMEM) => Unwatched::NoneLeft,
+                Some(Errno::ACCESS | Errno::PERM) => Unwatched::Closed,
+                _ => Unwatched::Refused(error),
+            }),
         }
     }
 

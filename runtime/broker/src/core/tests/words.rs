@@ -184,6 +184,53 @@ fn a_file_without_room_on_the_bus_is_tried_again_after_a_pause() {
 }
 
 #[test]
+fn a_file_that_is_back_to_what_was_judged_is_written_again_if_another_result_was_begun() {
+    let mut world = World::new();
+    world.join("First");
+    let (content, other) = (1, 2);
+    world.put(0, content);
+    world.until_stored(1);
+    world.put(0, other);
+    world.prepare(0, true);
+    world.answer(0);
+    // The result lies there, and only the journal could not be written.
+    world.store(0, false);
+    world.put(0, content);
+    world.pass(world.state.settings.retry_after);
+    world.store(0, true);
+    assert_eq!(world.stored.len(), 1, "what is stale is not stored");
+    world.until_stored(2);
+    world.put(0, content);
+    world.prepare(0, true);
+    assert!(
+        world.storing.is_empty() && world.stored.len() == 2,
+        "its own result lies there"
+    );
+}
+
+#[test]
+fn with_each_job_that_ends_one_file_without_a_place_on_the_bus_is_tried_again() {
+    let mut world = World::at_work();
+    for file in [1, 2] {
+        world.write(file);
+        let (job, _) = world.preparing.remove(0);
+        let result = Err(PrepareFailure::Busy);
+        world.event(Event::Prepared { job, result });
+    }
+    let waiting = |world: &World| world.preparing.iter().map(|it| it.1).collect::<Vec<_>>();
+    assert!(waiting(&world).is_empty(), "no job has ended");
+    world.until_judged(1);
+    assert_eq!(
+        waiting(&world),
+        [1],
+        "the one that came first, and no other"
+    );
+    let pause = world.state.settings.busy_pause;
+    world.pass(pause);
+    assert_eq!(waiting(&world), [1, 2]);
+}
+
+#[test]
 fn what_a_moment_hinders_is_tried_again_with_growing_pauses_and_then_said() {
     let mut world = World::new();
     world.join("First");
@@ -346,6 +393,29 @@ fn who_waits_for_a_file_that_goes_while_it_is_read_anew_is_not_told_what_it_was(
         matches!(answers[..], [Response::Unwatched { .. }]),
         "{answers:?}"
     );
+}
+
+/// Whoever asks while a result is being written has what it rests on looked at, and not what the one before did.
+#[test]
+fn what_a_verdict_on_its_way_rests_on_is_known() {
+    let mut world = World::new();
+    world.join("First");
+    for file in [6, 2] {
+        world.there.insert(path_of(file), u64::from(file));
+        world.contents.insert(u64::from(file), u64::from(file));
+    }
+    world.put(2, 20);
+    assert!(
+        world.state.inputs_of(&path_of(2)).is_empty(),
+        "nothing is read"
+    );
+    world.prepare(0, true);
+    world.answer(0);
+    assert_eq!(world.storing.len(), 1);
+    let read = world.inputs(2);
+    assert_eq!(world.state.inputs_of(&path_of(2)), read);
+    world.store(0, true);
+    assert_eq!(world.state.inputs_of(&path_of(2)), read);
 }
 
 #[test]

@@ -142,10 +142,17 @@ impl World {
     }
 
     pub fn event(&mut self, event: Event) {
+        let mut withdrawn = Vec::new();
         for action in self.state.handle(self.now, event) {
+            if let Action::Withdraw { path, .. } = &action {
+                withdrawn.push(path.clone());
+            }
             self.desk_hears(&action);
             self.gate_follows(&action);
             self.act(action);
+        }
+        for path in withdrawn {
+            self.event(Event::Withdrawn { path });
         }
         self.gate_must_be_true();
     }

@@ -15,7 +15,7 @@ use std::time::Duration;
 use rustix::fs::{CWD, Mode, OFlags, RenameFlags};
 
 use super::farm;
-use crate::watch::{Looking, Seen, WatchOptions, Watcher};
+use crate::watch::{Seen, WatchOptions, Watcher};
 
 const NEVER: Duration = Duration::from_secs(86_400);
 
@@ -413,8 +413,7 @@ fn many_things_that_cannot_be_looked_at_are_not_each_said() {
     let said = watched.said.iter().filter(|it| it.starts_with("unseen"));
     let said = said.count();
     assert!((100..=1_001).contains(&said), "{said}");
-    let found =
-        crate::watch::scan_directory(&root, std::slice::from_ref(&root), &Looking::default());
+    let found = crate::watch::scan_directory(&root, std::slice::from_ref(&root));
     assert!((100..=1_001).contains(&found.unseen.len()));
     put(&root.join("a.xodr"));
     watched.until("settled a.xodr");
