@@ -56,6 +56,21 @@ fn descriptors(broker: &Broker) -> usize {
     std::fs::read_dir(path).unwrap().count()
 }
 
+/// How many there are once it has judged something.
+fn descriptors_at_work(farm: &Farm, broker: &Broker) -> usize {
+    farm.write("early.xodr", &Content::Good(0).bytes());
+    assert_eq!(farm.verdict("early.xodr").verdict, Verdict::Accepted);
+    descriptors(broker)
+}
+
+fn until_descriptors_are_back(broker: &Broker, before: usize) {
+    until_or(
+        "nothing is left of those who have gone",
+        || (descriptors(broker) < before + 16).then_some(()),
+        || format!("{before} before, {} now", descriptors(broker)),
+    );
+}
+
 fn socket(farm: &Farm) -> PathBuf {
     farm.instance().join("control.sock")
 }
@@ -65,9 +80,7 @@ fn two_thousand_idle_connections_stop_nothing() {
     be_many();
     let farm = Farm::new();
     let broker = serve(&farm);
-    farm.write("early.xodr", &Content::Good(0).bytes());
-    assert_eq!(farm.verdict("early.xodr").verdict, Verdict::Accepted);
-    let before = descriptors(&broker);
+    let before = descriptors_at_work(&farm, &broker);
     let idle: Vec<UnixStream> = (0..2000)
         .map(|_| UnixStream::connect(socket(&farm)).unwrap())
         .collect();
@@ -79,11 +92,7 @@ fn two_thousand_idle_connections_stop_nothing() {
         "half of them are the broker's own"
     );
     drop(idle);
-    until_or(
-        "nothing is left of them",
-        || (descriptors(&broker) < before + 16).then_some(()),
-        || format!("{before} before, {} now", descriptors(&broker)),
-    );
+    until_descriptors_are_back(&broker, before);
 }
 
 #[test]
@@ -91,9 +100,7 @@ fn who_waits_and_vanishes_makes_room_for_others() {
     be_many();
     let farm = Farm::new();
     let broker = serve(&farm);
-    farm.write("early.xodr", &Content::Good(0).bytes());
-    assert_eq!(farm.verdict("early.xodr").verdict, Verdict::Accepted);
-    let before = descriptors(&broker);
+    let before = descriptors_at_work(&farm, &broker);
     let file = farm.root().join("never.xodr");
     let wait = Request::Wait {
         file,
@@ -120,11 +127,7 @@ fn who_waits_and_vanishes_makes_room_for_others() {
             }
         }
         drop(clients);
-        until_or(
-            "nothing is left of them",
-            || (descriptors(&broker) < before + 16).then_some(()),
-            || format!("{before} before, {} now", descriptors(&broker)),
-        );
+        until_descriptors_are_back(&broker, before);
     }
     assert!(
         told > 100,
@@ -217,11 +220,7 @@ fn an_honest_client_is_answered_beside_hostile_ones() {
         answered > 0 && attacks > 100,
         "{answered} answers, {attacks} attacks"
     );
-    until_or(
-        "nothing is left of them",
-        || (descriptors(&broker) < before + 16).then_some(()),
-        || format!("{before} before, {} now", descriptors(&broker)),
-    );
+    until_descriptors_are_back(&broker, before);
     assert!(farm.qcbus(&["down"]).status.success());
     assert!(broker.wait().success());
 }

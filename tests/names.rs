@@ -21,7 +21,7 @@ use qcbus_messages::path_text::to_text;
 use support::broker::Broker;
 use support::content::Content;
 use support::desk::{Desk, Said, files_below};
-use support::farm::{Farm, tail};
+use support::farm::{Farm, copy_program, tail};
 use support::judge::verdicts_in_journal;
 use support::watchdog::{until_or, until_so};
 
@@ -300,7 +300,7 @@ fn as_nobody(test: &str, closed: &Path) -> Option<Vec<&'static str>> {
 
 /// A command as somebody else, with a copy of the program where everybody may run it.
 fn command_of(who: &[&str], program: &Path) -> Command {
-    std::fs::copy(env!("CARGO_BIN_EXE_qcbus"), program).unwrap();
+    copy_program(Path::new(env!("CARGO_BIN_EXE_qcbus")), program);
     let mut words = who.iter().map(OsStr::new).chain([program.as_os_str()]);
     let mut command = Command::new(words.next().unwrap());
     command.args(words);

@@ -16,7 +16,7 @@ use qcbus_messages::control::{Request, Response};
 use rustix::process::Signal;
 use support::content::Content;
 use support::desk::Desk;
-use support::farm::{Farm, zoo};
+use support::farm::{Farm, copy_program, zoo};
 use support::processes::signal_pid;
 use support::watchdog::until_or;
 
@@ -56,7 +56,7 @@ fn manifest(directory: &Path, command: &str) {
 /// A copy of the zoo's program that can be deleted.
 fn own_program(directory: &Path) -> PathBuf {
     let own = directory.join("mine");
-    std::fs::copy(zoo(), &own).unwrap();
+    copy_program(&zoo(), &own);
     own
 }
 

@@ -297,6 +297,13 @@ pub fn shm_segments(prefix: &str) -> Vec<String> {
     names.filter(|name| name.starts_with(prefix)).collect()
 }
 
+/// Copies a program that is to be run at once, by another process: were it open for writing in this one while another
+/// test starts something, which then has it open, too, it could not be run ("text file busy").
+pub fn copy_program(from: &Path, to: &Path) {
+    let copied = Command::new("cp").arg(from).arg(to).status();
+    assert!(copied.unwrap().success(), "{} is copied", from.display());
+}
+
 /// The end of a log.
 pub fn tail(log: &str) -> String {
     let lines: Vec<&str> = log.lines().collect();
