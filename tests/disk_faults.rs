@@ -225,13 +225,16 @@ fn a_file_that_never_answers_is_named_and_holds_up_nobody() {
     let Some(mut victim) = Victim::new(test) else {
         return;
     };
-    for (round, kinds) in [(1, &[Kind::Look][..]), (2, &[Kind::Read])] {
+    // Whichever look it is: the watcher has several, and the one who reads has others.
+    let looks = (1..=6).map(|one_in| (Kind::Look, one_in));
+    for (round, (kind, one_in)) in looks.chain([(Kind::Read, 1)]).enumerate() {
+        let round = u64::try_from(round).unwrap();
         let map = victim.farm.root().join("map.xodr");
         victim.broker.trouble(Some(Trouble {
             below: map.clone(),
-            kinds,
+            kinds: if kind == Kind::Look { &[Kind::Look] } else { &[Kind::Read] },
             answer: Answer::Never,
-            one_in: 1,
+            one_in,
         }));
         victim.work(round);
         let named = || {

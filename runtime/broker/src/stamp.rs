@@ -26,7 +26,12 @@ pub fn stamp_of(path: &Path) -> io::Result<Option<Stamp>> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(error) if error.raw_os_error() == Some(libc::ENOTDIR) => Ok(None),
         // The path itself is that link, not a directory on the way to a file that may be there.
-        Err(error) if error.raw_os_error() == Some(libc::ELOOP) && path.is_symlink() => Ok(None),
+        Err(error)
+            if error.raw_os_error() == Some(libc::ELOOP)
+                && foreign::is_symlink(path).unwrap_or(false) =>
+        {
+            Ok(None)
+        }
         Err(error) => Err(error),
     }
 }

@@ -178,7 +178,7 @@ fn look_through(path: &Path, seen: Option<Stamp>) -> Option<Stamp> {
 /// what lies behind a symbolic link, of what is written under another name of the same file, nor of
 /// what is in a directory by that directory's own name.
 pub fn events_tell(path: &Path) -> bool {
-    match std::fs::symlink_metadata(path) {
+    match foreign::symlink_metadata(path) {
         Ok(data) => data.is_file() && data.nlink() == 1,
         Err(error) => error.kind() == std::io::ErrorKind::NotFound,
     }

@@ -4,6 +4,7 @@ use std::io;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use qcbus_disk::foreign;
 use qcbus_document::FileKind;
 use rustix::fs::inotify::ReadFlags;
 
@@ -262,7 +263,7 @@ impl Looker {
     /// Whether a link came that hides a directory, or no longer does; one whose name promises a
     /// file is looked at as that file.
     fn look_for_a_link(&mut self, path: &Path) {
-        if !path.is_symlink() {
+        if !foreign::is_symlink(path).unwrap_or(false) {
             if self.unseen.contains_key(path) {
                 self.look(path);
             }

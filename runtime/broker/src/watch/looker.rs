@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::sync::mpsc::TryRecvError;
 use std::time::{Duration, Instant};
 
+use qcbus_disk::foreign;
 use qcbus_document::FileKind;
 use qcbus_messages::control::Unseen;
 
@@ -153,10 +154,13 @@ impl Looker {
             return;
         }
         let is_checkable = FileKind::of_path(path).is_some() && !self.ignored(path, false);
-        if is_checkable && path.is_symlink() && sight != Sight::Nothing {
-            self.links.insert(path.to_path_buf());
-        } else {
-            self.links.remove(path);
+        match foreign::is_symlink(path) {
+            Ok(true) if is_checkable && sight != Sight::Nothing => {
+                self.links.insert(path.to_path_buf());
+            }
+            Ok(_) => drop(self.links.remove(path)),
+            // It does not answer: it is what it was.
+            Err(_) => {}
         }
         let changed = self.dependencies.look(path);
         match sight {

@@ -39,12 +39,9 @@ impl Looker {
     }
 
     fn check_root(&mut self, root: &Path) {
-        let now = match foreign::visit(root, || identity(root)) {
-            Ok(now) => now,
-            Err(error) if error.kind() == io::ErrorKind::TimedOut => {
-                return self.lose_root(root, "does not answer");
-            }
-            Err(_) => return self.lose_root(root, "is gone"),
+        let now = match look(root) {
+            Root::Here(now) => now,
+            Root::Away(how) => return self.lose_root(root, how),
         };
         let before = self.roots.seen.get(root).copied();
         if before.is_some_and(|before| is_unmounted(root, before, now)) {
@@ -97,25 +94,35 @@ impl Looker {
         let inside = |root: &&PathBuf| path.starts_with(root);
         let roots: Vec<PathBuf> = self.options.roots.iter().filter(inside).cloned().collect();
         for root in roots {
-            if identity(&root).is_err() {
-                self.lose_root(&root, "is gone");
+            if let Root::Away(how) = look(&root) {
+                self.lose_root(&root, how);
             }
         }
         self.roots.is_away(path)
     }
 }
 
-fn identity(root: &Path) -> io::Result<Identity> {
-    let data = std::fs::metadata(root)?;
-    if data.is_dir() {
-        Ok((data.dev(), data.ino()))
-    } else {
-        Err(io::ErrorKind::NotADirectory.into())
+/// What has the name of a watched directory.
+enum Root {
+    Here(Identity),
+    /// No directory that can be looked at; what has become of it.
+    Away(&'static str),
+}
+
+fn look(root: &Path) -> Root {
+    match foreign::symlink_metadata(root) {
+        Ok(data) if data.is_dir() => Root::Here((data.dev(), data.ino())),
+        // It would have been resolved when the broker started; the kernel tells nothing through it.
+        Ok(data) if data.is_symlink() => {
+            Root::Away("has become a symbolic link, which only a broker that starts anew follows")
+        }
+        Err(error) if error.kind() == io::ErrorKind::TimedOut => Root::Away("does not answer"),
+        Ok(_) | Err(_) => Root::Away("is gone"),
     }
 }
 
 /// Whether what lies there is the place where something was mounted.
 fn is_unmounted(root: &Path, before: Identity, now: Identity) -> bool {
-    let is_empty = || std::fs::read_dir(root).is_ok_and(|mut it| it.next().is_none());
-    before.0 != now.0 && is_empty()
+    let is_empty = || foreign::visit(root, || Ok(std::fs::read_dir(root)?.next().is_none()));
+    before.0 != now.0 && is_empty().unwrap_or(false)
 }

@@ -159,8 +159,9 @@ impl Listing {
                 // Most entries of most directories; nothing more is asked about them.
                 FileType::RegularFile if !is_checkable => {}
                 FileType::RegularFile => {
-                    let data = opened.fd().and_then(|fd| {
-                        rustix::fs::statat(fd, entry.file_name(), AtFlags::SYMLINK_NOFOLLOW)
+                    let data = foreign::visit(&path, || {
+                        let (fd, name) = (opened.fd()?, entry.file_name());
+                        Ok(rustix::fs::statat(fd, name, AtFlags::SYMLINK_NOFOLLOW)?)
                     });
                     match data {
                         Ok(data) if FileType::from_raw_mode(data.st_mode).is_file() => {

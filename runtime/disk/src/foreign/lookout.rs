@@ -152,12 +152,16 @@ impl Lookout {
             .then(|| format!("{IN_TOTAL} files have not answered for too long"))
     }
 
-    fn came_back(&self, path: &Path) {
+    /// The system has answered, be it late.
+    fn answered(&self, waiting: &mut Waiting) {
+        if !std::mem::take(&mut waiting.overdue) {
+            return;
+        }
         let mut lost = lock(&self.lost);
-        if let Some(count) = lost.get_mut(path) {
+        if let Some(count) = lost.get_mut(&waiting.path) {
             *count -= 1;
             if *count == 0 {
-                lost.remove(path);
+                lost.remove(&waiting.path);
             }
             self.losses.fetch_sub(1, Ordering::AcqRel);
         }
@@ -221,8 +225,14 @@ pub(super) fn note(path: &Path, error: &io::Error) {
     }
 }
 
-/// One thing that the system is asked about a file.
-pub(super) struct Visit(Option<Attended>);
+/// One thing that the system is asked about a file, perhaps while something else is done with another one.
+pub(super) struct Visit(Option<Begun>);
+
+struct Begun {
+    attended: Attended,
+    /// What is gone on with afterwards.
+    outer: Option<Waiting>,
+}
 
 impl Visit {
     /// # Errors
@@ -238,17 +248,21 @@ impl Visit {
             note(path, &error);
             return Err(error);
         }
-        lock(&attended.post.state).at = Some(Waiting {
+        let waiting = Waiting {
             path: path.to_path_buf(),
             since: Instant::now(),
             overdue: false,
-        });
-        Ok(Visit(Some(attended)))
+        };
+        let mut outer = lock(&attended.post.state).at.replace(waiting);
+        if let Some(outer) = &mut outer {
+            attended.lookout.answered(outer);
+        }
+        Ok(Visit(Some(Begun { attended, outer })))
     }
 
     /// Something has come: whoever waits does not wait in vain.
     pub(super) fn goes_on(&self) {
-        if let Some(attended) = &self.0
+        if let Some(Begun { attended, .. }) = &self.0
             && let Some(waiting) = &mut lock(&attended.post.state).at
         {
             waiting.since = Instant::now();
@@ -258,10 +272,16 @@ impl Visit {
 
 impl Drop for Visit {
     fn drop(&mut self) {
-        let Some(attended) = &self.0 else { return };
-        let over = lock(&attended.post.state).at.take();
-        if let Some(waiting) = over.filter(|it| it.overdue) {
-            attended.lookout.came_back(&waiting.path);
+        let Some(Begun { attended, outer }) = &mut self.0 else {
+            return;
+        };
+        let outer = outer.take().map(|outer| Waiting {
+            since: Instant::now(),
+            ..outer
+        });
+        let over = std::mem::replace(&mut lock(&attended.post.state).at, outer);
+        if let Some(mut waiting) = over {
+            attended.lookout.answered(&mut waiting);
         }
     }
 }

@@ -84,6 +84,27 @@ pub fn metadata(path: &Path) -> io::Result<Metadata> {
     noted(path, std::fs::metadata(path))
 }
 
+/// What [`std::fs::symlink_metadata`] says.
+///
+/// # Errors
+/// Whatever the system says.
+pub fn symlink_metadata(path: &Path) -> io::Result<Metadata> {
+    let _visit = Visit::begin(path)?;
+    noted(path, std::fs::symlink_metadata(path))
+}
+
+/// Whether this is a symbolic link. What is not there is none.
+///
+/// # Errors
+/// Whatever the system says, other than that there is nothing.
+pub fn is_symlink(path: &Path) -> io::Result<bool> {
+    match symlink_metadata(path) {
+        Ok(data) => Ok(data.is_symlink()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
 /// What [`std::fs::canonicalize`] says.
 ///
 /// # Errors

@@ -149,6 +149,29 @@ fn who_cannot_be_replaced_is_named_and_goes_on_when_there_is_an_answer() {
 }
 
 #[test]
+fn who_looks_at_one_thing_while_at_another_is_seen_at_each() {
+    let lookout = Arc::new(Lookout::default());
+    let attendance = lookout.attend_for_good();
+    let (directory, rules) = (Path::new("/farm"), Path::new("/farm/.qcignore"));
+    let outer = Visit::begin(directory).unwrap();
+    assert_eq!(lookout.overdue(Duration::ZERO)[0].path, directory);
+    let inner = Visit::begin(rules).unwrap();
+    assert!(lookout.hanging().is_empty(), "the directory has answered");
+    assert_eq!(lookout.overdue(Duration::ZERO)[0].path, rules);
+    drop(inner);
+    assert!(lookout.hanging().is_empty());
+    assert_eq!(
+        lookout.overdue(Duration::ZERO)[0].path,
+        directory,
+        "it is gone on with the directory"
+    );
+    drop(outer);
+    assert!(lookout.hanging().is_empty());
+    assert_eq!(lookout.overdue(Duration::ZERO), []);
+    assert_eq!(attendance.waits_since(), None);
+}
+
+#[test]
 fn who_waits_for_too_long_is_named_and_nobody_follows() {
     let lookout = Arc::new(Lookout::default());
     let path = Path::new("/farm/hung/map.xodr");

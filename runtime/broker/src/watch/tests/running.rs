@@ -222,6 +222,37 @@ fn what_is_above_a_root_may_be_away_for_long() {
     );
 }
 
+/// It is said once and not every second, and nothing is looked through again and again.
+#[test]
+fn a_root_that_becomes_a_link_is_away_until_it_is_a_directory() {
+    let (_dir, base) = farm();
+    let (root, aside) = (base.join("inbox"), base.join("aside"));
+    fs::create_dir(&root).unwrap();
+    put(&root.join("a.xodr"));
+    let mut watched = Watched::start(&root);
+    fs::rename(&root, &aside).unwrap();
+    std::os::unix::fs::symlink(&aside, &root).unwrap();
+    let away = |it: &String| it.contains("has become a symbolic link") || it.contains("is gone");
+    while !watched.said.iter().any(away) {
+        let seen = watched.told.recv_timeout(Duration::from_secs(30)).unwrap();
+        watched.said.push(watched.word(&seen));
+    }
+    // Several times as long as between two looks.
+    while let Ok(seen) = watched.told.recv_timeout(Duration::from_secs(3)) {
+        watched.said.push(watched.word(&seen));
+    }
+    let notices = watched.said.iter().filter(|it| it.starts_with("notice"));
+    assert_eq!(notices.count(), 1, "{:?}", watched.said);
+    put(&aside.join("b.xodr"));
+    fs::remove_file(&root).unwrap();
+    fs::rename(&aside, &root).unwrap();
+    watched.until("settled b.xodr");
+    put(&root.join("c.xodr"));
+    watched.until("settled c.xodr");
+    let said = &watched.said;
+    assert!(!said.contains(&"vanished a.xodr".to_owned()), "{said:?}");
+}
+
 /// A directory outside with a file, to which links may lead.
 fn outside() -> (tempfile::TempDir, PathBuf) {
     let (dir, outside) = farm();
