@@ -224,3 +224,41 @@ fn an_honest_client_is_answered_beside_hostile_ones() {
     assert!(farm.qcbus(&["down"]).status.success());
     assert!(broker.wait().success());
 }
+
+/// It says neither yes nor no, and whoever asks must not hang with it.
+#[test]
+fn a_broker_that_is_stopped_is_named_and_not_waited_for() {
+    let farm = Farm::new();
+    let broker = farm.serve_ready();
+    let pid = i32::try_from(broker.pid()).unwrap();
+    broker.signal(rustix::process::Signal::STOP);
+    for command in ["status", "down"] {
+        let told = farm.qcbus(&[command]);
+        let said = String::from_utf8_lossy(&told.stderr);
+        assert_eq!(told.status.code(), Some(5), "{command}: {said}");
+        let advice = format!("kill -CONT {pid}");
+        assert!(said.contains(&advice), "{command}: {said}");
+    }
+    broker.signal(rustix::process::Signal::CONT);
+}
+
+/// `qcbus down && qcbus serve` is what everybody writes.
+#[test]
+fn what_is_down_can_be_started_again_at_once() {
+    let farm = Farm::new();
+    for number in 0..200 {
+        farm.write(&format!("{number}.xodr"), b"<OpenDRIVE/>");
+    }
+    for _ in 0..8 {
+        let mut broker = farm.serve_ready();
+        assert_eq!(
+            farm.qcbus(&["down"]).status.code(),
+            Some(0),
+            "{}",
+            farm.log()
+        );
+        let after = farm.serve_ready();
+        assert!(broker.wait().success());
+        drop(after);
+    }
+}

@@ -21,7 +21,7 @@ use nix::libc;
 use qcbus_messages::Verdict;
 use qcbus_messages::control::{NoticeStatus, Request, Response};
 use support::broker::Broker;
-use support::content::Content;
+use support::content::{CATALOG, Content, Mark};
 use support::farm::Farm;
 use support::inside::skip;
 use support::watchdog::until_or;
@@ -78,6 +78,68 @@ fn files_that_turn_into_pipes_hold_up_nobody() {
         std::fs::remove_file(farm.root().join(&name)).unwrap();
         is_judged(&farm, &name, &Content::Good(2));
     }
+    assert_eq!(farm.qcbus(&["down"]).status.code(), Some(0));
+    assert!(broker.wait().success());
+}
+
+/// What a scenario refers to goes, and becomes a pipe: that is not the same as nothing, and the author is told so.
+#[test]
+fn a_map_that_becomes_a_pipe_is_not_said_to_be_missing() {
+    let farm = Farm::new();
+    let mut broker = farm.serve_ready();
+    std::fs::create_dir(farm.root().join("catalogs")).unwrap();
+    is_judged(&farm, CATALOG, &Content::Catalog(1, Mark::Clean));
+    is_judged(&farm, "map.xodr", &Content::Good(1));
+    let scenario = Content::Scenario(1, "map.xodr".to_owned());
+    is_judged(&farm, "drive.xosc", &scenario);
+    let map = farm.root().join("map.xodr");
+    let becomes = |what: &str, wanted: Verdict| {
+        let verdict = || (farm.verdict("drive.xosc").verdict == wanted).then_some(());
+        until_or(what, verdict, || farm.log());
+    };
+    std::fs::remove_file(&map).unwrap();
+    becomes("the map is missing", Verdict::Rejected);
+    fifo(&map);
+    becomes("the map cannot be read", Verdict::Undetermined);
+    std::fs::remove_file(&map).unwrap();
+    becomes("the map is missing again", Verdict::Rejected);
+    is_judged(&farm, "map.xodr", &Content::Good(2));
+    becomes("the map is back", Verdict::Accepted);
+    assert_eq!(farm.qcbus(&["down"]).status.code(), Some(0));
+    assert!(broker.wait().success());
+}
+
+/// Whoever waits for the verdict on what can have none is told why, and at once.
+#[test]
+fn who_waits_for_what_is_no_file_is_told_so() {
+    let farm = Farm::new();
+    let mut broker = farm.serve_ready();
+    let at = |name: &str| farm.root().join(name);
+    fifo(&at("pipe.xodr"));
+    std::fs::create_dir(at("directory.xodr")).unwrap();
+    symlink("loop.xodr", at("loop.xodr")).unwrap();
+    symlink(farm.base(), at("outside.xodr")).unwrap();
+    symlink("/dev/zero", at("zero.xodr")).unwrap();
+    for (name, why) in [
+        ("pipe.xodr", "a pipe, a socket or a device"),
+        ("zero.xodr", "a pipe, a socket or a device"),
+        ("directory.xodr", "a directory"),
+        ("loop.xodr", "leads back to itself"),
+        ("outside.xodr", "a symbolic link to the directory"),
+    ] {
+        // No limit: it ends because there is an answer.
+        let path = at(name);
+        let told = farm.qcbus(&["wait", path.to_str().unwrap()]);
+        let said = String::from_utf8_lossy(&told.stderr);
+        assert_eq!(told.status.code(), Some(2), "{name}: {said}");
+        assert!(said.contains(why), "{name}: {said}");
+    }
+    // What is not there may come.
+    let path = at("gone.xodr");
+    let told = farm.qcbus(&["wait", "--timeout", "1s", path.to_str().unwrap()]);
+    let said = String::from_utf8_lossy(&told.stderr);
+    assert_eq!(told.status.code(), Some(3), "{said}");
+    assert!(said.contains("there is no such file"), "{said}");
     assert_eq!(farm.qcbus(&["down"]).status.code(), Some(0));
     assert!(broker.wait().success());
 }

@@ -267,6 +267,12 @@ fn what_is_planted_later_is_said_and_not_run() {
     // A directory that everybody may write to from now on.
     mode(&farm.bundles_d(), 0o777);
     is_said("everybody may write to");
+    let older = |it: &qcbus_messages::control::NoticeStatus| it.text.contains("user 12345");
+    let notices = farm.status().unwrap().notices;
+    assert!(
+        !notices.iter().any(older),
+        "that manifest has gone: {notices:?}"
+    );
     std::fs::write(&path, evil(&trace)).unwrap();
     let reload = farm.qcbus(&["reload"]);
     assert!(!reload.status.success(), "{reload:?}");

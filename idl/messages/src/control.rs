@@ -42,7 +42,8 @@ pub enum Response {
     Verdict(FileVerdict),
     /// Answer to `Wait`: the time is over.
     TimedOut,
-    /// Answer to `Wait`: the file, or one that it refers to, lies on a disk that does not answer.
+    /// Answer to `Wait`: the file cannot be looked at, or one that it refers to; it lies on a disk that does not answer,
+    /// for instance.
     Unanswered {
         /// For a person.
         reason: String,
@@ -150,6 +151,9 @@ pub struct NoticeStatus {
     pub about: Option<String>,
     /// For a person.
     pub text: String,
+    /// Seconds since it last happened.
+    #[serde(default)]
+    pub ago_s: u64,
 }
 
 /// Something in a watched or given directory that could not be looked at, so that nothing is known

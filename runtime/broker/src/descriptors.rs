@@ -70,17 +70,22 @@ impl Descriptors {
     pub fn peers(&self, wanted: usize) -> (usize, Option<String>) {
         let fit = self.allowed.saturating_sub(FOR_THE_REST) / PER_PEER;
         // Without its standard bundles and a reporter a broker is of no use.
-        let fit = usize::try_from(fit).unwrap_or(usize::MAX).max(FEWEST);
+        let fit = usize::try_from(fit).unwrap_or(usize::MAX);
         if fit >= wanted {
             return (wanted, None);
         }
         let (allowed, needed) = (self.allowed, FOR_THE_REST + PER_PEER * wanted as u64);
+        let so_that = match fit >= FEWEST {
+            true => {
+                format!("no more than {fit} bundles and reporters can join instead of {wanted}")
+            }
+            false => "not even the standard bundles may be able to join".to_owned(),
+        };
         let said = format!(
-            "only {allowed} files may be open at once, so that no more than {fit} bundles and reporters can \
-             join instead of {wanted}; raise the limit to {needed} (`ulimit -Hn {needed}`; systemd: \
-             LimitNOFILE={needed}; docker: --ulimit nofile={needed})"
+            "only {allowed} files may be open at once, so that {so_that}; raise the limit to {needed} \
+             (`ulimit -Hn {needed}`; systemd: LimitNOFILE={needed}; docker: --ulimit nofile={needed})"
         );
-        (fit, Some(said))
+        (fit.max(FEWEST), Some(said))
     }
 }
 

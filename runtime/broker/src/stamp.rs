@@ -38,7 +38,7 @@ pub fn stamp_of(path: &Path) -> io::Result<Option<Stamp>> {
 
 /// The stamp of a file that may be reached through symbolic links, as dependencies may. A
 /// directory's stamp tells its scenarios: it changes when one comes or goes, not when something
-/// else, such as a result, is written there.
+/// else, such as a result, is written there. A pipe or a device has one, too: it is not the same as nothing.
 pub fn stamp_through_links(path: &Path) -> Option<Stamp> {
     let data = foreign::metadata(path).ok()?;
     if data.is_file() {
@@ -46,12 +46,19 @@ pub fn stamp_through_links(path: &Path) -> Option<Stamp> {
     } else if data.is_dir() {
         listing(path, data.ino())
     } else {
-        None
+        Some(Stamp {
+            ctime_ns: NO_FILE,
+            inode: data.ino(),
+            ..Stamp::default()
+        })
     }
 }
 
 /// The time of change of a directory's stamp: one that no file can have, centuries ago.
 const LISTED: i128 = i64::MIN as i128;
+
+/// The same of what is neither file nor directory, whose own times tell who used it.
+const NO_FILE: i128 = LISTED + 1;
 
 fn listing(directory: &Path, inode: u64) -> Option<Stamp> {
     let entries = foreign::list(directory).ok()?;

@@ -300,6 +300,15 @@ fn look_at(stream: UnixStream, launch: String) -> Option<Known> {
     })
 }
 
+impl Process {
+    /// The process at the other end of a connection: who has connected, or who listens. `None`: it has gone, or lives
+    /// in another container and has no number here.
+    pub fn behind(stream: &UnixStream) -> Option<Process> {
+        let [pid, _user, _group] = socket_option(stream, libc::SO_PEERCRED).ok()?;
+        process_of(stream, Pid::from_raw(pid)?)
+    }
+}
+
 /// The process that has connected, and nobody who was given its id since.
 fn process_of(stream: &UnixStream, pid: Pid) -> Option<Process> {
     let process = match peer_handle(stream) {

@@ -343,6 +343,11 @@ impl Host {
         self.ring();
     }
 
+    /// Why nobody can join any more, for a person; said once.
+    pub fn loss(&self) -> Option<String> {
+        self.presence.loss()
+    }
+
     /// Lends and publishes documents, from any thread.
     pub fn documents(&self) -> Documents {
         self.documents.clone()

@@ -128,7 +128,7 @@ pub enum StartError {
     Io(#[from] std::io::Error),
     /// There is no room for the bus itself; without it, the first write is a bus error.
     #[error(
-        "not enough shared memory: {free} of {size} bytes are free in /dev/shm, a broker needs {needed} to start; {}", way_out(*size, *needed)
+        "not enough shared memory: {free} of {size} bytes are free in /dev/shm, a broker needs {needed} to start; {}", way_out(*size, *free, *needed)
     )]
     NoSharedMemory {
         /// Bytes of /dev/shm.
@@ -160,8 +160,12 @@ impl StartError {
     }
 }
 
-fn way_out(size: u64, needed: u64) -> String {
-    let advised = needed.max(size / 2).saturating_mul(2).div_ceil(1 << 20);
+fn way_out(size: u64, free: u64, needed: u64) -> String {
+    let taken = size.saturating_sub(free);
+    // What is missing, and as much again for what is to be checked.
+    let advised = taken
+        .saturating_add(needed.saturating_mul(2))
+        .div_ceil(1 << 20);
     let make = format!(
         "make it larger: `mount -o remount,size={advised}M /dev/shm`, for a container `docker run --shm-size={advised}m`"
     );

@@ -19,6 +19,8 @@ pub(crate) struct Presence {
     state: Mutex<State>,
     /// What was said last about what cannot be made again yet.
     trouble: Mutex<String>,
+    /// What cannot be had back, until it has been asked for.
+    lost: Mutex<Option<String>>,
 }
 
 /// What is done about what is missing.
@@ -41,6 +43,7 @@ impl Presence {
             lock: Arc::clone(lock),
             state: Mutex::new(State::Hidden),
             trouble: Mutex::default(),
+            lost: Mutex::default(),
         }
     }
 
@@ -66,10 +69,17 @@ impl Presence {
             return;
         }
         if let Err(lost) = self.restore() {
-            let directory = self.instance.dir().display();
-            tracing::error!(%directory, "{lost}; until the broker is started again, nobody can join it");
+            let lost = format!("{lost}; until the broker is started again, nobody can join it");
+            tracing::error!("{lost}");
+            *self.lost.lock().unwrap_or_else(PoisonError::into_inner) = Some(lost);
             *state = State::Lost;
         }
+    }
+
+    /// What cannot be had back, for a person; said once.
+    pub(crate) fn loss(&self) -> Option<String> {
+        let mut lost = self.lost.lock().unwrap_or_else(PoisonError::into_inner);
+        lost.take()
     }
 
     fn restore(&self) -> Result<(), String> {

@@ -3,6 +3,7 @@
 use std::fs;
 use std::os::fd::OwnedFd;
 use std::sync::Arc;
+use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{
@@ -39,9 +40,20 @@ impl Process {
 
     /// A process that has ended but was not yet waited for counts as dead.
     pub fn is_alive(&self) -> bool {
+        !self.ends_within(Duration::ZERO)
+    }
+
+    /// Waits for its end.
+    pub fn ends_within(&self, limit: Duration) -> bool {
         let mut fds = [PollFd::new(&self.fd, PollFlags::IN)];
-        let at_once = Timespec::default();
-        !matches!(poll(&mut fds, Some(&at_once)), Ok(ready) if ready > 0)
+        let limit = Timespec::try_from(limit).ok();
+        matches!(poll(&mut fds, limit.as_ref()), Ok(ready) if ready > 0)
+    }
+
+    /// Whether somebody has stopped it, so that it does nothing until it is continued.
+    pub fn is_stopped(&self) -> bool {
+        let state = stat(self.id()).and_then(|rest| rest.chars().next());
+        matches!(state, Some('T' | 't')) && self.is_alive()
     }
 
     /// Kills it, with its group where it leads one. One that is dead stays so, and whoever has been given
@@ -59,11 +71,16 @@ impl Process {
 
 /// When a process started, in clock ticks since boot: with the id it names a process for good.
 pub(crate) fn start_time(pid: u32) -> Option<u64> {
+    // The 22nd field of all.
+    stat(pid)?.split_whitespace().nth(19)?.parse().ok()
+}
+
+/// What proc(5) says of a process, from the third field on, its state.
+fn stat(pid: u32) -> Option<String> {
     let stat = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
-    // The second field is the command in parentheses and may contain anything, so the fields are
-    // counted from its end: the start time is the 22nd of all (proc(5)).
+    // The second field is the command in parentheses and may contain anything.
     let (_, rest) = stat.rsplit_once(')')?;
-    rest.split_whitespace().nth(19)?.parse().ok()
+    Some(rest.trim_start().to_owned())
 }
 
 #[cfg(test)]

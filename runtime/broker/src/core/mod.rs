@@ -98,7 +98,8 @@ pub struct State {
     last_launch: Launch,
     /// When what could not be read is tried again.
     next_reading: Duration,
-    notices: VecDeque<Notice>,
+    /// Each with the time when it was last true.
+    notices: VecDeque<(Notice, Duration)>,
     rate: Rate,
     judged_once: bool,
     /// Until then nobody need be told again that there is no room.
@@ -343,12 +344,16 @@ impl State {
     }
 
     fn notice(&mut self, notice: Notice, actions: &mut Actions) {
-        if self.notices.back() != Some(&notice) {
-            if self.notices.len() >= NOTICES {
-                self.notices.pop_front();
-            }
-            self.notices.push_back(notice.clone());
-            actions.push(Action::Notice(notice));
+        if let Some((last, at)) = self.notices.back_mut()
+            && *last == notice
+        {
+            *at = self.now;
+            return;
         }
+        if self.notices.len() >= NOTICES {
+            self.notices.pop_front();
+        }
+        self.notices.push_back((notice.clone(), self.now));
+        actions.push(Action::Notice(notice));
     }
 }

@@ -60,6 +60,8 @@ pub enum Notice {
         /// Why.
         why: String,
     },
+    /// Nobody can join any more.
+    Lost(String),
     /// What the system allows is less than may be needed.
     Limited(String),
     /// Of the directories that are watched.
@@ -104,6 +106,7 @@ impl Notice {
             Notice::NotWritten(_) => "not-written",
             Notice::NotDelivered(_) => "not-delivered",
             Notice::NotReported { .. } => "not-reported",
+            Notice::Lost(_) => "lost",
             Notice::Limited(_) => "limited",
             Notice::Watching(_) => "watching",
             Notice::Loading(_) => "loading",
@@ -163,6 +166,7 @@ impl Notice {
             | Notice::NotRead(text)
             | Notice::NotWritten(text)
             | Notice::NotDelivered(text)
+            | Notice::Lost(text)
             | Notice::Limited(text)
             | Notice::Watching(text)
             | Notice::Loading(text)

@@ -64,7 +64,11 @@ impl State {
             queue: self.queue_status(),
             peers: self.peer_status(),
             epoch: self.epoch.0,
-            notices: self.notices.iter().map(told).collect(),
+            notices: {
+                let told =
+                    |(notice, at): &(Notice, Duration)| told(notice, self.now.saturating_sub(*at));
+                self.notices.iter().map(told).collect()
+            },
             ..Status::default()
         }
     }
@@ -80,6 +84,11 @@ impl State {
     /// Keeps something for `status` that the state machine did not find out itself.
     pub fn remark(&mut self, notice: Notice) {
         self.notice(notice, &mut Vec::new());
+    }
+
+    /// Nothing of this kind holds any more.
+    pub fn is_over(&mut self, of_this_kind: impl Fn(&Notice) -> bool) {
+        self.notices.retain(|(notice, _)| !of_this_kind(notice));
     }
 
     fn file_counts(&self) -> FileCounts {
@@ -229,8 +238,9 @@ impl State {
     }
 }
 
-fn told(notice: &Notice) -> control::NoticeStatus {
+fn told(notice: &Notice, ago: Duration) -> control::NoticeStatus {
     control::NoticeStatus {
+        ago_s: ago.as_secs(),
         kind: notice.kind().to_owned(),
         about: notice.about().map(str::to_owned),
         text: notice.to_string(),

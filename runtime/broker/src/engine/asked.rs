@@ -7,9 +7,9 @@ use std::time::Duration;
 use qcbus_messages::control::{Request, Response, Status, Unseen};
 use tokio::sync::oneshot;
 
-use super::Broker;
 use super::looks::{Look, Sighted};
 use super::start::in_force;
+use super::{Broker, Told};
 use crate::control::Asked;
 use crate::core::{Event, Notice, Stamp, Ticket};
 use crate::gate::Gate;
@@ -93,10 +93,16 @@ impl Broker {
             stamp,
             inputs,
             unwatched,
+            hidden,
         } = seen;
+        self.take_in(inputs);
+        if let Some(reason) = hidden {
+            // A client that has left needs no answer.
+            let _ = look.answer.send(Response::Unanswered { reason });
+            return true;
+        }
         let (file, timeout_ms) = (&*file, look.timeout_ms);
         let ticket = self.ticket(look.answer);
-        self.take_in(inputs);
         if let (None, Some(watcher)) = (&unwatched, &self.watcher) {
             match stamp {
                 // The watcher may not have come to it, and must tell when it goes.
@@ -134,16 +140,12 @@ impl Broker {
         let changes = differences(&self.loaded, &loaded);
         let in_force = Arc::new(in_force(&self.sources, &loaded)?);
         let children = (loaded.children != self.loaded.children).then(|| loaded.children.clone());
-        for notice in loaded
-            .notices
-            .iter()
-            .filter(|it| !self.loaded.notices.contains(it))
-            .cloned()
-            .collect::<Vec<_>>()
-        {
-            self.say(Notice::Loading(notice));
+        let before = std::mem::replace(&mut self.loaded, loaded).notices;
+        self.forget_older_attempts();
+        let new = |it: &&String| !before.contains(it);
+        for notice in self.loaded.notices.iter().filter(new) {
+            (self.tell)(Told::Notice(Notice::Loading(notice.clone())));
         }
-        self.loaded = loaded;
         if in_force.digest != self.in_force.digest {
             self.host.set_config(in_force.digest, &in_force.encoded);
             self.in_force = in_force.clone();
@@ -159,6 +161,14 @@ impl Broker {
         Ok(changes)
     }
 
+    /// What was wrong with former configurations and manifests is over; of those in force it still holds.
+    fn forget_older_attempts(&mut self) {
+        self.state.is_over(|it| matches!(it, Notice::Loading(_)));
+        for notice in &self.loaded.notices {
+            self.state.remark(Notice::Loading(notice.clone()));
+        }
+    }
+
     pub(super) fn reload_if_changed(&mut self, fingerprint: &mut Fingerprint) {
         let now = self.sources.fingerprint(&self.loaded);
         if now == *fingerprint {
@@ -170,9 +180,12 @@ impl Broker {
             Ok(changes) => {
                 self.say(Notice::Loading(format!("reloaded: {}", changes.join("; "))));
             }
-            Err(error) => self.say(Notice::Loading(format!(
-                "not reloaded, what was in force stays in force: {error}"
-            ))),
+            Err(error) => {
+                self.forget_older_attempts();
+                self.say(Notice::Loading(format!(
+                    "not reloaded, what was in force stays in force: {error}"
+                )));
+            }
         }
     }
 

@@ -16,7 +16,7 @@ use crate::core::{Event, Input, PrepareFailure, Stamp};
 use crate::result_paths::ResultPaths;
 use crate::scouts::{PATIENCE, Scouts};
 use crate::stamp::{stamp_of, stamp_through_links};
-use crate::watch::{is_behind_a_link, is_left_alone, is_looked_at};
+use crate::watch::{NoFile, Sight, is_behind_a_link, is_left_alone, is_looked_at, look_at};
 
 /// Who looks at files, and for whom.
 pub(super) struct Looks {
@@ -79,6 +79,8 @@ pub(super) struct Sighted {
     pub inputs: Vec<Changed>,
     /// Why nobody watches it.
     pub unwatched: Option<String>,
+    /// Why it cannot be looked at, and will not be soon.
+    pub hidden: Option<String>,
 }
 
 /// What a scout says, and which one.
@@ -109,13 +111,18 @@ impl Broker {
                 return Seen::Elsewhere(file);
             }
             let moved = moved(inputs);
-            let stamp = stamp_of(&file).ok().flatten();
-            let unwatched = why_unwatched(&file, stamp, &store.places, &roots);
+            let (stamp, hidden) = match stamp_of(&file) {
+                Ok(stamp) => (stamp, None),
+                Err(error) => (None, is_there_to_stay(&error).then(|| hides(&file, &error))),
+            };
+            let unwatched = why_unwatched(&file, stamp, &store.places, &roots)
+                .or_else(|| what_instead(&file, stamp, &roots));
             Seen::Sighted(Sighted {
                 file,
                 stamp,
                 inputs: moved,
                 unwatched,
+                hidden,
             })
         })
     }
@@ -280,6 +287,30 @@ fn moved(inputs: Vec<Input>) -> Vec<Changed> {
         (now != input.content.stamp()).then_some((input.path, now))
     });
     now.flatten().collect()
+}
+
+/// Whether an error is none of those that pass within a second; a server that does not answer passes, but who knows when.
+fn is_there_to_stay(error: &io::Error) -> bool {
+    error.kind() == io::ErrorKind::TimedOut || !foreign::is_of_the_moment(error)
+}
+
+fn hides(file: &Path, error: &io::Error) -> String {
+    format!("cannot look at {}: {error}", to_text(file))
+}
+
+/// What lies at the path of a file that is not there and hinders it from coming.
+fn what_instead(file: &Path, stamp: Option<Stamp>, roots: &[PathBuf]) -> Option<String> {
+    if stamp.is_some() {
+        return None;
+    }
+    let what = match look_at(file, roots) {
+        Sight::Directory | Sight::Known => "it is a directory".to_owned(),
+        // What it leads to may come.
+        Sight::NoFile(NoFile::Dangling(_)) => return None,
+        Sight::NoFile(what) => what.to_string(),
+        Sight::File(_) | Sight::Nothing | Sight::Hidden(_) => return None,
+    };
+    Some(format!("{} cannot be checked: {what}", to_text(file)))
 }
 
 fn why_unwatched(

@@ -257,7 +257,7 @@ impl Broker {
                     Stop::Quit => { quit = true; false }
                 },
                 Some(looked) = self.inbox.looked.recv() => self.looked(looked),
-                _ = tick.tick() => { self.give_up_the_overdue(); self.handle(Event::Tick) }
+                _ = tick.tick() => { self.look_around(); self.handle(Event::Tick) }
             };
             if !go_on {
                 break;
@@ -450,6 +450,13 @@ impl Broker {
                 self.say(Notice::Watching(notice));
                 true
             }
+        }
+    }
+
+    fn look_around(&mut self) {
+        self.give_up_the_overdue();
+        if let Some(lost) = self.host.loss() {
+            self.say(Notice::Lost(lost));
         }
     }
 

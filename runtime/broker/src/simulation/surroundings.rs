@@ -78,6 +78,10 @@ impl Host {
 
     pub fn set_config(&mut self, _: Digest, _: &[u8]) {}
 
+    pub fn loss(&self) -> Option<String> {
+        None
+    }
+
     pub fn documents(&self) -> Documents {
         self.simulation.documents.clone()
     }

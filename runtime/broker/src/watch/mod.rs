@@ -36,7 +36,7 @@ use crate::core::Stamp;
 use crate::seams::{Bell, Sender, channel, thread};
 
 pub use self::scan::Scan;
-pub use self::sight::is_behind_a_link;
+pub use self::sight::{NoFile, Sight, is_behind_a_link, look_at};
 
 /// Every checkable file below a directory, once. `roots` are all the directories that are looked
 /// at, without symbolic links.

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use qcbus_broker::{Broker, Options, Outside, ResultPaths, StartError, Told};
 use qcbus_broker::{Delivery, Judged, Notice, Settings, Stop};
-use qcbus_bus::{HostOptions, Instance, SharedMemory};
+use qcbus_bus::{HostOptions, Instance, SharedMemory, StartError as BusError};
 use qcbus_document::{FileKind, Suffix};
 use qcbus_formats::config::Config;
 use qcbus_messages::path_text::{from_text, to_text};
@@ -74,7 +74,7 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
     };
     let bundles = standard::bundle_specs(&program, &kinds, args.schema_dir.as_deref());
     let options = Options {
-        instance: private_instance().map_err(|why| (Exit::Internal, why))?,
+        instance: private_instance()?,
         roots,
         files,
         watch: false,
@@ -227,11 +227,12 @@ fn kinds(roots: &[PathBuf], files: &[PathBuf]) -> BTreeSet<FileKind> {
     }
 }
 
-fn private_instance() -> Result<Instance, String> {
+fn private_instance() -> Result<Instance, Refusal> {
     qcbus_bus::sweep_private_instances();
-    let random = u64::from_le_bytes(random_bytes()?);
+    let random = random_bytes().map_err(|why| (Exit::Internal, why))?;
+    let random = u64::from_le_bytes(random);
     let name = format!("check-{}-{random:016x}", std::process::id());
-    Instance::named(&name).map_err(|error| error.to_string())
+    Instance::named(&name).map_err(|error| usage(error.to_string()))
 }
 
 fn random_bytes() -> Result<[u8; 8], String> {
@@ -331,7 +332,9 @@ async fn start(
             Err(error) => error,
         };
         match &error {
-            StartError::Load(_) | StartError::Results(_) => return Err(usage(error.to_string())),
+            StartError::Load(_)
+            | StartError::Results(_)
+            | StartError::Bus(BusError::Instance(_)) => return Err(usage(error.to_string())),
             StartError::Bus(why) if why.may_pass() => {}
             _ => return Err((Exit::Internal, error.to_string())),
         }

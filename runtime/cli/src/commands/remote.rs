@@ -67,14 +67,10 @@ pub fn wait(args: &WaitArgs) -> Exit {
     match ask(&args.instance, &Request::Wait { file, timeout_ms }) {
         Ok(Response::Verdict(verdict)) => tell(args, &verdict),
         Ok(Response::TimedOut) => {
-            let why = if args.file.exists() {
-                ""
-            } else {
-                ": there is no such file"
-            };
             talk::fail(&format!(
-                "no verdict on {} in time{why}",
-                to_text(&args.file)
+                "no verdict on {} in time{}",
+                to_text(&args.file),
+                why_no_verdict(args)
             ));
             Exit::Undetermined
         }
@@ -89,6 +85,20 @@ pub fn wait(args: &WaitArgs) -> Exit {
         }
         Ok(other) => unexpected(&other),
         Err(exit) => exit,
+    }
+}
+
+/// What the broker knows of a file that it has no verdict on.
+fn why_no_verdict(args: &WaitArgs) -> String {
+    let file = named(&args.file);
+    let known = match ask(&args.instance, &Request::Status) {
+        Ok(Response::Status(status)) => status.unseen.into_iter().find(|it| it.path == file),
+        _ => None,
+    };
+    match known {
+        Some(it) => format!(": {}", shown::line(&it.why)),
+        None if args.file.exists() => String::new(),
+        None => ": there is no such file".to_owned(),
     }
 }
 

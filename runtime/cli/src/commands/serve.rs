@@ -50,7 +50,7 @@ async fn serve(options: Options) -> Exit {
             talk::fail(&explain(&error));
             return match error {
                 StartError::Load(_)
-                | StartError::Bus(BusError::AlreadyRunning { .. })
+                | StartError::Bus(BusError::AlreadyRunning { .. } | BusError::Instance(_))
                 | StartError::Journal(
                     JournalError::State(LockError::Held { .. }) | JournalError::Foreign(_),
                 )

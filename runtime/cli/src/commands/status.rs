@@ -96,7 +96,10 @@ pub fn render(status: &Status) -> String {
     // What is still unseen has been named, and the rest no longer is.
     let notices = status.notices.iter().filter(|it| it.kind != "unseen");
     for notice in notices.rev().take(5).collect::<Vec<_>>().into_iter().rev() {
-        line("note", notice.text.clone());
+        line(
+            "note",
+            format!("{} ({} ago)", notice.text, span(notice.ago_s as f64)),
+        );
     }
     text
 }
@@ -206,6 +209,7 @@ mod tests {
                 kind: "not-written".into(),
                 about: None,
                 text: "cannot write /farm/out/a.xqar: No space left on device".into(),
+                ago_s: 75,
             }],
             unseen: vec![Unseen {
                 path: "/farm/closed".into(),

@@ -3,7 +3,12 @@
 use super::*;
 
 pub fn notices(world: &World) -> Vec<&'static str> {
-    world.state.notices.iter().map(Notice::kind).collect()
+    world
+        .state
+        .notices
+        .iter()
+        .map(|(it, _)| it.kind())
+        .collect()
 }
 
 /// A manifest has come, and its child runs as version 1.

@@ -151,5 +151,5 @@ fn the_newest_notices_are_kept() {
     }
     assert_eq!(world.state.notices.len(), NOTICES);
     let newest = Notice::TurnedAway((NOTICES + 9).to_string());
-    assert_eq!(world.state.notices.back(), Some(&newest));
+    assert_eq!(world.state.notices.back().map(|(it, _)| it), Some(&newest));
 }

@@ -30,7 +30,7 @@ fn is_ended_after(
     assert!(!world.peers.is_empty(), "not before its time");
     world.pass(Duration::from_millis(1));
     assert!(world.peers.is_empty(), "not after its time");
-    let notice = world.state.notices.back().map(Notice::why);
+    let notice = world.state.notices.back().map(|(it, _)| it.why());
     notice.unwrap_or_default()
 }
 
@@ -333,7 +333,7 @@ fn a_catalogue_beyond_all_bounds_is_no_catalogue() {
         change(&mut said);
         world.say(session, FromPeer::Catalogue(Box::new(said)));
         assert!(!world.peers.contains_key(&session), "{word}");
-        let why = world.state.notices.back().unwrap().to_string();
+        let why = world.state.notices.back().unwrap().0.to_string();
         assert!(why.contains(word), "{why}");
         assert!(!why.chars().any(qcbus_messages::shown::moves), "{why:?}");
     }

@@ -532,7 +532,7 @@ fn that_there_is_no_room_is_said_once_in_a_while() {
     world.join("First");
     let said = |world: &World| {
         let notices = world.state.notices.iter();
-        notices.filter(|it| it.kind() == "no-room").count()
+        notices.filter(|it| it.0.kind() == "no-room").count()
     };
     for file in [0, 4] {
         world.write(file);

@@ -231,7 +231,7 @@ fn a_root_that_becomes_a_link_is_away_until_it_is_a_directory() {
     put(&root.join("a.xodr"));
     let mut watched = Watched::start(&root);
     fs::rename(&root, &aside).unwrap();
-    std::os::unix::fs::symlink(&aside, &root).unwrap();
+    symlink(&aside, &root).unwrap();
     let away = |it: &String| it.contains("has become a symbolic link") || it.contains("is gone");
     while !watched.said.iter().any(away) {
         let seen = watched.told.recv_timeout(Duration::from_secs(30)).unwrap();

@@ -1,0 +1,137 @@
+//! The side of whoever asks.
+
+use std::io::{self, BufRead, BufReader, Write};
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use qcbus_bus::Process;
+use qcbus_messages::control::{Request, Response};
+
+use super::{SOCKET, place};
+
+/// Why a broker could not be asked.
+#[derive(Debug, thiserror::Error)]
+pub enum AskError {
+    /// Nobody listens.
+    #[error(
+        "no broker runs as this instance ({path}); start one with `qcbus serve`, or name another with --instance"
+    )]
+    NoBroker {
+        /// The socket looked for.
+        path: PathBuf,
+    },
+    /// The broker went away before it answered.
+    #[error("the broker left before it answered ({0}); see its log, and ask again when it runs")]
+    Left(String),
+    /// The broker said something else than an answer.
+    #[error("the broker did not answer: {0}")]
+    NoAnswer(String),
+}
+
+/// Asks a broker one thing. Blocks until it answers.
+///
+/// # Errors
+/// See [`AskError`].
+pub fn ask_broker(directory: &Path, request: &Request) -> Result<Response, AskError> {
+    let path = directory.join(SOCKET);
+    let mut stream = place::connect(directory).map_err(|_| AskError::NoBroker { path })?;
+    let process = broker_behind(&stream);
+    let lost = |error: io::Error| AskError::Left(error.to_string());
+    let mut text =
+        serde_json::to_vec(request).map_err(|error| AskError::NoAnswer(error.to_string()))?;
+    text.push(b'\n');
+    stream.write_all(&text).map_err(lost)?;
+    let answer = answer(stream, request, process.as_ref())?;
+    if let (Response::Stopped, Some(process)) = (&answer, &process)
+        && !process.ends_within(END_WITHIN)
+    {
+        let (id, seconds) = (process.id(), END_WITHIN.as_secs());
+        let why = format!("it has stopped, but its process {id} is still there after {seconds} s");
+        return Err(AskError::NoAnswer(why));
+    }
+    Ok(answer)
+}
+
+/// Who listens there; `None` where it cannot be seen, in another container for instance.
+fn broker_behind(stream: &UnixStream) -> Option<Process> {
+    // Nobody waits for his own end.
+    Process::behind(stream).filter(|it| it.id() != std::process::id())
+}
+
+fn answer(
+    stream: UnixStream,
+    request: &Request,
+    process: Option<&Process>,
+) -> Result<Response, AskError> {
+    let lost = |error: io::Error| AskError::Left(error.to_string());
+    let (begin, limit) = (Instant::now(), limit_of(request));
+    let mut stopped = 0;
+    stream.set_read_timeout(Some(SLICE)).map_err(lost)?;
+    let (mut reader, mut line) = (BufReader::new(stream), Vec::new());
+    // What has been read of the line is kept when the time is over.
+    while let Err(error) = reader.read_until(b'\n', &mut line) {
+        if !is_timeout(&error) {
+            return Err(lost(error));
+        }
+        let is_over = limit.is_some_and(|limit| begin.elapsed() >= limit);
+        if is_over && matches!(request, Request::Wait { .. }) {
+            // The broker stands still: whoever asked for a limit gets it all the same.
+            return Ok(Response::TimedOut);
+        }
+        stopped += u32::from(process.is_some_and(Process::is_stopped));
+        let waits_in_vain = stopped >= STOPPED_FOR && !has_own_limit(request);
+        if let Some(process) = process.filter(|_| waits_in_vain) {
+            let id = process.id();
+            let why = format!("its process {id} is stopped; `kill -CONT {id}` lets it go on");
+            return Err(AskError::NoAnswer(why));
+        }
+        if is_over {
+            let seconds = limit.unwrap_or_default().as_secs();
+            let why = format!("nothing came within {seconds} s");
+            return Err(AskError::NoAnswer(why));
+        }
+    }
+    if line.is_empty() {
+        return Err(AskError::Left("it closed the connection".to_owned()));
+    }
+    serde_json::from_slice(&line).map_err(|error| AskError::NoAnswer(error.to_string()))
+}
+
+/// How often it is looked at whether the broker can answer at all.
+const SLICE: Duration = Duration::from_millis(500);
+/// In so many looks it is stopped before nobody waits any more.
+const STOPPED_FOR: u32 = 6;
+/// How long a broker that has stopped may take to let go of what it holds.
+const END_WITHIN: Duration = Duration::from_secs(30);
+/// Beyond its own limit, how long a request waits for a broker that stands still.
+const GRACE: Duration = Duration::from_secs(2);
+/// How long a broker may take for what needs no waiting.
+const AT_ONCE: Duration = Duration::from_secs(30);
+
+/// Whether whoever asks has said how long to wait.
+fn has_own_limit(request: &Request) -> bool {
+    matches!(
+        request,
+        Request::Wait {
+            timeout_ms: Some(_),
+            ..
+        }
+    )
+}
+
+/// How long to wait for an answer; `None`: as long as it takes.
+fn limit_of(request: &Request) -> Option<Duration> {
+    match request {
+        Request::Wait { timeout_ms, .. } => {
+            timeout_ms.map(|limit| Duration::from_millis(limit) + GRACE)
+        }
+        Request::Status | Request::Reload | Request::RemoveBundle { .. } => Some(AT_ONCE),
+        Request::Down => None,
+    }
+}
+
+fn is_timeout(error: &io::Error) -> bool {
+    use io::ErrorKind::{TimedOut, WouldBlock};
+    matches!(error.kind(), TimedOut | WouldBlock)
+}
