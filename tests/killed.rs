@@ -16,7 +16,7 @@ use qcbus_messages::Verdict;
 use qcbus_messages::control::PeerStatus;
 use rustix::process::Signal;
 use support::content::Content;
-use support::farm::{Farm, tail, zoo};
+use support::farm::{Farm, shm_segments, tail, zoo};
 use support::processes::signal_pid;
 use support::watchdog::until_or;
 
@@ -236,4 +236,27 @@ fn what_hung_when_its_broker_was_killed_does_not_outlive_the_next() {
     let _broker = farm.serve_ready();
     assert!(farm.qcbus(&["down"]).status.success());
     has_gone(&farm, &frozen);
+}
+
+/// Somebody cleans up after a crash and takes the one directory that knew of the shared memory.
+#[test]
+fn shared_memory_that_nobody_knows_of_any_more_is_given_back() {
+    let (farm, other) = (Farm::new(), Farm::new());
+    let mut broker = farm.serve_ready();
+    let _alive = other.serve_ready();
+    let prefixes = [&farm, &other].map(Farm::shm_prefix);
+    broker.kill();
+    std::fs::remove_dir_all(farm.instance()).unwrap();
+    assert!(!shm_segments(&prefixes[0]).is_empty());
+    // Whatever comes next, of whichever instance.
+    farm.write("good.xodr", &Content::Good(1).bytes());
+    let file = farm.root().join("good.xodr");
+    let mut check = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+    let check = check.arg("check").arg(file).arg("--out");
+    let checked = check.arg(farm.base().join("checked")).output().unwrap();
+    assert_eq!(checked.status.code(), Some(0), "{checked:?}");
+    assert_eq!(shm_segments(&prefixes[0]), [""; 0]);
+    assert!(!shm_segments(&prefixes[1]).is_empty(), "of one that lives");
+    other.write("good.xodr", &Content::Good(1).bytes());
+    assert_eq!(other.verdict("good.xodr").verdict, Verdict::Accepted);
 }

@@ -38,6 +38,9 @@ pub enum ToPeer {
     Drain,
 }
 
+/// Why a broker refuses who comes while it goes: nobody's fault, and of no interest to who was started by it.
+pub const IS_STOPPING: &str = "this broker is stopping";
+
 /// One file to check.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Job {

@@ -19,7 +19,9 @@ pub mod shown;
 /// same results. See `build.rs`.
 pub const BUILD_DATE: &str = env!("QCBUS_BUILD_DATE");
 
-pub use broker_to_peer::{Job, JobDocument, Link, PeerReport, ResultMessage, ToPeer, Withdrawn};
+pub use broker_to_peer::{
+    IS_STOPPING, Job, JobDocument, Link, PeerReport, ResultMessage, ToPeer, Withdrawn,
+};
 pub use catalogue::{Catalogue, CheckerInfo, Hello, ParamInfo, Role};
 pub use exit::Exit;
 pub use ids::{Digest, DocId, DocumentRole, JobId, PROTOCOL_VERSION};

@@ -5,14 +5,15 @@
 //! directory, `current` names them, and what older generations left is unlinked.
 
 use std::collections::hash_map::RandomState;
-use std::fs;
+use std::fs::{self, File};
 use std::hash::BuildHasher;
 use std::io::{self, Write};
-use std::os::unix::fs::{DirBuilderExt, PermissionsExt};
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
 use qcbus_messages::PROTOCOL_VERSION;
 use qcbus_messages::services::Limits;
+use rustix::fs::{FlockOperation, flock};
 use serde::{Deserialize, Serialize};
 
 use crate::instance::Instance;
@@ -22,6 +23,8 @@ use crate::process::{Process, start_time};
 
 const CURRENT: &str = "current";
 const IDENTITY: &str = "id";
+/// What a living broker keeps locked in its shared memory.
+const CLAIM: &str = "broker";
 /// Bytes of what is in it.
 const IDENTITY_LEN: usize = 18;
 /// Names that are tried for such a directory; each is as good as new.
@@ -77,6 +80,19 @@ impl Generation {
             pid_started: start_time(std::process::id()),
             limits,
         })
+    }
+
+    /// Keeps its shared memory from [`sweep_strays`] as long as the file is open.
+    pub(crate) fn claim(&self) -> io::Result<File> {
+        let mut options = File::options();
+        let file = options
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .mode(0o600)
+            .open(self.root.join(CLAIM))?;
+        flock(&file, FlockOperation::NonBlockingLockExclusive)?;
+        Ok(file)
     }
 
     /// Makes this the generation in force.
@@ -146,6 +162,28 @@ pub(crate) fn sweep(instance: &Instance, keep: Option<&Generation>) {
     }
 }
 
+/// Unlinks what brokers left that were killed and whose runtime directory is gone, so that nobody knows of it.
+pub(crate) fn sweep_strays() -> usize {
+    let user = rustix::process::geteuid().as_raw();
+    let is_own = |path: &Path| {
+        let data = fs::symlink_metadata(path);
+        data.is_ok_and(|data| data.is_dir() && data.uid() == user)
+    };
+    let is_ours = |name: &String| name.get(..IDENTITY_LEN).is_some_and(is_identity);
+    let names = names_in(Path::new(SHARED_MEMORY)).into_iter();
+    let roots = names
+        .filter(is_ours)
+        .map(|name| Path::new(SHARED_MEMORY).join(name));
+    let strays = roots.filter(|root| is_own(root) && is_stray(root));
+    strays.filter(|it| fs::remove_dir_all(it).is_ok()).count()
+}
+
+/// Nobody has it who lives. A broker that has not come to its claim yet has no file of that name.
+fn is_stray(root: &Path) -> bool {
+    let claim = File::options().write(true).open(root.join(CLAIM));
+    claim.is_ok_and(|file| flock(&file, FlockOperation::NonBlockingLockExclusive).is_ok())
+}
+
 fn names_in(dir: &Path) -> Vec<String> {
     let Ok(entries) = fs::read_dir(dir) else {
         return Vec::new();
@@ -169,16 +207,21 @@ fn last_number(instance: &Instance) -> u64 {
 fn identity(instance: &Instance) -> io::Result<String> {
     let path = instance.dir().join(IDENTITY);
     if let Ok(text) = fs::read_to_string(&path)
-        && text.len() == IDENTITY_LEN
-        && text.starts_with("qc")
-        && text[2..17].bytes().all(|byte| byte.is_ascii_hexdigit())
-        && text.ends_with('g')
+        && is_identity(&text)
     {
         return Ok(text);
     }
     let fresh = format!("qc{:015x}g", random() >> 4);
     write_identity(instance, &fresh)?;
     Ok(fresh)
+}
+
+fn is_identity(text: &str) -> bool {
+    text.len() == IDENTITY_LEN
+        && text.strip_prefix("qc").is_some_and(|rest| {
+            let number = rest.strip_suffix('g');
+            number.is_some_and(|it| it.bytes().all(|byte| byte.is_ascii_hexdigit()))
+        })
 }
 
 fn write_identity(instance: &Instance, identity: &str) -> io::Result<()> {

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;
+use std::fs::File;
 use std::ops::Bound;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -129,6 +130,7 @@ pub struct Host {
     documents: Documents,
     _janitor: Janitor,
     hub: Hub,
+    _claim: File,
     _remains: Remains,
 }
 
@@ -198,6 +200,7 @@ impl Host {
         let needed = own + room + fitting_reserve(options.shm_reserve_bytes);
         look_for_room(needed)?;
         let generation = Generation::begin(instance, limits)?;
+        let claim = generation.claim()?;
         // Somebody who takes no turns may have been faster.
         keep_room(&generation.root, room).map_err(|_| no_room(needed))?;
         let hub = Hub::new(&generation.root, Access::Create)?;
@@ -233,6 +236,7 @@ impl Host {
             last_tick: Instant::now(),
             last_watch: Instant::now(),
             _remains: remains,
+            _claim: claim,
             generation,
             limits,
             services,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::generation::sweep;
+use crate::generation::{sweep, sweep_strays};
 use crate::instance::{Instance, InstanceLock};
 
 /// Private instances (of `qcbus check`) begin with this and are nobody's but their process'.
@@ -11,9 +11,14 @@ pub const PRIVATE_PREFIX: &str = "check-";
 /// Private instances of living processes that are younger than this may be on the way to taking their lock.
 const YOUNG: std::time::Duration = std::time::Duration::from_secs(10);
 
-/// Removes what dead private instances have left: their directories and their shared memory.
+/// Removes what dead private instances have left: their directories and their shared memory; and the shared memory of
+/// any dead broker whose directory somebody has removed.
 /// Returns how many there were. Instances whose broker lives are left alone.
 pub fn sweep_private_instances() -> usize {
+    sweep_known() + sweep_strays()
+}
+
+fn sweep_known() -> usize {
     let Ok(probe) = Instance::base_dir() else {
         return 0;
     };

@@ -12,7 +12,7 @@ use qcbus_formats::config::Config;
 use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::Issue;
 use qcbus_messages::{
-    Digest, DocId, FromPeer, Hello, Job, JobId, PROTOCOL_VERSION, Role, ToPeer, codec,
+    Digest, DocId, FromPeer, Hello, IS_STOPPING, Job, JobId, PROTOCOL_VERSION, Role, ToPeer, codec,
 };
 use tokio::sync::mpsc;
 
@@ -163,10 +163,15 @@ async fn serve(
     hello: Hello,
     mut stops: Stops,
 ) -> Ended {
+    let was_started = hello.launch.is_some();
     let mut peer = match Peer::join(stand.instance, hello, stand.options()).await {
         Ok(peer) => peer,
         Err(error @ JoinError::NoBroker { .. }) => {
             return Ended::With(fail(&error.to_string(), Exit::NoBroker));
+        }
+        // A broker that had nothing to check has ended before those that it had started were there.
+        Err(JoinError::Refused(reason)) if was_started && reason == IS_STOPPING => {
+            return Ended::With(Exit::Accepted);
         }
         Err(error) => return Ended::With(fail(&error.to_string(), Exit::Internal)),
     };

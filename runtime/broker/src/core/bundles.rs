@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use qcbus_messages::shown::moves;
-use qcbus_messages::{Catalogue, DocId, FromPeer, Hello, JobId, Role, ToPeer};
+use qcbus_messages::{Catalogue, DocId, FromPeer, Hello, IS_STOPPING, JobId, Role, ToPeer};
 
 use super::action::Action;
 use super::announcing::Announced;
@@ -147,8 +147,7 @@ impl State {
     /// A process says hello.
     pub(super) fn hello(&mut self, session: SessionId, hello: &Hello, actions: &mut Actions) {
         if self.draining() {
-            // Nobody's fault and of no interest to anyone: it came as the broker went.
-            let reason = "this broker is stopping".to_owned();
+            let reason = IS_STOPPING.to_owned();
             actions.push(Action::Refuse { session, reason });
             return;
         }

@@ -228,7 +228,7 @@ fn stale_instances() -> Remark {
     let text = if swept == 0 {
         "none".to_owned()
     } else {
-        format!("{swept} left by killed checks, removed")
+        format!("{swept} left by what was killed, removed")
     };
     good("stale instances", text)
 }
