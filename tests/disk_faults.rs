@@ -246,6 +246,15 @@ fn a_file_that_never_answers_is_named_and_holds_up_nobody() {
             status.unseen.iter().any(|it| it.path == map).then_some(())
         };
         until_or("it is named", named, || victim.explain());
+        // Nobody asks for this one: it is noticed because somebody watches.
+        let unasked = format!("unasked-{round}.xodr");
+        victim.put(&unasked, Content::Good(2000 + round));
+        let result = victim.farm.out().join(format!("{unasked}.xqar"));
+        until_or(
+            "a new file is noticed",
+            || result.exists().then_some(()),
+            || victim.explain(),
+        );
         for number in 0..20 {
             let name = format!("honest-{round}-{number}.xodr");
             victim.put(&name, Content::Good(1000 * round + number));

@@ -343,6 +343,18 @@ impl State {
         coming.or(last).cloned().unwrap_or_default()
     }
 
+    /// All that verdicts depend on, each with the stamp under which it was read.
+    pub fn dependencies(&self) -> Vec<(Arc<Path>, Option<Stamp>)> {
+        let files = self.files.iter().map(|(_, entry)| &entry.path);
+        let inputs = files.flat_map(|path| self.inputs_of(path).into_iter().skip(1));
+        inputs.map(|it| (it.path, it.content.stamp())).collect()
+    }
+
+    /// Whether the first look through everything is over.
+    pub fn has_looked(&self) -> bool {
+        self.scanned
+    }
+
     fn notice(&mut self, notice: Notice, actions: &mut Actions) {
         if let Some((last, at)) = self.notices.back_mut()
             && *last == notice

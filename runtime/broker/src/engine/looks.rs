@@ -25,8 +25,6 @@ pub(super) struct Looks {
     scouts: Scouts,
     /// Files that did not answer when they were last asked for.
     hanging: BTreeSet<PathBuf>,
-    /// Where the one who looks for changes waits.
-    keeps_waiting: Option<PathBuf>,
     /// Who waits for a look at a file, by the number of the scout.
     pending: HashMap<u64, Look>,
     /// Files that have gone while somebody waits for them, which are looked at once more.
@@ -40,7 +38,6 @@ impl Default for Looks {
             scouts: Scouts::new(lookout.clone(), PATIENCE),
             lookout,
             hanging: BTreeSet::new(),
-            keeps_waiting: None,
             pending: HashMap::new(),
             missed: HashMap::new(),
         }
@@ -55,6 +52,10 @@ impl Looks {
 
     pub(super) fn lookout(&self) -> Arc<Lookout> {
         self.lookout.clone()
+    }
+
+    pub(super) fn is_hanging(&self, path: &Path) -> bool {
+        self.hanging.contains(path)
     }
 }
 
@@ -224,30 +225,25 @@ impl Broker {
         }
         let before = std::mem::take(&mut self.looks.hanging);
         self.looks.hanging.extend(hanging);
-        let hanging = &self.looks.hanging;
-        self.looks.keeps_waiting.take_if(|it| !hanging.contains(it));
-        for path in before.difference(&self.looks.hanging) {
-            self.unseen.remove(path);
+        let now = self.looks.hanging.clone();
+        for path in before.difference(&now).cloned() {
+            self.answers_again(path);
         }
-        for path in self.looks.hanging.clone().difference(&before) {
+        for path in now.difference(&before).cloned() {
             let seconds = PATIENCE.as_secs();
-            let further = match self.looks.keeps_waiting.as_ref() == Some(path) {
-                true => "; what else changes is not noticed until it answers or is unmounted",
-                false => "",
-            };
             let why = format!(
-                "the system has not answered for {seconds} s; is its disk or server there?{further}"
+                "the system has not answered for {seconds} s; is its disk or server there?"
             );
-            let path = path.clone();
             self.unseen(Unseen { path, why });
         }
     }
 
     fn give_up(&mut self, overdue: &Overdue) {
-        let Some(owner) = overdue.owner else {
-            self.looks.keeps_waiting = Some(overdue.path.clone());
+        // Without an owner: the only look that there is, which nobody can take over.
+        let Some(owner) = overdue.owner else { return };
+        if self.is_watcher(owner) {
             return;
-        };
+        }
         let (path, seconds) = (to_text(&overdue.path), overdue.waited.as_secs());
         let reason = format!("read {path}: the system has not answered for {seconds} s");
         if let Some(look) = self.looks.pending.remove(&owner) {

@@ -7,6 +7,7 @@ mod looks;
 mod simulated;
 mod start;
 mod systemd;
+mod watching;
 
 #[cfg(test)]
 pub(crate) use simulated::{line_of, simulate};
@@ -23,6 +24,7 @@ use qcbus_messages::control::{Response, Unseen};
 use qcbus_messages::{Hello, JobId, ToPeer};
 use tokio::sync::{mpsc, oneshot};
 
+use self::watching::Watching;
 use crate::control::Asked;
 use crate::core::{Event, Judged, Launch, Notice, SessionId, State, Ticket};
 use crate::demand::InForce;
@@ -115,6 +117,7 @@ pub struct Broker {
     loaded: Loaded,
     in_force: Arc<InForce>,
     watcher: Option<Watcher>,
+    watching: Option<Watching>,
     watch_mode: String,
     /// What could not be looked at, and why.
     unseen: BTreeMap<PathBuf, String>,
@@ -428,6 +431,8 @@ impl Broker {
                 self.look_whether_it_is_back(path)
             }
             Seen::Vanished(path) => self.handle(Event::Vanished { path }),
+            // It has been named, and why.
+            Seen::Unseen(unseen) if self.looks.is_hanging(&unseen.path) => true,
             Seen::Unseen(unseen) => {
                 self.unseen(unseen);
                 true
@@ -455,6 +460,7 @@ impl Broker {
 
     fn look_around(&mut self) {
         self.give_up_the_overdue();
+        self.watch_again();
         if let Some(lost) = self.host.loss() {
             self.say(Notice::Lost(lost));
         }

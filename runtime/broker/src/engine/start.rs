@@ -14,6 +14,7 @@ use qcbus_messages::control::Unseen;
 use tokio::sync::mpsc;
 
 use super::looks::Looks;
+use super::watching::Watching;
 use super::{AttendedTime, Broker, Inbox, Sessions, StartError, Told};
 use crate::control::Asked;
 use crate::core::{Member, Notice, Stamp, State};
@@ -32,7 +33,7 @@ use crate::seams::{Children, ControlSocket, Host, now, spawn_blocking};
 use crate::stamp::stamp_of;
 use crate::store::{Reconciled, Store, remove_earlier_results};
 use crate::supervise::Surroundings;
-use crate::watch::{Seen, WatchOptions, Watcher, is_looked_at, scan_directory};
+use crate::watch::{Seen, is_looked_at, scan_directory};
 use crate::writers::{Order, Writers};
 use qcbus_disk::sweep;
 
@@ -78,6 +79,7 @@ impl Broker {
             loaded,
             in_force,
             watcher: None,
+            watching: None,
             watch_mode: "once".to_owned(),
             unseen: BTreeMap::new(),
             looks,
@@ -144,18 +146,11 @@ impl Broker {
         seen: mpsc::UnboundedSender<Seen>,
     ) -> Result<(), StartError> {
         if self.options.watch {
-            let options = WatchOptions {
-                roots: self.options.roots.clone(),
-                poll: self.options.poll,
-                rescan: self.options.rescan,
-            };
-            let watcher = Watcher::start(options, self.looks.lookout(), move |what| {
-                // After the end of the loop nobody listens.
-                let _ = seen.send(what);
-            });
+            let watching = Watching::new(seen);
+            let watcher = self.watch(&watching, None);
             let watcher = watcher.map_err(|source| system("watch", source))?;
             watcher.depend(dependencies);
-            self.watcher = Some(watcher);
+            (self.watcher, self.watching) = (Some(watcher), Some(watching));
             return Ok(());
         }
         let (roots, files) = (self.options.roots.clone(), self.options.files.clone());

@@ -19,7 +19,7 @@ use super::scan::{MORE_UNSEEN, MOST_UNSEEN};
 use super::settle::Settling;
 use super::sight::{Sight, look_at};
 use super::tree::{Tree, below};
-use super::{Order, Seen, WatchOptions};
+use super::{Known, Order, Seen, WatchOptions};
 use crate::core::Stamp;
 use crate::seams::{Bell, Receiver, now, step};
 use crate::stamp::stamp_of;
@@ -50,6 +50,8 @@ pub(super) struct Looker {
     pub tree: Tree,
     pub due: Due,
     pub polling: super::events::Polling,
+    /// Another has looked through everything before.
+    goes_on: bool,
 }
 
 impl Looker {
@@ -74,13 +76,21 @@ impl Looker {
             tree: Tree::default(),
             due: Due::new(now()),
             polling: super::events::Polling::default(),
+            goes_on: false,
         }
+    }
+
+    /// Takes the place of another. What it said last of each file is not known, and is said again.
+    pub fn go_on_with(&mut self, known: Known) {
+        let files = known.files.into_iter();
+        self.known = files.map(|path| (path, Stamp::default())).collect();
+        self.goes_on = true;
     }
 
     pub fn run(mut self, inbox: &Receiver<Order>, bell: &Bell) {
         self.ask_for_events();
         self.check_roots();
-        self.begin_pass(true);
+        self.begin_pass(!self.goes_on);
         let mut next_look = now() + dependencies::INTERVAL;
         while self.take_orders(inbox) {
             self.take_events();
@@ -117,7 +127,7 @@ impl Looker {
                 Ok(Order::Undepend(paths)) => self.dependencies.remove(&paths),
                 Ok(Order::Forget(path)) => self.forget(&path),
                 Ok(Order::Learn(path, stamp)) => drop(self.known.entry(path).or_insert(stamp)),
-                Ok(Order::Look(path)) => self.look(&path),
+                Ok(Order::Look(path)) => self.look_again(&path),
                 Err(TryRecvError::Empty) => return true,
             }
         }
@@ -184,6 +194,14 @@ impl Looker {
         } else if let Some(changed) = changed {
             self.tell_changed(changed);
         }
+    }
+
+    /// As [`Looker::look`]; a directory is looked through.
+    fn look_again(&mut self, path: &Path) {
+        if self.tree.contains(path) {
+            self.due.push(path);
+        }
+        self.look(path);
     }
 
     /// It may have been one before somebody had it ignored, and others may depend on it.

@@ -96,6 +96,13 @@ pub struct WatchOptions {
     pub rescan: Duration,
 }
 
+/// What a watcher goes on with that takes the place of another. The first look through everything is over then.
+#[derive(Debug)]
+pub struct Known {
+    /// The files that were there.
+    pub files: Vec<Arc<Path>>,
+}
+
 /// A running watcher. It stops when this is dropped.
 #[derive(Debug)]
 pub struct Watcher {
@@ -120,24 +127,28 @@ impl Drop for Watcher {
 }
 
 impl Watcher {
-    /// Starts watching on a thread of its own; `tell` is called from there, and `lookout`
-    /// sees where it waits.
+    /// Starts watching on a thread of its own; `tell` is called from there, and the lookout sees under that number
+    /// where it waits. `known`: it takes the place of another.
     ///
     /// # Errors
     /// When no thread can be started, or there is no descriptor left to wake it.
     pub fn start(
         options: WatchOptions,
-        lookout: Arc<Lookout>,
+        (lookout, number): (Arc<Lookout>, u64),
+        known: Option<Known>,
         tell: impl FnMut(Seen) + Send + 'static,
     ) -> std::io::Result<Watcher> {
         let (orders, inbox) = channel();
         let bell = Arc::new(Bell::new()?);
-        let looker = Looker::new(options, Box::new(tell));
+        let mut looker = Looker::new(options, Box::new(tell));
+        if let Some(known) = known {
+            looker.go_on_with(known);
+        }
         let rung = bell.clone();
         thread::Builder::new()
             .name("watch".to_owned())
             .spawn(move || {
-                let _attendance = lookout.attend_for_good();
+                let _attendance = lookout.attend(number);
                 looker.run(&inbox, &rung);
             })?;
         Ok(Watcher { orders, bell })

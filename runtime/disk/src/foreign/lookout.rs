@@ -8,8 +8,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Threads that may wait in vain for files of one directory before nobody goes there any more.
+use super::mounts;
+
+/// Files of one directory that threads may wait for in vain before nobody goes there any more.
 pub(super) const PER_DIRECTORY: usize = 4;
+/// The same of one file system that is mounted.
+pub(super) const PER_MOUNT: usize = 4;
 /// And in total.
 const IN_TOTAL: usize = 256;
 
@@ -19,9 +23,17 @@ const IN_TOTAL: usize = 256;
 pub struct Lookout {
     posts: Mutex<Vec<Arc<Post>>>,
     /// By path, threads that were found overdue and have not come back.
-    lost: Mutex<HashMap<PathBuf, usize>>,
+    lost: Mutex<HashMap<PathBuf, Lost>>,
     /// How many those are, to be looked at without the lock.
     losses: AtomicUsize,
+}
+
+/// The threads that wait in vain for one file.
+#[derive(Debug)]
+struct Lost {
+    threads: usize,
+    /// Where its file system is mounted.
+    mount: Option<PathBuf>,
 }
 
 /// What one thread does.
@@ -118,7 +130,13 @@ impl Lookout {
         waiting.overdue = true;
         let path = waiting.path.clone();
         state.lost = post.owner.is_some();
-        *lock(&self.lost).entry(path.clone()).or_default() += 1;
+        let lost = || Lost {
+            threads: 0,
+            mount: mounts::mount_of(&path),
+        };
+        let mut all = lock(&self.lost);
+        all.entry(path.clone()).or_insert_with(lost).threads += 1;
+        drop(all);
         self.losses.fetch_add(1, Ordering::AcqRel);
         Some(Overdue {
             owner: post.owner,
@@ -143,10 +161,13 @@ impl Lookout {
         if lost.contains_key(path) {
             return Some("it has not answered for too long, and is still waited for".to_owned());
         }
-        let beside =
-            |(it, count): (&PathBuf, &usize)| (it.parent() == path.parent()).then_some(*count);
-        if lost.iter().filter_map(beside).sum::<usize>() >= PER_DIRECTORY {
+        let beside = |it: &&PathBuf| it.parent() == path.parent();
+        if lost.keys().filter(beside).count() >= PER_DIRECTORY {
             return Some("files in its directory have not answered for too long".to_owned());
+        }
+        let mounts = lost.values().filter_map(|it| it.mount.as_ref());
+        if mounts.filter(|it| path.starts_with(it)).count() >= PER_MOUNT {
+            return Some("files on its file system have not answered for too long".to_owned());
         }
         (self.losses.load(Ordering::Acquire) >= IN_TOTAL)
             .then(|| format!("{IN_TOTAL} files have not answered for too long"))
@@ -158,9 +179,9 @@ impl Lookout {
             return;
         }
         let mut lost = lock(&self.lost);
-        if let Some(count) = lost.get_mut(&waiting.path) {
-            *count -= 1;
-            if *count == 0 {
+        if let Some(it) = lost.get_mut(&waiting.path) {
+            it.threads -= 1;
+            if it.threads == 0 {
                 lost.remove(&waiting.path);
             }
             self.losses.fetch_sub(1, Ordering::AcqRel);

@@ -6,6 +6,7 @@
 
 mod behalf;
 mod lookout;
+mod mounts;
 
 use std::fs::{DirEntry, File, Metadata};
 use std::io::{self, Read};

@@ -234,6 +234,26 @@ fn a_directory_that_hangs_takes_few_threads() {
 }
 
 #[test]
+fn a_file_system_that_hangs_takes_few_threads_wherever_they_look() {
+    let lookout = Arc::new(Lookout::default());
+    let at = |number| PathBuf::from(format!("/proc/directory-{number}/a.xodr"));
+    let hanging: Vec<_> = (0..lookout::PER_MOUNT)
+        .map(|number| hang(&lookout, Some(1), &at(number)))
+        .collect();
+    let found = lookout.overdue(Duration::ZERO).len();
+    assert_eq!(found, lookout::PER_MOUNT);
+    let attendance = lookout.attend(2);
+    let other = Path::new("/proc/self/status");
+    assert_eq!(metadata(other).unwrap_err().kind(), io::ErrorKind::TimedOut);
+    assert!(metadata(Path::new("/")).is_ok(), "that is another one");
+    for it in hanging {
+        it.end();
+    }
+    assert!(metadata(other).is_ok());
+    drop(attendance);
+}
+
+#[test]
 fn a_disk_that_is_slow_is_not_overdue() {
     let lookout = Arc::new(Lookout::default());
     let attendance = lookout.attend(1);

@@ -41,7 +41,7 @@ impl Watched {
             told,
             said: Vec::new(),
             root: root.to_path_buf(),
-            _watcher: Watcher::start(options, Arc::default(), tell).unwrap(),
+            _watcher: Watcher::start(options, (Arc::default(), 1), None, tell).unwrap(),
         };
         watched.until("Scanned");
         watched

@@ -1,0 +1,117 @@
+//! The watcher, and another in its place once it waits for a file that does not answer.
+//!
+//! A thread that waits for a disk in vain cannot be ended. Its work can be given to another, which
+//! the lookout keeps from going there; the first has nothing to say any more, should it ever come back.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use tokio::sync::mpsc::UnboundedSender;
+
+use super::Broker;
+use crate::core::Notice;
+use crate::watch::{Known, Seen, WatchOptions, Watcher};
+
+/// Numbers of watchers at the lookout; jobs and scouts never come here.
+const FIRST: u64 = 3 << 62;
+
+/// Whose word counts, and where it goes.
+pub(super) struct Watching {
+    current: Arc<AtomicU64>,
+    seen: UnboundedSender<Seen>,
+    /// It waits in vain, and no successor could be started yet.
+    is_alone: bool,
+}
+
+impl Watching {
+    pub(super) fn new(seen: UnboundedSender<Seen>) -> Watching {
+        let current = Arc::new(AtomicU64::new(FIRST - 1));
+        Watching {
+            current,
+            seen,
+            is_alone: false,
+        }
+    }
+
+    fn number(&self) -> u64 {
+        self.current.load(Ordering::Acquire)
+    }
+}
+
+impl Broker {
+    /// Begins to watch; `known` is what is gone on with.
+    pub(super) fn watch(
+        &mut self,
+        watching: &Watching,
+        known: Option<Known>,
+    ) -> std::io::Result<Watcher> {
+        let options = WatchOptions {
+            roots: self.options.roots.clone(),
+            poll: self.options.poll,
+            rescan: self.options.rescan,
+        };
+        let own = watching.number() + 1;
+        let (current, seen) = (watching.current.clone(), watching.seen.clone());
+        let tell = move |what| {
+            if current.load(Ordering::Acquire) == own {
+                // After the end of the loop nobody listens.
+                let _ = seen.send(what);
+            }
+        };
+        watching.current.store(own, Ordering::Release);
+        let started = Watcher::start(options, (self.looks.lookout(), own), known, tell);
+        if started.is_err() {
+            watching.current.store(own - 1, Ordering::Release);
+        }
+        started
+    }
+
+    /// Whether this is the number of a watcher. One that waits in vain has a successor then.
+    pub(super) fn is_watcher(&mut self, number: u64) -> bool {
+        let is_current = |it: &mut Watching| it.number() == number;
+        if let Some(mut watching) = self.watching.take_if(is_current) {
+            self.succeed(&mut watching);
+            self.watching = Some(watching);
+        }
+        number >= FIRST
+    }
+
+    /// Tries again what could not be done for want of a thread.
+    pub(super) fn watch_again(&mut self) {
+        if let Some(mut watching) = self.watching.take_if(|it| it.is_alone) {
+            self.succeed(&mut watching);
+            self.watching = Some(watching);
+        }
+    }
+
+    fn succeed(&mut self, watching: &mut Watching) {
+        let known = self.state.has_looked().then(|| Known {
+            files: self.state.present_files(),
+        });
+        match self.watch(watching, known) {
+            Ok(watcher) => {
+                // What still cannot be looked at is named again.
+                self.unseen.retain(|path, _| self.looks.is_hanging(path));
+                watcher.depend(self.state.dependencies());
+                self.watcher = Some(watcher);
+                watching.is_alone = false;
+            }
+            Err(_) if watching.is_alone => {}
+            Err(error) => {
+                watching.is_alone = true;
+                self.say(Notice::Watching(format!(
+                    "nobody watches for changes at the moment: {error}; that is tried again"
+                )));
+            }
+        }
+    }
+
+    /// What did not answer does again: it may have changed meanwhile.
+    pub(super) fn answers_again(&mut self, path: PathBuf) {
+        self.unseen.remove(&path);
+        if let Some(watcher) = &self.watcher {
+            watcher.look(path.into());
+        }
+    }
+}
