@@ -371,3 +371,21 @@ fn a_user_without_rights_has_a_runtime_directory() {
     assert!(text.contains("no broker runs"), "{text}");
     assert_eq!(mode_of(&dir.path().join("qcbus-65534")), 0o700);
 }
+
+/// Many have a directory of results for a whole group. What that costs is said and not left to be found out.
+#[test]
+fn results_that_others_may_write_to_are_said() {
+    let farm = Farm::new();
+    std::fs::create_dir(farm.gate()).unwrap();
+    mode(&farm.gate(), 0o777);
+    let mut serve = farm.serve_command();
+    serve.arg("--gate").arg(farm.gate());
+    let _broker = Broker::start(&mut serve, &farm.log_path());
+    until_so("the broker answers", || farm.status().is_some());
+    let notices = farm.status().unwrap().notices;
+    let said = notices.iter().find(|it| it.kind == "storing").unwrap();
+    let gate = farm.gate();
+    assert!(said.text.contains(gate.to_str().unwrap()), "{notices:?}");
+    assert!(said.text.contains("is not ours alone"), "{notices:?}");
+    assert!(!said.text.contains(farm.out().to_str().unwrap()));
+}

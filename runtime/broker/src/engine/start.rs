@@ -7,10 +7,12 @@ use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 
 use qcbus_bus::HostOptions;
+use qcbus_disk::trust::{self, TrustError};
 use qcbus_formats::config::Config;
 use qcbus_ingest::modular::SearchPath;
 use qcbus_messages::Role;
 use qcbus_messages::control::Unseen;
+use qcbus_messages::path_text::to_text;
 use tokio::sync::mpsc;
 
 use super::looks::Looks;
@@ -97,7 +99,8 @@ impl Broker {
             options,
         };
         broker.take_up(members, broker.store.voids()?);
-        tell_what_was_put_right(&reconciled, limited, &senders.notices);
+        let open = open_to_others(&broker.options);
+        tell_at_the_start(&reconciled, open, limited, &senders.notices);
         let dependencies = broker.remember(reconciled);
         broker.look(dependencies, senders.seen)?;
         Ok(broker)
@@ -171,16 +174,40 @@ fn control_of(
         .map_err(|source| system("listen for commands", source))
 }
 
-fn tell_what_was_put_right(
+fn tell_at_the_start(
     reconciled: &Reconciled,
+    open: Vec<Notice>,
     limited: Option<String>,
     notices: &mpsc::UnboundedSender<Notice>,
 ) {
     let right = reconciled.said.iter().cloned().map(Notice::Storing);
-    for notice in limited.map(Notice::Limited).into_iter().chain(right) {
+    for notice in limited
+        .map(Notice::Limited)
+        .into_iter()
+        .chain(open)
+        .chain(right)
+    {
         // The loop that listens has not ended before it began.
         let _ = notices.send(notice);
     }
+}
+
+/// Directories of results into which others may write. Many want it so; that it has a price is said.
+fn open_to_others(options: &Options) -> Vec<Notice> {
+    if !options.watch {
+        return Vec::new();
+    }
+    let gate = options.gate.as_deref();
+    let places = [Some(&*options.out), gate].into_iter().flatten();
+    let foreign = places.filter_map(|place| match trust::directory(place) {
+        Err(error @ TrustError::Foreign { .. }) => Some(Notice::Storing(format!(
+            "{} is not ours alone: what lies there is not ours for certain, and whoever may write there can have us \
+             write elsewhere: {error}",
+            to_text(place)
+        ))),
+        _ => None,
+    });
+    foreign.collect()
 }
 
 fn sources_of(options: &Options) -> Sources {
