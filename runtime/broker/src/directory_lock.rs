@@ -5,6 +5,7 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
+use qcbus_disk::trust::{self, TrustError};
 use qcbus_messages::path_text::to_text;
 
 /// What a directory is to the one who has it.
@@ -236,6 +237,20 @@ fn refusal(file: &mut File, directory: &Path, purpose: Purpose) -> LockError {
         purpose,
         holder,
     }
+}
+
+/// What is to be said of those directories into which others may write. Many want it so, and it has a price.
+pub fn open_to_others<'p>(
+    directories: impl Iterator<Item = &'p Path>,
+) -> impl Iterator<Item = String> {
+    directories.filter_map(|directory| match trust::directory(directory) {
+        Err(error @ TrustError::Foreign { .. }) => Some(format!(
+            "{} is not ours alone: what lies there is not ours for certain, and whoever may write there can have us \
+             write elsewhere: {error}",
+            to_text(directory)
+        )),
+        _ => None,
+    })
 }
 
 #[cfg(test)]

@@ -77,6 +77,7 @@ mod tests {
     use std::process::{Child, Command};
 
     use qcbus_bus::LAUNCH;
+    use rustix::process::{Pid, Signal, kill_process_group};
 
     use super::*;
 
@@ -94,7 +95,9 @@ mod tests {
 
     fn ends(mut child: Child) -> bool {
         let runs = child.try_wait().unwrap().is_none();
-        child.kill().unwrap();
+        // With what it has started.
+        let group = Pid::from_child(&child);
+        kill_process_group(group, Signal::KILL).unwrap();
         child.wait().unwrap();
         runs
     }

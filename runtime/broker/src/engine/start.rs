@@ -7,12 +7,10 @@ use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 
 use qcbus_bus::HostOptions;
-use qcbus_disk::trust::{self, TrustError};
 use qcbus_formats::config::Config;
 use qcbus_ingest::modular::SearchPath;
 use qcbus_messages::Role;
 use qcbus_messages::control::Unseen;
-use qcbus_messages::path_text::to_text;
 use tokio::sync::mpsc;
 
 use super::looks::Looks;
@@ -22,7 +20,7 @@ use crate::control::Asked;
 use crate::core::{Member, Notice, Stamp, State};
 use crate::demand::InForce;
 use crate::descriptors::Descriptors;
-use crate::directory_lock::{DirectoryLock, LockError, Purpose};
+use crate::directory_lock::{DirectoryLock, LockError, Purpose, open_to_others};
 use crate::gate::{Gate, GateError, GateOptions};
 use crate::intake::Intake;
 use crate::journal::{Journal, JournalError, Void};
@@ -99,8 +97,7 @@ impl Broker {
             options,
         };
         broker.take_up(members, broker.store.voids()?);
-        let open = open_to_others(&broker.options);
-        tell_at_the_start(&reconciled, open, limited, &senders.notices);
+        tell_at_the_start(&reconciled, &broker.options, limited, &senders.notices);
         let dependencies = broker.remember(reconciled);
         broker.look(dependencies, senders.seen)?;
         Ok(broker)
@@ -176,11 +173,13 @@ fn control_of(
 
 fn tell_at_the_start(
     reconciled: &Reconciled,
-    open: Vec<Notice>,
+    options: &Options,
     limited: Option<String>,
     notices: &mpsc::UnboundedSender<Notice>,
 ) {
     let right = reconciled.said.iter().cloned().map(Notice::Storing);
+    let lasting = [Some(&*options.out), options.gate.as_deref()].into_iter();
+    let open = open_to_others(lasting.flatten().filter(|_| options.watch)).map(Notice::Storing);
     for notice in limited
         .map(Notice::Limited)
         .into_iter()
@@ -190,24 +189,6 @@ fn tell_at_the_start(
         // The loop that listens has not ended before it began.
         let _ = notices.send(notice);
     }
-}
-
-/// Directories of results into which others may write. Many want it so; that it has a price is said.
-fn open_to_others(options: &Options) -> Vec<Notice> {
-    if !options.watch {
-        return Vec::new();
-    }
-    let gate = options.gate.as_deref();
-    let places = [Some(&*options.out), gate].into_iter().flatten();
-    let foreign = places.filter_map(|place| match trust::directory(place) {
-        Err(error @ TrustError::Foreign { .. }) => Some(Notice::Storing(format!(
-            "{} is not ours alone: what lies there is not ours for certain, and whoever may write there can have us \
-             write elsewhere: {error}",
-            to_text(place)
-        ))),
-        _ => None,
-    });
-    foreign.collect()
 }
 
 fn sources_of(options: &Options) -> Sources {
