@@ -160,12 +160,14 @@ impl StartError {
     }
 }
 
+/// Sizes are advised in steps of so many bytes: people remember them.
+const STEP: u64 = 64 << 20;
+
 fn way_out(size: u64, free: u64, needed: u64) -> String {
     let taken = size.saturating_sub(free);
     // What is missing, and as much again for what is to be checked.
-    let advised = taken
-        .saturating_add(needed.saturating_mul(2))
-        .div_ceil(1 << 20);
+    let wanted = taken.saturating_add(needed.saturating_mul(2));
+    let advised = wanted.div_ceil(STEP).saturating_mul(STEP) >> 20;
     let make = format!(
         "make it larger: `mount -o remount,size={advised}M /dev/shm`, for a container `docker run --shm-size={advised}m`"
     );

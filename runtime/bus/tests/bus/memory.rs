@@ -148,10 +148,10 @@ fn a_start_without_room_says_what_would_do() {
     assert!(later.may_pass());
     let text = later.to_string();
     assert!(text.contains("remove what they left"), "{text}");
-    let more = "docker run --shm-size=80m`";
+    let more = "docker run --shm-size=128m`";
     assert!(text.ends_with(more), "more than there is: {text}");
     let never = refused(4 << 20, 8 << 20);
     assert!(!never.may_pass());
     let text = never.to_string();
-    assert!(text.ends_with("docker run --shm-size=20m`"), "{text}");
+    assert!(text.ends_with("docker run --shm-size=64m`"), "{text}");
 }
