@@ -24,7 +24,7 @@ use crate::process::{Process, start_time};
 const CURRENT: &str = "current";
 const IDENTITY: &str = "id";
 /// What a living broker keeps locked in its shared memory.
-const CLAIM: &str = "broker";
+const LIFE: &str = "broker";
 /// Bytes of what is in it.
 const IDENTITY_LEN: usize = 18;
 /// Names that are tried for such a directory; each is as good as new.
@@ -83,14 +83,14 @@ impl Generation {
     }
 
     /// Keeps its shared memory from [`sweep_strays`] as long as the file is open.
-    pub(crate) fn claim(&self) -> io::Result<File> {
+    pub(crate) fn lock_memory(&self) -> io::Result<File> {
         let mut options = File::options();
         let file = options
             .write(true)
             .create(true)
             .truncate(false)
             .mode(0o600)
-            .open(self.root.join(CLAIM))?;
+            .open(self.root.join(LIFE))?;
         flock(&file, FlockOperation::NonBlockingLockExclusive)?;
         Ok(file)
     }
@@ -178,10 +178,10 @@ pub(crate) fn sweep_strays() -> usize {
     strays.filter(|it| fs::remove_dir_all(it).is_ok()).count()
 }
 
-/// Nobody has it who lives. A broker that has not come to its claim yet has no file of that name.
+/// Nobody has it who lives. A broker that has not locked its own yet has no file of that name.
 fn is_stray(root: &Path) -> bool {
-    let claim = File::options().write(true).open(root.join(CLAIM));
-    claim.is_ok_and(|file| flock(&file, FlockOperation::NonBlockingLockExclusive).is_ok())
+    let lock = File::options().write(true).open(root.join(LIFE));
+    lock.is_ok_and(|file| flock(&file, FlockOperation::NonBlockingLockExclusive).is_ok())
 }
 
 fn names_in(dir: &Path) -> Vec<String> {

@@ -130,7 +130,7 @@ pub struct Host {
     documents: Documents,
     _janitor: Janitor,
     hub: Hub,
-    _claim: File,
+    _memory_lock: File,
     _remains: Remains,
 }
 
@@ -200,7 +200,7 @@ impl Host {
         let needed = own + room + fitting_reserve(options.shm_reserve_bytes);
         look_for_room(needed)?;
         let generation = Generation::begin(instance, limits)?;
-        let claim = generation.claim()?;
+        let memory_lock = generation.lock_memory()?;
         // Somebody who takes no turns may have been faster.
         keep_room(&generation.root, room).map_err(|_| no_room(needed))?;
         let hub = Hub::new(&generation.root, Access::Create)?;
@@ -236,7 +236,7 @@ impl Host {
             last_tick: Instant::now(),
             last_watch: Instant::now(),
             _remains: remains,
-            _claim: claim,
+            _memory_lock: memory_lock,
             generation,
             limits,
             services,

@@ -96,7 +96,7 @@ impl Broker {
             hidden,
         } = seen;
         self.take_in(inputs);
-        if let Some(reason) = hidden {
+        if let (Some(reason), None) = (hidden, &unwatched) {
             // A client that has left needs no answer.
             let _ = look.answer.send(Response::Unanswered { reason });
             return true;

@@ -42,7 +42,7 @@ impl Watching {
 impl Broker {
     /// Begins to watch; `known` is what is gone on with.
     pub(super) fn watch(
-        &mut self,
+        &self,
         watching: &Watching,
         known: Option<Known>,
     ) -> std::io::Result<Watcher> {
