@@ -10,7 +10,7 @@ mod common;
 use common::param;
 use qcbus_formats::config::{
     Config, Known, KnownBundle, KnownChecker, Levels, Oddity, Parsed, Selected, Selection,
-    reporter_for, same_bundle,
+    same_reporter, same_bundle,
 };
 use qcbus_formats::xqar::Level;
 
@@ -62,7 +62,7 @@ fn children_in_any_order_and_levels_by_number_or_missing() {
         Levels::between(Level::Warning, Level::Error)
     );
     assert_eq!(bundle.checkers[2].levels, Levels::ALL);
-    assert_eq!(config.reports[0].reporter, "qc-report-text");
+    assert!(same_reporter(&config.reports[0].application, "qc-report-text"));
 }
 
 #[test]
@@ -245,9 +245,20 @@ fn applications_mean_bundles_by_name_alias_and_published_name() {
             "{application} {name}"
         );
     }
-    assert_eq!(reporter_for("TextReport"), Some("qc-report-text"));
-    assert_eq!(reporter_for("qc-report-json"), Some("qc-report-json"));
-    assert_eq!(reporter_for("GithubCIReport"), None);
+    for (application, name, same) in [
+        ("TextReport", "qc-report-text", true),
+        ("qc_report_text", "qc-report-text", true),
+        ("text", "qc-report-text", true),
+        ("qc-report-json", "qc-report-json", true),
+        ("GithubCIReport", "qc-report-github", true),
+        ("TextReport", "qc-report-json", false),
+        ("mail", "mail", true),
+        ("mail", "mailbox", false),
+        ("", "qc-report-text", false),
+    ] {
+        let found = same_reporter(application, name);
+        assert_eq!(found, same, "{application} {name}");
+    }
 }
 
 #[test]
@@ -272,7 +283,9 @@ fn what_nobody_knows_is_told() {
                 checkers: Some(vec![checker("check_actors", &[])]),
             },
         ],
-        reporters: vec!["mail".into()],
+        reporters: ["qc-report-json", "qc-report-text", "mail"]
+            .map(str::to_owned)
+            .to_vec(),
     };
     let text = r#"<Config>
   <Param name="InputFile" value="a"/><Param name="tolerence" value="1"/>

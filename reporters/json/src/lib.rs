@@ -56,7 +56,7 @@
 //!
 //! Parameters: `OutputFile` (see [`Output`]; one file for several results is a sequence of JSON
 //! documents, as `jq` and streaming readers take it) and `Indent` (0 to 16 blanks, default 2; with
-//! 0 each document is one line, so that the file is JSON Lines).
+//! 0, the default on a stream, each document is one line: JSON Lines).
 
 mod document;
 mod issue;
@@ -64,16 +64,23 @@ mod ordered;
 mod report;
 mod xml;
 
-pub use report::JsonReporter;
-
 #[cfg(doc)]
 use qcbus_reporter_sdk::Output;
 
 use qcbus_messages::ResultMessage;
+use qcbus_reporter_sdk::{FormReporter, Registration};
 use serde::Serialize as _;
 
 /// The reporter's name on the bus and in configurations.
 pub const NAME: &str = "qc-report-json";
+
+/// What this crate offers.
+pub static REPORTER: Registration = Registration {
+    alias: "json",
+    name: NAME,
+    about: "NAME.json beside every result",
+    make: |setting| Box::new(FormReporter::new(report::Documents, setting)),
+};
 
 /// The number under `qcbus.schema`. It changes when a field changes its meaning or goes away.
 pub const SCHEMA: u32 = 1;

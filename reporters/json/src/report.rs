@@ -3,66 +3,34 @@
 use std::collections::BTreeMap;
 
 use qcbus_formats::xqar::Param;
-use qcbus_messages::{ResultMessage, Withdrawn};
-use qcbus_reporter_sdk::{Format, Outlet, ReportError, Reporter, Sources, Subject, param};
+use qcbus_messages::ResultMessage;
+use qcbus_reporter_sdk::{Destination, Form, ReportError, Sources, param};
 
 use crate::{DEFAULT_INDENT, render};
 
-/// Writes JSON reports.
-pub struct JsonReporter {
-    outlet: Outlet<Documents>,
-}
-
-impl JsonReporter {
-    /// A reporter that has written nothing yet. With `keep`, the documents that the one file of
-    /// `OutputFile` already holds stay in it: for a daemon that is started again.
-    pub fn new(keep: bool) -> JsonReporter {
-        JsonReporter {
-            outlet: Outlet::new(Documents, "json", keep),
-        }
-    }
-}
-
-impl Reporter for JsonReporter {
-    fn report(&mut self, result: &ResultMessage, _: &dyn Sources) -> Result<(), ReportError> {
-        let indent = indent(&result.params)?;
-        let text = render(result, indent).map_err(|error| ReportError::Form(error.to_string()))?;
-        self.outlet.put(Subject::from(result), text)
-    }
-
-    fn withdraw(&mut self, gone: &Withdrawn) -> Result<(), ReportError> {
-        self.outlet.withdraw(Subject::from(gone))
-    }
-
-    fn finish(&mut self) -> Result<(), ReportError> {
-        self.outlet.finish()
-    }
-}
-
-fn indent(params: &[Param]) -> Result<usize, ReportError> {
-    let Some(value) = param(params, "Indent").filter(|value| !value.is_empty()) else {
-        return Ok(DEFAULT_INDENT);
-    };
-    match value.trim().parse() {
-        Ok(indent @ 0..=16) => Ok(indent),
-        _ => Err(ReportError::Param {
-            name: "Indent".into(),
-            value: value.into(),
-            why: "a whole number from 0 to 16 is needed".into(),
-        }),
-    }
-}
-
 /// A sequence of JSON documents, each with `qcbus.inputFile`.
-struct Documents;
+pub(crate) struct Documents;
 
-impl Format for Documents {
-    fn key(&self, subject: Subject<'_>) -> String {
-        subject.input.to_owned()
+impl Form for Documents {
+    type Section = String;
+    const SUFFIX: &'static str = "json";
+
+    fn section(
+        &self,
+        result: &ResultMessage,
+        _: &dyn Sources,
+        place: Destination,
+    ) -> Result<String, ReportError> {
+        let indent = indent(&result.params, place)?;
+        render(result, indent).map_err(|error| ReportError::Form(error.to_string()))
     }
 
-    fn section(&self, _: &str, text: String) -> String {
-        text
+    fn whole(&self, sections: &BTreeMap<String, String>) -> Result<String, ReportError> {
+        Ok(sections.values().map(String::as_str).collect())
+    }
+
+    fn appended(&self, _: &str, section: &String) -> Option<String> {
+        Some(section.clone())
     }
 
     fn split(&self, text: &str) -> BTreeMap<String, String> {
@@ -81,3 +49,22 @@ impl Format for Documents {
         sections
     }
 }
+
+/// On a stream each document is one line unless somebody wants otherwise.
+fn indent(params: &[Param], place: Destination) -> Result<usize, ReportError> {
+    let Some(value) = param(params, "Indent").filter(|value| !value.is_empty()) else {
+        return Ok(match place {
+            Destination::Stream { .. } => 0,
+            Destination::File => DEFAULT_INDENT,
+        });
+    };
+    match value.trim().parse() {
+        Ok(indent @ 0..=16) => Ok(indent),
+        _ => Err(ReportError::Param {
+            name: "Indent".into(),
+            value: value.into(),
+            why: "a whole number from 0 to 16 is needed".into(),
+        }),
+    }
+}
+

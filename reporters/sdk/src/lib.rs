@@ -7,28 +7,33 @@
 //!
 //! What reporters have in common lies here too: the lines of the checked files ([`Sources`]), the
 //! places of an issue with those in other files ([`issue_locations`]), and where reports go ([`Outlet`],
-//! [`Output`], [`Shelf`]).
+//! [`Output`], [`Shelf`]). A reporter that turns results into text implements [`Form`] and nothing
+//! else; a crate says by a [`Registration`] what it offers.
 
 mod clean;
 mod daemon;
+mod form;
 mod issue_location;
 mod loaded;
 mod once;
 mod outlet;
 mod output;
+mod registration;
 mod responder;
 mod shelf;
 mod sources;
 
 pub use clean::{one_line, printable};
 pub use daemon::{Identity, RunError, run};
+pub use form::{Destination, Form, FormReporter};
 pub use issue_location::{IssueLocation, issue_locations};
 pub use loaded::{LoadError, load};
 pub use once::{OnceError, OneShot, report_once};
 pub use outlet::{Outlet, Subject};
 pub use output::{Output, param, replace_file};
+pub use registration::{Pages, Registration, RulePage, Setting};
 pub use responder::Responder;
-pub use shelf::{Format, Shelf};
+pub use shelf::Shelf;
 pub use sources::{Answer, BothSources, FileSources, ImageSources, Line, NoSources, Sources};
 
 use std::path::PathBuf;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use qcbus_formats::config::Config;
+use qcbus_formats::config::{Config, same_reporter};
 use qcbus_formats::xqar::Param;
 use qcbus_messages::path_text::to_text;
 
@@ -96,7 +96,10 @@ fn configured(path: &Path, name: &str) -> Result<Vec<Param>, OnceError> {
         .params
         .iter()
         .filter(|param| !qcbus_formats::config::INPUT_PARAMS.contains(&param.name.as_str()));
-    let module = config.reports.iter().find(|report| report.reporter == name);
+    let module = config
+        .reports
+        .iter()
+        .find(|report| same_reporter(&report.application, name));
     let own = module.iter().flat_map(|report| &report.params);
     Ok(global.chain(own).map(|param| param.to_param()).collect())
 }

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use qcbus_formats::xqar::Param;
 use qcbus_messages::{ResultMessage, Withdrawn};
 
-use crate::{Format, Output, ReportError, Shelf, replace_file};
+use crate::output::remove_file;
+use crate::{Destination, Form, Output, ReportError, Setting, Shelf, Sources, replace_file};
 
 /// The file that a report is about, and what its reporter was told.
 #[derive(Debug, Clone, Copy)]
@@ -44,44 +45,56 @@ impl<'m> From<&'m Withdrawn> for Subject<'m> {
 }
 
 /// Puts reports where the parameter `OutputFile` wants them, and takes them back.
-pub struct Outlet<F> {
-    format: F,
-    suffix: &'static str,
+pub struct Outlet<F: Form> {
+    form: F,
     keep: bool,
-    shelves: BTreeMap<PathBuf, Shelf>,
+    is_run: bool,
+    shelves: BTreeMap<PathBuf, Shelf<F>>,
+    /// What is printed when the run is over, by stream.
+    waiting: BTreeMap<Output, BTreeMap<String, F::Section>>,
 }
 
-impl<F: Format> Outlet<F> {
-    /// An outlet for reports of one form; `suffix` (without a dot) is that of reports in files of
-    /// their own. With `keep`, what the one file for all already holds stays in it: for a daemon
-    /// that is started again beside the same broker.
-    pub fn new(format: F, suffix: &'static str, keep: bool) -> Outlet<F> {
+impl<F: Form> Outlet<F> {
+    /// An outlet for reports of one form.
+    pub fn new(form: F, setting: &Setting) -> Outlet<F> {
         Outlet {
-            format,
-            suffix,
-            keep,
+            form,
+            keep: setting.keep,
+            is_run: setting.is_run,
             shelves: BTreeMap::new(),
+            waiting: BTreeMap::new(),
         }
     }
 
-    /// Writes a report; when this returns `Ok`, it is where it belongs.
+    /// Writes the report of a result. When this returns `Ok`, it is where it belongs; in a run,
+    /// what holds the reports of all files gets there with [`Outlet::finish`].
     ///
     /// # Errors
-    /// [`ReportError::Write`].
-    pub fn put(&mut self, subject: Subject<'_>, text: String) -> Result<(), ReportError> {
+    /// [`ReportError`].
+    pub fn put(
+        &mut self,
+        result: &ResultMessage,
+        sources: &dyn Sources,
+        color: bool,
+    ) -> Result<(), ReportError> {
+        let subject = Subject::from(result);
         let output = Output::of(subject.params);
+        let place = match output {
+            Output::Stdout | Output::Stderr => Destination::Stream { color },
+            Output::File(_) | Output::BesideResult | Output::Directory(_) => Destination::File,
+        };
+        let key = self.form.key(subject);
+        let section = self.form.section(result, sources, place)?;
         match &output {
-            Output::Stdout => stream("__stdout__", &mut std::io::stdout().lock(), &text),
-            Output::Stderr => stream("__stderr__", &mut std::io::stderr().lock(), &text),
+            Output::Stdout | Output::Stderr => self.stream(output, key, section),
             Output::File(path) => {
-                let key = self.format.key(subject);
-                let section = self.format.section(&key, text);
-                self.shelf(path)?
-                    .map_or(Ok(()), |shelf| shelf.put(&key, section))
+                self.open(path)?;
+                let shelf = self.shelves.get_mut(path);
+                shelf.map_or(Ok(()), |shelf| shelf.put(&self.form, &key, section))
             }
             Output::BesideResult | Output::Directory(_) => {
-                match output.own_file(subject, self.suffix) {
-                    Some(path) => replace_file(&path, text.as_bytes()),
+                match output.own_file(subject, F::SUFFIX) {
+                    Some(path) => replace_file(&path, self.form.alone(key, section)?.as_bytes()),
                     None => Ok(()),
                 }
             }
@@ -97,12 +110,13 @@ impl<F: Format> Outlet<F> {
         match &output {
             Output::Stdout | Output::Stderr => Ok(()),
             Output::File(path) => {
-                let key = self.format.key(subject);
-                self.shelf(path)?
-                    .map_or(Ok(()), |shelf| shelf.withdraw(&key))
+                let key = self.form.key(subject);
+                self.open(path)?;
+                let shelf = self.shelves.get_mut(path);
+                shelf.map_or(Ok(()), |shelf| shelf.withdraw(&self.form, &key))
             }
             Output::BesideResult | Output::Directory(_) => {
-                match output.own_file(subject, self.suffix) {
+                match output.own_file(subject, F::SUFFIX) {
                     Some(path) => remove_file(&path),
                     None => Ok(()),
                 }
@@ -110,37 +124,61 @@ impl<F: Format> Outlet<F> {
         }
     }
 
-    /// Brings the sections of files for all in the order of their paths.
+    /// Brings the sections of files for all in the order of their paths, and writes what waited for
+    /// the end of the run.
     ///
     /// # Errors
     /// [`ReportError::Write`].
     pub fn finish(&mut self) -> Result<(), ReportError> {
-        self.shelves.values_mut().try_for_each(Shelf::sort)
+        let mut shelves = self.shelves.values_mut();
+        shelves.try_for_each(|shelf| shelf.finish(&self.form))?;
+        for (output, sections) in std::mem::take(&mut self.waiting) {
+            stream(&output, &self.form.whole(&sections)?)?;
+        }
+        Ok(())
     }
 
-    fn shelf(&mut self, path: &Path) -> Result<Option<&mut Shelf>, ReportError> {
+    /// A form of sections is streamed as they come; of one that is a document there is one in a run.
+    fn stream(
+        &mut self,
+        output: Output,
+        key: String,
+        section: F::Section,
+    ) -> Result<(), ReportError> {
+        let is_document = self.form.appended(&key, &section).is_none();
+        if self.is_run && is_document {
+            self.waiting.entry(output).or_default().insert(key, section);
+            return Ok(());
+        }
+        stream(&output, &self.form.alone(key, section)?)
+    }
+
+    fn open(&mut self, path: &Path) -> Result<(), ReportError> {
         if !self.shelves.contains_key(path) {
-            let shelf = Shelf::open(path, &self.format, self.keep)?;
+            let shelf = Shelf::open(path, &self.form, self.keep, self.is_run)?;
             self.shelves.insert(path.to_owned(), shelf);
         }
-        Ok(self.shelves.get_mut(path))
+        Ok(())
     }
 }
 
-fn remove_file(path: &Path) -> Result<(), ReportError> {
-    match std::fs::remove_file(path) {
-        Err(source) if source.kind() != std::io::ErrorKind::NotFound => Err(ReportError::Write {
-            path: path.to_owned(),
-            source,
-        }),
-        _ => Ok(()),
-    }
-}
-
-fn stream(name: &str, out: &mut dyn std::io::Write, text: &str) -> Result<(), ReportError> {
-    let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+fn stream(output: &Output, text: &str) -> Result<(), ReportError> {
+    use std::io::Write as _;
+    let written = match output {
+        Output::Stderr => {
+            let mut err = std::io::stderr().lock();
+            err.write_all(text.as_bytes()).and_then(|()| err.flush())
+        }
+        _ => {
+            let mut out = std::io::stdout().lock();
+            out.write_all(text.as_bytes()).and_then(|()| out.flush())
+        }
+    };
     written.map_err(|source| ReportError::Write {
-        path: name.into(),
+        path: match output {
+            Output::Stderr => "__stderr__".into(),
+            _ => "__stdout__".into(),
+        },
         source,
     })
 }

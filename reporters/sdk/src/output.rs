@@ -8,7 +8,7 @@ use qcbus_messages::path_text::from_text;
 use crate::{ReportError, Subject};
 
 /// Where reports go: the parameter `OutputFile`, or what ASAM's C++ reports call `strReportFile`.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Output {
     /// No parameter: one report per result, beside it. `a.xodr.xqar` gets `a.xodr.txt`.
     BesideResult,
@@ -74,6 +74,17 @@ pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
         path: path.to_owned(),
         source,
     })
+}
+
+/// Removes a file that need not be there.
+pub(crate) fn remove_file(path: &Path) -> Result<(), ReportError> {
+    match std::fs::remove_file(path) {
+        Err(source) if source.kind() != std::io::ErrorKind::NotFound => Err(ReportError::Write {
+            path: path.to_owned(),
+            source,
+        }),
+        _ => Ok(()),
+    }
 }
 
 /// The path without what would lead out of the directory that it is joined to.

@@ -4,36 +4,27 @@ use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use crate::{ReportError, Subject, replace_file};
+use crate::output::remove_file;
+use crate::{Form, ReportError, replace_file};
 
-/// How a report's sections follow each other in one file.
-pub trait Format {
-    /// Under what the section of a checked file is found again, as [`Format::split`] gives it.
-    fn key(&self, subject: Subject<'_>) -> String;
-
-    /// A report as a section.
-    fn section(&self, key: &str, text: String) -> String;
-
-    /// The sections of a file written earlier, by the path of the checked file. What is not of
-    /// this form is dropped.
-    fn split(&self, text: &str) -> BTreeMap<String, String>;
-}
-
-/// A file of sections, one per checked file. New sections are appended; a section that is there
-/// already is replaced, and [`Shelf::sort`] brings them in the order of their paths.
-pub struct Shelf {
+/// A file of sections, one per checked file. New sections are appended where the form allows it;
+/// a section that is there already is replaced, and [`Shelf::finish`] brings them in the order of
+/// their paths.
+pub struct Shelf<F: Form> {
     path: PathBuf,
-    sections: BTreeMap<String, String>,
+    sections: BTreeMap<String, F::Section>,
     sorted: bool,
+    /// Nothing is written before the end.
+    waits: bool,
 }
 
-impl Shelf {
+impl<F: Form> Shelf<F> {
     /// Opens the file. With `keep`, sections written earlier stay (a daemon that was restarted);
-    /// otherwise the file begins empty.
+    /// otherwise the file begins empty. With `waits`, it is written when all sections are there.
     ///
     /// # Errors
     /// [`ReportError::Write`] when the file cannot be read or emptied.
-    pub fn open(path: &Path, format: &dyn Format, keep: bool) -> Result<Shelf, ReportError> {
+    pub fn open(path: &Path, form: &F, keep: bool, waits: bool) -> Result<Shelf<F>, ReportError> {
         let earlier = match std::fs::read_to_string(path) {
             Ok(text) if keep => text,
             Err(source) if keep && source.kind() != std::io::ErrorKind::NotFound => {
@@ -46,27 +37,41 @@ impl Shelf {
         };
         let shelf = Shelf {
             path: path.to_owned(),
-            sections: format.split(&earlier),
+            sections: form.split(&earlier),
             sorted: false,
+            waits,
         };
-        // What was torn by a crash is gone after this.
-        shelf.rewrite()?;
+        if waits {
+            // A place that refuses is found early. No report is better than one that says nothing:
+            // whoever finds it after a kill would take it for the result.
+            replace_file(path, b"")?;
+            remove_file(path)?;
+        } else {
+            // What was torn by a crash is gone after this.
+            shelf.rewrite(form)?;
+        }
         Ok(shelf)
     }
 
-    /// Puts a section in, and returns when it is in the file.
+    /// Puts a section in, and returns when it is in the file, unless the shelf waits.
     ///
     /// # Errors
-    /// [`ReportError::Write`].
-    pub fn put(&mut self, key: &str, section: String) -> Result<(), ReportError> {
+    /// [`ReportError`].
+    pub fn put(&mut self, form: &F, key: &str, section: F::Section) -> Result<(), ReportError> {
+        let appended = form.appended(key, &section);
         let earlier = self.sections.insert(key.to_owned(), section);
-        let section = &self.sections[key];
-        match earlier {
-            Some(earlier) if earlier == *section => Ok(()),
-            Some(_) => self.rewrite(),
-            None => {
-                self.sorted = false;
-                append(&self.path, section.as_bytes()).map_err(|source| ReportError::Write {
+        let is_as_before = earlier.as_ref() == self.sections.get(key);
+        if is_as_before {
+            return Ok(());
+        }
+        self.sorted = false;
+        if self.waits {
+            return Ok(());
+        }
+        match appended.filter(|_| earlier.is_none()) {
+            None => self.rewrite(form),
+            Some(text) => {
+                append(&self.path, text.as_bytes()).map_err(|source| ReportError::Write {
                     path: self.path.clone(),
                     source,
                 })
@@ -77,29 +82,29 @@ impl Shelf {
     /// Takes a section out, if it is there.
     ///
     /// # Errors
-    /// [`ReportError::Write`].
-    pub fn withdraw(&mut self, key: &str) -> Result<(), ReportError> {
+    /// [`ReportError`].
+    pub fn withdraw(&mut self, form: &F, key: &str) -> Result<(), ReportError> {
         match self.sections.remove(key) {
-            Some(_) => self.rewrite(),
+            Some(_) if self.waits => Ok(()),
+            Some(_) => self.rewrite(form),
             None => Ok(()),
         }
     }
 
-    /// Brings the sections in the order of their paths.
+    /// Brings the sections in the order of their paths, and writes what has waited.
     ///
     /// # Errors
-    /// [`ReportError::Write`].
-    pub fn sort(&mut self) -> Result<(), ReportError> {
+    /// [`ReportError`].
+    pub fn finish(&mut self, form: &F) -> Result<(), ReportError> {
         if !self.sorted {
-            self.rewrite()?;
+            self.rewrite(form)?;
             self.sorted = true;
         }
         Ok(())
     }
 
-    fn rewrite(&self) -> Result<(), ReportError> {
-        let text: String = self.sections.values().map(String::as_str).collect();
-        replace_file(&self.path, text.as_bytes())
+    fn rewrite(&self, form: &F) -> Result<(), ReportError> {
+        replace_file(&self.path, form.whole(&self.sections)?.as_bytes())
     }
 }
 
@@ -114,18 +119,29 @@ fn append(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
 
 #[cfg(test)]
 mod tests {
+    use qcbus_messages::ResultMessage;
+
     use super::*;
+    use crate::{Destination, Sources};
 
     /// One section per line, `path=text`.
     struct Lines;
 
-    impl Format for Lines {
-        fn key(&self, subject: Subject<'_>) -> String {
-            subject.input.to_owned()
+    impl Form for Lines {
+        type Section = String;
+        const SUFFIX: &'static str = "lines";
+
+        fn section(
+            &self,
+            _: &ResultMessage,
+            _: &dyn Sources,
+            _: Destination,
+        ) -> Result<String, ReportError> {
+            Err(ReportError::Form("sections are put in as they are".into()))
         }
 
-        fn section(&self, key: &str, text: String) -> String {
-            format!("{key}={text}\n")
+        fn whole(&self, sections: &BTreeMap<String, String>) -> Result<String, ReportError> {
+            Ok(sections.values().map(String::as_str).collect())
         }
 
         fn split(&self, text: &str) -> BTreeMap<String, String> {
@@ -134,6 +150,10 @@ mod tests {
                 .filter_map(|line| Some((line.split_once('=')?.0.to_owned(), line.to_owned())))
                 .collect()
         }
+
+        fn appended(&self, _: &str, section: &String) -> Option<String> {
+            Some(section.clone())
+        }
     }
 
     #[test]
@@ -141,17 +161,30 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("all.txt");
         let read = || std::fs::read_to_string(&path).unwrap();
-        let mut shelf = Shelf::open(&path, &Lines, false).unwrap();
-        shelf.put("b", "b=1\n".into()).unwrap();
-        shelf.put("a", "a=1\n".into()).unwrap();
+        let mut shelf = Shelf::open(&path, &Lines, false, false).unwrap();
+        shelf.put(&Lines, "b", "b=1\n".into()).unwrap();
+        shelf.put(&Lines, "a", "a=1\n".into()).unwrap();
         assert_eq!(read(), "b=1\na=1\n");
-        shelf.sort().unwrap();
+        shelf.finish(&Lines).unwrap();
         assert_eq!(read(), "a=1\nb=1\n");
-        shelf.put("a", "a=2\n".into()).unwrap();
+        shelf.put(&Lines, "a", "a=2\n".into()).unwrap();
         assert_eq!(read(), "a=2\nb=1\n");
-        shelf.withdraw("a").unwrap();
-        shelf.withdraw("never there").unwrap();
+        shelf.withdraw(&Lines, "a").unwrap();
+        shelf.withdraw(&Lines, "never there").unwrap();
         assert_eq!(read(), "b=1\n");
+    }
+
+    #[test]
+    fn in_a_run_the_file_is_written_once() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("all.txt");
+        let read = || std::fs::read_to_string(&path).unwrap();
+        let mut shelf = Shelf::open(&path, &Lines, false, true).unwrap();
+        shelf.put(&Lines, "b", "b=1\n".into()).unwrap();
+        shelf.put(&Lines, "a", "a=1\n".into()).unwrap();
+        assert!(!path.exists(), "half a report is none");
+        shelf.finish(&Lines).unwrap();
+        assert_eq!(read(), "a=1\nb=1\n");
     }
 
     #[test]
@@ -159,9 +192,9 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("all.txt");
         std::fs::write(&path, "a=1\nb=2\nc=to").unwrap();
-        Shelf::open(&path, &Lines, true).unwrap();
+        Shelf::open(&path, &Lines, true, false).unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "a=1\nb=2\n");
-        Shelf::open(&path, &Lines, false).unwrap();
+        Shelf::open(&path, &Lines, false, false).unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "");
     }
 }

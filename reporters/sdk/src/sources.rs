@@ -15,6 +15,12 @@ pub trait Sources {
     /// Line `row` (from 1) of the file at `path`, without its end; of a very long line the part
     /// around the character at column `near` (from 1).
     fn line(&self, path: &str, row: u64, near: u64) -> Option<Line>;
+
+    /// Gives `look` the image of the file at `path`, if it is that of the bytes that were checked:
+    /// in place where it is on the bus still.
+    fn image(&self, path: &str, look: &mut dyn FnMut(&[u8])) {
+        let _ = (path, look);
+    }
 }
 
 /// A line, or a part of a very long one: some maps are one line of many megabytes.
@@ -112,6 +118,12 @@ impl<B: Deref<Target = [u8]>> Sources for ImageSources<B> {
             Answer::NoSuchLine | Answer::OtherFile => None,
         }
     }
+
+    fn image(&self, path: &str, look: &mut dyn FnMut(&[u8])) {
+        if path == self.input {
+            look(&self.image);
+        }
+    }
 }
 
 /// Lines from an image where it has the file, from the disk otherwise.
@@ -132,6 +144,13 @@ impl<B: Deref<Target = [u8]>> Sources for BothSources<B> {
             Some(Answer::Line(line)) => Some(line),
             Some(Answer::NoSuchLine) => None,
             Some(Answer::OtherFile) | None => self.files.line(path, row, near),
+        }
+    }
+
+    fn image(&self, path: &str, look: &mut dyn FnMut(&[u8])) {
+        match &self.image {
+            Some(image) if image.input == path => image.image(path, look),
+            _ => self.files.image(path, look),
         }
     }
 }
@@ -182,6 +201,16 @@ impl Sources for FileSources {
             .entry(path.to_owned())
             .or_insert_with(|| self.open(path));
         image.as_ref()?.line(path, row, near)
+    }
+
+    fn image(&self, path: &str, look: &mut dyn FnMut(&[u8])) {
+        let mut images = self.images.borrow_mut();
+        let image = images
+            .entry(path.to_owned())
+            .or_insert_with(|| self.open(path));
+        if let Some(image) = image {
+            image.image(path, look);
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 //! a caret, the rule, why it matters, and at the end the verdict with what ran and what did not.
 //!
 //! [`render`] is a pure function, so that `qcbus check` prints the very text that the report
-//! files hold. [`TextReporter`] is the daemon around it.
+//! files hold.
 //!
 //! Parameters: `OutputFile` (see [`Output`]; in one file, each report is under a line
 //! `==== PATH ====`) and `LineWidth` in characters (40 to 1000, default 100).
@@ -14,18 +14,26 @@ mod snippet;
 mod summary;
 mod wrap;
 
-pub use report::{DEFAULT_WIDTH, TextReporter};
+pub use report::DEFAULT_WIDTH;
 
 use qcbus_formats::xqar::{Checker, CheckerBundle, Issue};
 use qcbus_messages::ResultMessage;
 #[cfg(doc)]
 use qcbus_reporter_sdk::Output;
-use qcbus_reporter_sdk::{IssueLocation, Sources, issue_locations};
+use qcbus_reporter_sdk::{FormReporter, IssueLocation, Registration, Sources, issue_locations};
 
 use paint::Paint;
 
 /// The reporter's name on the bus and in configurations.
 pub const NAME: &str = "qc-report-text";
+
+/// What this crate offers.
+pub static REPORTER: Registration = Registration {
+    alias: "text",
+    name: NAME,
+    about: "NAME.txt beside every result",
+    make: |setting| Box::new(FormReporter::new(report::Full, setting)),
+};
 
 /// How to render.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

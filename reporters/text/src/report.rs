@@ -3,57 +3,15 @@
 use std::collections::BTreeMap;
 
 use qcbus_formats::xqar::Param;
-use qcbus_messages::{ResultMessage, Withdrawn};
+use qcbus_messages::ResultMessage;
 use qcbus_reporter_sdk::{
-    Format, Outlet, Output, ReportError, Reporter, Sources, Subject, one_line, param,
+    Destination, Form, ReportError, Sources, Subject, one_line, param,
 };
 
 use crate::{Options, render};
 
 /// Columns unless `LineWidth` says otherwise; ASAM's report has the same.
 pub const DEFAULT_WIDTH: usize = 100;
-
-/// Writes text reports.
-pub struct TextReporter {
-    /// Whether to colour what goes to `__stdout__` and `__stderr__`. Files are never coloured.
-    color: bool,
-    outlet: Outlet<Sections>,
-}
-
-impl TextReporter {
-    /// A reporter that has written nothing yet. `color`: whether to colour what goes to
-    /// `__stdout__` and `__stderr__`; files are never coloured. `keep`: whether reports that the
-    /// one file of `OutputFile` already holds stay in it.
-    pub fn new(color: bool, keep: bool) -> TextReporter {
-        TextReporter {
-            color,
-            outlet: Outlet::new(Sections, "txt", keep),
-        }
-    }
-}
-
-impl Reporter for TextReporter {
-    fn report(&mut self, result: &ResultMessage, sources: &dyn Sources) -> Result<(), ReportError> {
-        let output = Output::of(&result.params);
-        let streamed = matches!(output, Output::Stdout | Output::Stderr);
-        let options = Options {
-            width: line_width(&result.params)?,
-            color: self.color && streamed,
-            inapplicable: !streamed,
-            ..Options::default()
-        };
-        let text = render(result, &options, sources);
-        self.outlet.put(Subject::from(result), text)
-    }
-
-    fn withdraw(&mut self, gone: &Withdrawn) -> Result<(), ReportError> {
-        self.outlet.withdraw(Subject::from(gone))
-    }
-
-    fn finish(&mut self) -> Result<(), ReportError> {
-        self.outlet.finish()
-    }
-}
 
 fn line_width(params: &[Param]) -> Result<usize, ReportError> {
     let Some(value) = param(params, "LineWidth").filter(|value| !value.is_empty()) else {
@@ -72,16 +30,44 @@ fn line_width(params: &[Param]) -> Result<usize, ReportError> {
 /// Both ends of the line that begins a section of the one file.
 const RULER: &str = "====";
 
-/// Sections under `==== PATH ====`. No other line of a report begins with a ruler.
-struct Sections;
+/// Reports in full. In a file for all each stands under `==== PATH ====`; no other line of a
+/// report begins with a ruler.
+pub(crate) struct Full;
 
-impl Format for Sections {
+impl Form for Full {
+    type Section = String;
+    const SUFFIX: &'static str = "txt";
+
     fn key(&self, subject: Subject<'_>) -> String {
         one_line(subject.display_path)
     }
 
-    fn section(&self, key: &str, text: String) -> String {
-        format!("{RULER} {key} {RULER}\n{text}\n")
+    fn section(
+        &self,
+        result: &ResultMessage,
+        sources: &dyn Sources,
+        place: Destination,
+    ) -> Result<String, ReportError> {
+        let options = Options {
+            width: line_width(&result.params)?,
+            color: place == Destination::Stream { color: true },
+            inapplicable: place == Destination::File,
+            ..Options::default()
+        };
+        Ok(render(result, &options, sources))
+    }
+
+    fn whole(&self, sections: &BTreeMap<String, String>) -> Result<String, ReportError> {
+        let parts = sections.iter().map(|(key, text)| under_ruler(key, text));
+        Ok(parts.collect())
+    }
+
+    fn alone(&self, _: String, section: String) -> Result<String, ReportError> {
+        Ok(section)
+    }
+
+    fn appended(&self, key: &str, section: &String) -> Option<String> {
+        Some(under_ruler(key, section))
     }
 
     fn split(&self, text: &str) -> BTreeMap<String, String> {
@@ -91,14 +77,18 @@ impl Format for Sections {
             if let Some(key) = key_of(line) {
                 sections.remove(key);
                 current = Some(key.to_owned());
-            }
-            if let Some(key) = &current {
+            } else if let Some(key) = &current {
                 sections.entry(key.clone()).or_default().push_str(line);
             }
         }
-        sections.retain(|_, section| section.ends_with("\n\n"));
+        // What was torn does not end in an empty line.
+        sections.retain(|_, section| section.ends_with("\n\n") && section.pop().is_some());
         sections
     }
+}
+
+fn under_ruler(key: &str, text: &str) -> String {
+    format!("{RULER} {key} {RULER}\n{text}\n")
 }
 
 fn key_of(line: &str) -> Option<&str> {

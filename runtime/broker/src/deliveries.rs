@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use qcbus_disk::foreign;
-use qcbus_formats::config::{Config, reporter_for};
+use qcbus_formats::config::{Config, same_reporter};
 use qcbus_formats::xqar::{self, Checker, Param, Results};
 use qcbus_messages::codec::MAX_MESSAGE;
 use qcbus_messages::path_text::to_text;
@@ -135,9 +135,8 @@ fn params_of(reporter: &str, config: Option<&Arc<Config>>) -> Vec<Param> {
     let Some(config) = config else {
         return Vec::new();
     };
-    let mine = config.reports.iter().find(|report| {
-        report.application == reporter || reporter_for(&report.application) == Some(reporter)
-    });
+    let mut reports = config.reports.iter();
+    let mine = reports.find(|report| same_reporter(&report.application, reporter));
     mine.map(|report| config.report_params(report))
         .unwrap_or_default()
 }

@@ -6,7 +6,9 @@ use std::time::Duration;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
 
-use crate::standard::{REPORTERS, StandardReporter};
+use qcbus_reporter_sdk::Registration;
+
+use crate::standard::REPORTERS;
 
 /// A checker for OpenDRIVE roads and OpenSCENARIO scenarios that parses every file once and lets
 /// independent checker bundles read it in place.
@@ -207,7 +209,7 @@ pub struct ServeArgs {
     pub gate_outside: OutsideArg,
     /// Run a reporter; may be given several times
     #[arg(long, value_name = "NAME", value_parser = reporter())]
-    pub report: Vec<&'static StandardReporter>,
+    pub report: Vec<&'static Registration>,
     /// Look around at intervals instead of relying on file events (network file systems)
     #[arg(long, value_name = "TIME", num_args = 0..=1, default_missing_value = "2s", value_parser = duration)]
     pub poll: Option<Duration>,
@@ -363,7 +365,7 @@ pub enum ReporterCommand {
     Run {
         /// Which one
         #[arg(value_parser = reporter())]
-        name: &'static StandardReporter,
+        name: &'static Registration,
         /// How to join the bus.
         #[command(flatten)]
         bus: BusArgs,
@@ -452,9 +454,9 @@ pub struct DoctorArgs {
 }
 
 /// Takes a standard reporter by its short name.
-fn reporter() -> impl TypedValueParser<Value = &'static StandardReporter> {
-    let row = |it: &StandardReporter| PossibleValue::new(it.alias).help(it.about);
-    let find = |alias: String| REPORTERS.iter().find(|it| it.alias == alias);
+fn reporter() -> impl TypedValueParser<Value = &'static Registration> {
+    let row = |it: &&'static Registration| PossibleValue::new(it.alias).help(it.about);
+    let find = |alias: String| REPORTERS.into_iter().find(|it| it.alias == alias);
     PossibleValuesParser::new(REPORTERS.iter().map(row))
         .try_map(move |alias| find(alias).ok_or("there is no such reporter"))
 }

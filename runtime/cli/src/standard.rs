@@ -7,7 +7,7 @@ use qcbus_broker::{ChildSpec, Restart};
 use qcbus_document::FileKind;
 use qcbus_formats::config::{Known, KnownBundle, KnownChecker};
 use qcbus_messages::Role;
-use qcbus_reporter_sdk::Reporter;
+use qcbus_reporter_sdk::{Registration, RulePage};
 use qcbus_sdk::{Bundle, Checker, UserFiles};
 
 /// The standard bundles.
@@ -56,46 +56,36 @@ pub fn bundle_specs(
     specs.collect()
 }
 
-/// A reporter that comes with the program.
-#[derive(Debug)]
-pub struct StandardReporter {
-    /// What it is called on the command line.
-    pub alias: &'static str,
-    /// What it is called on the bus and in configurations.
-    pub name: &'static str,
-    /// What it writes, for the help.
-    pub about: &'static str,
-    /// Makes one that has written nothing yet, for the bus and for one result alike: whether to
-    /// colour what goes to a terminal, and whether earlier reports stay in a file for all.
-    pub make: fn(color: bool, keep: bool) -> Box<dyn Reporter>,
-}
+/// The reporters that come with the program. One more is one more crate, which `Cargo.toml` names, and
+/// one more row: everything else follows from its registration (`docs/writing-a-reporter.md`).
+pub static REPORTERS: [&Registration; 2] =
+    [&qcbus_report_text::REPORTER, &qcbus_report_json::REPORTER];
 
-/// The standard reporters: one more is one more row.
-pub static REPORTERS: [StandardReporter; 2] = [
-    StandardReporter {
-        alias: "text",
-        name: qcbus_report_text::NAME,
-        about: "NAME.txt beside every result",
-        make: |color, keep| Box::new(qcbus_report_text::TextReporter::new(color, keep)),
-    },
-    StandardReporter {
-        alias: "json",
-        name: qcbus_report_json::NAME,
-        about: "NAME.json beside every result",
-        make: |_, keep| Box::new(qcbus_report_json::JsonReporter::new(keep)),
-    },
-];
-
-impl StandardReporter {
-    /// How to start it.
-    pub fn spec(&self, program: &Path) -> ChildSpec {
-        spec(program, "reporter", self.alias, self.name, Role::Reporter)
-    }
+/// How to start a standard reporter.
+pub fn reporter_spec(program: &Path, reporter: &Registration) -> ChildSpec {
+    let (alias, name) = (reporter.alias, reporter.name);
+    spec(program, "reporter", alias, name, Role::Reporter)
 }
 
 /// How to start the standard reporters.
 pub fn reporter_specs(program: &Path) -> Vec<ChildSpec> {
-    REPORTERS.iter().map(|it| it.spec(program)).collect()
+    let reporters = REPORTERS.iter();
+    reporters.map(|it| reporter_spec(program, it)).collect()
+}
+
+/// What a standard bundle has to say about a rule: the page of the checker of this id, else of the first
+/// one that answers for the UID.
+pub fn page(uid: &str, checker: &str) -> Option<RulePage> {
+    let all = || BUNDLES.iter().flat_map(|bundle| bundle.checkers());
+    let by_id = || all().find(|it| it.id == checker);
+    let by_uid = || all().find(|it| it.facts.uids.contains(&uid));
+    let found = by_id().or_else(by_uid)?;
+    Some(RulePage {
+        checker: found.id.clone(),
+        summary: found.description.to_owned(),
+        text: found.facts.page,
+        link: String::new(),
+    })
 }
 
 fn spec(program: &Path, command: &str, alias: &str, name: &str, role: Role) -> ChildSpec {
@@ -116,8 +106,8 @@ fn spec(program: &Path, command: &str, alias: &str, name: &str, role: Role) -> C
     }
 }
 
-/// What a configuration can name: the standard bundles with their checkers and parameters. (The
-/// standard reporters are known to the configuration itself.)
+/// What a configuration can name: the standard bundles with their checkers and parameters, and the
+/// standard reporters.
 pub fn known() -> Known {
     let bundle = |bundle: &&Bundle| {
         let checker = |checker: Checker| KnownChecker {
@@ -137,6 +127,6 @@ pub fn known() -> Known {
     };
     Known {
         bundles: BUNDLES.iter().map(bundle).collect(),
-        ..Known::default()
+        reporters: REPORTERS.iter().map(|it| it.name.to_owned()).collect(),
     }
 }

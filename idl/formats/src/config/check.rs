@@ -2,10 +2,10 @@
 
 use std::collections::HashSet;
 
-use super::lookup::{canonical_bundle, reporter_names};
+use super::lookup::canonical_bundle;
 use super::{
     BundleConfig, CheckerConfig, Config, ConfigParam, INPUT_PARAMS, LEVEL_PARAM, Oddity, Parsed,
-    ReportConfig, SCENARIO_PATH_PARAM, TextPosition, reporter_for, same_bundle,
+    ReportConfig, SCENARIO_PATH_PARAM, TextPosition, same_bundle, same_reporter,
 };
 use crate::distance::{DID_YOU_MEAN, did_you_mean};
 
@@ -14,7 +14,7 @@ use crate::distance::{DID_YOU_MEAN, did_you_mean};
 pub struct Known {
     /// The bundles.
     pub bundles: Vec<KnownBundle>,
-    /// Reporters besides the two that qcbus brings along.
+    /// The names of the reporters, such as `qc-report-text`.
     pub reporters: Vec<String>,
 }
 
@@ -243,16 +243,14 @@ fn check_params(
 
 fn check_report(report: &ReportConfig, known: &Known) -> Option<Oddity> {
     let name = report.application.as_str();
-    if reporter_for(name).is_some() || known.reporters.iter().any(|known| known == name) {
+    let is_it = |known: &String| same_reporter(name, known);
+    if known.reporters.iter().any(is_it) {
         return None;
     }
-    let ours: Vec<&str> = reporter_names().collect();
-    let names = ours
-        .into_iter()
-        .chain(known.reporters.iter().map(String::as_str));
-    let hint = match did_you_mean(name, names) {
-        hint if hint.is_empty() => {
-            String::from("; there are qc-report-text (TextReport) and qc-report-json")
+    let names: Vec<&str> = known.reporters.iter().map(String::as_str).collect();
+    let hint = match did_you_mean(name, names.iter().copied()) {
+        hint if hint.is_empty() && !names.is_empty() => {
+            format!("; there are {}", names.join(", "))
         }
         hint => hint,
     };

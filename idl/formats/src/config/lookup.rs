@@ -27,12 +27,6 @@ const PUBLISHED: [(&str, &str, &[&str]); 2] = [
     ),
 ];
 
-/// Our reporters and the names under which configurations know them.
-const REPORTERS: [(&str, &[&str]); 2] = [
-    ("qc-report-text", &["TextReport", "text", "qc_report_text"]),
-    ("qc-report-json", &["JsonReport", "json", "qc_report_json"]),
-];
-
 /// What a configuration says about one checker of one bundle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Selection {
@@ -95,21 +89,25 @@ pub(super) fn canonical_bundle(application: &str) -> Option<(&'static str, &'sta
         .map(|(name, alias, _)| (*name, *alias))
 }
 
-/// The reporter of ours that an `application` means: `TextReport` and `qc-report-text` are
-/// `qc-report-text`. `None`: none of ours.
-pub fn reporter_for(application: &str) -> Option<&'static str> {
-    REPORTERS
-        .iter()
-        .find(|(name, others)| *name == application || others.contains(&application))
-        .map(|(name, _)| *name)
+/// Whether an `application` in a configuration means the reporter of this name: as it is, or as
+/// [`reporter_named`] reads it.
+pub fn same_reporter(application: &str, name: &str) -> bool {
+    application == name || reporter_named(application) == name
 }
 
-/// Every name that [`reporter_for`] knows.
-pub(super) fn reporter_names() -> impl Iterator<Item = &'static str> {
-    REPORTERS
-        .iter()
-        .flat_map(|(name, others)| std::iter::once(*name).chain(others.iter().copied()))
+/// The name of ours that an `application` stands for: `TextReport`, ASAM's `qc_report_text` and
+/// plain `text` are `qc-report-text`. Whether there is such a reporter is another question.
+pub fn reporter_named(application: &str) -> String {
+    let lower = application.to_ascii_lowercase().replace('_', "-");
+    let stem = lower.strip_prefix(REPORTER).unwrap_or(&lower);
+    let stem = stem.strip_suffix("report").unwrap_or(stem);
+    // ASAM's framework has a `GithubCIReport`.
+    let stem = stem.strip_suffix("ci").unwrap_or(stem);
+    format!("{REPORTER}{stem}")
 }
+
+/// What the names of our reporters begin with.
+const REPORTER: &str = "qc-report-";
 
 impl Config {
     /// The file to check: `InputFile`, else `XodrFile`, else `XoscFile`; global before a

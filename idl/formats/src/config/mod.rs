@@ -16,7 +16,7 @@ use crate::xqar::{Level, Param};
 
 pub use check::{Known, KnownBundle, KnownChecker};
 pub use levels::Levels;
-pub use lookup::{Selected, Selection, published_name, reporter_for, same_bundle};
+pub use lookup::{Selected, Selection, published_name, same_bundle, same_reporter};
 
 /// The name of the checker parameter that gives a checker's issues another level.
 pub const LEVEL_PARAM: &str = "qcbus.level";
@@ -73,8 +73,6 @@ pub struct CheckerConfig {
 pub struct ReportConfig {
     /// As written, such as `TextReport`.
     pub application: String,
-    /// The reporter that is meant, such as `qc-report-text`; as written when it is none of ours.
-    pub reporter: String,
     /// Its parameters.
     pub params: Vec<ConfigParam>,
     /// Where it stands in the file.

@@ -3,7 +3,7 @@
 use super::lookup::canonical_bundle;
 use super::{
     BundleConfig, CheckerConfig, Config, ConfigError, ConfigParam, LEVEL_PARAM, Levels, Oddity,
-    Parsed, ReportConfig, TextPosition, reporter_for,
+    Parsed, ReportConfig, TextPosition,
 };
 use crate::distance::did_you_mean;
 use crate::xml::{self, Document, Element, Node};
@@ -129,13 +129,9 @@ impl Parser<'_> {
             }
         }
         self.misplaced_level(&params, "report");
-        let reporter = reporter_for(&application)
-            .unwrap_or(&application)
-            .to_owned();
         let position = self.position(element.offset);
         Ok(ReportConfig {
             application,
-            reporter,
             params,
             position,
         })

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 use qcbus_disk::trust::{self, TrustError};
 use qcbus_formats::config::{
-    Config, Known, KnownBundle, Oddity, Parsed, reporter_for, same_bundle,
+    Config, Known, KnownBundle, Oddity, Parsed, same_bundle, same_reporter,
 };
 use qcbus_messages::Role;
 use qcbus_messages::path_text::to_text;
@@ -159,10 +159,9 @@ impl Sources {
 
     fn add_reporters(&self, config: &Config, loaded: &mut Loaded) {
         for report in &config.reports {
-            let name = reporter_for(&report.application).unwrap_or(&report.application);
-            let spec = self.reporters.iter().find(|spec| spec.name == name);
-            if let Some(spec) = spec
-                && loaded.children.iter().all(|child| child.name != name)
+            let is_it = |spec: &&ChildSpec| same_reporter(&report.application, &spec.name);
+            if let Some(spec) = self.reporters.iter().find(is_it)
+                && loaded.children.iter().all(|child| child.name != spec.name)
             {
                 loaded.children.push(spec.clone());
             }

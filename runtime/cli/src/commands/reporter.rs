@@ -1,15 +1,14 @@
 //! `qcbus reporter run`: a reporter daemon.
 
 use qcbus_messages::Exit;
-use qcbus_reporter_sdk::{Identity, RunError};
+use qcbus_reporter_sdk::{Identity, Registration, RunError, Setting};
 
 use super::settings::instance;
 use crate::args::BusArgs;
-use crate::standard::StandardReporter;
-use crate::talk;
+use crate::{standard, talk};
 
 /// Runs the command.
-pub fn run(which: &StandardReporter, bus: &BusArgs) -> Exit {
+pub fn run(which: &Registration, bus: &BusArgs) -> Exit {
     talk::log("warn");
     let instance = match instance(&bus.instance) {
         Ok(instance) => instance,
@@ -18,9 +17,13 @@ pub fn run(which: &StandardReporter, bus: &BusArgs) -> Exit {
             return Exit::Usage;
         }
     };
-    // A private run reports its own files and nothing of earlier ones.
-    let keep = !bus.die_with_parent;
-    let mut reporter = (which.make)(talk::color(), keep);
+    let mut reporter = (which.make)(&Setting {
+        color: talk::color(),
+        // A private run reports its own files and nothing of earlier ones.
+        keep: !bus.die_with_parent,
+        is_run: false,
+        pages: standard::page,
+    });
     let identity = Identity {
         name: which.name.to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),

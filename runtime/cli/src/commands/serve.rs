@@ -196,7 +196,8 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         standard::bundle_specs(&program, &every_kind, args.schema_dir.as_deref())?
     };
     let reporters = standard::reporter_specs(&program);
-    children.extend(args.report.iter().map(|report| report.spec(&program)));
+    let asked = args.report.iter();
+    children.extend(asked.map(|report| standard::reporter_spec(&program, report)));
     Ok(Options {
         instance: instance(&args.instance)?,
         roots,

@@ -1,0 +1,1 @@
+//! A plan view of a road network, small enough to be sent.

@@ -1,0 +1,102 @@
+//! A form in which results are written.
+
+use std::collections::BTreeMap;
+
+use qcbus_messages::{ResultMessage, Withdrawn};
+
+use crate::{Outlet, ReportError, Reporter, Setting, Sources, Subject};
+
+/// A form of reports, such as SARIF: how results become text. Pure; where the text goes is the
+/// [`Outlet`]'s affair.
+///
+/// What one result gives is a *section*. A report is made of one section or of those of many files.
+pub trait Form {
+    /// What one result gives.
+    type Section: PartialEq;
+
+    /// What the names of reports in files of their own end with, without a dot.
+    const SUFFIX: &'static str;
+
+    /// Under what the section of a checked file is found again by [`Form::split`].
+    fn key(&self, subject: Subject<'_>) -> String {
+        subject.input.to_owned()
+    }
+
+    /// What a result gives.
+    ///
+    /// # Errors
+    /// [`ReportError`], mostly for parameters that make no sense.
+    fn section(
+        &self,
+        result: &ResultMessage,
+        sources: &dyn Sources,
+        place: Destination,
+    ) -> Result<Self::Section, ReportError>;
+
+    /// A whole report of these sections, in the order of their keys: also of none.
+    ///
+    /// # Errors
+    /// [`ReportError::Form`].
+    fn whole(&self, sections: &BTreeMap<String, Self::Section>) -> Result<String, ReportError>;
+
+    /// A report of one section in a file of its own or on a stream.
+    ///
+    /// # Errors
+    /// [`ReportError::Form`].
+    fn alone(&self, key: String, section: Self::Section) -> Result<String, ReportError> {
+        self.whole(&BTreeMap::from([(key, section)]))
+    }
+
+    /// The sections of a report that was written earlier, by their keys. What is not of this form is
+    /// dropped.
+    fn split(&self, text: &str) -> BTreeMap<String, Self::Section>;
+
+    /// How a section is put at the end of a report of many; `None` when such a report is one
+    /// document, which has to be written anew.
+    fn appended(&self, key: &str, section: &Self::Section) -> Option<String> {
+        let _ = (key, section);
+        None
+    }
+}
+
+/// For what a section is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Destination {
+    /// A stream that somebody may look at, and whether to colour.
+    Stream {
+        /// Whether to colour.
+        color: bool,
+    },
+    /// A file.
+    File,
+}
+
+/// The reporter of a form.
+pub struct FormReporter<F: Form> {
+    outlet: Outlet<F>,
+    color: bool,
+}
+
+impl<F: Form> FormReporter<F> {
+    /// A reporter that has written nothing yet.
+    pub fn new(form: F, setting: &Setting) -> FormReporter<F> {
+        FormReporter {
+            outlet: Outlet::new(form, setting),
+            color: setting.color,
+        }
+    }
+}
+
+impl<F: Form> Reporter for FormReporter<F> {
+    fn report(&mut self, result: &ResultMessage, sources: &dyn Sources) -> Result<(), ReportError> {
+        self.outlet.put(result, sources, self.color)
+    }
+
+    fn withdraw(&mut self, gone: &Withdrawn) -> Result<(), ReportError> {
+        self.outlet.withdraw(Subject::from(gone))
+    }
+
+    fn finish(&mut self) -> Result<(), ReportError> {
+        self.outlet.finish()
+    }
+}
