@@ -377,7 +377,7 @@ impl Finding<'_, '_> {
             children: Vec::new(),
         };
         self.info(DomainInfo {
-            name: "qcbus.rule".to_owned(),
+            name: qcbus_formats::pool::RULE_INFO.to_owned(),
             content: vec![rule],
         })
     }

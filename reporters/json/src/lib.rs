@@ -79,6 +79,7 @@ pub static REPORTER: Registration = Registration {
     alias: "json",
     name: NAME,
     about: "NAME.json beside every result",
+    is_page: false,
     make: |setting| Box::new(FormReporter::new(report::Documents, setting)),
 };
 

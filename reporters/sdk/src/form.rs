@@ -10,9 +10,9 @@ use crate::{Outlet, ReportError, Reporter, Setting, Sources, Subject};
 /// [`Outlet`]'s affair.
 ///
 /// What one result gives is a *section*. A report is made of one section or of those of many files.
-pub trait Form {
+pub trait Form: Send {
     /// What one result gives.
-    type Section: PartialEq;
+    type Section: PartialEq + Send;
 
     /// What the names of reports in files of their own end with, without a dot.
     const SUFFIX: &'static str;

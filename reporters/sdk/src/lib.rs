@@ -22,6 +22,7 @@ mod registration;
 mod responder;
 mod shelf;
 mod sources;
+mod wording;
 
 pub use clean::{one_line, printable};
 pub use daemon::{Identity, RunError, run};
@@ -35,6 +36,7 @@ pub use registration::{Pages, Registration, RulePage, Setting};
 pub use responder::Responder;
 pub use shelf::Shelf;
 pub use sources::{Answer, BothSources, FileSources, ImageSources, Line, NoSources, Sources};
+pub use wording::{meaning, rounded, rule_name};
 
 use std::path::PathBuf;
 
@@ -45,7 +47,7 @@ use qcbus_messages::{ResultMessage, Withdrawn};
 ///
 /// Writing is idempotent: the same result may be given again after a crash, and the newer result
 /// of a file takes the place of the older one.
-pub trait Reporter {
+pub trait Reporter: Send {
     /// Writes one result. When this returns `Ok`, the report is where it belongs.
     ///
     /// # Errors

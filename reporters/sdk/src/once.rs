@@ -9,7 +9,7 @@ use qcbus_messages::path_text::to_text;
 
 use crate::loaded::{LoadError, load};
 use crate::output::asked;
-use crate::{FileSources, ReportError, Reporter, param};
+use crate::{FileSources, Registration, ReportError, Reporter, param};
 
 /// The result file that ASAM's runtime writes, meant when a configuration names none.
 const DEFAULT_RESULT: &str = "Result.xqar";
@@ -17,8 +17,8 @@ const DEFAULT_RESULT: &str = "Result.xqar";
 /// What to report on.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct OneShot {
-    /// The result file (`-x`). It wins over the configuration's.
-    pub xqar: Option<PathBuf>,
+    /// The result files. They win over the configuration's.
+    pub results: Vec<PathBuf>,
     /// A configuration (`-c`): the parameters of this reporter's `ReportModule`. Its `InputFile`
     /// names the result file.
     pub config: Option<PathBuf>,
@@ -47,33 +47,39 @@ pub enum OnceError {
     Report(#[from] ReportError),
 }
 
-/// Reports on one result file. `name` is the reporter's, such as `qc-report-text`.
+/// Reports on result files: a report of its own to the stream unless somebody wants it elsewhere, for
+/// who asks wants to see it; pages of HTML go beside the results.
 ///
 /// # Errors
 /// [`OnceError`]
 pub fn report_once(
     reporter: &mut dyn Reporter,
-    name: &str,
+    registration: &Registration,
     what: &OneShot,
 ) -> Result<(), OnceError> {
     let mut params = match &what.config {
-        Some(path) => configured(path, name)?,
+        Some(path) => configured(path, registration.name)?,
         None => Vec::new(),
     };
     params.extend(what.params.iter().cloned());
     let named = param(&params, "InputFile").map(PathBuf::from);
-    let xqar = what.xqar.clone().or(named);
-    let mut result = load(&xqar.unwrap_or_else(|| PathBuf::from(DEFAULT_RESULT)))?;
-    // Who asks for one report wants to see it.
-    if asked(&params).is_none() {
+    let mut results = what.results.clone();
+    if results.is_empty() {
+        results.push(named.unwrap_or_else(|| PathBuf::from(DEFAULT_RESULT)));
+    }
+    if asked(&params).is_none() && !registration.is_page {
         params.push(Param {
             name: "OutputFile".into(),
             value: "__stdout__".into(),
         });
     }
-    result.params = params;
-    result.rules.clone_from(&what.rules);
-    reporter.report(&result, &FileSources::new(&result))?;
+    // All are looked at before anything is said of one.
+    let loaded: Result<Vec<_>, LoadError> = results.iter().map(|path| load(path)).collect();
+    for mut result in loaded? {
+        result.params.clone_from(&params);
+        result.rules.clone_from(&what.rules);
+        reporter.report(&result, &FileSources::new(&result))?;
+    }
     reporter.finish()?;
     Ok(())
 }

@@ -13,6 +13,8 @@ pub struct Registration {
     pub name: &'static str,
     /// What it writes, for the help: `NAME.sarif beside every result`.
     pub about: &'static str,
+    /// Whether it is a page to look at, which nobody wants on a stream.
+    pub is_page: bool,
     /// Makes one that has written nothing yet.
     pub make: fn(&Setting) -> Box<dyn Reporter>,
 }

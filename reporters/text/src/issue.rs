@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use qcbus_formats::xqar::{DomainInfo, InfoElement, Level};
 use qcbus_messages::{ResultMessage, shown};
-use qcbus_reporter_sdk::{IssueLocation, Sources, one_line, printable};
+use qcbus_reporter_sdk::{IssueLocation, Sources, one_line, printable, rounded, rule_name};
 
 use crate::Entry;
 use crate::paint::Paint;
@@ -17,6 +17,8 @@ pub(crate) struct View<'v> {
     pub(crate) sources: &'v dyn Sources,
     pub(crate) paint: Paint,
     pub(crate) width: usize,
+    /// Whether UID and checker are written in full, besides the rule's name in the headline.
+    pub(crate) full_names: bool,
 }
 
 impl View<'_> {
@@ -33,10 +35,14 @@ impl View<'_> {
             let _ = writeln!(out, "{:gutter$}{arrow} {path}", "");
         }
         let mut note = |name: &str, text: &str| self.note(out, gutter, name, text);
-        note("rule", &rule_of(entry));
+        if self.full_names {
+            note("rule", &rule_of(entry));
+        }
         for info in &entry.issue.domain_info {
-            if info.name != qcbus_formats::location::NAME {
-                note(&one_line(&info.name), &flat(info));
+            match info.name.as_str() {
+                qcbus_formats::location::NAME => {}
+                qcbus_formats::pool::RULE_INFO => note("breaks as well", &further_rules(info)),
+                name => note(&one_line(name), &flat(info)),
             }
         }
         if let Some(why) = why {
@@ -49,7 +55,9 @@ impl View<'_> {
         let text = printable(entry.issue.description.trim());
         let mut lines = text.lines();
         let first = self.paint.bold(lines.next().unwrap_or("(no description)"));
-        let _ = writeln!(out, "{}: {first}", self.paint.level(level, level.as_str()));
+        let name = shown::line(rule_name(&entry.issue.rule_uid, &entry.checker.id));
+        let head = self.paint.level(level, &format!("{}[{name}]", level.as_str()));
+        let _ = writeln!(out, "{head}: {first}");
         for line in lines {
             let _ = writeln!(out, "    {}", line.trim_end());
         }
@@ -158,6 +166,13 @@ fn gutter(places: &[IssueLocation]) -> usize {
     rows.max().map_or(1, |row| row.to_string().len().min(8))
 }
 
+/// The UIDs of further rules that the same fact breaks.
+fn further_rules(info: &DomainInfo) -> String {
+    let values = info.content.iter().flat_map(|element| &element.attributes);
+    let uids: Vec<String> = values.map(|(_, uid)| one_line(uid)).collect();
+    uids.join(", ")
+}
+
 /// The rule's UID and the checker; ASAM's checkers carry the rule's name, so both are needed to
 /// look either up.
 fn rule_of(entry: &Entry<'_>) -> String {
@@ -174,13 +189,15 @@ fn facts(place: &IssueLocation) -> String {
         facts.push(xpath.clone());
     }
     if let Some((id, s, t)) = &place.road {
+        let (s, t) = (rounded(*s), rounded(*t));
         facts.push(format!("road {id}, s = {s} m, t = {t} m"));
     }
     if let Some((x, y, z)) = place.inertial {
+        let (x, y, z) = (rounded(x), rounded(y), rounded(z));
         facts.push(format!("x = {x} m, y = {y} m, z = {z} m"));
     }
     if let Some(time) = place.time {
-        facts.push(format!("time {time} s"));
+        facts.push(format!("time {} s", rounded(time)));
     }
     if let Some((index, channel)) = &place.message {
         facts.push(format!("message {index} {channel}").trim_end().to_owned());

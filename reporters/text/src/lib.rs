@@ -7,6 +7,7 @@
 //! Parameters: `OutputFile` (see [`Output`]; in one file, each report is under a line
 //! `==== PATH ====`) and `LineWidth` in characters (40 to 1000, default 100).
 
+mod concise;
 mod issue;
 mod paint;
 mod report;
@@ -14,9 +15,10 @@ mod snippet;
 mod summary;
 mod wrap;
 
+pub use concise::{Folding, concise};
 pub use report::DEFAULT_WIDTH;
 
-use qcbus_formats::xqar::{Checker, CheckerBundle, Issue};
+use qcbus_formats::xqar::{Checker, CheckerBundle, Issue, Level};
 use qcbus_messages::ResultMessage;
 #[cfg(doc)]
 use qcbus_reporter_sdk::Output;
@@ -32,7 +34,17 @@ pub static REPORTER: Registration = Registration {
     alias: "text",
     name: NAME,
     about: "NAME.txt beside every result",
+    is_page: false,
     make: |setting| Box::new(FormReporter::new(report::Full, setting)),
+};
+
+/// The same on one line each, which editors and CI read.
+pub static CONCISE: Registration = Registration {
+    alias: "concise",
+    name: "qc-report-concise",
+    about: "NAME.concise.txt beside every result: a line for each finding",
+    is_page: false,
+    make: |setting| Box::new(FormReporter::new(report::Concise, setting)),
 };
 
 /// How to render.
@@ -44,6 +56,8 @@ pub struct Options {
     pub color: bool,
     /// How many checkers that were skipped for one reason are named; the rest are counted.
     pub skipped_names: usize,
+    /// Whether each issue names its rule's UID and its checker in full.
+    pub full_names: bool,
     /// Whether those that do not apply to the file are listed with the reason, and not only counted.
     pub inapplicable: bool,
 }
@@ -54,6 +68,7 @@ impl Default for Options {
             width: DEFAULT_WIDTH,
             color: false,
             skipped_names: usize::MAX,
+            full_names: true,
             inapplicable: true,
         }
     }
@@ -70,12 +85,17 @@ pub(crate) struct Entry<'r> {
 /// The report of one result: its issues in the order of their places, then the verdict and the
 /// summary. Ends with a line feed; equal input gives equal text.
 pub fn render(result: &ResultMessage, options: &Options, sources: &dyn Sources) -> String {
+    let mut out = findings(result, options, sources);
+    summary::write(&mut out, result, Paint::new(options.color), options);
+    out
+}
+
+/// What was found, without the verdict and what it rests on. Empty when nothing was.
+pub fn findings(result: &ResultMessage, options: &Options, sources: &dyn Sources) -> String {
     let paint = Paint::new(options.color);
-    let mut entries = entries(result);
-    entries.sort_by_key(order);
     let mut explained = std::collections::BTreeSet::new();
     let mut out = String::new();
-    for entry in &entries {
+    for entry in &sorted(result) {
         // Why a rule exists is said once per report, not under each of a hundred issues.
         let why = result.rules.get(&entry.issue.rule_uid);
         let why = why.filter(|_| explained.insert(entry.issue.rule_uid.as_str()));
@@ -84,12 +104,25 @@ pub fn render(result: &ResultMessage, options: &Options, sources: &dyn Sources) 
             sources,
             paint,
             width: options.width,
+            full_names: options.full_names,
         };
         view.write(&mut out, entry, why.map(String::as_str));
         out.push('\n');
     }
-    summary::write(&mut out, result, paint, options);
     out
+}
+
+/// What kept somebody from looking, in lines for a person: checkers that failed and, with `blocked`,
+/// those that something else kept from looking. Empty when nothing did.
+pub fn not_looked(result: &ResultMessage, options: &Options, blocked: bool) -> String {
+    summary::not_looked(result, options, blocked)
+}
+
+/// All issues, as they are read.
+fn sorted(result: &ResultMessage) -> Vec<Entry<'_>> {
+    let mut entries = entries(result);
+    entries.sort_by_key(order);
+    entries
 }
 
 fn entries(result: &ResultMessage) -> Vec<Entry<'_>> {
@@ -107,9 +140,10 @@ fn entries(result: &ResultMessage) -> Vec<Entry<'_>> {
     issues.collect()
 }
 
-/// Issues are read along the file; what is in other files goes by where it is referred to, what
-/// qcbus says about the check itself comes last. The sort is stable: ties stay in result order.
-fn order(entry: &Entry<'_>) -> (bool, u64, u64) {
+/// What rejects comes first. Issues of one level are read along the file; what is in other files goes
+/// by where it is referred to, what qcbus says about the check itself comes last. The sort is stable:
+/// ties stay in result order.
+fn order(entry: &Entry<'_>) -> (Level, bool, u64, u64) {
     let own = entry.bundle.name == qcbus_formats::pool::OWN_BUNDLE;
     let place = entry.places.first();
     let at = place.map_or((0, 0), |place| {
@@ -119,5 +153,5 @@ fn order(entry: &Entry<'_>) -> (bool, u64, u64) {
             None => here,
         }
     });
-    (own, at.0, at.1)
+    (entry.issue.level, own, at.0, at.1)
 }

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use qcbus_formats::xqar::Param;
-use qcbus_messages::ResultMessage;
+use qcbus_formats::xqar::{Level, Param};
+use qcbus_messages::{ResultMessage, Verdict, shown};
 use qcbus_reporter_sdk::{
     Destination, Form, ReportError, Sources, Subject, one_line, param,
 };
 
-use crate::{Options, render};
+use crate::{Folding, Options, concise, render};
 
 /// Columns unless `LineWidth` says otherwise; ASAM's report has the same.
 pub const DEFAULT_WIDTH: usize = 100;
@@ -29,6 +29,60 @@ fn line_width(params: &[Param]) -> Result<usize, ReportError> {
 
 /// Both ends of the line that begins a section of the one file.
 const RULER: &str = "====";
+
+/// A line for each finding.
+pub(crate) struct Concise;
+
+impl Form for Concise {
+    type Section = String;
+    const SUFFIX: &'static str = "concise.txt";
+
+    fn section(
+        &self,
+        result: &ResultMessage,
+        _: &dyn Sources,
+        place: Destination,
+    ) -> Result<String, ReportError> {
+        let color = place == Destination::Stream { color: true };
+        Ok(concise(result, color, Folding::None))
+    }
+
+    fn key(&self, subject: Subject<'_>) -> String {
+        shown::line(subject.display_path).into_owned()
+    }
+
+    fn whole(&self, sections: &BTreeMap<String, String>) -> Result<String, ReportError> {
+        Ok(sections.values().map(String::as_str).collect())
+    }
+
+    fn appended(&self, _: &str, section: &String) -> Option<String> {
+        Some(section.clone())
+    }
+
+    fn split(&self, text: &str) -> BTreeMap<String, String> {
+        let mut sections = BTreeMap::<String, String>::new();
+        for line in text.split_inclusive('\n').filter(|it| it.ends_with('\n')) {
+            let key = path_of(line).unwrap_or_default();
+            sections.entry(key.to_owned()).or_default().push_str(line);
+        }
+        sections
+    }
+}
+
+/// The path that a line of [`concise`] begins with.
+fn path_of(line: &str) -> Option<&str> {
+    let levels = [Level::Error, Level::Warning, Level::Information];
+    let levels = levels.map(|level| format!(": {}: ", level.as_str()));
+    let open = format!(": {}: ", Verdict::Undetermined);
+    let at = levels.iter().chain([&open]).filter_map(|it| line.find(it));
+    let place = line.get(..at.min()?)?;
+    let number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    let without = |place| match str::rsplit_once(place, ':') {
+        Some((path, last)) if number(last) => path,
+        _ => place,
+    };
+    Some(without(without(place)))
+}
 
 /// Reports in full. In a file for all each stands under `==== PATH ====`; no other line of a
 /// report begins with a ruler.

@@ -88,6 +88,35 @@ fn is_inapplicable(checker: &Checker) -> bool {
     checker.status == Some(Status::Skipped) && !is_blocked()
 }
 
+/// Whether a checker keeps a verdict open: it failed, or something kept it from looking.
+pub(crate) fn is_open(checker: &Checker) -> bool {
+    match checker.status {
+        Some(Status::Completed) => false,
+        Some(Status::Skipped) => !is_inapplicable(checker),
+        Some(Status::Error) | None => true,
+    }
+}
+
+/// Why a checker did not look, on one line; may be empty.
+pub(crate) fn reason_of(checker: &Checker) -> String {
+    without_count(&one_line(&checker.summary)).to_owned()
+}
+
+/// What kept somebody from looking, in lines.
+pub(crate) fn not_looked(result: &ResultMessage, options: &Options, blocked: bool) -> String {
+    let options = Options {
+        inapplicable: false,
+        ..*options
+    };
+    let mut out = String::new();
+    for group in groups(result, &options) {
+        if blocked || group.status == Status::Error {
+            group.write(&mut out, &options);
+        }
+    }
+    out
+}
+
 /// Checkers that ended alike for the same reason: when a file is not well-formed, all of the
 /// semantic ones are skipped, and one line says so.
 struct Group {
@@ -145,7 +174,7 @@ fn groups(result: &ResultMessage, options: &Options) -> Vec<Group> {
                 continue;
             }
             let name = shown::line(&format!("{}/{}", bundle.name, checker.id)).into_owned();
-            let reason = without_count(&one_line(&checker.summary)).to_owned();
+            let reason = reason_of(checker);
             let known = groups
                 .iter_mut()
                 .find(|group| group.status == status && group.reason == reason);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use qcbus_document::FileKind;
-use qcbus_formats::config::Config;
+use qcbus_formats::config::{Choice, Config, Names};
 use qcbus_ingest::modular::SearchPath;
 use qcbus_messages::codec;
 use qcbus_messages::{Catalogue, Digest};
@@ -22,6 +22,8 @@ pub struct InForce {
     pub digest: Digest,
     /// Where the scenarios are looked for that modular scenarios refer to.
     pub search: Arc<SearchPath>,
+    /// What of all that was asked for, or left out, for this run.
+    pub choice: Choice,
 }
 
 impl InForce {
@@ -43,15 +45,38 @@ impl InForce {
             encoded,
             digest,
             search: Arc::new(search),
+            choice: Choice::default(),
         })
+    }
+
+    /// The same, but only what `choice` asks for.
+    #[must_use]
+    pub fn narrowed(mut self, choice: Choice) -> InForce {
+        if !choice.is_everything() {
+            let mut hash = Sha256::new_with_prefix(self.digest.0);
+            hash.update(choice.to_string());
+            self.digest = Digest(hash.finalize().into());
+        }
+        self.choice = choice;
+        self
     }
 
     /// What it demands.
     pub fn demand(&self) -> Arc<dyn Demand> {
-        match &self.config {
+        let all: Arc<dyn Demand> = match &self.config {
             Some(config) => Arc::new(Configured(config.clone())),
             None => Arc::new(Everything),
+        };
+        if self.choice.is_everything() {
+            return all;
         }
+        let configured = self.config.is_some();
+        let choice = self.choice.clone();
+        Arc::new(Chosen {
+            all,
+            choice,
+            configured,
+        })
     }
 }
 
@@ -106,6 +131,48 @@ impl Demand for Configured {
 
     fn means(&self, named: &str, name: &str, alias: &str) -> bool {
         qcbus_formats::config::same_bundle(named, name, alias)
+    }
+}
+
+/// What is chosen of what would be demanded.
+#[derive(Debug)]
+struct Chosen {
+    all: Arc<dyn Demand>,
+    choice: Choice,
+    /// Whether a configuration says what would be demanded.
+    configured: bool,
+}
+
+impl Demand for Chosen {
+    fn wants_bundle(&self, name: &str, alias: &str) -> bool {
+        self.all.wants_bundle(name, alias)
+    }
+
+    fn checkers(&self, name: &str, catalogue: &Catalogue, kind: FileKind) -> Vec<u32> {
+        let demanded = self.all.checkers(name, catalogue, kind);
+        let asks = |index: u32, checker: &qcbus_messages::CheckerInfo| {
+            let names = Names {
+                bundle: name,
+                alias: &catalogue.alias,
+                id: &checker.id,
+                uids: &checker.rule_uids,
+            };
+            let is_demanded = demanded.contains(&index);
+            // One that is off by default may be asked for by its name, where no configuration speaks.
+            let may_ask = is_demanded || (!self.configured && checker.kinds.contains(&kind));
+            may_ask && self.choice.asks(names, is_demanded)
+        };
+        let checkers = (0..).zip(&catalogue.checkers);
+        let asked = checkers.filter(|&(index, checker)| asks(index, checker));
+        asked.map(|(index, _)| index).collect()
+    }
+
+    fn named(&self) -> Vec<String> {
+        self.all.named()
+    }
+
+    fn means(&self, named: &str, name: &str, alias: &str) -> bool {
+        self.all.means(named, name, alias)
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use qcbus_bus::{HostOptions, Instance};
-use qcbus_formats::config::Known;
+use qcbus_formats::config::{Choice, Known};
 use qcbus_formats::xqar::Dialect;
 use qcbus_ingest::Limits;
 
@@ -36,6 +36,8 @@ pub struct Options {
     pub state: Option<PathBuf>,
     /// How long the history of jobs is kept.
     pub retention: Duration,
+    /// What of all that would be demanded is asked for.
+    pub choice: Choice,
     /// The form of the results.
     pub dialect: Dialect,
     /// Whether results are safe on the disk before they are announced.

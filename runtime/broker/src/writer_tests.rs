@@ -25,6 +25,7 @@ fn store_in(dir: &Path) -> Store {
     Store {
         scouts: Scouts::default(),
         places: ResultPaths::of_watched(dir.join("out"), vec![dir.join("farm")]),
+        choice: Default::default(),
         dialect: Dialect::default(),
         durable: false,
         verdict_files: true,

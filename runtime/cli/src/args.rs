@@ -42,6 +42,8 @@ pub enum Command {
     /// List, run, add or remove checker bundles
     #[command(subcommand)]
     Bundle(BundleCommand),
+    /// Report on results that are there already, also ASAM's own
+    Report(ReportArgs),
     /// Run a reporter
     #[command(subcommand, hide = true)]
     Reporter(ReporterCommand),
@@ -148,12 +150,15 @@ pub struct CheckArgs {
     /// How results are written.
     #[command(flatten)]
     pub output: OutputArgs,
-    /// What to print
-    #[arg(long, value_enum, default_value_t = Format::Text)]
-    pub format: Format,
-    /// Print only the verdicts
-    #[arg(short, long)]
-    pub quiet: bool,
+    /// Ask only these checkers: ids, rule UIDs, their beginnings or last parts, families, bundles
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub select: Vec<String>,
+    /// Do not ask these checkers; results and verdicts say what was left out
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub ignore: Vec<String>,
+    /// What is printed, and what ends how.
+    #[command(flatten)]
+    pub print: PrintArgs,
     /// Directory of manifests of further bundles
     #[arg(long, value_name = "DIR")]
     pub bundles_d: Option<PathBuf>,
@@ -168,7 +173,170 @@ pub struct CheckArgs {
     pub limits: LimitArgs,
 }
 
-/// What is printed.
+/// What `check` prints, and with which exit code it ends.
+#[derive(Debug, Clone, ClapArgs)]
+#[command(next_help_heading = "Output")]
+pub struct PrintArgs {
+    /// What to print, or to write to FILE; several with commas [default: full for one file, concise for
+    /// several]
+    #[arg(
+        long,
+        visible_alias = "format",
+        value_name = "FORMAT[=FILE]",
+        value_delimiter = ',',
+        value_parser = OutputFormats
+    )]
+    pub output_format: Vec<OutputFormat>,
+    /// Count findings by rule, the most frequent first
+    #[arg(long)]
+    pub statistics: bool,
+    /// Print findings and nothing else
+    #[arg(short, long, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Print everything of every file, also what was skipped and why
+    #[arg(short, long)]
+    pub verbose: bool,
+    /// End with 1 from this level of findings on
+    #[arg(long, value_name = "LEVEL", value_enum, default_value_t = FailLevel::Error)]
+    pub fail_level: FailLevel,
+    /// End with 0 whatever is found; with 3 still when something could not be checked
+    #[arg(long)]
+    pub exit_zero: bool,
+    /// Whether to colour
+    #[arg(long, value_name = "WHEN", value_enum, default_value_t = ColorArg::Auto)]
+    pub color: ColorArg,
+}
+
+/// From which level on findings end in exit code 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum FailLevel {
+    /// Errors: what is rejected
+    Error,
+    /// Warnings, too
+    Warning,
+    /// Everything that is found
+    Information,
+}
+
+/// Whether to colour what is printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ColorArg {
+    /// On a terminal, unless NO_COLOR is set
+    Auto,
+    /// Always
+    Always,
+    /// Never
+    Never,
+}
+
+/// A format, and the file that it goes to.
+#[derive(Debug, Clone)]
+pub struct OutputFormat {
+    /// As it was typed.
+    name: String,
+    /// Who writes it.
+    pub registration: &'static Registration,
+    /// The file; `None` for stdout.
+    pub file: Option<PathBuf>,
+}
+
+impl OutputFormat {
+    /// How the program itself prints it, if it does.
+    pub fn terminal(&self) -> Option<TerminalFormat> {
+        match self.registration.alias {
+            "text" => Some(TerminalFormat::Full),
+            "concise" => Some(TerminalFormat::Concise),
+            _ => None,
+        }
+    }
+
+    /// Whether it is a page to look at, which nobody wants on a terminal.
+    pub fn is_page(&self) -> bool {
+        self.registration.is_page
+    }
+}
+
+impl std::fmt::Display for OutputFormat {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.name)
+    }
+}
+
+/// Formats that the program prints itself, as results come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TerminalFormat {
+    /// Each finding with its line of the file.
+    Full,
+    /// A line for each finding.
+    Concise,
+}
+
+/// Takes `FORMAT` and `FORMAT=FILE`.
+#[derive(Debug, Clone)]
+struct OutputFormats;
+
+impl TypedValueParser for OutputFormats {
+    type Value = OutputFormat;
+
+    fn parse_ref(
+        &self,
+        command: &clap::Command,
+        arg: Option<&clap::Arg>,
+        value: &std::ffi::OsStr,
+    ) -> Result<OutputFormat, clap::Error> {
+        let bytes = value.as_encoded_bytes();
+        let split = bytes.iter().position(|byte| *byte == b'=');
+        let (name, file) = match split {
+            Some(at) => {
+                use std::os::unix::ffi::OsStrExt as _;
+                let file = std::ffi::OsStr::from_bytes(&bytes[at + 1..]);
+                (&bytes[..at], Some(PathBuf::from(file)))
+            }
+            None => (bytes, None),
+        };
+        let name = String::from_utf8_lossy(name).into_owned();
+        let found = REPORTERS.iter().find(|it| it.alias == standard_alias(&name));
+        match found {
+            Some(registration) => Ok(OutputFormat {
+                name,
+                registration,
+                file,
+            }),
+            None => {
+                let parser = PossibleValuesParser::new(self.values());
+                // It says which there are, and which is near.
+                let refused = parser.parse_ref(command, arg, std::ffi::OsStr::new(&name));
+                Err(refused.err().unwrap_or_else(|| {
+                    clap::Error::new(clap::error::ErrorKind::InvalidValue).with_cmd(command)
+                }))
+            }
+        }
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        Some(Box::new(self.values().into_iter()))
+    }
+}
+
+impl OutputFormats {
+    fn values(&self) -> Vec<PossibleValue> {
+        let name = |it: &&'static Registration| match it.alias {
+            "text" => PossibleValue::new("full").alias("text"),
+            alias => PossibleValue::new(alias),
+        };
+        REPORTERS.iter().map(name).collect()
+    }
+}
+
+/// The text report is called `full` beside `concise`.
+fn standard_alias(name: &str) -> &str {
+    match name {
+        "full" => "text",
+        name => name,
+    }
+}
+
+/// How a rule is printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     /// For people
@@ -372,6 +540,26 @@ pub enum ReporterCommand {
     },
 }
 
+/// `qcbus report`.
+#[derive(Debug, ClapArgs)]
+pub struct ReportArgs {
+    /// Which report
+    #[arg(value_parser = reporter())]
+    pub format: &'static Registration,
+    /// Result files (.xqar)
+    #[arg(value_name = "FILE.xqar", required_unless_present = "config")]
+    pub results: Vec<PathBuf>,
+    /// Where the report goes (default: stdout; a page goes beside the result)
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// ASAM configuration: the parameters of this reporter's ReportModule
+    #[arg(short, long, value_name = "CONFIG")]
+    pub config: Option<PathBuf>,
+    /// A parameter of the reporter, such as LineWidth=80; may be given several times
+    #[arg(short, long, value_name = "NAME=VALUE", value_parser = name_value)]
+    pub param: Vec<(String, String)>,
+}
+
 /// `qcbus rule`.
 #[derive(Debug, ClapArgs)]
 pub struct RuleArgs {
@@ -459,6 +647,14 @@ fn reporter() -> impl TypedValueParser<Value = &'static Registration> {
     let find = |alias: String| REPORTERS.into_iter().find(|it| it.alias == alias);
     PossibleValuesParser::new(REPORTERS.iter().map(row))
         .try_map(move |alias| find(alias).ok_or("there is no such reporter"))
+}
+
+/// Reads `NAME=VALUE`.
+fn name_value(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.is_empty() => Ok((name.to_owned(), value.to_owned())),
+        _ => Err("write NAME=VALUE".to_owned()),
+    }
 }
 
 /// Reads `250ms`, `30s`, `5m`, `2h`, `90d`; a number alone is seconds.

@@ -5,9 +5,9 @@ use std::path::Path;
 
 use qcbus_broker::{ChildSpec, Restart};
 use qcbus_document::FileKind;
-use qcbus_formats::config::{Known, KnownBundle, KnownChecker};
+use qcbus_formats::config::{Known, KnownBundle, KnownChecker, Names};
 use qcbus_messages::Role;
-use qcbus_reporter_sdk::{Registration, RulePage};
+use qcbus_reporter_sdk::{Registration, RulePage, rule_name};
 use qcbus_sdk::{Bundle, Checker, UserFiles};
 
 /// The standard bundles.
@@ -58,8 +58,45 @@ pub fn bundle_specs(
 
 /// The reporters that come with the program. One more is one more crate, which `Cargo.toml` names, and
 /// one more row: everything else follows from its registration (`docs/writing-a-reporter.md`).
-pub static REPORTERS: [&Registration; 2] =
-    [&qcbus_report_text::REPORTER, &qcbus_report_json::REPORTER];
+pub static REPORTERS: [&Registration; 3] = [
+    &qcbus_report_text::REPORTER,
+    &qcbus_report_text::CONCISE,
+    &qcbus_report_json::REPORTER,
+];
+
+/// The checkers of all standard bundles, each with its bundle.
+fn checkers() -> impl Iterator<Item = (&'static Bundle, Checker)> {
+    let bundles = BUNDLES.into_iter();
+    bundles.flat_map(|bundle| bundle.checkers().into_iter().map(move |it| (bundle, it)))
+}
+
+/// Whether a name of `--select` and `--ignore` fits any checker.
+pub fn is_named(pattern: &str) -> bool {
+    checkers().any(|(bundle, checker)| {
+        let uids = checker.facts.uids.iter();
+        let uids: Vec<String> = uids.map(|uid| (*uid).to_owned()).collect();
+        let names = Names {
+            bundle: bundle.name,
+            alias: bundle.alias,
+            id: &checker.id,
+            uids: &uids,
+        };
+        names.match_pattern(pattern)
+    })
+}
+
+/// The name of a checker or rule that a mistyped one is nearest to.
+pub fn suggest(word: &str) -> Option<String> {
+    let mut names: Vec<String> = Vec::new();
+    for (_, checker) in checkers() {
+        names.extend(checker.facts.uids.iter().map(|uid| (*uid).to_owned()));
+        let rules = checker.facts.uids.iter();
+        names.extend(rules.map(|uid| rule_name(uid, &checker.id).to_owned()));
+        names.push(checker.id);
+    }
+    let near = qcbus_formats::distance::closest(word, names.iter().map(String::as_str));
+    near.map(str::to_owned)
+}
 
 /// How to start a standard reporter.
 pub fn reporter_spec(program: &Path, reporter: &Registration) -> ChildSpec {

@@ -1,9 +1,11 @@
 //! What people see: results on stdout, everything else on stderr.
 
 use std::io::{self, IsTerminal, Write};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
 use qcbus_messages::{Exit, shown};
+
+use crate::args::ColorArg;
 
 /// Whether something that was to be printed did not get out.
 static LOST: AtomicBool = AtomicBool::new(false);
@@ -44,9 +46,23 @@ pub fn fail(text: &str) {
     say(&format!("error: {text}"));
 }
 
+/// What somebody wants of colours: nothing, all, none.
+static COLOR: AtomicU8 = AtomicU8::new(ColorArg::Auto as u8);
+
+/// Takes what somebody wants of colours.
+pub fn set_color(wanted: ColorArg) {
+    COLOR.store(wanted as u8, Ordering::Relaxed);
+}
+
 /// Whether stdout may be coloured.
 pub fn color() -> bool {
-    io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|it| it.is_empty())
+    let wanted = COLOR.load(Ordering::Relaxed);
+    let plain = || std::env::var_os("NO_COLOR").is_some_and(|it| !it.is_empty());
+    if wanted == ColorArg::Auto as u8 {
+        io::stdout().is_terminal() && !plain()
+    } else {
+        wanted == ColorArg::Always as u8
+    }
 }
 
 /// Columns of the terminal, or the reporters' default.

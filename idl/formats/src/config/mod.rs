@@ -6,6 +6,7 @@
 //! answer the questions that a broker or a bundle asks while it works.
 
 mod check;
+mod choice;
 mod levels;
 mod lookup;
 mod parse;
@@ -16,6 +17,7 @@ use crate::xqar::{Level, Param};
 
 pub use check::{Known, KnownBundle, KnownChecker};
 pub use levels::Levels;
+pub use choice::{Choice, Names};
 pub use lookup::{Selected, Selection, published_name, same_bundle, same_reporter};
 
 /// The name of the checker parameter that gives a checker's issues another level.

@@ -17,12 +17,17 @@ use crate::config::Config;
 use crate::xqar::{Issue, Results};
 
 pub use asked::NotAsked;
+pub use remarks::chosen;
 pub use outcome::{Asked, BundleOutcome, CheckerOutcome, Ending, in_the_answer};
 pub use places::{NoPlaces, Resolver, XPathPlace};
 pub use uid::is_rule_uid;
 
 /// The name of the bundle in which qcbus speaks for itself.
 pub const OWN_BUNDLE: &str = "qcbus";
+
+/// Name of the information on an issue that names a further rule which the same fact breaks: the format
+/// has room for one only.
+pub const RULE_INFO: &str = "qcbus.rule";
 
 /// Key of the metadata of a checker that could not look, which ASAM's format calls `skipped` like
 /// one that does not apply.

@@ -1,11 +1,13 @@
 //! What qcbus itself has to say: the bundle `qcbus`.
 
 use super::{CheckerOutcome, Counts, Ending, OWN_BUNDLE, Pooled, Remark};
-use crate::config::{Config, Levels};
+use crate::config::{Choice, Config, Levels};
 use crate::xqar::{Issue, Level};
 
 /// Rule: issues that the configuration does not want are removed, and that is said.
 pub(super) const FILTERED: &str = "qcbus.dev:qcbus:1.0.0:pooling.filtered";
+/// Rule: what was left out on the command line is said.
+const CHOSEN: &str = "qcbus.dev:qcbus:1.0.0:pooling.chosen";
 /// Rule: `minLevel` and `maxLevel` are in today's order.
 pub(super) const LEVEL_ORDER: &str = "qcbus.dev:qcbus:1.0.0:config.level_order";
 
@@ -60,6 +62,23 @@ impl Removal {
             open: None,
         }
     }
+}
+
+/// The remark that not everything was asked, for whoever reads the result later.
+pub fn chosen(choice: &Choice) -> Option<Remark> {
+    if choice.is_everything() {
+        return None;
+    }
+    let text = format!(
+        "not every checker was asked: the check was run with `{choice}`, and the verdict says nothing about \
+         what was left out"
+    );
+    Some(Remark {
+        checker: String::from("qcbus_choice"),
+        description: String::from("What was left out on the command line is told."),
+        issue: Some(information(CHOSEN, text)),
+        open: None,
+    })
 }
 
 /// The remark that a configuration uses the order of levels of 2023.

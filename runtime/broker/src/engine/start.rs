@@ -196,6 +196,7 @@ fn sources_of(options: &Options) -> Sources {
         config: options.config.clone(),
         lasting: options.watch,
         bundles_d: options.bundles_d.clone(),
+        choice: options.choice.clone(),
         standard: options.standard.clone(),
         reporters: options.reporters.clone(),
         known: options.known.clone(),
@@ -223,6 +224,7 @@ pub(super) fn in_force(sources: &Sources, loaded: &Loaded) -> Result<InForce, Lo
         None => of_environment,
     };
     InForce::new(loaded.config.clone(), search)
+        .map(|in_force| in_force.narrowed(sources.choice.clone()))
         .map_err(|error| LoadError::Config(error.to_string()))
 }
 
@@ -254,6 +256,7 @@ fn store(
     });
     Ok(Store {
         places,
+        choice: options.choice.clone(),
         dialect: options.dialect,
         durable: options.durable,
         verdict_files: options.verdict_files,

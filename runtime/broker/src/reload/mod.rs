@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 use qcbus_disk::trust::{self, TrustError};
 use qcbus_formats::config::{
-    Config, Known, KnownBundle, Oddity, Parsed, same_bundle, same_reporter,
+    Choice, Config, Known, KnownBundle, Oddity, Parsed, same_bundle, same_reporter,
 };
 use qcbus_messages::Role;
 use qcbus_messages::path_text::to_text;
@@ -37,6 +37,8 @@ pub struct Sources {
     pub lasting: bool,
     /// Directory of manifests.
     pub bundles_d: Option<PathBuf>,
+    /// What of all that would be demanded is asked for.
+    pub choice: Choice,
     /// The children that come with the program.
     pub standard: Vec<ChildSpec>,
     /// Reporters that run when the configuration names them.

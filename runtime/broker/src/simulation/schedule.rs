@@ -108,6 +108,7 @@ fn options(dir: &Path) -> Options {
         single_result: None,
         state: Some(dir.join("state")),
         retention: Duration::from_secs(3600),
+        choice: Default::default(),
         dialect: qcbus_formats::xqar::Dialect::default(),
         durable: false,
         verdict_files: true,

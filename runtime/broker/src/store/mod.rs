@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use qcbus_formats::config::Config;
+use qcbus_formats::config::{Choice, Config};
 use qcbus_formats::pool::{BundleOutcome, Pooled};
 use qcbus_formats::xqar::{self, Dialect, Status};
 use qcbus_messages::Verdict;
@@ -40,6 +40,8 @@ use refresh::refreshed;
 pub struct Store {
     /// Where results go.
     pub places: ResultPaths,
+    /// What of all that would be demanded is asked for.
+    pub choice: Choice,
     /// The form of the results.
     pub dialect: Dialect,
     /// Whether results are on the disk before they are announced.

@@ -21,6 +21,7 @@ impl Store {
     ) -> Pooled {
         let document = root.and_then(|bytes| Document::open(bytes).ok());
         let mut remarks: Vec<Remark> = unanswered(job).into_iter().collect();
+        remarks.extend(pool::chosen(&self.choice));
         match (&document, &job.prepared) {
             (Some(document), Some(prepared)) => {
                 remarks.extend(qcbus_ingest::remarks(document, &prepared.missing, &bundles));

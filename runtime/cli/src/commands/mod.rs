@@ -8,6 +8,7 @@ mod expand;
 mod manifests;
 mod pack;
 mod remote;
+mod report;
 mod reporter;
 mod rule;
 mod schema;
@@ -33,6 +34,7 @@ pub fn run(args: Args) -> Exit {
         Command::Bundle(BundleCommand::Run(args)) => bundle::run(args),
         Command::Bundle(BundleCommand::Add(args)) => manifests::add(&args),
         Command::Bundle(BundleCommand::Remove(args)) => manifests::remove(&args),
+        Command::Report(args) => report::run(&args),
         Command::Reporter(ReporterCommand::Run { name, bus }) => reporter::run(name, &bus),
         Command::Rule(args) => rule::run(&args),
         Command::Config(ConfigCommand::Check { file, bundles_d }) => {

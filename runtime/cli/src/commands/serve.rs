@@ -211,6 +211,7 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         out,
         state: Some(state),
         retention: args.retention,
+        choice: Default::default(),
         dialect: dialect(args.output.xqar_dialect),
         durable: true,
         verdict_files: true,

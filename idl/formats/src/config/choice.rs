@@ -1,0 +1,147 @@
+//! What somebody wants to be asked or left out in one run, beside any configuration.
+
+use std::fmt;
+
+use super::same_bundle;
+
+/// Checkers by name: only those selected, and of them none that is ignored.
+///
+/// A name is a checker's id or a rule's UID, whole or their beginning, their last part, a family
+/// (`ids` or `ids.` for every rule `ids.…`), or a bundle's name or alias. Empty: everything.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Choice {
+    /// Only what one of these names.
+    pub select: Vec<String>,
+    /// Nothing that one of these names.
+    pub ignore: Vec<String>,
+}
+
+/// By what a checker is known.
+#[derive(Debug, Clone, Copy)]
+pub struct Names<'n> {
+    /// Name of its bundle.
+    pub bundle: &'n str,
+    /// Short name of its bundle.
+    pub alias: &'n str,
+    /// Its id.
+    pub id: &'n str,
+    /// The UIDs of its rules.
+    pub uids: &'n [String],
+}
+
+impl Choice {
+    /// Whether nothing is left out.
+    pub fn is_everything(&self) -> bool {
+        self.select.is_empty() && self.ignore.is_empty()
+    }
+
+    /// Whether a checker is asked. One that is off by default is when it is named in full.
+    pub fn asks(&self, names: Names<'_>, default_on: bool) -> bool {
+        let named = |patterns: &[String]| patterns.iter().any(|it| names.match_pattern(it));
+        let in_full = || self.select.iter().any(|it| names.are(it));
+        let selected = (self.select.is_empty() || named(&self.select)) && default_on;
+        (selected || in_full()) && !named(&self.ignore)
+    }
+}
+
+impl Names<'_> {
+    /// Whether the pattern names this checker.
+    pub fn match_pattern(self, pattern: &str) -> bool {
+        if pattern.is_empty() {
+            return false;
+        }
+        same_bundle(pattern, self.bundle, self.alias)
+            || belongs_to(self.id, pattern)
+            || self.uids.iter().any(|uid| {
+                let rule = uid.rsplit(':').next().unwrap_or(uid);
+                belongs_to(uid, pattern) || belongs_to(rule, pattern)
+            })
+    }
+
+    /// Whether the pattern is the checker's whole id or one of its UIDs.
+    fn are(self, pattern: &str) -> bool {
+        self.id == pattern || self.uids.iter().any(|uid| uid == pattern)
+    }
+}
+
+/// Whether a name is the pattern, goes on from it with a new word, or ends with it as a word.
+fn belongs_to(name: &str, pattern: &str) -> bool {
+    const BETWEEN: [char; 3] = ['.', '_', ':'];
+    let goes_on = |rest: &str| {
+        rest.is_empty() || rest.starts_with(BETWEEN) || pattern.ends_with(BETWEEN)
+    };
+    name.strip_prefix(pattern).is_some_and(goes_on)
+        || name
+            .strip_suffix(pattern)
+            .is_some_and(|before| before.ends_with(BETWEEN))
+}
+
+impl fmt::Display for Choice {
+    /// As it is typed: `--select ids --ignore road.lane`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut said = Vec::new();
+        for (flag, names) in [("--select", &self.select), ("--ignore", &self.ignore)] {
+            if !names.is_empty() {
+                said.push(format!("{flag} {}", names.join(",")));
+            }
+        }
+        f.write_str(&said.join(" "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ID: &str = "check_asam_xodr_road_lane_link_order";
+    const UID: &str = "asam.net:xodr:1.4.0:road.lane.link_order";
+
+    fn asks(select: &[&str], ignore: &[&str], default_on: bool) -> bool {
+        let list = |names: &[&str]| names.iter().map(|&it| it.to_owned()).collect();
+        let choice = Choice {
+            select: list(select),
+            ignore: list(ignore),
+        };
+        let names = Names {
+            bundle: "xodrBundle",
+            alias: "xodr",
+            id: ID,
+            uids: &[UID.to_owned()],
+        };
+        choice.asks(names, default_on)
+    }
+
+    #[test]
+    fn a_checker_goes_by_every_name_that_people_see() {
+        for name in [
+            ID,
+            UID,
+            "xodr",
+            "xodrBundle",
+            "road",
+            "road.",
+            "road.lane",
+            "road.lane.link_order",
+            "link_order",
+            "check_asam_xodr_road",
+            "asam.net:xodr:1.4.0",
+        ] {
+            assert!(asks(&[name], &[], true), "{name}");
+            assert!(!asks(&[], &[name], true), "{name}");
+        }
+        for other in ["", "roa", "lane", "road.la", "xosc", "order.", "1.4.0", "k_order"] {
+            assert!(!asks(&[other], &[], true), "{other}");
+            assert!(asks(&[], &[other], true), "{other}");
+        }
+    }
+
+    #[test]
+    fn to_ignore_wins_and_what_is_off_is_named_in_full() {
+        assert!(!asks(&["road"], &["road.lane"], true));
+        assert!(!asks(&[], &[], false));
+        assert!(!asks(&["road"], &[], false));
+        assert!(asks(&[ID], &[], false));
+        assert!(asks(&[UID], &[], false));
+        assert!(!asks(&[UID], &["xodr"], false));
+    }
+}

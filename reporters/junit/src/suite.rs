@@ -1,0 +1,152 @@
+//! The suite of a checked file.
+
+use std::collections::BTreeMap;
+
+use qcbus_formats::pool::{BLOCKED, NotAsked};
+use qcbus_formats::xqar::{Checker, CheckerBundle, Status};
+use qcbus_messages::{Digest, ResultMessage, Verdict};
+use quick_junit::{NonSuccessKind, Property, TestCase, TestCaseStatus, TestSuite};
+
+use crate::case::{self, Findings};
+use crate::text::{counted, name, path, reason, short};
+
+/// The property by which a suite is found again: absolute path of the checked file.
+pub(crate) const INPUT: &str = "qcbus.inputFile";
+
+/// What becomes of checkers that do not apply to the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Inapplicable {
+    /// The suite says how many there are.
+    Counted,
+    /// Each has a skipped case.
+    Listed,
+}
+
+/// The suite of a result.
+pub(crate) fn suite(result: &ResultMessage, inapplicable: Inapplicable) -> TestSuite {
+    let shown_path = name(&result.display_path, "(no path)");
+    let mut suite = TestSuite::new(shown_path.as_str());
+    let mut names = Names::default();
+    let findings = Findings::new(result);
+    let mut cases = Vec::new();
+    let mut left_out = 0;
+    for (bundle, checker) in checkers(result) {
+        if does_not_apply(checker) && inapplicable == Inapplicable::Counted {
+            left_out += 1;
+            continue;
+        }
+        let class = class(&bundle.name, &shown_path);
+        let id = names.free(&class, &name(&checker.id, "(no id)"));
+        cases.push(case::case(&id, &class, checker, &findings));
+    }
+    let is_red = |case: &TestCase| matches!(case.status, TestCaseStatus::NonSuccess { .. });
+    if result.verdict != Verdict::Accepted && !cases.iter().any(is_red) {
+        let class = class(qcbus_formats::pool::OWN_BUNDLE, &shown_path);
+        let id = names.free(&class, "verdict");
+        cases.insert(0, verdict(&id, &class, result));
+    }
+    suite.add_test_cases(cases);
+    suite.properties = properties(result, left_out);
+    let said = remarks(result, left_out);
+    if !said.is_empty() {
+        suite.set_system_out(said);
+    }
+    suite
+}
+
+fn checkers(result: &ResultMessage) -> impl Iterator<Item = (&CheckerBundle, &Checker)> {
+    let bundles = result.results.bundles.iter();
+    bundles.flat_map(|bundle| bundle.checkers.iter().map(move |checker| (bundle, checker)))
+}
+
+/// Whether the file is none that the checker is for. One that found something all the same, as other
+/// tools may write it, is not passed over.
+pub(crate) fn does_not_apply(checker: &Checker) -> bool {
+    checker.status == Some(Status::Skipped) && !is_blocked(checker) && checker.issues.is_empty()
+}
+
+/// Whether a checker could not look. It owes an answer, whatever its status.
+pub(crate) fn is_blocked(checker: &Checker) -> bool {
+    checker.metadata.iter().any(|fact| fact.key == BLOCKED)
+}
+
+fn class(bundle: &str, shown_path: &str) -> String {
+    format!("{}.{shown_path}", name(bundle, "(no bundle)"))
+}
+
+/// The case of a file that is not accepted though none of its checkers is red.
+fn verdict(id: &str, class: &str, result: &ResultMessage) -> TestCase {
+    let blocked: Vec<&Checker> = checkers(result)
+        .map(|(_, checker)| checker)
+        .filter(|checker| is_blocked(checker))
+        .collect();
+    let why = match blocked.as_slice() {
+        [] if result.verdict == Verdict::Undetermined => {
+            "no checker has looked at the file".to_owned()
+        }
+        [] => "the result does not say why".to_owned(),
+        [first, ..] => format!(
+            "{} could not look: {}",
+            counted(blocked.len(), "checker"),
+            short(&reason(&first.summary), crate::LONGEST_FINDING)
+        ),
+    };
+    let message = format!("{}: {why}", result.verdict);
+    let status = case::red(NonSuccessKind::Error, result.verdict.as_str(), &message);
+    let mut case = TestCase::new(id, status);
+    case.set_classname(class);
+    case
+}
+
+fn properties(result: &ResultMessage, left_out: usize) -> Vec<Property> {
+    let mut properties = vec![
+        Property::new(INPUT, path(&result.input)),
+        Property::new("qcbus.verdict", result.verdict.to_string()),
+    ];
+    if result.digest != Digest::default() {
+        let digest = result.digest.to_string();
+        properties.push(Property::new("qcbus.sha256", digest));
+    }
+    if left_out > 0 {
+        let count = left_out.to_string();
+        properties.push(Property::new("qcbus.notApplicable", count));
+    }
+    properties
+}
+
+/// What is not among the cases, for a person.
+fn remarks(result: &ResultMessage, left_out: usize) -> String {
+    let mut lines = Vec::new();
+    match left_out {
+        0 => {}
+        1 => lines.push("1 checker does not apply to the file and is left out".to_owned()),
+        many => lines.push(format!(
+            "{many} checkers do not apply to the file and are left out"
+        )),
+    }
+    let not_asked = NotAsked::of(&result.results);
+    lines.extend(not_asked.iter().map(|it| path(&format!("not asked: {it}"))));
+    lines.join("\n")
+}
+
+/// The names of cases that are taken, each with its class, and the last number given to it.
+#[derive(Default)]
+struct Names {
+    taken: BTreeMap<(String, String), usize>,
+}
+
+impl Names {
+    /// The name; a second one of its class gets `#2`, so that a host that keeps one of each name
+    /// loses nothing.
+    fn free(&mut self, class: &str, name: &str) -> String {
+        let of = |name: &str| (class.to_owned(), name.to_owned());
+        let mut free = name.to_owned();
+        while self.taken.contains_key(&of(&free)) {
+            let number = self.taken.entry(of(name)).or_insert(1);
+            *number += 1;
+            free = format!("{name}#{number}");
+        }
+        self.taken.insert(of(&free), 1);
+        free
+    }
+}

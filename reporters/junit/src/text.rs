@@ -1,0 +1,100 @@
+//! Text of others in the form that XML, and those who read it back, leave as it is.
+
+use qcbus_messages::shown;
+use qcbus_reporter_sdk::one_line;
+
+/// The text on one line of at most `most` characters and the sign that something was cut.
+pub(crate) fn short(text: &str, most: usize) -> String {
+    let line = legal(&one_line(text));
+    match line.char_indices().nth(most) {
+        Some((end, _)) => format!("{}…", line.get(..end).unwrap_or_default().trim_end()),
+        None => line,
+    }
+}
+
+/// A path or a name on one line, as exact as XML allows.
+pub(crate) fn path(text: &str) -> String {
+    legal(&shown::line(text))
+}
+
+/// A name that is never empty: hosts drop a case or a suite without one.
+pub(crate) fn name(text: &str, otherwise: &str) -> String {
+    match path(text) {
+        name if name.trim().is_empty() => otherwise.to_owned(),
+        name => name,
+    }
+}
+
+/// Control characters are gone when it comes to this; two more characters are in no XML.
+fn legal(text: &str) -> String {
+    text.replace(['\u{FFFE}', '\u{FFFF}'], "\u{FFFD}")
+}
+
+/// Why a checker did not complete: its summary without its status, which is said already, and
+/// without the count that pooling and ASAM's framework append.
+pub(crate) fn reason(summary: &str) -> String {
+    let line = one_line(summary);
+    let bare = ["Skipped: ", "Error: ", "Skipped. ", "Error. "]
+        .into_iter()
+        .find_map(|status| line.strip_prefix(status))
+        .unwrap_or(&line);
+    let counts = [" issue(s) are found.", " issues.", " issue."];
+    let counted = counts.into_iter().find_map(|it| bare.strip_suffix(it));
+    let reason = counted.map_or(bare, |start| {
+        start
+            .trim_end_matches(|c: char| c.is_ascii_digit())
+            .trim_end()
+    });
+    match reason {
+        "" => "no reason given".to_owned(),
+        reason => reason.to_owned(),
+    }
+}
+
+/// `1 finding`, `2 findings`.
+pub(crate) fn counted(count: usize, what: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {what}{plural}")
+}
+
+#[cfg(test)]
+mod tests {
+    use quick_junit::XmlString;
+
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_what_is_meant() {
+        // quick-junit takes escape sequences and control characters out; nothing is left for it.
+        let all: String = ('\0'..=char::MAX).collect();
+        for text in [short(&all, usize::MAX), path(&all)] {
+            assert_eq!(XmlString::new(&text).as_str(), text);
+            assert!(!text.contains(['\u{FFFE}', '\u{FFFF}', '\r', '\n', '\t']));
+        }
+        assert_eq!(
+            short("a\u{1b}[31mb\u{9b}2Kc", 99),
+            "a\u{FFFD}[31mb\u{FFFD}2Kc"
+        );
+    }
+
+    #[test]
+    fn long_text_is_cut_between_characters() {
+        assert_eq!(short("äöü", 3), "äöü");
+        assert_eq!(short("äö ü", 3), "äö…");
+        assert_eq!(short("", 3), "");
+    }
+
+    #[test]
+    fn a_reason_is_bare() {
+        assert_eq!(reason("Skipped: too old. 0 issues."), "too old.");
+        assert_eq!(reason("It died. 12 issue(s) are found."), "It died.");
+        assert_eq!(reason("Error. 0 issues."), "no reason given");
+        assert_eq!(reason(" \n"), "no reason given");
+    }
+
+    #[test]
+    fn a_name_is_never_empty() {
+        assert_eq!(name(" \u{3000}", "(no id)"), "(no id)");
+        assert_eq!(name("a\nb", "(no id)"), "a\\nb");
+    }
+}

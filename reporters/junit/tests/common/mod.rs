@@ -1,0 +1,189 @@
+//! Results to report on, and what must hold of every report.
+
+pub mod markup;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use qcbus_formats::pool::BLOCKED;
+use qcbus_formats::xqar::{
+    Checker, CheckerBundle, Issue, Level, Location, Locations, Metadata, Results, Status,
+};
+use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
+use qcbus_report_junit::Suites;
+use qcbus_reporter_sdk::{Destination, Form as _, NoSources, ReportError, Subject};
+
+use markup::Element;
+
+pub fn issue(level: Level, text: &str, row: u64) -> Issue {
+    let place = Location::File {
+        row,
+        column: 5,
+        offset: None,
+    };
+    Issue {
+        id: 0,
+        description: text.into(),
+        level,
+        rule_uid: "asam.net:xodr:1.4.0:ids.id_unique_in_class".into(),
+        locations: vec![Locations {
+            places: vec![place],
+            ..Locations::default()
+        }],
+        domain_info: Vec::new(),
+    }
+}
+
+pub fn checker(id: &str, status: Option<Status>, summary: &str, issues: Vec<Issue>) -> Checker {
+    Checker {
+        id: id.into(),
+        summary: summary.into(),
+        status,
+        issues,
+        ..Checker::default()
+    }
+}
+
+pub fn blocked(id: &str) -> Checker {
+    let by = Metadata {
+        key: BLOCKED.into(),
+        value: "check_version".into(),
+        ..Metadata::default()
+    };
+    let summary = "Skipped: `check_version` found errors. 0 issues.";
+    Checker {
+        metadata: vec![by],
+        ..checker(id, Some(Status::Skipped), summary, Vec::new())
+    }
+}
+
+/// A result whose verdict follows from its checkers.
+pub fn result(path: &str, checkers: Vec<Checker>) -> ResultMessage {
+    let results = Results {
+        version: "1.0.0".into(),
+        bundles: vec![CheckerBundle {
+            name: "xodrBundle".into(),
+            checkers,
+            ..CheckerBundle::default()
+        }],
+    };
+    ResultMessage {
+        job: JobId(1),
+        input: format!("/farm/{path}"),
+        display_path: path.into(),
+        xqar: format!("/out/{path}.xqar"),
+        verdict: Verdict::of(&results),
+        digest: Digest([7; 32]),
+        config: Digest::default(),
+        document: None,
+        results,
+        rules: BTreeMap::new(),
+        params: Vec::new(),
+    }
+}
+
+/// A checker of every ending.
+pub fn endings() -> Vec<Checker> {
+    let completed = Some(Status::Completed);
+    let remarks = vec![
+        issue(Level::Information, "the name is empty", 7),
+        issue(Level::Warning, "the road is 3 mm long", 8),
+    ];
+    let errors = vec![
+        issue(Level::Warning, "the id \"5\" is odd", 3),
+        issue(Level::Error, "the id \"5\" is taken\nby <road>", 4),
+    ];
+    let too_old = "Skipped: the rule applies to OpenDRIVE 1.7 and later. 0 issues.";
+    let died = "Error: the bundle died. 0 issues.";
+    vec![
+        checker("check_version", completed, "0 issues.", Vec::new()),
+        checker("check_lengths", completed, "2 issues.", remarks),
+        checker("check_ids", completed, "2 issues.", errors),
+        checker("check_1_7", Some(Status::Skipped), too_old, Vec::new()),
+        checker("check_links", Some(Status::Error), died, Vec::new()),
+        checker("check_silent", None, "", Vec::new()),
+        blocked("check_lanes"),
+    ]
+}
+
+/// Sections by their keys.
+pub fn sections(
+    results: &[ResultMessage],
+) -> Result<BTreeMap<String, quick_junit::TestSuite>, ReportError> {
+    let section = |result: &ResultMessage| {
+        let section = Suites.section(result, &NoSources, Destination::File)?;
+        Ok((Suites.key(Subject::from(result)), section))
+    };
+    results.iter().map(section).collect()
+}
+
+/// The report of these results. Whatever they are, it keeps to the rules of JUnit and reads back as
+/// what it was made of.
+pub fn report(results: &[ResultMessage]) -> String {
+    let sections = sections(results).unwrap();
+    let text = Suites.whole(&sections).unwrap();
+    assert_keeps_the_rules(&text);
+    assert!(Suites.split(&text) == sections, "{text}");
+    text
+}
+
+/// Names, places and numbers of elements as JUnit has them.
+pub fn assert_keeps_the_rules(text: &str) {
+    let root = markup::read(text);
+    assert_eq!(root.name, "testsuites");
+    root.has_only(&["name", "tests", "failures", "errors"]);
+    let mut sums = [0; 3];
+    for suite in &root.children {
+        assert_eq!(suite.name, "testsuite");
+        suite.has_only(&["name", "tests", "skipped", "errors", "failures"]);
+        assert!(!suite.attributes["name"].trim().is_empty());
+        let order = ["properties", "testcase", "system-out"];
+        let places = suite.children.iter().map(|child| {
+            let place = order.iter().position(|name| *name == child.name);
+            place.unwrap_or_else(|| panic!("a suite has no {}", child.name))
+        });
+        assert!(places.is_sorted(), "{order:?} is the order");
+        let cases: Vec<&Element> = suite.named("testcase").collect();
+        let counts = [cases.len(), with(&cases, "failure"), with(&cases, "error")];
+        assert_eq!(counts, suite.numbers(["tests", "failures", "errors"]));
+        assert_eq!([with(&cases, "skipped")], suite.numbers(["skipped"]));
+        sums.iter_mut().zip(counts).for_each(|(sum, it)| *sum += it);
+        assert_cases(&cases);
+    }
+    assert_eq!(sums, root.numbers(["tests", "failures", "errors"]));
+}
+
+fn with(cases: &[&Element], child: &str) -> usize {
+    let has = |case: &&&Element| case.named(child).next().is_some();
+    cases.iter().filter(has).count()
+}
+
+fn assert_cases(cases: &[&Element]) {
+    let mut names = BTreeSet::new();
+    for case in cases {
+        case.has_only(&["name", "classname"]);
+        assert!(
+            case.attributes
+                .values()
+                .all(|value| !value.trim().is_empty())
+        );
+        assert!(
+            names.insert(&case.attributes),
+            "twice: {:?}",
+            case.attributes
+        );
+        let kinds: Vec<&str> = case.children.iter().map(|it| it.name.as_str()).collect();
+        let allowed: [&[&str]; 6] = [
+            &[],
+            &["failure"],
+            &["error"],
+            &["skipped"],
+            &["system-out"],
+            &["skipped", "system-out"],
+        ];
+        assert!(allowed.contains(&kinds.as_slice()), "{kinds:?}");
+        for child in case.children.iter().filter(|it| it.name != "system-out") {
+            child.has_only(&["type", "message"]);
+            assert!(child.attributes.values().all(|value| !value.is_empty()));
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! How rules and numbers are written for people.
+
+use qcbus_messages::Verdict;
+
+/// What people call a rule: the end of its UID (`road.lane.link_order` of
+/// `asam.net:xodr:1.4.0:road.lane.link_order`), which `qcbus rule` and `--select` take; the id of
+/// its checker where there is no UID.
+pub fn rule_name<'r>(uid: &'r str, checker: &'r str) -> &'r str {
+    match uid.rsplit(':').next() {
+        Some(name) if !name.is_empty() => name,
+        _ => checker,
+    }
+}
+
+/// A number of metres or seconds as far as it matters: to the thousandth, without zeros at its end.
+/// Very large ones, which no road has, in scientific notation.
+pub fn rounded(number: f64) -> String {
+    if !number.is_finite() || number.abs() >= 1e9 {
+        return format!("{number:e}");
+    }
+    let text = format!("{number:.3}");
+    let short = text.trim_end_matches('0').trim_end_matches('.');
+    match short {
+        "-0" => "0".to_owned(),
+        short => short.to_owned(),
+    }
+}
+
+/// What a verdict means, for those who meet it for the first time.
+pub fn meaning(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Accepted => "everything that was asked has looked, and found no error",
+        Verdict::Rejected => "at least one error was found",
+        Verdict::Undetermined => "something that was asked could not look; this is no acceptance",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rule_goes_by_the_end_of_its_uid() {
+        assert_eq!(rule_name("asam.net:xodr:1.4.0:ids.x", "check_x"), "ids.x");
+        assert_eq!(rule_name("odd", "check_x"), "odd");
+        assert_eq!(rule_name("", "check_x"), "check_x");
+        assert_eq!(rule_name("a:", "check_x"), "check_x");
+    }
+
+    #[test]
+    fn numbers_say_what_matters() {
+        for (number, text) in [
+            (0.0, "0"),
+            (-0.0001, "0"),
+            (12.340_000_000_000_002, "12.34"),
+            (690_123.456_789, "690123.457"),
+            (-1.75, "-1.75"),
+            (100.0, "100"),
+            (1e300, "1e300"),
+            (f64::NAN, "NaN"),
+        ] {
+            assert_eq!(rounded(number), text);
+        }
+    }
+}

@@ -1,0 +1,324 @@
+//! `qcbus check`: a private broker for one run, the same engine as `serve`.
+
+mod outputs;
+mod printer;
+mod tally;
+mod targets;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::{Duration, Instant};
+
+use qcbus_broker::{Broker, Options, Outside, ResultPaths, Settings, StartError, Stop};
+use qcbus_bus::{HostOptions, Instance, SharedMemory, StartError as BusError};
+use qcbus_document::FileKind;
+use qcbus_formats::config::{Choice, Config};
+use qcbus_messages::Exit;
+use qcbus_messages::path_text::to_text;
+use tokio::sync::mpsc;
+
+use super::settings::{
+    absolute, dialect, limits, manifest_directory, memory_limit, program, settings,
+};
+use crate::args::CheckArgs;
+use crate::{standard, talk};
+use outputs::Outputs;
+use printer::{News, Printer};
+use targets::{kinds, targets};
+
+/// Runs the command.
+pub fn run(args: &CheckArgs) -> Exit {
+    talk::log("warn");
+    talk::set_color(args.print.color);
+    match prepare(args) {
+        Ok(prepared) => check(args, prepared),
+        Err((exit, why)) => {
+            talk::fail(&why);
+            exit
+        }
+    }
+}
+
+type Refusal = (Exit, String);
+
+fn usage(why: impl Into<String>) -> Refusal {
+    (Exit::Usage, why.into())
+}
+
+/// What is to be checked, and how.
+struct Prepared {
+    options: Options,
+    config: Option<Arc<Config>>,
+    outputs: Outputs,
+}
+
+fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
+    let config = args.config.as_deref().map(absolute);
+    let parsed = match &config {
+        Some(path) => Some(
+            qcbus_broker::reload::read_config(path)
+                .map_err(|error| usage(error.to_string()))?
+                .config,
+        ),
+        None => None,
+    };
+    let bundles_d = args.bundles_d.as_deref().map(manifest_directory);
+    let bundles_d = bundles_d.transpose().map_err(usage)?;
+    let (roots, files) = targets(args, config.as_deref(), parsed.as_ref())?;
+    let asam = config.is_some() && roots.is_empty() && files.len() == 1;
+    let out = absolute(args.output.out.as_deref().unwrap_or(Path::new(if asam {
+        "."
+    } else {
+        "qcbus-out"
+    })));
+    writable(&out)?;
+    let outputs = Outputs::new(&args.print, &out)?;
+    let program = program().map_err(|why| (Exit::Internal, why))?;
+    let (kinds, config_named) = (kinds(&roots, &files), parsed.is_some());
+    let kinds = if config_named {
+        FileKind::ALL.into_iter().collect()
+    } else {
+        kinds
+    };
+    let bundles = standard::bundle_specs(&program, &kinds, args.schema_dir.as_deref());
+    let options = Options {
+        instance: private_instance()?,
+        roots,
+        files,
+        watch: false,
+        poll: None,
+        rescan: Duration::MAX,
+        here: Some(here()?),
+        single_result: asam.then(|| out.join("Result.xqar")),
+        out,
+        choice: choice(args)?,
+        state: None,
+        retention: Duration::MAX,
+        dialect: dialect(args.output.xqar_dialect),
+        durable: false,
+        verdict_files: false,
+        gate: None,
+        gate_outside: Outside::default(),
+        config,
+        bundles_d,
+        standard: wanted_bundles(bundles.map_err(usage)?, parsed.as_ref()),
+        reporters: standard::reporter_specs(&program),
+        known: standard::known(),
+        die_with_broker: true,
+        sandbox: !args.no_sandbox,
+        memory_limit: memory_limit(&args.limits),
+        limits: limits(&args.limits),
+        host: HostOptions::default(),
+        settings: Settings {
+            once: true,
+            collect: Duration::ZERO,
+            ..settings(&args.limits)
+        },
+    };
+    Ok(Prepared {
+        options,
+        config: parsed.map(Arc::new),
+        outputs,
+    })
+}
+
+/// What is to be asked, if somebody narrows it. A name that fits nothing is a mistake: what it was to
+/// keep or leave out would go unsaid.
+fn choice(args: &CheckArgs) -> Result<Choice, Refusal> {
+    let choice = Choice {
+        select: args.select.clone(),
+        ignore: args.ignore.clone(),
+    };
+    // Only they themselves know what bundles of others look at, once they have joined.
+    if args.bundles_d.is_some() {
+        return Ok(choice);
+    }
+    for name in choice.select.iter().chain(&choice.ignore) {
+        if !standard::is_named(name) {
+            let hint = match standard::suggest(name) {
+                Some(near) => format!("did you mean `{near}`?"),
+                None => "`qcbus rule` lists all".to_owned(),
+            };
+            return Err(usage(format!("no checker is called `{name}`; {hint}")));
+        }
+    }
+    Ok(choice)
+}
+
+/// The directory in which the command was typed.
+fn here() -> Result<PathBuf, Refusal> {
+    std::env::current_dir().map_err(|error| usage(format!("cannot see where this is: {error}")))
+}
+
+/// Refuses a place for results where nothing can be written, before anything is checked for it.
+fn writable(out: &Path) -> Result<(), Refusal> {
+    use rustix::fs::{Access, access};
+    let mut above = out.ancestors();
+    let there = above.find(|path| path.symlink_metadata().is_ok());
+    let there = there.unwrap_or(Path::new("/"));
+    let refused = if there.is_dir() {
+        access(there, Access::WRITE_OK | Access::EXEC_OK)
+    } else {
+        Err(rustix::io::Errno::NOTDIR)
+    };
+    refused.map_err(|error| {
+        let (out, there) = (to_text(out), to_text(there));
+        usage(format!(
+            "cannot write results into {out}: {there}: {error}; choose another directory with --out"
+        ))
+    })
+}
+
+/// A configuration runs what it names and nothing else.
+fn wanted_bundles(
+    specs: Vec<qcbus_broker::ChildSpec>,
+    config: Option<&Config>,
+) -> Vec<qcbus_broker::ChildSpec> {
+    let Some(config) = config else { return specs };
+    let named = |name: &str| {
+        let alias = standard::bundle(name).map_or("", |bundle| bundle.alias);
+        config.bundle(name, alias).is_some()
+    };
+    specs.into_iter().filter(|spec| named(&spec.name)).collect()
+}
+
+fn private_instance() -> Result<Instance, Refusal> {
+    qcbus_bus::sweep_private_instances();
+    let random = random_bytes().map_err(|why| (Exit::Internal, why))?;
+    let random = u64::from_le_bytes(random);
+    let name = format!("check-{}-{random:016x}", std::process::id());
+    Instance::named(&name).map_err(|error| usage(error.to_string()))
+}
+
+fn random_bytes() -> Result<[u8; 8], String> {
+    let mut bytes = [0; 8];
+    rustix::rand::getrandom(&mut bytes, rustix::rand::GetRandomFlags::empty())
+        .map_err(|error| format!("no random number: {error}"))?;
+    Ok(bytes)
+}
+
+fn check(args: &CheckArgs, prepared: Prepared) -> Exit {
+    let options = &prepared.options;
+    let here = options.here.clone().unwrap_or_default();
+    let (out, roots) = (options.out.clone(), options.roots.clone());
+    let mut places = ResultPaths::of_run(out, here, roots, &options.files);
+    places.single.clone_from(&options.single_result);
+    let printer = Printer::new(places, prepared.config, prepared.outputs, args);
+    let directory = prepared.options.instance.dir().to_path_buf();
+    let (sender, receiver) = channel();
+    // Reports of large maps take their time; the broker has others to listen to meanwhile.
+    let printing = std::thread::Builder::new()
+        .name("reports".to_owned())
+        .spawn(move || print(printer, &receiver));
+    let printing = match printing {
+        Ok(printing) => printing,
+        Err(error) => {
+            talk::fail(&format!("cannot start a thread: {error}"));
+            return Exit::Internal;
+        }
+    };
+    let driven = drive(prepared.options, &sender);
+    drop(sender);
+    let printer = printing.join();
+    // Private to this run; what is left of it is of no use to anybody.
+    let _ = std::fs::remove_dir_all(directory);
+    match (driven, printer) {
+        (Err((exit, why)), _) => {
+            talk::fail(&why);
+            exit
+        }
+        (Ok(()), Ok(printer)) => printer.finish(),
+        // The panic has been printed.
+        (Ok(()), Err(_)) => Exit::Internal,
+    }
+}
+
+/// Prints until nobody has news any more.
+fn print(mut printer: Printer, news: &Receiver<News>) -> Printer {
+    while let Ok(news) = news.recv() {
+        printer.take(news);
+    }
+    printer
+}
+
+fn drive(options: Options, news: &Sender<News>) -> Result<(), Refusal> {
+    let internal = |why: String| (Exit::Internal, why);
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(|error| internal(format!("cannot start: {error}")))?;
+    runtime.block_on(async {
+        let stops = super::stops::listen().map_err(|error| internal(error.to_string()))?;
+        let mut stops = noted(stops, news.clone());
+        if let Some(broker) = start(options, news, &mut stops).await? {
+            broker.run(stops).await;
+        }
+        Ok(())
+    })?;
+    // Threads that still read a file must not hold up the end.
+    runtime.shutdown_background();
+    Ok(())
+}
+
+/// Passes wishes to stop on, and tells the printer that there was one.
+fn noted(mut stops: mpsc::Receiver<Stop>, news: Sender<News>) -> mpsc::Receiver<Stop> {
+    let (sender, receiver) = mpsc::channel(4);
+    tokio::spawn(async move {
+        while let Some(stop) = stops.recv().await {
+            let _ = news.send(News::Interrupted);
+            if sender.send(stop).await.is_err() {
+                return;
+            }
+        }
+    });
+    receiver
+}
+
+/// How often a start is tried again for which there is no shared memory.
+const START_AGAIN: Duration = Duration::from_millis(50);
+
+/// Starts the broker, when others have let go of shared memory if need be. `None`: somebody wanted it
+/// to stop before.
+async fn start(
+    options: Options,
+    news: &Sender<News>,
+    stops: &mut mpsc::Receiver<Stop>,
+) -> Result<Option<Broker>, Refusal> {
+    let (mut moved, mut most_free) = (Instant::now(), 0);
+    let limit = options.settings.room_limit;
+    loop {
+        let listener = news.clone();
+        let tell = move |told| {
+            // Who prints lives longer than the broker.
+            let _ = listener.send(News::Told(told));
+        };
+        let error = match Broker::start(options.clone(), tell) {
+            Ok(broker) => return Ok(Some(broker)),
+            Err(error) => error,
+        };
+        match &error {
+            StartError::Load(_)
+            | StartError::Results(_)
+            | StartError::Bus(BusError::Instance(_)) => return Err(usage(error.to_string())),
+            StartError::Bus(why) if why.may_pass() => {}
+            _ => return Err((Exit::Internal, error.to_string())),
+        }
+        // What becomes free goes to others, who end, too: that is progress.
+        let free = SharedMemory::now().map_or(0, |memory| memory.free);
+        if free != most_free {
+            (moved, most_free) = (Instant::now(), free);
+        }
+        if moved.elapsed() >= limit {
+            let waited = limit.as_secs();
+            let why = format!("{error} (waited until nothing had moved for {waited} seconds)");
+            return Err((Exit::Internal, why));
+        }
+        let waits = "waiting for shared memory, which others use at the moment";
+        let _ = news.send(News::Waits(waits));
+        tokio::select! {
+            _ = stops.recv() => return Ok(None),
+            () = tokio::time::sleep(START_AGAIN) => {}
+        }
+    }
+}

@@ -1,0 +1,371 @@
+//! What a person sees of a run, as it goes on.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::sync::Arc;
+
+use qcbus_broker::{Delivery, Judged, Notice, ResultPaths, Told};
+use qcbus_document::Suffix;
+use qcbus_formats::config::Config;
+use qcbus_formats::xqar::Level;
+use qcbus_messages::path_text::to_text;
+use qcbus_messages::{Exit, ResultMessage, Verdict, shown};
+use qcbus_report_text::{Folding, Options};
+use qcbus_reporter_sdk::{FileSources, meaning};
+
+use super::outputs::{Outputs, Terminal};
+use super::tally::Tally;
+use crate::args::{CheckArgs, FailLevel, PrintArgs};
+use crate::commands::settings::relative;
+use crate::talk;
+
+/// So many files that were not judged are named.
+const NAMED: usize = 10;
+
+/// So many findings of one rule are shown of one of several files.
+const SHOWN_OF_A_RULE: usize = 5;
+
+/// Something to print, or to remember for the end.
+pub(super) enum News {
+    /// The broker has told something.
+    Told(Told),
+    /// Something is waited for.
+    Waits(&'static str),
+    /// Somebody wants it to stop.
+    Interrupted,
+}
+
+/// Prints results in the order of their paths, each as soon as those before it are there.
+pub(super) struct Printer {
+    places: ResultPaths,
+    config: Option<Arc<Config>>,
+    outputs: Outputs,
+    args: PrintArgs,
+    progress: talk::Progress,
+    expected: Vec<Arc<Path>>,
+    printed: usize,
+    judged: BTreeMap<Arc<Path>, Arc<Judged>>,
+    tally: Tally,
+    /// Files whose result could not be written.
+    unwritten: usize,
+    /// Files whose result could not be read back for the reports.
+    unreported: usize,
+    /// What could not be looked at: nobody knows what lies there.
+    unseen: usize,
+    /// Somebody wanted it to stop.
+    interrupted: bool,
+    /// Everything that is to be checked is known.
+    scanned: bool,
+    notices: BTreeSet<String>,
+}
+
+impl Printer {
+    pub(super) fn new(
+        places: ResultPaths,
+        config: Option<Arc<Config>>,
+        outputs: Outputs,
+        args: &CheckArgs,
+    ) -> Printer {
+        Printer {
+            places,
+            config,
+            outputs,
+            args: args.print.clone(),
+            progress: talk::Progress::new(!args.print.quiet),
+            expected: Vec::new(),
+            printed: 0,
+            judged: BTreeMap::new(),
+            tally: Tally::default(),
+            unwritten: 0,
+            unreported: 0,
+            unseen: 0,
+            interrupted: false,
+            scanned: false,
+            notices: BTreeSet::new(),
+        }
+    }
+
+    /// Prints what there is to print.
+    pub(super) fn take(&mut self, news: News) {
+        match news {
+            News::Interrupted => self.interrupted = true,
+            News::Waits(what) => self.note(what.to_owned()),
+            News::Told(Told::Notice(notice)) => {
+                self.unseen += usize::from(matches!(notice, Notice::Unseen(_)));
+                self.note(notice.to_string());
+            }
+            News::Told(Told::Scanned { files }) => {
+                self.expected = files;
+                self.scanned = true;
+                self.print_ready();
+            }
+            News::Told(Told::Verdict(verdict)) => {
+                self.judged.insert(verdict.path, verdict.judged);
+                self.print_ready();
+            }
+        }
+    }
+
+    /// Says something once.
+    fn note(&mut self, text: String) {
+        if !self.notices.contains(&text) {
+            self.progress.clear();
+            talk::say(&format!("note: {text}"));
+            self.notices.insert(text);
+        }
+    }
+
+    fn print_ready(&mut self) {
+        while let Some(path) = self.expected.get(self.printed).cloned() {
+            let Some(judged) = self.judged.remove(&path) else {
+                break;
+            };
+            self.print(&path, judged);
+            self.printed += 1;
+        }
+        let (done, total) = (self.printed + self.judged.len(), self.expected.len());
+        if total > 0 {
+            self.progress.show(&format!("{done}/{total} files"));
+        }
+    }
+
+    fn print(&mut self, path: &Arc<Path>, judged: Arc<Judged>) {
+        self.progress.clear();
+        let shown = self.places.display(path);
+        let is_written = judged.is_written();
+        if !is_written {
+            self.unwritten += 1;
+            let why = judged.why.join("; ");
+            talk::fail(&format!("{} has no result: {why}", to_text(&shown)));
+        }
+        let verdict = judged.verdict;
+        let delivery = Delivery {
+            job: judged.job,
+            path: path.clone(),
+            judged,
+        };
+        let (places, config) = (&self.places, self.config.as_ref());
+        let message =
+            qcbus_broker::deliveries::message("stdout", &delivery, None, places, config);
+        match message {
+            Ok(mut message) => self.report(&mut message),
+            Err(why) => {
+                self.tally.add_verdict(verdict);
+                self.unreported += 1;
+                // Of what was not written that has been said.
+                if is_written {
+                    talk::fail(&why);
+                }
+            }
+        }
+    }
+
+    fn report(&mut self, message: &mut ResultMessage) {
+        self.tally.add(message);
+        let sources = FileSources::new(message);
+        let options = Options {
+            width: talk::width(),
+            color: talk::color(),
+            skipped_names: if self.args.verbose { usize::MAX } else { 2 },
+            full_names: self.args.verbose,
+            inapplicable: self.args.verbose,
+        };
+        let text = match self.terminal() {
+            Terminal::Reporter => String::new(),
+            Terminal::Concise => qcbus_report_text::concise(message, options.color, Folding::None),
+            Terminal::Fitting if !self.args.verbose => {
+                let folding = match self.args.quiet {
+                    true => Folding::None,
+                    false => Folding::After(SHOWN_OF_A_RULE),
+                };
+                qcbus_report_text::concise(message, options.color, folding)
+            }
+            _ if self.args.verbose => qcbus_report_text::render(message, &options, &sources),
+            _ => full(message, &options, &sources),
+        };
+        if !text.is_empty() {
+            talk::print(&text);
+        }
+        self.outputs.report(message, &sources);
+    }
+
+    /// What stdout is for: of one file there is room for everything.
+    fn terminal(&self) -> Terminal {
+        match self.outputs.terminal {
+            Terminal::Fitting if self.expected.len() == 1 => Terminal::Full,
+            terminal => terminal,
+        }
+    }
+
+    /// The files without a verdict, apart from those that are still to be printed.
+    fn unjudged(&self, rest: &[(Arc<Path>, Arc<Judged>)]) -> Vec<Arc<Path>> {
+        let left = self.expected.iter().skip(self.printed);
+        let waiting = left.filter(|path| !rest.iter().any(|(it, _)| it == *path));
+        waiting.cloned().collect()
+    }
+
+    /// Says what was not looked at.
+    fn say_unjudged(&self, missing: &[Arc<Path>]) {
+        let why = match self.interrupted {
+            true => "ended by a signal",
+            false => "not there any more",
+        };
+        if self.interrupted && !self.scanned {
+            talk::fail(&format!(
+                "{why} before it was known what is to be checked: nothing was looked at"
+            ));
+        }
+        if missing.is_empty() {
+            return;
+        }
+        let files = match missing.len() {
+            1 => "1 file was".to_owned(),
+            many => format!("{many} files were"),
+        };
+        talk::fail(&format!("{files} not judged: {why}"));
+        for path in missing.iter().take(NAMED) {
+            let shown = self.places.display(path);
+            talk::say(&format!("  {}", to_text(&shown)));
+        }
+        if missing.len() > NAMED {
+            talk::say(&format!("  and {} more", missing.len() - NAMED));
+        }
+    }
+
+    /// All news are in: prints what is left and the summary.
+    pub(super) fn finish(mut self) -> Exit {
+        self.progress.clear();
+        let rest: Vec<_> = std::mem::take(&mut self.judged).into_iter().collect();
+        let missing = self.unjudged(&rest);
+        for (path, judged) in rest {
+            self.print(&path, judged);
+        }
+        self.say_unjudged(&missing);
+        let interrupted = self.interrupted && (!self.scanned || !missing.is_empty());
+        let reported = self.finish_reports(interrupted);
+        if self.tally.total() == 0 {
+            return self.nothing(interrupted);
+        }
+        self.say_summary();
+        let exit = self.exit();
+        if self.unwritten > 0 || self.unreported > 0 || !reported {
+            Exit::Internal
+        } else if exit == Exit::Accepted && (!missing.is_empty() || interrupted || self.unseen > 0)
+        {
+            Exit::Undetermined
+        } else {
+            exit
+        }
+    }
+
+    /// Half a run would look like a whole one to whoever reads the reports. Says whether they are
+    /// where they belong.
+    fn finish_reports(&mut self, interrupted: bool) -> bool {
+        if !interrupted && self.tally.total() > 0 {
+            return self.outputs.finish();
+        }
+        let names = self.outputs.names();
+        if !names.is_empty() {
+            let names = names.join(", ");
+            talk::fail(&format!("not written, as not everything was checked: {names}"));
+        }
+        true
+    }
+
+    /// No file has a verdict.
+    fn nothing(&self, interrupted: bool) -> Exit {
+        if interrupted {
+            return Exit::Undetermined;
+        }
+        if self.unseen > 0 {
+            talk::fail("nothing was checked: what there may be could not be looked at");
+            return Exit::Undetermined;
+        }
+        talk::fail(&format!(
+            "nothing to check: there is no file that qcbus checks ({})",
+            Suffix::list()
+        ));
+        Exit::Usage
+    }
+
+    fn say_summary(&self) {
+        let mut lines = String::new();
+        if self.args.statistics {
+            lines.push_str(&self.tally.statistics());
+        } else if !self.args.quiet {
+            lines.push_str(&self.tally.first().unwrap_or_default());
+        }
+        if !self.args.quiet {
+            for sentence in self.tally.not_looked() {
+                lines.push_str(&format!("note: {sentence}\n"));
+            }
+            for verdict in [Verdict::Undetermined] {
+                if self.tally.count(verdict) > 0 {
+                    lines.push_str(&format!("note: {verdict}: {}\n", meaning(verdict)));
+                }
+            }
+            if self.terminal() == Terminal::Fitting && self.tally.count(Verdict::Rejected) > 0 {
+                lines.push_str("note: `qcbus check FILE` shows the findings of one file in full\n");
+            }
+            lines.push_str(&self.last_line());
+        }
+        // What is printed for programs stays for programs.
+        if self.terminal() == Terminal::Reporter {
+            talk::say_lines(lines.trim_end());
+        } else {
+            talk::print(&lines);
+        }
+    }
+
+    fn last_line(&self) -> String {
+        let mut line = self.tally.line();
+        if self.unseen > 0 {
+            line.push_str(&format!(", {} not looked at", self.unseen));
+        }
+        let failing = self.failing();
+        if failing > 0 {
+            line.push_str(&format!(", {failing} accepted but with findings that --fail-level names"));
+        }
+        let out = relative(&self.places.out);
+        line.push_str(&format!("; results in {}", shown::line(&to_text(out))));
+        for file in self.outputs.files() {
+            let file = relative(Path::new(file));
+            line.push_str(&format!(", report in {}", shown::line(&to_text(file))));
+        }
+        line.push('\n');
+        line
+    }
+
+    /// Files that are accepted, and are to fail all the same.
+    fn failing(&self) -> usize {
+        let level = match self.args.fail_level {
+            FailLevel::Error => return 0,
+            FailLevel::Warning => Level::Warning,
+            FailLevel::Information => Level::Information,
+        };
+        let errors = self.tally.files_from(Level::Error);
+        self.tally.files_from(level).saturating_sub(errors)
+    }
+
+    fn exit(&self) -> Exit {
+        let verdict = match Exit::of_verdicts(self.tally.verdicts()) {
+            Exit::Accepted | Exit::Undetermined if self.failing() > 0 => Exit::Rejected,
+            exit => exit,
+        };
+        match verdict {
+            Exit::Rejected if !self.args.exit_zero => Exit::Rejected,
+            // That nobody could look is no finding.
+            Exit::Rejected if self.tally.count(Verdict::Undetermined) > 0 => Exit::Undetermined,
+            Exit::Rejected => Exit::Accepted,
+            exit => exit,
+        }
+    }
+}
+
+/// The findings of one file in full, and why nobody can say more where that is so.
+fn full(message: &ResultMessage, options: &Options, sources: &FileSources) -> String {
+    let mut text = qcbus_report_text::findings(message, options, sources);
+    let blocked = message.verdict == Verdict::Undetermined;
+    text.push_str(&qcbus_report_text::not_looked(message, options, blocked));
+    text
+}

@@ -1,0 +1,193 @@
+//! What a run comes to.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
+
+use qcbus_formats::pool::{BLOCKED, NotAsked};
+use qcbus_formats::xqar::{Level, Status};
+use qcbus_messages::{ResultMessage, Verdict, shown};
+use qcbus_reporter_sdk::rule_name;
+
+/// Rules that are named at the end of a run without `--statistics`.
+const FIRST: usize = 5;
+
+/// From so many findings on, the end of a run says what to mend first.
+const MANY: usize = 30;
+
+/// Counts over all files of a run.
+#[derive(Debug, Default)]
+pub(super) struct Tally {
+    /// Verdicts in the order of [`Verdict`].
+    verdicts: BTreeMap<Verdict, usize>,
+    /// Findings by level.
+    levels: BTreeMap<Level, usize>,
+    /// Files with findings of any level, and the worst of each.
+    files_at: BTreeMap<Level, usize>,
+    rules: BTreeMap<String, RuleCount>,
+    /// Checkers that were kept from looking in files that have errors, and the number of those files.
+    blocked: (usize, usize),
+    /// What configuration or command line left out, by bundle: the same for every file.
+    left_out: BTreeMap<String, NotAsked>,
+}
+
+/// Findings of one rule.
+#[derive(Debug)]
+struct RuleCount {
+    level: Level,
+    findings: usize,
+    files: usize,
+    about: String,
+}
+
+impl Tally {
+    /// Counts a file.
+    pub(super) fn add(&mut self, result: &ResultMessage) {
+        *self.verdicts.entry(result.verdict).or_default() += 1;
+        let (mut worst, mut seen, mut blocked) = (None, BTreeSet::new(), 0);
+        let bundles = result.results.bundles.iter();
+        for checker in bundles.flat_map(|bundle| &bundle.checkers) {
+            let is_blocked = checker.metadata.iter().any(|fact| fact.key == BLOCKED);
+            blocked += usize::from(checker.status == Some(Status::Skipped) && is_blocked);
+            for issue in &checker.issues {
+                let name = rule_name(&issue.rule_uid, &checker.id).to_owned();
+                *self.levels.entry(issue.level).or_default() += 1;
+                worst = worst.min(Some(issue.level)).or(Some(issue.level));
+                let rule = self.rules.entry(name.clone()).or_insert(RuleCount {
+                    level: issue.level,
+                    findings: 0,
+                    files: 0,
+                    about: checker.description.clone(),
+                });
+                rule.level = rule.level.min(issue.level);
+                rule.findings += 1;
+                rule.files += usize::from(seen.insert(name));
+            }
+        }
+        if let Some(worst) = worst {
+            *self.files_at.entry(worst).or_default() += 1;
+        }
+        if blocked > 0 && result.verdict == Verdict::Rejected {
+            self.blocked = (self.blocked.0 + blocked, self.blocked.1 + 1);
+        }
+        for left_out in NotAsked::of(&result.results) {
+            self.left_out.insert(left_out.bundle.clone(), left_out);
+        }
+    }
+
+    /// A file whose result could not be read back.
+    pub(super) fn add_verdict(&mut self, verdict: Verdict) {
+        *self.verdicts.entry(verdict).or_default() += 1;
+    }
+
+    /// Files with a verdict.
+    pub(super) fn total(&self) -> usize {
+        self.verdicts.values().sum()
+    }
+
+    /// Files with this verdict.
+    pub(super) fn count(&self, verdict: Verdict) -> usize {
+        self.verdicts.get(&verdict).copied().unwrap_or(0)
+    }
+
+    /// The verdicts, each as often as it was given.
+    pub(super) fn verdicts(&self) -> impl Iterator<Item = Verdict> {
+        let each = self.verdicts.iter();
+        each.flat_map(|(verdict, count)| std::iter::repeat_n(*verdict, *count))
+    }
+
+    /// Files with a finding of this level or a worse one.
+    pub(super) fn files_from(&self, level: Level) -> usize {
+        self.files_at.range(..=level).map(|(_, files)| files).sum()
+    }
+
+    /// `28 errors, 9 warnings in 13 of 28 files; 15 accepted, 13 rejected`.
+    pub(super) fn line(&self) -> String {
+        let level = |level, one: &str, many: &str| {
+            let count = self.levels.get(&level).copied().unwrap_or(0);
+            format!("{count} {}", if count == 1 { one } else { many })
+        };
+        let mut line = level(Level::Error, "error", "errors");
+        let _ = write!(line, ", {}", level(Level::Warning, "warning", "warnings"));
+        if let Some(count) = self.levels.get(&Level::Information) {
+            let _ = write!(line, ", {count} information");
+        }
+        let (some, total) = (self.files_from(Level::Information), self.total());
+        let files = if total == 1 { "file" } else { "files" };
+        let _ = write!(line, " in {some} of {total} {files};");
+        let verdicts = [Verdict::Accepted, Verdict::Rejected, Verdict::Undetermined];
+        let said = verdicts.map(|verdict| (verdict, self.count(verdict)));
+        let said = said.iter().filter(|(_, count)| *count > 0);
+        let said: Vec<String> = said.map(|(it, count)| format!("{count} {it}")).collect();
+        let _ = write!(line, " {}", said.join(", "));
+        line
+    }
+
+    /// What was not looked at although it might have been, in sentences.
+    pub(super) fn not_looked(&self) -> Vec<String> {
+        let mut said = Vec::new();
+        let (checks, files) = self.blocked;
+        if checks > 0 {
+            let files = match files {
+                1 => "1 file".to_owned(),
+                files => format!("{files} files"),
+            };
+            said.push(format!(
+                "{checks} checks of {files} could not run because of errors above; mend those and check again"
+            ));
+        }
+        if !self.left_out.is_empty() {
+            let left_out: Vec<String> = self.left_out.values().map(ToString::to_string).collect();
+            said.push(format!(
+                "not asked, so the verdicts say nothing about it: {}",
+                shown::line(&left_out.join(", "))
+            ));
+        }
+        said
+    }
+
+    /// The rules that were broken, those first whose mending helps most: errors before warnings, then
+    /// by files, then by findings.
+    fn ranked(&self) -> Vec<(&str, &RuleCount)> {
+        let mut rules: Vec<_> = self.rules.iter().map(|(name, it)| (name.as_str(), it)).collect();
+        rules.sort_by_key(|(_, it)| (it.level, usize::MAX - it.files, usize::MAX - it.findings));
+        rules
+    }
+
+    /// What to mend first, when there is so much that a person cannot see it: the first few rules.
+    pub(super) fn first(&self) -> Option<String> {
+        let findings: usize = self.levels.values().sum();
+        let errors = self.levels.contains_key(&Level::Error);
+        if findings < MANY || self.total() < 2 || !errors {
+            return None;
+        }
+        let ranked = self.ranked();
+        let first = ranked.iter().filter(|(_, it)| it.level == Level::Error);
+        Some(format!("fix first:\n{}", table(first.take(FIRST))))
+    }
+
+    /// All rules that were broken, the most frequent first.
+    pub(super) fn statistics(&self) -> String {
+        let mut rules = self.ranked();
+        rules.sort_by_key(|(_, it)| usize::MAX - it.findings);
+        if rules.is_empty() {
+            return String::new();
+        }
+        format!("findings by rule:\n{}", table(rules.iter()))
+    }
+}
+
+/// Rows of findings, files, level, rule and what it is about.
+fn table<'r>(rules: impl Iterator<Item = &'r (&'r str, &'r RuleCount)>) -> String {
+    let rows: Vec<_> = rules.collect();
+    let names = rows.iter().map(|(name, _)| name.chars().count());
+    let width = names.max().unwrap_or(0).min(60);
+    let mut out = String::new();
+    for (name, it) in rows {
+        let files = if it.files == 1 { "file" } else { "files" };
+        let count = format!("{} in {} {files}", it.findings, it.files);
+        let (level, name) = (it.level.as_str(), shown::line(name));
+        let about = shown::line(it.about.split(". ").next().unwrap_or(&it.about)).into_owned();
+        let _ = writeln!(out, "  {count:>18}  {level:<11} {name:<width$}  {about}");
+    }
+    out
+}

@@ -1,0 +1,90 @@
+//! What is to be checked.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use qcbus_document::{FileKind, Suffix};
+use qcbus_formats::config::Config;
+use qcbus_messages::path_text::{from_text, to_text};
+
+use super::{Refusal, usage};
+use crate::args::CheckArgs;
+use crate::commands::settings::named;
+
+/// Directories and files, from the command line or from the configuration.
+pub(super) fn targets(
+    args: &CheckArgs,
+    config_path: Option<&Path>,
+    config: Option<&Config>,
+) -> Result<(Vec<PathBuf>, Vec<PathBuf>), Refusal> {
+    let mut paths = args.paths.clone();
+    if paths.is_empty() {
+        let Some(config) = config else {
+            return Err(usage(
+                "nothing to check: name files or directories, or a configuration with -c",
+            ));
+        };
+        let Some(input) = config.input_file() else {
+            return Err(usage(
+                "the configuration names no InputFile; add one, or name a file after -c CONFIG",
+            ));
+        };
+        paths.push(input_path(&from_text(input), config_path));
+    }
+    let (mut roots, mut files) = (BTreeSet::new(), BTreeSet::new());
+    for path in &paths {
+        let real = std::fs::canonicalize(path)
+            .map_err(|error| usage(format!("cannot check {}: {error}", to_text(path))))?;
+        // A link to a file is checked under its own name, as it is in a directory.
+        let file = named(path);
+        if real.is_dir() {
+            roots.insert(real);
+        } else if !real.is_file() {
+            let shown = to_text(path);
+            return Err(usage(format!(
+                "cannot check {shown}: it is no regular file"
+            )));
+        } else if FileKind::of_path(&file).is_some() {
+            files.insert(file);
+        } else if FileKind::of_path(&real).is_some() {
+            files.insert(real);
+        } else {
+            let shown = to_text(path);
+            return Err(usage(format!(
+                "{shown} is no file that qcbus checks ({})",
+                Suffix::list()
+            )));
+        }
+    }
+    files.retain(|file| !roots.iter().any(|root| file.starts_with(root)));
+    let nested: Vec<PathBuf> = roots
+        .iter()
+        .filter(|root| roots.iter().any(|it| it != *root && root.starts_with(it)))
+        .cloned()
+        .collect();
+    roots.retain(|root| !nested.contains(root));
+    Ok((roots.into_iter().collect(), files.into_iter().collect()))
+}
+
+/// A relative InputFile is meant from here, as ASAM's bundles take it, else from beside the
+/// configuration.
+fn input_path(input: &Path, config: Option<&Path>) -> PathBuf {
+    let beside = config
+        .and_then(Path::parent)
+        .map(|directory| directory.join(input));
+    match beside {
+        Some(beside) if !input.exists() && beside.exists() => beside,
+        _ => input.to_path_buf(),
+    }
+}
+
+pub(super) fn kinds(roots: &[PathBuf], files: &[PathBuf]) -> BTreeSet<FileKind> {
+    if roots.is_empty() {
+        files
+            .iter()
+            .filter_map(|file| FileKind::of_path(file))
+            .collect()
+    } else {
+        FileKind::ALL.into_iter().collect()
+    }
+}
