@@ -65,8 +65,8 @@ const BUNDLE: &[&str] = &[
 /// What the name of a reporter's crate begins with. One more needs no row in [`MAY_KNOW`].
 const A_REPORTER: &str = "qcbus-report-";
 
-/// What a reporter may link: its sdk, and what draws.
-const REPORTER: &[&str] = &["qcbus-reporter-sdk", "qcbus-plan"];
+/// What a reporter may link: its sdk, the model of road networks, and what draws them.
+const REPORTER: &[&str] = &["qcbus-reporter-sdk", "qcbus-plan", "qcbus-opendrive"];
 
 /// Among the crates of [`IDL`], who may know whom: the lowest knows nobody.
 const INSIDE_IDL: &[(&str, &[&str])] = &[

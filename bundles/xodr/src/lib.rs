@@ -7,6 +7,9 @@ mod examples;
 mod families;
 mod model;
 mod rules;
+mod sections;
+
+pub use sections::section;
 
 use qcbus_document::FileKind;
 use qcbus_sdk::{Bundle, Version, basic};

@@ -10,7 +10,7 @@ mod common;
 use common::param;
 use qcbus_formats::config::{
     Config, Known, KnownBundle, KnownChecker, Levels, Oddity, Parsed, Selected, Selection,
-    same_reporter, same_bundle,
+    same_bundle, same_reporter,
 };
 use qcbus_formats::xqar::Level;
 
@@ -62,7 +62,10 @@ fn children_in_any_order_and_levels_by_number_or_missing() {
         Levels::between(Level::Warning, Level::Error)
     );
     assert_eq!(bundle.checkers[2].levels, Levels::ALL);
-    assert!(same_reporter(&config.reports[0].application, "qc-report-text"));
+    assert!(same_reporter(
+        &config.reports[0].application,
+        "qc-report-text"
+    ));
 }
 
 #[test]

@@ -67,4 +67,3 @@ fn indent(params: &[Param], place: Destination) -> Result<usize, ReportError> {
         }),
     }
 }
-

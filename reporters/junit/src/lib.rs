@@ -14,10 +14,13 @@
 //!   there. A scenario without a version blocks a hundred checkers: a host that shows a hundred red cases
 //!   hides the one that somebody has to mend. So that a verdict that is not an acceptance never looks green,
 //!   a suite without a red case gets one, `verdict`, which is an `error` and says why.
-//! * **Checkers that do not apply are left out**, because a host draws every case: of the checkers that are
-//!   asked about a file, often a third is for other versions of the standard, and three hundred files
-//!   would have thousands of cases that tell nobody anything. How many there are stands in the suite's
-//!   property `qcbus.notApplicable` and its `system-out`. The parameter `Inapplicable` brings them back.
+//! * **Checkers that do not apply are left out**, because a host draws every case and these tell nobody
+//!   anything: of 323 checkers, 125 are for other versions than that of an OpenDRIVE 1.4 file. Three hundred
+//!   files, maps of several versions and scenarios, have 70,800 cases in 9.9 MB (0.75 MB packed) without
+//!   them, and 91,800 in 15.3 MB with them. How many there are stands in the suite's property
+//!   `qcbus.notApplicable` and its `system-out`. The parameter `Inapplicable` brings them back.
+//! * **A checker without a status is an error**, also where the verdict, which takes it at its issues, is
+//!   an acceptance: other tools write such results, and whether it ran to its end is not known.
 //! * **The class of a case is `BUNDLE.PATH`**, with the file. Hosts tell cases apart by class and name
 //!   alone (GitLab keeps one of each pair), and the same checker looks at every file.
 //! * **The text of a case is bounded**: [`MOST_FINDINGS`] findings, the errors first, and how many more
@@ -46,6 +49,7 @@ pub static REPORTER: Registration = Registration {
     alias: "junit",
     name: NAME,
     about: "NAME.junit.xml beside every result",
+    is_page: false,
     make: |setting| Box::new(FormReporter::new(Suites, setting)),
 };
 

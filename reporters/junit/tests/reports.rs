@@ -1,5 +1,11 @@
 //! The JUnit of whole reports.
 
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on should panic"
+)]
+
 mod common;
 
 use common::{blocked, checker, endings, issue, markup, report, result, sections};
@@ -19,7 +25,8 @@ fn set(name: &str, value: &str) -> Param {
 #[test]
 fn a_case_of_every_ending() {
     let ended = result("maps/harbour.xodr", endings());
-    insta::assert_snapshot!(report(&[ended]));
+    let text = report(&[ended]);
+    insta::assert_snapshot!(text);
 }
 
 #[test]
@@ -47,7 +54,8 @@ fn a_file_that_nobody_has_judged_is_red() {
     assert_eq!(nobody.verdict, Verdict::Undetermined);
     let mut unexplained = result("c.xodr", Vec::new());
     unexplained.verdict = Verdict::Rejected;
-    insta::assert_snapshot!(report(&[only_blocked, nobody, unexplained]));
+    let text = report(&[only_blocked, nobody, unexplained]);
+    insta::assert_snapshot!(text);
 }
 
 #[test]

@@ -3,6 +3,12 @@
 //! `QCBUS_JUNIT_XSD` names a copy of `junit-10.xsd`; `xmllint` looks at the reports. Without either,
 //! nothing is looked at, and the test says so.
 
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on should panic"
+)]
+
 mod common;
 
 use std::process::Command;

@@ -20,8 +20,10 @@ mod outlet;
 mod output;
 mod registration;
 mod responder;
+mod road_network;
 mod shelf;
 mod sources;
+mod underline;
 mod wording;
 
 pub use clean::{one_line, printable};
@@ -30,12 +32,14 @@ pub use form::{Destination, Form, FormReporter};
 pub use issue_location::{IssueLocation, issue_locations};
 pub use loaded::{LoadError, load};
 pub use once::{OnceError, OneShot, report_once};
-pub use outlet::{Outlet, Subject};
-pub use output::{Output, param, replace_file};
+pub use outlet::{Outlet, Subject, write_stream};
+pub use output::{Output, inside, param, remove_file, replace_file};
 pub use registration::{Pages, Registration, RulePage, Setting};
 pub use responder::Responder;
+pub use road_network::road_network;
 pub use shelf::Shelf;
 pub use sources::{Answer, BothSources, FileSources, ImageSources, Line, NoSources, Sources};
+pub use underline::underlined;
 pub use wording::{meaning, rounded, rule_name};
 
 use std::path::PathBuf;

@@ -133,7 +133,7 @@ impl<F: Form> Outlet<F> {
         let mut shelves = self.shelves.values_mut();
         shelves.try_for_each(|shelf| shelf.finish(&self.form))?;
         for (output, sections) in std::mem::take(&mut self.waiting) {
-            stream(&output, &self.form.whole(&sections)?)?;
+            write_stream(&output, &self.form.whole(&sections)?)?;
         }
         Ok(())
     }
@@ -150,7 +150,7 @@ impl<F: Form> Outlet<F> {
             self.waiting.entry(output).or_default().insert(key, section);
             return Ok(());
         }
-        stream(&output, &self.form.alone(key, section)?)
+        write_stream(&output, &self.form.alone(key, section)?)
     }
 
     fn open(&mut self, path: &Path) -> Result<(), ReportError> {
@@ -162,7 +162,11 @@ impl<F: Form> Outlet<F> {
     }
 }
 
-fn stream(output: &Output, text: &str) -> Result<(), ReportError> {
+/// Writes to the stream that an output is; to stdout for one that is none.
+///
+/// # Errors
+/// [`ReportError::Write`].
+pub fn write_stream(output: &Output, text: &str) -> Result<(), ReportError> {
     use std::io::Write as _;
     let written = match output {
         Output::Stderr => {

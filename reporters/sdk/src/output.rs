@@ -77,7 +77,10 @@ pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
 }
 
 /// Removes a file that need not be there.
-pub(crate) fn remove_file(path: &Path) -> Result<(), ReportError> {
+///
+/// # Errors
+/// [`ReportError::Write`].
+pub fn remove_file(path: &Path) -> Result<(), ReportError> {
     match std::fs::remove_file(path) {
         Err(source) if source.kind() != std::io::ErrorKind::NotFound => Err(ReportError::Write {
             path: path.to_owned(),
@@ -88,7 +91,7 @@ pub(crate) fn remove_file(path: &Path) -> Result<(), ReportError> {
 }
 
 /// The path without what would lead out of the directory that it is joined to.
-fn inside(path: &Path) -> PathBuf {
+pub fn inside(path: &Path) -> PathBuf {
     use std::path::Component;
     path.components()
         .filter(|part| matches!(part, Component::Normal(_)))

@@ -85,6 +85,15 @@ impl<B: Deref<Target = [u8]>> ImageSources<B> {
         }
     }
 
+    /// Whether the image names its root so, and not another file of equal bytes.
+    fn is_named(&self, path: &str) -> bool {
+        let named = |document: Document<'_>| {
+            let rest = document.path().strip_prefix(path);
+            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('!'))
+        };
+        Document::open(&self.image).is_ok_and(named)
+    }
+
     /// Whether the image holds that file, and its line.
     pub fn answer(&self, path: &str, row: u64, near: u64) -> Answer {
         let Ok(document) = Document::open(&self.image) else {
@@ -149,7 +158,8 @@ impl<B: Deref<Target = [u8]>> Sources for BothSources<B> {
 
     fn image(&self, path: &str, look: &mut dyn FnMut(&[u8])) {
         match &self.image {
-            Some(image) if image.input == path => image.image(path, look),
+            // What an image refers to is told by where its root lies.
+            Some(image) if image.input == path && image.is_named(path) => image.image(path, look),
             _ => self.files.image(path, look),
         }
     }
@@ -178,11 +188,17 @@ impl FileSources {
 
     fn open(&self, path: &str) -> Option<ImageSources<Vec<u8>>> {
         let file = from_text(path);
-        if !file.is_absolute() || !file.is_file() {
+        // A member of an archive is as old as the archive.
+        let on_disk = if file.is_file() {
+            path
+        } else {
+            path.split_once('!')?.0
+        };
+        if !file.is_absolute() || !from_text(on_disk).is_file() {
             return None;
         }
         let known = path == self.input && self.digest != Digest::default();
-        if !known && modified(path)? > self.written? {
+        if !known && modified(on_disk)? > self.written? {
             return None;
         }
         let boundary = file.parent()?;

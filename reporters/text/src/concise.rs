@@ -39,7 +39,10 @@ pub fn concise(result: &ResultMessage, color: bool, folding: Folding) -> String 
             let path = shown::line(&result.display_path);
             let level = paint.level(level, level.as_str());
             let rule = shown::line(rule);
-            let _ = writeln!(out, "{path}: {level}: and {more} more of this rule [{rule}]");
+            let _ = writeln!(
+                out,
+                "{path}: {level}: and {more} more of this rule [{rule}]"
+            );
         }
     }
     if result.verdict == Verdict::Undetermined {

@@ -56,7 +56,9 @@ impl View<'_> {
         let mut lines = text.lines();
         let first = self.paint.bold(lines.next().unwrap_or("(no description)"));
         let name = shown::line(rule_name(&entry.issue.rule_uid, &entry.checker.id));
-        let head = self.paint.level(level, &format!("{}[{name}]", level.as_str()));
+        let head = self
+            .paint
+            .level(level, &format!("{}[{name}]", level.as_str()));
         let _ = writeln!(out, "{head}: {first}");
         for line in lines {
             let _ = writeln!(out, "    {}", line.trim_end());

@@ -4,9 +4,7 @@ use std::collections::BTreeMap;
 
 use qcbus_formats::xqar::{Level, Param};
 use qcbus_messages::{ResultMessage, Verdict, shown};
-use qcbus_reporter_sdk::{
-    Destination, Form, ReportError, Sources, Subject, one_line, param,
-};
+use qcbus_reporter_sdk::{Destination, Form, ReportError, Sources, Subject, one_line, param};
 
 use crate::{Folding, Options, concise, render};
 

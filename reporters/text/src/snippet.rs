@@ -1,13 +1,10 @@
 //! A source line with a caret under the place.
 
-use qcbus_reporter_sdk::{Line, printable};
+use qcbus_reporter_sdk::{Line, printable, underlined};
 use unicode_width::UnicodeWidthChar as _;
 
 /// Columns that a tab is shown as.
 const TAB: usize = 4;
-
-/// The longest underline; an element's name or an attribute is shorter.
-const MAX_UNDERLINE: usize = 60;
 
 /// Where a line was cut.
 const CUT: char = '…';
@@ -31,7 +28,8 @@ pub(crate) fn snippet(line: &Line, column: Option<u64>, width: usize) -> Snippet
         let before = column.saturating_sub(line.skipped).saturating_sub(1);
         usize::try_from(before).map_or(cells.len(), |before| before.min(cells.len()))
     });
-    let marked = at.map_or(0, |at| underlined(&cells, at));
+    let chars: Vec<char> = cells.iter().map(|&(c, _)| c).collect();
+    let marked = at.map_or(0, |at| underlined(&chars, at));
     let from = at.map_or(0, |at| first_shown(&cells, at, marked, width));
     let cut_left = from > 0 || line.skipped > 0;
     let mut shown = Shown::new(cut_left);
@@ -104,42 +102,6 @@ fn first_shown(cells: &[Cell], at: usize, marked: usize, width: usize) -> usize 
         before += cells[from].1;
     }
     from
-}
-
-/// How many characters to mark: the start of a tag with its name, an attribute with its value,
-/// one character otherwise.
-fn underlined(cells: &[Cell], at: usize) -> usize {
-    let rest = &cells[at..];
-    let name_from = |start: usize| {
-        let name = rest.iter().skip(start).take_while(|&&(c, _)| is_name(c));
-        start + name.count()
-    };
-    let length = match rest.first() {
-        Some(('<', _)) => {
-            let slash = matches!(rest.get(1), Some(('/' | '?' | '!', _)));
-            name_from(1 + usize::from(slash))
-        }
-        Some(&(c, _)) if is_name(c) => attribute(rest, name_from(0)),
-        _ => 1,
-    };
-    length.clamp(1, MAX_UNDERLINE)
-}
-
-/// `name="value"` as a whole when that is what stands there.
-fn attribute(rest: &[Cell], name: usize) -> usize {
-    let quoted = match (rest.get(name), rest.get(name + 1)) {
-        (Some(('=', _)), Some(&(quote @ ('"' | '\''), _))) => rest
-            .iter()
-            .skip(name + 2)
-            .position(|&(c, _)| c == quote)
-            .map(|value| name + 2 + value + 1),
-        _ => None,
-    };
-    quoted.unwrap_or(name)
-}
-
-fn is_name(c: char) -> bool {
-    c.is_alphanumeric() || matches!(c, '_' | '-' | '.' | ':')
 }
 
 #[cfg(test)]

@@ -295,7 +295,9 @@ impl TypedValueParser for OutputFormats {
             None => (bytes, None),
         };
         let name = String::from_utf8_lossy(name).into_owned();
-        let found = REPORTERS.iter().find(|it| it.alias == standard_alias(&name));
+        let found = REPORTERS
+            .iter()
+            .find(|it| it.alias == standard_alias(&name));
         match found {
             Some(registration) => Ok(OutputFormat {
                 name,

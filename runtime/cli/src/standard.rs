@@ -58,10 +58,12 @@ pub fn bundle_specs(
 
 /// The reporters that come with the program. One more is one more crate, which `Cargo.toml` names, and
 /// one more row: everything else follows from its registration (`docs/writing-a-reporter.md`).
-pub static REPORTERS: [&Registration; 3] = [
+pub static REPORTERS: [&Registration; 5] = [
     &qcbus_report_text::REPORTER,
     &qcbus_report_text::CONCISE,
     &qcbus_report_json::REPORTER,
+    &qcbus_report_junit::REPORTER,
+    &qcbus_report_github::REPORTER,
 ];
 
 /// The checkers of all standard bundles, each with its bundle.
@@ -98,6 +100,29 @@ pub fn suggest(word: &str) -> Option<String> {
     near.map(str::to_owned)
 }
 
+/// Names of rules that have a word of this name, the first few.
+pub fn with_word(name: &str) -> Vec<String> {
+    const MOST: usize = 5;
+    let words = |text: &str| -> BTreeSet<String> {
+        let parts = text.split(|c: char| !c.is_alphanumeric());
+        let long = parts.filter(|part| part.len() > 2);
+        long.map(str::to_lowercase).collect()
+    };
+    let wanted = words(name);
+    let rules = checkers().flat_map(|(_, checker)| {
+        let uids = checker.facts.uids.iter();
+        let names = uids.map(|uid| rule_name(uid, &checker.id).to_owned());
+        names.collect::<Vec<_>>()
+    });
+    let mut near: Vec<(usize, String)> = rules
+        .map(|rule| (words(&rule).intersection(&wanted).count(), rule))
+        .filter(|(common, _)| *common > 0)
+        .collect();
+    near.sort_by(|a, b| b.0.cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
+    near.dedup();
+    near.into_iter().take(MOST).map(|(_, rule)| rule).collect()
+}
+
 /// How to start a standard reporter.
 pub fn reporter_spec(program: &Path, reporter: &Registration) -> ChildSpec {
     let (alias, name) = (reporter.alias, reporter.name);
@@ -117,13 +142,31 @@ pub fn page(uid: &str, checker: &str) -> Option<RulePage> {
     let by_id = || all().find(|it| it.id == checker);
     let by_uid = || all().find(|it| it.facts.uids.contains(&uid));
     let found = by_id().or_else(by_uid)?;
+    let uids = std::iter::once(uid).chain(found.facts.uids.iter().copied());
+    let section = uids.into_iter().find_map(section);
     Some(RulePage {
         checker: found.id.clone(),
         summary: found.description.to_owned(),
         text: found.facts.page,
-        link: String::new(),
+        link: section.map(|(_, link)| link).unwrap_or_default(),
     })
 }
+
+/// Where the standard states a rule: what it is cited as, and an address.
+pub fn section(uid: &str) -> Option<(String, String)> {
+    let name = uid.rsplit(':').next()?;
+    if uid.starts_with("asam.net:xodr:") {
+        qcbus_xodr::section(name)
+    } else if uid.starts_with("asam.net:xosc:") {
+        let cited = "ASAM OpenSCENARIO XML, annex of checker rules".to_owned();
+        Some((cited, OPENSCENARIO.to_owned()))
+    } else {
+        None
+    }
+}
+
+/// The pages of ASAM OpenSCENARIO XML.
+const OPENSCENARIO: &str = "https://publications.pages.asam.net/standards/ASAM_OpenSCENARIO/ASAM_OpenSCENARIO_XML/latest/index.html";
 
 fn spec(program: &Path, command: &str, alias: &str, name: &str, role: Role) -> ChildSpec {
     let program = program.to_string_lossy().into_owned();

@@ -50,8 +50,15 @@ impl Names<'_> {
         if pattern.is_empty() {
             return false;
         }
+        let own = self.id.strip_prefix("check_").unwrap_or(self.id);
+        let (maker, own) = own.split_once('_').unwrap_or(("", own));
+        let own = own
+            .strip_prefix(self.alias)
+            .unwrap_or(own)
+            .trim_start_matches('_');
         same_bundle(pattern, self.bundle, self.alias)
             || belongs_to(self.id, pattern)
+            || (!maker.is_empty() && belongs_to(own, pattern))
             || self.uids.iter().any(|uid| {
                 let rule = uid.rsplit(':').next().unwrap_or(uid);
                 belongs_to(uid, pattern) || belongs_to(rule, pattern)
@@ -64,16 +71,15 @@ impl Names<'_> {
     }
 }
 
-/// Whether a name is the pattern, goes on from it with a new word, or ends with it as a word.
+/// Whether a name is the pattern, goes on from it with a new word, or ends with it as a part.
 fn belongs_to(name: &str, pattern: &str) -> bool {
     const BETWEEN: [char; 3] = ['.', '_', ':'];
-    let goes_on = |rest: &str| {
-        rest.is_empty() || rest.starts_with(BETWEEN) || pattern.ends_with(BETWEEN)
-    };
+    let goes_on =
+        |rest: &str| rest.is_empty() || rest.starts_with(BETWEEN) || pattern.ends_with(BETWEEN);
     name.strip_prefix(pattern).is_some_and(goes_on)
         || name
             .strip_suffix(pattern)
-            .is_some_and(|before| before.ends_with(BETWEEN))
+            .is_some_and(|before| before.ends_with(['.', ':']))
 }
 
 impl fmt::Display for Choice {
@@ -124,12 +130,16 @@ mod tests {
             "road.lane.link_order",
             "link_order",
             "check_asam_xodr_road",
+            "road_lane_link",
+            "road_lane_link_order",
             "asam.net:xodr:1.4.0",
         ] {
             assert!(asks(&[name], &[], true), "{name}");
             assert!(!asks(&[], &[name], true), "{name}");
         }
-        for other in ["", "roa", "lane", "road.la", "xosc", "order.", "1.4.0", "k_order"] {
+        for other in [
+            "", "roa", "lane", "road.la", "xosc", "order.", "1.4.0", "k_order", "order",
+        ] {
             assert!(!asks(&[other], &[], true), "{other}");
             assert!(asks(&[], &[other], true), "{other}");
         }

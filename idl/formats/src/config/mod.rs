@@ -16,8 +16,8 @@ use serde::{Deserialize, Serialize};
 use crate::xqar::{Level, Param};
 
 pub use check::{Known, KnownBundle, KnownChecker};
-pub use levels::Levels;
 pub use choice::{Choice, Names};
+pub use levels::Levels;
 pub use lookup::{Selected, Selection, published_name, same_bundle, same_reporter};
 
 /// The name of the checker parameter that gives a checker's issues another level.

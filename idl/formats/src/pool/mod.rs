@@ -17,13 +17,16 @@ use crate::config::Config;
 use crate::xqar::{Issue, Results};
 
 pub use asked::NotAsked;
-pub use remarks::chosen;
 pub use outcome::{Asked, BundleOutcome, CheckerOutcome, Ending, in_the_answer};
 pub use places::{NoPlaces, Resolver, XPathPlace};
+pub use remarks::chosen;
 pub use uid::is_rule_uid;
 
 /// The name of the bundle in which qcbus speaks for itself.
 pub const OWN_BUNDLE: &str = "qcbus";
+
+/// The checker of [`OWN_BUNDLE`] that says what the command line left out.
+pub const CHOICE_CHECKER: &str = "qcbus_choice";
 
 /// Name of the information on an issue that names a further rule which the same fact breaks: the format
 /// has room for one only.

@@ -74,7 +74,7 @@ pub fn chosen(choice: &Choice) -> Option<Remark> {
          what was left out"
     );
     Some(Remark {
-        checker: String::from("qcbus_choice"),
+        checker: String::from(super::CHOICE_CHECKER),
         description: String::from("What was left out on the command line is told."),
         issue: Some(information(CHOSEN, text)),
         open: None,

@@ -61,17 +61,19 @@ fn element(rest: &mut &str) -> Element {
         children: Vec::new(),
         text: String::new(),
     };
-    while !is_empty {
+    if is_empty {
+        return read;
+    }
+    loop {
         let at = rest.find('<').unwrap();
         read.text.push_str(&plain(&rest[..at]));
         *rest = &rest[at..];
         if let Some(end) = rest.strip_prefix("</") {
             *rest = end.strip_prefix(&format!("{name}>")).unwrap();
-            break;
+            return read;
         }
         read.children.push(element(rest));
     }
-    read
 }
 
 fn attributes(mut text: &str) -> BTreeMap<String, String> {

@@ -51,10 +51,16 @@ pub fn run(args: &ReportArgs) -> Exit {
 
 /// What the rules of the standard bundles are about, by UID.
 fn about() -> BTreeMap<String, String> {
-    let checkers = standard::BUNDLES.iter().flat_map(|bundle| bundle.checkers());
+    let checkers = standard::BUNDLES
+        .iter()
+        .flat_map(|bundle| bundle.checkers());
     let rules = checkers.flat_map(|checker| {
         let about = checker.description;
-        checker.facts.uids.iter().map(move |uid| ((*uid).to_owned(), about.clone()))
+        checker
+            .facts
+            .uids
+            .iter()
+            .map(move |uid| ((*uid).to_owned(), about.clone()))
     });
     rules.collect()
 }

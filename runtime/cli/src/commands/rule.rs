@@ -2,8 +2,9 @@
 
 use std::fmt::Write;
 
+use qcbus_formats::config::Names;
 use qcbus_messages::Exit;
-use qcbus_sdk::Checker;
+use qcbus_sdk::{Bundle, Checker};
 
 use crate::args::{Format, RuleArgs};
 use crate::{standard, talk};
@@ -60,26 +61,63 @@ fn show(id: &str, format: Format) -> Exit {
             Exit::Accepted
         }
         several => {
-            let names: Vec<&str> = several.iter().map(|(_, it)| it.facts.id).collect();
-            talk::fail(&format!("`{id}` may mean any of:"));
-            talk::say_lines(&format!("  {}", names.join("\n  ")));
+            list_candidates(id, several);
             Exit::Usage
         }
     }
 }
 
+/// Rules that a name may mean, each with what it is about.
+fn list_candidates(id: &str, checkers: &[(&Bundle, Checker)]) {
+    let names = checkers.iter().map(|(_, it)| it.id.chars().count());
+    let width = names.max().unwrap_or(0);
+    talk::fail(&format!(
+        "`{id}` is not one rule; there are {} that it may mean:",
+        checkers.len()
+    ));
+    let rows = checkers.iter().map(|(_, checker)| {
+        let about = first_sentence(&checker.description);
+        format!("  {:<width$}  {about}", checker.id)
+    });
+    talk::say_lines(&rows.collect::<Vec<_>>().join("\n"));
+}
+
+fn first_sentence(text: &str) -> &str {
+    text.split(". ").next().unwrap_or(text)
+}
+
+/// All rules that a family or the beginning of a name stands for.
+fn family(id: &str) -> Vec<(&'static Bundle, Checker)> {
+    let fits = |bundle: &Bundle, checker: &Checker| {
+        let uids = checker.facts.uids.iter();
+        let uids: Vec<String> = uids.map(|uid| (*uid).to_owned()).collect();
+        let names = Names {
+            bundle: bundle.name,
+            alias: bundle.alias,
+            id: &checker.id,
+            uids: &uids,
+        };
+        names.match_pattern(id) && !checker.is_backport
+    };
+    let bundles = standard::BUNDLES.into_iter();
+    let all = bundles.flat_map(|bundle| bundle.checkers().into_iter().map(move |it| (bundle, it)));
+    all.filter(|(bundle, checker)| fits(bundle, checker))
+        .collect()
+}
+
 fn unknown(id: &str) -> Exit {
-    let mut names: Vec<String> = Vec::new();
-    for bundle in standard::BUNDLES {
-        for checker in bundle.checkers() {
-            names.push(checker.id.clone());
-            names.extend(checker.facts.uids.iter().map(|uid| (*uid).to_owned()));
-        }
+    let family = family(id);
+    if !family.is_empty() {
+        list_candidates(id, &family);
+        return Exit::Usage;
     }
-    let hint = qcbus_formats::distance::closest(id, names.iter().map(String::as_str)).map_or_else(
-        || "`qcbus rule` lists all".to_owned(),
-        |name| format!("did you mean `{name}`?"),
-    );
+    let hint = match standard::suggest(id) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => match standard::with_word(id).as_slice() {
+            [] => "`qcbus rule` lists all".to_owned(),
+            near => format!("rules with such a word: {}", near.join(", ")),
+        },
+    };
     talk::fail(&format!("there is no rule `{id}`; {hint}"));
     Exit::Usage
 }
@@ -97,7 +135,11 @@ fn page(checker: &Checker) -> String {
         Ok(range) => format!("versions {range}"),
         Err(why) => why.clone(),
     };
-    let _ = writeln!(head, "  level {level}, {versions}\n");
+    let _ = writeln!(head, "  level {level}, {versions}");
+    if let Some((cited, link)) = facts.uids.iter().find_map(|uid| standard::section(uid)) {
+        let _ = writeln!(head, "  {cited}: {link}");
+    }
+    head.push('\n');
     format!("{head}{}", facts.page)
 }
 
@@ -117,6 +159,7 @@ fn describe(bundle: &str, checker: &Checker) -> serde_json::Value {
         "default": facts.default_on,
         "after": facts.after,
         "description": checker.description,
+        "section": facts.uids.iter().find_map(|uid| standard::section(uid)).map(|(cited, _)| cited),
         "params": params,
         "page": facts.page,
     })

@@ -26,8 +26,12 @@ pub fn absolute(path: &Path) -> PathBuf {
 /// A path as a person here would write it.
 pub fn relative(path: &Path) -> &Path {
     let here = std::env::current_dir().ok();
-    let below = here.as_deref().and_then(|here| path.strip_prefix(here).ok());
-    below.filter(|it| !it.as_os_str().is_empty()).unwrap_or(path)
+    let below = here
+        .as_deref()
+        .and_then(|here| path.strip_prefix(here).ok());
+    below
+        .filter(|it| !it.as_os_str().is_empty())
+        .unwrap_or(path)
 }
 
 /// Where a path leads, through links as far as it is there already.

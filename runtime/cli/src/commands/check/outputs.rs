@@ -158,7 +158,9 @@ impl Output {
 fn writable(file: &Path) -> Result<(), Refusal> {
     let shown = to_text(file);
     if shown.is_empty() || shown.ends_with('/') || file.is_dir() {
-        return Err(usage(format!("cannot write a report to {shown}: name a file")));
+        return Err(usage(format!(
+            "cannot write a report to {shown}: name a file"
+        )));
     }
     let directory = match file.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,

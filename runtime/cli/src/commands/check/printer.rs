@@ -7,7 +7,8 @@ use std::sync::Arc;
 use qcbus_broker::{Delivery, Judged, Notice, ResultPaths, Told};
 use qcbus_document::Suffix;
 use qcbus_formats::config::Config;
-use qcbus_formats::xqar::Level;
+use qcbus_formats::pool::{CHOICE_CHECKER, OWN_BUNDLE};
+use qcbus_formats::xqar::{Issue, Level};
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Exit, ResultMessage, Verdict, shown};
 use qcbus_report_text::{Folding, Options};
@@ -145,8 +146,7 @@ impl Printer {
             judged,
         };
         let (places, config) = (&self.places, self.config.as_ref());
-        let message =
-            qcbus_broker::deliveries::message("stdout", &delivery, None, places, config);
+        let message = qcbus_broker::deliveries::message("stdout", &delivery, None, places, config);
         match message {
             Ok(mut message) => self.report(&mut message),
             Err(why) => {
@@ -161,6 +161,8 @@ impl Printer {
     }
 
     fn report(&mut self, message: &mut ResultMessage) {
+        // The end of the run says it once for all files.
+        let choice = take_choice(message);
         self.tally.add(message);
         let sources = FileSources::new(message);
         let options = Options {
@@ -186,6 +188,7 @@ impl Printer {
         if !text.is_empty() {
             talk::print(&text);
         }
+        choice.put_back(message);
         self.outputs.report(message, &sources);
     }
 
@@ -267,7 +270,9 @@ impl Printer {
         let names = self.outputs.names();
         if !names.is_empty() {
             let names = names.join(", ");
-            talk::fail(&format!("not written, as not everything was checked: {names}"));
+            talk::fail(&format!(
+                "not written, as not everything was checked: {names}"
+            ));
         }
         true
     }
@@ -324,7 +329,9 @@ impl Printer {
         }
         let failing = self.failing();
         if failing > 0 {
-            line.push_str(&format!(", {failing} accepted but with findings that --fail-level names"));
+            line.push_str(&format!(
+                ", {failing} accepted but with findings that --fail-level names"
+            ));
         }
         let out = relative(&self.places.out);
         line.push_str(&format!("; results in {}", shown::line(&to_text(out))));
@@ -358,6 +365,30 @@ impl Printer {
             Exit::Rejected if self.tally.count(Verdict::Undetermined) > 0 => Exit::Undetermined,
             Exit::Rejected => Exit::Accepted,
             exit => exit,
+        }
+    }
+}
+
+/// The issues that only say what the command line left out, taken out of a result.
+struct Choice(Option<(usize, Vec<Issue>)>);
+
+fn take_choice(message: &mut ResultMessage) -> Choice {
+    let mut bundles = message.results.bundles.iter_mut().enumerate();
+    let own = bundles.find(|(_, bundle)| bundle.name == OWN_BUNDLE);
+    let checkers = own.map(|(at, bundle)| (at, &mut bundle.checkers));
+    Choice(checkers.and_then(|(at, checkers)| {
+        let it = checkers.iter_mut().find(|it| it.id == CHOICE_CHECKER)?;
+        Some((at, std::mem::take(&mut it.issues)))
+    }))
+}
+
+impl Choice {
+    fn put_back(self, message: &mut ResultMessage) {
+        let Some((at, issues)) = self.0 else { return };
+        let bundle = message.results.bundles.get_mut(at);
+        let mut checkers = bundle.into_iter().flat_map(|bundle| &mut bundle.checkers);
+        if let Some(it) = checkers.find(|it| it.id == CHOICE_CHECKER) {
+            it.issues = issues;
         }
     }
 }

@@ -1,5 +1,6 @@
 //! What a run comes to.
 
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
@@ -23,7 +24,7 @@ pub(super) struct Tally {
     levels: BTreeMap<Level, usize>,
     /// Files with findings of any level, and the worst of each.
     files_at: BTreeMap<Level, usize>,
-    rules: BTreeMap<String, RuleCount>,
+    rules: BTreeMap<(Level, String), RuleCount>,
     /// Checkers that were kept from looking in files that have errors, and the number of those files.
     blocked: (usize, usize),
     /// What configuration or command line left out, by bundle: the same for every file.
@@ -33,7 +34,6 @@ pub(super) struct Tally {
 /// Findings of one rule.
 #[derive(Debug)]
 struct RuleCount {
-    level: Level,
     findings: usize,
     files: usize,
     about: String,
@@ -52,15 +52,14 @@ impl Tally {
                 let name = rule_name(&issue.rule_uid, &checker.id).to_owned();
                 *self.levels.entry(issue.level).or_default() += 1;
                 worst = worst.min(Some(issue.level)).or(Some(issue.level));
-                let rule = self.rules.entry(name.clone()).or_insert(RuleCount {
-                    level: issue.level,
+                let key = (issue.level, name);
+                let rule = self.rules.entry(key.clone()).or_insert(RuleCount {
                     findings: 0,
                     files: 0,
                     about: checker.description.clone(),
                 });
-                rule.level = rule.level.min(issue.level);
                 rule.findings += 1;
-                rule.files += usize::from(seen.insert(name));
+                rule.files += usize::from(seen.insert(key));
             }
         }
         if let Some(worst) = worst {
@@ -147,9 +146,9 @@ impl Tally {
 
     /// The rules that were broken, those first whose mending helps most: errors before warnings, then
     /// by files, then by findings.
-    fn ranked(&self) -> Vec<(&str, &RuleCount)> {
-        let mut rules: Vec<_> = self.rules.iter().map(|(name, it)| (name.as_str(), it)).collect();
-        rules.sort_by_key(|(_, it)| (it.level, usize::MAX - it.files, usize::MAX - it.findings));
+    fn ranked(&self) -> Vec<Row<'_>> {
+        let mut rules: Vec<Row<'_>> = self.rules.iter().collect();
+        rules.sort_by_key(|((level, _), it)| (*level, Reverse(it.files), Reverse(it.findings)));
         rules
     }
 
@@ -161,14 +160,16 @@ impl Tally {
             return None;
         }
         let ranked = self.ranked();
-        let first = ranked.iter().filter(|(_, it)| it.level == Level::Error);
+        let first = ranked
+            .iter()
+            .filter(|((level, _), _)| *level == Level::Error);
         Some(format!("fix first:\n{}", table(first.take(FIRST))))
     }
 
     /// All rules that were broken, the most frequent first.
     pub(super) fn statistics(&self) -> String {
         let mut rules = self.ranked();
-        rules.sort_by_key(|(_, it)| usize::MAX - it.findings);
+        rules.sort_by_key(|(_, it)| Reverse(it.findings));
         if rules.is_empty() {
             return String::new();
         }
@@ -176,18 +177,22 @@ impl Tally {
     }
 }
 
+/// A rule at one level, and how often it was broken.
+type Row<'t> = (&'t (Level, String), &'t RuleCount);
+
 /// Rows of findings, files, level, rule and what it is about.
-fn table<'r>(rules: impl Iterator<Item = &'r (&'r str, &'r RuleCount)>) -> String {
+fn table<'t>(rules: impl Iterator<Item = &'t Row<'t>>) -> String {
     let rows: Vec<_> = rules.collect();
-    let names = rows.iter().map(|(name, _)| name.chars().count());
-    let width = names.max().unwrap_or(0).min(60);
+    let names = rows.iter().map(|((_, name), _)| name.chars().count());
+    let width = names.max().unwrap_or(0).min(50);
     let mut out = String::new();
-    for (name, it) in rows {
+    for ((level, name), it) in rows {
         let files = if it.files == 1 { "file" } else { "files" };
         let count = format!("{} in {} {files}", it.findings, it.files);
-        let (level, name) = (it.level.as_str(), shown::line(name));
-        let about = shown::line(it.about.split(". ").next().unwrap_or(&it.about)).into_owned();
-        let _ = writeln!(out, "  {count:>18}  {level:<11} {name:<width$}  {about}");
+        let (level, name) = (level.as_str(), shown::line(name));
+        let about = shown::line(it.about.split(". ").next().unwrap_or(&it.about));
+        let about = about.trim_end_matches('.');
+        let _ = writeln!(out, "  {count:>16}  {level:<11}  {name:<width$}  {about}");
     }
     out
 }

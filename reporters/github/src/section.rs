@@ -1,0 +1,214 @@
+//! What is said of a checked file.
+
+use std::collections::BTreeMap;
+
+use qcbus_formats::pool::BLOCKED;
+use qcbus_formats::xqar::{Checker, CheckerBundle, Issue, Level, Status};
+use qcbus_messages::{ResultMessage, Verdict, shown};
+use qcbus_reporter_sdk::{IssueLocation, issue_locations, one_line};
+
+use crate::command::tame;
+use crate::{Entry, LONGEST_TEXT};
+
+/// What is said of a checked file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Section {
+    /// The verdict and how much was found: `rejected: 2 errors, 1 warning`.
+    pub summary: String,
+    /// What there is to say in particular: what keeps the verdict open, then the findings along the
+    /// file.
+    pub entries: Vec<Entry>,
+}
+
+/// How many checkers without an answer are named; the others are counted.
+const MOST_NAMES: usize = 3;
+
+impl Section {
+    pub(crate) fn of(result: &ResultMessage) -> Section {
+        let mut entries = unanswered(result);
+        if result.verdict == Verdict::Undetermined && entries.is_empty() {
+            entries.push(undetermined(result));
+        }
+        entries.extend(findings(result));
+        Section {
+            summary: summary(result),
+            entries,
+        }
+    }
+}
+
+fn checkers(result: &ResultMessage) -> impl Iterator<Item = (&CheckerBundle, &Checker)> {
+    let bundles = result.results.bundles.iter();
+    bundles.flat_map(|bundle| bundle.checkers.iter().map(move |checker| (bundle, checker)))
+}
+
+/// The checkers that could not look, whatever their status.
+fn blocked(result: &ResultMessage) -> Vec<&Checker> {
+    let is_blocked = |checker: &&Checker| checker.metadata.iter().any(|fact| fact.key == BLOCKED);
+    let checkers = checkers(result).map(|(_, checker)| checker);
+    checkers.filter(is_blocked).collect()
+}
+
+fn summary(result: &ResultMessage) -> String {
+    let issues = || checkers(result).flat_map(|(_, checker)| &checker.issues);
+    let of = |level| issues().filter(|issue| issue.level == level).count();
+    let counts = [
+        (of(Level::Error), "error", "errors"),
+        (of(Level::Warning), "warning", "warnings"),
+        (of(Level::Information), "information", "information"),
+    ];
+    let said = counts.into_iter().filter(|&(count, ..)| count > 0);
+    let said: Vec<String> = said
+        .map(|(count, one, many)| format!("{count} {}", if count == 1 { one } else { many }))
+        .collect();
+    let mut summary = match said.as_slice() {
+        [] => format!("{}: no findings", result.verdict),
+        _ => format!("{}: {}", result.verdict, said.join(", ")),
+    };
+    let blocked = blocked(result).len();
+    if blocked > 0 {
+        summary.push_str(&format!("; {} could not look", number_of(blocked)));
+    }
+    summary
+}
+
+fn number_of(checkers: usize) -> String {
+    let plural = if checkers == 1 { "" } else { "s" };
+    format!("{checkers} checker{plural}")
+}
+
+/// Checkers that failed or have no status, an entry for each reason.
+fn unanswered(result: &ResultMessage) -> Vec<Entry> {
+    let mut reasons: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for (bundle, checker) in checkers(result) {
+        let reason = match checker.status {
+            Some(Status::Completed | Status::Skipped) => continue,
+            Some(Status::Error) => reason(&checker.summary),
+            None => "the result does not say how it ended".to_owned(),
+        };
+        let names = reasons.entry(reason).or_default();
+        names.push(checker_name(bundle, checker));
+    }
+    let entry = |(reason, names): (String, Vec<String>)| {
+        let mut named = names.iter().take(MOST_NAMES).cloned().collect::<Vec<_>>();
+        if let more @ 1.. = names.len().saturating_sub(MOST_NAMES) {
+            named.push(format!("{more} more"));
+        }
+        let said = format!(
+            "{} gave no answer ({}): {reason}",
+            number_of(names.len()),
+            named.join(", ")
+        );
+        let rule = names.into_iter().next().unwrap_or_default();
+        of_the_file(result, &said, rule)
+    };
+    reasons.into_iter().map(entry).collect()
+}
+
+/// Why a file is undetermined though no checker failed.
+fn undetermined(result: &ResultMessage) -> Entry {
+    let blocked = blocked(result);
+    let why = match blocked.first() {
+        Some(first) => format!(
+            "{} could not look: {}",
+            number_of(blocked.len()),
+            reason(&first.summary)
+        ),
+        None => "no checker has looked at the file".to_owned(),
+    };
+    let said = format!("the verdict is undetermined: {why}");
+    of_the_file(result, &said, "qcbus/verdict".to_owned())
+}
+
+fn of_the_file(result: &ResultMessage, text: &str, rule: String) -> Entry {
+    Entry {
+        level: Level::Error,
+        path: shown::line(&result.display_path).into_owned(),
+        row: None,
+        column: None,
+        text: tame(text, LONGEST_TEXT),
+        rule,
+    }
+}
+
+/// The findings along the file. What is in other files goes by where it is referred to.
+fn findings(result: &ResultMessage) -> Vec<Entry> {
+    let base = result.input.strip_suffix(&result.display_path);
+    let base = base.filter(|base| base.ends_with('/'));
+    let mut entries = Vec::new();
+    for (bundle, checker) in checkers(result) {
+        for issue in &checker.issues {
+            let place = issue_locations(issue).into_iter().next();
+            let place = place.unwrap_or_default();
+            let here = place.row.map(|row| (row, place.column.unwrap_or(0)));
+            // Another file's path is relative to the same directory as that of the checked file.
+            let (path, order) = match &place.path {
+                None => (&*result.display_path, here),
+                Some(path) => {
+                    let below = base.and_then(|base| path.strip_prefix(base));
+                    (below.unwrap_or(path), place.referred_at)
+                }
+            };
+            let entry = Entry {
+                level: issue.level,
+                path: shown::line(path).into_owned(),
+                row: place.row,
+                column: place.row.and(place.column),
+                text: text_of(issue, &place),
+                rule: rule(bundle, checker, issue),
+            };
+            entries.push((order, entry));
+        }
+    }
+    entries.sort_by_key(|&(order, _)| order);
+    entries.into_iter().map(|(_, entry)| entry).collect()
+}
+
+/// What was found; without a row the element stands behind.
+fn text_of(issue: &Issue, place: &IssueLocation) -> String {
+    let text = match tame(&issue.description, LONGEST_TEXT) {
+        text if text.is_empty() => "(no description)".to_owned(),
+        text => text,
+    };
+    match (place.row, &place.xpath) {
+        (None, Some(xpath)) => format!("{text} ({})", tame(xpath, LONGEST_TEXT)),
+        _ => text,
+    }
+}
+
+fn rule(bundle: &CheckerBundle, checker: &Checker, issue: &Issue) -> String {
+    match without_blanks(&issue.rule_uid) {
+        uid if uid.is_empty() => checker_name(bundle, checker),
+        uid => uid,
+    }
+}
+
+fn checker_name(bundle: &CheckerBundle, checker: &Checker) -> String {
+    without_blanks(&format!("{}/{}", bundle.name, checker.id))
+}
+
+/// A name in which nothing ends it: the last blank of a line stands before it.
+fn without_blanks(name: &str) -> String {
+    tame(name, LONGEST_TEXT).replace(' ', "_")
+}
+
+/// Why a checker did not complete: its summary without its status, which is said already, and
+/// without the count that pooling and ASAM's framework append.
+fn reason(summary: &str) -> String {
+    let line = one_line(summary);
+    let bare = ["Skipped: ", "Error: ", "Skipped. ", "Error. "]
+        .into_iter()
+        .find_map(|status| line.strip_prefix(status))
+        .unwrap_or(&line);
+    let counts = [" issue(s) are found.", " issues.", " issue."];
+    let counted = counts.into_iter().find_map(|it| bare.strip_suffix(it));
+    let reason = counted.map_or(bare, |start| {
+        start
+            .trim_end_matches(|c: char| c.is_ascii_digit())
+            .trim_end()
+    });
+    match reason {
+        "" => "no reason given".to_owned(),
+        reason => reason.to_owned(),
+    }
+}

@@ -1,0 +1,208 @@
+//! The daemon: which page goes where.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use qcbus_messages::path_text::{from_text, to_text};
+use qcbus_messages::{ResultMessage, Withdrawn};
+use qcbus_reporter_sdk::{
+    Output, Pages, ReportError, Reporter, Setting, Sources, Subject, one_line, remove_file,
+    replace_file, write_stream,
+};
+
+use crate::page::{Page, stored};
+use crate::result_data::ResultData;
+use crate::run_data::{RunData, Section};
+
+/// Writes pages.
+pub struct HtmlReporter {
+    keep: bool,
+    is_run: bool,
+    pages: Pages,
+    /// The pages of runs, by their paths.
+    runs: BTreeMap<PathBuf, Run>,
+}
+
+/// The page of a run, and what is on it.
+struct Run {
+    path: PathBuf,
+    sections: BTreeMap<String, Section>,
+}
+
+impl HtmlReporter {
+    /// A reporter that has written nothing yet.
+    pub fn new(setting: &Setting) -> HtmlReporter {
+        HtmlReporter {
+            keep: setting.keep,
+            is_run: setting.is_run,
+            pages: setting.pages,
+            runs: BTreeMap::new(),
+        }
+    }
+
+    fn run(&mut self, path: &Path) -> Result<&mut Run, ReportError> {
+        let (keep, is_run) = (self.keep, self.is_run);
+        match self.runs.entry(path.to_owned()) {
+            std::collections::btree_map::Entry::Occupied(there) => Ok(there.into_mut()),
+            std::collections::btree_map::Entry::Vacant(free) => {
+                let run = Run::open(path, keep, is_run)?;
+                Ok(free.insert(run))
+            }
+        }
+    }
+}
+
+impl Reporter for HtmlReporter {
+    fn report(&mut self, result: &ResultMessage, sources: &dyn Sources) -> Result<(), ReportError> {
+        let subject = Subject::from(result);
+        let output = Output::of(subject.params);
+        let (data, plan) = ResultData::of(result, sources, self.pages);
+        let title = one_line(&format!("{}: {}", result.display_path, result.verdict));
+        let page = render(&title, &data, plan.as_deref(), false)?;
+        let Output::File(path) = &output else {
+            return match output.own_file(subject, SUFFIX) {
+                Some(path) => replace_file(&path, page.as_bytes()),
+                None => write_stream(&output, &page),
+            };
+        };
+        let is_run = self.is_run;
+        let run = self.run(path)?;
+        let key = one_line(subject.display_path);
+        let below = run.below(subject.display_path);
+        replace_file(&run.directory().join(&below), page.as_bytes())?;
+        let link = format!("{}/{}", run.directory_name(), to_text(&below));
+        let section = Section::of(result, &data, url(&link));
+        run.sections.insert(key, section);
+        // In a run nobody looks before the end.
+        if is_run { Ok(()) } else { run.write() }
+    }
+
+    fn withdraw(&mut self, gone: &Withdrawn) -> Result<(), ReportError> {
+        let subject = Subject::from(gone);
+        let output = Output::of(subject.params);
+        let Output::File(path) = &output else {
+            return match output.own_file(subject, SUFFIX) {
+                Some(path) => remove_file(&path),
+                None => Ok(()),
+            };
+        };
+        let run = self.run(path)?;
+        remove_file(&run.directory().join(run.below(subject.display_path)))?;
+        match run.sections.remove(&one_line(subject.display_path)) {
+            Some(_) => run.write(),
+            None => Ok(()),
+        }
+    }
+
+    fn finish(&mut self) -> Result<(), ReportError> {
+        self.runs.values().try_for_each(|run| match self.is_run {
+            true => run.finish(),
+            false => run.write(),
+        })
+    }
+}
+
+/// What the names of pages end with.
+const SUFFIX: &str = "html";
+
+impl Run {
+    fn open(path: &Path, keep: bool, is_run: bool) -> Result<Run, ReportError> {
+        let earlier = std::fs::read_to_string(path).ok().filter(|_| keep);
+        let data = earlier.and_then(|page| stored(&page));
+        let data = data.and_then(|data| serde_json::from_slice::<RunData>(&data).ok());
+        let run = Run {
+            path: path.to_owned(),
+            sections: data.map(RunData::into_sections).unwrap_or_default(),
+        };
+        if is_run {
+            // A place that refuses is found early; a page of an earlier run is none of this one.
+            replace_file(path, b"")?;
+            remove_file(path)?;
+        } else {
+            run.write()?;
+        }
+        Ok(run)
+    }
+
+    /// Where the pages of the results lie.
+    fn directory(&self) -> PathBuf {
+        self.path.with_file_name(self.directory_name())
+    }
+
+    fn directory_name(&self) -> String {
+        let stem = self.path.file_stem().unwrap_or_default();
+        format!("{}-files", stem.to_string_lossy())
+    }
+
+    /// Where the page of a result lies in there.
+    fn below(&self, display_path: &str) -> PathBuf {
+        qcbus_reporter_sdk::inside(&from_text(&format!("{display_path}.{SUFFIX}")))
+    }
+
+    fn write(&self) -> Result<(), ReportError> {
+        let title = match self.sections.len() {
+            1 => "1 file".to_owned(),
+            files => format!("{files} files"),
+        };
+        let data = RunData::of(&title, &self.sections);
+        let page = render(&format!("qcbus: {title}"), &data, None, true)?;
+        replace_file(&self.path, page.as_bytes())
+    }
+
+    /// One result needs no page around it.
+    fn finish(&self) -> Result<(), ReportError> {
+        let Some(only) = self
+            .sections
+            .keys()
+            .next()
+            .filter(|_| self.sections.len() == 1)
+        else {
+            return self.write();
+        };
+        let page = self.directory().join(self.below(only));
+        let moved = std::fs::rename(&page, &self.path);
+        moved.map_err(|source| ReportError::Write {
+            path: self.path.clone(),
+            source,
+        })?;
+        // The directories above it, as far as they are empty: others may use them.
+        let mut above = page.parent();
+        while let Some(directory) = above.filter(|it| it.starts_with(self.directory())) {
+            if std::fs::remove_dir(directory).is_err() {
+                break;
+            }
+            above = directory.parent();
+        }
+        Ok(())
+    }
+}
+
+fn render(
+    title: &str,
+    data: &impl serde::Serialize,
+    plan: Option<&[u8]>,
+    is_run: bool,
+) -> Result<String, ReportError> {
+    let data = serde_json::to_vec(data).map_err(|error| ReportError::Form(error.to_string()))?;
+    let page = Page {
+        title,
+        data: &data,
+        plan,
+        is_run,
+    };
+    page.render()
+}
+
+/// A path as a relative reference in a page.
+fn url(path: &str) -> String {
+    let mut url = String::with_capacity(path.len());
+    for byte in path.bytes() {
+        match byte {
+            b'A'..=b'Z' | b'a'..=b'z' | b'0'..=b'9' | b'/' | b'-' | b'.' | b'_' | b'~' => {
+                url.push(char::from(byte));
+            }
+            byte => url.push_str(&format!("%{byte:02X}")),
+        }
+    }
+    url
+}

@@ -1,0 +1,197 @@
+//! What the page of a run is about, as `docs/html-report.md` says.
+
+use std::collections::{BTreeMap, HashMap};
+
+use qcbus_formats::pool::BLOCKED;
+use qcbus_formats::xqar::{Level, Status};
+use qcbus_messages::{ResultMessage, Verdict};
+use qcbus_reporter_sdk::one_line;
+use serde::{Deserialize, Serialize};
+
+use crate::result_data::{ResultData, RuleData, generator};
+
+/// Findings that the page of a run holds; the pages of the results have the rest.
+pub(crate) const MOST_FINDINGS: usize = 20_000;
+
+/// What the page of a run says of one file.
+#[derive(Serialize, Deserialize, Clone, PartialEq)]
+pub(crate) struct FileEntry {
+    path: String,
+    verdict: String,
+    /// Relative to the page of the run; empty when there is none.
+    page: String,
+    error: usize,
+    warning: usize,
+    information: usize,
+    why: String,
+}
+
+/// A finding of one file.
+#[derive(Serialize, Deserialize, Clone, PartialEq)]
+struct Finding {
+    file: usize,
+    level: String,
+    rule: i64,
+    text: String,
+    row: Option<u64>,
+    column: Option<u64>,
+    id: u64,
+}
+
+/// Everything on the page of a run.
+#[derive(Serialize, Deserialize)]
+pub(crate) struct RunData {
+    schema: u32,
+    generator: String,
+    title: String,
+    made: String,
+    files: Vec<FileEntry>,
+    rules: Vec<RuleData>,
+    findings: Vec<Finding>,
+    cuts: Vec<String>,
+}
+
+/// What one result gives to the page of a run.
+#[derive(Clone, PartialEq)]
+pub(crate) struct Section {
+    entry: FileEntry,
+    findings: Vec<(Finding, Option<RuleData>)>,
+}
+
+impl Section {
+    /// What a result gives. `page` leads from the page of the run to that of the result.
+    pub(crate) fn of(result: &ResultMessage, data: &ResultData<'_>, page: String) -> Section {
+        let count = |level: Level| {
+            let bundles = result.results.bundles.iter();
+            let checkers = bundles.flat_map(|bundle| &bundle.checkers);
+            let issues = checkers.flat_map(|checker| &checker.issues);
+            issues.filter(|issue| issue.level == level).count()
+        };
+        let finding = |it: &crate::result_data::FindingData| {
+            let place = it.places.first();
+            let rule = usize::try_from(it.rule).ok();
+            let rule = rule.and_then(|index| data.rules.get(index)).cloned();
+            let finding = Finding {
+                file: 0,
+                level: it.level.to_owned(),
+                rule: -1,
+                text: it.text.clone(),
+                row: place.and_then(|place| place.row),
+                column: place.and_then(|place| place.column),
+                id: it.id,
+            };
+            (finding, rule)
+        };
+        Section {
+            entry: FileEntry {
+                path: one_line(&result.display_path),
+                verdict: result.verdict.as_str().to_owned(),
+                page,
+                error: count(Level::Error),
+                warning: count(Level::Warning),
+                information: count(Level::Information),
+                why: why(result),
+            },
+            findings: data.findings.iter().map(finding).collect(),
+        }
+    }
+}
+
+/// Why a verdict is not known: the first checker that did not look.
+fn why(result: &ResultMessage) -> String {
+    if result.verdict != Verdict::Undetermined {
+        return String::new();
+    }
+    let bundles = result.results.bundles.iter();
+    let mut checkers = bundles.flat_map(|bundle| &bundle.checkers);
+    let open = checkers.find(|checker| match checker.status {
+        Some(Status::Completed) => false,
+        Some(Status::Skipped) => checker.metadata.iter().any(|fact| fact.key == BLOCKED),
+        Some(Status::Error) | None => true,
+    });
+    open.map_or_else(
+        || "nobody has looked".to_owned(),
+        |checker| one_line(&format!("{}: {}", checker.id, checker.summary)),
+    )
+}
+
+impl RunData {
+    /// The page of these sections, in the order of their paths.
+    pub(crate) fn of(title: &str, sections: &BTreeMap<String, Section>) -> RunData {
+        let mut rules = Rules::default();
+        let mut all: Vec<(usize, &Finding, Option<&RuleData>)> = Vec::new();
+        for (file, section) in sections.values().enumerate() {
+            let findings = section.findings.iter();
+            all.extend(findings.map(|(finding, rule)| (file, finding, rule.as_ref())));
+        }
+        let total = all.len();
+        // Stable: those of one level stay in the order of files and places.
+        all.sort_by_key(|(_, finding, _)| Level::from_word(&finding.level));
+        all.truncate(MOST_FINDINGS);
+        let findings = all.into_iter().map(|(file, finding, rule)| Finding {
+            file,
+            rule: rule.map_or(-1, |rule| rules.index(rule)),
+            ..finding.clone()
+        });
+        let findings = findings.collect();
+        let mut cuts = Vec::new();
+        if total > MOST_FINDINGS {
+            let left_out = total - MOST_FINDINGS;
+            cuts.push(format!(
+                "{left_out} of {total} findings are not on this page, the mildest; the pages of the files \
+                 have them"
+            ));
+        }
+        RunData {
+            schema: 1,
+            generator: generator(),
+            title: title.to_owned(),
+            made: String::new(),
+            files: sections.values().map(|it| it.entry.clone()).collect(),
+            rules: rules.list,
+            findings,
+            cuts,
+        }
+    }
+
+    /// The sections of a page that was written earlier, by their paths.
+    pub(crate) fn into_sections(self) -> BTreeMap<String, Section> {
+        let rules = self.rules;
+        let mut sections: Vec<Section> = self
+            .files
+            .into_iter()
+            .map(|entry| Section {
+                entry,
+                findings: Vec::new(),
+            })
+            .collect();
+        for finding in self.findings {
+            let rule = usize::try_from(finding.rule).ok();
+            let rule = rule.and_then(|index| rules.get(index)).cloned();
+            if let Some(section) = sections.get_mut(finding.file) {
+                section.findings.push((finding, rule));
+            }
+        }
+        let keyed = sections.into_iter().map(|it| (it.entry.path.clone(), it));
+        keyed.collect()
+    }
+}
+
+/// Each rule once.
+#[derive(Default)]
+struct Rules {
+    list: Vec<RuleData>,
+    known: HashMap<(String, String), usize>,
+}
+
+impl Rules {
+    fn index(&mut self, rule: &RuleData) -> i64 {
+        let key = (rule.uid.clone(), rule.checker.clone());
+        let list = &mut self.list;
+        let index = *self.known.entry(key).or_insert_with(|| {
+            list.push(rule.clone());
+            list.len() - 1
+        });
+        i64::try_from(index).unwrap_or(-1)
+    }
+}

@@ -1,0 +1,61 @@
+//! Which characters of a line a finding is about.
+
+/// The longest underline; an element's name or an attribute is shorter.
+const MOST: usize = 60;
+
+/// How many characters from `at` on to mark: the start of a tag with its name, an attribute with its
+/// value, one character otherwise.
+pub fn underlined(line: &[char], at: usize) -> usize {
+    let rest = line.get(at..).unwrap_or_default();
+    let name_from = |start: usize| {
+        let name = rest.iter().skip(start).take_while(|&&c| is_name(c));
+        start + name.count()
+    };
+    let length = match rest.first() {
+        Some('<') => {
+            let slash = matches!(rest.get(1), Some('/' | '?' | '!'));
+            name_from(1 + usize::from(slash))
+        }
+        Some(&c) if is_name(c) => attribute(rest, name_from(0)),
+        _ => 1,
+    };
+    length.clamp(1, MOST)
+}
+
+/// `name="value"` as a whole when that is what stands there.
+fn attribute(rest: &[char], name: usize) -> usize {
+    let quoted = match (rest.get(name), rest.get(name + 1)) {
+        (Some('='), Some(quote @ ('"' | '\''))) => rest
+            .iter()
+            .skip(name + 2)
+            .position(|c| c == quote)
+            .map(|value| name + 2 + value + 1),
+        _ => None,
+    };
+    quoted.unwrap_or(name)
+}
+
+fn is_name(c: char) -> bool {
+    c.is_alphanumeric() || matches!(c, '_' | '-' | '.' | ':')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tags_and_attributes_are_marked_as_a_whole() {
+        for (line, at, marked) in [
+            ("<road id='5'>", 0, 5),
+            ("<road id='5'>", 6, 6),
+            ("</road>", 0, 6),
+            ("a & b", 2, 1),
+            ("", 0, 1),
+            ("<a>", 99, 1),
+            ("n='open", 0, 1),
+        ] {
+            let chars: Vec<char> = line.chars().collect();
+            assert_eq!(underlined(&chars, at), marked, "{line} {at}");
+        }
+    }
+}
