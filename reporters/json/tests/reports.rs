@@ -7,8 +7,8 @@ use qcbus_formats::xqar::{
     Checker, CheckerBundle, Issue, Level, Location, Locations, Metadata, Param, Results, Status,
 };
 use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
-use qcbus_report_json::{JsonReporter, render};
-use qcbus_reporter_sdk::{NoSources, Reporter as _};
+use qcbus_report_json::{REPORTER, render};
+use qcbus_reporter_sdk::{NoSources, Reporter, Setting};
 use serde_json::Value;
 
 const UID: &str = "asam.net:xodr:1.4.0:ids.id_unique_in_class";
@@ -154,7 +154,7 @@ fn one_file_holds_the_newest_report_of_each_checked_file() {
     let output = param("OutputFile", &path.to_string_lossy());
     let (mut one, mut other) = (result("b.xodr"), result("a.xodr"));
     (one.params, other.params) = (vec![output.clone()], vec![output]);
-    let mut reporter = JsonReporter::new(false);
+    let mut reporter = new_reporter(false);
     for result in [&one, &other, &one] {
         reporter.report(result, &NoSources).unwrap();
     }
@@ -164,7 +164,7 @@ fn one_file_holds_the_newest_report_of_each_checked_file() {
 
     // Started again, after a crash in the middle of a write.
     std::fs::write(&path, expected.clone() + "{\"version\": ").unwrap();
-    JsonReporter::new(true).report(&one, &NoSources).unwrap();
+    new_reporter(true).report(&one, &NoSources).unwrap();
     assert_eq!(std::fs::read_to_string(&path).unwrap(), expected);
 }
 
@@ -172,9 +172,17 @@ fn one_file_holds_the_newest_report_of_each_checked_file() {
 fn a_senseless_indent_is_refused_with_what_is_allowed() {
     let mut result = result("a.xodr");
     result.params.push(param("Indent", "-1"));
-    let error = JsonReporter::new(false).report(&result, &NoSources);
+    let error = new_reporter(false).report(&result, &NoSources);
     assert_eq!(
         error.unwrap_err().to_string(),
         "use the parameter Indent=\"-1\": a whole number from 0 to 16 is needed"
     );
+}
+
+fn new_reporter(keep: bool) -> Box<dyn Reporter> {
+    (REPORTER.make)(&Setting {
+        keep,
+        is_run: false,
+        ..Setting::plain_run()
+    })
 }

@@ -5,8 +5,8 @@
 use std::path::Path;
 
 use qcbus_formats::xqar::Param;
-use qcbus_report_text::{NAME, TextReporter};
-use qcbus_reporter_sdk::{OneShot, report_once};
+use qcbus_report_text::REPORTER;
+use qcbus_reporter_sdk::{OnceError, OneShot, Setting, report_once};
 
 const RESULT: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <CheckerResults version="1.0.0">
@@ -43,11 +43,11 @@ fn the_result_file_is_enough() {
     scene(dir.path());
     let output = dir.path().join("report.txt");
     let what = OneShot {
-        xqar: Some(dir.path().join("Result.xqar")),
+        results: vec![dir.path().join("Result.xqar")],
         params: params(&output),
         ..OneShot::default()
     };
-    report_once(&mut TextReporter::new(false, false), NAME, &what).unwrap();
+    once(&what).unwrap();
     let text = std::fs::read_to_string(output).unwrap();
     let place = dir.path().canonicalize().unwrap().join("quay.xodr");
     let text = text.replace(&*place.to_string_lossy(), "DIR/quay.xodr");
@@ -76,7 +76,7 @@ fn a_configuration_names_result_output_and_width() {
         config: Some(at("config.xml")),
         ..OneShot::default()
     };
-    let error = report_once(&mut TextReporter::new(false, false), NAME, &what).unwrap_err();
+    let error = once(&what).unwrap_err();
     assert!(
         error.to_string().contains("LineWidth=\"narrow\""),
         "{error}"
@@ -85,7 +85,7 @@ fn a_configuration_names_result_output_and_width() {
         name: "LineWidth".into(),
         value: "80".into(),
     });
-    report_once(&mut TextReporter::new(false, false), NAME, &what).unwrap();
+    once(&what).unwrap();
     let text = std::fs::read_to_string(at("report.txt")).unwrap();
     assert!(text.contains("rejected"), "{text}");
 }
@@ -93,14 +93,10 @@ fn a_configuration_names_result_output_and_width() {
 #[test]
 fn what_cannot_be_used_is_named() {
     let dir = tempfile::tempdir().unwrap();
-    let fails = |what: &OneShot| {
-        report_once(&mut TextReporter::new(false, false), NAME, what)
-            .unwrap_err()
-            .to_string()
-    };
-    let xqar = Some(dir.path().join("none.xqar"));
+    let fails = |what: &OneShot| once(what).unwrap_err().to_string();
+    let results = vec![dir.path().join("none.xqar")];
     let missing = fails(&OneShot {
-        xqar,
+        results,
         ..OneShot::default()
     });
     assert!(missing.contains("none.xqar"), "{missing}");
@@ -111,4 +107,9 @@ fn what_cannot_be_used_is_named() {
         ..OneShot::default()
     });
     assert!(broken.contains("c.xml: 1:"), "{broken}");
+}
+
+fn once(what: &OneShot) -> Result<(), OnceError> {
+    let mut reporter = (REPORTER.make)(&Setting::plain_run());
+    report_once(reporter.as_mut(), &REPORTER, what)
 }

@@ -9,8 +9,8 @@ use qcbus_formats::xqar::{
     Param, Results, Status,
 };
 use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
-use qcbus_report_text::{Options, TextReporter, render};
-use qcbus_reporter_sdk::{Line, NoSources, Reporter as _, Sources};
+use qcbus_report_text::{Options, REPORTER, render};
+use qcbus_reporter_sdk::{Line, NoSources, Reporter, Setting, Sources};
 
 const UNIQUE: &str = "asam.net:xodr:1.4.0:ids.id_unique_in_class";
 
@@ -293,9 +293,7 @@ fn reports_go_beside_the_result_or_into_one_file() {
     let path = |name: &str| dir.path().join(name).to_string_lossy().into_owned();
     let mut first = duplicates();
     first.xqar = path("a.xodr.xqar");
-    TextReporter::new(true, false)
-        .report(&first, &pages())
-        .unwrap();
+    new_reporter(true, false).report(&first, &pages()).unwrap();
     let own = std::fs::read_to_string(path("a.xodr.txt")).unwrap();
     assert_eq!(own, text(&first));
 
@@ -305,7 +303,7 @@ fn reports_go_beside_the_result_or_into_one_file() {
     };
     let mut other = result("a.xodr", Verdict::Accepted, Vec::new());
     (first.params, other.params) = (vec![all.clone()], vec![all]);
-    let mut reporter = TextReporter::new(true, false);
+    let mut reporter = new_reporter(true, false);
     for result in [&first, &other, &first] {
         reporter.report(result, &pages()).unwrap();
     }
@@ -317,7 +315,7 @@ fn reports_go_beside_the_result_or_into_one_file() {
     );
     assert_eq!(std::fs::read_to_string(path("all.txt")).unwrap(), expected);
 
-    let mut again = TextReporter::new(true, true);
+    let mut again = new_reporter(true, true);
     again.report(&other, &pages()).unwrap();
     assert_eq!(std::fs::read_to_string(path("all.txt")).unwrap(), expected);
 }
@@ -329,11 +327,20 @@ fn a_senseless_width_is_refused_with_what_is_allowed() {
         name: "LineWidth".into(),
         value: "wide".into(),
     });
-    let error = TextReporter::new(false, false)
+    let error = new_reporter(false, false)
         .report(&result, &NoSources)
         .unwrap_err();
     insta::assert_snapshot!(
         error,
         @r#"use the parameter LineWidth="wide": a whole number from 40 to 1000 is needed"#
     );
+}
+
+fn new_reporter(color: bool, keep: bool) -> Box<dyn Reporter> {
+    (REPORTER.make)(&Setting {
+        color,
+        keep,
+        is_run: false,
+        ..Setting::plain_run()
+    })
 }
