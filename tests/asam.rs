@@ -163,7 +163,7 @@ fn a_malformed_configuration_is_refused_with_its_place() {
 fn unknown_names_are_warned_about_with_their_place() {
     let desk = Desk::new();
     let more = "<CheckerBundle application=\"xodrBundel\"><Checker checkerId=\"c\" maxLevel=\"1\" minLevel=\"3\"/></CheckerBundle>\n\
-                <ReportModule application=\"GithubReport\"/>\n";
+                <ReportModule application=\"GitforgeReport\"/>\n";
     desk.write(
         "config.xml",
         config(&header_faults(), ALL, more).replace(HEADER, "check_qcbus_xodr_header_atributes"),
@@ -173,7 +173,7 @@ fn unknown_names_are_warned_about_with_their_place() {
     for (name, row) in [
         ("check_qcbus_xodr_header_atributes", 6),
         ("xodrBundel", 8),
-        ("GithubReport", 9),
+        ("GitforgeReport", 9),
     ] {
         let warned = said.stdout.lines().any(|line| {
             line.starts_with(&format!("config.xml:{row}:"))

@@ -148,7 +148,14 @@ fn quiet_and_json_say_no_more_than_asked() {
     desk.write("in/a.xodr", Content::Good(1).bytes());
     desk.write("in/b.xodr", Content::NoHeader(1).bytes());
     let quiet = desk.qcbus(&["check", "in", "--quiet"]);
-    assert_eq!(quiet.stdout, "in/a.xodr: accepted\nin/b.xodr: rejected\n");
+    let lines: Vec<&str> = quiet.stdout.lines().collect();
+    assert_eq!(lines.len(), 1, "{}", quiet.whole(&desk));
+    assert!(
+        lines[0].starts_with("in/b.xodr:2:1: error: "),
+        "{}",
+        lines[0]
+    );
+    assert_eq!((quiet.code, quiet.stderr.as_str()), (Some(1), ""));
     let json = desk.qcbus(&["check", "in", "--format", "json"]);
     assert_eq!(
         (json.code, json.stdout.lines().count()),

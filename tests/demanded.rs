@@ -115,19 +115,11 @@ fn how_little_was_asked_is_said_in_one_line() {
     assert_eq!(said.code, Some(0), "{whole}");
     let line = said.stdout.lines().find(|line| line.contains("not asked"));
     let line = line.unwrap_or_else(|| panic!("{whole}")).trim();
-    let words: Vec<&str> = line.split(' ').collect();
-    let [
-        "not",
-        "asked:",
-        out,
-        "of",
-        "the",
-        all,
-        "checkers",
-        "of",
-        "xodrBundle",
-    ] = words[..]
-    else {
+    let (_, numbers) = line
+        .split_once("not asked, so the verdicts say nothing about it: ")
+        .unwrap_or_default();
+    let words: Vec<&str> = numbers.split(' ').collect();
+    let [out, "of", "the", all, "checkers", "of", "xodrBundle"] = words[..] else {
         panic!("{line}")
     };
     let (out, all): (usize, usize) = (out.parse().unwrap(), all.parse().unwrap());

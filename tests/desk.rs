@@ -168,7 +168,7 @@ const ODD: &str = r#"<Config>
   <Checker checkerId="check_asam_xodr_junctions_no_overlap"><Param name="dept" value="1"/></Checker>
 </CheckerBundle>
 <CheckerBundle application="xodrBundel"/>
-<ReportModule application="GithubReport"/>
+<ReportModule application="GitforgeReport"/>
 </Config>"#;
 
 /// Words of what is wrong with it, and the rows.
@@ -179,7 +179,7 @@ const ODDITIES: [(&str, u32); 4] = [
     ),
     ("no parameter `dept`; did you mean `depth`", 6),
     ("no bundle is called `xodrBundel`; did you mean", 8),
-    ("no reporter is called `GithubReport`", 9),
+    ("no reporter is called `GitforgeReport`", 9),
 ];
 
 fn says_it_all(text: &str) {
@@ -214,7 +214,7 @@ fn a_misspelt_parameter_alone_is_said_and_judges_nothing() {
     let kept: Vec<&str> = ODD
         .lines()
         .filter(|line| !line.contains("geometrie\"") && !line.contains("Bundel"))
-        .filter(|line| !line.contains("Github"))
+        .filter(|line| !line.contains("Gitforge"))
         .collect();
     desk.write("config.xml", kept.join("\n"));
     let said = desk.qcbus(&["check", "-c", "config.xml"]);

@@ -225,9 +225,9 @@ fn links_to_what_is_looked_at_anyway_are_nothing_to_speak_of() {
     symlink("nowhere", desk.path().join("maps/readme")).unwrap();
     desk.write("other/c.xodr", Content::Good(3).bytes());
     symlink("../other", desk.path().join("maps/other")).unwrap();
-    let said = check(&desk, &["maps", "other", "-q"]);
+    let said = check(&desk, &["maps", "other"]);
     assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
-    assert!(said.stderr.contains("3 files"), "{}", said.stderr);
+    assert!(said.stdout.contains("of 3 files;"), "{}", said.stdout);
     assert!(!said.stderr.contains("note"), "{}", said.stderr);
 }
 
@@ -495,7 +495,7 @@ fn names_that_are_no_text_have_a_result_each() {
     put_both(&desk.path().join("maps"));
     let said = check(&desk, &["maps"]);
     assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
-    assert!(said.stderr.contains("2 files: 1 accepted, 1 rejected"));
+    assert!(said.stdout.contains("of 2 files; 1 accepted, 1 rejected"));
     // The place of the error, with its line.
     assert!(
         said.stdout.contains("bytes:maps/stra%FEe.xodr:"),

@@ -132,7 +132,7 @@ impl<'r> ResultData<'r> {
         sources: &dyn Sources,
         pages: Pages,
     ) -> (ResultData<'r>, Option<Vec<u8>>) {
-        let mut gathered = Gathered {
+        let mut collected = Collected {
             result,
             sources,
             pages,
@@ -141,13 +141,13 @@ impl<'r> ResultData<'r> {
             findings: Vec::new(),
             locations: Vec::new(),
         };
-        let total = gathered.gather();
-        let Gathered {
+        let total = collected.collect();
+        let Collected {
             rules,
             mut findings,
             locations,
             ..
-        } = gathered;
+        } = collected;
         let shown = |path: &str| shown(result, path);
         let drawn = {
             let data = findings.iter_mut().flat_map(|it| &mut it.places);
@@ -185,7 +185,7 @@ pub(crate) fn generator() -> String {
 }
 
 /// Findings on their way to the page.
-struct Gathered<'r, 's> {
+struct Collected<'r, 's> {
     result: &'r ResultMessage,
     sources: &'s dyn Sources,
     pages: Pages,
@@ -196,9 +196,9 @@ struct Gathered<'r, 's> {
     locations: Vec<IssueLocation>,
 }
 
-impl<'r> Gathered<'r, '_> {
+impl<'r> Collected<'r, '_> {
     /// Takes the findings, the worst first and those of one level along the file; says how many there are.
-    fn gather(&mut self) -> usize {
+    fn collect(&mut self) -> usize {
         let bundles = self.result.results.bundles.iter();
         let checkers = bundles.flat_map(|bundle| &bundle.checkers).enumerate();
         let mut all: Vec<(usize, &Checker, &Issue, Vec<IssueLocation>)> = checkers

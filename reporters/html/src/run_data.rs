@@ -15,7 +15,7 @@ pub(crate) const MOST_FINDINGS: usize = 20_000;
 
 /// What the page of a run says of one file.
 #[derive(Serialize, Deserialize, Clone, PartialEq)]
-pub(crate) struct FileEntry {
+pub(crate) struct FileRow {
     path: String,
     verdict: String,
     /// Relative to the page of the run; empty when there is none.
@@ -28,7 +28,7 @@ pub(crate) struct FileEntry {
 
 /// A finding of one file.
 #[derive(Serialize, Deserialize, Clone, PartialEq)]
-struct Finding {
+struct FindingRow {
     file: usize,
     level: String,
     rule: i64,
@@ -45,17 +45,17 @@ pub(crate) struct RunData {
     generator: String,
     title: String,
     made: String,
-    files: Vec<FileEntry>,
+    files: Vec<FileRow>,
     rules: Vec<RuleData>,
-    findings: Vec<Finding>,
+    findings: Vec<FindingRow>,
     cuts: Vec<String>,
 }
 
 /// What one result gives to the page of a run.
 #[derive(Clone, PartialEq)]
 pub(crate) struct Section {
-    entry: FileEntry,
-    findings: Vec<(Finding, Option<RuleData>)>,
+    entry: FileRow,
+    findings: Vec<(FindingRow, Option<RuleData>)>,
 }
 
 impl Section {
@@ -71,7 +71,7 @@ impl Section {
             let place = it.places.first();
             let rule = usize::try_from(it.rule).ok();
             let rule = rule.and_then(|index| data.rules.get(index)).cloned();
-            let finding = Finding {
+            let finding = FindingRow {
                 file: 0,
                 level: it.level.to_owned(),
                 rule: -1,
@@ -83,7 +83,7 @@ impl Section {
             (finding, rule)
         };
         Section {
-            entry: FileEntry {
+            entry: FileRow {
                 path: one_line(&result.display_path),
                 verdict: result.verdict.as_str().to_owned(),
                 page,
@@ -119,7 +119,7 @@ impl RunData {
     /// The page of these sections, in the order of their paths.
     pub(crate) fn of(title: &str, sections: &BTreeMap<String, Section>) -> RunData {
         let mut rules = Rules::default();
-        let mut all: Vec<(usize, &Finding, Option<&RuleData>)> = Vec::new();
+        let mut all: Vec<(usize, &FindingRow, Option<&RuleData>)> = Vec::new();
         for (file, section) in sections.values().enumerate() {
             let findings = section.findings.iter();
             all.extend(findings.map(|(finding, rule)| (file, finding, rule.as_ref())));
@@ -128,7 +128,7 @@ impl RunData {
         // Stable: those of one level stay in the order of files and places.
         all.sort_by_key(|(_, finding, _)| Level::from_word(&finding.level));
         all.truncate(MOST_FINDINGS);
-        let findings = all.into_iter().map(|(file, finding, rule)| Finding {
+        let findings = all.into_iter().map(|(file, finding, rule)| FindingRow {
             file,
             rule: rule.map_or(-1, |rule| rules.index(rule)),
             ..finding.clone()

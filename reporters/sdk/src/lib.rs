@@ -12,6 +12,7 @@
 
 mod clean;
 mod daemon;
+mod fingerprint;
 mod form;
 mod issue_location;
 mod loaded;
@@ -28,6 +29,7 @@ mod wording;
 
 pub use clean::{one_line, printable};
 pub use daemon::{Identity, RunError, run};
+pub use fingerprint::{Repeats, fingerprint, fingerprint_of};
 pub use form::{Destination, Form, FormReporter};
 pub use issue_location::{IssueLocation, issue_locations};
 pub use loaded::{LoadError, load};

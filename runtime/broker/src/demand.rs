@@ -1,5 +1,7 @@
 //! What a configuration demands, in the state machine's words.
 
+use std::ffi::OsStr;
+use std::path::Path;
 use std::sync::Arc;
 
 use qcbus_document::FileKind;
@@ -10,6 +12,7 @@ use qcbus_messages::{Catalogue, Digest};
 use sha2::{Digest as _, Sha256};
 
 use crate::core::Demand;
+use crate::reload::{LoadError, Loaded, Sources};
 
 /// A configuration in force: parsed, encoded for the bus, and with its digest.
 #[derive(Debug, Clone)]
@@ -47,6 +50,27 @@ impl InForce {
             search: Arc::new(search),
             choice: Choice::default(),
         })
+    }
+
+    /// What was loaded, with the search path of the configuration before that of the environment.
+    /// Relative directories of the former start where the configuration lies.
+    ///
+    /// # Errors
+    /// [`LoadError::Config`] when it is too large for the bus.
+    pub fn of(sources: &Sources, loaded: &Loaded) -> Result<InForce, LoadError> {
+        let of_environment = SearchPath::of_environment();
+        let written = loaded.config.as_ref().and_then(Config::scenario_path);
+        let search = match written {
+            Some(text) => {
+                let file = sources.config.as_deref().unwrap_or(Path::new(""));
+                let base = file.parent().unwrap_or(Path::new(""));
+                SearchPath::parse(OsStr::new(text), base).then(&of_environment)
+            }
+            None => of_environment,
+        };
+        InForce::new(loaded.config.clone(), search)
+            .map(|in_force| in_force.narrowed(sources.choice.clone()))
+            .map_err(|error| LoadError::Config(error.to_string()))
     }
 
     /// The same, but only what `choice` asks for.

@@ -8,10 +8,10 @@ use qcbus_messages::control::{Request, Response, Status, Unseen};
 use tokio::sync::oneshot;
 
 use super::looks::{Look, Sighted};
-use super::start::in_force;
 use super::{Broker, Told};
 use crate::control::Asked;
 use crate::core::{Event, Notice, Stamp, Ticket};
+use crate::demand::InForce;
 use crate::gate::Gate;
 use crate::reload::{Fingerprint, LoadError, differences};
 
@@ -138,7 +138,7 @@ impl Broker {
         let loaded = self.sources.load()?;
         self.sources.still_has(&self.loaded, &loaded)?;
         let changes = differences(&self.loaded, &loaded);
-        let in_force = Arc::new(in_force(&self.sources, &loaded)?);
+        let in_force = Arc::new(InForce::of(&self.sources, &loaded)?);
         let children = (loaded.children != self.loaded.children).then(|| loaded.children.clone());
         let before = std::mem::replace(&mut self.loaded, loaded).notices;
         self.forget_older_attempts();

@@ -1,14 +1,11 @@
 //! How a broker starts: the instance, the journal, the configuration, the first look.
 
 use std::collections::{BTreeMap, HashMap};
-use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 
 use qcbus_bus::HostOptions;
-use qcbus_formats::config::Config;
-use qcbus_ingest::modular::SearchPath;
 use qcbus_messages::Role;
 use qcbus_messages::control::Unseen;
 use tokio::sync::mpsc;
@@ -26,7 +23,7 @@ use crate::intake::Intake;
 use crate::journal::{Journal, JournalError, Void};
 use crate::launches::Launches;
 use crate::options::Options;
-use crate::reload::{LoadError, Loaded, Sources};
+use crate::reload::{Loaded, Sources};
 use crate::result_paths::ResultPaths;
 use crate::scouts::Scouts;
 use crate::seams::{Children, ControlSocket, Host, now, spawn_blocking};
@@ -55,7 +52,7 @@ impl Broker {
         let journal = journal_of(&options)?;
         let results = results_of(&options)?;
         let members = journal.members()?;
-        let in_force = Arc::new(in_force(&sources, &loaded)?);
+        let in_force = Arc::new(InForce::of(&sources, &loaded)?);
         host.set_config(in_force.digest, &in_force.encoded);
         let state = State::new(options.settings.clone(), in_force.digest, in_force.demand());
         let (inbox, senders) = Inbox::new();
@@ -208,24 +205,6 @@ fn journal_of(options: &Options) -> Result<Journal, JournalError> {
         Some(state) => Journal::open(state, options.instance.name()),
         None => Journal::in_memory(),
     }
-}
-
-/// What was loaded, with the search path of the configuration before that of the environment. Relative
-/// directories of the former start where the configuration lies.
-pub(super) fn in_force(sources: &Sources, loaded: &Loaded) -> Result<InForce, LoadError> {
-    let of_environment = SearchPath::of_environment();
-    let written = loaded.config.as_ref().and_then(Config::scenario_path);
-    let search = match written {
-        Some(text) => {
-            let file = sources.config.as_deref().unwrap_or(Path::new(""));
-            let base = file.parent().unwrap_or(Path::new(""));
-            SearchPath::parse(OsStr::new(text), base).then(&of_environment)
-        }
-        None => of_environment,
-    };
-    InForce::new(loaded.config.clone(), search)
-        .map(|in_force| in_force.narrowed(sources.choice.clone()))
-        .map_err(|error| LoadError::Config(error.to_string()))
 }
 
 /// Nobody else may write results there meanwhile, but for other runs of `check`.
