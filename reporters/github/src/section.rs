@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use qcbus_formats::pool::BLOCKED;
 use qcbus_formats::xqar::{Checker, CheckerBundle, Issue, Level, Status};
 use qcbus_messages::{ResultMessage, Verdict, shown};
-use qcbus_reporter_sdk::{IssueLocation, issue_locations, one_line};
+use qcbus_reporter_sdk::{
+    IssueLocation, checkers, is_blocked, issue_locations, path_for_people, reason,
+};
 
 use crate::command::tame;
 use crate::{Entry, LONGEST_TEXT};
@@ -37,16 +38,10 @@ impl Section {
     }
 }
 
-fn checkers(result: &ResultMessage) -> impl Iterator<Item = (&CheckerBundle, &Checker)> {
-    let bundles = result.results.bundles.iter();
-    bundles.flat_map(|bundle| bundle.checkers.iter().map(move |checker| (bundle, checker)))
-}
-
 /// The checkers that could not look, whatever their status.
 fn blocked(result: &ResultMessage) -> Vec<&Checker> {
-    let is_blocked = |checker: &&Checker| checker.metadata.iter().any(|fact| fact.key == BLOCKED);
     let checkers = checkers(result).map(|(_, checker)| checker);
-    checkers.filter(is_blocked).collect()
+    checkers.filter(|it| is_blocked(it)).collect()
 }
 
 fn summary(result: &ResultMessage) -> String {
@@ -81,12 +76,10 @@ fn number_of(checkers: usize) -> String {
 fn unanswered(result: &ResultMessage) -> Vec<Entry> {
     let mut reasons: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for (bundle, checker) in checkers(result) {
-        let reason = match checker.status {
-            Some(Status::Completed | Status::Skipped) => continue,
-            Some(Status::Error) => reason(&checker.summary),
-            None => "the result does not say how it ended".to_owned(),
-        };
-        let names = reasons.entry(reason).or_default();
+        if matches!(checker.status, Some(Status::Completed | Status::Skipped)) {
+            continue;
+        }
+        let names = reasons.entry(reason(checker)).or_default();
         names.push(checker_name(bundle, checker));
     }
     let entry = |(reason, names): (String, Vec<String>)| {
@@ -112,7 +105,7 @@ fn undetermined(result: &ResultMessage) -> Entry {
         Some(first) => format!(
             "{} could not look: {}",
             number_of(blocked.len()),
-            reason(&first.summary)
+            reason(first)
         ),
         None => "no checker has looked at the file".to_owned(),
     };
@@ -133,8 +126,6 @@ fn of_the_file(result: &ResultMessage, text: &str, rule: String) -> Entry {
 
 /// The findings along the file. What is in other files goes by where it is referred to.
 fn findings(result: &ResultMessage) -> Vec<Entry> {
-    let base = result.input.strip_suffix(&result.display_path);
-    let base = base.filter(|base| base.ends_with('/'));
     let mut entries = Vec::new();
     for (bundle, checker) in checkers(result) {
         for issue in &checker.issues {
@@ -144,10 +135,7 @@ fn findings(result: &ResultMessage) -> Vec<Entry> {
             // Another file's path is relative to the same directory as that of the checked file.
             let (path, order) = match &place.path {
                 None => (&*result.display_path, here),
-                Some(path) => {
-                    let below = base.and_then(|base| path.strip_prefix(base));
-                    (below.unwrap_or(path), place.referred_at)
-                }
+                Some(path) => (path_for_people(result, path), place.referred_at),
             };
             let entry = Entry {
                 level: issue.level,
@@ -190,25 +178,4 @@ fn checker_name(bundle: &CheckerBundle, checker: &Checker) -> String {
 /// A name in which nothing ends it: the last blank of a line stands before it.
 fn without_blanks(name: &str) -> String {
     tame(name, LONGEST_TEXT).replace(' ', "_")
-}
-
-/// Why a checker did not complete: its summary without its status, which is said already, and
-/// without the count that pooling and ASAM's framework append.
-fn reason(summary: &str) -> String {
-    let line = one_line(summary);
-    let bare = ["Skipped: ", "Error: ", "Skipped. ", "Error. "]
-        .into_iter()
-        .find_map(|status| line.strip_prefix(status))
-        .unwrap_or(&line);
-    let counts = [" issue(s) are found.", " issues.", " issue."];
-    let counted = counts.into_iter().find_map(|it| bare.strip_suffix(it));
-    let reason = counted.map_or(bare, |start| {
-        start
-            .trim_end_matches(|c: char| c.is_ascii_digit())
-            .trim_end()
-    });
-    match reason {
-        "" => "no reason given".to_owned(),
-        reason => reason.to_owned(),
-    }
 }

@@ -11,13 +11,40 @@ use qcbus_reporter_sdk::ReportError;
 use sha2::{Digest as _, Sha256};
 
 /// The scripts that both pages have, in their order.
-const SHARED: &[&str] = &[include_str!("../assets/shared.js")];
+const SHARED: &[&str] = &[
+    include_str!("../assets/shared.js"),
+    include_str!("../assets/markdown.js"),
+    include_str!("../assets/list.js"),
+];
 
 /// The scripts of the page of a result, after the shared ones.
-const OF_RESULT: &[&str] = &[include_str!("../assets/report.js")];
+const OF_RESULT: &[&str] = &[
+    include_str!("../assets/plan-data.js"),
+    include_str!("../assets/plan-grid.js"),
+    include_str!("../assets/plan-pick.js"),
+    include_str!("../assets/plan-theme.js"),
+    include_str!("../assets/plan-paint.js"),
+    include_str!("../assets/plan-detail.js"),
+    include_str!("../assets/plan-tile.js"),
+    include_str!("../assets/plan-camera.js"),
+    include_str!("../assets/plan-markers.js"),
+    include_str!("../assets/plan-view.js"),
+    include_str!("../assets/model.js"),
+    include_str!("../assets/filters.js"),
+    include_str!("../assets/detail.js"),
+    include_str!("../assets/table.js"),
+    include_str!("../assets/profile.js"),
+    include_str!("../assets/road-panel.js"),
+    include_str!("../assets/help.js"),
+    include_str!("../assets/report.js"),
+];
 
 /// The scripts of the page of a run, after the shared ones.
-const OF_RUN: &[&str] = &[include_str!("../assets/run.js")];
+const OF_RUN: &[&str] = &[
+    include_str!("../assets/filters.js"),
+    include_str!("../assets/run-files.js"),
+    include_str!("../assets/run.js"),
+];
 
 const STYLE: &str = include_str!("../assets/style.css");
 

@@ -2,12 +2,11 @@
 
 use std::collections::HashMap;
 
-use qcbus_formats::pool::BLOCKED;
 use qcbus_formats::xqar::{Checker, Issue};
 use qcbus_messages::{Digest, ResultMessage};
 use qcbus_plan::{How, Spot, Target};
 use qcbus_reporter_sdk::{
-    IssueLocation, Line, Pages, Sources, issue_locations, one_line, printable, underlined,
+    IssueLocation, Line, Pages, Sources, is_blocked, issue_locations, one_line, path_for_people, printable, underlined,
 };
 use serde::Serialize;
 
@@ -377,7 +376,7 @@ fn checkers(result: &ResultMessage) -> Vec<CheckerData<'_>> {
         id: &checker.id,
         bundle: &bundle.name,
         status: checker.status.map(|status| status.as_str()),
-        blocked: checker.metadata.iter().any(|fact| fact.key == BLOCKED),
+        blocked: is_blocked(checker),
         summary: &checker.summary,
         about: &checker.description,
         findings: checker.issues.len(),
@@ -401,10 +400,7 @@ fn facts(issue: &Issue) -> Vec<(String, String)> {
     others.map(fact).collect()
 }
 
-/// Another file's path, relative to the directory that the checked file's path is relative to.
+/// Another file's path, for people.
 fn shown(result: &ResultMessage, path: &str) -> String {
-    let base = result.input.strip_suffix(&result.display_path);
-    let base = base.filter(|base| base.ends_with('/'));
-    let short = base.and_then(|base| path.strip_prefix(base));
-    one_line(short.unwrap_or(path))
+    one_line(path_for_people(result, path))
 }

@@ -2,10 +2,9 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use qcbus_formats::pool::BLOCKED;
-use qcbus_formats::xqar::{Level, Status};
+use qcbus_formats::xqar::Level;
 use qcbus_messages::{ResultMessage, Verdict};
-use qcbus_reporter_sdk::one_line;
+use qcbus_reporter_sdk::{checkers, is_open, one_line, reason};
 use serde::{Deserialize, Serialize};
 
 use crate::result_data::{ResultData, RuleData, generator};
@@ -62,9 +61,7 @@ impl Section {
     /// What a result gives. `page` leads from the page of the run to that of the result.
     pub(crate) fn of(result: &ResultMessage, data: &ResultData<'_>, page: String) -> Section {
         let count = |level: Level| {
-            let bundles = result.results.bundles.iter();
-            let checkers = bundles.flat_map(|bundle| &bundle.checkers);
-            let issues = checkers.flat_map(|checker| &checker.issues);
+            let issues = checkers(result).flat_map(|(_, checker)| &checker.issues);
             issues.filter(|issue| issue.level == level).count()
         };
         let finding = |it: &crate::result_data::FindingData| {
@@ -102,16 +99,10 @@ fn why(result: &ResultMessage) -> String {
     if result.verdict != Verdict::Undetermined {
         return String::new();
     }
-    let bundles = result.results.bundles.iter();
-    let mut checkers = bundles.flat_map(|bundle| &bundle.checkers);
-    let open = checkers.find(|checker| match checker.status {
-        Some(Status::Completed) => false,
-        Some(Status::Skipped) => checker.metadata.iter().any(|fact| fact.key == BLOCKED),
-        Some(Status::Error) | None => true,
-    });
+    let open = checkers(result).map(|(_, checker)| checker).find(|it| is_open(it));
     open.map_or_else(
         || "nobody has looked".to_owned(),
-        |checker| one_line(&format!("{}: {}", checker.id, checker.summary)),
+        |checker| one_line(&format!("{}: {}", checker.id, reason(checker))),
     )
 }
 

@@ -2,11 +2,11 @@
 
 use qcbus_formats::xqar::{Checker, Issue, Level, Status};
 use qcbus_messages::ResultMessage;
-use qcbus_reporter_sdk::issue_locations;
+use qcbus_reporter_sdk::{is_blocked, issue_locations, path_for_people, reason};
 use quick_junit::{NonSuccessKind, TestCase, TestCaseStatus};
 
-use crate::suite::{does_not_apply, is_blocked};
-use crate::text::{counted, path, reason, short};
+use crate::suite::does_not_apply;
+use crate::text::{counted, path, short};
 use crate::{LONGEST_FINDING, MOST_FINDINGS};
 
 /// How many characters of a text a message has: hosts show it on a line.
@@ -96,29 +96,13 @@ fn text_of(issue: &Issue, most: usize) -> String {
 }
 
 fn reason_of(checker: &Checker) -> String {
-    match checker.status {
-        None => "the result does not say how the checker ended".to_owned(),
-        Some(_) => short(&reason(&checker.summary), LONGEST_FINDING),
-    }
+    short(&reason(checker), LONGEST_FINDING)
 }
 
 /// How findings of one result are said.
-pub(crate) struct Findings<'r> {
-    /// Path of the checked file for people.
-    display_path: &'r str,
-    /// The directory that it is relative to, with the last slash.
-    base: Option<&'r str>,
-}
+pub(crate) struct Findings<'r>(pub(crate) &'r ResultMessage);
 
-impl<'r> Findings<'r> {
-    pub(crate) fn new(result: &'r ResultMessage) -> Findings<'r> {
-        let base = result.input.strip_suffix(&result.display_path);
-        Findings {
-            display_path: &result.display_path,
-            base: base.filter(|base| base.ends_with('/')),
-        }
-    }
-
+impl Findings<'_> {
     /// The findings of a checker, one on a line, the worst first, and how many more there are.
     fn lines(&self, checker: &Checker) -> String {
         let mut issues: Vec<&Issue> = checker.issues.iter().collect();
@@ -151,9 +135,8 @@ impl<'r> Findings<'r> {
     /// Another file's path is relative to the same directory as that of the checked file.
     fn shortened(&self, other: Option<&str>) -> String {
         let Some(other) = other else {
-            return path(self.display_path);
+            return path(&self.0.display_path);
         };
-        let below = self.base.and_then(|base| other.strip_prefix(base));
-        path(below.unwrap_or(other))
+        path(path_for_people(self.0, other))
     }
 }

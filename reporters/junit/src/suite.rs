@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use qcbus_formats::pool::{BLOCKED, NotAsked};
-use qcbus_formats::xqar::{Checker, CheckerBundle, Status};
+use qcbus_formats::pool::NotAsked;
+use qcbus_formats::xqar::Checker;
 use qcbus_messages::{Digest, ResultMessage, Verdict};
+use qcbus_reporter_sdk::{checkers, is_blocked, is_inapplicable, reason};
 use quick_junit::{NonSuccessKind, Property, TestCase, TestCaseStatus, TestSuite};
 
 use crate::case::{self, Findings};
-use crate::text::{counted, name, path, reason, short};
+use crate::text::{counted, name, path, short};
 
 /// The property by which a suite is found again: absolute path of the checked file.
 pub(crate) const INPUT: &str = "qcbus.inputFile";
@@ -27,7 +28,7 @@ pub(crate) fn suite(result: &ResultMessage, inapplicable: Inapplicable) -> TestS
     let shown_path = name(&result.display_path, "(no path)");
     let mut suite = TestSuite::new(shown_path.as_str());
     let mut names = Names::default();
-    let findings = Findings::new(result);
+    let findings = Findings(result);
     let mut cases = Vec::new();
     let mut left_out = 0;
     for (bundle, checker) in checkers(result) {
@@ -54,20 +55,10 @@ pub(crate) fn suite(result: &ResultMessage, inapplicable: Inapplicable) -> TestS
     suite
 }
 
-fn checkers(result: &ResultMessage) -> impl Iterator<Item = (&CheckerBundle, &Checker)> {
-    let bundles = result.results.bundles.iter();
-    bundles.flat_map(|bundle| bundle.checkers.iter().map(move |checker| (bundle, checker)))
-}
-
 /// Whether the file is none that the checker is for. One that found something all the same, as other
 /// tools may write it, is not passed over.
 pub(crate) fn does_not_apply(checker: &Checker) -> bool {
-    checker.status == Some(Status::Skipped) && !is_blocked(checker) && checker.issues.is_empty()
-}
-
-/// Whether a checker could not look. It owes an answer, whatever its status.
-pub(crate) fn is_blocked(checker: &Checker) -> bool {
-    checker.metadata.iter().any(|fact| fact.key == BLOCKED)
+    is_inapplicable(checker) && checker.issues.is_empty()
 }
 
 fn class(bundle: &str, shown_path: &str) -> String {
@@ -88,7 +79,7 @@ fn verdict(id: &str, class: &str, result: &ResultMessage) -> TestCase {
         [first, ..] => format!(
             "{} could not look: {}",
             counted(blocked.len(), "checker"),
-            short(&reason(&first.summary), crate::LONGEST_FINDING)
+            short(&reason(first), crate::LONGEST_FINDING)
         ),
     };
     let message = format!("{}: {why}", result.verdict);

@@ -30,27 +30,6 @@ fn legal(text: &str) -> String {
     text.replace(['\u{FFFE}', '\u{FFFF}'], "\u{FFFD}")
 }
 
-/// Why a checker did not complete: its summary without its status, which is said already, and
-/// without the count that pooling and ASAM's framework append.
-pub(crate) fn reason(summary: &str) -> String {
-    let line = one_line(summary);
-    let bare = ["Skipped: ", "Error: ", "Skipped. ", "Error. "]
-        .into_iter()
-        .find_map(|status| line.strip_prefix(status))
-        .unwrap_or(&line);
-    let counts = [" issue(s) are found.", " issues.", " issue."];
-    let counted = counts.into_iter().find_map(|it| bare.strip_suffix(it));
-    let reason = counted.map_or(bare, |start| {
-        start
-            .trim_end_matches(|c: char| c.is_ascii_digit())
-            .trim_end()
-    });
-    match reason {
-        "" => "no reason given".to_owned(),
-        reason => reason.to_owned(),
-    }
-}
-
 /// `1 finding`, `2 findings`.
 pub(crate) fn counted(count: usize, what: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
@@ -82,14 +61,6 @@ mod tests {
         assert_eq!(short("äöü", 3), "äöü");
         assert_eq!(short("äö ü", 3), "äö…");
         assert_eq!(short("", 3), "");
-    }
-
-    #[test]
-    fn a_reason_is_bare() {
-        assert_eq!(reason("Skipped: too old. 0 issues."), "too old.");
-        assert_eq!(reason("It died. 12 issue(s) are found."), "It died.");
-        assert_eq!(reason("Error. 0 issues."), "no reason given");
-        assert_eq!(reason(" \n"), "no reason given");
     }
 
     #[test]

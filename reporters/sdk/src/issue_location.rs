@@ -2,6 +2,7 @@
 
 use qcbus_formats::location::OtherPlace;
 use qcbus_formats::xqar::{Issue, Location, Locations};
+use qcbus_messages::ResultMessage;
 
 /// Where an issue shows, put together from the several ways in which a result says where.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -45,6 +46,15 @@ pub fn issue_locations(issue: &Issue) -> Vec<IssueLocation> {
         None => gather(locations),
     };
     issue.locations.iter().map(place_of).collect()
+}
+
+/// The path of another file as people read it in a report: from the directory that the checked file's path is
+/// relative to, where it lies below.
+pub fn path_for_people<'p>(result: &ResultMessage, path: &'p str) -> &'p str {
+    let base = result.input.strip_suffix(&result.display_path);
+    let base = base.filter(|base| base.ends_with('/'));
+    let short = base.and_then(|base| path.strip_prefix(base));
+    short.unwrap_or(path)
 }
 
 /// Everything that one `Locations` says.

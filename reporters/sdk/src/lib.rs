@@ -10,6 +10,7 @@
 //! [`Output`], [`Shelf`]). A reporter that turns results into text implements [`Form`] and nothing
 //! else; a crate says by a [`Registration`] what it offers.
 
+mod checkers;
 mod clean;
 mod daemon;
 mod fingerprint;
@@ -27,11 +28,12 @@ mod sources;
 mod underline;
 mod wording;
 
+pub use checkers::{checkers, is_blocked, is_inapplicable, is_open, reason};
 pub use clean::{one_line, printable};
 pub use daemon::{Identity, RunError, run};
 pub use fingerprint::{Repeats, fingerprint, fingerprint_of};
 pub use form::{Destination, Form, FormReporter};
-pub use issue_location::{IssueLocation, issue_locations};
+pub use issue_location::{IssueLocation, issue_locations, path_for_people};
 pub use loaded::{LoadError, load};
 pub use once::{OnceError, OneShot, report_once};
 pub use outlet::{Outlet, Subject, write_stream};

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use qcbus_formats::xqar::{Level, Status};
+use qcbus_formats::xqar::{Checker, Level, Status};
 use qcbus_messages::{ResultMessage, Verdict, shown};
-use qcbus_reporter_sdk::{one_line, rule_name};
+use qcbus_reporter_sdk::{checkers, is_open, one_line, reason, rule_name};
 
 use crate::paint::Paint;
 use crate::{Entry, sorted};
@@ -91,17 +91,15 @@ fn line(out: &mut String, result: &ResultMessage, entry: &Entry<'_>, rule: &str,
 
 /// Why nobody can say more: the first reason, and how many checkers there are that did not look.
 fn why(result: &ResultMessage) -> String {
-    let bundles = result.results.bundles.iter();
-    let checkers = bundles.flat_map(|bundle| &bundle.checkers);
-    let open: Vec<_> = checkers.filter(|it| crate::summary::is_open(it)).collect();
+    let open: Vec<&Checker> = checkers(result)
+        .map(|(_, checker)| checker)
+        .filter(|it| is_open(it))
+        .collect();
     let failed = open.iter().filter(|it| it.status != Some(Status::Skipped));
     let Some(first) = failed.chain(&open).next() else {
         return "nobody has looked".to_owned();
     };
-    let reason = match crate::summary::reason_of(first) {
-        reason if reason.is_empty() => "no reason given".to_owned(),
-        reason => reason,
-    };
+    let reason = reason(first);
     let first = shown::line(&first.id);
     match open.len() {
         1 => format!("{first} did not look: {reason}"),

@@ -4,7 +4,9 @@ use std::fmt::Write as _;
 
 use qcbus_formats::xqar::{DomainInfo, InfoElement, Level};
 use qcbus_messages::{ResultMessage, shown};
-use qcbus_reporter_sdk::{IssueLocation, Sources, one_line, printable, rounded, rule_name};
+use qcbus_reporter_sdk::{
+    IssueLocation, Sources, one_line, path_for_people, printable, rounded, rule_name,
+};
 
 use crate::Entry;
 use crate::paint::Paint;
@@ -96,21 +98,13 @@ impl View<'_> {
     /// `PATH:ROW:COLUMN`, as far as known.
     fn name(&self, place: &IssueLocation) -> String {
         let mut name = match &place.path {
-            Some(path) => shown::line(&self.shortened(path)).into_owned(),
+            Some(path) => shown::line(path_for_people(self.result, path)).into_owned(),
             None => shown::line(&self.result.display_path).into_owned(),
         };
         if let Some(row) = place.row {
             name.push_str(&row_column((row, place.column.unwrap_or(0))));
         }
         name
-    }
-
-    /// Another file's path, relative to the directory that the checked file's path is relative to.
-    fn shortened(&self, path: &str) -> String {
-        let base = self.result.input.strip_suffix(&self.result.display_path);
-        let base = base.filter(|base| base.ends_with('/'));
-        let short = base.and_then(|base| path.strip_prefix(base));
-        short.unwrap_or(path).to_owned()
     }
 
     /// The source line with marks; says whether there was one.

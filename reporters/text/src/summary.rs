@@ -2,10 +2,10 @@
 
 use std::fmt::Write as _;
 
-use qcbus_formats::pool::{BLOCKED, NotAsked};
-use qcbus_formats::xqar::{Checker, Level, Status};
+use qcbus_formats::pool::NotAsked;
+use qcbus_formats::xqar::{Level, Status};
 use qcbus_messages::{Digest, ResultMessage, shown};
-use qcbus_reporter_sdk::one_line;
+use qcbus_reporter_sdk::{is_inapplicable, reason};
 
 use crate::Options;
 use crate::paint::Paint;
@@ -81,27 +81,6 @@ fn checkers(result: &ResultMessage, options: &Options) -> String {
     text
 }
 
-/// Whether a checker was skipped because the file is none that it is for, and not because something
-/// was in its way.
-fn is_inapplicable(checker: &Checker) -> bool {
-    let is_blocked = || checker.metadata.iter().any(|fact| fact.key == BLOCKED);
-    checker.status == Some(Status::Skipped) && !is_blocked()
-}
-
-/// Whether a checker keeps a verdict open: it failed, or something kept it from looking.
-pub(crate) fn is_open(checker: &Checker) -> bool {
-    match checker.status {
-        Some(Status::Completed) => false,
-        Some(Status::Skipped) => !is_inapplicable(checker),
-        Some(Status::Error) | None => true,
-    }
-}
-
-/// Why a checker did not look, on one line; may be empty.
-pub(crate) fn reason_of(checker: &Checker) -> String {
-    without_count(&one_line(&checker.summary)).to_owned()
-}
-
 /// What kept somebody from looking, in lines.
 pub(crate) fn not_looked(result: &ResultMessage, options: &Options, blocked: bool) -> String {
     let options = Options {
@@ -132,11 +111,7 @@ impl Group {
             Status::Skipped => "skipped",
             Status::Completed | Status::Error => "gave no answer",
         };
-        let reason = match self.reason.as_str() {
-            "" => "no reason given",
-            reason => reason,
-        };
-        let head = format!("{word}, {}: {reason}", self.checkers.len());
+        let head = format!("{word}, {}: {}", self.checkers.len(), self.reason);
         for (number, line) in wrap(&head, width.saturating_sub(6)).iter().enumerate() {
             let _ = writeln!(out, "  {}{line}", if number == 0 { "" } else { "    " });
         }
@@ -174,7 +149,7 @@ fn groups(result: &ResultMessage, options: &Options) -> Vec<Group> {
                 continue;
             }
             let name = shown::line(&format!("{}/{}", bundle.name, checker.id)).into_owned();
-            let reason = reason_of(checker);
+            let reason = reason(checker);
             let known = groups
                 .iter_mut()
                 .find(|group| group.status == status && group.reason == reason);
@@ -212,37 +187,4 @@ fn by_cause(groups: Vec<Group>) -> Vec<Group> {
         }
     }
     merged
-}
-
-/// A summary without its status, which is said already, and without the count that pooling and
-/// ASAM's framework append.
-fn without_count(summary: &str) -> &str {
-    let bare = ["Skipped: ", "Error: "]
-        .into_iter()
-        .find_map(|status| summary.strip_prefix(status))
-        .unwrap_or(summary);
-    let counts = [" issue(s) are found.", " issues.", " issue."];
-    let Some(start) = counts
-        .into_iter()
-        .find_map(|count| bare.strip_suffix(count))
-    else {
-        return bare;
-    };
-    start
-        .trim_end_matches(|c: char| c.is_ascii_digit())
-        .trim_end()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::without_count;
-
-    #[test]
-    fn the_appended_count_is_no_reason() {
-        assert_eq!(without_count("Too old. 0 issue(s) are found."), "Too old.");
-        assert_eq!(without_count("0 issue(s) are found."), "");
-        assert_eq!(without_count("Too old."), "Too old.");
-        assert_eq!(without_count("Skipped: too old. 0 issues."), "too old.");
-        assert_eq!(without_count("Error: it died. 1 issue."), "it died.");
-    }
 }

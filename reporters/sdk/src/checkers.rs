@@ -1,0 +1,83 @@
+//! What a result says of its checkers, apart from what they found.
+
+use qcbus_formats::pool::BLOCKED;
+use qcbus_formats::xqar::{Checker, CheckerBundle, Status};
+use qcbus_messages::ResultMessage;
+
+use crate::one_line;
+
+/// The checkers of a result with their bundles, in its order.
+pub fn checkers(result: &ResultMessage) -> impl Iterator<Item = (&CheckerBundle, &Checker)> {
+    let bundles = result.results.bundles.iter();
+    bundles.flat_map(|bundle| bundle.checkers.iter().map(move |checker| (bundle, checker)))
+}
+
+/// Whether something was in the way of a checker that would have looked: it rests on others, and
+/// those found errors or failed.
+pub fn is_blocked(checker: &Checker) -> bool {
+    checker.metadata.iter().any(|fact| fact.key == BLOCKED)
+}
+
+/// Whether a checker was skipped because the file is none that it is for. That is an answer.
+pub fn is_inapplicable(checker: &Checker) -> bool {
+    checker.status == Some(Status::Skipped) && !is_blocked(checker)
+}
+
+/// Whether a checker gave no answer: it failed, something was in its way, or, as other tools write it,
+/// nobody says how it ended.
+pub fn is_open(checker: &Checker) -> bool {
+    match checker.status {
+        Some(Status::Completed) => is_blocked(checker),
+        Some(Status::Skipped) => is_blocked(checker),
+        Some(Status::Error) | None => true,
+    }
+}
+
+/// Why a checker ended as it did, on one line: its summary without the status, which is said
+/// already, and without the count that pooling and ASAM's framework append.
+pub fn reason(checker: &Checker) -> String {
+    if checker.status.is_none() {
+        return "the result does not say how it ended".to_owned();
+    }
+    let line = one_line(&checker.summary);
+    let bare = ["Skipped: ", "Error: ", "Skipped. ", "Error. "]
+        .into_iter()
+        .find_map(|status| line.strip_prefix(status))
+        .unwrap_or(&line);
+    let counts = ["issue(s) are found.", "issues.", "issue."];
+    let counted = counts.into_iter().find_map(|it| bare.strip_suffix(it));
+    let without_count = counted.and_then(|start| {
+        let start = start.strip_suffix(' ')?;
+        let rest = start.trim_end_matches(|c: char| c.is_ascii_digit());
+        (rest.len() < start.len()).then(|| rest.trim_end())
+    });
+    match without_count.unwrap_or(bare) {
+        "" => "no reason given".to_owned(),
+        reason => reason.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_appended_count_is_no_reason() {
+        for (summary, text) in [
+            ("Too old. 0 issue(s) are found.", "Too old."),
+            ("0 issue(s) are found.", "no reason given"),
+            ("Too old.", "Too old."),
+            ("Skipped: too old. 0 issues.", "too old."),
+            ("Error: it died. 1 issue.", "it died."),
+            ("Error: this is an issue.", "this is an issue."),
+            ("", "no reason given"),
+        ] {
+            let checker = Checker {
+                status: Some(Status::Error),
+                summary: summary.to_owned(),
+                ..Checker::default()
+            };
+            assert_eq!(reason(&checker), text);
+        }
+    }
+}

@@ -1,0 +1,417 @@
+//! What `qcbus check` prints and writes besides results, and with what it ends.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use support::content::Content;
+use support::desk::{Desk, Said, files_below, issues, sample_farm};
+
+/// A road that only a warning can be said about: its name of a junction is written twice.
+fn warned_of() -> Vec<u8> {
+    let farm = sample_farm();
+    std::fs::read(farm.join("modular/convoy.xosc")).unwrap()
+}
+
+fn desk() -> Desk {
+    let desk = Desk::new();
+    desk.write("in/good.xodr", Content::Good(1).bytes());
+    desk.write("in/bad.xodr", Content::NoHeader(1).bytes());
+    desk
+}
+
+fn read(desk: &Desk, name: &str) -> String {
+    let path = desk.path().join(name);
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+fn last_line(said: &Said) -> &str {
+    said.stdout.lines().last().unwrap_or_default()
+}
+
+#[test]
+fn of_one_file_everything_is_shown_and_of_several_a_line_each() {
+    let desk = desk();
+    let one = desk.qcbus(&["check", "in/bad.xodr"]);
+    assert!(
+        one.stdout.starts_with("error[xml.fileheader_is_present]: "),
+        "{}",
+        one.stdout
+    );
+    assert!(
+        one.stdout.contains(" --> in/bad.xodr:2:1\n"),
+        "{}",
+        one.stdout
+    );
+    let two = desk.qcbus(&["check", "in"]);
+    assert!(
+        two.stdout.starts_with("in/bad.xodr:2:1: error: "),
+        "{}",
+        two.stdout
+    );
+    let full = desk.qcbus(&["check", "in", "--output-format", "full"]);
+    assert!(
+        full.stdout.contains(" --> in/bad.xodr:2:1\n"),
+        "{}",
+        full.stdout
+    );
+    let good = desk.qcbus(&["check", "in/good.xodr"]);
+    assert_eq!(
+        good.stdout,
+        "0 errors, 0 warnings in 0 of 1 file; 1 accepted; results in qcbus-out\n"
+    );
+}
+
+#[test]
+fn a_line_for_programs_is_found_by_a_problem_matcher() {
+    let desk = desk();
+    let said = desk.qcbus(&["check", "in", "--output-format", "concise", "-q"]);
+    for line in said.stdout.lines() {
+        // What docs/ci.md gives to editors: PATH:ROW:COLUMN: LEVEL: TEXT [RULE]
+        let (place, rest) = line.split_once(": ").unwrap();
+        let parts: Vec<&str> = place.rsplitn(3, ':').collect();
+        assert!(
+            parts[0].parse::<u64>().is_ok() && parts[1].parse::<u64>().is_ok(),
+            "{line}"
+        );
+        assert!(
+            desk.path().join(parts[2]).is_file(),
+            "a click opens it: {line}"
+        );
+        let (level, text) = rest.split_once(": ").unwrap();
+        assert!(
+            ["error", "warning", "information"].contains(&level),
+            "{line}"
+        );
+        assert!(text.ends_with(']') && text.contains(" ["), "{line}");
+    }
+    assert_eq!(said.stdout.lines().count(), 1);
+}
+
+#[test]
+fn paths_are_those_from_here() {
+    let desk = desk();
+    let absolute = desk.path().canonicalize().unwrap().join("in/bad.xodr");
+    let said = desk.qcbus(&["check", &absolute.to_string_lossy(), "--format", "concise"]);
+    assert!(
+        said.stdout.starts_with("in/bad.xodr:2:1: "),
+        "{}",
+        said.stdout
+    );
+}
+
+#[test]
+fn several_formats_go_to_a_file_each() {
+    let desk = desk();
+    let formats = "sarif=r/all.sarif,junit=r/all.xml,gitlab=r/all.json,json=r/lines.json,\
+                   concise=r/all.txt,html=r/all.html,github";
+    let said = desk.qcbus(&["check", "in", "--output-format", formats]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    assert!(
+        said.stdout.contains("::error file=in/bad.xodr,line=2"),
+        "{}",
+        said.stdout
+    );
+    assert!(said.stderr.contains("1 rejected"), "{}", said.whole(&desk));
+    let sarif: serde_json::Value = serde_json::from_str(&read(&desk, "r/all.sarif")).unwrap();
+    assert_eq!(sarif["runs"].as_array().unwrap().len(), 1);
+    assert!(!sarif["runs"][0]["results"].as_array().unwrap().is_empty());
+    let issues: serde_json::Value = serde_json::from_str(&read(&desk, "r/all.json")).unwrap();
+    assert_eq!(issues[0]["location"]["path"], "in/bad.xodr");
+    assert!(read(&desk, "r/all.xml").contains("<failure"));
+    assert_eq!(
+        read(&desk, "r/lines.json")
+            .matches("\"resultFile\"")
+            .count(),
+        2
+    );
+    assert!(read(&desk, "r/all.txt").starts_with("in/bad.xodr:2:1: error: "));
+    assert!(read(&desk, "r/all.html").contains("Content-Security-Policy"));
+    let mut pages = files_below(&desk.path().join("r/all-files"));
+    pages.sort();
+    let expected = ["in/bad.xodr.html", "in/good.xodr.html"].map(std::path::PathBuf::from);
+    assert_eq!(pages, expected);
+}
+
+#[test]
+fn a_page_of_one_file_stands_alone() {
+    let desk = desk();
+    let said = desk.qcbus(&["check", "in/bad.xodr", "--output-format", "html"]);
+    assert_eq!(said.code, Some(1));
+    assert!(
+        last_line(&said).ends_with("report in qcbus-out/report.html"),
+        "{}",
+        said.stdout
+    );
+    assert!(read(&desk, "qcbus-out/report.html").contains("bad.xodr"));
+    assert!(!desk.path().join("qcbus-out/report-files").exists());
+}
+
+#[test]
+fn what_cannot_be_written_is_said_before_anything_is_checked() {
+    let desk = desk();
+    desk.write("file", "");
+    for (format, words) in [
+        ("sarif,junit", "cannot both be printed"),
+        ("sarif=file/x.sarif", "file"),
+        ("sarif=in", "name a file"),
+        ("sarif=", "name a file"),
+        ("serif=x", "serif"),
+    ] {
+        let said = desk.qcbus(&["check", "in", "--output-format", format]);
+        assert_eq!(said.code, Some(2), "{format}: {}", said.whole(&desk));
+        assert!(said.stderr.contains(words), "{format}: {}", said.stderr);
+        assert!(said.stdout.is_empty(), "{format}: {}", said.stdout);
+        assert!(!desk.path().join("qcbus-out").exists(), "{format}");
+    }
+}
+
+#[test]
+fn what_is_left_out_is_said_and_the_result_says_so() {
+    let desk = desk();
+    let said = desk.qcbus(&["check", "in", "--ignore", "xml.fileheader_is_present"]);
+    let whole = said.whole(&desk);
+    assert!(
+        !said.stdout.contains("[xml.fileheader_is_present]"),
+        "{whole}"
+    );
+    assert!(
+        said.stdout
+            .contains("not asked, so the verdicts say nothing about it: 1 of"),
+        "{whole}"
+    );
+    let results = desk.result("qcbus-out/in/bad.xodr.xqar");
+    let said = issues(&results).find(|(checker, _)| checker.id == "qcbus_choice");
+    let text = &said.unwrap().1.description;
+    assert!(
+        text.contains("`--ignore xml.fileheader_is_present`"),
+        "{text}"
+    );
+}
+
+#[test]
+fn to_select_asks_nobody_else() {
+    let desk = desk();
+    let said = desk.qcbus(&["check", "in/good.xodr", "--select", "ids"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    let results = desk.result("qcbus-out/good.xodr.xqar");
+    let asked = support::desk::checkers(&results).map(|checker| checker.id.as_str());
+    let asked: Vec<&str> = asked.filter(|id| *id != "qcbus_choice").collect();
+    assert!(
+        !asked.is_empty() && asked.iter().all(|id| id.contains("_ids_")),
+        "{asked:?}"
+    );
+}
+
+#[test]
+fn where_nobody_is_asked_nothing_is_accepted() {
+    let desk = desk();
+    let said = desk.qcbus(&["check", "in/good.xodr", "--select", "xosc"]);
+    assert_eq!(said.code, Some(3), "{}", said.whole(&desk));
+}
+
+#[test]
+fn what_something_rests_on_cannot_be_ignored_away() {
+    let desk = desk();
+    desk.write("torn.xodr", "<OpenDRIVE><road>");
+    let said = desk.qcbus(&["check", "torn.xodr", "--ignore", "xml.valid_xml_document"]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+}
+
+#[test]
+fn a_name_that_fits_nothing_is_a_mistake() {
+    let desk = desk();
+    for flag in ["--select", "--ignore"] {
+        let said = desk.qcbus(&["check", "in", flag, "ids,xml.fileheader_is_presnt"]);
+        assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
+        assert!(
+            said.stderr
+                .contains("did you mean `xml.fileheader_is_present`?"),
+            "{}",
+            said.stderr
+        );
+    }
+}
+
+#[test]
+fn the_exit_code_is_what_somebody_wants_of_it() {
+    let desk = desk();
+    desk.write("in/modular/convoy.xosc", warned_of());
+    let farm = sample_farm();
+    let convoy = "modular/convoy.xosc";
+    let code = |arguments: &[&str]| {
+        let mut all = vec![convoy];
+        all.extend(arguments);
+        desk.check_in(&farm, &all, "out").code
+    };
+    assert_eq!(code(&[]), Some(0));
+    assert_eq!(code(&["--fail-level", "warning"]), Some(1));
+    assert_eq!(code(&["--fail-level", "warning", "--exit-zero"]), Some(0));
+    let bad = desk.qcbus(&["check", "in/bad.xodr", "--exit-zero"]);
+    assert_eq!(bad.code, Some(0));
+    assert!(
+        last_line(&bad).contains("1 rejected"),
+        "the verdict stays: {}",
+        bad.stdout
+    );
+    let nobody = desk.qcbus(&["check", "in/good.xodr", "--exit-zero", "--select", "xosc"]);
+    assert_eq!(nobody.code, Some(3), "that nobody looked is no finding");
+}
+
+#[test]
+fn quiet_loses_no_finding() {
+    let desk = desk();
+    let loud = desk.qcbus(&["check", "in", "--format", "concise"]);
+    let quiet = desk.qcbus(&["check", "in", "--format", "concise", "-q"]);
+    assert!(loud.stdout.starts_with(&quiet.stdout) && !quiet.stdout.is_empty());
+    assert_eq!(quiet.stderr, "");
+    let good = desk.qcbus(&["check", "in/good.xodr", "-q"]);
+    assert_eq!((good.stdout.as_str(), good.stderr.as_str()), ("", ""));
+}
+
+#[test]
+fn verbose_says_what_was_skipped_and_why() {
+    let desk = desk();
+    let said = desk.qcbus(&["check", "in", "-v"]);
+    for words in [
+        "accepted: in/good.xodr",
+        "skipped",
+        "sha256: ",
+        "(xodrBundle/",
+    ] {
+        assert!(said.stdout.contains(words), "{words}: {}", said.stdout);
+    }
+    let plain = desk.qcbus(&["check", "in"]);
+    assert!(!plain.stdout.contains("skipped"), "{}", plain.stdout);
+}
+
+#[test]
+fn colours_are_there_when_they_are_wanted() {
+    let desk = desk();
+    let coloured = |when: &str| {
+        let said = desk.qcbus(&["check", "in", "--color", when]);
+        said.stdout.contains("\u{1b}[")
+    };
+    assert!(coloured("always"));
+    assert!(!coloured("never"));
+    assert!(!coloured("auto"), "this is no terminal");
+}
+
+#[test]
+fn two_inputs_of_one_name_have_a_result_each() {
+    let desk = desk();
+    desk.write("a/m.xodr", Content::Good(1).bytes());
+    desk.write("b/m.xodr", Content::NoHeader(1).bytes());
+    let said = desk.qcbus(&["check", "a/m.xodr", "b/m.xodr", "--format", "html"]);
+    assert_eq!(said.code, Some(1));
+    let files = files_below(&desk.path().join("qcbus-out"));
+    let results = files
+        .iter()
+        .filter(|it| it.to_string_lossy().ends_with(".xqar"));
+    assert_eq!(results.count(), 2, "{files:?}");
+    let pages = files.iter().filter(|it| it.starts_with("report-files"));
+    assert_eq!(pages.count(), 2, "{files:?}");
+}
+
+#[test]
+fn of_many_files_the_end_says_what_to_mend_first() {
+    let desk = Desk::new();
+    for number in 0..300 {
+        let content = match number % 5 {
+            0 => Content::NoHeader(number),
+            1 if number < 20 => Content::NoVersion(number),
+            _ => Content::Good(number),
+        };
+        desk.write(&format!("in/{number:03}.xodr"), content.bytes());
+    }
+    let said = desk.qcbus(&["check", "in"]);
+    let (findings, end) = said.stdout.split_once("fix first:\n").unwrap();
+    assert_eq!(findings.lines().count(), 64);
+    let rows: Vec<&str> = end.lines().collect();
+    assert!(rows[0].trim().starts_with("60 in 60 files  error"), "{end}");
+    assert!(rows[0].contains("xml.fileheader_is_present"), "{end}");
+    assert!(rows[1].trim().starts_with("4 in 4 files  error"), "{end}");
+    assert_eq!(
+        last_line(&said),
+        "64 errors, 0 warnings in 64 of 300 files; 236 accepted, 64 rejected; results in qcbus-out"
+    );
+    let counted = desk.qcbus(&["check", "in", "-q", "--statistics"]);
+    let (_, end) = counted.stdout.split_once("findings by rule:\n").unwrap();
+    assert_eq!(end.lines().count(), 2, "{end}");
+}
+
+#[test]
+fn a_report_is_made_of_results_that_are_there() {
+    let desk = desk();
+    desk.qcbus(&["check", "in"]);
+    let (bad, good) = ("qcbus-out/in/bad.xodr.xqar", "qcbus-out/in/good.xodr.xqar");
+    for format in [
+        "text", "concise", "json", "sarif", "junit", "gitlab", "github",
+    ] {
+        let said = desk.qcbus(&["report", format, bad, good]);
+        assert_eq!(said.code, Some(0), "{format}: {}", said.whole(&desk));
+        assert!(
+            said.stdout.contains("fileheader_is_present"),
+            "{format}: {}",
+            said.stdout
+        );
+    }
+    let said = desk.qcbus(&["report", "html", bad, good]);
+    assert_eq!(
+        (said.code, said.stdout.as_str()),
+        (Some(0), ""),
+        "{}",
+        said.whole(&desk)
+    );
+    assert!(read(&desk, "qcbus-out/in/bad.xodr.html").contains("in/bad.xodr"));
+    let said = desk.qcbus(&["report", "sarif", bad, "-o", "one.sarif"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    assert!(read(&desk, "one.sarif").contains("2.1.0"));
+    desk.write("none.xqar", "<CheckerResults");
+    for (file, words) in [
+        ("none.xqar", "as a result"),
+        ("nowhere.xqar", "nowhere.xqar"),
+    ] {
+        let said = desk.qcbus(&["report", "json", good, file]);
+        assert_eq!(
+            (said.code, said.stdout.as_str()),
+            (Some(2), ""),
+            "{}",
+            said.whole(&desk)
+        );
+        assert!(said.stderr.contains(words), "{}", said.stderr);
+    }
+}
+
+#[test]
+fn rules_are_found_by_what_people_remember_of_them() {
+    let desk = Desk::new();
+    let family = desk.qcbus(&["rule", "ids"]);
+    assert_eq!(family.code, Some(2));
+    assert!(
+        family
+            .stderr
+            .contains("check_asam_xodr_ids_only_ref_defined_ids"),
+        "{}",
+        family.stderr
+    );
+    let near = desk.qcbus(&["rule", "ids.only_ref_defind_ids"]);
+    assert!(
+        near.stderr
+            .contains("did you mean `ids.only_ref_defined_ids`?"),
+        "{}",
+        near.stderr
+    );
+    let word = desk.qcbus(&["rule", "smoothness of elevation"]);
+    assert!(word.stderr.contains("smoothness"), "{}", word.stderr);
+    let page = desk.qcbus(&["rule", "ids.only_ref_defined_ids"]);
+    assert!(
+        page.stdout.contains("https://publications.pages.asam.net/"),
+        "{}",
+        page.stdout
+    );
+}
