@@ -18,6 +18,7 @@ use super::verdicts::JUDGE;
 use crate::support::desk::files_below;
 use crate::support::dice::Dice;
 use crate::support::farm::Farm;
+use crate::support::reports::torn;
 use crate::support::watchdog::pause;
 
 /// Something that was seen.
@@ -35,6 +36,8 @@ pub struct Seen {
 pub enum What {
     /// A verdict file.
     Told(Box<Told>),
+    /// A report that was not whole.
+    TornReport { name: String, why: String },
     /// A file behind the gate.
     Published { name: String, digest: String },
     /// An answer to `qcbus wait`.
@@ -171,6 +174,8 @@ impl Drop for Watchers {
 
 /// How often the results and the gate are looked through.
 const LOOK: Duration = Duration::from_millis(10);
+/// Every so many looks at the reports there are.
+const LOOK_AT_REPORTS: u32 = 50;
 /// Every so many looks the broker is asked what it has to say.
 const ASK_STATUS: u32 = 10;
 
@@ -181,6 +186,9 @@ fn look(shared: &Shared) {
     let (mut results, mut gate) = (Marks::new(), Marks::new());
     let (mut from, mut round) = (Duration::ZERO, 0);
     let mut told: Vec<(String, String)> = Vec::new();
+    // Those that are documents, of which half can be told from the whole.
+    let documents = [".sarif", ".junit.xml", ".html"];
+    let mut reports = documents.map(|suffix| (suffix, Marks::new()));
     while !shared.is_over() {
         let begun = shared.start.elapsed();
         for (name, bytes) in changed(&shared.out, &mut results, ".verdict.json") {
@@ -191,6 +199,16 @@ fn look(shared: &Shared) {
         for (name, bytes) in changed(&shared.gate, &mut gate, "") {
             let digest = ledger::digest(&bytes);
             shared.saw(from, What::Published { name, digest });
+        }
+        if round % LOOK_AT_REPORTS == 0 {
+            for (suffix, marks) in &mut reports {
+                for (file, bytes) in changed(&shared.out, marks, suffix) {
+                    let name = format!("{file}{suffix}");
+                    if let Some(why) = torn(&name, &bytes) {
+                        shared.saw(from, What::TornReport { name, why });
+                    }
+                }
+            }
         }
         if round % ASK_STATUS == 0
             && let Ok(Response::Status(status)) = ask_broker(&shared.instance, &Request::Status)

@@ -23,6 +23,7 @@ use crate::support::farm::{Farm, shm_segments, tail};
 use crate::support::inside::is_inside;
 use crate::support::judge::{judge_with, verdicts_in_journal};
 use crate::support::processes::{peak_private_kib, private_kib};
+use crate::support::reports::{REPORTS, reported};
 use crate::support::watchdog::{until, until_or};
 use crate::{end, report};
 
@@ -91,10 +92,6 @@ fn arguments(farm: &Farm) -> Vec<String> {
     let words = [
         "--gate",
         &gate.to_string_lossy(),
-        "--report",
-        "text",
-        "--report",
-        "json",
         "--silence-limit",
         "4s",
         "--job-deadline",
@@ -104,7 +101,12 @@ fn arguments(farm: &Farm) -> Vec<String> {
         "--memory-limit",
         "1024",
     ];
-    words.iter().map(|it| (*it).to_owned()).collect()
+    let reports = REPORTS.iter().flat_map(|(alias, _)| ["--report", alias]);
+    words
+        .into_iter()
+        .chain(reports)
+        .map(str::to_owned)
+        .collect()
 }
 
 /// What must be so of everything that was seen while it stormed.
@@ -200,12 +202,9 @@ fn demand(mut driver: Driver, seen: usize, start_kib: u64, end_kib: u64, seconds
     ));
 }
 
-/// What the standard reporters put behind a file's name.
-const REPORTS: [&str; 2] = [".txt", ".json"];
-
 /// The reporters have everything, too, and nothing about files that have gone.
 fn reports_are_there(driver: &Driver) {
-    let with_suffixes = |name: &String| REPORTS.map(|suffix| format!("{name}{suffix}"));
+    let with_suffixes = |name: &String| REPORTS.map(|(_, suffix)| format!("{name}{suffix}"));
     for name in driver.files.keys().flat_map(with_suffixes) {
         let path = driver.farm.out().join(name);
         until_or(
@@ -217,11 +216,8 @@ fn reports_are_there(driver: &Driver) {
     let left = || -> Vec<String> {
         let files = files_below(&driver.farm.out()).into_iter();
         let names = files.map(|it| it.to_string_lossy().into_owned());
-        let gone = |name: &String| {
-            let file = REPORTS.iter().find_map(|suffix| name.strip_suffix(suffix));
-            let verdict = name.ends_with(".verdict.json");
-            !verdict && file.is_some_and(|file| !driver.files.contains_key(file))
-        };
+        let gone =
+            |name: &String| reported(name).is_some_and(|file| !driver.files.contains_key(file));
         names.filter(gone).collect()
     };
     until_or(

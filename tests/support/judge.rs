@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 use super::content::{Content, STRICT};
 use super::desk::files_below;
 use super::farm::Farm;
+use super::reports::{reported, torn};
 
 /// The files that are there, by name.
 pub type Files = BTreeMap<String, Content>;
@@ -209,7 +210,13 @@ impl Judgement {
             let results = [".xqar", ".verdict.json"];
             let file = results.iter().find_map(|suffix| name.strip_suffix(suffix));
             // Reports are withdrawn by their reporters, later than results.
-            let report = file.is_none() && [".txt", ".json"].iter().any(|it| name.ends_with(it));
+            let report = file.is_none() && reported(&name).is_some();
+            if report
+                && let Ok(bytes) = std::fs::read(farm.out().join(&path))
+                && let Some(why) = torn(&name, &bytes)
+            {
+                self.complain(&name, &format!("is no whole report: {why}"));
+            }
             if !report && !file.is_some_and(|file| files.contains_key(file)) {
                 self.complain(&name, "lies among the results, and no file is there for it");
             }

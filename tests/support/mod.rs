@@ -12,5 +12,6 @@ pub mod farm;
 pub mod inside;
 pub mod judge;
 pub mod processes;
+pub mod reports;
 pub mod tracer;
 pub mod watchdog;

@@ -17,9 +17,9 @@
 //!   most, below the 50 of a job. Reports in files of their own have these limits each: who prints
 //!   several in one step loses some, so one report of all files (`OutputFile`) is what a step should
 //!   print.
-//! * **No answer is an error.** Checkers that failed or have no status, one error for each reason, and
-//!   verdicts that are undetermined for other reasons. A checker without a status, as other tools write
-//!   it, is one also where the verdict takes it at its issues and accepts.
+//! * **No answer is an error.** Checkers that failed, one error for each reason, and verdicts that are
+//!   undetermined for other reasons. A checker without a status, as ASAM's first form of results has it,
+//!   is taken at its issues, as the verdict takes it.
 //! * **Text of others is no command.** A runner knows two forms: `::error::` at the begin of a line, after
 //!   blanks, and the older `##[error]` anywhere in it. No line begins with text of others: findings
 //!   begin with a path, in which a colon is written as `%3A`. Two `#` one after the other get a blank

@@ -1,11 +1,9 @@
 //! What is said of a checked file.
 
-use std::collections::BTreeMap;
-
-use qcbus_formats::xqar::{Checker, CheckerBundle, Issue, Level, Status};
+use qcbus_formats::xqar::{Checker, CheckerBundle, Issue, Level};
 use qcbus_messages::{ResultMessage, Verdict, shown};
 use qcbus_reporter_sdk::{
-    IssueLocation, checkers, is_blocked, issue_locations, path_for_people, reason,
+    IssueLocation, Silence, checkers, is_blocked, issue_locations, path_for_people, silences,
 };
 
 use crate::command::tame;
@@ -21,15 +19,9 @@ pub struct Section {
     pub entries: Vec<Entry>,
 }
 
-/// How many checkers without an answer are named; the others are counted.
-const MOST_NAMES: usize = 3;
-
 impl Section {
     pub(crate) fn of(result: &ResultMessage) -> Section {
         let mut entries = unanswered(result);
-        if result.verdict == Verdict::Undetermined && entries.is_empty() {
-            entries.push(undetermined(result));
-        }
         entries.extend(findings(result));
         Section {
             summary: summary(result),
@@ -72,45 +64,22 @@ fn number_of(checkers: usize) -> String {
     format!("{checkers} checker{plural}")
 }
 
-/// Checkers that failed or have no status, an entry for each reason.
+/// What gave no answer, an entry for each reason.
 fn unanswered(result: &ResultMessage) -> Vec<Entry> {
-    let mut reasons: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    for (bundle, checker) in checkers(result) {
-        if matches!(checker.status, Some(Status::Completed | Status::Skipped)) {
-            continue;
-        }
-        let names = reasons.entry(reason(checker)).or_default();
-        names.push(checker_name(bundle, checker));
-    }
-    let entry = |(reason, names): (String, Vec<String>)| {
-        let mut named = names.iter().take(MOST_NAMES).cloned().collect::<Vec<_>>();
-        if let more @ 1.. = names.len().saturating_sub(MOST_NAMES) {
-            named.push(format!("{more} more"));
-        }
-        let said = format!(
-            "{} gave no answer ({}): {reason}",
-            number_of(names.len()),
-            named.join(", ")
-        );
-        let rule = names.into_iter().next().unwrap_or_default();
-        of_the_file(result, &said, rule)
+    let about = match result.verdict {
+        Verdict::Undetermined => "the file is undetermined, not accepted",
+        Verdict::Accepted | Verdict::Rejected => "the file was not looked at by all",
     };
-    reasons.into_iter().map(entry).collect()
-}
-
-/// Why a file is undetermined though no checker failed.
-fn undetermined(result: &ResultMessage) -> Entry {
-    let blocked = blocked(result);
-    let why = match blocked.first() {
-        Some(first) => format!(
-            "{} could not look: {}",
-            number_of(blocked.len()),
-            reason(first)
-        ),
-        None => "no checker has looked at the file".to_owned(),
+    let entry = |silence: Silence| {
+        let said = format!("{about}: {silence}");
+        let rule = silence.names.into_iter().next();
+        of_the_file(
+            result,
+            &said,
+            rule.unwrap_or_else(|| "qcbus/verdict".to_owned()),
+        )
     };
-    let said = format!("the verdict is undetermined: {why}");
-    of_the_file(result, &said, "qcbus/verdict".to_owned())
+    silences(result).into_iter().map(entry).collect()
 }
 
 fn of_the_file(result: &ResultMessage, text: &str, rule: String) -> Entry {

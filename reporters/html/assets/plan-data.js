@@ -5,7 +5,8 @@
 
 /**
  * @typedef {object} PlanLane
- * @property {number} id
+ * @property {number} id 0 where the file has no whole number
+ * @property {boolean} left on which side of the center it lies
  * @property {string} type
  * @property {number} inner line further in
  * @property {number} outer its own line
@@ -43,7 +44,7 @@
  */
 
 /** @typedef {{id: string, name: string, type: string, connections: [number, number][], outline: Int32Array, box: Box}} PlanJunction */
-/** @typedef {{id: string, name: string, type: string, subtype: string, road: number, s: number, t: number, x: number, y: number, heading: number, dynamic: boolean}} PlanSignal */
+/** @typedef {{id: string, name: string, type: string, subtype: string, road: number, s: number, t: number, x: number, y: number, heading: number, dynamic: boolean, box: Box}} PlanSignal */
 /** @typedef {{id: string, name: string, type: string, road: number, s: number, t: number, outline: Int32Array, box: Box}} PlanObject */
 
 /** A list of numbers that grows. */
@@ -339,18 +340,18 @@ class RoadReader {
     const s1 = reader.unsigned();
     this.box = emptyBox();
     const center = this.border();
-    const lanes = [...this.side(center), ...this.side(center)];
+    const lanes = [...this.side(center, true), ...this.side(center, false)];
     return { road, index, s0, s1, center, lanes, box: this.box };
   }
 
-  /** The lanes of a side, outward: each begins where the one before ends. @param {number} center */
-  side(center) {
+  /** The lanes of a side, outward: each begins where the one before ends. @param {number} center @param {boolean} left */
+  side(center, left) {
     let inner = center;
     return this.reader.items(5, () => {
       const id = this.reader.signed();
       const type = this.reader.text();
       const outer = this.border();
-      const lane = { id, type, inner, outer, widths: this.reader.profile(false) };
+      const lane = { id, left, type, inner, outer, widths: this.reader.profile(false) };
       inner = outer;
       return lane;
     });
@@ -375,7 +376,8 @@ function readSignal(reader) {
   const y = reader.coordinate(reader.signed());
   const heading = reader.signed() / 1000;
   const flags = reader.unsigned();
-  return { id, name, type, subtype, road, s, t, x, y, heading, dynamic: (flags & 1) !== 0 };
+  const box = (flags & 2) === 0 ? /** @type {Box} */ ([x, y, x, y]) : emptyBox();
+  return { id, name, type, subtype, road, s, t, x, y, heading, dynamic: (flags & 1) !== 0, box };
 }
 
 /** @param {PlanReader} reader @returns {PlanObject} */
@@ -407,7 +409,7 @@ function decodePlan(bytes) {
   const box = emptyBox();
   for (const road of roads) growBox(box, road.box);
   for (const junction of junctions) growBox(box, junction.box);
-  for (const { x, y } of signals) if (x !== 0 || y !== 0) growBox(box, [x, y, x, y]);
+  for (const signal of signals) growBox(box, signal.box);
   for (const object of objects) growBox(box, object.box);
   const sections = roads.flatMap((road) => road.sections);
   return {

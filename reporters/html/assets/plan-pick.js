@@ -19,7 +19,7 @@ function indexPlan(plan) {
     plan,
     sections: new Grid(plan.sections.map((section) => section.box)),
     junctions: new Grid(plan.junctions.map((junction) => junction.box)),
-    signals: new Grid(plan.signals.map(({ x, y }) => /** @type {Box} */ ([x, y, x, y]))),
+    signals: new Grid(plan.signals.map((signal) => signal.box)),
     objects: new Grid(plan.objects.map((object) => object.box)),
     roadsById: byId(plan.roads),
     junctionsById: byId(plan.junctions),
@@ -150,9 +150,7 @@ function boxOfTarget(plan, target) {
   if (section && target.lane === 0) return boxOfLines(plan, [section.center]);
   if (section && target.lane === undefined) return section.box;
   if (target.lane !== undefined) return boxOfLines(plan, lanesOf(plan, target).flatMap((lane) => [lane.inner, lane.outer]));
-  const signal = plan.signals[target.signal ?? -1];
-  if (signal) return [signal.x, signal.y, signal.x, signal.y];
-  const whole = plan.roads[target.road ?? -1] ?? plan.junctions[target.junction ?? -1] ?? plan.objects[target.object ?? -1];
+  const whole = plan.signals[target.signal ?? -1] ?? plan.roads[target.road ?? -1] ?? plan.junctions[target.junction ?? -1] ?? plan.objects[target.object ?? -1];
   return whole?.box ?? emptyBox();
 }
 

@@ -13,9 +13,9 @@ const LANE_KINDS = [
   { name: 'parking', types: ['parking'], light: '#a9c8e8', dark: '#2c4c6d' },
   { name: 'biking', types: ['biking'], light: '#d9958b', dark: '#7d4038' },
   { name: 'rail, tram', types: ['rail', 'tram'], light: '#8f8378', dark: '#6b6059' },
-  { name: 'bus, taxi, HOV', types: ['bus', 'taxi', 'HOV', 'shared'], light: '#9db3ad', dark: '#3f5f5a' },
-  { name: 'entry, exit, ramp', types: ['entry', 'exit', 'onRamp', 'offRamp', 'connectingRamp', 'slipLane', 'mwyEntry', 'mwyExit'], light: '#a3adbf', dark: '#4a5670' },
-  { name: 'driving', types: ['driving', 'bidirectional'], light: '#b4b8be', dark: '#4a4f57' },
+  { name: 'bus, taxi, HOV', types: ['bus', 'taxi', 'HOV', 'shared'], light: '#8ba69f', dark: '#3f5f5a' },
+  { name: 'entry, exit, ramp', types: ['entry', 'exit', 'onRamp', 'offRamp', 'connectingRamp', 'slipLane', 'mwyEntry', 'mwyExit'], light: '#93a0b8', dark: '#4a5670' },
+  { name: 'driving', types: ['driving', 'bidirectional'], light: '#a3a8b0', dark: '#4a4f57' },
 ];
 
 /** @type {Map<string, number>} */
@@ -32,8 +32,8 @@ const MOVING = new Set(['driving', 'bidirectional', 'entry', 'exit', 'onRamp', '
 
 const MAP_THEMES = {
   light: {
-    ground: '#f3f4f1', lanes: LANE_KINDS.map(({ light }) => light), edge: '#8c929b', reference: '#7d4fb0', text: '#20242a', halo: '#ffffffd8',
-    arrow: '#4d545e', junction: '#2f6f9f', signal: '#22262c', object: '#6b5a3a', objectFill: '#b9a37a55', highlight: '#0050d8', highlightHalo: '#ffffff',
+    ground: '#f3f4f1', lanes: LANE_KINDS.map(({ light }) => light), edge: '#727984', reference: '#7d4fb0', text: '#20242a', halo: '#ffffffd8',
+    arrow: '#3c434d', junction: '#2f6f9f', signal: '#22262c', object: '#6b5a3a', objectFill: '#b9a37a55', highlight: '#0050d8', highlightHalo: '#ffffff',
     highlightFill: '#2f80ff40', cluster: '#2a2f37', clusterText: '#ffffff', grid: '#e6e8e4', white: '#ffffff', markEdge: '#9aa0a8',
   },
   dark: {

@@ -5,7 +5,7 @@
 //   result  shared.js markdown.js list.js plan-data.js plan-grid.js plan-pick.js plan-theme.js plan-paint.js
 //           plan-detail.js plan-tile.js plan-camera.js plan-markers.js plan-view.js model.js filters.js detail.js
 //           table.js profile.js road-panel.js help.js report.js
-//   run     shared.js markdown.js list.js run.js
+//   run     shared.js markdown.js list.js filters.js run-files.js run.js
 //
 // Everything in a report comes from files of others. Text goes into the page through `textContent` alone, by `make`,
 // and whatever is not shown by a browser, or turns the text around it, is made visible by `plain` before.
@@ -127,6 +127,26 @@ function fixed(value, digits = 2) {
 function shortRule(uid) {
   const name = uid.slice(uid.lastIndexOf(':') + 1);
   return plain(name || uid, 120);
+}
+
+/** Text of a finding; what stands between backticks is code. @param {unknown} value @param {number} [most] @returns {(Node|string)[]} */
+function withCode(value, most) {
+  return plain(value, most).split(/(`[^`\n]+`)/).map((part, index) => (index % 2 === 1 ? make('code', '', part.slice(1, -1)) : part));
+}
+
+/** A place in a file. Where there is no room for all of it the directories give way, the name and the row stay. @param {string} where @param {string} [className] */
+function whereElement(where, className = 'where') {
+  const shown = plain(where, 600);
+  const name = Math.max(shown.lastIndexOf('/'), shown.lastIndexOf('\\')) + 1;
+  const element = make('span', className, make('span', 'directory', shown.slice(0, name)), make('span', 'file-name', shown.slice(name)));
+  return withAttributes(element, { title: shown });
+}
+
+/** How much all paths begin with: directories that say nothing. @param {readonly string[]} paths */
+function commonDirectory(paths) {
+  let common = paths[0] ?? '';
+  for (const path of paths) while (!path.startsWith(common)) common = common.slice(0, -1);
+  return common.slice(0, common.lastIndexOf('/') + 1);
 }
 
 /** @param {Level} level */
@@ -259,7 +279,7 @@ class Theme {
   }
 
   button() {
-    return makeButton('tool', '◐', () => this.toggle(), 'Dark or light (d)');
+    return withAttributes(makeButton('tool', '◐', () => this.toggle(), 'Dark or light (d)'), { 'aria-label': 'Dark or light' });
   }
 }
 

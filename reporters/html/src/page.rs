@@ -169,10 +169,8 @@ mod tests {
         assert!(!text.contains("alert(1)") && !text.contains("<b>"));
         assert_eq!(stored(&text).as_deref(), Some(data.as_bytes()));
         assert_eq!(stored("<html>"), None);
-        assert_eq!(
-            stored(&text[..text.len() / 2].replace("</script>", "")),
-            None
-        );
+        let (torn, _) = text.split_once("id=\"data\">").unwrap();
+        assert_eq!(stored(torn), None);
     }
 
     #[test]

@@ -6,7 +6,8 @@ use qcbus_formats::xqar::{Checker, Issue};
 use qcbus_messages::{Digest, ResultMessage};
 use qcbus_plan::{How, Spot, Target};
 use qcbus_reporter_sdk::{
-    IssueLocation, Line, Pages, Sources, is_blocked, issue_locations, one_line, path_for_people, printable, underlined,
+    IssueLocation, Line, Pages, Sources, checkers, is_blocked, issue_locations, one_line,
+    path_for_people, printable, underlined,
 };
 use serde::Serialize;
 
@@ -168,7 +169,7 @@ impl<'r> ResultData<'r> {
             schema: 1,
             generator: generator(),
             file: file(result),
-            checkers: checkers(result),
+            checkers: checkers_of(result),
             rules,
             findings,
             map,
@@ -369,10 +370,8 @@ fn file(result: &ResultMessage) -> FileData<'_> {
     }
 }
 
-fn checkers(result: &ResultMessage) -> Vec<CheckerData<'_>> {
-    let bundles = result.results.bundles.iter();
-    let each = bundles.flat_map(|bundle| bundle.checkers.iter().map(move |it| (bundle, it)));
-    let data = each.map(|(bundle, checker)| CheckerData {
+fn checkers_of(result: &ResultMessage) -> Vec<CheckerData<'_>> {
+    let data = checkers(result).map(|(bundle, checker)| CheckerData {
         id: &checker.id,
         bundle: &bundle.name,
         status: checker.status.map(|status| status.as_str()),

@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, HashMap};
 
 use qcbus_formats::xqar::Level;
-use qcbus_messages::{ResultMessage, Verdict};
-use qcbus_reporter_sdk::{checkers, is_open, one_line, reason};
+use qcbus_messages::ResultMessage;
+use qcbus_reporter_sdk::{checkers, one_line, silences};
 use serde::{Deserialize, Serialize};
 
 use crate::result_data::{ResultData, RuleData, generator};
@@ -94,16 +94,10 @@ impl Section {
     }
 }
 
-/// Why a verdict is not known: the first checker that did not look.
+/// Why a verdict is not known.
 fn why(result: &ResultMessage) -> String {
-    if result.verdict != Verdict::Undetermined {
-        return String::new();
-    }
-    let open = checkers(result).map(|(_, checker)| checker).find(|it| is_open(it));
-    open.map_or_else(
-        || "nobody has looked".to_owned(),
-        |checker| one_line(&format!("{}: {}", checker.id, reason(checker))),
-    )
+    let silences: Vec<String> = silences(result).iter().map(ToString::to_string).collect();
+    silences.join("; ")
 }
 
 impl RunData {

@@ -126,8 +126,7 @@ fn known(digest: Digest) -> Option<String> {
 }
 
 fn checkers(result: &ResultMessage) -> impl Iterator<Item = &Checker> {
-    let bundles = result.results.bundles.iter();
-    bundles.flat_map(|bundle| &bundle.checkers)
+    qcbus_reporter_sdk::checkers(result).map(|(_, checker)| checker)
 }
 
 fn levels<T>(of: impl Fn(Level) -> T) -> Levels<T> {

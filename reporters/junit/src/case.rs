@@ -40,9 +40,10 @@ pub(crate) fn red(kind: NonSuccessKind, ty: &str, message: &str) -> TestCaseStat
     status
 }
 
-/// Whether nobody knows what the checker would have found.
+/// Whether nobody knows what the checker would have found. One without a status, as ASAM's first form
+/// has it, is taken at its issues, as the verdict takes it.
 fn is_unanswered(checker: &Checker) -> bool {
-    matches!(checker.status, Some(Status::Error) | None)
+    checker.status == Some(Status::Error)
 }
 
 fn status(checker: &Checker) -> TestCaseStatus {
@@ -50,15 +51,14 @@ fn status(checker: &Checker) -> TestCaseStatus {
     let error = issues.find(|issue| issue.level == Level::Error);
     match error {
         _ if is_unanswered(checker) => {
-            let ty = checker.status.map_or("no status", |_| "no answer");
             let message = short(&reason_of(checker), LONGEST_MESSAGE);
-            red(NonSuccessKind::Error, ty, &message)
+            red(NonSuccessKind::Error, "no answer", &message)
         }
         Some(error) => {
             let message = message(error, checker.issues.len());
             red(NonSuccessKind::Failure, &rule(error), &message)
         }
-        None if checker.status == Some(Status::Completed) && !is_blocked(checker) => {
+        None if checker.status != Some(Status::Skipped) && !is_blocked(checker) => {
             TestCaseStatus::success()
         }
         None => {

@@ -6,7 +6,7 @@
 //! |---|---|
 //! | completed, nothing of level error | passed; other findings are in its `system-out` |
 //! | found something of level error | `failure`; its message is the first of them, its text all findings |
-//! | failed, or has no status | `error` with the reason: nobody knows what it would have found |
+//! | failed | `error` with the reason: nobody knows what it would have found |
 //! | could not look, because of what others found | `skipped`, type `blocked`, with the reason |
 //! | does not apply to the file | left out and counted |
 //!
@@ -19,8 +19,8 @@
 //!   files, maps of several versions and scenarios, have 70,800 cases in 9.9 MB (0.75 MB packed) without
 //!   them, and 91,800 in 15.3 MB with them. How many there are stands in the suite's property
 //!   `qcbus.notApplicable` and its `system-out`. The parameter `Inapplicable` brings them back.
-//! * **A checker without a status is an error**, also where the verdict, which takes it at its issues, is
-//!   an acceptance: other tools write such results, and whether it ran to its end is not known.
+//! * **A checker without a status is taken at its issues**, as the verdict takes it: ASAM's first form of
+//!   results has none.
 //! * **The class of a case is `BUNDLE.PATH`**, with the file. Hosts tell cases apart by class and name
 //!   alone (GitLab keeps one of each pair), and the same checker looks at every file.
 //! * **The text of a case is bounded**: [`MOST_FINDINGS`] findings, the errors first, and how many more

@@ -19,18 +19,37 @@ impl Spot {
         // Saturates, and what is an `Origin`'s lies far within.
         [self.x.round() as i64, self.y.round() as i64]
     }
+}
 
-    /// The distance from the segment between two places, in centimetres.
-    pub(crate) fn off(self, from: Spot, to: Spot) -> f64 {
-        let (along_x, along_y) = (to.x - from.x, to.y - from.y);
-        let (x, y) = (self.x - from.x, self.y - from.y);
-        let square = along_x * along_x + along_y * along_y;
-        let share = if square > 0.0 {
-            ((x * along_x + y * along_y) / square).clamp(0.0, 1.0)
-        } else {
-            0.0
+/// The line between two places.
+pub(crate) struct Segment {
+    from: Spot,
+    along: Spot,
+    /// One over the square of its length; zero when it has none.
+    inverse: f64,
+}
+
+impl Segment {
+    pub(crate) fn between(from: Spot, to: Spot) -> Segment {
+        let along = Spot {
+            x: to.x - from.x,
+            y: to.y - from.y,
         };
-        (x - share * along_x).hypot(y - share * along_y)
+        let square = along.x * along.x + along.y * along.y;
+        let inverse = if square > 0.0 { 1.0 / square } else { 0.0 };
+        Segment {
+            from,
+            along,
+            inverse,
+        }
+    }
+
+    /// The square of the distance to a place, in square centimetres.
+    pub(crate) fn square(&self, at: Spot) -> f64 {
+        let (x, y) = (at.x - self.from.x, at.y - self.from.y);
+        let share = ((x * self.along.x + y * self.along.y) * self.inverse).clamp(0.0, 1.0);
+        let (x, y) = (x - share * self.along.x, y - share * self.along.y);
+        x * x + y * y
     }
 }
 

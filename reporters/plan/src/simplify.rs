@@ -1,6 +1,6 @@
 //! Fewer points for the same line, level by level.
 
-use crate::origin::Spot;
+use crate::origin::{Segment, Spot};
 
 /// How far, in centimetres, a line may lie from the sampled one on the levels of detail from fine to coarse. Near by
 /// 2 cm are allowed, of which the samples themselves take [`SAMPLED`](crate::sample::SAMPLED).
@@ -56,19 +56,23 @@ pub(crate) fn levels(points: &[Spot], forced: &[usize]) -> Vec<Option<u8>> {
         };
         levels[at] = Some(level);
         let depth = stretch.depth + 1;
-        open.extend([(stretch.from, at), (at, stretch.to)].map(|(from, to)| Stretch {
-            from,
-            to,
-            level,
-            depth,
-        }));
+        open.extend(
+            [(stretch.from, at), (at, stretch.to)].map(|(from, to)| Stretch {
+                from,
+                to,
+                level,
+                depth,
+            }),
+        );
     }
     levels
 }
 
 /// The point at which a stretch has to be split, with its level.
 fn split(points: &[Spot], forced: &[usize], stretch: &Stretch) -> Option<(usize, u8)> {
-    let &Stretch { from, to, level, .. } = stretch;
+    let &Stretch {
+        from, to, level, ..
+    } = stretch;
     if to - from < 2 {
         return None;
     }
@@ -79,23 +83,23 @@ fn split(points: &[Spot], forced: &[usize], stretch: &Stretch) -> Option<(usize,
             y: y as f64,
         }
     };
-    let (start, end) = (rounded(from), rounded(to));
-    let (mut farthest, mut distance) = (from + 1, -1.0);
+    let chord = Segment::between(rounded(from), rounded(to));
+    let (mut farthest, mut square) = (from + 1, -1.0);
     for (at, point) in points.iter().enumerate().take(to).skip(from + 1) {
-        let off = point.off(start, end);
-        if off > distance {
-            (farthest, distance) = (at, off);
+        let off = chord.square(*point);
+        if off > square {
+            (farthest, square) = (at, off);
         }
     }
-    if distance > TOLERANCES[0] {
-        let needed = TOLERANCES.iter().filter(|allowed| distance > **allowed);
-        let own = needed.count().saturating_sub(1) as u8;
+    let exceeds = |allowed: &&f64| square > *allowed * *allowed;
+    let needed = TOLERANCES.iter().filter(exceeds).count();
+    if let Some(own) = needed.checked_sub(1) {
         let at = if stretch.depth < DEEPEST {
             farthest
         } else {
             from.midpoint(to)
         };
-        return Some((at, own.min(level)));
+        return Some((at, (own as u8).min(level)));
     }
     let next = forced.partition_point(|at| *at <= from);
     let at = *forced.get(next).filter(|at| **at < to)?;
@@ -138,4 +142,102 @@ pub(crate) fn profile(points: &[[f64; 2]], tolerance: f64) -> Vec<[f64; 2]> {
         kept.push(last);
     }
     kept
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn off(points: &[Spot], levels: &[Option<u8>], level: u8) -> f64 {
+        let kept: Vec<usize> = (0..points.len())
+            .filter(|at| levels[*at] >= Some(level))
+            .collect();
+        let mut farthest: f64 = 0.0;
+        for pair in kept.windows(2) {
+            let segment = Segment::between(points[pair[0]], points[pair[1]]);
+            let inside = points[pair[0]..=pair[1]].iter();
+            farthest = inside
+                .map(|at| segment.square(*at))
+                .fold(farthest, f64::max);
+        }
+        farthest.sqrt()
+    }
+
+    #[test]
+    fn forced_points_stay_on_the_finest_level() {
+        let points: Vec<Spot> = (0..10)
+            .map(|x| Spot {
+                x: f64::from(x),
+                y: 0.0,
+            })
+            .collect();
+        let mut expected = [None; 10];
+        (expected[0], expected[9]) = (Some(2), Some(2));
+        assert_eq!(levels(&points, &[]), expected);
+        expected[4] = Some(0);
+        assert_eq!(levels(&points, &[0, 4, 9]), expected);
+        assert_eq!(levels(&points[..1], &[0]), [Some(2)]);
+        assert_eq!(levels(&[], &[]), []);
+    }
+
+    #[test]
+    fn a_line_that_loses_one_point_at_a_time_is_halved() {
+        // The farthest point is always the next one: at this length quadratic time would be hours.
+        let point = |at: u32| Spot {
+            x: f64::from(at),
+            y: 1e9
+                * (-f64::from(at) / 10_000.0).exp()
+                * if at.is_multiple_of(2) { 1.0 } else { -1.0 },
+        };
+        let points: Vec<Spot> = (0..100_000).map(point).collect();
+        let levels = levels(&points, &[]);
+        assert!(off(&points, &levels, 0) <= 3.0);
+    }
+
+    proptest! {
+        #[test]
+        fn every_level_keeps_its_distance(
+            steps in prop::collection::vec((-300.0..300.0_f64, -300.0..300.0_f64), 2..200),
+        ) {
+            let mut at = Spot { x: 0.0, y: 0.0 };
+            let walk = steps.into_iter().map(|(x, y)| {
+                at = Spot { x: at.x + x, y: at.y + y };
+                at
+            });
+            let points: Vec<Spot> = walk.collect();
+            let levels = levels(&points, &[]);
+            for (level, allowed) in TOLERANCES.into_iter().enumerate() {
+                // Distances were taken from rounded ends, which lie up to half a diagonal away.
+                prop_assert!(off(&points, &levels, level as u8) <= allowed + 0.71);
+            }
+        }
+
+        #[test]
+        fn profiles_stay_within_their_tolerance(
+            values in prop::collection::vec((0_u8..3, -5.0..5.0_f64), 1..100),
+        ) {
+            let mut along = 0.0;
+            let points = values.into_iter().map(|(step, value)| {
+                along += f64::from(step);
+                [along, value]
+            });
+            let points: Vec<[f64; 2]> = points.collect();
+            let kept = profile(&points, 1.0);
+            prop_assert_eq!((kept[0], kept.last()), (points[0], points.last()));
+            for [along, value] in points {
+                let near = kept.windows(2).chain([&[kept[0], kept[0]][..]]).any(|pair| {
+                    let [from, to] = [pair[0], pair[1]];
+                    let length = to[0] - from[0];
+                    let share = if length > 0.0 { (along - from[0]) / length } else { 0.0 };
+                    let inside = (from[0]..=to[0]).contains(&along);
+                    let drawn = from[1] + share * (to[1] - from[1]);
+                    let between = (from[1].min(to[1])..=from[1].max(to[1])).contains(&value);
+                    inside && ((drawn - value).abs() <= 1.0 + 1e-9 || length == 0.0 && between)
+                });
+                prop_assert!(near, "{along}, {value} in {kept:?}");
+            }
+        }
+    }
 }

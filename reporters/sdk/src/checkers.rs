@@ -23,22 +23,14 @@ pub fn is_inapplicable(checker: &Checker) -> bool {
     checker.status == Some(Status::Skipped) && !is_blocked(checker)
 }
 
-/// Whether a checker gave no answer: it failed, something was in its way, or, as other tools write it,
-/// nobody says how it ended.
+/// Whether a checker gave no answer: it failed, or something was in its way.
 pub fn is_open(checker: &Checker) -> bool {
-    match checker.status {
-        Some(Status::Completed) => is_blocked(checker),
-        Some(Status::Skipped) => is_blocked(checker),
-        Some(Status::Error) | None => true,
-    }
+    checker.status == Some(Status::Error) || is_blocked(checker)
 }
 
 /// Why a checker ended as it did, on one line: its summary without the status, which is said
 /// already, and without the count that pooling and ASAM's framework append.
 pub fn reason(checker: &Checker) -> String {
-    if checker.status.is_none() {
-        return "the result does not say how it ended".to_owned();
-    }
     let line = one_line(&checker.summary);
     let bare = ["Skipped: ", "Error: ", "Skipped. ", "Error. "]
         .into_iter()

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use qcbus_formats::xqar::{Checker, Level, Status};
+use qcbus_formats::xqar::Level;
 use qcbus_messages::{ResultMessage, Verdict, shown};
-use qcbus_reporter_sdk::{checkers, is_open, one_line, reason, rule_name};
+use qcbus_reporter_sdk::{one_line, rule_name, silences};
 
 use crate::paint::Paint;
 use crate::{Entry, sorted};
@@ -89,20 +89,8 @@ fn line(out: &mut String, result: &ResultMessage, entry: &Entry<'_>, rule: &str,
     let _ = writeln!(out, "{place_name}: {level}: {text} {rule}");
 }
 
-/// Why nobody can say more: the first reason, and how many checkers there are that did not look.
+/// Why nobody can say more.
 fn why(result: &ResultMessage) -> String {
-    let open: Vec<&Checker> = checkers(result)
-        .map(|(_, checker)| checker)
-        .filter(|it| is_open(it))
-        .collect();
-    let failed = open.iter().filter(|it| it.status != Some(Status::Skipped));
-    let Some(first) = failed.chain(&open).next() else {
-        return "nobody has looked".to_owned();
-    };
-    let reason = reason(first);
-    let first = shown::line(&first.id);
-    match open.len() {
-        1 => format!("{first} did not look: {reason}"),
-        many => format!("{many} checkers did not look, such as {first}: {reason}"),
-    }
+    let silences: Vec<String> = silences(result).iter().map(ToString::to_string).collect();
+    shown::line(&silences.join("; ")).into_owned()
 }

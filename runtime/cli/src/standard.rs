@@ -58,12 +58,15 @@ pub fn bundle_specs(
 
 /// The reporters that come with the program. One more is one more crate, which `Cargo.toml` names, and
 /// one more row: everything else follows from its registration (`docs/writing-a-reporter.md`).
-pub static REPORTERS: [&Registration; 5] = [
+pub static REPORTERS: [&Registration; 8] = [
     &qcbus_report_text::REPORTER,
     &qcbus_report_text::CONCISE,
     &qcbus_report_json::REPORTER,
     &qcbus_report_junit::REPORTER,
     &qcbus_report_github::REPORTER,
+    &qcbus_report_gitlab::REPORTER,
+    &qcbus_report_sarif::REPORTER,
+    &qcbus_report_html::REPORTER,
 ];
 
 /// The checkers of all standard bundles, each with its bundle.

@@ -1,6 +1,7 @@
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
 
+use crate::families::shown;
 use crate::model::{Part, Roads};
 
 pub static RULE: Rule<Roads> = Rule {
@@ -37,8 +38,10 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                 }
                 let instead = if start.abs() <= least { "line" } else { "arc" };
                 let text = format!(
-                    "the spiral starts with curvature {start} and ends with {end}; they should differ; a \
-                     piece of constant curvature is written as `{instead}`"
+                    "the spiral starts with curvature {} and ends with {}; they should differ; a \
+                     piece of constant curvature is written as `{instead}`",
+                    shown::number(start),
+                    shown::number(end)
                 );
                 let finding = found.issue(spiral, text);
                 if let Some(s) = geometry.s() {

@@ -3,6 +3,7 @@ use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink};
 
 use crate::families::object_parts::{is_before, is_by_schema, number, objects};
+use crate::families::shown;
 use crate::model::Roads;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -65,19 +66,28 @@ fn along<'a>(map: &RoadMap<'a>, repeat: Node<'a>, tolerance: f64, found: &mut Si
     };
     let Some(end) = road.length() else { return };
     let (attribute, text) = if s < -tolerance || s > end + tolerance {
-        ("s", format!("the repetition starts at s = {s} m"))
+        (
+            "s",
+            format!("the repetition starts at s = {} m", shown::beside(s, 0.0)),
+        )
     } else if s + length > end + tolerance {
         (
             "length",
             format!(
-                "the repetition ends at s = {} m ({s} + {length})",
-                s + length
+                "the repetition ends at s = {} m ({} + {})",
+                shown::beside(s + length, end),
+                shown::number(s),
+                shown::number(length)
             ),
         )
     } else {
         return;
     };
-    let text = format!("{text}, but road `{}` reaches from 0 to {end} m", road.id());
+    let text = format!(
+        "{text}, but road `{}` reaches from 0 to {} m",
+        road.id(),
+        shown::number(end)
+    );
     let finding = found.issue(Place::attribute_or_node(repeat, attribute), text);
     let finding = finding.road(road.id(), s, number(repeat, "tStart").unwrap_or(0.0));
     if older {

@@ -1,0 +1,250 @@
+// The map as an element: it draws when something has changed, says where the pointer is and what was clicked.
+
+/**
+ * @typedef {object} MapEvents
+ * @property {(finding: number) => void} finding a mark was clicked
+ * @property {(members: number[], x: number, y: number) => void} several marks at one place were
+ * @property {(road: number, x: number) => void} road
+ * @property {() => void} nothing
+ */
+
+const DOUBLE_CLICK_MILLISECONDS = 220;
+
+class PlanView {
+  /** @param {Plan} plan @param {Theme} theme @param {MapEvents} events */
+  constructor(plan, theme, events) {
+    this.indexed = indexPlan(plan);
+    this.plan = plan;
+    this.theme = theme;
+    this.events = events;
+    this.painter = new BasePainter(this.indexed);
+    this.tiles = new TileStore(this.painter);
+    this.markers = new Markers();
+    this.selected = -1;
+    /** @type {PlanTarget[]} */
+    this.targets = [];
+    /** Further places of the selected finding. @type {{x: number, y: number}[]} */
+    this.further = [];
+    /** @type {number} */
+    this.road = -1;
+    /** s on the selected road that the pointer is at in its profile. @type {number|null} */
+    this.station = null;
+    this.roadTimer = 0;
+    this.pending = false;
+    this.sized = false;
+    this.frames = { painted: 0, longest: 0, total: 0, firstPaint: 0, last: 0, gap: 0 };
+    this.canvas = withAttributes(make('canvas', 'map-canvas'), { tabindex: 0, role: 'img', 'aria-label': 'Map of the roads with the findings; the table has the same as text' });
+    this.readout = make('div', 'readout');
+    this.scaleBar = make('div', 'scale-bar', make('span', ''));
+    this.north = withAttributes(make('div', 'north', make('span', '', '▲'), make('span', '', 'N')), { title: 'y points up', 'aria-hidden': 'true' });
+    this.element = make('div', 'map', this.canvas, this.north, this.scaleBar, this.readout);
+    this.camera = new Camera(() => this.refresh());
+    this.input = new CameraInput(this.canvas, this.camera, (x, y) => this.click(x, y), (x, y, inside) => this.hover(x, y, inside));
+    this.canvas.addEventListener('dblclick', () => clearTimeout(this.roadTimer));
+    theme.listeners.push(() => this.refresh());
+    new ResizeObserver(() => this.resize()).observe(this.element);
+    this.hover(0, 0, false);
+  }
+
+  /** @returns {MapTheme} */
+  get colors() {
+    return this.theme.dark && !this.printing ? MAP_THEMES.dark : MAP_THEMES.light;
+  }
+
+  printing = false;
+
+  resize() {
+    const { clientWidth, clientHeight } = this.element;
+    if (clientWidth < 2 || clientHeight < 2) return;
+    this.camera.width = clientWidth;
+    this.camera.height = clientHeight;
+    this.tiles.clear();
+    if (!this.sized) {
+      this.sized = true;
+      if (this.plan.box) {
+        const [x0, y0, x1, y1] = this.plan.box;
+        Object.assign(this.camera, { x: (x0 + x1) / 2, y: (y0 + y1) / 2, k: this.camera.scaleFor((x1 - x0) / 2, (y1 - y0) / 2) });
+      }
+    }
+    this.paint(performance.now(), 40);
+    this.refresh();
+  }
+
+  refresh() {
+    if (this.pending) return;
+    this.pending = true;
+    requestAnimationFrame((now) => {
+      this.pending = false;
+      this.paint(now, BUDGET);
+    });
+  }
+
+  /** @param {number} now @param {number} budget milliseconds for drawing the map itself */
+  paint(now, budget) {
+    if (!this.sized) return;
+    const began = performance.now();
+    const flying = this.camera.step(now);
+    const ratio = Math.min(3, window.devicePixelRatio || 1);
+    const { canvas } = this;
+    const frame = this.camera.frame();
+    const [wide, high] = [Math.max(1, Math.round(frame.width * ratio)), Math.max(1, Math.round(frame.height * ratio))];
+    if (canvas.width !== wide || canvas.height !== high) {
+      canvas.width = wide;
+      canvas.height = high;
+      this.tiles.clear();
+    }
+    const context = canvas.getContext('2d', { alpha: false });
+    if (!context) return;
+    const more = this.tiles.advance(frame, ratio, this.colors, this.tiles.front ? budget : Math.max(budget, 40));
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    this.tiles.draw(context, frame, this.colors);
+    this.overlay(context, frame);
+    this.drawScale();
+    this.count(performance.now() - began);
+    if (flying || more) this.refresh();
+  }
+
+  /** Draws everything at once, as printing needs it. */
+  paintWhole() {
+    this.paint(performance.now(), Infinity);
+    this.paint(performance.now(), Infinity);
+  }
+
+  /** @param {number} took */
+  count(took) {
+    const { frames } = this;
+    frames.painted++;
+    frames.total += took;
+    frames.longest = Math.max(frames.longest, took);
+    const now = performance.now();
+    if (frames.firstPaint === 0) frames.firstPaint = now;
+    // Only frames that follow each other: while nothing changes none is drawn.
+    const gap = now - frames.last;
+    if (gap < 250) frames.gap = frames.gap === 0 ? gap : frames.gap * 0.9 + gap * 0.1;
+    frames.last = now;
+  }
+
+  /** @param {CanvasRenderingContext2D} context @param {Frame} frame */
+  overlay(context, frame) {
+    const { colors } = this;
+    if (this.road >= 0) this.highlight(context, frame, [{ road: this.road }], 0.45);
+    this.highlight(context, frame, this.targets, 1);
+    for (const { x, y } of this.further) {
+      const [px, py] = onFrame(frame, x, y);
+      ring(context, px, py, 7, colors);
+    }
+    this.markers.draw(context, frame, colors, this.selected);
+    const road = this.plan.roads[this.road];
+    if (road && this.station !== null) {
+      const point = pointAt(this.plan, road, this.station);
+      if (point) this.crosshair(context, frame, point);
+    }
+  }
+
+  /** @param {CanvasRenderingContext2D} context @param {Frame} frame @param {PlanTarget[]} targets @param {number} strength */
+  highlight(context, frame, targets, strength) {
+    if (targets.length === 0) return;
+    context.beginPath();
+    for (const target of targets.slice(0, 200)) traceTarget(this.painter, context, frame, target);
+    context.fillStyle = this.colors.highlightFill;
+    if (strength === 1) context.fill();
+    context.lineJoin = 'round';
+    context.lineWidth = 5;
+    context.strokeStyle = this.colors.highlightHalo;
+    context.globalAlpha = 0.8 * strength;
+    context.stroke();
+    context.lineWidth = 2.2;
+    context.globalAlpha = strength === 1 ? 1 : 0.7;
+    context.strokeStyle = this.colors.highlight;
+    context.stroke();
+    context.globalAlpha = 1;
+  }
+
+  /** @param {CanvasRenderingContext2D} context @param {Frame} frame @param {{x: number, y: number, heading: number}} point */
+  crosshair(context, frame, point) {
+    const [x, y] = onFrame(frame, point.x, point.y);
+    const [dx, dy] = [Math.sin(point.heading) * 16, Math.cos(point.heading) * 16];
+    for (const [width, color] of /** @type {[number, string][]} */ ([[6, this.colors.highlightHalo], [2.5, this.colors.highlight]])) {
+      context.lineWidth = width;
+      context.strokeStyle = color;
+      context.beginPath();
+      context.moveTo(x - dx, y - dy);
+      context.lineTo(x + dx, y + dy);
+      context.stroke();
+    }
+  }
+
+  drawScale() {
+    const most = 130 / this.camera.k / 100;
+    const power = 10 ** Math.floor(Math.log10(most));
+    const metres = power * (most / power >= 5 ? 5 : most / power >= 2 ? 2 : 1);
+    this.scaleBar.style.width = `${metres * 100 * this.camera.k}px`;
+    const label = metres >= 1000 ? `${metres / 1000} km` : metres >= 1 ? `${metres} m` : `${Math.round(metres * 100)} cm`;
+    if (this.scaleBar.firstChild) this.scaleBar.firstChild.textContent = label;
+  }
+
+  /** @param {number} px @param {number} py @returns {[number, number]} cm from the origin */
+  toPlan(px, py) {
+    const frame = this.camera.frame();
+    return [(px - frame.width / 2) / frame.k + frame.x, (frame.height / 2 - py) / frame.k + frame.y];
+  }
+
+  /** @param {number} px @param {number} py @param {boolean} inside */
+  hover(px, py, inside) {
+    this.canvas.classList.toggle('on-marker', inside && this.markers.pick(this.camera.frame(), px, py) !== null);
+    if (!inside) {
+      this.readout.textContent = '';
+      return;
+    }
+    const [x, y] = this.toPlan(px, py);
+    const { origin } = this.plan;
+    const spot = spotAt(this.indexed, x, y);
+    const road = spot ? this.plan.roads[spot.road] : undefined;
+    const where = spot && road ? `road ${plain(road.id, 40)}   lane ${spot.lane}   s ${fixed(spot.s / 100)}   t ${fixed(spot.t / 100)}` : '';
+    this.readout.textContent = `x ${fixed(origin.x + x / 100)}   y ${fixed(origin.y + y / 100)}${where ? `   ${where}` : ''}`;
+  }
+
+  /** @param {number} px @param {number} py */
+  click(px, py) {
+    clearTimeout(this.roadTimer);
+    const cluster = this.markers.pick(this.camera.frame(), px, py);
+    const [first] = cluster?.members ?? [];
+    if (cluster && cluster.members.length > 1) {
+      const extent = Math.max(cluster.box[2] - cluster.box[0], cluster.box[3] - cluster.box[1]);
+      if (extent > 100 && this.camera.k * 100 < 40) void this.camera.fit(cluster.box);
+      else this.events.several(cluster.members, px, py);
+      return;
+    }
+    if (first !== undefined) {
+      this.events.finding(first);
+      return;
+    }
+    const [x, y] = this.toPlan(px, py);
+    const spot = spotAt(this.indexed, x, y);
+    this.events.nothing();
+    // A second click makes it a double one, which zooms.
+    if (spot) this.roadTimer = setTimeout(() => this.events.road(spot.road, px), DOUBLE_CLICK_MILLISECONDS);
+  }
+
+  /** Shows all roads. @returns {Promise<void>} */
+  fit() {
+    return this.plan.box ? this.camera.fit(this.plan.box) : Promise.resolve();
+  }
+
+  /** Goes to a finding. @param {Finding} finding @returns {Promise<void>} */
+  show(finding) {
+    const { anchor } = finding;
+    if (!anchor) return Promise.resolve();
+    // At least 25 m to each side; more where all of an element is meant and not a spot on it.
+    const half = [2500, 2500];
+    if (finding.wholeElement) {
+      for (const target of this.targets) {
+        const box = boxOfTarget(this.plan, target);
+        if (!(box[0] <= box[2])) continue;
+        half[0] = Math.max(half[0] ?? 0, anchor.x - box[0], box[2] - anchor.x);
+        half[1] = Math.max(half[1] ?? 0, anchor.y - box[1], box[3] - anchor.y);
+      }
+    }
+    return this.camera.fly(anchor.x, anchor.y, this.camera.scaleFor(half[0] ?? 2500, half[1] ?? 2500));
+  }
+}

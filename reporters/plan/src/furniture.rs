@@ -1,0 +1,151 @@
+//! Signals and objects in the plan.
+
+use std::f64::consts::{PI, TAU};
+
+use qcbus_opendrive::geometry::{Placed, Point, Pose, wrap_angle};
+use qcbus_opendrive::{Corner, CornerKind, CurveLocal, Object, Outline, Road, Signal};
+
+use crate::origin::Origin;
+
+/// A round object is drawn with so many corners.
+const CORNERS: u32 = 8;
+
+/// A curve of an outline is drawn with so many lines.
+const CURVE_STEPS: u32 = 8;
+
+/// A signal and where it stands.
+pub(crate) struct SignalPlan<'a> {
+    pub(crate) signal: Signal<'a>,
+    /// Its road's place among the roads.
+    pub(crate) road: usize,
+    /// `None` when it has no finite place.
+    pub(crate) at: Option<[i64; 2]>,
+    /// In radians, from -π to π.
+    pub(crate) hdg: f64,
+}
+
+/// An object and its outline.
+pub(crate) struct ObjectPlan<'a> {
+    pub(crate) object: Object<'a>,
+    /// Its road's place among the roads.
+    pub(crate) road: usize,
+    /// One point is the place alone; none when it has no finite place.
+    pub(crate) outline: Vec<[i64; 2]>,
+}
+
+/// A signal's part of the plan. It looks along the road, against it where its orientation is `-` (14.1).
+pub(crate) fn signal<'a>(road: &Road<'a>, signal: Signal<'a>, origin: Origin) -> SignalPlan<'a> {
+    let pose = signal_pose(road, signal);
+    let spot = pose.and_then(|pose| origin.spot(pose.point()));
+    let against = if signal.orientation() == Some("-") {
+        PI
+    } else {
+        0.0
+    };
+    let turned = pose.map(|pose| pose.hdg + against + signal.h_offset().unwrap_or(0.0));
+    SignalPlan {
+        signal,
+        road: road.index(),
+        at: spot.map(|spot| spot.rounded()),
+        hdg: turned.and_then(wrap_angle).unwrap_or(0.0),
+    }
+}
+
+/// Where a signal stands, with the heading of the road.
+pub(crate) fn signal_pose(road: &Road<'_>, signal: Signal<'_>) -> Option<Pose> {
+    pose(road, signal.s()?, signal.t()?)
+}
+
+/// Where an object stands, with the heading of the road.
+pub(crate) fn object_pose(road: &Road<'_>, object: Object<'_>) -> Option<Pose> {
+    pose(road, object.s()?, object.t()?)
+}
+
+fn pose(road: &Road<'_>, s: f64, t: f64) -> Option<Pose> {
+    let point = road.point(s, t, 0.0)?;
+    Some(Pose {
+        x: point.x,
+        y: point.y,
+        ..road.pose(s)?
+    })
+}
+
+/// An object's part of the plan: its outline, else its bounding box or cylinder, else its place.
+pub(crate) fn object<'a>(road: &Road<'a>, object: Object<'a>, origin: Origin) -> ObjectPlan<'a> {
+    let pose = object_pose(road, object).map(|pose| Pose {
+        hdg: pose.hdg + object.hdg().unwrap_or(0.0),
+        ..pose
+    });
+    let written = object
+        .outlines()
+        .find(|outline| outline.outer() != Some(false));
+    let corners = written.and_then(|outline| corners(road, pose, outline));
+    let points = corners
+        .or_else(|| bounds(pose?, object))
+        .unwrap_or_default();
+    let spots: Option<Vec<[i64; 2]>> = points
+        .into_iter()
+        .map(|point| origin.spot(point).map(|spot| spot.rounded()))
+        .collect();
+    ObjectPlan {
+        object,
+        road: road.index(),
+        outline: spots.unwrap_or_default(),
+    }
+}
+
+/// The corners of a written outline (13.2); `None` when there are fewer than two or one has no place.
+fn corners(road: &Road<'_>, pose: Option<Pose>, outline: Outline<'_>) -> Option<Vec<Point>> {
+    let mut points = Vec::new();
+    for corner in outline.corners() {
+        let Corner { kind, point } = corner;
+        match kind {
+            CornerKind::Road => {
+                points.push(road.point(point.s()?, point.t()?, 0.0)?.plan());
+            }
+            CornerKind::Local => points.push(local(pose?, point.u()?, point.v()?)?),
+            CornerKind::Curve => curve(pose?, CurveLocal::of(point.node()), &mut points)?,
+        }
+    }
+    (points.len() > 1).then_some(points)
+}
+
+/// The points along a curve of an outline (13.2.3).
+fn curve(pose: Pose, curve: CurveLocal<'_>, points: &mut Vec<Point>) -> Option<()> {
+    let placed = Placed {
+        origin: Point::finite(curve.u()?, curve.v()?)?,
+        hdg: curve.hdg()?,
+        length: curve.length()?,
+        curve: curve.curve()?,
+    };
+    for step in 0..=CURVE_STEPS {
+        let at = placed.point(placed.length * f64::from(step) / f64::from(CURVE_STEPS))?;
+        points.push(local(pose, at.x, at.y)?);
+    }
+    Some(())
+}
+
+/// What its length and width, or its radius, say (13.1), else its place.
+fn bounds(pose: Pose, object: Object<'_>) -> Option<Vec<Point>> {
+    let positive = |value: Option<f64>| value.filter(|value| *value > 0.0);
+    if let Some(radius) = positive(object.radius()) {
+        let corner = |at: u32| {
+            let (sin, cos) = (TAU * f64::from(at) / f64::from(CORNERS)).sin_cos();
+            local(pose, radius * cos, radius * sin)
+        };
+        return (0..CORNERS).map(corner).collect();
+    }
+    let sides = positive(object.length()).zip(positive(object.width()));
+    let Some((length, width)) = sides else {
+        return Some(vec![pose.point()]);
+    };
+    let corners = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)];
+    let corners = corners.map(|(u, v)| local(pose, u * length, v * width));
+    corners.into_iter().collect()
+}
+
+/// A point given in u and v of an object at `pose`.
+fn local(pose: Pose, u: f64, v: f64) -> Option<Point> {
+    let (sin, cos) = pose.hdg.sin_cos();
+    Point::finite(pose.x + u * cos - v * sin, pose.y + u * sin + v * cos)
+}

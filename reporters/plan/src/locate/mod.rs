@@ -1,0 +1,224 @@
+//! Where findings lie on the plan.
+
+mod element;
+mod find;
+mod paths;
+
+use std::cell::{OnceCell, RefCell};
+use std::collections::HashMap;
+
+use qcbus_document::Node;
+use qcbus_opendrive::geometry::Point;
+use qcbus_opendrive::{Junction, Road, RoadMap};
+
+use crate::hull::centroid;
+use crate::junction::{Outlines, Roads};
+use crate::origin::Origin;
+use crate::plan::allowance;
+use crate::road::{RoadPlan, road};
+use paths::Paths;
+
+/// What a finding says about its place.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Said<'a> {
+    /// The XPath of an element of the map.
+    pub xpath: Option<&'a str>,
+    /// The id of a road, s and t in metres.
+    pub road: Option<(&'a str, f64, f64)>,
+    /// x and y in metres, in the coordinates of the map.
+    pub position: Option<(f64, f64)>,
+}
+
+/// Where a finding lies.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Spot {
+    /// x and y in metres, in the coordinates of the map as it is written.
+    pub at: Option<[f64; 2]>,
+    /// Where `at` comes from; `None` when there is none.
+    pub how: Option<How>,
+    /// What it is about, the most telling first.
+    pub on: Vec<Target>,
+}
+
+/// Where a place comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum How {
+    /// The finding says x and y.
+    Position,
+    /// It says road, s and t.
+    Road,
+    /// It names an element that has a place.
+    Element,
+}
+
+/// Something on the plan, by its place in the plan's lists.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Target {
+    /// A road.
+    Road {
+        /// Its place among the roads.
+        road: usize,
+    },
+    /// A lane section.
+    Section {
+        /// Its road's place among the roads.
+        road: usize,
+        /// Its place among the sections of the road, over all layers.
+        section: usize,
+    },
+    /// A lane.
+    Lane {
+        /// Its road's place among the roads.
+        road: usize,
+        /// Its section's place among the sections of the road, over all layers.
+        section: usize,
+        /// Its id.
+        lane: i64,
+    },
+    /// A junction.
+    Junction {
+        /// Its place among the junctions.
+        junction: usize,
+    },
+    /// A signal.
+    Signal {
+        /// Its place among the signals.
+        signal: usize,
+    },
+    /// An object.
+    Object {
+        /// Its place among the objects.
+        object: usize,
+    },
+}
+
+/// Leads findings to their places. What it has to look up it looks up once for all of them.
+pub struct Locator<'m, 'a> {
+    map: &'m RoadMap<'a>,
+    origin: Origin,
+    paths: Option<Paths<'a>>,
+    signals: OnceCell<Vec<Node<'a>>>,
+    objects: OnceCell<Vec<Node<'a>>>,
+    junctions: RefCell<Junctions>,
+}
+
+/// The middles of the junctions that were asked for.
+struct Junctions {
+    outlines: OnceCell<Outlines>,
+    middles: HashMap<usize, Option<[f64; 2]>>,
+    /// How many more points of roads may be looked at.
+    left: usize,
+}
+
+/// How many points of roads are looked at for the middles of junctions.
+const WORK: usize = 8_000_000;
+
+impl std::fmt::Debug for Locator<'_, '_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Locator")
+            .field("origin", &self.origin)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<'m, 'a> Locator<'m, 'a> {
+    /// Leads findings to places on the plan of this map.
+    pub fn new(map: &'m RoadMap<'a>) -> Locator<'m, 'a> {
+        let root = map.root();
+        Locator {
+            map,
+            origin: Origin::of(map),
+            paths: root.map(|root| Paths::new(root.document())),
+            signals: OnceCell::new(),
+            objects: OnceCell::new(),
+            junctions: RefCell::new(Junctions {
+                outlines: OnceCell::new(),
+                middles: HashMap::new(),
+                left: WORK,
+            }),
+        }
+    }
+
+    /// Leads to the place that a finding tells: its position, else road, s and t, else the element of its XPath. A
+    /// place that is not on the plan (NaN, more than 1,000 km from the middle) counts as not told.
+    pub fn locate(&self, said: &Said<'_>) -> Spot {
+        let node = said.xpath.zip(self.paths.as_ref());
+        let node = node.and_then(|(xpath, paths)| paths.find(xpath));
+        let found = node.map(|node| self.element(node)).unwrap_or_default();
+        let road = said.road.and_then(|(id, _, _)| self.road(id, node));
+        let position = said.position.map(|(x, y)| Point { x, y });
+        let on_road = || {
+            let ((_, s, t), road) = said.road.zip(road)?;
+            road.point(s, t, 0.0).map(|point| point.plan())
+        };
+        let ways = [
+            (How::Position, self.on_plan(position)),
+            (How::Road, self.on_plan(on_road())),
+            (How::Element, self.on_plan(found.at)),
+        ];
+        let way = ways.into_iter().find_map(|(how, at)| Some((how, at?)));
+        let mut on = found.on;
+        if on.is_empty() {
+            on.extend(road.map(|road| Target::Road { road: road.index() }));
+        }
+        Spot {
+            at: way.map(|(_, at)| at),
+            how: way.map(|(how, _)| how),
+            on,
+        }
+    }
+
+    /// The road that a finding means: of several with this id the one in which its element lies.
+    fn road(&self, id: &str, node: Option<Node<'a>>) -> Option<&'m Road<'a>> {
+        let around = node.and_then(|node| self.map.road_of(node));
+        around
+            .filter(|road| road.id() == id)
+            .or_else(|| self.map.road(id))
+    }
+
+    fn on_plan(&self, point: Option<Point>) -> Option<[f64; 2]> {
+        let point = point?;
+        self.origin.spot(point)?;
+        Some([point.x, point.y])
+    }
+
+    /// The middle of a junction's outline.
+    fn middle(&self, junction: &Junction<'a>) -> Option<Point> {
+        let mut junctions = self.junctions.borrow_mut();
+        let junctions = &mut *junctions;
+        if let Some(known) = junctions.middles.get(&junction.index()) {
+            return known.map(|[x, y]| Point { x, y });
+        }
+        let mut outlines = junctions
+            .outlines
+            .take()
+            .unwrap_or_else(|| Outlines::new(self.map));
+        let mut roads = RoadsWhenAsked {
+            map: self.map,
+            origin: self.origin,
+            left: &mut junctions.left,
+        };
+        let outline = outlines.outline(self.map, junction, &mut roads);
+        let middle = centroid(&outline).map(|at| self.origin.unshifted(at));
+        let _ = junctions.outlines.set(outlines);
+        junctions.middles.insert(junction.index(), middle);
+        middle.map(|[x, y]| Point { x, y })
+    }
+}
+
+/// Roads that are drawn for the outline of a junction.
+struct RoadsWhenAsked<'m, 'a, 'w> {
+    map: &'m RoadMap<'a>,
+    origin: Origin,
+    left: &'w mut usize,
+}
+
+impl Roads for RoadsWhenAsked<'_, '_, '_> {
+    fn with<T>(&mut self, index: usize, look: impl FnOnce(&RoadPlan<'_>) -> T) -> Option<T> {
+        let one = self.map.roads().get(index)?;
+        let work = allowance(self.map, one).min(*self.left);
+        let (drawn, spent) = road(one, self.origin, work);
+        *self.left -= spent;
+        drawn.ok().map(|plan| look(&plan))
+    }
+}

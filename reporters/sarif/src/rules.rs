@@ -1,0 +1,106 @@
+//! What a report says about rules.
+
+use std::collections::BTreeMap;
+
+use qcbus_formats::pool::is_rule_uid;
+use qcbus_reporter_sdk::{Pages, rule_name};
+
+use crate::finding::plain;
+use crate::log::{Configuration, Finding, Message, Rule, RuleProperties, Severity};
+use crate::section::{RuleNote, Section};
+use crate::text;
+
+/// The rules of these findings, by id. What two sections say differently is taken from the first.
+pub(crate) fn rules<'s>(
+    sections: impl Iterator<Item = &'s Section>,
+    findings: &[Finding],
+    pages: Pages,
+) -> Vec<Rule> {
+    let mut levels: BTreeMap<&str, Severity> = BTreeMap::new();
+    for finding in findings {
+        let level = levels.entry(&finding.rule_id).or_insert(finding.level);
+        *level = finding.level.min(*level);
+    }
+    let mut notes: BTreeMap<&str, &RuleNote> = BTreeMap::new();
+    for (id, note) in sections.flat_map(|section| &section.rules) {
+        notes.entry(id).or_insert(note);
+    }
+    let nothing = RuleNote::default();
+    let rule = |(id, level): (&str, Severity)| {
+        let note = notes.get(id).copied().unwrap_or(&nothing);
+        rule(id, note, level, pages)
+    };
+    levels.into_iter().map(rule).collect()
+}
+
+fn rule(id: &str, note: &RuleNote, level: Severity, pages: Pages) -> Rule {
+    let uid = if is_rule_uid(id) { id } else { "" };
+    let page = pages(uid, &note.checker).unwrap_or_default();
+    let name = rule_name(uid, &note.checker);
+    Rule {
+        id: id.to_owned(),
+        name: (!name.is_empty() && name != id).then(|| text::name(name)),
+        short_description: plain(&note.about),
+        full_description: plain(&match beginning(page.text) {
+            said if said.is_empty() => note.about.clone(),
+            said => text::description(&said),
+        }),
+        help_uri: (!page.link.is_empty()).then_some(page.link),
+        // GitHub demands one.
+        help: Some(match page.text {
+            "" => plain(&note.about),
+            text => Message {
+                text: text::page(text),
+                markdown: Some(text::page(text)),
+            },
+        }),
+        default_configuration: Configuration { level },
+        properties: RuleProperties {
+            checker: note.checker.clone(),
+            tags: tags(uid),
+        },
+    }
+}
+
+/// The first paragraph of a page, after its title.
+fn beginning(page: &str) -> String {
+    let mut lines = page.lines().map(str::trim);
+    let text = lines
+        .by_ref()
+        .skip_while(|it| it.is_empty() || it.starts_with('#'));
+    let lines: Vec<&str> = text.take_while(|it| !it.is_empty()).collect();
+    lines.join(" ")
+}
+
+/// The standard, its version and the field of a rule: `xodr`, `xodr 1.4.0`, `road`.
+fn tags(uid: &str) -> Vec<String> {
+    let parts: Vec<&str> = uid.split(':').collect();
+    let [_, standard, version, name] = parts[..] else {
+        return Vec::new();
+    };
+    let field = name.split('.').next().unwrap_or(name);
+    let mut tags = vec![standard.to_owned(), format!("{standard} {version}")];
+    if field != standard {
+        tags.push(field.to_owned());
+    }
+    tags.iter().map(|tag| text::name(tag)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_begins_after_its_title() {
+        let page = "# Title\n\nFirst `a`\nsecond.\n\n## Why\n\nBecause.";
+        assert_eq!(beginning(page), "First `a` second.");
+        assert_eq!(beginning("# Title"), "");
+    }
+
+    #[test]
+    fn tags_are_what_people_filter_by() {
+        let uid = "asam.net:xodr:1.4.0:road.lane.x";
+        assert_eq!(tags(uid), ["xodr", "xodr 1.4.0", "road"]);
+        assert!(tags("").is_empty());
+    }
+}

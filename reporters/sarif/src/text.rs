@@ -1,0 +1,66 @@
+//! Text of others in messages.
+
+use qcbus_reporter_sdk::{one_line, printable};
+
+/// Characters of a message that are kept: more than anybody reads, and a bound for hostile files.
+const LONGEST_MESSAGE: usize = 2000;
+
+/// Characters that GitHub takes of a rule's descriptions.
+const LONGEST_DESCRIPTION: usize = 1024;
+
+/// A message: one line of plain text. Plain text of SARIF can hold links, `[text](target)` (3.11.6), and
+/// no text of others makes one. Braces stay: they are placeholders only in messages with arguments.
+pub(crate) fn message(text: &str) -> String {
+    match short(&one_line(text), LONGEST_MESSAGE) {
+        text if text.is_empty() => "(no description)".to_owned(),
+        text => text.replace("](", "] ("),
+    }
+}
+
+/// A description of a rule: as a message, and as long as GitHub takes it.
+pub(crate) fn description(text: &str) -> String {
+    short(&message(text), LONGEST_DESCRIPTION)
+}
+
+/// Several lines: a page of a rule.
+pub(crate) fn page(text: &str) -> String {
+    printable(text)
+}
+
+/// A name, such as the id of a rule: one line without blanks at its ends.
+pub(crate) fn name(text: &str) -> String {
+    short(&one_line(text), LONGEST_DESCRIPTION)
+}
+
+fn short(text: &str, most: usize) -> String {
+    match text.char_indices().nth(most) {
+        // The sign that something is missing is one of the characters.
+        Some(_) => {
+            let kept: String = text.chars().take(most.saturating_sub(1)).collect();
+            format!("{}…", kept.trim_end())
+        }
+        None => text.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_text_of_others_steers_or_links() {
+        assert_eq!(
+            message("a\u{1b}[2K\n b [x](http://e) {0}"),
+            "a\u{FFFD}[2K b [x] (http://e) {0}"
+        );
+        assert_eq!(message(" \n"), "(no description)");
+    }
+
+    #[test]
+    fn what_is_too_long_ends_with_a_sign() {
+        let long = message(&"ü".repeat(5000));
+        assert_eq!(long.chars().count(), LONGEST_MESSAGE);
+        assert!(long.ends_with("ü…"));
+        assert_eq!(description(&"ü".repeat(1024)), "ü".repeat(1024));
+    }
+}
