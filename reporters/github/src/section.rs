@@ -72,12 +72,9 @@ fn unanswered(result: &ResultMessage) -> Vec<Entry> {
     };
     let entry = |silence: Silence| {
         let said = format!("{about}: {silence}");
-        let rule = silence.names.into_iter().next();
-        of_the_file(
-            result,
-            &said,
-            rule.unwrap_or_else(|| "qcbus/verdict".to_owned()),
-        )
+        let rule = silence.names.first();
+        let rule = rule.map_or("qcbus/verdict", String::as_str);
+        of_the_file(result, &said, without_blanks(rule))
     };
     silences(result).into_iter().map(entry).collect()
 }

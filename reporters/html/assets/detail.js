@@ -100,7 +100,7 @@ function findingDetail(finding, rules, checkers, plan, actions) {
 /** The row of a finding in the list. @param {Finding} finding @param {RuleInfo|undefined} rule @param {boolean} selected @param {boolean} hasMap @param {() => void} choose */
 function findingRow(finding, rule, selected, hasMap, choose) {
   const button = makeButton('finding-row', '', choose);
-  const where = whereElement(finding.where || 'no place');
+  const where = whereElement(finding.where || 'no place', 'where short');
   const meta = make('span', 'meta', where, make('span', 'rule-name', rule ? shortRule(rule.uid) : ''));
   if (hasMap && !finding.anchor) meta.append(withAttributes(make('span', 'off-map', 'not on map'), { title: 'This finding has no place on the map' }));
   button.append(levelBadge(finding.level), make('span', 'row-text', ...withCode(finding.text, 400)), meta);
