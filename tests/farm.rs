@@ -89,7 +89,7 @@ fn every_promised_issue_is_found_at_its_place() {
     let said = desk.check_in(&sample_farm(), &["."], "out");
     assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
     let promises = promises();
-    assert_eq!(promises.len(), 19, "the table is read");
+    assert_eq!(promises.len(), 24, "the table is read");
     for Promise {
         file,
         rule,

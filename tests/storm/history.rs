@@ -37,7 +37,7 @@ pub enum What {
     /// A verdict file.
     Told(Box<Told>),
     /// A report that was not whole.
-    TornReport { name: String, why: String },
+    TornReport(String),
     /// A file behind the gate.
     Published { name: String, digest: String },
     /// An answer to `qcbus wait`.
@@ -205,7 +205,7 @@ fn look(shared: &Shared) {
                 for (file, bytes) in changed(&shared.out, marks, suffix) {
                     let name = format!("{file}{suffix}");
                     if let Some(why) = torn(&name, &bytes) {
-                        shared.saw(from, What::TornReport { name, why });
+                        shared.saw(from, What::TornReport(format!("{name}: {why}")));
                     }
                 }
             }

@@ -65,7 +65,7 @@ pub fn complaints(history: &[Seen], ledger: &Ledger, removals: &Removals) -> Vec
                 verdict,
                 digest,
             } => judge.wrong_answer(name, *verdict, digest),
-            What::TornReport { .. } => Some("half a report"),
+            What::TornReport(what) => Some(what.as_str()),
             What::Demanded | What::Killed { .. } => None,
         };
         let at = seen.at.as_secs_f64();

@@ -7,22 +7,22 @@ use qcbus_formats::xqar::Level;
 use crate::{Entry, MOST_ANNOTATIONS};
 
 /// What is annotated, and how much there is of each level.
-pub(crate) struct Choice<'e> {
+pub(crate) struct Chosen<'e> {
     /// The worst first.
     pub(crate) chosen: Vec<&'e Entry>,
     /// By level: annotated, and all there are.
     counts: BTreeMap<Level, (usize, usize)>,
 }
 
-impl<'e> Choice<'e> {
+impl<'e> Chosen<'e> {
     /// As many of each level as the host takes.
-    pub(crate) fn of(entries: &[&'e Entry]) -> Choice<'e> {
+    pub(crate) fn of(entries: &[&'e Entry]) -> Chosen<'e> {
         let mut levels: BTreeMap<Level, Vec<&Entry>> = BTreeMap::new();
         for entry in entries {
             levels.entry(entry.level).or_default().push(entry);
         }
         let is_cut = levels.values().any(|all| all.len() > MOST_ANNOTATIONS);
-        let mut choice = Choice {
+        let mut choice = Chosen {
             chosen: Vec::new(),
             counts: BTreeMap::new(),
         };
@@ -126,7 +126,7 @@ mod tests {
     fn what_fits_is_taken_as_it_is() {
         let all: Vec<Entry> = (0..10).map(|row| entry("a", "often", row)).collect();
         let all: Vec<&Entry> = all.iter().collect();
-        let choice = Choice::of(&all);
+        let choice = Chosen::of(&all);
         assert_eq!(choice.chosen, all);
         assert_eq!(choice.cut(), None);
     }

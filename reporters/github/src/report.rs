@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use qcbus_messages::{ResultMessage, Verdict, shown};
-use qcbus_reporter_sdk::{Destination, Form, ReportError, Sources, Subject};
+use qcbus_reporter_sdk::{Destination, ReportError, ReportForm, Sources, Subject};
 
-use crate::choice::Choice;
+use crate::choice::Chosen;
 use crate::command::{annotation, data, place_path, unescaped};
 use crate::{Entry, Section};
 
@@ -16,7 +16,7 @@ const END_OF_GROUP: &str = "::endgroup::";
 #[derive(Debug, Clone, Copy)]
 pub struct Annotations;
 
-impl Form for Annotations {
+impl ReportForm for Annotations {
     type Section = Section;
     const SUFFIX: &'static str = "github.txt";
 
@@ -40,7 +40,7 @@ impl Form for Annotations {
             log(&mut lines, key, section);
         }
         let entries: Vec<&Entry> = sections.values().flat_map(|it| &it.entries).collect();
-        let choice = Choice::of(&entries);
+        let choice = Chosen::of(&entries);
         lines.extend(choice.chosen.iter().map(|entry| annotation(entry)));
         let cut = choice.cut();
         lines.extend(cut.map(|said| format!("::notice title=qcbus::{}", data(&said))));

@@ -9,7 +9,7 @@ pub(crate) struct Entry {
     pub check_name: String,
     pub fingerprint: String,
     pub severity: Severity,
-    pub location: Place,
+    pub location: Location,
     pub qcbus: Own,
 }
 
@@ -24,7 +24,7 @@ pub(crate) enum Severity {
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Place {
+pub(crate) struct Location {
     pub path: String,
     pub lines: Lines,
 }

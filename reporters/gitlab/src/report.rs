@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use qcbus_messages::ResultMessage;
-use qcbus_reporter_sdk::{Destination, Form, Repeats, ReportError, Sources, fingerprint_of};
+use qcbus_reporter_sdk::{Destination, Repeats, ReportError, ReportForm, Sources, fingerprint_of};
 
-use crate::entry::{Entry, Lines, Own, Place, Severity};
+use crate::entry::{Entry, Lines, Location, Own, Severity};
 use crate::section::Section;
 
 /// Entries of a report, besides one that says what was left out: about 10 MB of text.
@@ -18,7 +18,7 @@ const LEFT_OUT: &str = "qcbus/left_out";
 #[derive(Debug, Clone, Copy, Default)]
 pub struct CodeQuality;
 
-impl Form for CodeQuality {
+impl ReportForm for CodeQuality {
     type Section = Section;
     const SUFFIX: &'static str = "codequality.json";
 
@@ -93,7 +93,7 @@ fn left_out(entries: &[Entry]) -> Option<Entry> {
         check_name: LEFT_OUT.to_owned(),
         fingerprint: fingerprint_of(&[LEFT_OUT]),
         severity: Severity::Blocker,
-        location: Place {
+        location: Location {
             path: rest.first()?.location.path.clone(),
             lines: Lines { begin: 1 },
         },

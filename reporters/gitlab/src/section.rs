@@ -7,7 +7,7 @@ use qcbus_reporter_sdk::{
     silences,
 };
 
-use crate::entry::{Entry, Lines, Own, Place, Severity};
+use crate::entry::{Entry, Lines, Location, Own, Severity};
 
 /// Characters of a description that are kept.
 const LONGEST_TEXT: usize = 2000;
@@ -118,9 +118,9 @@ fn described(issue: &Issue, main: Option<&IssueLocation>) -> String {
     }
 }
 
-fn place(result: &ResultMessage, row: Option<u64>) -> Place {
+fn place(result: &ResultMessage, row: Option<u64>) -> Location {
     let path = shown::line(&result.display_path);
-    Place {
+    Location {
         path: path.strip_prefix("./").unwrap_or(&path).to_owned(),
         lines: Lines {
             begin: row.unwrap_or(1).clamp(1, LARGEST_LINE),

@@ -12,7 +12,7 @@ use qcbus_formats::xqar::{
 };
 use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
 use qcbus_report_gitlab::{CodeQuality, MOST_ENTRIES, Section};
-use qcbus_reporter_sdk::{Destination, Form as _, NoSources};
+use qcbus_reporter_sdk::{Destination, NoSources, ReportForm as _};
 use serde_json::Value;
 
 const UID: &str = "asam.net:xodr:1.4.0:road.lane.link_order";

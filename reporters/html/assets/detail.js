@@ -10,7 +10,10 @@
 function sourceLineElement(line) {
   // Indentation would take the room of what matters.
   const all = Array.from(line.text);
-  const indent = Math.min(all.findIndex((character) => character !== ' ' && character !== '\t'), line.mark?.[0] ?? all.length);
+  const indent = Math.min(
+    all.findIndex((character) => character !== ' ' && character !== '\t'),
+    line.mark?.[0] ?? all.length,
+  );
   const characters = all.slice(Math.max(0, indent));
   const mark = line.mark ? [line.mark[0] - (all.length - characters.length), line.mark[1]] : null;
   const code = make('code', 'source');
@@ -39,7 +42,8 @@ function placeElement(place, plan, actions) {
   if (place.line) parts.push(sourceLineElement(place.line));
   if (place.xpath) parts.push(make('div', 'xpath', plain(place.xpath, 2000)));
   const spots = [];
-  if (place.road) spots.push(`road ${plain(place.road[0], 60)}, s ${fixed(place.road[1])} m, t ${fixed(place.road[2])} m`);
+  if (place.road)
+    spots.push(`road ${plain(place.road[0], 60)}, s ${fixed(place.road[1])} m, t ${fixed(place.road[2])} m`);
   if (place.at) spots.push(`x ${coordinate(place.at.x)}, y ${coordinate(place.at.y)}`);
   if (place.time !== null) spots.push(`at ${fixed(place.time, 3)} s`);
   if (place.at && plan && !place.anchor) spots.push('too far away for the map');
@@ -48,7 +52,10 @@ function placeElement(place, plan, actions) {
     const road = plan?.roads[target.road ?? -1];
     if (!road || target.road === undefined) continue;
     const index = target.road;
-    parts[parts.length - 1]?.append(' ', makeButton('link', `road ${plain(road.id, 40)}`, () => actions.road(index), 'Show the profile of this road'));
+    parts[parts.length - 1]?.append(
+      ' ',
+      makeButton('link', `road ${plain(road.id, 40)}`, () => actions.road(index), 'Show the profile of this road'),
+    );
     break;
   }
   return make('div', 'place', ...parts);
@@ -84,10 +91,13 @@ function findingDetail(finding, rules, checkers, plan, actions) {
     if (index === 1) detail.append(make('h4', '', `Further places (${finding.places.length - 1})`));
     detail.append(placeElement(place, plan, actions));
   });
-  if (finding.places.length > 100) detail.append(make('p', 'muted', `and ${counted(finding.places.length - 100, 'further place')}`));
+  if (finding.places.length > 100)
+    detail.append(make('p', 'muted', `and ${counted(finding.places.length - 100, 'further place')}`));
   if (finding.places.length === 0) detail.append(make('p', 'muted', 'This finding comes without a place.'));
   if (finding.facts.length > 0) {
-    const rows = finding.facts.slice(0, 200).map(([name, text]) => make('tr', '', make('th', '', plain(name, 200)), make('td', '', plain(text, 2000))));
+    const rows = finding.facts
+      .slice(0, 200)
+      .map(([name, text]) => make('tr', '', make('th', '', plain(name, 200)), make('td', '', plain(text, 2000))));
     detail.append(make('table', 'facts', make('tbody', '', ...rows)));
   }
   const rule = rules[finding.rule];
@@ -97,12 +107,74 @@ function findingDetail(finding, rules, checkers, plan, actions) {
   return detail;
 }
 
-/** The row of a finding in the list. @param {Finding} finding @param {RuleInfo|undefined} rule @param {boolean} selected @param {boolean} hasMap @param {() => void} choose */
+/**
+ * The row of a finding in the list.
+ *
+ * @param {Finding} finding
+ * @param {RuleInfo|undefined} rule
+ * @param {boolean} selected
+ * @param {boolean} hasMap
+ * @param {() => void} choose
+ */
 function findingRow(finding, rule, selected, hasMap, choose) {
   const button = makeButton('finding-row', '', choose);
   const where = whereElement(finding.where || 'no place', 'where short');
   const meta = make('span', 'meta', where, make('span', 'rule-name', rule ? shortRule(rule.uid) : ''));
-  if (hasMap && !finding.anchor) meta.append(withAttributes(make('span', 'off-map', 'not on map'), { title: 'This finding has no place on the map' }));
+  if (hasMap && !finding.anchor)
+    meta.append(
+      withAttributes(make('span', 'off-map', 'not on map'), { title: 'This finding has no place on the map' }),
+    );
   button.append(levelBadge(finding.level), make('span', 'row-text', ...withCode(finding.text, 400)), meta);
   return withAttributes(button, { 'aria-expanded': String(selected), 'data-finding': finding.id });
+}
+
+/**
+ * What there is to choose from where several findings lie at one place.
+ *
+ * @param {number[]} members
+ * @param {readonly Finding[]} findings
+ * @param {(index: number) => void} choose
+ * @returns {Node[]}
+ */
+function chooserContent(members, findings, choose) {
+  const items = members.slice(0, 100).map((index) => {
+    const finding = findings[index];
+    const button = makeButton('chooser-item', '', () => choose(index));
+    button.append(levelBadge(finding?.level ?? 'information'), make('span', '', ...withCode(finding?.text, 160)));
+    return make('li', '', button);
+  });
+  const content = [make('h2', '', `${counted(members.length, 'finding')} here`), make('ul', '', ...items)];
+  const more = members.length - items.length;
+  if (more > 0) content.push(make('p', 'muted', `and ${COUNT_FORMAT.format(more)} more; the filters make them fewer`));
+  return content;
+}
+
+/** How the checkers ended, the ones with trouble first. @param {readonly any[]} checkers */
+function checkersNote(checkers) {
+  if (checkers.length === 0) return null;
+  const rank = (/** @type {any} */ checker) =>
+    checker?.status === 'error' ? 0 : checker?.blocked ? 1 : checker?.status ? 3 : 2;
+  const rows = [...checkers]
+    .sort((a, b) => rank(a) - rank(b))
+    .map((checker) => {
+      const status = checker?.blocked
+        ? 'blocked'
+        : checker?.status === 'error'
+          ? 'failed'
+          : textOf(checker?.status) || 'unknown';
+      const name = withAttributes(make('td', 'mono', plain(checker?.id, 200)), {
+        title: plain(checker?.about, 500),
+      });
+      return make(
+        'tr',
+        '',
+        make('td', `status ${['blocked', 'failed', 'unknown'].includes(status) ? 'trouble' : ''}`, status),
+        name,
+        make('td', 'number', COUNT_FORMAT.format(numberOrNull(checker?.findings) ?? 0)),
+        make('td', '', plain(checker?.summary, 500)),
+      );
+    });
+  const trouble = checkers.filter((checker) => rank(checker) < 3).length;
+  const label = `${counted(checkers.length, 'checker')}${trouble > 0 ? `, ${trouble} with trouble` : ''}`;
+  return make('details', 'note checkers', make('summary', '', label), make('table', '', make('tbody', '', ...rows)));
 }

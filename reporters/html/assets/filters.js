@@ -33,7 +33,11 @@ class Filters {
     /** Indices of what passes. @type {number[]} */
     this.shown = [];
     this.search = withAttributes(make('input', 'search'), {
-      type: 'search', placeholder: 'Search  ( / )', 'aria-label': 'Search in findings', autocomplete: 'off', spellcheck: 'false',
+      type: 'search',
+      placeholder: 'Search  ( / )',
+      'aria-label': 'Search in findings',
+      autocomplete: 'off',
+      spellcheck: 'false',
     });
     this.switch = withAttributes(make('input'), { type: 'checkbox' });
     /** @type {Record<Level, HTMLElement>} */
@@ -46,16 +50,27 @@ class Filters {
 
   build() {
     this.search.addEventListener('input', () => {
-      this.words = this.search.value.toLowerCase().split(/\s+/).filter((word) => word !== '');
+      this.words = this.search.value
+        .toLowerCase()
+        .split(/\s+/)
+        .filter((word) => word !== '');
       this.update();
     });
     this.switch.addEventListener('change', () => this.update());
     const levels = LEVELS.map((level) => this.levelBox(level));
-    const bar = make('div', 'filters', make('div', 'filter-row', this.search), make('div', 'filter-row levels', ...levels));
+    const bar = make(
+      'div',
+      'filters',
+      make('div', 'filter-row', this.search),
+      make('div', 'filter-row levels', ...levels),
+    );
     const facets = make('div', 'filter-row');
     for (const facet of this.facets) {
       withAttributes(facet.select, { 'aria-label': facet.name });
-      facet.select.append(new Option(facet.all, '-1'), ...facet.values.map((value, index) => new Option(plain(value, 120), String(index))));
+      facet.select.append(
+        new Option(facet.all, '-1'),
+        ...facet.values.map((value, index) => new Option(plain(value, 120), String(index))),
+      );
       facet.select.addEventListener('change', () => {
         facet.chosen = Number(facet.select.value);
         this.update();
@@ -71,13 +86,25 @@ class Filters {
 
   /** @param {Level} level */
   levelBox(level) {
-    const box = withAttributes(make('input'), { type: 'checkbox', checked: true, 'data-level': level, 'aria-label': LEVEL_NAMES[level][1] });
+    const box = withAttributes(make('input'), {
+      type: 'checkbox',
+      checked: true,
+      'data-level': level,
+      'aria-label': LEVEL_NAMES[level][1],
+    });
     box.addEventListener('change', () => {
       if (box.checked) this.levels.add(level);
       else this.levels.delete(level);
       this.update();
     });
-    return make('label', 'check', box, levelBadge(level), this.counts[level], ` ${level === 'information' ? 'info' : LEVEL_NAMES[level][1]}`);
+    return make(
+      'label',
+      'check',
+      box,
+      levelBadge(level),
+      this.counts[level],
+      ` ${level === 'information' ? 'info' : LEVEL_NAMES[level][1]}`,
+    );
   }
 
   /** @param {string} name of a facet @param {number} value -1: all */
@@ -92,7 +119,8 @@ class Filters {
 
   clear() {
     this.levels = new Set(LEVELS);
-    for (const box of this.element.querySelectorAll('input[data-level]')) if (box instanceof HTMLInputElement) box.checked = true;
+    for (const box of this.element.querySelectorAll('input[data-level]'))
+      if (box instanceof HTMLInputElement) box.checked = true;
     this.words = [];
     this.search.value = '';
     this.switch.checked = false;
@@ -104,7 +132,12 @@ class Filters {
   }
 
   get active() {
-    return this.levels.size < LEVELS.length || this.words.length > 0 || this.switch.checked || this.facets.some(({ chosen }) => chosen >= 0);
+    return (
+      this.levels.size < LEVELS.length ||
+      this.words.length > 0 ||
+      this.switch.checked ||
+      this.facets.some(({ chosen }) => chosen >= 0)
+    );
   }
 
   update() {
@@ -118,7 +151,9 @@ class Filters {
     const facetCounts = this.facets.map(({ values }) => new Int32Array(values.length));
     this.shown = [];
     this.findings.forEach((finding, index) => {
-      const other = !this.words.every((word) => finding.search.includes(word)) || (this.switch.checked && !this.toggle?.passes(finding));
+      const other =
+        !this.words.every((word) => finding.search.includes(word)) ||
+        (this.switch.checked && !this.toggle?.passes(finding));
       if (other) return;
       const levelFails = !this.levels.has(finding.level);
       let failed = -1;
@@ -133,7 +168,8 @@ class Filters {
       if (levelFails || fails > 1) return;
       this.facets.forEach((facet, position) => {
         const value = facet.of(finding);
-        if ((fails === 0 || failed === position) && value >= 0) /** @type {Int32Array} */ (facetCounts[position])[value]++;
+        if ((fails === 0 || failed === position) && value >= 0)
+          /** @type {Int32Array} */ (facetCounts[position])[value]++;
       });
     });
     this.tell(levelCounts, facetCounts);
@@ -151,7 +187,10 @@ class Filters {
       });
     });
     const all = this.findings.length;
-    this.total.textContent = this.shown.length === all ? counted(all, 'finding') : `${COUNT_FORMAT.format(this.shown.length)} of ${counted(all, 'finding')}`;
+    this.total.textContent =
+      this.shown.length === all
+        ? counted(all, 'finding')
+        : `${COUNT_FORMAT.format(this.shown.length)} of ${counted(all, 'finding')}`;
     this.clearButton.hidden = !this.active;
   }
 }

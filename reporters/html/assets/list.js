@@ -117,7 +117,7 @@ class VirtualList {
     }
     this.rows.set(position, item);
     const next = [...this.rows.keys()].filter((other) => other > position).sort((a, b) => a - b)[0];
-    this.space.insertBefore(item, next === undefined ? null : this.rows.get(next) ?? null);
+    this.space.insertBefore(item, next === undefined ? null : (this.rows.get(next) ?? null));
     if (position === this.opened) this.detailHeight = item.offsetHeight - this.source.rowHeight;
   }
 

@@ -47,14 +47,19 @@ function numberOrNull(value) {
 
 /** @param {unknown} value @param {number} length @returns {number} */
 function indexInto(value, length) {
-  return Number.isInteger(value) && /** @type {number} */ (value) >= 0 && /** @type {number} */ (value) < length ? /** @type {number} */ (value) : -1;
+  return Number.isInteger(value) && /** @type {number} */ (value) >= 0 && /** @type {number} */ (value) < length
+    ? /** @type {number} */ (value)
+    : -1;
 }
 
 /** @param {any} line @returns {SourceLine|null} */
 function sourceLine(line) {
   if (line === null || typeof line !== 'object') return null;
   const [first, count] = listOf(line.mark);
-  const mark = Number.isInteger(first) && Number.isInteger(count) && first >= 0 && count >= 0 ? /** @type {[number, number]} */ ([first, count]) : null;
+  const mark =
+    Number.isInteger(first) && Number.isInteger(count) && first >= 0 && count >= 0
+      ? /** @type {[number, number]} */ ([first, count])
+      : null;
   return { text: textOf(line.text), skipped: numberOrNull(line.skipped) ?? 0, more: line.more === true, mark };
 }
 
@@ -68,7 +73,12 @@ function planTarget(target) {
   return known;
 }
 
-/** @param {any} place @param {string} checked path of the checked file @param {Plan|null} plan @returns {FindingPlace} */
+/**
+ * @param {any} place
+ * @param {string} checked path of the checked file
+ * @param {Plan|null} plan
+ * @returns {FindingPlace}
+ */
 function findingPlace(place, checked, plan) {
   const [x, y] = listOf(place?.at);
   const at = isFiniteNumber(x) && isFiniteNumber(y) ? { x, y } : null;
@@ -76,10 +86,17 @@ function findingPlace(place, checked, plan) {
   const on = listOf(place?.on).map(planTarget);
   return {
     file: typeof place?.file === 'string' ? place.file : checked,
-    row: numberOrNull(place?.row), column: numberOrNull(place?.column),
-    xpath: textOf(place?.xpath), text: textOf(place?.text), line: sourceLine(place?.line),
+    row: numberOrNull(place?.row),
+    column: numberOrNull(place?.column),
+    xpath: textOf(place?.xpath),
+    text: textOf(place?.text),
+    line: sourceLine(place?.line),
     road: typeof road === 'string' && isFiniteNumber(s) ? [road, s, numberOrNull(t) ?? 0] : null,
-    time: numberOrNull(place?.time), at, anchor: plan ? anchorInPlan(plan, at, on) : null, how: textOf(place?.how), on,
+    time: numberOrNull(place?.time),
+    at,
+    anchor: plan ? anchorInPlan(plan, at, on) : null,
+    how: textOf(place?.how),
+    on,
   };
 }
 
@@ -105,12 +122,26 @@ function whereOf(place) {
 
 /** @param {Record<string, any>} data */
 function rulesOf(data) {
-  return listOf(data.rules).map((rule) => /** @type {RuleInfo} */ ({
-    uid: textOf(rule?.uid), checker: textOf(rule?.checker), about: textOf(rule?.about), page: textOf(rule?.page), link: textOf(rule?.link),
-  }));
+  return listOf(data.rules).map(
+    (rule) =>
+      /** @type {RuleInfo} */ ({
+        uid: textOf(rule?.uid),
+        checker: textOf(rule?.checker),
+        about: textOf(rule?.about),
+        page: textOf(rule?.page),
+        link: textOf(rule?.link),
+      }),
+  );
 }
 
-/** Findings, worst first, else in the order of the result. @param {Record<string, any>} data @param {readonly RuleInfo[]} rules @param {Plan|null} plan @returns {Finding[]} */
+/**
+ * Findings, worst first, else in the order of the result.
+ *
+ * @param {Record<string, any>} data
+ * @param {readonly RuleInfo[]} rules
+ * @param {Plan|null} plan
+ * @returns {Finding[]}
+ */
 function findingsOf(data, rules, plan) {
   const checked = textOf(data.file?.path) || textOf(data.file?.name);
   const checkers = listOf(data.checkers).length;
@@ -118,13 +149,32 @@ function findingsOf(data, rules, plan) {
     const places = listOf(raw?.places).map((place) => findingPlace(place, checked, plan));
     const first = places.find(({ anchor }) => anchor !== null);
     const rule = indexInto(raw?.rule, rules.length);
-    const facts = listOf(raw?.facts).map((fact) => /** @type {[string, string]} */ ([textOf(fact?.[0]), textOf(fact?.[1])]));
+    const facts = listOf(raw?.facts).map(
+      (fact) => /** @type {[string, string]} */ ([textOf(fact?.[0]), textOf(fact?.[1])]),
+    );
     const text = textOf(raw?.text);
     const where = whereOf(places[0]);
     return {
-      index: order, id: numberOrNull(raw?.id) ?? order, level: levelOf(raw?.level), rule, checker: indexInto(raw?.checker, checkers),
-      text, places, facts, where, anchor: first?.anchor ?? null, wholeElement: first?.how === 'element' || (first !== undefined && first.at === null),
-      search: [text, where, rules[rule]?.uid, ...places.map(({ xpath, text: said }) => `${xpath} ${said}`), ...facts.flat()].join('\n').toLowerCase(),
+      index: order,
+      id: numberOrNull(raw?.id) ?? order,
+      level: levelOf(raw?.level),
+      rule,
+      checker: indexInto(raw?.checker, checkers),
+      text,
+      places,
+      facts,
+      where,
+      anchor: first?.anchor ?? null,
+      wholeElement: first?.how === 'element' || (first !== undefined && first.at === null),
+      search: [
+        text,
+        where,
+        rules[rule]?.uid,
+        ...places.map(({ xpath, text: said }) => `${xpath} ${said}`),
+        ...facts.flat(),
+      ]
+        .join('\n')
+        .toLowerCase(),
     };
   });
   findings.sort((a, b) => LEVELS.indexOf(a.level) - LEVELS.indexOf(b.level) || a.index - b.index);
@@ -134,10 +184,16 @@ function findingsOf(data, rules, plan) {
   return findings;
 }
 
-/** Why a verdict is what it is, in a few words. @param {Record<string, any>} data @param {readonly Finding[]} findings */
+/**
+ * Why a verdict is what it is, in a few words.
+ *
+ * @param {Record<string, any>} data
+ * @param {readonly Finding[]} findings
+ */
 function verdictReason(data, findings) {
   const errors = findings.filter(({ level }) => level === 'error').length;
-  if (data.file?.verdict === 'rejected') return errors > 0 ? `${counted(errors, 'error')} must be mended` : 'an error was found';
+  if (data.file?.verdict === 'rejected')
+    return errors > 0 ? `${counted(errors, 'error')} must be mended` : 'an error was found';
   if (data.file?.verdict === 'accepted') return 'everything that was demanded has been checked, without an error';
   const checkers = listOf(data.checkers);
   const failed = checkers.filter((checker) => checker?.status === 'error').length;
@@ -149,5 +205,7 @@ function verdictReason(data, findings) {
     silent > 0 ? `${counted(silent, 'checker')} did not say how they ended` : '',
   ].filter((reason) => reason !== '');
   if (reasons.length > 0) return `no error was found, but ${reasons.join(', and ')}`;
-  return checkers.some((checker) => checker?.status === 'completed') ? 'not everything could be checked' : 'no checker has looked at this file';
+  return checkers.some((checker) => checker?.status === 'completed')
+    ? 'not everything could be checked'
+    : 'no checker has looked at this file';
 }

@@ -22,7 +22,11 @@ class Camera {
     this.reduced = matchMedia('(prefers-reduced-motion: reduce)');
   }
 
-  /** The frame of the whole canvas, of which `x` and `y` are the middle of the part that is not hidden. @returns {Frame} */
+  /**
+   * The frame of the whole canvas, of which `x` and `y` are the middle of the part that is not hidden.
+   *
+   * @returns {Frame}
+   */
   frame() {
     return { x: this.x + this.hidden / 2 / this.k, y: this.y, k: this.k, width: this.width, height: this.height };
   }
@@ -52,10 +56,17 @@ class Camera {
     this.changed();
   }
 
-  /** The scale at which a box around a point is seen whole. @param {number} halfWidth cm @param {number} halfHeight */
+  /**
+   * The scale at which a box around a point is seen whole.
+   *
+   * @param {number} halfWidth cm
+   * @param {number} halfHeight
+   */
   scaleFor(halfWidth, halfHeight) {
     const free = Math.max(80, this.width - this.hidden);
-    return Camera.clamp(Math.min((free * 0.44) / Math.max(halfWidth, 1), (this.height * 0.42) / Math.max(halfHeight, 1)));
+    return Camera.clamp(
+      Math.min((free * 0.44) / Math.max(halfWidth, 1), (this.height * 0.42) / Math.max(halfHeight, 1)),
+    );
   }
 
   /** @param {Box} box @returns {Promise<void>} */
@@ -152,7 +163,8 @@ class CameraInput {
     const others = [...this.pointers].filter(([id]) => id !== event.pointerId).map(([, point]) => point);
     this.travelled += Math.hypot(dx, dy);
     if (others[0]) {
-      const distance = (/** @type {{x: number, y: number}} */ point) => Math.hypot(point.x - (others[0]?.x ?? 0), point.y - (others[0]?.y ?? 0));
+      const distance = (/** @type {{x: number, y: number}} */ point) =>
+        Math.hypot(point.x - (others[0]?.x ?? 0), point.y - (others[0]?.y ?? 0));
       const now = { x: event.offsetX, y: event.offsetY };
       const middle = { x: (now.x + others[0].x) / 2, y: (now.y + others[0].y) / 2 };
       this.camera.pan(dx / 2, dy / 2);

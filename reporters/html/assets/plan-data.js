@@ -43,9 +43,41 @@
  * @property {Box} box
  */
 
-/** @typedef {{id: string, name: string, type: string, connections: [number, number][], outline: Int32Array, box: Box}} PlanJunction */
-/** @typedef {{id: string, name: string, type: string, subtype: string, road: number, s: number, t: number, x: number, y: number, heading: number, dynamic: boolean, box: Box}} PlanSignal */
-/** @typedef {{id: string, name: string, type: string, road: number, s: number, t: number, outline: Int32Array, box: Box}} PlanObject */
+/**
+ * @typedef {object} PlanJunction
+ * @property {string} id
+ * @property {string} name
+ * @property {string} type
+ * @property {[number, number][]} connections
+ * @property {Int32Array} outline
+ * @property {Box} box
+ */
+/**
+ * @typedef {object} PlanSignal
+ * @property {string} id
+ * @property {string} name
+ * @property {string} type
+ * @property {string} subtype
+ * @property {number} road
+ * @property {number} s
+ * @property {number} t
+ * @property {number} x
+ * @property {number} y
+ * @property {number} heading
+ * @property {boolean} dynamic
+ * @property {Box} box
+ */
+/**
+ * @typedef {object} PlanObject
+ * @property {string} id
+ * @property {string} name
+ * @property {string} type
+ * @property {number} road
+ * @property {number} s
+ * @property {number} t
+ * @property {Int32Array} outline
+ * @property {Box} box
+ */
 
 /** A list of numbers that grows. */
 class NumberPool {
@@ -91,12 +123,20 @@ class PlanLines {
     }
   }
 
-  /** Plain arrays of one level; line `i` has the points from `start[i]` to before `start[i + 1]`. @param {number} level */
+  /**
+   * Plain arrays of one level; line `i` has the points from `start[i]` to before `start[i + 1]`.
+   *
+   * @param {number} level
+   */
   level(level) {
     const x = /** @type {NumberPool} */ (this.x[level]);
     const y = /** @type {NumberPool} */ (this.y[level]);
     const starts = /** @type {NumberPool} */ (this.starts[level]);
-    return { x: x.array.subarray(0, x.length), y: y.array.subarray(0, y.length), start: starts.array.subarray(0, starts.length) };
+    return {
+      x: x.array.subarray(0, x.length),
+      y: y.array.subarray(0, y.length),
+      start: starts.array.subarray(0, starts.length),
+    };
   }
 }
 
@@ -189,7 +229,11 @@ class PlanReader {
     return points;
   }
 
-  /** Pairs of s, which is written as a difference, and a value. @param {boolean} differences whether the value is one, too */
+  /**
+   * Pairs of s, which is written as a difference, and a value.
+   *
+   * @param {boolean} differences whether the value is one, too
+   */
   profile(differences) {
     const count = this.count(2);
     const pairs = new Float64Array(count * 2);
@@ -265,8 +309,19 @@ class RoadReader {
     const sections = reader.items(8, (section) => this.section(index, section));
     for (const section of sections) growBox(box, section.box);
     return {
-      id, name, junction, leftHand: (flags & 1) !== 0, drawable: (flags & 2) === 0, length, line, stations, elevation,
-      predecessor, successor, sections, box,
+      id,
+      name,
+      junction,
+      leftHand: (flags & 1) !== 0,
+      drawable: (flags & 2) === 0,
+      length,
+      line,
+      stations,
+      elevation,
+      predecessor,
+      successor,
+      sections,
+      box,
     };
   }
 
@@ -344,7 +399,12 @@ class RoadReader {
     return { road, index, s0, s1, center, lanes, box: this.box };
   }
 
-  /** The lanes of a side, outward: each begins where the one before ends. @param {number} center @param {boolean} left */
+  /**
+   * The lanes of a side, outward: each begins where the one before ends.
+   *
+   * @param {number} center
+   * @param {boolean} left
+   */
   side(center, left) {
     let inner = center;
     return this.reader.items(5, () => {
@@ -363,7 +423,10 @@ function readJunction(reader) {
   const id = reader.text();
   const name = reader.text();
   const type = reader.text();
-  const connections = reader.items(2, () => /** @type {[number, number]} */ ([reader.unsigned() - 1, reader.unsigned() - 1]));
+  const connections = reader.items(
+    2,
+    () => /** @type {[number, number]} */ ([reader.unsigned() - 1, reader.unsigned() - 1]),
+  );
   const outline = reader.outline();
   return { id, name, type, connections, outline, box: boxOfPoints(outline) };
 }
@@ -393,7 +456,8 @@ function readObject(reader) {
 /** @param {Uint8Array} bytes */
 function decodePlan(bytes) {
   const reader = new PlanReader(bytes);
-  if (bytes.length < 5 || String.fromCharCode(...bytes.subarray(0, 4)) !== 'QCPL') reader.fail('it does not begin as one');
+  if (bytes.length < 5 || String.fromCharCode(...bytes.subarray(0, 4)) !== 'QCPL')
+    reader.fail('it does not begin as one');
   reader.at = 4;
   if (reader.unsigned() !== 1) reader.fail('its version is unknown');
   const origin = { x: reader.double(), y: reader.double() };
@@ -413,7 +477,15 @@ function decodePlan(bytes) {
   for (const object of objects) growBox(box, object.box);
   const sections = roads.flatMap((road) => road.sections);
   return {
-    origin, roads, sections, junctions, signals, objects, cuts, strings: reader.strings, box: box[0] <= box[2] ? box : null,
+    origin,
+    roads,
+    sections,
+    junctions,
+    signals,
+    objects,
+    cuts,
+    strings: reader.strings,
+    box: box[0] <= box[2] ? box : null,
     levels: [lines.level(0), lines.level(1), lines.level(2)],
     marks: lines.marks.array.subarray(0, lines.marks.length),
     markStarts: lines.markStarts.array.subarray(0, lines.markStarts.length),

@@ -31,7 +31,12 @@ class LabelRaster {
 }
 
 class DetailPainter {
-  /** @param {IndexedPlan} indexed @param {CanvasRenderingContext2D} canvas @param {Frame} frame @param {MapTheme} theme */
+  /**
+   * @param {IndexedPlan} indexed
+   * @param {CanvasRenderingContext2D} canvas
+   * @param {Frame} frame
+   * @param {MapTheme} theme
+   */
   constructor(indexed, canvas, frame, theme) {
     this.indexed = indexed;
     this.plan = indexed.plan;
@@ -76,7 +81,8 @@ class DetailPainter {
       else canvas.lineTo(px, py);
     }
     canvas.setLineDash(markPattern(type).map((metres) => metres * perMetre));
-    const double = type === 'solid solid' || type === 'broken broken' || type === 'solid broken' || type === 'broken solid';
+    const double =
+      type === 'solid solid' || type === 'broken broken' || type === 'solid broken' || type === 'broken solid';
     canvas.lineWidth = Math.max(1.1, double ? wide * 2.6 : wide) + (theme.ground === MAP_THEMES.light.ground ? 0.9 : 0);
     // White on light grey needs an edge to be seen.
     if (theme.ground === MAP_THEMES.light.ground) {
@@ -252,7 +258,12 @@ class DetailPainter {
     return length;
   }
 
-  /** Where a share of a line's length is, on the frame, with its direction there. @param {number} line @param {number} share */
+  /**
+   * Where a share of a line's length is, on the frame, with its direction there.
+   *
+   * @param {number} line
+   * @param {number} share
+   */
   along(line, share) {
     const { x, y, start } = /** @type {LevelOfLines} */ (this.plan.levels[1]);
     let left = this.lengthOf(line) * share;
@@ -292,7 +303,12 @@ class DetailPainter {
     }
   }
 
-  /** A point of the reference line that is in sight, the middle if possible. @param {PlanRoad} road @param {Box} box */
+  /**
+   * A point of the reference line that is in sight, the middle if possible.
+   *
+   * @param {PlanRoad} road
+   * @param {Box} box
+   */
   middleInSight(road, box) {
     for (const share of [0.5, 0.3, 0.7, 0.15, 0.85, 0.05, 0.95]) {
       const point = pointAt(this.plan, road, road.length * share);

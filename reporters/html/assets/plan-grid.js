@@ -42,7 +42,10 @@ class Grid {
     }, false);
   }
 
-  /** @param {(cell: number, item: number) => void} visit @param {boolean} [first] whether the great ones are put apart now */
+  /**
+   * @param {(cell: number, item: number) => void} visit
+   * @param {boolean} [first] whether the great ones are put apart now
+   */
   eachCell(visit, first = true) {
     this.boxes.forEach((box, item) => {
       if (!(box[0] <= box[2])) return;
@@ -59,8 +62,10 @@ class Grid {
 
   /** @param {Box} box @returns {Box} first column, first row, last column, last row */
   cellsOf(box) {
-    const column = (/** @type {number} */ x) => Math.min(this.columns - 1, Math.max(0, Math.floor((x - this.extent[0]) / this.side)));
-    const row = (/** @type {number} */ y) => Math.min(this.rows - 1, Math.max(0, Math.floor((y - this.extent[1]) / this.side)));
+    const column = (/** @type {number} */ x) =>
+      Math.min(this.columns - 1, Math.max(0, Math.floor((x - this.extent[0]) / this.side)));
+    const row = (/** @type {number} */ y) =>
+      Math.min(this.rows - 1, Math.max(0, Math.floor((y - this.extent[1]) / this.side)));
     return [column(box[0]), row(box[1]), column(box[2]), row(box[3])];
   }
 
@@ -73,7 +78,8 @@ class Grid {
       if (this.seen[item] === mark) return;
       this.seen[item] = mark;
       const other = this.boxes[item];
-      if (other && other[0] <= box[2] && other[2] >= box[0] && other[1] <= box[3] && other[3] >= box[1]) found.push(item);
+      if (other && other[0] <= box[2] && other[2] >= box[0] && other[1] <= box[3] && other[3] >= box[1])
+        found.push(item);
     };
     this.everywhere.forEach(look);
     if (this.items.length === 0 || box[0] > this.extent[2] || box[2] < this.extent[0]) return found;

@@ -1,6 +1,15 @@
 // Findings on the map: a mark for each, one with a number where many are close.
 
-/** @typedef {{x: number, y: number, level: Level, members: number[], box: Box}} Cluster x and y in cm; members are indices of findings */
+/**
+ * x and y in cm; members are indices of findings
+ *
+ * @typedef {object} Cluster
+ * @property {number} x
+ * @property {number} y
+ * @property {Level} level
+ * @property {number[]} members
+ * @property {Box} box
+ */
 
 /** @param {readonly Finding[]} findings @param {number} index @returns {number} 0 is the worst */
 function levelRank(findings, index) {
@@ -25,7 +34,11 @@ class Markers {
     this.scale = 0;
   }
 
-  /** Clusters for a scale. They change at powers of √2 only, so that they stand while the map moves. @param {number} k */
+  /**
+   * Clusters for a scale. They change at powers of √2 only, so that they stand while the map moves.
+   *
+   * @param {number} k
+   */
   at(k) {
     const step = 2 ** (Math.floor(Math.log2(k) * 2) / 2);
     if (step !== this.scale) {
@@ -63,7 +76,14 @@ class Markers {
     return list.sort((a, b) => LEVELS.indexOf(b.level) - LEVELS.indexOf(a.level));
   }
 
-  /** The topmost cluster at a pixel. @param {Frame} frame @param {number} px @param {number} py @returns {Cluster|null} */
+  /**
+   * The topmost cluster at a pixel.
+   *
+   * @param {Frame} frame
+   * @param {number} px
+   * @param {number} py
+   * @returns {Cluster|null}
+   */
   pick(frame, px, py) {
     const clusters = this.at(frame.k);
     for (let i = clusters.length - 1; i >= 0; i--) {
@@ -75,7 +95,12 @@ class Markers {
     return null;
   }
 
-  /** @param {CanvasRenderingContext2D} canvas @param {Frame} frame @param {MapTheme} theme @param {number} selected index */
+  /**
+   * @param {CanvasRenderingContext2D} canvas
+   * @param {Frame} frame
+   * @param {MapTheme} theme
+   * @param {number} selected index
+   */
   draw(canvas, frame, theme, selected) {
     const box = boxOfFrame(frame, 30);
     for (const cluster of this.at(frame.k)) {
@@ -97,7 +122,16 @@ function clusterRadius(cluster) {
   return cluster.members.length === 1 ? 8 : 9 + Math.min(9, Math.log10(cluster.members.length) * 3.2);
 }
 
-/** Errors are round, warnings are triangles, information is square. @param {CanvasRenderingContext2D} canvas @param {Level} level @param {number} x @param {number} y @param {number} size @param {MapTheme} theme */
+/**
+ * Errors are round, warnings are triangles, information is square.
+ *
+ * @param {CanvasRenderingContext2D} canvas
+ * @param {Level} level
+ * @param {number} x
+ * @param {number} y
+ * @param {number} size
+ * @param {MapTheme} theme
+ */
 function drawMarker(canvas, level, x, y, size, theme) {
   canvas.beginPath();
   if (level === 'error') {
@@ -121,7 +155,13 @@ function drawMarker(canvas, level, x, y, size, theme) {
   canvas.stroke();
 }
 
-/** @param {CanvasRenderingContext2D} canvas @param {number} x @param {number} y @param {number} radius @param {MapTheme} theme */
+/**
+ * @param {CanvasRenderingContext2D} canvas
+ * @param {number} x
+ * @param {number} y
+ * @param {number} radius
+ * @param {MapTheme} theme
+ */
 function ring(canvas, x, y, radius, theme) {
   canvas.beginPath();
   canvas.arc(x, y, radius, 0, 2 * Math.PI);
@@ -133,7 +173,13 @@ function ring(canvas, x, y, radius, theme) {
   canvas.stroke();
 }
 
-/** @param {CanvasRenderingContext2D} canvas @param {Cluster} cluster @param {number} x @param {number} y @param {MapTheme} theme */
+/**
+ * @param {CanvasRenderingContext2D} canvas
+ * @param {Cluster} cluster
+ * @param {number} x
+ * @param {number} y
+ * @param {MapTheme} theme
+ */
 function drawCluster(canvas, cluster, x, y, theme) {
   const radius = clusterRadius(cluster);
   const count = cluster.members.length;

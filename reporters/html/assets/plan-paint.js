@@ -1,7 +1,16 @@
 // Draws the map itself: lanes, borders, marks, reference lines, junctions. It is done in steps, each of a few
 // milliseconds, so that a map of any size is drawn without the page standing still.
 
-/** @typedef {{x: number, y: number, k: number, width: number, height: number}} Frame center in cm, pixels per cm, size in pixels */
+/**
+ * center in cm, pixels per cm, size in pixels
+ *
+ * @typedef {object} Frame
+ * @property {number} x
+ * @property {number} y
+ * @property {number} k
+ * @property {number} width
+ * @property {number} height
+ */
 
 /** @param {Frame} frame @param {number} [margin] pixels @returns {Box} */
 function boxOfFrame(frame, margin = 0) {
@@ -140,7 +149,14 @@ class BasePainter {
     canvas.globalAlpha = 1;
   }
 
-  /** Puts a line into the path. @param {CanvasRenderingContext2D} canvas @param {Frame} frame @param {number} line @param {number} level */
+  /**
+   * Puts a line into the path.
+   *
+   * @param {CanvasRenderingContext2D} canvas
+   * @param {Frame} frame
+   * @param {number} line
+   * @param {number} level
+   */
   line(canvas, frame, line, level) {
     const { x, y, start } = /** @type {LevelOfLines} */ (this.plan.levels[level]);
     const from = start[line] ?? 0;
@@ -191,17 +207,30 @@ class BasePainter {
     /** @type {[number, number][]} */
     const right = [];
     for (const section of meant) {
-      for (const [side, points] of /** @type {[boolean, [number, number][]][]} */ ([[true, left], [false, right]])) {
+      for (const [side, points] of /** @type {[boolean, [number, number][]][]} */ ([
+        [true, left],
+        [false, right],
+      ])) {
         const line = section.lanes.findLast((lane) => lane.left === side)?.outer ?? section.center;
-        for (let i = start[line] ?? 0; i < (start[line + 1] ?? 0); i++) points.push(onFrame(frame, x[i] ?? 0, y[i] ?? 0));
+        for (let i = start[line] ?? 0; i < (start[line + 1] ?? 0); i++)
+          points.push(onFrame(frame, x[i] ?? 0, y[i] ?? 0));
       }
     }
-    [...left, ...right.reverse()].forEach(([px, py], index) => (index === 0 ? canvas.moveTo(px, py) : canvas.lineTo(px, py)));
+    [...left, ...right.reverse()].forEach(([px, py], index) =>
+      index === 0 ? canvas.moveTo(px, py) : canvas.lineTo(px, py),
+    );
     if (left.length > 0) canvas.closePath();
   }
 }
 
-/** Puts what a target means into the path. @param {BasePainter} painter @param {CanvasRenderingContext2D} canvas @param {Frame} frame @param {PlanTarget} target */
+/**
+ * Puts what a target means into the path.
+ *
+ * @param {BasePainter} painter
+ * @param {CanvasRenderingContext2D} canvas
+ * @param {Frame} frame
+ * @param {PlanTarget} target
+ */
 function traceTarget(painter, canvas, frame, target) {
   const { plan } = painter;
   const level = BasePainter.levelFor(frame.k);

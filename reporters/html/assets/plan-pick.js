@@ -1,8 +1,25 @@
 // What is where: from a point of the map to road, section and lane, and from road and s to a point.
 
 /** @typedef {{road: number, section: number, lane: number, s: number, t: number}} PlanSpot all lengths in centimetres */
-/** @typedef {{road?: number, section?: number, lane?: number, junction?: number, signal?: number, object?: number}} PlanTarget */
-/** @typedef {{plan: Plan, sections: Grid, junctions: Grid, signals: Grid, objects: Grid, roadsById: Map<string, number>, junctionsById: Map<string, number>}} IndexedPlan */
+/**
+ * @typedef {object} PlanTarget
+ * @property {number} [road]
+ * @property {number} [section]
+ * @property {number} [lane]
+ * @property {number} [junction]
+ * @property {number} [signal]
+ * @property {number} [object]
+ */
+/**
+ * @typedef {object} IndexedPlan
+ * @property {Plan} plan
+ * @property {Grid} sections
+ * @property {Grid} junctions
+ * @property {Grid} signals
+ * @property {Grid} objects
+ * @property {Map<string, number>} roadsById
+ * @property {Map<string, number>} junctionsById
+ */
 
 /** @param {Plan} plan @returns {IndexedPlan} */
 function indexPlan(plan) {
@@ -32,16 +49,31 @@ function lineRange(plan, line) {
   return [start?.[line] ?? 0, start?.[line + 1] ?? 0];
 }
 
-/** Whether a ray to the right crosses a piece of a line an odd number of times. @param {Plan} plan @param {number} line @param {number} x @param {number} y */
+/**
+ * Whether a ray to the right crosses a piece of a line an odd number of times.
+ *
+ * @param {Plan} plan
+ * @param {number} line
+ * @param {number} x
+ * @param {number} y
+ */
 function crossings(plan, line, x, y) {
   const level = /** @type {LevelOfLines} */ (plan.levels[0]);
   const [from = 0, to = 0] = lineRange(plan, line);
   let odd = false;
-  for (let i = from; i + 1 < to; i++) odd = crosses(level.x[i], level.y[i], level.x[i + 1], level.y[i + 1], x, y) !== odd;
+  for (let i = from; i + 1 < to; i++)
+    odd = crosses(level.x[i], level.y[i], level.x[i + 1], level.y[i + 1], x, y) !== odd;
   return odd;
 }
 
-/** @param {number|undefined} x0 @param {number|undefined} y0 @param {number|undefined} x1 @param {number|undefined} y1 @param {number} x @param {number} y */
+/**
+ * @param {number|undefined} x0
+ * @param {number|undefined} y0
+ * @param {number|undefined} x1
+ * @param {number|undefined} y1
+ * @param {number} x
+ * @param {number} y
+ */
 function crosses(x0 = 0, y0 = 0, x1 = 0, y1 = 0, x, y) {
   return y0 > y !== y1 > y && x < ((x1 - x0) * (y - y0)) / (y1 - y0) + x0;
 }
@@ -60,7 +92,14 @@ function isInLane(plan, lane, x, y) {
 /** How many stacked lanes are looked at before the pointer gets an answer. */
 const MOST_LANES_TRIED = 400;
 
-/** The road and the lane at a point; of several the last, which is drawn on top. @param {IndexedPlan} indexed @param {number} x @param {number} y @returns {PlanSpot|null} */
+/**
+ * The road and the lane at a point; of several the last, which is drawn on top.
+ *
+ * @param {IndexedPlan} indexed
+ * @param {number} x
+ * @param {number} y
+ * @returns {PlanSpot|null}
+ */
 function spotAt(indexed, x, y) {
   const { plan } = indexed;
   const near = indexed.sections.within([x, y, x, y]);
@@ -79,7 +118,14 @@ function spotAt(indexed, x, y) {
   return null;
 }
 
-/** The nearest station of a road's reference line. @param {Plan} plan @param {PlanRoad} road @param {number} x @param {number} y */
+/**
+ * The nearest station of a road's reference line.
+ *
+ * @param {Plan} plan
+ * @param {PlanRoad} road
+ * @param {number} x
+ * @param {number} y
+ */
 function projectOn(plan, road, x, y) {
   const level = /** @type {LevelOfLines} */ (plan.levels[0]);
   const [from = 0, to = 0] = lineRange(plan, road.line);
@@ -101,7 +147,13 @@ function projectOn(plan, road, x, y) {
   return best.distance === Infinity ? null : best;
 }
 
-/** The point of a reference line at s, with the direction there. @param {Plan} plan @param {PlanRoad} road @param {number} s */
+/**
+ * The point of a reference line at s, with the direction there.
+ *
+ * @param {Plan} plan
+ * @param {PlanRoad} road
+ * @param {number} s
+ */
 function pointAt(plan, road, s) {
   const level = /** @type {LevelOfLines} */ (plan.levels[0]);
   const [from = 0, to = 0] = lineRange(plan, road.line);
@@ -139,18 +191,35 @@ function boxOfLines(plan, lines) {
 /** @param {Plan} plan @param {PlanTarget} target */
 function lanesOf(plan, target) {
   const road = target.road === undefined ? undefined : plan.roads[target.road];
-  const sections = road?.sections.filter((section) => target.section === undefined || section.index === target.section) ?? [];
-  return sections.flatMap((section) => section.lanes.filter((lane) => target.lane === undefined || lane.id === target.lane));
+  const sections =
+    road?.sections.filter((section) => target.section === undefined || section.index === target.section) ?? [];
+  return sections.flatMap((section) =>
+    section.lanes.filter((lane) => target.lane === undefined || lane.id === target.lane),
+  );
 }
 
-/** What a target covers; an empty box where it is not on the map. @param {Plan} plan @param {PlanTarget} target @returns {Box} */
+/**
+ * What a target covers; an empty box where it is not on the map.
+ *
+ * @param {Plan} plan
+ * @param {PlanTarget} target
+ * @returns {Box}
+ */
 function boxOfTarget(plan, target) {
   const section = plan.roads[target.road ?? -1]?.sections[target.section ?? -1];
   // The middle lane has no width: it is the center line.
   if (section && target.lane === 0) return boxOfLines(plan, [section.center]);
   if (section && target.lane === undefined) return section.box;
-  if (target.lane !== undefined) return boxOfLines(plan, lanesOf(plan, target).flatMap((lane) => [lane.inner, lane.outer]));
-  const whole = plan.signals[target.signal ?? -1] ?? plan.roads[target.road ?? -1] ?? plan.junctions[target.junction ?? -1] ?? plan.objects[target.object ?? -1];
+  if (target.lane !== undefined)
+    return boxOfLines(
+      plan,
+      lanesOf(plan, target).flatMap((lane) => [lane.inner, lane.outer]),
+    );
+  const whole =
+    plan.signals[target.signal ?? -1] ??
+    plan.roads[target.road ?? -1] ??
+    plan.junctions[target.junction ?? -1] ??
+    plan.objects[target.object ?? -1];
   return whole?.box ?? emptyBox();
 }
 

@@ -39,7 +39,13 @@ class TileStore {
     this.back = { tile: { canvas, frame, theme }, steps: this.painter.paint(context, frame, theme), spent: 0 };
   }
 
-  /** Whether a picture shows all of a view sharply. @param {Tile|undefined|null} tile @param {Frame} view @param {MapTheme} theme */
+  /**
+   * Whether a picture shows all of a view sharply.
+   *
+   * @param {Tile|undefined|null} tile
+   * @param {Frame} view
+   * @param {MapTheme} theme
+   */
   static suits(tile, view, theme) {
     if (!tile || tile.theme !== theme) return false;
     const { frame } = tile;
@@ -49,15 +55,32 @@ class TileStore {
     return Math.abs(frame.k / view.k - 1) < 1e-9 && spareX >= 0 && spareY >= 0 && moved <= 0.5;
   }
 
-  /** Whether it is better to go on with a picture than to begin another. @param {Tile} tile @param {Frame} view @param {MapTheme} theme */
+  /**
+   * Whether it is better to go on with a picture than to begin another.
+   *
+   * @param {Tile} tile
+   * @param {Frame} view
+   * @param {MapTheme} theme
+   */
   static isOfUse(tile, view, theme) {
     if (tile.theme !== theme) return false;
     const ratio = tile.frame.k / view.k;
-    const moved = Math.max(Math.abs(view.x - tile.frame.x) / tile.frame.width, Math.abs(view.y - tile.frame.y) / tile.frame.height);
+    const moved = Math.max(
+      Math.abs(view.x - tile.frame.x) / tile.frame.width,
+      Math.abs(view.y - tile.frame.y) / tile.frame.height,
+    );
     return ratio > 0.6 && ratio < 1.7 && moved * view.k < 0.7;
   }
 
-  /** Goes on drawing. @param {Frame} view @param {number} ratio @param {MapTheme} theme @param {number} budget @returns {boolean} whether there is more to do */
+  /**
+   * Goes on drawing.
+   *
+   * @param {Frame} view
+   * @param {number} ratio
+   * @param {MapTheme} theme
+   * @param {number} budget
+   * @returns {boolean} whether there is more to do
+   */
   advance(view, ratio, theme, budget) {
     if (TileStore.suits(this.front, view, theme) && !this.back) return false;
     if (!this.back || !TileStore.isOfUse(this.back.tile, view, theme)) {

@@ -33,13 +33,25 @@ class PlanView {
     this.pending = false;
     this.sized = false;
     this.frames = { painted: 0, longest: 0, total: 0, firstPaint: 0, last: 0, gap: 0 };
-    this.canvas = withAttributes(make('canvas', 'map-canvas'), { tabindex: 0, role: 'img', 'aria-label': 'Map of the roads with the findings; the table has the same as text' });
+    this.canvas = withAttributes(make('canvas', 'map-canvas'), {
+      tabindex: 0,
+      role: 'img',
+      'aria-label': 'Map of the roads with the findings; the table has the same as text',
+    });
     this.readout = make('div', 'readout');
     this.scaleBar = make('div', 'scale-bar', make('span', ''));
-    this.north = withAttributes(make('div', 'north', make('span', '', '▲'), make('span', '', 'N')), { title: 'y points up', 'aria-hidden': 'true' });
+    this.north = withAttributes(make('div', 'north', make('span', '', '▲'), make('span', '', 'N')), {
+      title: 'y points up',
+      'aria-hidden': 'true',
+    });
     this.element = make('div', 'map', this.canvas, this.north, this.scaleBar, this.readout);
     this.camera = new Camera(() => this.refresh());
-    this.input = new CameraInput(this.canvas, this.camera, (x, y) => this.click(x, y), (x, y, inside) => this.hover(x, y, inside));
+    this.input = new CameraInput(
+      this.canvas,
+      this.camera,
+      (x, y) => this.click(x, y),
+      (x, y, inside) => this.hover(x, y, inside),
+    );
     this.canvas.addEventListener('dblclick', () => clearTimeout(this.roadTimer));
     theme.listeners.push(() => this.refresh());
     new ResizeObserver(() => this.resize()).observe(this.element);
@@ -63,7 +75,11 @@ class PlanView {
       this.sized = true;
       if (this.plan.box) {
         const [x0, y0, x1, y1] = this.plan.box;
-        Object.assign(this.camera, { x: (x0 + x1) / 2, y: (y0 + y1) / 2, k: this.camera.scaleFor((x1 - x0) / 2, (y1 - y0) / 2) });
+        Object.assign(this.camera, {
+          x: (x0 + x1) / 2,
+          y: (y0 + y1) / 2,
+          k: this.camera.scaleFor((x1 - x0) / 2, (y1 - y0) / 2),
+        });
       }
     }
     this.paint(performance.now(), 40);
@@ -141,7 +157,12 @@ class PlanView {
     }
   }
 
-  /** @param {CanvasRenderingContext2D} context @param {Frame} frame @param {PlanTarget[]} targets @param {number} strength */
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {Frame} frame
+   * @param {PlanTarget[]} targets
+   * @param {number} strength
+   */
   highlight(context, frame, targets, strength) {
     if (targets.length === 0) return;
     context.beginPath();
@@ -160,11 +181,18 @@ class PlanView {
     context.globalAlpha = 1;
   }
 
-  /** @param {CanvasRenderingContext2D} context @param {Frame} frame @param {{x: number, y: number, heading: number}} point */
+  /**
+   * @param {CanvasRenderingContext2D} context
+   * @param {Frame} frame
+   * @param {{x: number, y: number, heading: number}} point
+   */
   crosshair(context, frame, point) {
     const [x, y] = onFrame(frame, point.x, point.y);
     const [dx, dy] = [Math.sin(point.heading) * 16, Math.cos(point.heading) * 16];
-    for (const [width, color] of /** @type {[number, string][]} */ ([[6, this.colors.highlightHalo], [2.5, this.colors.highlight]])) {
+    for (const [width, color] of /** @type {[number, string][]} */ ([
+      [6, this.colors.highlightHalo],
+      [2.5, this.colors.highlight],
+    ])) {
       context.lineWidth = width;
       context.strokeStyle = color;
       context.beginPath();
@@ -179,7 +207,8 @@ class PlanView {
     const power = 10 ** Math.floor(Math.log10(most));
     const metres = power * (most / power >= 5 ? 5 : most / power >= 2 ? 2 : 1);
     this.scaleBar.style.width = `${metres * 100 * this.camera.k}px`;
-    const label = metres >= 1000 ? `${metres / 1000} km` : metres >= 1 ? `${metres} m` : `${Math.round(metres * 100)} cm`;
+    const label =
+      metres >= 1000 ? `${metres / 1000} km` : metres >= 1 ? `${metres} m` : `${Math.round(metres * 100)} cm`;
     if (this.scaleBar.firstChild) this.scaleBar.firstChild.textContent = label;
   }
 
@@ -200,7 +229,10 @@ class PlanView {
     const { origin } = this.plan;
     const spot = spotAt(this.indexed, x, y);
     const road = spot ? this.plan.roads[spot.road] : undefined;
-    const where = spot && road ? `road ${plain(road.id, 40)}   lane ${spot.lane}   s ${fixed(spot.s / 100)}   t ${fixed(spot.t / 100)}` : '';
+    const where =
+      spot && road
+        ? `road ${plain(road.id, 40)}   lane ${spot.lane}   s ${fixed(spot.s / 100)}   t ${fixed(spot.t / 100)}`
+        : '';
     this.readout.textContent = `x ${fixed(origin.x + x / 100)}   y ${fixed(origin.y + y / 100)}${where ? `   ${where}` : ''}`;
   }
 
@@ -247,4 +279,25 @@ class PlanView {
     }
     return this.camera.fly(anchor.x, anchor.y, this.camera.scaleFor(half[0] ?? 2500, half[1] ?? 2500));
   }
+}
+
+/** Kinds of lanes that are on the map, and the shapes of marks. @param {PlanView} view @param {Theme} theme */
+function legend(view, theme) {
+  const used = new Set(view.painter.kinds.flatMap((kinds) => [...kinds]));
+  const list = make('ul');
+  const fill = () => {
+    const kinds = LANE_KINDS.map((kind, index) => ({ ...kind, index }))
+      .filter(({ index }) => used.has(index))
+      .reverse();
+    list.replaceChildren(
+      ...kinds.map(({ name, light, dark }) => {
+        const swatch = make('span', 'swatch');
+        swatch.style.background = theme.dark ? dark : light;
+        return make('li', '', swatch, name);
+      }),
+    );
+  };
+  fill();
+  theme.listeners.push(fill);
+  return make('details', 'legend', make('summary', '', 'Lanes'), list);
 }

@@ -1,6 +1,16 @@
 // Plots of a value along a road: elevation, widths of lanes.
 
-/** @typedef {{name: string, color: string, pairs: Float64Array, from: number, to: number, labelled: boolean}} ProfileLine pairs of s and value in cm; s counts from `from` */
+/**
+ * pairs of s and value in cm; s counts from `from`
+ *
+ * @typedef {object} ProfileLine
+ * @property {string} name
+ * @property {string} color
+ * @property {Float64Array} pairs
+ * @property {number} from
+ * @property {number} to
+ * @property {boolean} labelled
+ */
 
 /** Colours of lines that are told apart by people who see red and green as one (Paul Tol's bright and muted ones). */
 const PROFILE_COLORS = ['#4477aa', '#ee6677', '#228833', '#ccbb44', '#66ccee', '#aa3377', '#997700', '#88ccaa'];
@@ -23,9 +33,17 @@ class ProfilePlot {
     /** Heights that have a label. @type {number[]} */
     this.labels = [];
     const [low, high] = this.range;
-    this.canvas = withAttributes(make('canvas', 'plot'), { role: 'img', 'aria-label': `${title}, between ${fixed(low / 100)} and ${fixed(high / 100)} metres over ${fixed(length / 100, 1)} metres` });
+    this.canvas = withAttributes(make('canvas', 'plot'), {
+      role: 'img',
+      'aria-label': `${title}, between ${fixed(low / 100)} and ${fixed(high / 100)} metres over ${fixed(length / 100, 1)} metres`,
+    });
     this.value = make('span', 'plot-value muted');
-    this.element = make('figure', lines.length > 1 ? 'profile several' : 'profile', make('figcaption', '', `${title} `, this.value), this.canvas);
+    this.element = make(
+      'figure',
+      lines.length > 1 ? 'profile several' : 'profile',
+      make('figcaption', '', `${title} `, this.value),
+      this.canvas,
+    );
     this.canvas.addEventListener('pointermove', (event) => this.hover(event.offsetX));
     this.canvas.addEventListener('pointerleave', () => this.hover(null));
   }
@@ -71,7 +89,9 @@ class ProfilePlot {
   /** @param {number} station */
   valuesAt(station) {
     const values = this.lines.filter(({ from, to }) => station >= from && station <= to).slice(0, 6);
-    return values.map(({ name, pairs, from }) => `${name}${name ? ': ' : ''}${fixed(valueAt(pairs, station - from) / 100)}`).join('   ');
+    return values
+      .map(({ name, pairs, from }) => `${name}${name ? ': ' : ''}${fixed(valueAt(pairs, station - from) / 100)}`)
+      .join('   ');
   }
 
   /** @param {number} s */
@@ -103,7 +123,8 @@ class ProfilePlot {
     }
     context.textBaseline = 'alphabetic';
     context.textAlign = 'center';
-    for (const value of niceTicks(0, this.length / 100, 4)) context.fillText(tickText(value), this.x(value * 100), PLOT.height - 5);
+    for (const value of niceTicks(0, this.length / 100, 4))
+      context.fillText(tickText(value), this.x(value * 100), PLOT.height - 5);
     context.strokeStyle = theme.edge;
     context.beginPath();
     context.moveTo(PLOT.left + 0.5, PLOT.top);
@@ -146,14 +167,22 @@ class ProfilePlot {
   }
 }
 
-/** Round numbers within a range. @param {number} low @param {number} high @param {number} wanted @returns {number[]} */
+/**
+ * Round numbers within a range.
+ *
+ * @param {number} low
+ * @param {number} high
+ * @param {number} wanted
+ * @returns {number[]}
+ */
 function niceTicks(low, high, wanted) {
   const raw = (high - low) / Math.max(1, wanted);
   if (!(raw > 0) || !Number.isFinite(raw)) return [low];
   const power = 10 ** Math.floor(Math.log10(raw));
   const step = power * (raw / power > 5 ? 10 : raw / power > 2 ? 5 : raw / power > 1 ? 2 : 1);
   const ticks = [];
-  for (let value = Math.ceil(low / step) * step; value <= high && ticks.length < 12; value += step) ticks.push(Math.abs(value) < step / 1e6 ? 0 : value);
+  for (let value = Math.ceil(low / step) * step; value <= high && ticks.length < 12; value += step)
+    ticks.push(Math.abs(value) < step / 1e6 ? 0 : value);
   return ticks;
 }
 

@@ -16,22 +16,37 @@
       this.selected = -1;
       /** What the last selection flies to; kept for those who wait for it. */
       this.flight = Promise.resolve();
-      this.filters = new Filters(this.findings, [this.ruleFacet()], () => this.filtered(), plan
-        ? { label: 'only without place on the map', passes: (finding) => finding.anchor === null } : null);
+      this.filters = new Filters(
+        this.findings,
+        [this.ruleFacet()],
+        () => this.filtered(),
+        plan ? { label: 'only without place on the map', passes: (finding) => finding.anchor === null } : null,
+      );
       this.list = new VirtualList({
-        rowHeight: 66, label: 'Findings',
-        row: (position) => this.row(position), detail: (position) => this.detail(position),
+        rowHeight: 66,
+        label: 'Findings',
+        row: (position) => this.row(position),
+        detail: (position) => this.detail(position),
       });
       this.table = new FindingsTable(this.findings, this.rules, (index) => this.choose(index));
-      this.chooser = withAttributes(make('div', 'chooser'), { hidden: true, role: 'dialog', 'aria-label': 'Findings at this place' });
+      this.chooser = withAttributes(make('div', 'chooser'), {
+        hidden: true,
+        role: 'dialog',
+        'aria-label': 'Findings at this place',
+      });
       this.help = helpDialog(KEYS);
-      this.empty = make('p', 'empty muted', this.findings.length === 0 ? 'There are no findings.' : 'No finding passes the filters.');
+      this.empty = make(
+        'p',
+        'empty muted',
+        this.findings.length === 0 ? 'There are no findings.' : 'No finding passes the filters.',
+      );
       this.view = plan ? this.mapView(plan) : null;
       this.panel = this.view ? this.roadPanel(this.view) : null;
       this.stage = make('section', 'stage', this.view?.element, this.panel?.element, this.chooser, this.table.element);
       if (!this.view) this.stage.append(make('div', 'no-map muted', planFault || noPlanSentence(data)));
       if (this.view) this.stage.append(legend(this.view, theme));
-      if (this.view && data.map?.own === false) this.stage.append(make('div', 'map-name muted', plain(`map: ${textOf(data.map.path)}`, 200)));
+      if (this.view && data.map?.own === false)
+        this.stage.append(make('div', 'map-name muted', plain(`map: ${textOf(data.map.path)}`, 200)));
       this.side = make('aside', 'side', this.filters.element, this.empty, this.list.element);
       this.modeButton = makeButton('tool mode', 'Table', () => this.setTable(!this.tableShown), 'Table or map (t)');
       this.tableShown = false;
@@ -43,7 +58,9 @@
       const rules = [...used].sort((a, b) => (this.rules[a]?.uid ?? '').localeCompare(this.rules[b]?.uid ?? ''));
       const position = new Map(rules.map((rule, index) => [rule, index]));
       return {
-        name: 'rule', all: `All rules (${rules.length})`, values: rules.map((rule) => shortRule(this.rules[rule]?.uid ?? '')),
+        name: 'rule',
+        all: `All rules (${rules.length})`,
+        values: rules.map((rule) => shortRule(this.rules[rule]?.uid ?? '')),
         of: ({ rule }) => position.get(rule) ?? -1,
       };
     }
@@ -85,14 +102,22 @@
 
     mount() {
       app.className = 'report';
-      const notes = make('div', 'notes', this.checkersNote(), cutsNote(this.data.cuts, 'Left out of this report'),
-        cutsNote([...listOf(this.data.map?.cuts), ...(this.plan?.cuts ?? [])], 'Left out of the map'));
+      const notes = make(
+        'div',
+        'notes',
+        checkersNote(this.checkers),
+        cutsNote(this.data.cuts, 'Left out of this report'),
+        cutsNote([...listOf(this.data.map?.cuts), ...(this.plan?.cuts ?? [])], 'Left out of the map'),
+      );
       app.replaceChildren(this.head(notes), make('div', 'body', this.side, this.stage), this.help);
       this.setTable(false);
       this.view?.resize();
       this.filtered();
       document.addEventListener('keydown', (event) => this.key(event));
-      printing(() => this.beforePrint(), () => this.afterPrint());
+      printing(
+        () => this.beforePrint(),
+        () => this.afterPrint(),
+      );
       addEventListener('hashchange', () => this.followHash());
       this.followHash();
     }
@@ -105,43 +130,60 @@
       const counts = make('span', 'head-counts');
       for (const level of LEVELS) {
         const count = this.findings.filter((finding) => finding.level === level).length;
-        counts.append(make('span', 'head-count', levelBadge(level), make('b', '', COUNT_FORMAT.format(count)), ` ${LEVEL_NAMES[level][count === 1 ? 0 : 1].replace(/informations?/, 'info')}`));
+        counts.append(
+          make(
+            'span',
+            'head-count',
+            levelBadge(level),
+            make('b', '', COUNT_FORMAT.format(count)),
+            ` ${LEVEL_NAMES[level][count === 1 ? 0 : 1].replace(/informations?/, 'info')}`,
+          ),
+        );
       }
-      const tools = make('div', 'tools', this.view ? makeButton('tool', 'Fit', () => void this.view?.fit(), 'The whole map (f)') : null,
-        this.modeButton, this.theme.button(), withAttributes(makeButton('tool', '?', () => this.help.showModal(), 'Keys (?)'), { 'aria-label': 'Keys' }));
+      const tools = make(
+        'div',
+        'tools',
+        this.view ? makeButton('tool', 'Fit', () => void this.view?.fit(), 'The whole map (f)') : null,
+        this.modeButton,
+        this.theme.button(),
+        withAttributes(
+          makeButton('tool', '?', () => this.help.showModal(), 'Keys (?)'),
+          { 'aria-label': 'Keys' },
+        ),
+      );
       const digest = textOf(file?.sha256);
-      const title = withAttributes(make('h1', '', whereElement(name, 'title')), { title: digest ? `sha256 ${plain(digest, 80)}` : null });
-      const top = make('div', 'head-line', verdictBadge(file?.verdict), title, counts, tools);
-      const second = make('div', 'head-line second', make('span', 'reason', plain(verdictReason(this.data, this.findings))), notes,
-        make('span', 'muted generator', plain(this.data.generator, 80)));
-      return make('header', 'head', top, second);
-    }
-
-    checkersNote() {
-      if (this.checkers.length === 0) return null;
-      const rank = (/** @type {any} */ checker) => (checker?.status === 'error' ? 0 : checker?.blocked ? 1 : checker?.status ? 3 : 2);
-      const rows = [...this.checkers].sort((a, b) => rank(a) - rank(b)).map((checker) => {
-        const status = checker?.blocked ? 'blocked' : checker?.status === 'error' ? 'failed' : textOf(checker?.status) || 'unknown';
-        const name = withAttributes(make('td', 'mono', plain(checker?.id, 200)), { title: plain(checker?.about, 500) });
-        return make('tr', '', make('td', `status ${['blocked', 'failed', 'unknown'].includes(status) ? 'trouble' : ''}`, status), name,
-          make('td', 'number', COUNT_FORMAT.format(numberOrNull(checker?.findings) ?? 0)), make('td', '', plain(checker?.summary, 500)));
+      const title = withAttributes(make('h1', '', whereElement(name, 'title')), {
+        title: digest ? `sha256 ${plain(digest, 80)}` : null,
       });
-      const trouble = this.checkers.filter((checker) => rank(checker) < 3).length;
-      const label = `${counted(this.checkers.length, 'checker')}${trouble > 0 ? `, ${trouble} with trouble` : ''}`;
-      return make('details', 'note checkers', make('summary', '', label), make('table', '', make('tbody', '', ...rows)));
+      const top = make('div', 'head-line', verdictBadge(file?.verdict), title, counts, tools);
+      const second = make(
+        'div',
+        'head-line second',
+        make('span', 'reason', plain(verdictReason(this.data, this.findings))),
+        notes,
+        make('span', 'muted generator', plain(this.data.generator, 80)),
+      );
+      return make('header', 'head', top, second);
     }
 
     /** @param {number} position */
     row(position) {
       const index = this.filters.shown[position] ?? -1;
       const finding = /** @type {Finding} */ (this.findings[index]);
-      return findingRow(finding, this.rules[finding.rule], index === this.selected, this.view !== null, () => this.choose(index === this.selected ? -1 : index));
+      return findingRow(finding, this.rules[finding.rule], index === this.selected, this.view !== null, () =>
+        this.choose(index === this.selected ? -1 : index),
+      );
     }
 
     /** @param {number} position */
     detail(position) {
       const finding = this.findings[this.filters.shown[position] ?? -1];
-      return finding ? findingDetail(finding, this.rules, this.checkers, this.plan, { go: (place) => this.goTo(finding, place), road: (road) => this.showRoad(road, false) }) : null;
+      return finding
+        ? findingDetail(finding, this.rules, this.checkers, this.plan, {
+            go: (place) => this.goTo(finding, place),
+            road: (road) => this.showRoad(road, false),
+          })
+        : null;
     }
 
     filtered() {
@@ -154,7 +196,12 @@
       this.view?.refresh();
     }
 
-    /** Selects a finding, shows it in the list and flies there. @param {number} index -1: none @param {boolean} [focus] */
+    /**
+     * Selects a finding, shows it in the list and flies there.
+     *
+     * @param {number} index -1: none
+     * @param {boolean} [focus]
+     */
     choose(index, focus = false) {
       this.chooser.hidden = true;
       this.selected = index;
@@ -167,12 +214,14 @@
         this.list.reveal(position);
         if (focus) this.list.focus(position);
       }
-      for (const row of this.table.body.querySelectorAll('tr')) row.classList.toggle('selected', finding !== undefined && row.dataset.finding === String(finding.id));
+      for (const row of this.table.body.querySelectorAll('tr'))
+        row.classList.toggle('selected', finding !== undefined && row.dataset.finding === String(finding.id));
       if (this.view) {
         const main = finding?.places.find(({ anchor }) => anchor !== null);
         this.view.selected = index;
         this.view.targets = finding?.places.flatMap(({ on }) => on) ?? [];
-        this.view.further = finding?.places.flatMap((place) => (place.anchor && place !== main ? [place.anchor] : [])) ?? [];
+        this.view.further =
+          finding?.places.flatMap((place) => (place.anchor && place !== main ? [place.anchor] : [])) ?? [];
         this.view.refresh();
         this.flight = finding ? this.view.show(finding) : Promise.resolve();
       }
@@ -182,7 +231,8 @@
     /** @param {Finding} finding @param {FindingPlace} place */
     goTo(finding, place) {
       if (this.tableShown) this.setTable(false);
-      if (place.anchor) this.flight = this.view?.show({ ...finding, anchor: place.anchor, wholeElement: false }) ?? Promise.resolve();
+      if (place.anchor)
+        this.flight = this.view?.show({ ...finding, anchor: place.anchor, wholeElement: false }) ?? Promise.resolve();
     }
 
     /** @param {number} by */
@@ -225,14 +275,7 @@
 
     /** @param {number[]} members @param {number} x @param {number} y */
     openChooser(members, x, y) {
-      const items = members.slice(0, 100).map((index) => {
-        const finding = this.findings[index];
-        const button = makeButton('chooser-item', '', () => void this.choose(index, true));
-        button.append(levelBadge(finding?.level ?? 'information'), make('span', '', ...withCode(finding?.text, 160)));
-        return make('li', '', button);
-      });
-      const more = members.length > 100 ? make('p', 'muted', `and ${COUNT_FORMAT.format(members.length - 100)} more; the filters make them fewer`) : null;
-      this.chooser.replaceChildren(make('h2', '', `${counted(members.length, 'finding')} here`), make('ul', '', ...items), more ?? '');
+      this.chooser.replaceChildren(...chooserContent(members, this.findings, (index) => void this.choose(index, true)));
       this.chooser.hidden = false;
       const left = Math.max(8, Math.min(x + 14, this.stage.clientWidth - this.chooser.offsetWidth - 8));
       const top = Math.max(8, Math.min(y - 10, this.stage.clientHeight - this.chooser.offsetHeight - 8));
@@ -264,7 +307,12 @@
     /** @param {KeyboardEvent} event @returns {boolean} whether the key means something here */
     act(event) {
       const camera = this.view?.camera;
-      const arrows = /** @type {Record<string, [number, number]>} */ ({ ArrowLeft: [90, 0], ArrowRight: [-90, 0], ArrowUp: [0, 90], ArrowDown: [0, -90] });
+      const arrows = /** @type {Record<string, [number, number]>} */ ({
+        ArrowLeft: [90, 0],
+        ArrowRight: [-90, 0],
+        ArrowUp: [0, 90],
+        ArrowDown: [0, -90],
+      });
       const arrow = arrows[event.key];
       if (event.shiftKey && arrow) camera?.pan(...arrow);
       else if (event.key === 'j' || event.key === 'ArrowDown') this.move(1);
@@ -286,7 +334,8 @@
     enter(event) {
       const finding = this.findings[this.selected];
       const target = event.target instanceof Element ? event.target.closest('button, a, summary, input') : null;
-      if (!finding || (target && !(target instanceof HTMLElement && target.dataset.finding === String(finding.id)))) return false;
+      if (!finding || (target && !(target instanceof HTMLElement && target.dataset.finding === String(finding.id))))
+        return false;
       if (this.tableShown) this.setTable(false);
       this.flight = this.view?.show(finding) ?? Promise.resolve();
       return true;
@@ -328,31 +377,9 @@
 
   /** @param {Record<string, any>} data */
   function noPlanSentence(data) {
-    return data.map ? 'The map of this report is missing from the file.' : 'There is no road network to show: the findings are in the list and in the table.';
-  }
-
-  /** Kinds of lanes that are on the map, and the shapes of marks. @param {PlanView} view @param {Theme} theme */
-  function legend(view, theme) {
-    const used = new Set(view.painter.kinds.flatMap((kinds) => [...kinds]));
-    const list = make('ul');
-    const fill = () => {
-      const kinds = LANE_KINDS.map((kind, index) => ({ ...kind, index })).filter(({ index }) => used.has(index)).reverse();
-      list.replaceChildren(...kinds.map(({ name, light, dark }) => {
-        const swatch = make('span', 'swatch');
-        swatch.style.background = theme.dark ? dark : light;
-        return make('li', '', swatch, name);
-      }));
-    };
-    fill();
-    theme.listeners.push(fill);
-    return make('details', 'legend', make('summary', '', 'Lanes'), list);
-  }
-
-  /** Calls before and after the page is printed, whoever prints. @param {() => void} before @param {() => void} after */
-  function printing(before, after) {
-    addEventListener('beforeprint', before);
-    addEventListener('afterprint', after);
-    matchMedia('print').addEventListener('change', ({ matches }) => (matches ? before() : after()));
+    return data.map
+      ? 'The map of this report is missing from the file.'
+      : 'There is no road network to show: the findings are in the list and in the table.';
   }
 
   /** @returns {Promise<{plan: Plan|null, fault: string}>} */
@@ -361,7 +388,10 @@
       const bytes = await readBlock('plan');
       return { plan: bytes ? decodePlan(bytes) : null, fault: '' };
     } catch (error) {
-      return { plan: null, fault: error instanceof BlockError ? error.message : 'The map in this report cannot be read.' };
+      return {
+        plan: null,
+        fault: error instanceof BlockError ? error.message : 'The map in this report cannot be read.',
+      };
     }
   }
 
@@ -370,43 +400,60 @@
   let page = null;
   const theme = new Theme();
 
-  const ready = whenParsed(() => startPage(app, async () => {
-    const began = performance.now();
-    const data = await readData();
-    const { plan, fault } = await readPlan();
-    times.decodeMs = performance.now() - began;
-    page = new ReportPage(data, plan, fault, theme);
-    page.mount();
-    await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
-  }));
+  const ready = whenParsed(() =>
+    startPage(app, async () => {
+      const began = performance.now();
+      const data = await readData();
+      const { plan, fault } = await readPlan();
+      times.decodeMs = performance.now() - began;
+      page = new ReportPage(data, plan, fault, theme);
+      page.mount();
+      await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
+    }),
+  );
 
-  Object.assign(window, { qcbus: {
-    ready,
-    /** @param {number} id */
-    select: (id) => page?.select(id),
-    /** Ends with the last flight that was begun. */
-    settled: () => page?.flight,
-    /** The middle of what is seen, in metres of the map; scale in CSS pixels per metre. */
-    view: () => {
-      const view = page?.view;
-      return view ? { x: view.plan.origin.x + view.camera.x / 100, y: view.plan.origin.y + view.camera.y / 100, scale: view.camera.k * 100 } : null;
+  Object.assign(window, {
+    qcbus: {
+      ready,
+      /** @param {number} id */
+      select: (id) => page?.select(id),
+      /** Ends with the last flight that was begun. */
+      settled: () => page?.flight,
+      /** The middle of what is seen, in metres of the map; scale in CSS pixels per metre. */
+      view: () => {
+        const view = page?.view;
+        return view
+          ? {
+              x: view.plan.origin.x + view.camera.x / 100,
+              y: view.plan.origin.y + view.camera.y / 100,
+              scale: view.camera.k * 100,
+            }
+          : null;
+      },
+      /** Where a point of the map is on the page, in CSS pixels. @param {number} x metres @param {number} y */
+      screen: (x, y) => {
+        const view = page?.view;
+        if (!view) return null;
+        const [px, py] = onFrame(view.camera.frame(), (x - view.plan.origin.x) * 100, (y - view.plan.origin.y) * 100);
+        const { left, top } = view.canvas.getBoundingClientRect();
+        return { x: left + px, y: top + py };
+      },
+      stats: () => {
+        const frames = page?.view?.frames;
+        return {
+          ...times,
+          firstPaintMs: frames?.firstPaint ?? 0,
+          fps: frames && frames.gap > 0 ? 1000 / frames.gap : 0,
+          frames: frames?.painted ?? 0,
+          longestFrameMs: frames?.longest ?? 0,
+          meanFrameMs: frames && frames.painted > 0 ? frames.total / frames.painted : 0,
+          tilePaintMs: page?.view?.tiles.lastPaint ?? 0,
+          busy: page?.view?.pending ?? false,
+          lanes: page?.plan?.laneCount ?? 0,
+          points: page?.plan?.levels[0]?.x.length ?? 0,
+          findings: page?.findings.length ?? 0,
+        };
+      },
     },
-    /** Where a point of the map is on the page, in CSS pixels. @param {number} x metres @param {number} y */
-    screen: (x, y) => {
-      const view = page?.view;
-      if (!view) return null;
-      const [px, py] = onFrame(view.camera.frame(), (x - view.plan.origin.x) * 100, (y - view.plan.origin.y) * 100);
-      const { left, top } = view.canvas.getBoundingClientRect();
-      return { x: left + px, y: top + py };
-    },
-    stats: () => {
-      const frames = page?.view?.frames;
-      return {
-        ...times, firstPaintMs: frames?.firstPaint ?? 0, fps: frames && frames.gap > 0 ? 1000 / frames.gap : 0, frames: frames?.painted ?? 0, longestFrameMs: frames?.longest ?? 0,
-        meanFrameMs: frames && frames.painted > 0 ? frames.total / frames.painted : 0, tilePaintMs: page?.view?.tiles.lastPaint ?? 0,
-        busy: page?.view?.pending ?? false,
-        lanes: page?.plan?.laneCount ?? 0, points: page?.plan?.levels[0]?.x.length ?? 0, findings: page?.findings.length ?? 0,
-      };
-    },
-  } });
+  });
 })();

@@ -1,6 +1,20 @@
 // The table of the files of a run.
 
-/** @typedef {{path: string, verdict: string, page: string, error: number, warning: number, information: number, why: string, index: number, search: string, shown: string}} RunFile shown: the path without what all paths begin with */
+/**
+ * shown: the path without what all paths begin with
+ *
+ * @typedef {object} RunFile
+ * @property {string} path
+ * @property {string} verdict
+ * @property {string} page
+ * @property {number} error
+ * @property {number} warning
+ * @property {number} information
+ * @property {string} why
+ * @property {number} index
+ * @property {string} search
+ * @property {string} shown
+ */
 
 /** @typedef {{name: string, title: string, value: (file: RunFile) => string|number}} FileColumn */
 
@@ -22,8 +36,16 @@ function runFilesOf(data) {
     const verdict = VERDICTS.includes(textOf(file?.verdict)) ? textOf(file.verdict) : 'undetermined';
     const [path, why] = [textOf(file?.path), textOf(file?.why)];
     return {
-      path, shown: path.slice(common) || path, verdict, page: textOf(file?.page), why, index, error: count(file?.error), warning: count(file?.warning),
-      information: count(file?.information), search: `${path}\n${why}`.toLowerCase(),
+      path,
+      shown: path.slice(common) || path,
+      verdict,
+      page: textOf(file?.page),
+      why,
+      index,
+      error: count(file?.error),
+      warning: count(file?.warning),
+      information: count(file?.information),
+      search: `${path}\n${why}`.toLowerCase(),
     };
   });
 }
@@ -35,7 +57,10 @@ function runFilesOf(data) {
  */
 function pageAddress(page, finding) {
   if (page === '' || page.startsWith('/') || page.includes('\\')) return null;
-  const path = page.split('/').map((part) => encodeURIComponent(part)).join('/');
+  const path = page
+    .split('/')
+    .map((part) => encodeURIComponent(part))
+    .join('/');
   return `./${path}${finding === undefined ? '' : `#finding=${finding}`}`;
 }
 
@@ -49,12 +74,22 @@ class RunFiles {
     this.verdict = '';
     /** @type {RunFile[]} */
     this.shown = [];
-    this.search = withAttributes(make('input', 'search'), { type: 'search', placeholder: 'Search files', 'aria-label': 'Search files' });
+    this.search = withAttributes(make('input', 'search'), {
+      type: 'search',
+      placeholder: 'Search files',
+      'aria-label': 'Search files',
+    });
     this.search.addEventListener('input', () => this.update());
     this.count = withAttributes(make('span', 'shown-count'), { role: 'status' });
     this.head = make('div', 'file-row file-head');
     this.list = new VirtualList({ rowHeight: 30, label: 'Files', row: (position) => this.row(position) });
-    this.element = make('section', files.some(({ why }) => why !== '') ? 'files' : 'files no-why', make('div', 'filter-row', this.search, this.count), this.head, this.list.element);
+    this.element = make(
+      'section',
+      files.some(({ why }) => why !== '') ? 'files' : 'files no-why',
+      make('div', 'filter-row', this.search, this.count),
+      this.head,
+      this.list.element,
+    );
     for (const column of FILE_COLUMNS) {
       const button = makeButton(`link cell-${column.name}`, column.title, () => this.sortBy(column), 'Sort');
       this.head.append(withAttributes(button, { 'data-column': column.name }));
@@ -76,8 +111,14 @@ class RunFiles {
   }
 
   update() {
-    const words = this.search.value.toLowerCase().split(/\s+/).filter((word) => word !== '');
-    this.shown = this.files.filter((file) => (this.verdict === '' || file.verdict === this.verdict) && words.every((word) => file.search.includes(word)));
+    const words = this.search.value
+      .toLowerCase()
+      .split(/\s+/)
+      .filter((word) => word !== '');
+    this.shown = this.files.filter(
+      (file) =>
+        (this.verdict === '' || file.verdict === this.verdict) && words.every((word) => file.search.includes(word)),
+    );
     const { value } = this.sorted ?? /** @type {FileColumn} */ (FILE_COLUMNS[0]);
     const sign = this.reversed ? -1 : 1;
     this.shown.sort((a, b) => {
@@ -89,7 +130,10 @@ class RunFiles {
       button.textContent = `${FILE_COLUMNS.find(({ name }) => name === button.dataset.column)?.title ?? ''}${isSorted ? (this.reversed ? ' ↑' : ' ↓') : ''}`;
       withAttributes(button, { 'aria-pressed': String(isSorted) });
     }
-    this.count.textContent = this.shown.length === this.files.length ? counted(this.files.length, 'file') : `${COUNT_FORMAT.format(this.shown.length)} of ${counted(this.files.length, 'file')}`;
+    this.count.textContent =
+      this.shown.length === this.files.length
+        ? counted(this.files.length, 'file')
+        : `${COUNT_FORMAT.format(this.shown.length)} of ${counted(this.files.length, 'file')}`;
     this.list.reset(this.shown.length, -1);
   }
 
@@ -98,11 +142,26 @@ class RunFiles {
     const file = /** @type {RunFile} */ (this.shown[position]);
     const address = pageAddress(file.page);
     const name = plain(file.path, 400);
-    const path = address ? withAttributes(make('a', '', whereElement(file.shown, 'title')), { href: address }) : whereElement(file.shown, 'title');
-    const number = (/** @type {Level} */ level) => make('span', `number cell-${level}`, file[level] > 0 ? COUNT_FORMAT.format(file[level]) : '·');
+    const path = address
+      ? withAttributes(make('a', '', whereElement(file.shown, 'title')), { href: address })
+      : whereElement(file.shown, 'title');
+    const number = (/** @type {Level} */ level) =>
+      make('span', `number cell-${level}`, file[level] > 0 ? COUNT_FORMAT.format(file[level]) : '·');
     const total = file.error + file.warning + file.information;
-    const only = total > 0 ? makeButton('link only', 'findings', () => this.choose(file.index), 'Only the findings of this file') : null;
-    return make('div', 'file-row', make('span', 'cell-verdict', verdictBadge(file.verdict)), withAttributes(make('span', 'cell-path', path), { title: name }),
-      number('error'), number('warning'), number('information'), make('span', 'cell-why muted', plain(file.why, 300)), only);
+    const only =
+      total > 0
+        ? makeButton('link only', 'findings', () => this.choose(file.index), 'Only the findings of this file')
+        : null;
+    return make(
+      'div',
+      'file-row',
+      make('span', 'cell-verdict', verdictBadge(file.verdict)),
+      withAttributes(make('span', 'cell-path', path), { title: name }),
+      number('error'),
+      number('warning'),
+      number('information'),
+      make('span', 'cell-why muted', plain(file.why, 300)),
+      only,
+    );
   }
 }

@@ -74,7 +74,8 @@ function makeButton(className, label, action, hint) {
 
 /** Controls, marks that turn the direction of text, and what has no width: nothing of these may act unseen. */
 // eslint-disable-next-line no-control-regex
-const UNSEEN = /[\u0000-\u0008\u000b-\u001f\u007f-\u009f\u00ad\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\uffff]|[\ud800-\udbff](?![\udc00-\udfff])|(?<![\ud800-\udbff])[\udc00-\udfff]/g;
+const UNSEEN =
+  /[\u0000-\u0008\u000b-\u001f\u007f-\u009f\u00ad\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\uffff]|[\ud800-\udbff](?![\udc00-\udfff])|(?<![\ud800-\udbff])[\udc00-\udfff]/g;
 
 /**
  * Text of others, so that all of it is seen: `‹U+202E›` instead of a mark that turns the rest of the line around.
@@ -129,16 +130,34 @@ function shortRule(uid) {
   return plain(name || uid, 120);
 }
 
-/** Text of a finding; what stands between backticks is code. @param {unknown} value @param {number} [most] @returns {(Node|string)[]} */
+/**
+ * Text of a finding; what stands between backticks is code.
+ *
+ * @param {unknown} value
+ * @param {number} [most]
+ * @returns {(Node|string)[]}
+ */
 function withCode(value, most) {
-  return plain(value, most).split(/(`[^`\n]+`)/).map((part, index) => (index % 2 === 1 ? make('code', '', part.slice(1, -1)) : part));
+  return plain(value, most)
+    .split(/(`[^`\n]+`)/)
+    .map((part, index) => (index % 2 === 1 ? make('code', '', part.slice(1, -1)) : part));
 }
 
-/** A place in a file. Where there is no room for all of it the directories give way, the name and the row stay. @param {string} where @param {string} [className] */
+/**
+ * A place in a file. Where there is no room for all of it the directories give way, the name and the row stay.
+ *
+ * @param {string} where
+ * @param {string} [className]
+ */
 function whereElement(where, className = 'where') {
   const shown = plain(where, 600);
   const name = Math.max(shown.lastIndexOf('/'), shown.lastIndexOf('\\')) + 1;
-  const element = make('span', className, make('span', 'directory', shown.slice(0, name)), make('span', 'file-name', shown.slice(name)));
+  const element = make(
+    'span',
+    className,
+    make('span', 'directory', shown.slice(0, name)),
+    make('span', 'file-name', shown.slice(name)),
+  );
   return withAttributes(element, { title: shown });
 }
 
@@ -166,7 +185,12 @@ function outwardLink(address, label) {
   const target = textOf(address);
   if (!/^https?:\/\/[^\s]+$/i.test(target)) return target ? make('span', 'muted', plain(target, 500)) : null;
   const link = make('a', 'outward', label);
-  return withAttributes(link, { href: target, rel: 'noopener noreferrer', target: '_blank', title: plain(target, 500) });
+  return withAttributes(link, {
+    href: target,
+    rel: 'noopener noreferrer',
+    target: '_blank',
+    title: plain(target, 500),
+  });
 }
 
 /** What is wrong with a block of data, in a sentence for people. */
@@ -174,7 +198,9 @@ class BlockError extends Error {}
 
 /** @param {string} base64 @returns {Uint8Array<ArrayBuffer>} */
 function fromBase64(base64) {
-  const native = /** @type {{fromBase64?: (text: string) => Uint8Array<ArrayBuffer>}} */ (/** @type {unknown} */ (Uint8Array)).fromBase64;
+  const native = /** @type {{fromBase64?: (text: string) => Uint8Array<ArrayBuffer>}} */ (
+    /** @type {unknown} */ (Uint8Array)
+  ).fromBase64;
   if (native) return native.call(Uint8Array, base64);
   const binary = atob(base64);
   const bytes = new Uint8Array(binary.length);
@@ -222,16 +248,20 @@ async function readData() {
 /** @param {HTMLElement} app @param {unknown} error */
 function showFailure(app, error) {
   const said = error instanceof BlockError ? error.message : 'Something in this report could not be shown.';
-  const detail = error instanceof BlockError || !(error instanceof Error) ? null : make('pre', '', plain(error.message, 2000));
-  app.replaceChildren(withAttributes(
-    make('div', 'failure', make('h1', '', 'This report cannot be shown'), make('p', '', said), detail),
-    { role: 'alert' },
-  ));
+  const detail =
+    error instanceof BlockError || !(error instanceof Error) ? null : make('pre', '', plain(error.message, 2000));
+  app.replaceChildren(
+    withAttributes(make('div', 'failure', make('h1', '', 'This report cannot be shown'), make('p', '', said), detail), {
+      role: 'alert',
+    }),
+  );
 }
 
 /** @param {unknown} cuts sentences about what was left out @param {string} title */
 function cutsNote(cuts, title) {
-  const sentences = listOf(cuts).map((cut) => plain(cut, 1000)).filter((cut) => cut !== '');
+  const sentences = listOf(cuts)
+    .map((cut) => plain(cut, 1000))
+    .filter((cut) => cut !== '');
   if (sentences.length === 0) return null;
   const items = sentences.map((sentence) => make('li', '', sentence));
   const summary = make('summary', '', `${title} (${sentences.length})`);
@@ -279,7 +309,10 @@ class Theme {
   }
 
   button() {
-    return withAttributes(makeButton('tool', '◐', () => this.toggle(), 'Dark or light (d)'), { 'aria-label': 'Dark or light' });
+    return withAttributes(
+      makeButton('tool', '◐', () => this.toggle(), 'Dark or light (d)'),
+      { 'aria-label': 'Dark or light' },
+    );
   }
 }
 
@@ -299,10 +332,27 @@ async function startPage(app, build) {
   }
 }
 
-/** Runs once the markup is there, wherever the script stands. @param {() => Promise<void>} start @returns {Promise<void>} */
+/**
+ * Runs once the markup is there, wherever the script stands.
+ *
+ * @param {() => Promise<void>} start
+ * @returns {Promise<void>}
+ */
 function whenParsed(start) {
   if (document.readyState !== 'loading') return start();
   return new Promise((resolve) => {
     document.addEventListener('DOMContentLoaded', () => resolve(start()), { once: true });
   });
+}
+
+/**
+ * Calls before and after the page is printed, whoever prints.
+ *
+ * @param {() => void} before
+ * @param {() => void} after
+ */
+function printing(before, after) {
+  addEventListener('beforeprint', before);
+  addEventListener('afterprint', after);
+  matchMedia('print').addEventListener('change', ({ matches }) => (matches ? before() : after()));
 }

@@ -7,21 +7,36 @@ const COLUMNS = ['level', 'finding', 'place', 'rule', 'x', 'y', 'XPath'];
 function tableCells(finding, rules) {
   const at = finding.places.find((place) => place.at)?.at;
   return [
-    finding.level, plain(finding.text), plain(finding.where), plain(rules[finding.rule]?.uid ?? ''),
-    at ? coordinate(at.x) : '', at ? coordinate(at.y) : '', plain(finding.places[0]?.xpath ?? '', 2000),
+    finding.level,
+    plain(finding.text),
+    plain(finding.where),
+    plain(rules[finding.rule]?.uid ?? ''),
+    at ? coordinate(at.x) : '',
+    at ? coordinate(at.y) : '',
+    plain(finding.places[0]?.xpath ?? '', 2000),
   ];
 }
 
 /** Text for spreadsheets. What would be a formula there is made text. @param {readonly string[][]} rows */
 function tabSeparated(rows) {
-  return rows.map((cells) => cells.map((cell) => {
-    const flat = cell.replace(/[\t\r\n]+/g, ' ');
-    return /^[=+@]|^-[^\d.]/.test(flat) ? `'${flat}` : flat;
-  }).join('\t')).join('\n');
+  return rows
+    .map((cells) =>
+      cells
+        .map((cell) => {
+          const flat = cell.replace(/[\t\r\n]+/g, ' ');
+          return /^[=+@]|^-[^\d.]/.test(flat) ? `'${flat}` : flat;
+        })
+        .join('\t'),
+    )
+    .join('\n');
 }
 
 class FindingsTable {
-  /** @param {readonly Finding[]} findings @param {readonly RuleInfo[]} rules @param {(index: number) => void} choose */
+  /**
+   * @param {readonly Finding[]} findings
+   * @param {readonly RuleInfo[]} rules
+   * @param {(index: number) => void} choose
+   */
   constructor(findings, rules, choose) {
     this.findings = findings;
     this.rules = rules;
@@ -33,15 +48,34 @@ class FindingsTable {
     this.body = make('tbody');
     this.status = withAttributes(make('span', 'muted'), { role: 'status' });
     this.more = makeButton('tool', 'Show all rows', () => this.grow(this.shown.length));
-    const copy = makeButton('tool', 'Copy as table', () => void this.copy(), 'Copies all filtered findings, separated by tabs');
+    const copy = makeButton(
+      'tool',
+      'Copy as table',
+      () => void this.copy(),
+      'Copies all filtered findings, separated by tabs',
+    );
     const head = make('tr', '', ...COLUMNS.map((name) => withAttributes(make('th', '', name), { scope: 'col' })));
-    const table = make('table', 'findings-table', make('caption', 'sr-only', 'Findings'), make('thead', '', head), this.body);
-    this.scroll = withAttributes(make('div', 'table-scroll', table), { tabindex: 0, role: 'region', 'aria-label': 'Findings as a table' });
+    const table = make(
+      'table',
+      'findings-table',
+      make('caption', 'sr-only', 'Findings'),
+      make('thead', '', head),
+      this.body,
+    );
+    this.scroll = withAttributes(make('div', 'table-scroll', table), {
+      tabindex: 0,
+      role: 'region',
+      'aria-label': 'Findings as a table',
+    });
     this.element = make('div', 'table-pane', make('div', 'table-tools', copy, this.more, this.status), this.scroll);
-    this.scroll.addEventListener('scroll', () => {
-      const { scrollTop, clientHeight, scrollHeight } = this.scroll;
-      if (scrollTop + 2 * clientHeight > scrollHeight) this.grow(this.built + ROWS_AT_ONCE);
-    }, { passive: true });
+    this.scroll.addEventListener(
+      'scroll',
+      () => {
+        const { scrollTop, clientHeight, scrollHeight } = this.scroll;
+        if (scrollTop + 2 * clientHeight > scrollHeight) this.grow(this.built + ROWS_AT_ONCE);
+      },
+      { passive: true },
+    );
   }
 
   /** @param {readonly number[]} shown @param {number} selected */
@@ -67,11 +101,15 @@ class FindingsTable {
   row(index) {
     const finding = this.findings[index];
     if (!finding) return make('tr');
-    const cells = tableCells(finding, this.rules).map((text, column) => make('td', COLUMNS[column] === 'XPath' || column === 2 ? 'mono' : '', column === 0 ? null : text));
+    const cells = tableCells(finding, this.rules).map((text, column) =>
+      make('td', COLUMNS[column] === 'XPath' || column === 2 ? 'mono' : '', column === 0 ? null : text),
+    );
     cells[0]?.append(levelBadge(finding.level), ` ${finding.level}`);
     const text = cells[1]?.textContent ?? '';
     cells[1]?.replaceChildren(makeButton('link cell', text, () => this.choose(index), 'Show this finding'));
-    return withAttributes(make('tr', index === this.selected ? 'selected' : '', ...cells), { 'data-finding': finding.id });
+    return withAttributes(make('tr', index === this.selected ? 'selected' : '', ...cells), {
+      'data-finding': finding.id,
+    });
   }
 
   async copy() {
@@ -99,12 +137,33 @@ function copyBySelection(text) {
   area.remove();
 }
 
-/** All findings for the printer; it is there while the page is printed only. @param {readonly Finding[]} findings @param {readonly number[]} shown @param {readonly RuleInfo[]} rules */
+/**
+ * All findings for the printer; it is there while the page is printed only.
+ *
+ * @param {readonly Finding[]} findings
+ * @param {readonly number[]} shown
+ * @param {readonly RuleInfo[]} rules
+ */
 function printedTable(findings, shown, rules) {
   const rows = shown.flatMap((index) => {
     const finding = findings[index];
-    return finding ? [make('tr', '', ...tableCells(finding, rules).slice(0, 4).map((text) => make('td', '', text)))] : [];
+    return finding
+      ? [
+          make(
+            'tr',
+            '',
+            ...tableCells(finding, rules)
+              .slice(0, 4)
+              .map((text) => make('td', '', text)),
+          ),
+        ]
+      : [];
   });
   const head = make('tr', '', ...COLUMNS.slice(0, 4).map((name) => make('th', '', name)));
-  return make('section', 'printed', make('h2', '', counted(rows.length, 'finding')), make('table', 'findings-table', make('thead', '', head), make('tbody', '', ...rows)));
+  return make(
+    'section',
+    'printed',
+    make('h2', '', counted(rows.length, 'finding')),
+    make('table', 'findings-table', make('thead', '', head), make('tbody', '', ...rows)),
+  );
 }

@@ -3,7 +3,7 @@
 use qcbus_opendrive::geometry::{Cubic, Curve, Placed, Point, Pose};
 use qcbus_opendrive::{Profile, Road, Station};
 
-use crate::origin::{Origin, Spot};
+use crate::origin::{Shift, Spot};
 
 /// Farther from the reference line than this, in metres, no border lies: such a lane counts as having no width.
 const WIDEST: f64 = 10_000.0;
@@ -99,7 +99,7 @@ impl Piece {
     }
 
     /// Puts the cross section at `s` into `row`; `None` where it has no place on the plan.
-    pub(crate) fn row(&self, origin: Origin, s: f64, row: &mut Vec<Sample>) -> Option<()> {
+    pub(crate) fn row(&self, origin: Shift, s: f64, row: &mut Vec<Sample>) -> Option<()> {
         let pose = self.pose((s - self.start).max(0.0))?;
         let ds = s - self.from;
         // t turns with the superelevation (8.3).

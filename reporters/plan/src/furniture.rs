@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use qcbus_opendrive::geometry::{Placed, Point, Pose, wrap_angle};
 use qcbus_opendrive::{Corner, CornerKind, CurveLocal, Object, Outline, Road, Signal};
 
-use crate::origin::Origin;
+use crate::origin::Shift;
 
 /// A round object is drawn with so many corners.
 const CORNERS: u32 = 8;
@@ -34,7 +34,7 @@ pub(crate) struct ObjectPlan<'a> {
 }
 
 /// A signal's part of the plan. It looks along the road, against it where its orientation is `-` (14.1).
-pub(crate) fn signal<'a>(road: &Road<'a>, signal: Signal<'a>, origin: Origin) -> SignalPlan<'a> {
+pub(crate) fn signal<'a>(road: &Road<'a>, signal: Signal<'a>, origin: Shift) -> SignalPlan<'a> {
     let pose = signal_pose(road, signal);
     let spot = pose.and_then(|pose| origin.spot(pose.point()));
     let against = if signal.orientation() == Some("-") {
@@ -61,7 +61,18 @@ pub(crate) fn object_pose(road: &Road<'_>, object: Object<'_>) -> Option<Pose> {
     pose(road, object.s()?, object.t()?)
 }
 
+/// `s`, or the end of the road that it misses: what stands beyond the road is drawn where the road ends, for
+/// that is where somebody has to look.
+pub(crate) fn on_the_road(road: &Road<'_>, s: f64) -> Option<f64> {
+    let end = match (road.length(), road.plan_view().end()) {
+        (Some(length), Some(end)) => length.max(end),
+        (one, other) => one.or(other)?,
+    };
+    Some(s.clamp(0.0, end.max(0.0)))
+}
+
 fn pose(road: &Road<'_>, s: f64, t: f64) -> Option<Pose> {
+    let s = on_the_road(road, s)?;
     let point = road.point(s, t, 0.0)?;
     Some(Pose {
         x: point.x,
@@ -71,7 +82,7 @@ fn pose(road: &Road<'_>, s: f64, t: f64) -> Option<Pose> {
 }
 
 /// An object's part of the plan: its outline, else its bounding box or cylinder, else its place.
-pub(crate) fn object<'a>(road: &Road<'a>, object: Object<'a>, origin: Origin) -> ObjectPlan<'a> {
+pub(crate) fn object<'a>(road: &Road<'a>, object: Object<'a>, origin: Shift) -> ObjectPlan<'a> {
     let pose = object_pose(road, object).map(|pose| Pose {
         hdg: pose.hdg + object.hdg().unwrap_or(0.0),
         ..pose

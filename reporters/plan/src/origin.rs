@@ -16,7 +16,7 @@ pub(crate) struct Spot {
 impl Spot {
     /// In whole centimetres, as the plan is written.
     pub(crate) fn rounded(self) -> [i64; 2] {
-        // Saturates, and what is an `Origin`'s lies far within.
+        // Saturates, and what is an `Shift`'s lies far within.
         [self.x.round() as i64, self.y.round() as i64]
     }
 }
@@ -56,18 +56,18 @@ impl Segment {
 /// The middle of the roads, which the plan's coordinates are counted from. Large coordinates (UTM) lose their
 /// digits in single precision and their bytes in a file unless they are shifted first.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Origin {
+pub(crate) struct Shift {
     pub(crate) x: f64,
     pub(crate) y: f64,
 }
 
-impl Origin {
+impl Shift {
     /// The median of the starts of all roads, in whole metres: one road at the end of the world does not move it.
-    pub(crate) fn of(map: &RoadMap<'_>) -> Origin {
+    pub(crate) fn of(map: &RoadMap<'_>) -> Shift {
         let starts = map.roads().iter();
         let starts = starts.filter_map(|road| road.plan_view().in_order().next()?.start_point());
         let (mut xs, mut ys): (Vec<f64>, Vec<f64>) = starts.map(|point| (point.x, point.y)).unzip();
-        Origin {
+        Shift {
             x: median(&mut xs).floor(),
             y: median(&mut ys).floor(),
         }

@@ -7,7 +7,7 @@ use qcbus_opendrive::{Road, RoadMap};
 use crate::encode;
 use crate::furniture;
 use crate::junction::{Outlines, Roads};
-use crate::origin::Origin;
+use crate::origin::Shift;
 use crate::road::{RoadPlan, road};
 use crate::sample::Trouble;
 use crate::writer::{Writer, unsigned};
@@ -42,7 +42,7 @@ const LONGEST_NAME: usize = 24;
 /// The plan of a road network.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    origin: Origin,
+    origin: Shift,
     strings: Vec<String>,
     /// All that follows the strings.
     body: Vec<u8>,
@@ -55,7 +55,7 @@ type Drawn<'a> = Result<RoadPlan<'a>, Trouble>;
 impl Plan {
     /// Draws a map. Takes 2 to 10 ms per megabyte of it, and whatever it says time in proportion to its size.
     pub fn of(map: &RoadMap<'_>) -> Plan {
-        let origin = Origin::of(map);
+        let origin = Shift::of(map);
         let mut roads = draw(map, origin);
         redraw(map, origin, &mut roads);
         let mut cuts = Vec::new();
@@ -126,7 +126,7 @@ pub(crate) fn allowance(map: &RoadMap<'_>, road: &Road<'_>) -> usize {
 }
 
 /// All roads, each with its own allowance, so that the result does not depend on the number of threads.
-fn draw<'a>(map: &RoadMap<'a>, origin: Origin) -> Vec<Drawn<'a>> {
+fn draw<'a>(map: &RoadMap<'a>, origin: Shift) -> Vec<Drawn<'a>> {
     let each = |one: &Road<'a>| road(one, origin, allowance(map, one)).0;
     if map.roads().len() <= PORTION {
         return map.roads().iter().map(each).collect();
@@ -161,7 +161,7 @@ fn draw<'a>(map: &RoadMap<'a>, origin: Origin) -> Vec<Drawn<'a>> {
 }
 
 /// Gives the roads that have used up their share another try.
-fn redraw<'a>(map: &RoadMap<'a>, origin: Origin, roads: &mut [Drawn<'a>]) {
+fn redraw<'a>(map: &RoadMap<'a>, origin: Shift, roads: &mut [Drawn<'a>]) {
     let mut left = RESERVE;
     for (one, drawn) in map.roads().iter().zip(roads) {
         let work = left.min(RESERVE_OF_A_ROAD);
@@ -197,7 +197,7 @@ fn junctions(out: &mut Writer, map: &RoadMap<'_>, roads: &[Drawn<'_>], cuts: &mu
     }
 }
 
-fn signals(out: &mut Writer, map: &RoadMap<'_>, origin: Origin, cuts: &mut Vec<String>) {
+fn signals(out: &mut Writer, map: &RoadMap<'_>, origin: Shift, cuts: &mut Vec<String>) {
     let all = map.signals();
     let all: Vec<_> = all
         .map(|(road, signal)| furniture::signal(road, signal, origin))
@@ -211,7 +211,7 @@ fn signals(out: &mut Writer, map: &RoadMap<'_>, origin: Origin, cuts: &mut Vec<S
     cuts.extend(sentence(lost, "signal", NO_PLACE));
 }
 
-fn objects(out: &mut Writer, map: &RoadMap<'_>, origin: Origin, cuts: &mut Vec<String>) {
+fn objects(out: &mut Writer, map: &RoadMap<'_>, origin: Shift, cuts: &mut Vec<String>) {
     let all = map.objects();
     let all: Vec<_> = all
         .map(|(road, object)| furniture::object(road, object, origin))

@@ -4,7 +4,7 @@ use qcbus_opendrive::Road;
 use qcbus_opendrive::geometry::Cubic;
 
 use crate::frame::{Piece, Rows};
-use crate::origin::Origin;
+use crate::origin::Shift;
 use crate::sample::{Sampler, Trouble};
 use crate::section::{self, SectionPlan, TOLERANCE};
 use crate::simplify::{Vertex, profile};
@@ -23,7 +23,7 @@ pub(crate) struct RoadPlan<'a> {
 /// The road's part of the plan, and how many points were looked at for it: at most `work`.
 pub(crate) fn road<'a>(
     road: &Road<'a>,
-    origin: Origin,
+    origin: Shift,
     work: usize,
 ) -> (Result<RoadPlan<'a>, Trouble>, usize) {
     let mut sampler = Sampler { origin, left: work };

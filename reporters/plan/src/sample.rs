@@ -3,7 +3,7 @@
 use qcbus_opendrive::geometry::{Curve, Placed};
 
 use crate::frame::{Piece, Rows, Sample};
-use crate::origin::{Origin, Segment};
+use crate::origin::{Segment, Shift};
 
 /// How far, in centimetres, borders may lie from the lines between their samples.
 pub(crate) const SAMPLED: f64 = 0.3;
@@ -39,7 +39,7 @@ pub(crate) enum Trouble {
 
 /// Takes samples, as long as there is work left that it may do.
 pub(crate) struct Sampler {
-    pub(crate) origin: Origin,
+    pub(crate) origin: Shift,
     /// How many more points may be looked at.
     pub(crate) left: usize,
 }

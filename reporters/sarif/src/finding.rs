@@ -6,7 +6,7 @@ use qcbus_reporter_sdk::{IssueLocation, fingerprint, issue_locations};
 use crate::artifact::Paths;
 use crate::limits::MOST_PLACES;
 use crate::log::{
-    ArtifactLocation, Finding, FindingProperties, Fingerprints, Location, LogicalLocation, Message,
+    ArtifactLocation, FindingProperties, Fingerprints, Location, LogicalLocation, Message, Outcome,
     PhysicalLocation, Region, Severity,
 };
 use crate::text;
@@ -36,12 +36,12 @@ pub(crate) fn finding(
     paths: &Paths,
     checker: &Checker,
     issue: &Issue,
-) -> Finding {
+) -> Outcome {
     let places = issue_locations(issue);
     let rule_id = rule_id(checker, issue);
     let hash = fingerprint(display_path, &rule_id, issue, places.first());
     let (related_locations, left_out) = related(&places, paths);
-    Finding {
+    Outcome {
         level: severity(issue.level),
         message: plain(&text::message(&issue.description)),
         locations: vec![main(places.first(), paths)],

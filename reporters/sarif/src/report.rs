@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use qcbus_messages::ResultMessage;
-use qcbus_reporter_sdk::{Destination, Form, Pages, Repeats, ReportError, Sources};
+use qcbus_reporter_sdk::{Destination, Pages, Repeats, ReportError, ReportForm, Sources};
 
 use crate::finding::plain;
 use crate::limits;
 use crate::log::{
-    Artifact, Base, Driver, Finding, Found, Invocation, Location, Log, Notification, ROOT, Rule,
+    Artifact, Base, Driver, Found, Invocation, Location, Log, Notification, Outcome, ROOT, Rule,
     Run, RunProperties, SCHEMA, Tool,
 };
 use crate::rules::rules;
@@ -30,7 +30,7 @@ impl Sarif {
     }
 }
 
-impl Form for Sarif {
+impl ReportForm for Sarif {
     type Section = Section;
     const SUFFIX: &'static str = "sarif";
 
@@ -72,7 +72,7 @@ impl Form for Sarif {
 
 impl Sarif {
     /// The run around these findings, without them.
-    fn run(&self, sections: &BTreeMap<String, Section>, findings: &[Finding]) -> Run {
+    fn run(&self, sections: &BTreeMap<String, Section>, findings: &[Outcome]) -> Run {
         let artifacts = || sections.values().map(|section| &section.artifact);
         let found = artifacts().map(|artifact| artifact.properties.found);
         let found = found.fold(Found::default(), Found::plus);
@@ -125,7 +125,7 @@ fn written(run: Run) -> Result<String, ReportError> {
 
 /// The findings of all sections: the most severe first, then file by file. The first so many of them
 /// are the same ones as long as nothing more severe comes or goes, whatever a host takes.
-fn by_importance(sections: &BTreeMap<String, Section>) -> Vec<Finding> {
+fn by_importance(sections: &BTreeMap<String, Section>) -> Vec<Outcome> {
     let mut repeats = Repeats::default();
     let mut findings = Vec::new();
     for (index, section) in sections.values().enumerate() {
@@ -168,7 +168,7 @@ fn artifact_of(locations: &[Location]) -> Option<usize> {
     location.physical_location.artifact_location.index
 }
 
-/// What [`Form::whole`] put together, taken apart.
+/// What [`ReportForm::whole`] put together, taken apart.
 fn sections_of(run: Run) -> BTreeMap<String, Section> {
     let notes: BTreeMap<String, RuleNote> = run.tool.driver.rules.into_iter().map(note).collect();
     let mut sections: Vec<Section> = run.artifacts.into_iter().map(bare).collect();

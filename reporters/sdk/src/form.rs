@@ -10,14 +10,14 @@ use crate::{Outlet, ReportError, Reporter, Setting, Sources, Subject};
 /// [`Outlet`]'s affair.
 ///
 /// What one result gives is a *section*. A report is made of one section or of those of many files.
-pub trait Form: Send {
+pub trait ReportForm: Send {
     /// What one result gives.
     type Section: PartialEq + Send;
 
     /// What the names of reports in files of their own end with, without a dot.
     const SUFFIX: &'static str;
 
-    /// Under what the section of a checked file is found again by [`Form::split`].
+    /// Under what the section of a checked file is found again by [`ReportForm::split`].
     fn key(&self, subject: Subject<'_>) -> String {
         subject.input.to_owned()
     }
@@ -72,12 +72,12 @@ pub enum Destination {
 }
 
 /// The reporter of a form.
-pub struct FormReporter<F: Form> {
+pub struct FormReporter<F: ReportForm> {
     outlet: Outlet<F>,
     color: bool,
 }
 
-impl<F: Form> FormReporter<F> {
+impl<F: ReportForm> FormReporter<F> {
     /// A reporter that has written nothing yet.
     pub fn new(form: F, setting: &Setting) -> FormReporter<F> {
         FormReporter {
@@ -87,7 +87,7 @@ impl<F: Form> FormReporter<F> {
     }
 }
 
-impl<F: Form> Reporter for FormReporter<F> {
+impl<F: ReportForm> Reporter for FormReporter<F> {
     fn report(&mut self, result: &ResultMessage, sources: &dyn Sources) -> Result<(), ReportError> {
         self.outlet.put(result, sources, self.color)
     }

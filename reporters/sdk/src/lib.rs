@@ -7,7 +7,7 @@
 //!
 //! What reporters have in common lies here too: the lines of the checked files ([`Sources`]), the
 //! places of an issue with those in other files ([`issue_locations`]), and where reports go ([`Outlet`],
-//! [`Output`], [`Shelf`]). A reporter that turns results into text implements [`Form`] and nothing
+//! [`Output`], [`Shelf`]). A reporter that turns results into text implements [`ReportForm`] and nothing
 //! else; a crate says by a [`Registration`] what it offers.
 
 mod checkers;
@@ -33,7 +33,7 @@ pub use checkers::{checkers, is_blocked, is_inapplicable, is_open, reason};
 pub use clean::{one_line, printable};
 pub use daemon::{Identity, RunError, run};
 pub use fingerprint::{Repeats, fingerprint, fingerprint_of};
-pub use form::{Destination, Form, FormReporter};
+pub use form::{Destination, FormReporter, ReportForm};
 pub use issue_location::{IssueLocation, issue_locations, path_for_people};
 pub use loaded::{LoadError, load};
 pub use once::{OnceError, OneShot, report_once};

@@ -7,7 +7,7 @@ use qcbus_formats::xqar::Param;
 use qcbus_messages::{ResultMessage, Withdrawn};
 
 use crate::output::remove_file;
-use crate::{Destination, Form, Output, ReportError, Setting, Shelf, Sources, replace_file};
+use crate::{Destination, Output, ReportError, ReportForm, Setting, Shelf, Sources, replace_file};
 
 /// The file that a report is about, and what its reporter was told.
 #[derive(Debug, Clone, Copy)]
@@ -45,7 +45,7 @@ impl<'m> From<&'m Withdrawn> for Subject<'m> {
 }
 
 /// Puts reports where the parameter `OutputFile` wants them, and takes them back.
-pub struct Outlet<F: Form> {
+pub struct Outlet<F: ReportForm> {
     form: F,
     keep: bool,
     is_run: bool,
@@ -54,7 +54,7 @@ pub struct Outlet<F: Form> {
     waiting: BTreeMap<Output, BTreeMap<String, F::Section>>,
 }
 
-impl<F: Form> Outlet<F> {
+impl<F: ReportForm> Outlet<F> {
     /// An outlet for reports of one form.
     pub fn new(form: F, setting: &Setting) -> Outlet<F> {
         Outlet {

@@ -5,12 +5,12 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use crate::output::remove_file;
-use crate::{Form, ReportError, replace_file};
+use crate::{ReportError, ReportForm, replace_file};
 
 /// A file of sections, one per checked file. New sections are appended where the form allows it;
 /// a section that is there already is replaced, and [`Shelf::finish`] brings them in the order of
 /// their paths.
-pub struct Shelf<F: Form> {
+pub struct Shelf<F: ReportForm> {
     path: PathBuf,
     sections: BTreeMap<String, F::Section>,
     sorted: bool,
@@ -18,7 +18,7 @@ pub struct Shelf<F: Form> {
     waits: bool,
 }
 
-impl<F: Form> Shelf<F> {
+impl<F: ReportForm> Shelf<F> {
     /// Opens the file. With `keep`, sections written earlier stay (a daemon that was restarted);
     /// otherwise the file begins empty. With `waits`, it is written when all sections are there.
     ///
@@ -127,7 +127,7 @@ mod tests {
     /// One section per line, `path=text`.
     struct Lines;
 
-    impl Form for Lines {
+    impl ReportForm for Lines {
         type Section = String;
         const SUFFIX: &'static str = "lines";
 

@@ -71,7 +71,7 @@ pub fn chosen(choice: &Choice) -> Option<Remark> {
     }
     let text = format!(
         "not every checker was asked: the check was run with `{choice}`, and the verdict says nothing about \
-         what was left out"
+         what was left out; what others rest on was asked all the same"
     );
     Some(Remark {
         checker: String::from(super::CHOICE_CHECKER),

@@ -10,7 +10,7 @@ use qcbus_formats::xqar::{
 };
 use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
 use qcbus_report_github::{Annotations, Section};
-use qcbus_reporter_sdk::{Destination, Form as _, NoSources, Subject};
+use qcbus_reporter_sdk::{Destination, NoSources, ReportForm as _, Subject};
 
 pub fn issue(level: Level, rule: &str, text: &str, row: u64) -> Issue {
     let place = Location::File {

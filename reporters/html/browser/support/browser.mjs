@@ -14,7 +14,10 @@ export function findChromium() {
   const given = process.env.QCBUS_CHROMIUM;
   if (given) return existsSync(given) ? given : null;
   const directories = ['/usr/bin', ...(process.env.PATH ?? '').split(delimiter)];
-  return NAMES.flatMap((name) => directories.map((directory) => join(directory, name))).find((path) => existsSync(path)) ?? null;
+  return (
+    NAMES.flatMap((name) => directories.map((directory) => join(directory, name))).find((path) => existsSync(path)) ??
+    null
+  );
 }
 
 export async function launch() {
@@ -32,7 +35,11 @@ export function store(name, html) {
 
 /** Opens a file; `troubles` collects what must not be. */
 export async function open(browser, path, options = {}) {
-  const context = await browser.newContext({ viewport: { width: 1440, height: 900 }, reducedMotion: 'reduce', ...options });
+  const context = await browser.newContext({
+    viewport: { width: 1440, height: 900 },
+    reducedMotion: 'reduce',
+    ...options,
+  });
   const page = await context.newPage();
   const troubles = [];
   const own = pathToFileURL(path).href;

@@ -69,7 +69,7 @@ function writeLine(writer, points, stations) {
       s = ns;
     }
     const isEnd = index === 0 || index === points.length - 1;
-    writer.u(isEnd ? 2 : level ?? (index % 8 === 0 ? 2 : index % 4 === 0 ? 1 : 0));
+    writer.u(isEnd ? 2 : (level ?? (index % 8 === 0 ? 2 : index % 4 === 0 ? 1 : 0)));
     x = nx;
     y = ny;
   });

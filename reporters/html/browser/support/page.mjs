@@ -20,11 +20,14 @@ function scriptsOf(kind) {
 }
 
 const digest = (text) => `'sha256-${createHash('sha256').update(text).digest('base64')}'`;
-const block = (id, bytes) => `<script type="application/octet-stream" id="${id}">${gzipSync(bytes).toString('base64')}</script>`;
+const block = (id, bytes) =>
+  `<script type="application/octet-stream" id="${id}">${gzipSync(bytes).toString('base64')}</script>`;
 
 /** @param {'result'|'run'} kind @param {object} data @param {Uint8Array} [plan] @param {(html: string) => string} [damage] */
 export function makePage(kind, data, plan, damage = (html) => html) {
-  const script = scriptsOf(kind).map((name) => readFileSync(new URL(name, ASSETS), 'utf8')).join('\n');
+  const script = scriptsOf(kind)
+    .map((name) => readFileSync(new URL(name, ASSETS), 'utf8'))
+    .join('\n');
   const style = readFileSync(new URL('style.css', ASSETS), 'utf8');
   const policy = `default-src 'none'; script-src ${digest(script)}; style-src ${digest(style)}`;
   const blocks = [block('data', JSON.stringify(data)), plan ? block('plan', plan) : ''].join('\n');

@@ -19,24 +19,28 @@ describe('the page of a result', { skip: findChromium() ? false : 'no Chromium' 
   after(() => browser?.close());
 
   /** Runs a test on a fresh page, which must stay without an error and without a request. */
-  const onPage = (name, run, options) => test(name, async () => {
-    const { page, troubles, context } = await open(browser, path, options);
-    await atRest(page);
-    await run(page);
-    assert.deepEqual(troubles, []);
-    await context.close();
-  });
+  const onPage = (name, run, options) =>
+    test(name, async () => {
+      const { page, troubles, context } = await open(browser, path, options);
+      await atRest(page);
+      await run(page);
+      assert.deepEqual(troubles, []);
+      await context.close();
+    });
   const view = (page) => page.evaluate(() => window.qcbus.view());
-  const near = (actual, expected, tolerance = 0.05) => assert.ok(Math.abs(actual - expected) <= tolerance, `${actual} is not ${expected}`);
+  const near = (actual, expected, tolerance = 0.05) =>
+    assert.ok(Math.abs(actual - expected) <= tolerance, `${actual} is not ${expected}`);
   const row = (page, id) => page.locator(`.finding-row[data-finding="${id}"]`);
   const selected = (page) => page.locator('.finding-row[aria-expanded="true"]').getAttribute('data-finding');
   /** Whether the canvas has the colour of highlights somewhere around a point. */
-  const isHighlighted = (page) => page.evaluate(() => {
-    const canvas = document.querySelector('.map-canvas');
-    const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
-    for (let i = 0; i < data.length; i += 4) if (data[i] < 12 && Math.abs(data[i + 1] - 80) < 12 && Math.abs(data[i + 2] - 216) < 12) return true;
-    return false;
-  });
+  const isHighlighted = (page) =>
+    page.evaluate(() => {
+      const canvas = document.querySelector('.map-canvas');
+      const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+      for (let i = 0; i < data.length; i += 4)
+        if (data[i] < 12 && Math.abs(data[i + 1] - 80) < 12 && Math.abs(data[i + 2] - 216) < 12) return true;
+      return false;
+    });
 
   onPage('says what it is about', async (page) => {
     assert.equal(await page.locator('.head .verdict').textContent(), 'rejected');
@@ -44,7 +48,10 @@ describe('the page of a result', { skip: findChromium() ? false : 'no Chromium' 
     assert.match(await page.locator('.checkers summary').textContent(), /4 checkers, 2 with trouble/);
     const stats = await page.evaluate(() => window.qcbus.stats());
     assert.equal(stats.findings, findings.length);
-    assert.equal(stats.lanes, town.roads.flatMap((road) => road.sections).reduce((sum, { left, right }) => sum + left.length + right.length, 0));
+    assert.equal(
+      stats.lanes,
+      town.roads.flatMap((road) => road.sections).reduce((sum, { left, right }) => sum + left.length + right.length, 0),
+    );
   });
 
   onPage('a click on a finding moves the map to its place', async (page) => {
@@ -61,18 +68,25 @@ describe('the page of a result', { skip: findChromium() ? false : 'no Chromium' 
     assert.equal(await isHighlighted(page), true);
     assert.equal(await page.locator('.detail mark').textContent(), '<lane id="-2" '.trim().padEnd(14));
     assert.match(await page.locator('.detail .facts').textContent(), /sOffset3\.5/);
-    assert.equal(await page.locator('.detail a.outward').getAttribute('href'), 'https://publications.pages.asam.net/standards/');
+    assert.equal(
+      await page.locator('.detail a.outward').getAttribute('href'),
+      'https://publications.pages.asam.net/standards/',
+    );
     assert.match(await page.locator('.markdown').textContent(), /the specification \(https:/);
     assert.equal(await page.locator('.markdown a').count(), 0);
   });
 
-  onPage('with motion the flight ends at the same place', async (page) => {
-    await row(page, 3).click();
-    await atRest(page);
-    const now = await view(page);
-    near(now.x, findings[2].places[0].at[0]);
-    near(now.y, findings[2].places[0].at[1]);
-  }, { reducedMotion: 'no-preference' });
+  onPage(
+    'with motion the flight ends at the same place',
+    async (page) => {
+      await row(page, 3).click();
+      await atRest(page);
+      const now = await view(page);
+      near(now.x, findings[2].places[0].at[0]);
+      near(now.y, findings[2].places[0].at[1]);
+    },
+    { reducedMotion: 'no-preference' },
+  );
 
   onPage('a further place is flown to', async (page) => {
     await row(page, 2).click();
@@ -104,7 +118,10 @@ describe('the page of a result', { skip: findChromium() ? false : 'no Chromium' 
   });
 
   onPage('a click on a road shows its profile', async (page) => {
-    const point = await page.evaluate(([x, y]) => window.qcbus.screen(x, y), [town.origin[0] + 100, town.origin[1] + 1.5]);
+    const point = await page.evaluate(
+      ([x, y]) => window.qcbus.screen(x, y),
+      [town.origin[0] + 100, town.origin[1] + 1.5],
+    );
     await page.mouse.move(point.x, point.y);
     assert.match(await page.locator('.readout').textContent(), /road 1 {3}lane 1 {3}s 8\d\.\d\d/);
     await page.mouse.click(point.x, point.y);
@@ -112,10 +129,16 @@ describe('the page of a result', { skip: findChromium() ? false : 'no Chromium' 
     assert.match(await page.locator('.road-panel h2').textContent(), /Road 1 East Street/);
     assert.equal(await page.locator('.plot').count(), 2);
     // What was clicked stays in sight, beside the panel.
-    const after = await page.evaluate(([x, y]) => window.qcbus.screen(x, y), [town.origin[0] + 100, town.origin[1] + 1.5]);
+    const after = await page.evaluate(
+      ([x, y]) => window.qcbus.screen(x, y),
+      [town.origin[0] + 100, town.origin[1] + 1.5],
+    );
     near(after.y, point.y, 0.5);
     assert.ok(after.x <= point.x && after.x < (await page.locator('.road-panel').boundingBox()).x);
-    await page.locator('.plot').first().hover({ position: { x: 170, y: 40 } });
+    await page
+      .locator('.plot')
+      .first()
+      .hover({ position: { x: 170, y: 40 } });
     assert.match(await page.locator('.plot-value').first().textContent(), /^s 6\d\.\d/);
     await page.locator('.road-panel .link', { hasText: 'road 20' }).click();
     await atRest(page);
@@ -189,17 +212,26 @@ describe('the page of a result', { skip: findChromium() ? false : 'no Chromium' 
   });
 
   onPage('wheel and drag', async (page) => {
-    const point = await page.evaluate(([x, y]) => window.qcbus.screen(x, y), [town.origin[0] + 50, town.origin[1] + 20]);
+    const point = await page.evaluate(
+      ([x, y]) => window.qcbus.screen(x, y),
+      [town.origin[0] + 50, town.origin[1] + 20],
+    );
     await page.mouse.move(point.x, point.y);
     await page.mouse.wheel(0, -400);
     await atRest(page);
-    const stays = await page.evaluate(([x, y]) => window.qcbus.screen(x, y), [town.origin[0] + 50, town.origin[1] + 20]);
+    const stays = await page.evaluate(
+      ([x, y]) => window.qcbus.screen(x, y),
+      [town.origin[0] + 50, town.origin[1] + 20],
+    );
     near(stays.x, point.x, 1);
     near(stays.y, point.y, 1);
     await page.mouse.down();
     await page.mouse.move(point.x + 60, point.y + 40, { steps: 4 });
     await page.mouse.up();
-    const moved = await page.evaluate(([x, y]) => window.qcbus.screen(x, y), [town.origin[0] + 50, town.origin[1] + 20]);
+    const moved = await page.evaluate(
+      ([x, y]) => window.qcbus.screen(x, y),
+      [town.origin[0] + 50, town.origin[1] + 20],
+    );
     near(moved.x, point.x + 60, 1);
     near(moved.y, point.y + 40, 1);
     assert.equal(await page.locator('.road-panel').isVisible(), false);
@@ -218,23 +250,35 @@ describe('the page of a result', { skip: findChromium() ? false : 'no Chromium' 
 
   onPage('what is copied is text in a spreadsheet', async (page) => {
     // eslint-disable-next-line no-undef
-    const copied = await page.evaluate(() => tabSeparated([['=HYPERLINK("x")', '-1.5', '-x', 'a\tb\nc'], ['@a', '+b', 'c', '']]));
-    assert.equal(copied, '\'=HYPERLINK("x")\t-1.5\t\'-x\ta b c\n\'@a\t\'+b\tc\t');
+    const copied = await page.evaluate(() =>
+      tabSeparated([
+        ['=HYPERLINK("x")', '-1.5', '-x', 'a\tb\nc'],
+        ['@a', '+b', 'c', ''],
+      ]),
+    );
+    assert.equal(copied, "'=HYPERLINK(\"x\")\t-1.5\t'-x\ta b c\n'@a\t'+b\tc\t");
     await page.keyboard.press('t');
     await page.getByText('Copy as table').click();
     await page.getByText('10 rows copied').waitFor();
   });
 
-  onPage('dark and light', async (page) => {
-    const corner = () => page.evaluate(() => [...document.querySelector('.map-canvas').getContext('2d').getImageData(4, 300, 1, 1).data.slice(0, 3)]);
-    const ground = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
-    assert.ok((await corner())[0] < 60);
-    assert.equal(await ground(), 'rgb(26, 29, 33)');
-    await page.keyboard.press('d');
-    await atRest(page);
-    assert.ok((await corner())[0] > 200);
-    assert.equal(await ground(), 'rgb(255, 255, 255)');
-  }, { colorScheme: 'dark' });
+  onPage(
+    'dark and light',
+    async (page) => {
+      const corner = () =>
+        page.evaluate(() => [
+          ...document.querySelector('.map-canvas').getContext('2d').getImageData(4, 300, 1, 1).data.slice(0, 3),
+        ]);
+      const ground = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+      assert.ok((await corner())[0] < 60);
+      assert.equal(await ground(), 'rgb(26, 29, 33)');
+      await page.keyboard.press('d');
+      await atRest(page);
+      assert.ok((await corner())[0] > 200);
+      assert.equal(await ground(), 'rgb(255, 255, 255)');
+    },
+    { colorScheme: 'dark' },
+  );
 
   onPage('printed: all findings as a table, the map as it is', async (page) => {
     await page.getByLabel('warnings').uncheck();

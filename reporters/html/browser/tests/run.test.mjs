@@ -42,9 +42,11 @@ describe('the page of a run', { skip: findChromium() ? false : 'no Chromium' }, 
   test('10,000 files and 60,000 findings', async () => {
     const { page, troubles, context } = await open(browser, store('run-big.html', makePage('run', runOf(10000, 12))));
     assert.deepEqual(await page.evaluate(() => window.qcbus.shown()), { files: 10000, findings: 60000 });
-    assert.ok(await page.locator('.file-row').count() < 100);
+    assert.ok((await page.locator('.file-row').count()) < 100);
     await page.locator('.files .virtual-list').evaluate((list) => list.scrollTo(0, 150000));
-    await page.waitForFunction(() => [...document.querySelectorAll('.files li')].some((item) => Number(item.getAttribute('aria-posinset')) > 5000));
+    await page.waitForFunction(() =>
+      [...document.querySelectorAll('.files li')].some((item) => Number(item.getAttribute('aria-posinset')) > 5000),
+    );
     const took = await page.evaluate(() => {
       const box = document.querySelector('.side input[type=search]');
       const began = performance.now();

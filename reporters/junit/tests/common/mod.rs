@@ -10,7 +10,7 @@ use qcbus_formats::xqar::{
 };
 use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
 use qcbus_report_junit::Suites;
-use qcbus_reporter_sdk::{Destination, Form as _, NoSources, ReportError, Subject};
+use qcbus_reporter_sdk::{Destination, NoSources, ReportError, ReportForm as _, Subject};
 
 use markup::Element;
 

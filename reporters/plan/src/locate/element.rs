@@ -8,7 +8,7 @@ use qcbus_opendrive::{
 
 use super::find::{lane_at, section_at};
 use super::{Locator, Target};
-use crate::furniture::{object_pose, signal_pose};
+use crate::furniture::{object_pose, on_the_road, signal_pose};
 
 /// Where an element lies and what it is about.
 #[derive(Debug, Default)]
@@ -187,11 +187,7 @@ fn length(section: SectionRef<'_, '_>, lane: Option<LaneRef<'_, '_>>) -> Option<
 
 /// A point of the road; at its nearer end for what lies before or beyond it.
 fn on_line(road: &Road<'_>, s: f64, t: f64) -> Option<Point> {
-    let end = match (road.length(), road.plan_view().end()) {
-        (Some(length), Some(end)) => length.max(end),
-        (one, other) => one.or(other)?,
-    };
-    let point = road.point(s.clamp(0.0, end.max(0.0)), t, 0.0)?;
+    let point = road.point(on_the_road(road, s)?, t, 0.0)?;
     Some(point.plan())
 }
 

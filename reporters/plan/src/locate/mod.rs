@@ -13,7 +13,7 @@ use qcbus_opendrive::{Junction, Road, RoadMap};
 
 use crate::hull::centroid;
 use crate::junction::{Outlines, Roads};
-use crate::origin::Origin;
+use crate::origin::Shift;
 use crate::plan::allowance;
 use crate::road::{RoadPlan, road};
 use paths::Paths;
@@ -95,7 +95,7 @@ pub enum Target {
 /// Leads findings to their places. What it has to look up it looks up once for all of them.
 pub struct Locator<'m, 'a> {
     map: &'m RoadMap<'a>,
-    origin: Origin,
+    origin: Shift,
     paths: Option<Paths<'a>>,
     signals: OnceCell<Vec<Node<'a>>>,
     objects: OnceCell<Vec<Node<'a>>>,
@@ -127,7 +127,7 @@ impl<'m, 'a> Locator<'m, 'a> {
         let root = map.root();
         Locator {
             map,
-            origin: Origin::of(map),
+            origin: Shift::of(map),
             paths: root.map(|root| Paths::new(root.document())),
             signals: OnceCell::new(),
             objects: OnceCell::new(),
@@ -209,7 +209,7 @@ impl<'m, 'a> Locator<'m, 'a> {
 /// Roads that are drawn for the outline of a junction.
 struct RoadsWhenAsked<'m, 'a, 'w> {
     map: &'m RoadMap<'a>,
-    origin: Origin,
+    origin: Shift,
     left: &'w mut usize,
 }
 

@@ -88,7 +88,7 @@ impl Border {
 }
 
 #[derive(Debug, Clone)]
-pub struct Lane {
+pub struct DrawnLane {
     pub id: i64,
     pub kind: String,
     pub border: Border,
@@ -99,8 +99,8 @@ pub struct Lane {
 pub struct Section {
     pub s: [u64; 2],
     pub center: Border,
-    pub left: Vec<Lane>,
-    pub right: Vec<Lane>,
+    pub left: Vec<DrawnLane>,
+    pub right: Vec<DrawnLane>,
 }
 
 #[derive(Debug, Clone)]
@@ -237,14 +237,14 @@ impl Reader<'_> {
         Border { points, marks }
     }
 
-    fn lane(&mut self) -> Lane {
+    fn lane(&mut self) -> DrawnLane {
         let (id, kind, border) = (self.z(), self.s(), self.border());
         let mut ds = 0;
         let widths = self.list(|bytes| {
             ds += bytes.u();
             [ds, bytes.u()]
         });
-        Lane {
+        DrawnLane {
             id,
             kind,
             border,

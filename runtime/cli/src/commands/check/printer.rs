@@ -370,19 +370,19 @@ impl Printer {
 }
 
 /// The issues that only say what the command line left out, taken out of a result.
-struct Choice(Option<(usize, Vec<Issue>)>);
+struct LeftOut(Option<(usize, Vec<Issue>)>);
 
-fn take_choice(message: &mut ResultMessage) -> Choice {
+fn take_choice(message: &mut ResultMessage) -> LeftOut {
     let mut bundles = message.results.bundles.iter_mut().enumerate();
     let own = bundles.find(|(_, bundle)| bundle.name == OWN_BUNDLE);
     let checkers = own.map(|(at, bundle)| (at, &mut bundle.checkers));
-    Choice(checkers.and_then(|(at, checkers)| {
+    LeftOut(checkers.and_then(|(at, checkers)| {
         let it = checkers.iter_mut().find(|it| it.id == CHOICE_CHECKER)?;
         Some((at, std::mem::take(&mut it.issues)))
     }))
 }
 
-impl Choice {
+impl LeftOut {
     fn put_back(self, message: &mut ResultMessage) {
         let Some((at, issues)) = self.0 else { return };
         let bundle = message.results.bundles.get_mut(at);
