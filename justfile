@@ -28,6 +28,12 @@ bless:
 farm:
     cargo run --release -- check tests/farm
 
+# Try the pages of the HTML report in Chromium, those of the sample farm among them; needs node and npm.
+browser:
+    cargo build -p qcbus
+    -target/debug/qcbus check tests/farm --quiet --out target/pages/out --output-format html=target/pages/farm.html
+    reporters/html/browser/run target/pages
+
 # Advisories, licences and bans of dependencies; needs cargo-deny.
 deny:
     cargo deny --all-features check

@@ -71,7 +71,7 @@ impl Reporter for HtmlReporter {
         let below = run.below(subject.display_path);
         replace_file(&run.directory().join(&below), page.as_bytes())?;
         let link = format!("{}/{}", run.directory_name(), to_text(&below));
-        let section = Section::of(result, &data, url(&link));
+        let section = Section::of(result, &data, link);
         run.sections.insert(key, section);
         // In a run nobody looks before the end.
         if is_run { Ok(()) } else { run.write() }
@@ -191,18 +191,4 @@ fn render(
         is_run,
     };
     page.render()
-}
-
-/// A path as a relative reference in a page.
-fn url(path: &str) -> String {
-    let mut url = String::with_capacity(path.len());
-    for byte in path.bytes() {
-        match byte {
-            b'A'..=b'Z' | b'a'..=b'z' | b'0'..=b'9' | b'/' | b'-' | b'.' | b'_' | b'~' => {
-                url.push(char::from(byte));
-            }
-            byte => url.push_str(&format!("%{byte:02X}")),
-        }
-    }
-    url
 }
