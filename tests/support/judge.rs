@@ -215,7 +215,7 @@ impl Judgement {
                 && let Ok(bytes) = std::fs::read(farm.out().join(&path))
                 && let Some(why) = torn(&name, &bytes)
             {
-                self.complain(&name, &format!("is no whole report: {why}"));
+                self.complain(&name, format!("is no whole report: {why}"));
             }
             if !report && !file.is_some_and(|file| files.contains_key(file)) {
                 self.complain(&name, "lies among the results, and no file is there for it");

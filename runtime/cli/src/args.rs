@@ -28,7 +28,7 @@ pub struct Args {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Check files and directories once, and print what was found
-    Check(CheckArgs),
+    Check(Box<CheckArgs>),
     /// Watch directories and judge whatever appears in them
     Serve(Box<ServeArgs>),
     /// Let a running broker finish what it has and stop

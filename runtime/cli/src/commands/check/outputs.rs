@@ -1,6 +1,6 @@
 //! What is printed, and what is written besides.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use qcbus_formats::xqar::Param;
 use qcbus_messages::ResultMessage;
@@ -72,13 +72,13 @@ impl Outputs {
                      --output-format {format}=FILE"
                 )));
             }
-            outputs.add(format, file)?;
+            outputs.add(format, file.as_deref())?;
         }
         Ok(outputs)
     }
 
-    fn add(&mut self, format: &OutputFormat, file: Option<PathBuf>) -> Result<(), Refusal> {
-        let to = match (&file, format.terminal()) {
+    fn add(&mut self, format: &OutputFormat, file: Option<&Path>) -> Result<(), Refusal> {
+        let to = match (file, format.terminal()) {
             (None, Some(terminal)) => {
                 self.terminal = terminal.into();
                 return Ok(());
