@@ -7,11 +7,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use qcbus_formats::location::OtherPlace;
 use qcbus_formats::pool::BLOCKED;
-use qcbus_formats::xqar::{
-    Checker, CheckerBundle, Issue, Level, Location, Locations, Metadata, Results, Status,
-};
-use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
+use qcbus_formats::xqar::{Checker, Issue, Level, Location, Locations, Metadata, Status};
+use qcbus_messages::{ResultMessage, Verdict};
 use qcbus_report_gitlab::{CodeQuality, MOST_ENTRIES, Section};
+use qcbus_reporter_sdk::samples::result;
 use qcbus_reporter_sdk::{Destination, NoSources, ReportForm as _};
 use serde_json::Value;
 
@@ -49,31 +48,6 @@ fn checker(id: &str, status: Status, issues: Vec<Issue>) -> Checker {
         status: Some(status),
         issues,
         ..Checker::default()
-    }
-}
-
-fn result(path: &str, checkers: Vec<Checker>) -> ResultMessage {
-    let bundle = CheckerBundle {
-        name: "xodrBundle".into(),
-        checkers,
-        ..CheckerBundle::default()
-    };
-    let results = Results {
-        version: "1.0.0".into(),
-        bundles: vec![bundle],
-    };
-    ResultMessage {
-        job: JobId(1),
-        input: format!("/farm/{path}"),
-        display_path: path.into(),
-        xqar: format!("/out/{path}.xqar"),
-        verdict: Verdict::of(&results),
-        digest: Digest::default(),
-        config: Digest::default(),
-        document: None,
-        results,
-        rules: BTreeMap::new(),
-        params: Vec::new(),
     }
 }
 

@@ -7,13 +7,12 @@ use std::path::Path;
 
 use qcbus_formats::location::OtherPlace;
 use qcbus_formats::pool::BLOCKED;
-use qcbus_formats::xqar::{
-    Checker, CheckerBundle, Issue, Level, Location, Locations, Metadata, Results, Status,
-};
-use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
+use qcbus_formats::xqar::{Checker, Issue, Level, Location, Locations, Metadata, Status};
+use qcbus_messages::{ResultMessage, Verdict};
 use qcbus_report_sarif::{
     MOST_PACKED_BYTES, MOST_PLACES, MOST_RESULTS, SHOWN_RESULTS, Sarif, Section, UNANSWERED,
 };
+use qcbus_reporter_sdk::samples::result;
 use qcbus_reporter_sdk::{Destination, NoSources, ReportForm as _, RulePage};
 use serde_json::Value;
 
@@ -66,31 +65,6 @@ fn checker(id: &str, status: Option<Status>, issues: Vec<Issue>) -> Checker {
         status,
         issues,
         ..Checker::default()
-    }
-}
-
-fn result(path: &str, checkers: Vec<Checker>) -> ResultMessage {
-    let bundle = CheckerBundle {
-        name: "xodrBundle".into(),
-        checkers,
-        ..CheckerBundle::default()
-    };
-    let results = Results {
-        version: "1.0.0".into(),
-        bundles: vec![bundle],
-    };
-    ResultMessage {
-        job: JobId(1),
-        input: format!("/farm/{path}"),
-        display_path: path.into(),
-        xqar: format!("/out/{path}.xqar"),
-        verdict: Verdict::of(&results),
-        digest: Digest([7; 32]),
-        config: Digest::default(),
-        document: None,
-        results,
-        rules: BTreeMap::from([(UID.to_owned(), "Links are in order.".to_owned())]),
-        params: Vec::new(),
     }
 }
 

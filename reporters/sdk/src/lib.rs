@@ -23,6 +23,7 @@ mod output;
 mod registration;
 mod responder;
 mod road_network;
+pub mod samples;
 mod shelf;
 mod silence;
 mod sources;

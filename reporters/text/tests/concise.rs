@@ -2,67 +2,32 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
-use std::collections::BTreeMap;
-
 use qcbus_formats::location::OtherPlace;
 use qcbus_formats::pool::BLOCKED;
-use qcbus_formats::xqar::{
-    Checker, CheckerBundle, Issue, Level, Location, Locations, Metadata, Param, Results, Status,
-};
-use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
+use qcbus_formats::xqar::{Checker, Issue, Level, Metadata, Param, Status};
+use qcbus_messages::{ResultMessage, Verdict};
 use qcbus_report_text::{CONCISE, Folding, concise};
+use qcbus_reporter_sdk::samples;
 use qcbus_reporter_sdk::{NoSources, Reporter, Setting};
 
 fn issue(level: Level, text: &str, row: u64) -> Issue {
-    let place = Location::File {
-        row,
-        column: 3,
-        offset: None,
-    };
-    Issue {
-        id: 0,
-        description: text.into(),
+    samples::issue(
         level,
-        rule_uid: "asam.net:xodr:1.4.0:ids.id_unique_in_class".into(),
-        locations: vec![Locations {
-            places: vec![place],
-            ..Locations::default()
-        }],
-        domain_info: Vec::new(),
-    }
+        "asam.net:xodr:1.4.0:ids.id_unique_in_class",
+        text,
+        (row, 3),
+    )
 }
 
 fn result(path: &str, verdict: Verdict, checkers: Vec<Checker>) -> ResultMessage {
     ResultMessage {
-        job: JobId(1),
-        input: format!("/farm/{path}"),
-        display_path: path.into(),
-        xqar: format!("/out/{path}.xqar"),
         verdict,
-        digest: Digest::default(),
-        config: Digest::default(),
-        document: None,
-        results: Results {
-            version: "1.0.0".into(),
-            bundles: vec![CheckerBundle {
-                name: "xodrBundle".into(),
-                checkers,
-                ..CheckerBundle::default()
-            }],
-        },
-        rules: BTreeMap::new(),
-        params: Vec::new(),
+        ..samples::result(path, checkers)
     }
 }
 
 fn checker(status: Status, summary: &str, issues: Vec<Issue>) -> Checker {
-    Checker {
-        id: "check_x".into(),
-        summary: summary.into(),
-        status: Some(status),
-        issues,
-        ..Checker::default()
-    }
+    samples::checker("check_x", Some(status), summary, issues)
 }
 
 #[test]

@@ -70,24 +70,27 @@ pub static REPORTERS: [&Registration; 8] = [
 ];
 
 /// The checkers of all standard bundles, each with its bundle.
-fn checkers() -> impl Iterator<Item = (&'static Bundle, Checker)> {
+pub fn checkers() -> impl Iterator<Item = (&'static Bundle, Checker)> {
     let bundles = BUNDLES.into_iter();
     bundles.flat_map(|bundle| bundle.checkers().into_iter().map(move |it| (bundle, it)))
 }
 
+/// Whether a name of `--select` and `--ignore` fits a checker.
+pub fn fits(bundle: &Bundle, checker: &Checker, pattern: &str) -> bool {
+    let uids = checker.facts.uids.iter();
+    let uids: Vec<String> = uids.map(|uid| (*uid).to_owned()).collect();
+    let names = Names {
+        bundle: bundle.name,
+        alias: bundle.alias,
+        id: &checker.id,
+        uids: &uids,
+    };
+    names.match_pattern(pattern)
+}
+
 /// Whether a name of `--select` and `--ignore` fits any checker.
 pub fn is_named(pattern: &str) -> bool {
-    checkers().any(|(bundle, checker)| {
-        let uids = checker.facts.uids.iter();
-        let uids: Vec<String> = uids.map(|uid| (*uid).to_owned()).collect();
-        let names = Names {
-            bundle: bundle.name,
-            alias: bundle.alias,
-            id: &checker.id,
-            uids: &uids,
-        };
-        names.match_pattern(pattern)
-    })
+    checkers().any(|(bundle, checker)| fits(bundle, &checker, pattern))
 }
 
 /// The name of a checker or rule that a mistyped one is nearest to.

@@ -4,81 +4,22 @@ pub mod markup;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use qcbus_formats::pool::BLOCKED;
-use qcbus_formats::xqar::{
-    Checker, CheckerBundle, Issue, Level, Location, Locations, Metadata, Results, Status,
-};
-use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
+use qcbus_formats::xqar::{Checker, Issue, Level, Status};
+use qcbus_messages::ResultMessage;
 use qcbus_report_junit::Suites;
+use qcbus_reporter_sdk::samples;
+pub use qcbus_reporter_sdk::samples::{blocked, checker, result};
 use qcbus_reporter_sdk::{Destination, NoSources, ReportError, ReportForm as _, Subject};
 
 use markup::Element;
 
 pub fn issue(level: Level, text: &str, row: u64) -> Issue {
-    let place = Location::File {
-        row,
-        column: 5,
-        offset: None,
-    };
-    Issue {
-        id: 0,
-        description: text.into(),
+    samples::issue(
         level,
-        rule_uid: "asam.net:xodr:1.4.0:ids.id_unique_in_class".into(),
-        locations: vec![Locations {
-            places: vec![place],
-            ..Locations::default()
-        }],
-        domain_info: Vec::new(),
-    }
-}
-
-pub fn checker(id: &str, status: Option<Status>, summary: &str, issues: Vec<Issue>) -> Checker {
-    Checker {
-        id: id.into(),
-        summary: summary.into(),
-        status,
-        issues,
-        ..Checker::default()
-    }
-}
-
-pub fn blocked(id: &str) -> Checker {
-    let by = Metadata {
-        key: BLOCKED.into(),
-        value: "check_version".into(),
-        ..Metadata::default()
-    };
-    let summary = "Skipped: `check_version` found errors. 0 issues.";
-    Checker {
-        metadata: vec![by],
-        ..checker(id, Some(Status::Skipped), summary, Vec::new())
-    }
-}
-
-/// A result whose verdict follows from its checkers.
-pub fn result(path: &str, checkers: Vec<Checker>) -> ResultMessage {
-    let results = Results {
-        version: "1.0.0".into(),
-        bundles: vec![CheckerBundle {
-            name: "xodrBundle".into(),
-            checkers,
-            ..CheckerBundle::default()
-        }],
-    };
-    ResultMessage {
-        job: JobId(1),
-        input: format!("/farm/{path}"),
-        display_path: path.into(),
-        xqar: format!("/out/{path}.xqar"),
-        verdict: Verdict::of(&results),
-        digest: Digest([7; 32]),
-        config: Digest::default(),
-        document: None,
-        results,
-        rules: BTreeMap::new(),
-        params: Vec::new(),
-    }
+        "asam.net:xodr:1.4.0:ids.id_unique_in_class",
+        text,
+        (row, 5),
+    )
 }
 
 /// A checker of every ending.

@@ -2,7 +2,6 @@
 
 use std::fmt::Write;
 
-use qcbus_formats::config::Names;
 use qcbus_messages::Exit;
 use qcbus_sdk::{Bundle, Checker};
 
@@ -88,20 +87,9 @@ fn first_sentence(text: &str) -> &str {
 
 /// All rules that a family or the beginning of a name stands for.
 fn family(id: &str) -> Vec<(&'static Bundle, Checker)> {
-    let fits = |bundle: &Bundle, checker: &Checker| {
-        let uids = checker.facts.uids.iter();
-        let uids: Vec<String> = uids.map(|uid| (*uid).to_owned()).collect();
-        let names = Names {
-            bundle: bundle.name,
-            alias: bundle.alias,
-            id: &checker.id,
-            uids: &uids,
-        };
-        names.match_pattern(id) && !checker.is_backport
-    };
-    let bundles = standard::BUNDLES.into_iter();
-    let all = bundles.flat_map(|bundle| bundle.checkers().into_iter().map(move |it| (bundle, it)));
-    all.filter(|(bundle, checker)| fits(bundle, checker))
+    let checkers = standard::checkers().filter(|(_, checker)| !checker.is_backport);
+    checkers
+        .filter(|(bundle, checker)| standard::fits(bundle, checker, id))
         .collect()
 }
 
