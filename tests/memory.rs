@@ -108,7 +108,7 @@ fn a_map_that_never_fits_is_undetermined_at_once() {
         let place = Place::new();
         place.write("large.xodr", &dense(10_000_000));
         place.write("small.xodr", &Content::Good(1).bytes());
-        let (code, said) = place.run(&["check", "large.xodr", "small.xodr", "--out", "out"]);
+        let (code, said) = place.run(&["check", "large.xodr", "small.xodr", "-v", "--out", "out"]);
         assert_eq!(code, Some(3), "{said}");
         assert!(said.contains("undetermined: large.xodr"), "{said}");
         assert!(said.contains("small.xodr: "), "{said}");
@@ -124,7 +124,7 @@ fn a_map_that_just_fits_is_checked() {
     with_memory("a_map_that_just_fits_is_checked", 64, || {
         let place = Place::new();
         place.write("map.xodr", &dense(11_000_000));
-        let (code, said) = place.run(&["check", "map.xodr", "--out", "out"]);
+        let (code, said) = place.run(&["check", "map.xodr", "-v", "--out", "out"]);
         assert_eq!(code, Some(1), "{said}");
         assert!(said.contains("rejected: map.xodr"), "{said}");
     });

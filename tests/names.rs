@@ -493,7 +493,7 @@ fn names_that_are_no_text_have_a_result_each() {
     let desk = Desk::new();
     std::fs::create_dir(desk.path().join("maps")).unwrap();
     put_both(&desk.path().join("maps"));
-    let said = check(&desk, &["maps"]);
+    let said = check(&desk, &["maps", "-v"]);
     assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
     assert!(said.stdout.contains("of 2 files; 1 accepted, 1 rejected"));
     // The place of the error, with its line.

@@ -268,7 +268,7 @@ fn what_a_scenario_refers_to_counts() {
     for case in &cases {
         desk.write(&format!("scenarios/{}.xosc", case.name), &case.text);
     }
-    let said = desk.qcbus(&["check", "scenarios", "--out", "out"]);
+    let said = desk.qcbus(&["check", "scenarios", "-v", "--out", "out"]);
     assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
     for case in &cases {
         let name = format!("scenarios/{}.xosc", case.name);
@@ -355,6 +355,7 @@ fn a_scenario_on_a_rejected_map_says_so_and_is_not_rejected_for_it() {
         "a/on_it.xosc",
         "maps/quay_straight.xodr",
         "z/on_it.xosc",
+        "-v",
         "--out",
         "out",
     ]);

@@ -85,7 +85,7 @@ fn undetermined(path: &str) -> ResultMessage {
 
 fn sections(results: &[ResultMessage]) -> BTreeMap<String, Section> {
     let section = |result: &ResultMessage| {
-        let section = CodeQuality.section(result, &NoSources, Destination::File);
+        let section = CodeQuality.section(result, &NoSources, Destination::OwnFile);
         (result.input.clone(), section.unwrap())
     };
     results.iter().map(section).collect()

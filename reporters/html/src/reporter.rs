@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use qcbus_messages::path_text::{from_text, to_text};
 use qcbus_messages::{ResultMessage, Withdrawn};
 use qcbus_reporter_sdk::{
-    Output, Pages, ReportError, Reporter, Setting, Sources, Subject, one_line, remove_file,
-    replace_file, write_stream,
+    Output, Pages, ReportError, Reporter, Setting, Sources, Subject, clear_place, earlier,
+    one_line, remove_file, replace_file, write_named, write_stream,
 };
 
 use crate::page::{Page, stored};
@@ -107,7 +107,7 @@ const SUFFIX: &str = "html";
 
 impl Run {
     fn open(path: &Path, keep: bool, is_run: bool) -> Result<Run, ReportError> {
-        let earlier = std::fs::read_to_string(path).ok().filter(|_| keep);
+        let earlier = if keep { earlier(path)? } else { None };
         let data = earlier.and_then(|page| stored(&page));
         let data = data.and_then(|data| serde_json::from_slice::<RunData>(&data).ok());
         let run = Run {
@@ -115,9 +115,7 @@ impl Run {
             sections: data.map(RunData::into_sections).unwrap_or_default(),
         };
         if is_run {
-            // A place that refuses is found early; a page of an earlier run is none of this one.
-            replace_file(path, b"")?;
-            remove_file(path)?;
+            clear_place(path)?;
         } else {
             run.write()?;
         }
@@ -146,7 +144,7 @@ impl Run {
         };
         let data = RunData::of(&title, &self.sections);
         let page = render(&format!("qcbus: {title}"), &data, None, true)?;
-        replace_file(&self.path, page.as_bytes())
+        write_named(&self.path, page.as_bytes())
     }
 
     /// One result needs no page around it.
@@ -160,11 +158,12 @@ impl Run {
             return self.write();
         };
         let page = self.directory().join(self.below(only));
-        let moved = std::fs::rename(&page, &self.path);
-        moved.map_err(|source| ReportError::Write {
-            path: self.path.clone(),
+        let bytes = std::fs::read(&page).map_err(|source| ReportError::Write {
+            path: page.clone(),
             source,
         })?;
+        write_named(&self.path, &bytes)?;
+        remove_file(&page)?;
         // The directories above it, as far as they are empty: others may use them.
         let mut above = page.parent();
         while let Some(directory) = above.filter(|it| it.starts_with(self.directory())) {

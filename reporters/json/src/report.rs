@@ -50,12 +50,12 @@ impl ReportForm for Documents {
     }
 }
 
-/// On a stream each document is one line unless somebody wants otherwise.
+/// Where several documents follow each other, each is one line unless somebody wants otherwise.
 fn indent(params: &[Param], place: Destination) -> Result<usize, ReportError> {
     let Some(value) = param(params, "Indent").filter(|value| !value.is_empty()) else {
         return Ok(match place {
-            Destination::Stream { .. } => 0,
-            Destination::File => DEFAULT_INDENT,
+            Destination::Stream { .. } | Destination::SharedFile => 0,
+            Destination::OwnFile => DEFAULT_INDENT,
         });
     };
     match value.trim().parse() {

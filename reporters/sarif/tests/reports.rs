@@ -133,7 +133,7 @@ fn undetermined(path: &str) -> ResultMessage {
 
 fn sections(results: &[ResultMessage]) -> BTreeMap<String, Section> {
     let section = |result: &ResultMessage| {
-        let section = form().section(result, &NoSources, Destination::File);
+        let section = form().section(result, &NoSources, Destination::OwnFile);
         (result.input.clone(), section.unwrap())
     };
     results.iter().map(section).collect()

@@ -67,8 +67,10 @@ pub enum Destination {
         /// Whether to colour.
         color: bool,
     },
-    /// A file.
-    File,
+    /// A file of its own.
+    OwnFile,
+    /// A file for the reports of all files.
+    SharedFile,
 }
 
 /// The reporter of a form.

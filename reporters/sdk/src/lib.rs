@@ -39,7 +39,9 @@ pub use issue_location::{IssueLocation, issue_locations, path_for_people};
 pub use loaded::{LoadError, load};
 pub use once::{OnceError, OneShot, report_once};
 pub use outlet::{Outlet, Subject, write_stream};
-pub use output::{Output, inside, param, remove_file, replace_file};
+pub use output::{
+    Output, clear_place, earlier, inside, param, remove_file, replace_file, write_named,
+};
 pub use registration::{Pages, Registration, RulePage, Setting};
 pub use responder::Responder;
 pub use road_network::road_network;

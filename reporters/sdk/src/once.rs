@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use qcbus_formats::config::{Config, same_reporter};
 use qcbus_formats::xqar::Param;
-use qcbus_messages::path_text::to_text;
+use qcbus_messages::ResultMessage;
+use qcbus_messages::path_text::{from_text, to_text};
 
 use crate::loaded::{LoadError, load};
 use crate::output::asked;
@@ -78,10 +79,28 @@ pub fn report_once(
     for mut result in loaded? {
         result.params.clone_from(&params);
         result.rules.clone_from(&what.rules);
+        if let Some(why) = outdated(&result) {
+            tracing::warn!("{}: {why}", result.display_path);
+        }
         reporter.report(&result, &FileSources::new(&result))?;
     }
     reporter.finish()?;
     Ok(())
+}
+
+/// Why places in a report may not be those of today's file.
+fn outdated(result: &ResultMessage) -> Option<&'static str> {
+    let modified = |path: &str| std::fs::metadata(from_text(path)).and_then(|it| it.modified());
+    if result.input.is_empty() {
+        return Some("the result does not say which file was checked");
+    }
+    match (modified(&result.input), modified(&result.xqar)) {
+        (Err(_), _) => Some("the file is not there any more; its lines cannot be shown"),
+        (Ok(file), Ok(checked)) if file > checked => {
+            Some("the file has changed since it was checked; places are those of then")
+        }
+        _ => None,
+    }
 }
 
 /// The global parameters, then those of this reporter's module. The global `InputFile` is the

@@ -81,7 +81,8 @@ impl<F: ReportForm> Outlet<F> {
         let output = Output::of(subject.params);
         let place = match output {
             Output::Stdout | Output::Stderr => Destination::Stream { color },
-            Output::File(_) | Output::BesideResult | Output::Directory(_) => Destination::File,
+            Output::File(_) => Destination::SharedFile,
+            Output::BesideResult | Output::Directory(_) => Destination::OwnFile,
         };
         let key = self.form.key(subject);
         let section = self.form.section(result, sources, place)?;
@@ -178,6 +179,12 @@ pub fn write_stream(output: &Output, text: &str) -> Result<(), ReportError> {
             out.write_all(text.as_bytes()).and_then(|()| out.flush())
         }
     };
+    // A reader that has left wants no more; that is no error of ours.
+    if let Err(error) = &written
+        && error.kind() == std::io::ErrorKind::BrokenPipe
+    {
+        return Ok(());
+    }
     written.map_err(|source| ReportError::Write {
         path: match output {
             Output::Stderr => "__stderr__".into(),

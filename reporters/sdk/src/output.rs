@@ -76,6 +76,47 @@ pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
     })
 }
 
+/// Writes a report where a person has named a place for it: a link is followed, and a device is written
+/// to, not replaced.
+///
+/// # Errors
+/// [`ReportError::Write`] with the name of the file.
+pub fn write_named(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
+    qcbus_disk::write_named(path, bytes, true).map_err(|source| ReportError::Write {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// Finds out whether a report can be written at a place, and takes away one of an earlier run: no report
+/// is better than one that says nothing, which whoever finds it after a kill would take for the result.
+///
+/// # Errors
+/// [`ReportError::Write`] with the name of the file.
+pub fn clear_place(path: &Path) -> Result<(), ReportError> {
+    if std::fs::metadata(path).is_ok_and(|data| !data.is_file() && !data.is_dir()) {
+        return Ok(());
+    }
+    write_named(path, b"")?;
+    remove_file(&path.canonicalize().unwrap_or_else(|_| path.to_owned()))
+}
+
+/// What a report that was written earlier holds; `None` where there is no file.
+///
+/// # Errors
+/// [`ReportError::Write`] with the name of the file.
+pub fn earlier(path: &Path) -> Result<Option<String>, ReportError> {
+    // Devices and pipes have no earlier content, and may never end.
+    if !std::fs::metadata(path).is_ok_and(|data| data.is_file()) {
+        return Ok(None);
+    }
+    let text = std::fs::read_to_string(path).map(Some);
+    text.map_err(|source| ReportError::Write {
+        path: path.to_owned(),
+        source,
+    })
+}
+
 /// Removes a file that need not be there.
 ///
 /// # Errors

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use crate::output::remove_file;
-use crate::{ReportError, ReportForm, replace_file};
+use crate::output::{clear_place, earlier, write_named};
+use crate::{ReportError, ReportForm};
 
 /// A file of sections, one per checked file. New sections are appended where the form allows it;
 /// a section that is there already is replaced, and [`Shelf::finish`] brings them in the order of
@@ -25,27 +25,15 @@ impl<F: ReportForm> Shelf<F> {
     /// # Errors
     /// [`ReportError::Write`] when the file cannot be read or emptied.
     pub fn open(path: &Path, form: &F, keep: bool, waits: bool) -> Result<Shelf<F>, ReportError> {
-        let earlier = match std::fs::read_to_string(path) {
-            Ok(text) if keep => text,
-            Err(source) if keep && source.kind() != std::io::ErrorKind::NotFound => {
-                return Err(ReportError::Write {
-                    path: path.to_owned(),
-                    source,
-                });
-            }
-            _ => String::new(),
-        };
+        let earlier = if keep { earlier(path)? } else { None };
         let shelf = Shelf {
             path: path.to_owned(),
-            sections: form.split(&earlier),
+            sections: earlier.map(|text| form.split(&text)).unwrap_or_default(),
             sorted: false,
             waits,
         };
         if waits {
-            // A place that refuses is found early. No report is better than one that says nothing:
-            // whoever finds it after a kill would take it for the result.
-            replace_file(path, b"")?;
-            remove_file(path)?;
+            clear_place(path)?;
         } else {
             // What was torn by a crash is gone after this.
             shelf.rewrite(form)?;
@@ -104,7 +92,7 @@ impl<F: ReportForm> Shelf<F> {
     }
 
     fn rewrite(&self, form: &F) -> Result<(), ReportError> {
-        replace_file(&self.path, form.whole(&self.sections)?.as_bytes())
+        write_named(&self.path, form.whole(&self.sections)?.as_bytes())
     }
 }
 

@@ -56,6 +56,8 @@ pub struct Options {
     pub color: bool,
     /// How many checkers that were skipped for one reason are named; the rest are counted.
     pub skipped_names: usize,
+    /// How many checkers that failed for one reason are named; the rest are counted.
+    pub failed_names: usize,
     /// Whether each issue names its rule's UID and its checker in full.
     pub full_names: bool,
     /// Whether those that do not apply to the file are listed with the reason, and not only counted.
@@ -68,6 +70,7 @@ impl Default for Options {
             width: DEFAULT_WIDTH,
             color: false,
             skipped_names: usize::MAX,
+            failed_names: usize::MAX,
             full_names: true,
             inapplicable: true,
         }

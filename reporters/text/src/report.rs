@@ -103,7 +103,7 @@ impl ReportForm for Full {
         let options = Options {
             width: line_width(&result.params)?,
             color: place == Destination::Stream { color: true },
-            inapplicable: place == Destination::File,
+            inapplicable: !matches!(place, Destination::Stream { .. }),
             ..Options::default()
         };
         Ok(render(result, &options, sources))

@@ -115,10 +115,10 @@ impl Group {
         for (number, line) in wrap(&head, width.saturating_sub(6)).iter().enumerate() {
             let _ = writeln!(out, "  {}{line}", if number == 0 { "" } else { "    " });
         }
-        // What failed is always named; of what did not apply, a few names do on a terminal.
+        // On a terminal a few names do.
         let most = match self.status {
             Status::Skipped => options.skipped_names,
-            Status::Completed | Status::Error => usize::MAX,
+            Status::Completed | Status::Error => options.failed_names,
         };
         let mut names = self
             .checkers

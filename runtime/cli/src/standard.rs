@@ -94,7 +94,7 @@ pub fn is_named(pattern: &str) -> bool {
 }
 
 /// The name of a checker or rule that a mistyped one is nearest to.
-pub fn suggest(word: &str) -> Option<String> {
+fn suggest(word: &str) -> Option<String> {
     let mut names: Vec<String> = Vec::new();
     for (_, checker) in checkers() {
         names.extend(checker.facts.uids.iter().map(|uid| (*uid).to_owned()));
@@ -106,8 +106,19 @@ pub fn suggest(word: &str) -> Option<String> {
     near.map(str::to_owned)
 }
 
+/// What to try instead of a name that fits nothing.
+pub fn hint(name: &str) -> String {
+    match suggest(name) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => match with_word(name).as_slice() {
+            [] => "`qcbus rule` lists all".to_owned(),
+            near => format!("rules with such a word: {}", near.join(", ")),
+        },
+    }
+}
+
 /// Names of rules that have a word of this name, the first few.
-pub fn with_word(name: &str) -> Vec<String> {
+fn with_word(name: &str) -> Vec<String> {
     const MOST: usize = 5;
     let words = |text: &str| -> BTreeSet<String> {
         let parts = text.split(|c: char| !c.is_alphanumeric());

@@ -73,6 +73,8 @@ impl Names<'_> {
 
 /// Whether a name is the pattern, goes on from it with a new word, or ends with it as a part.
 fn belongs_to(name: &str, pattern: &str) -> bool {
+    let (name, pattern) = (&name.to_ascii_lowercase(), pattern.to_ascii_lowercase());
+    let pattern = pattern.as_str();
     const BETWEEN: [char; 3] = ['.', '_', ':'];
     let goes_on =
         |rest: &str| rest.is_empty() || rest.starts_with(BETWEEN) || pattern.ends_with(BETWEEN);
@@ -131,6 +133,7 @@ mod tests {
             "link_order",
             "check_asam_xodr_road",
             "road_lane_link",
+            "ROAD.Lane",
             "road_lane_link_order",
             "asam.net:xodr:1.4.0",
         ] {

@@ -26,7 +26,7 @@ pub fn completed(issues: Vec<Issue>) -> Checker {
 
 pub fn sections(results: &[ResultMessage]) -> BTreeMap<String, Section> {
     let section = |result: &ResultMessage| {
-        let section = Annotations.section(result, &NoSources, Destination::File);
+        let section = Annotations.section(result, &NoSources, Destination::OwnFile);
         (Annotations.key(Subject::from(result)), section.unwrap())
     };
     results.iter().map(section).collect()

@@ -51,7 +51,7 @@ pub fn sections(
     results: &[ResultMessage],
 ) -> Result<BTreeMap<String, quick_junit::TestSuite>, ReportError> {
     let section = |result: &ResultMessage| {
-        let section = Suites.section(result, &NoSources, Destination::File)?;
+        let section = Suites.section(result, &NoSources, Destination::OwnFile)?;
         Ok((Suites.key(Subject::from(result)), section))
     };
     results.iter().map(section).collect()

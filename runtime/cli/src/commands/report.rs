@@ -7,6 +7,7 @@ use qcbus_messages::Exit;
 use qcbus_messages::path_text::to_text;
 use qcbus_reporter_sdk::{LoadError, OnceError, OneShot, Setting, report_once};
 
+use super::check::report_place;
 use crate::args::ReportArgs;
 use crate::{standard, talk};
 
@@ -24,6 +25,10 @@ pub fn run(args: &ReportArgs) -> Exit {
         name: name.clone(),
         value: value.clone(),
     };
+    if let Some(Err((exit, why))) = args.output.as_deref().map(report_place) {
+        talk::fail(&why);
+        return exit;
+    }
     let mut params: Vec<Param> = args.param.iter().map(param).collect();
     if let Some(file) = &args.output {
         params.push(Param {

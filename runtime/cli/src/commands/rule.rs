@@ -99,13 +99,7 @@ fn unknown(id: &str) -> Exit {
         list_candidates(id, &family);
         return Exit::Usage;
     }
-    let hint = match standard::suggest(id) {
-        Some(near) => format!("did you mean `{near}`?"),
-        None => match standard::with_word(id).as_slice() {
-            [] => "`qcbus rule` lists all".to_owned(),
-            near => format!("rules with such a word: {}", near.join(", ")),
-        },
-    };
+    let hint = standard::hint(id);
     talk::fail(&format!("there is no rule `{id}`; {hint}"));
     Exit::Usage
 }

@@ -24,6 +24,7 @@ use super::settings::{
 use crate::args::CheckArgs;
 use crate::{standard, talk};
 use outputs::Outputs;
+pub(super) use outputs::report_place;
 use printer::{News, Printer};
 use targets::{kinds, targets};
 
@@ -136,10 +137,7 @@ fn choice(args: &CheckArgs) -> Result<Choice, Refusal> {
     }
     for name in choice.select.iter().chain(&choice.ignore) {
         if !standard::is_named(name) {
-            let hint = match standard::suggest(name) {
-                Some(near) => format!("did you mean `{near}`?"),
-                None => "`qcbus rule` lists all".to_owned(),
-            };
+            let hint = standard::hint(name);
             return Err(usage(format!("no checker is called `{name}`; {hint}")));
         }
     }
@@ -202,9 +200,9 @@ fn check(args: &CheckArgs, prepared: Prepared) -> Exit {
     let options = &prepared.options;
     let here = options.here.clone().unwrap_or_default();
     let (out, roots) = (options.out.clone(), options.roots.clone());
-    let mut places = ResultPaths::of_run(out, here, roots, &options.files);
+    let mut places = ResultPaths::of_run(out, here, roots.clone(), &options.files);
     places.single.clone_from(&options.single_result);
-    let printer = Printer::new(places, prepared.config, prepared.outputs, args);
+    let printer = Printer::new(places, roots, prepared.config, prepared.outputs, args);
     let directory = prepared.options.instance.dir().to_path_buf();
     let (sender, receiver) = channel();
     // Reports of large maps take their time; the broker has others to listen to meanwhile.

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use qcbus_document::FileKind;
 use qcbus_formats::xqar::Param;
 use qcbus_messages::ResultMessage;
 use qcbus_messages::path_text::to_text;
@@ -9,6 +10,7 @@ use qcbus_reporter_sdk::{FileSources, Registration, Reporter, Setting};
 
 use super::{Refusal, usage};
 use crate::args::{OutputFormat, PrintArgs, TerminalFormat};
+use crate::commands::settings::real;
 use crate::{standard, talk};
 
 /// What goes to stdout.
@@ -60,10 +62,14 @@ impl Outputs {
         let mut printed: Option<&OutputFormat> = None;
         for format in &args.output_format {
             let file = match &format.file {
+                Some(file) if file.as_os_str() == "-" => None,
                 Some(file) => Some(file.clone()),
                 None if format.is_page() => Some(out.join("report.html")),
                 None => None,
             };
+            if let Some(file) = &file {
+                outputs.refuse_twice(file)?;
+            }
             if file.is_none()
                 && let Some(other) = printed.replace(format)
             {
@@ -77,6 +83,19 @@ impl Outputs {
         Ok(outputs)
     }
 
+    /// Of two reports in one file, one would be lost.
+    fn refuse_twice(&self, file: &Path) -> Result<(), Refusal> {
+        let to = to_text(&real(file));
+        match self.reporters.iter().find(|it| it.to == to) {
+            None => Ok(()),
+            Some(other) => Err(usage(format!(
+                "{} is the file of the {} report already: name another one",
+                to_text(file),
+                other.alias
+            ))),
+        }
+    }
+
     fn add(&mut self, format: &OutputFormat, file: Option<&Path>) -> Result<(), Refusal> {
         let to = match (file, format.terminal()) {
             (None, Some(terminal)) => {
@@ -88,8 +107,8 @@ impl Outputs {
                 "__stdout__".to_owned()
             }
             (Some(file), _) => {
-                writable(file)?;
-                to_text(&super::absolute(file))
+                report_place(file)?;
+                to_text(&real(file))
             }
         };
         let registration: &Registration = format.registration;
@@ -131,10 +150,14 @@ impl Outputs {
         self.reporters.iter().all(|output| !output.failed)
     }
 
-    /// The formats that wait for the end of the run, and where they were to go.
-    pub(super) fn names(&self) -> Vec<String> {
-        let named = |output: &Output| format!("{} ({})", output.alias, output.to);
-        self.reporters.iter().map(named).collect()
+    /// Not everything was checked, so there are no reports: half of one looks like a whole one. Gives their
+    /// names and places.
+    pub(super) fn give_up(&mut self) -> Vec<String> {
+        let named = |output: &mut Output| {
+            output.failed = true;
+            format!("{} ({})", output.alias, output.to)
+        };
+        self.reporters.iter_mut().map(named).collect()
     }
 
     /// The files that were written.
@@ -154,17 +177,32 @@ impl Output {
     }
 }
 
-/// Refuses a file for a report that cannot be written, before anything is checked for it.
-fn writable(file: &Path) -> Result<(), Refusal> {
+/// Refuses a file for a report that cannot be written, or that nobody would want to be written over, before
+/// anything is done for it; takes away the report of an earlier run, which is none of this one.
+pub(in crate::commands) fn report_place(file: &Path) -> Result<(), Refusal> {
     let shown = to_text(file);
+    let is_result = file.extension().is_some_and(|it| it == "xqar");
+    if is_result || FileKind::of_path(file).is_some() {
+        return Err(usage(format!(
+            "a report would be written over {shown}, which is a file to check or a result; name another one"
+        )));
+    }
     if shown.is_empty() || shown.ends_with('/') || file.is_dir() {
         return Err(usage(format!(
             "cannot write a report to {shown}: name a file"
         )));
     }
-    let directory = match file.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    super::writable(&super::absolute(directory))
+    let is_device = ["/dev/", "/proc/"].iter().any(|it| shown.starts_with(it));
+    let data = std::fs::metadata(file);
+    if !is_device && data.is_ok_and(|data| !data.is_file()) {
+        return Err(usage(format!(
+            "cannot write a report to {shown}: it is no regular file"
+        )));
+    }
+    let cleared = qcbus_reporter_sdk::clear_place(file);
+    cleared.map_err(|error| {
+        usage(format!(
+            "failed to {error}; name another file for the report"
+        ))
+    })
 }

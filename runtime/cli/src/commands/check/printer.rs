@@ -1,7 +1,7 @@
 //! What a person sees of a run, as it goes on.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use qcbus_broker::{Delivery, Judged, Notice, ResultPaths, Told};
@@ -39,6 +39,8 @@ pub(super) enum News {
 /// Prints results in the order of their paths, each as soon as those before it are there.
 pub(super) struct Printer {
     places: ResultPaths,
+    /// The directories that are checked.
+    roots: Vec<PathBuf>,
     config: Option<Arc<Config>>,
     outputs: Outputs,
     args: PrintArgs,
@@ -63,12 +65,14 @@ pub(super) struct Printer {
 impl Printer {
     pub(super) fn new(
         places: ResultPaths,
+        roots: Vec<PathBuf>,
         config: Option<Arc<Config>>,
         outputs: Outputs,
         args: &CheckArgs,
     ) -> Printer {
         Printer {
             places,
+            roots,
             config,
             outputs,
             args: args.print.clone(),
@@ -98,6 +102,7 @@ impl Printer {
             News::Told(Told::Scanned { files }) => {
                 self.expected = files;
                 self.scanned = true;
+                self.say_empty();
                 self.print_ready();
             }
             News::Told(Told::Verdict(verdict)) => {
@@ -113,6 +118,19 @@ impl Printer {
             self.progress.clear();
             talk::say(&format!("note: {text}"));
             self.notices.insert(text);
+        }
+    }
+
+    /// A directory that somebody named and in which there is nothing to check is told: perhaps it was moved.
+    fn say_empty(&mut self) {
+        let is_empty = |root: &&PathBuf| !self.expected.iter().any(|it| it.starts_with(root));
+        let empty: Vec<PathBuf> = self.roots.iter().filter(is_empty).cloned().collect();
+        // Where there is nothing at all, that is what is said in the end.
+        if !self.expected.is_empty() {
+            for root in empty {
+                let shown = to_text(relative(&root));
+                self.note(format!("there is nothing to check in {shown}"));
+            }
         }
     }
 
@@ -169,6 +187,7 @@ impl Printer {
             width: talk::width(),
             color: talk::color(),
             skipped_names: if self.args.verbose { usize::MAX } else { 2 },
+            failed_names: if self.args.verbose { usize::MAX } else { 10 },
             full_names: self.args.verbose,
             inapplicable: self.args.verbose,
         };
@@ -267,7 +286,7 @@ impl Printer {
         if !interrupted && self.tally.total() > 0 {
             return self.outputs.finish();
         }
-        let names = self.outputs.names();
+        let names = self.outputs.give_up();
         if !names.is_empty() {
             let names = names.join(", ");
             talk::fail(&format!(
@@ -304,10 +323,10 @@ impl Printer {
             for sentence in self.tally.not_looked() {
                 lines.push_str(&format!("note: {sentence}\n"));
             }
-            for verdict in [Verdict::Undetermined] {
-                if self.tally.count(verdict) > 0 {
-                    lines.push_str(&format!("note: {verdict}: {}\n", meaning(verdict)));
-                }
+            let open = Verdict::Undetermined;
+            if self.tally.count(open) > 0 {
+                let files = shown::line(&self.tally.open_files()).into_owned();
+                lines.push_str(&format!("note: {open}: {}: {files}\n", meaning(open)));
             }
             if self.terminal() == Terminal::Fitting && self.tally.count(Verdict::Rejected) > 0 {
                 lines.push_str("note: `qcbus check FILE` shows the findings of one file in full\n");

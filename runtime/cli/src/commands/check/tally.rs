@@ -27,6 +27,8 @@ pub(super) struct Tally {
     rules: BTreeMap<(Level, String), RuleCount>,
     /// Checkers that were kept from looking in files that have errors, and the number of those files.
     blocked: (usize, usize),
+    /// Files that are undetermined, the first few.
+    open: Vec<String>,
     /// What configuration or command line left out, by bundle: the same for every file.
     left_out: BTreeMap<String, NotAsked>,
 }
@@ -68,6 +70,9 @@ impl Tally {
         if blocked > 0 && result.verdict == Verdict::Rejected {
             self.blocked = (self.blocked.0 + blocked, self.blocked.1 + 1);
         }
+        if result.verdict == Verdict::Undetermined && self.open.len() < FIRST {
+            self.open.push(result.display_path.clone());
+        }
         for left_out in NotAsked::of(&result.results) {
             self.left_out.insert(left_out.bundle.clone(), left_out);
         }
@@ -86,6 +91,18 @@ impl Tally {
     /// Files with this verdict.
     pub(super) fn count(&self, verdict: Verdict) -> usize {
         self.verdicts.get(&verdict).copied().unwrap_or(0)
+    }
+
+    /// The files that are undetermined: the first few, and how many more.
+    pub(super) fn open_files(&self) -> String {
+        let named = self.open.join(", ");
+        match self
+            .count(Verdict::Undetermined)
+            .saturating_sub(self.open.len())
+        {
+            0 => named,
+            more => format!("{named} and {more} more"),
+        }
     }
 
     /// The verdicts, each as often as it was given.
