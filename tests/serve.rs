@@ -270,6 +270,39 @@ fn a_deleted_file_takes_its_result_along() {
     assert!(farm.out().join("stays.xodr.xqar").exists());
 }
 
+/// After a restart of the machine the runtime directory is empty and generations begin at one again; the
+/// journal is as it was. A report that the last broker wrote is none of this one's job of the same number.
+#[test]
+fn a_new_verdict_reaches_reporters_whatever_became_of_the_runtime_directory() {
+    let mut farm = Farm::with(&["--report", "text", "--absence-limit", "1s"]);
+    let config = farm.base().join("config.xml");
+    let demand = |names: &[&str]| {
+        let bundle = |name: &&str| format!("<CheckerBundle application=\"{name}\"/>");
+        let bundles: String = names.iter().map(bundle).collect();
+        std::fs::write(&config, format!("<Config>{bundles}</Config>")).unwrap();
+    };
+    let named = config.to_string_lossy().into_owned();
+    farm.arguments.extend(["-c".to_owned(), named]);
+    let report = farm.out().join("a.xodr.txt");
+    let says = |word: &str| {
+        until_so("the report says the verdict", || {
+            std::fs::read_to_string(&report).is_ok_and(|text| text.starts_with(word))
+        });
+    };
+    farm.write("a.xodr", &Content::Good(1).bytes());
+    for (bundles, word) in [
+        (&["xodrBundle"][..], "accepted: a.xodr"),
+        (&["xodrBundle", "nobody"], "undetermined: a.xodr"),
+        (&["xodrBundle"], "accepted: a.xodr"),
+    ] {
+        demand(bundles);
+        let mut broker = farm.serve_ready();
+        says(word);
+        broker.kill();
+        let _ = std::fs::remove_dir_all(farm.instance());
+    }
+}
+
 #[test]
 fn a_file_to_come_is_awaited_through_a_link() {
     let farm = Farm::new();

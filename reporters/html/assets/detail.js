@@ -32,9 +32,12 @@ function sourceLineElement(line) {
   return make('pre', 'source-line', code);
 }
 
+const UNDRAWABLE = 'this road cannot be drawn';
+
 /** @param {FindingPlace} place @param {Plan|null} plan @param {DetailActions} actions */
 function placeElement(place, plan, actions) {
-  const head = make('div', 'place-head', whereElement(whereOf(place)));
+  const where = withAttributes(whereElement(shortWhereOf(place)), { title: plain(whereOf(place), 600) });
+  const head = make('div', 'place-head', where);
   if (place.anchor) head.append(makeButton('link', 'on the map', () => actions.go(place), 'Fly to this place'));
   /** @type {HTMLElement[]} */
   const parts = [head];
@@ -48,6 +51,7 @@ function placeElement(place, plan, actions) {
   if (place.time !== null) spots.push(`at ${fixed(place.time, 3)} s`);
   if (place.at && plan && !place.anchor) spots.push('too far away for the map');
   if (spots.length > 0) parts.push(make('div', 'spot muted', spots.join(' · ')));
+  if (isOnUndrawableRoad(place, plan)) parts.push(make('div', 'undrawable', UNDRAWABLE));
   for (const target of place.on) {
     const road = plan?.roads[target.road ?? -1];
     if (!road || target.road === undefined) continue;
@@ -76,6 +80,9 @@ function ruleElement(rule) {
   return make('details', 'why', make('summary', '', 'Why this is a finding'), body);
 }
 
+/** The name of a fact up to this length stays on one line. */
+const SHORT_NAME = 20;
+
 /** The text again where the row has room for its beginning only. @param {string} text */
 function wholeText(text) {
   return text.length > 90 || text.includes('\n') ? make('p', 'detail-text', ...withCode(text)) : null;
@@ -97,7 +104,14 @@ function findingDetail(finding, rules, checkers, plan, actions) {
   if (finding.facts.length > 0) {
     const rows = finding.facts
       .slice(0, 200)
-      .map(([name, text]) => make('tr', '', make('th', '', plain(name, 200)), make('td', '', plain(text, 2000))));
+      .map(([name, text]) =>
+        make(
+          'tr',
+          '',
+          make('th', name.length <= SHORT_NAME ? 'short' : '', ...breakable(name, 200)),
+          make('td', '', ...breakable(text, 2000)),
+        ),
+      );
     detail.append(make('table', 'facts', make('tbody', '', ...rows)));
   }
   const rule = rules[finding.rule];
@@ -118,7 +132,9 @@ function findingDetail(finding, rules, checkers, plan, actions) {
  */
 function findingRow(finding, rule, selected, hasMap, choose) {
   const button = makeButton('finding-row', '', choose);
-  const where = whereElement(finding.where || 'no place', 'where short');
+  const [first] = finding.places;
+  const where = whereElement(shortWhereOf(first), first?.own === false ? 'where' : 'where own');
+  if (first) withAttributes(where, { title: plain(finding.where, 600) });
   const meta = make('span', 'meta', where, make('span', 'rule-name', rule ? shortRule(rule.uid) : ''));
   if (hasMap && !finding.anchor)
     meta.append(
@@ -162,7 +178,7 @@ function checkersNote(checkers) {
         : checker?.status === 'error'
           ? 'failed'
           : textOf(checker?.status) || 'unknown';
-      const name = withAttributes(make('td', 'mono', plain(checker?.id, 200)), {
+      const name = withAttributes(make('td', 'mono name', ...breakable(checker?.id, 200)), {
         title: plain(checker?.about, 500),
       });
       return make(
@@ -171,7 +187,7 @@ function checkersNote(checkers) {
         make('td', `status ${['blocked', 'failed', 'unknown'].includes(status) ? 'trouble' : ''}`, status),
         name,
         make('td', 'number', COUNT_FORMAT.format(numberOrNull(checker?.findings) ?? 0)),
-        make('td', '', plain(checker?.summary, 500)),
+        make('td', 'summary', ...withCode(checker?.summary, 500)),
       );
     });
   const trouble = checkers.filter((checker) => rank(checker) < 3).length;

@@ -49,6 +49,7 @@ class Filters {
   }
 
   build() {
+    emptiedByEscape(this.search);
     this.search.addEventListener('input', () => {
       this.words = this.search.value
         .toLowerCase()

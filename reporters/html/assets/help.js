@@ -6,7 +6,7 @@ const KEYS = [
   ['j  k  ↓  ↑', 'next, previous finding'],
   ['Enter', 'fly to the finding'],
   ['Esc', 'close, then clear'],
-  ['f', 'the whole map'],
+  ['f', 'all roads'],
   ['+  −', 'zoom'],
   ['Shift + arrows', 'move the map'],
   ['t', 'table or map'],

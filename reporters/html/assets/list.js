@@ -31,13 +31,25 @@ class VirtualList {
 
   /** Other rows: everything is made anew. @param {number} count @param {number} opened */
   reset(count, opened) {
+    const focused = this.drawnFocus()?.querySelector('button')?.dataset.finding;
     this.count = count;
     this.drop();
     this.open(opened);
+    if (focused === undefined) return;
+    // The focus goes with its row, or else to the list: the keyboard must not fall back to the top of the page.
+    const rows = [...this.rows.values()].map((row) => row.querySelector('button'));
+    (rows.find((button) => button?.dataset.finding === focused) ?? this.element).focus({ preventScroll: true });
+  }
+
+  /** The row that has the focus. */
+  drawnFocus() {
+    const active = document.activeElement;
+    return active === null ? undefined : [...this.rows.values()].find((row) => row.contains(active));
   }
 
   /** @param {number} position -1: none */
   open(position) {
+    const focused = [this.opened, position].find((at) => this.rows.get(at)?.contains(document.activeElement));
     for (const at of [this.opened, position]) {
       this.rows.get(at)?.remove();
       this.rows.delete(at);
@@ -46,6 +58,7 @@ class VirtualList {
     this.opened = position >= 0 && position < this.count ? position : -1;
     this.detailHeight = 0;
     this.paint();
+    if (focused !== undefined) this.focus(focused);
   }
 
   /** Brings a row into sight, with as much of its detail as fits. @param {number} position */

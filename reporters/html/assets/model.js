@@ -6,6 +6,7 @@
 /**
  * @typedef {object} FindingPlace
  * @property {string} file path for people
+ * @property {boolean} own whether that is the checked file
  * @property {number|null} row
  * @property {number|null} column
  * @property {string} xpath
@@ -86,6 +87,7 @@ function findingPlace(place, checked, plan) {
   const on = listOf(place?.on).map(planTarget);
   return {
     file: typeof place?.file === 'string' ? place.file : checked,
+    own: typeof place?.file !== 'string' || place.file === checked,
     row: numberOrNull(place?.row),
     column: numberOrNull(place?.column),
     xpath: textOf(place?.xpath),
@@ -118,6 +120,26 @@ function whereOf(place) {
   if (!place) return '';
   const row = place.row === null ? '' : `:${place.row}${place.column === null ? '' : `:${place.column}`}`;
   return `${place.file}${row}`;
+}
+
+/** A place as the list says it: the checked file is named in the head. @param {FindingPlace|undefined} place */
+function shortWhereOf(place) {
+  if (!place) return 'no place';
+  return place.own ? whereOf({ ...place, file: '' }) || 'this file' : whereOf(place);
+}
+
+/**
+ * Whether a place lies on a road that cannot be drawn: nothing but the mark is to be seen on the map then.
+ *
+ * @param {FindingPlace} place
+ * @param {Plan|null} plan
+ */
+function isOnUndrawableRoad(place, plan) {
+  if (!plan) return false;
+  const targets = place.on.flatMap(({ road }) => plan.roads[road ?? -1] ?? []);
+  if (targets.length > 0) return targets.some(({ drawable }) => !drawable);
+  const named = plan.roads.filter(({ id }) => id === place.road?.[0]);
+  return named.length > 0 && named.every(({ drawable }) => !drawable);
 }
 
 /** @param {Record<string, any>} data */

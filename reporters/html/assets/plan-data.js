@@ -472,6 +472,7 @@ function decodePlan(bytes) {
   lines.begin(); // so that the last line has an end
   const box = emptyBox();
   for (const road of roads) growBox(box, road.box);
+  const roadBox = /** @type {Box} */ ([...box]);
   for (const junction of junctions) growBox(box, junction.box);
   for (const signal of signals) growBox(box, signal.box);
   for (const object of objects) growBox(box, object.box);
@@ -486,6 +487,8 @@ function decodePlan(bytes) {
     cuts,
     strings: reader.strings,
     box: box[0] <= box[2] ? box : null,
+    /** Of the roads alone; of everything where no road can be drawn. */
+    roadBox: roadBox[0] <= roadBox[2] ? roadBox : box[0] <= box[2] ? box : null,
     levels: [lines.level(0), lines.level(1), lines.level(2)],
     marks: lines.marks.array.subarray(0, lines.marks.length),
     markStarts: lines.markStarts.array.subarray(0, lines.markStarts.length),

@@ -10,6 +10,29 @@
 
 const DOUBLE_CLICK_MILLISECONDS = 220;
 
+/**
+ * What lies farther outside of the roads than they are big, in a sentence; empty where nothing does.
+ *
+ * @param {Plan} plan
+ */
+function farSentence(plan) {
+  if (!plan.roadBox) return '';
+  const [x0, y0, x1, y1] = plan.roadBox;
+  const size = Math.max(x1 - x0, y1 - y0);
+  const isFar = (/** @type {{box: Box}} */ { box }) =>
+    box[0] <= box[2] && Math.max(x0 - box[0], y0 - box[1], box[2] - x1, box[3] - y1) > size;
+  const parts = /** @type {[{box: Box}[], string][]} */ ([
+    [plan.signals, 'signal'],
+    [plan.objects, 'object'],
+    [plan.junctions, 'junction'],
+  ])
+    .map(([list, one]) => ({ count: list.filter(isFar).length, one }))
+    .filter(({ count }) => count > 0);
+  if (parts.length === 0) return '';
+  const lies = parts.length === 1 && parts[0]?.count === 1 ? 'lies' : 'lie';
+  return `${parts.map(({ count, one }) => counted(count, one)).join(' and ')} ${lies} far outside of the view`;
+}
+
 class PlanView {
   /** @param {Plan} plan @param {Theme} theme @param {MapEvents} events */
   constructor(plan, theme, events) {
@@ -44,7 +67,10 @@ class PlanView {
       title: 'y points up',
       'aria-hidden': 'true',
     });
-    this.element = make('div', 'map', this.canvas, this.north, this.scaleBar, this.readout);
+    this.said = withAttributes(make('span', 'map-said'), { role: 'status' });
+    this.notes = make('div', 'map-notes', this.farNote(), this.said);
+    this.element = make('div', 'map', this.canvas, this.north, this.scaleBar, this.readout, this.notes);
+    this.say('');
     this.camera = new Camera(() => this.refresh());
     this.input = new CameraInput(
       this.canvas,
@@ -56,6 +82,21 @@ class PlanView {
     theme.listeners.push(() => this.refresh());
     new ResizeObserver(() => this.resize()).observe(this.element);
     this.hover(0, 0, false);
+  }
+
+  farNote() {
+    const sentence = farSentence(this.plan);
+    if (sentence === '') return null;
+    const everything = makeButton('link', 'Show everything', () => {
+      if (this.plan.box) void this.camera.fit(this.plan.box);
+    });
+    return make('span', 'far', `${sentence} `, everything);
+  }
+
+  /** Says something about what is selected, below the scale. @param {string} sentence empty: nothing */
+  say(sentence) {
+    this.said.textContent = sentence;
+    this.element.classList.toggle('with-notes', sentence !== '' || this.notes.querySelector('.far') !== null);
   }
 
   /** @returns {MapTheme} */
@@ -73,8 +114,8 @@ class PlanView {
     this.tiles.clear();
     if (!this.sized) {
       this.sized = true;
-      if (this.plan.box) {
-        const [x0, y0, x1, y1] = this.plan.box;
+      if (this.plan.roadBox) {
+        const [x0, y0, x1, y1] = this.plan.roadBox;
         Object.assign(this.camera, {
           x: (x0 + x1) / 2,
           y: (y0 + y1) / 2,
@@ -260,7 +301,7 @@ class PlanView {
 
   /** Shows all roads. @returns {Promise<void>} */
   fit() {
-    return this.plan.box ? this.camera.fit(this.plan.box) : Promise.resolve();
+    return this.plan.roadBox ? this.camera.fit(this.plan.roadBox) : Promise.resolve();
   }
 
   /** Goes to a finding. @param {Finding} finding @returns {Promise<void>} */

@@ -106,8 +106,8 @@
         'div',
         'notes',
         checkersNote(this.checkers),
-        cutsNote(this.data.cuts, 'Left out of this report'),
-        cutsNote([...listOf(this.data.map?.cuts), ...(this.plan?.cuts ?? [])], 'Left out of the map'),
+        cutsNote('Left out of this report', this.data.cuts),
+        cutsNote('Left out of the map', this.data.map?.cuts, this.plan?.cuts),
       );
       app.replaceChildren(this.head(notes), make('div', 'body', this.side, this.stage), this.help);
       this.setTable(false);
@@ -143,7 +143,7 @@
       const tools = make(
         'div',
         'tools',
-        this.view ? makeButton('tool', 'Fit', () => void this.view?.fit(), 'The whole map (f)') : null,
+        this.view ? makeButton('tool', 'Fit', () => void this.view?.fit(), 'All roads (f)') : null,
         this.modeButton,
         this.theme.button(),
         withAttributes(
@@ -222,15 +222,22 @@
         this.view.targets = finding?.places.flatMap(({ on }) => on) ?? [];
         this.view.further =
           finding?.places.flatMap((place) => (place.anchor && place !== main ? [place.anchor] : [])) ?? [];
+        this.sayAbout(main ?? finding?.places[0]);
         this.view.refresh();
         this.flight = finding ? this.view.show(finding) : Promise.resolve();
       }
       return this.flight;
     }
 
+    /** Why there may be nothing to see where the map is moved to. @param {FindingPlace|undefined} place */
+    sayAbout(place) {
+      this.view?.say(place && isOnUndrawableRoad(place, this.plan) ? UNDRAWABLE : '');
+    }
+
     /** @param {Finding} finding @param {FindingPlace} place */
     goTo(finding, place) {
       if (this.tableShown) this.setTable(false);
+      this.sayAbout(place);
       if (place.anchor)
         this.flight = this.view?.show({ ...finding, anchor: place.anchor, wholeElement: false }) ?? Promise.resolve();
     }

@@ -79,6 +79,7 @@ class RunFiles {
       placeholder: 'Search files',
       'aria-label': 'Search files',
     });
+    emptiedByEscape(this.search);
     this.search.addEventListener('input', () => this.update());
     this.count = withAttributes(make('span', 'shown-count'), { role: 'status' });
     this.head = make('div', 'file-row file-head');

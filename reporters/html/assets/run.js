@@ -125,7 +125,7 @@
         'head-line second',
         make('span', 'muted', plain(commonDirectory(this.files.map(({ path }) => path)), 300)),
         make('span', 'muted', made ? plain(made.replace('T', ' ').replace('Z', ' UTC'), 60) : ''),
-        cutsNote(this.data.cuts, 'Left out of this report'),
+        cutsNote('Left out of this report', this.data.cuts),
         make('span', 'muted generator', plain(this.data.generator, 80)),
       );
       const left = make('div', 'run-left', this.firstToMend(), this.table.element);
@@ -290,7 +290,7 @@
 
     beforePrint() {
       this.afterPrint();
-      const files = this.table.shown.map((file) =>
+      const files = this.table.shown.slice(0, MOST_PRINTED).map((file) =>
         make(
           'tr',
           '',
@@ -301,13 +301,13 @@
           make('td', '', plain(file.why)),
         ),
       );
-      const findings = this.filters.shown.slice(0, 5000).map((index) => {
+      const findings = this.filters.shown.slice(0, MOST_PRINTED).map((index) => {
         const finding = /** @type {RunFinding} */ (this.findings[index]);
         return make(
           'tr',
           '',
           make('td', '', finding.level),
-          make('td', '', plain(finding.text)),
+          make('td', '', ...withCode(finding.text)),
           make('td', '', plain(this.files[finding.file]?.path)),
           make('td', '', shortRule(this.rules[finding.rule]?.uid ?? '')),
         );
@@ -316,15 +316,9 @@
         make(
           'section',
           'printed',
-          make('h2', '', counted(files.length, 'file')),
+          ...printedHead(this.table.shown.length, 'file'),
           make('table', 'findings-table', make('tbody', '', ...files)),
-          make(
-            'h2',
-            '',
-            findings.length < this.filters.shown.length
-              ? `${COUNT_FORMAT.format(findings.length)} of ${counted(this.filters.shown.length, 'finding')}`
-              : counted(findings.length, 'finding'),
-          ),
+          ...printedHead(this.filters.shown.length, 'finding'),
           make('table', 'findings-table', make('tbody', '', ...findings)),
         ),
       );

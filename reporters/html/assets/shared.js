@@ -131,6 +131,13 @@ function shortRule(uid) {
 }
 
 /**
+ * Code begins with a backtick that does not follow a word and ends with one that no word follows, without space at
+ * either end. A backtick within a word is of an id: it stays where it is, and so does any other without its partner, or
+ * all code after it would be turned inside out. Of limited length, as text may consist of beginnings only.
+ */
+const CODE = /((?<![\p{L}\p{N}_`])`(?!\s)(?:[^`\n]|(?<=[\p{L}\p{N}_])`(?=[\p{L}\p{N}_])){1,600}(?<!\s)`(?![\p{L}\p{N}_`]))/u;
+
+/**
  * Text of a finding; what stands between backticks is code.
  *
  * @param {unknown} value
@@ -139,12 +146,28 @@ function shortRule(uid) {
  */
 function withCode(value, most) {
   return plain(value, most)
-    .split(/(`[^`\n]+`)/)
+    .split(CODE)
     .map((part, index) => (index % 2 === 1 ? make('code', '', part.slice(1, -1)) : part));
 }
 
+/** Parts of more than 32 characters may be broken anywhere: no column is wide enough for them. */
+const NAME_PARTS = /[^._]{1,32}[._]{0,32}|[._]{1,32}/gu;
+
 /**
- * A place in a file. Where there is no room for all of it the directories give way, the name and the row stay.
+ * A name that may be broken after dots and underscores only.
+ *
+ * @param {unknown} value
+ * @param {number} [most]
+ * @returns {(Node|string)[]}
+ */
+function breakable(value, most) {
+  const parts = plain(value, most).match(NAME_PARTS) ?? [];
+  return parts.flatMap((part, index) => (index === 0 ? [part] : [make('wbr'), part]));
+}
+
+/**
+ * A place in a file. Where there is no room for all of it the directories give way from the left, then the beginning of
+ * the name; the row stays.
  *
  * @param {string} where
  * @param {string} [className]
@@ -155,8 +178,8 @@ function whereElement(where, className = 'where') {
   const element = make(
     'span',
     className,
-    make('span', 'directory', shown.slice(0, name)),
-    make('span', 'file-name', shown.slice(name)),
+    make('span', 'directory', withAttributes(make('bdi', '', shown.slice(0, name)), { dir: 'ltr' })),
+    make('span', 'file-name', withAttributes(make('bdi', '', shown.slice(name)), { dir: 'ltr' })),
   );
   return withAttributes(element, { title: shown });
 }
@@ -257,14 +280,30 @@ function showFailure(app, error) {
   );
 }
 
-/** @param {unknown} cuts sentences about what was left out @param {string} title */
-function cutsNote(cuts, title) {
-  const sentences = listOf(cuts)
-    .map((cut) => plain(cut, 1000))
-    .filter((cut) => cut !== '');
-  if (sentences.length === 0) return null;
-  const items = sentences.map((sentence) => make('li', '', sentence));
-  const summary = make('summary', '', `${title} (${sentences.length})`);
+/**
+ * What was left out. A sentence is there once, with how often it was said; where two lists say the same they are about
+ * the same thing.
+ *
+ * @param {string} title
+ * @param {...unknown} lists sentences
+ */
+function cutsNote(title, ...lists) {
+  /** @type {Map<string, number>} */
+  const times = new Map();
+  for (const list of lists) {
+    /** @type {Map<string, number>} */
+    const own = new Map();
+    for (const cut of listOf(list)) {
+      const sentence = plain(cut, 1000);
+      if (sentence !== '') own.set(sentence, (own.get(sentence) ?? 0) + 1);
+    }
+    for (const [sentence, count] of own) times.set(sentence, Math.max(count, times.get(sentence) ?? 0));
+  }
+  if (times.size === 0) return null;
+  const items = [...times].map(([sentence, count]) =>
+    make('li', '', ...withCode(sentence), count > 1 ? ` (${COUNT_FORMAT.format(count)} times)` : null),
+  );
+  const summary = make('summary', '', `${title} (${COUNT_FORMAT.format(times.size)})`);
   return make('details', 'note cuts', summary, make('ul', '', ...items));
 }
 
@@ -323,6 +362,20 @@ function isTyping(event) {
   return target instanceof HTMLTextAreaElement || target instanceof HTMLSelectElement;
 }
 
+/**
+ * Escape empties a field for searching, too; the browser's own emptying would come after it has lost the focus, without
+ * an event that says so.
+ *
+ * @param {HTMLInputElement} search
+ */
+function emptiedByEscape(search) {
+  search.addEventListener('keydown', (event) => {
+    if (event.key !== 'Escape' || search.value === '') return;
+    search.value = '';
+    search.dispatchEvent(new Event('input', { bubbles: true }));
+  });
+}
+
 /** @param {HTMLElement} app @param {(app: HTMLElement) => Promise<void>} build */
 async function startPage(app, build) {
   try {
@@ -343,6 +396,19 @@ function whenParsed(start) {
   return new Promise((resolve) => {
     document.addEventListener('DOMContentLoaded', () => resolve(start()), { once: true });
   });
+}
+
+/** More rows than this take a browser a minute to put on pages, and nobody reads them. */
+const MOST_PRINTED = 2000;
+
+/** Heading of what is printed, with what is left out. @param {number} all @param {string} one @returns {HTMLElement[]} */
+function printedHead(all, one) {
+  if (all <= MOST_PRINTED) return [make('h2', '', counted(all, one))];
+  const left = all - MOST_PRINTED;
+  return [
+    make('h2', '', `${COUNT_FORMAT.format(MOST_PRINTED)} of ${counted(all, one)}`),
+    make('p', 'left-out', `${counted(left, one)} ${left === 1 ? 'is' : 'are'} not printed; the filters make them fewer.`),
+  ];
 }
 
 /**

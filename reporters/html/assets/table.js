@@ -105,8 +105,9 @@ class FindingsTable {
       make('td', COLUMNS[column] === 'XPath' || column === 2 ? 'mono' : '', column === 0 ? null : text),
     );
     cells[0]?.append(levelBadge(finding.level), ` ${finding.level}`);
-    const text = cells[1]?.textContent ?? '';
-    cells[1]?.replaceChildren(makeButton('link cell', text, () => this.choose(index), 'Show this finding'));
+    const button = makeButton('link cell', '', () => this.choose(index), 'Show this finding');
+    button.append(...withCode(finding.text));
+    cells[1]?.replaceChildren(button);
     return withAttributes(make('tr', index === this.selected ? 'selected' : '', ...cells), {
       'data-finding': finding.id,
     });
@@ -138,32 +139,26 @@ function copyBySelection(text) {
 }
 
 /**
- * All findings for the printer; it is there while the page is printed only.
+ * The filtered findings for the printer; it is there while the page is printed only.
  *
  * @param {readonly Finding[]} findings
  * @param {readonly number[]} shown
  * @param {readonly RuleInfo[]} rules
  */
 function printedTable(findings, shown, rules) {
-  const rows = shown.flatMap((index) => {
+  const rows = shown.slice(0, MOST_PRINTED).flatMap((index) => {
     const finding = findings[index];
-    return finding
-      ? [
-          make(
-            'tr',
-            '',
-            ...tableCells(finding, rules)
-              .slice(0, 4)
-              .map((text) => make('td', '', text)),
-          ),
-        ]
-      : [];
+    if (!finding) return [];
+    const cells = tableCells(finding, rules)
+      .slice(0, 4)
+      .map((text, column) => make('td', '', ...(column === 1 ? withCode(finding.text) : [text])));
+    return [make('tr', '', ...cells)];
   });
   const head = make('tr', '', ...COLUMNS.slice(0, 4).map((name) => make('th', '', name)));
   return make(
     'section',
     'printed',
-    make('h2', '', counted(rows.length, 'finding')),
+    ...printedHead(shown.length, 'finding'),
     make('table', 'findings-table', make('thead', '', head), make('tbody', '', ...rows)),
   );
 }

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use qcbus_formats::pool::NotAsked;
 use qcbus_formats::xqar::{Level, Status};
-use qcbus_messages::{Digest, ResultMessage, shown};
+use qcbus_messages::{Digest, ResultMessage, Verdict, shown};
 use qcbus_reporter_sdk::{is_inapplicable, reason};
 
 use crate::Options;
@@ -46,6 +46,9 @@ fn issues(result: &ResultMessage) -> String {
     ];
     let said: Vec<String> = counts.into_iter().flatten().collect();
     match said.as_slice() {
+        [] if result.verdict == Verdict::Undetermined => {
+            "no issues, but not everybody has looked".into()
+        }
         [] => "no issues".into(),
         _ => said.join(", "),
     }

@@ -10,7 +10,7 @@ use qcbus_sdk::{Finding, Param, Sink};
 
 use super::driving::is_drivable;
 use super::gap_levels::Misfit;
-use super::on_road::lane_name;
+use super::on_road::{OnRoad as _, lane_name};
 
 pub(crate) const GAP: Param = Param::number(
     "gap",
@@ -205,7 +205,9 @@ impl Pair<'_, '_> {
             .road(self.from.at.road.id(), s, point.t)
             .point(point.point.x, point.point.y, point.point.z)
             .at(self.from.node(), "the one lane")
+            .at_lane_end(self.from, joint.from.end)
             .at(self.to.node(), "the other lane")
+            .at_lane_end(self.to, joint.to.end)
     }
 }
 

@@ -77,6 +77,11 @@ impl Config {
         for report in &self.reports {
             oddities.extend(check_report(report, known));
         }
+        if let ([], [first, ..]) = (self.bundles.as_slice(), self.reports.as_slice()) {
+            let text =
+                "no checker bundle is named, so nothing is checked and there is nothing to report";
+            oddities.push(Oddity::warning(first.position, text.to_owned()));
+        }
         oddities.sort_by_key(|oddity| (oddity.row, oddity.column));
         oddities
     }

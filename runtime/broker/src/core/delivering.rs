@@ -125,6 +125,7 @@ impl State {
         reporter.moved = now;
         reporter.done += 1;
         let name = reporter.name.clone();
+        let is_written = report == PeerReport::Written;
         if let PeerReport::Failed(mut why) = report {
             clip_text(&mut why, max_text);
             reporter.failed += 1;
@@ -135,12 +136,16 @@ impl State {
         if let Some(entry) = self.files.get_mut(file) {
             entry.delivered.retain(|(other, _)| *other != index);
             entry.delivered.push((index, Reported::Of(job)));
-            let path = entry.path.clone();
-            actions.push(Action::Delivered {
-                reporter: name,
-                path,
-                job,
-            });
+            // What failed is not tried again by this broker, and is by the next one: the journal
+            // does not have it.
+            if is_written {
+                let path = entry.path.clone();
+                actions.push(Action::Delivered {
+                    reporter: name,
+                    path,
+                    job,
+                });
+            }
         }
         self.deliver(index, actions);
     }

@@ -450,6 +450,6 @@ impl State {
 
     fn next_job(&mut self) -> JobId {
         self.next_job += 1;
-        JobId((self.settings.generation << 32) | self.next_job)
+        JobId((self.settings.numbers << 32) | self.next_job)
     }
 }

@@ -132,7 +132,7 @@ impl State {
     pub fn new(settings: Settings, config: Digest, demand: Arc<dyn Demand>) -> State {
         // Launches differ from those of earlier generations, whose children may be adopted.
         let last_launch = Launch::first_of(settings.generation);
-        let epoch = Epoch::first_of(settings.generation);
+        let epoch = Epoch::first_of(settings.numbers);
         let mut state = State {
             settings,
             now: Duration::ZERO,

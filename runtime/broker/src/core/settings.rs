@@ -5,8 +5,12 @@ use std::time::Duration;
 /// Numbers that shape the state machine. All have defaults.
 #[derive(Debug, Clone)]
 pub struct Settings {
-    /// Number of this broker's start; the upper half of every job number.
+    /// Number of this broker's start.
     pub generation: u64,
+    /// The upper half of every number of a job and an epoch: above that of all that the journal knows. The
+    /// generation alone would come back with a new runtime directory, as after a restart of the machine,
+    /// and whoever has the result of a job of that number would not be given this one's.
+    pub numbers: u64,
     /// Jobs between being read and being stored.
     pub max_active: usize,
     /// Files being read at once.
@@ -76,6 +80,7 @@ impl Default for Settings {
     fn default() -> Self {
         Settings {
             generation: 1,
+            numbers: 1,
             max_active: 24,
             max_preparing: 4,
             max_storing: 8,

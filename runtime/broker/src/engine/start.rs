@@ -50,6 +50,7 @@ impl Broker {
         let mut host = Host::start(&options.instance, shape(&options, &loaded))?;
         options.settings.generation = host.generation();
         let journal = journal_of(&options)?;
+        options.settings.numbers = journal.numbers()?.max(host.generation());
         let results = results_of(&options)?;
         let members = journal.members()?;
         let in_force = Arc::new(InForce::of(&sources, &loaded)?);

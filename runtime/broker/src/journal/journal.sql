@@ -5,7 +5,7 @@
 -- One row per file with a verdict: what the broker remembers over a restart.
 CREATE TABLE IF NOT EXISTS files (
     path     TEXT PRIMARY KEY,      -- absolute
-    job      INTEGER NOT NULL,      -- the job that gave the verdict: generation << 32 | number
+    job      INTEGER NOT NULL,      -- the job that gave the verdict: a number that never comes back (`Settings::numbers`)
     verdict  TEXT NOT NULL,         -- accepted, rejected, undetermined
     digest   TEXT NOT NULL,         -- of the file's bytes
     basis    TEXT NOT NULL,         -- digest over everything that the verdict depends on

@@ -198,6 +198,20 @@ impl Journal {
         }
     }
 
+    /// From where on the upper halves of the numbers of jobs and epochs are new: none that is
+    /// written here comes back.
+    ///
+    /// # Errors
+    /// When the journal cannot be read.
+    pub fn numbers(&self) -> Result<u64, JournalError> {
+        let highest = "SELECT max(n) FROM (SELECT max(job) AS n FROM jobs UNION SELECT max(job) FROM files \
+                       UNION SELECT max(job) FROM deliveries UNION SELECT max(epoch) FROM files)";
+        let highest: rusqlite::Result<Option<i64>> =
+            self.connection.query_row(highest, [], |row| row.get(0));
+        let highest = highest.map_err(|source| classify(&self.path, source))?;
+        Ok(highest.map_or(0, |it| (number(it) >> 32) + 1))
+    }
+
     /// Everything that is remembered of files.
     ///
     /// # Errors

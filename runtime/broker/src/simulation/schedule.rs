@@ -179,6 +179,7 @@ impl Play {
         self.with(|world| {
             world.generation += 1;
             options.settings.generation = world.generation;
+            options.settings.numbers = world.generation;
             world.say(|| "the broker starts".to_owned());
         });
         let simulation = self.simulation.clone();

@@ -45,6 +45,7 @@ pub fn fresh_state(generation: u64, configuration: u8) -> State {
     let in_force = InForce::new(None, SearchPath::default()).unwrap();
     let settings = Settings {
         generation,
+        numbers: generation,
         collect: Duration::ZERO,
         max_active: 4,
         max_preparing: 2,
