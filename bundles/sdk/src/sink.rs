@@ -270,7 +270,7 @@ impl<'d> Sink<'d> {
         rest.locations.push(suppressed.first.locations);
         issues.push(rest);
         let metadata = Metadata {
-            key: "qcbus.not_listed".to_owned(),
+            key: qcbus_formats::pool::NOT_LISTED.to_owned(),
             value: count.to_string(),
             description: "findings beyond the number that this checker lists".to_owned(),
         };

@@ -6,8 +6,8 @@ use qcbus_formats::xqar::{Checker, Issue};
 use qcbus_messages::{Digest, ResultMessage};
 use qcbus_plan::{How, Spot, Target};
 use qcbus_reporter_sdk::{
-    IssueLocation, Line, Pages, Sources, checkers, is_blocked, issue_locations, one_line,
-    path_for_people, printable, underlined,
+    IssueLocation, Line, Pages, Sources, checkers, is_blocked, issue_locations, not_listed,
+    one_line, path_for_people, printable, underlined,
 };
 use serde::Serialize;
 
@@ -159,6 +159,12 @@ impl<'r> ResultData<'r> {
             let left_out = total - MOST_FINDINGS;
             cuts.push(format!(
                 "{left_out} of {total} findings are not on this page, the mildest; the .xqar has all of them"
+            ));
+        }
+        let not_listed = not_listed(result);
+        if not_listed > 0 {
+            cuts.push(format!(
+                "{not_listed} further findings are counted and not listed: a checker lists so many of a file"
             ));
         }
         let (map, plan) = match drawn {

@@ -1,6 +1,6 @@
 //! What a result says of its checkers, apart from what they found.
 
-use qcbus_formats::pool::BLOCKED;
+use qcbus_formats::pool::{BLOCKED, NOT_LISTED};
 use qcbus_formats::xqar::{Checker, CheckerBundle, Status};
 use qcbus_messages::ResultMessage;
 
@@ -21,6 +21,15 @@ pub fn is_blocked(checker: &Checker) -> bool {
 /// Whether a checker was skipped because the file is none that it is for. That is an answer.
 pub fn is_inapplicable(checker: &Checker) -> bool {
     checker.status == Some(Status::Skipped) && !is_blocked(checker)
+}
+
+/// How many findings a result does not list: each checker lists so many and counts the rest.
+pub fn not_listed(result: &ResultMessage) -> u64 {
+    let facts = checkers(result).flat_map(|(_, checker)| &checker.metadata);
+    let counts = facts.filter(|fact| fact.key == NOT_LISTED);
+    counts
+        .filter_map(|fact| fact.value.parse::<u64>().ok())
+        .fold(0, u64::saturating_add)
 }
 
 /// Whether a checker gave no answer: it failed, or something was in its way.

@@ -30,7 +30,7 @@ mod sources;
 mod underline;
 mod wording;
 
-pub use checkers::{checkers, is_blocked, is_inapplicable, is_open, reason};
+pub use checkers::{checkers, is_blocked, is_inapplicable, is_open, not_listed, reason};
 pub use clean::{one_line, printable};
 pub use daemon::{Identity, RunError, run};
 pub use fingerprint::{Repeats, fingerprint, fingerprint_of};

@@ -25,6 +25,9 @@ pub use uid::is_rule_uid;
 /// The name of the bundle in which qcbus speaks for itself.
 pub const OWN_BUNDLE: &str = "qcbus";
 
+/// Key of a checker's metadata: how many findings it has besides those that it lists.
+pub const NOT_LISTED: &str = "qcbus.not_listed";
+
 /// The checker of [`OWN_BUNDLE`] that says what the command line left out.
 pub const CHOICE_CHECKER: &str = "qcbus_choice";
 

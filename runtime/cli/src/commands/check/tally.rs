@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use qcbus_formats::pool::{BLOCKED, NotAsked};
 use qcbus_formats::xqar::{Level, Status};
 use qcbus_messages::{ResultMessage, Verdict, shown};
-use qcbus_reporter_sdk::rule_name;
+use qcbus_reporter_sdk::{not_listed, rule_name};
 
 /// Rules that are named at the end of a run without `--statistics`.
 const FIRST: usize = 5;
@@ -27,6 +27,8 @@ pub(super) struct Tally {
     rules: BTreeMap<(Level, String), RuleCount>,
     /// Checkers that were kept from looking in files that have errors, and the number of those files.
     blocked: (usize, usize),
+    /// Findings that are counted and not listed.
+    not_listed: u64,
     /// Files that are undetermined, the first few.
     open: Vec<String>,
     /// What configuration or command line left out, by bundle: the same for every file.
@@ -73,6 +75,7 @@ impl Tally {
         if result.verdict == Verdict::Undetermined && self.open.len() < FIRST {
             self.open.push(result.display_path.clone());
         }
+        self.not_listed = self.not_listed.saturating_add(not_listed(result));
         for left_out in NotAsked::of(&result.results) {
             self.left_out.insert(left_out.bundle.clone(), left_out);
         }
@@ -126,6 +129,9 @@ impl Tally {
         let _ = write!(line, ", {}", level(Level::Warning, "warning", "warnings"));
         if let Some(count) = self.levels.get(&Level::Information) {
             let _ = write!(line, ", {count} information");
+        }
+        if self.not_listed > 0 {
+            let _ = write!(line, " and {} more that are not listed", self.not_listed);
         }
         let (some, total) = (self.files_from(Level::Information), self.total());
         let files = if total == 1 { "file" } else { "files" };
