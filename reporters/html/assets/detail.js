@@ -51,7 +51,6 @@ function placeElement(place, plan, actions) {
   if (place.time !== null) spots.push(`at ${fixed(place.time, 3)} s`);
   if (place.at && plan && !place.anchor) spots.push('too far away for the map');
   if (spots.length > 0) parts.push(make('div', 'spot muted', spots.join(' · ')));
-  if (isOnUndrawableRoad(place, plan)) parts.push(make('div', 'undrawable', UNDRAWABLE));
   for (const target of place.on) {
     const road = plan?.roads[target.road ?? -1];
     if (!road || target.road === undefined) continue;
@@ -62,6 +61,7 @@ function placeElement(place, plan, actions) {
     );
     break;
   }
+  if (isOnUndrawableRoad(place, plan)) parts.push(make('div', 'undrawable', UNDRAWABLE));
   return make('div', 'place', ...parts);
 }
 
@@ -79,9 +79,6 @@ function ruleElement(rule) {
   if (link) body.append(make('p', '', link));
   return make('details', 'why', make('summary', '', 'Why this is a finding'), body);
 }
-
-/** The name of a fact up to this length stays on one line. */
-const SHORT_NAME = 20;
 
 /** The text again where the row has room for its beginning only. @param {string} text */
 function wholeText(text) {
@@ -102,17 +99,13 @@ function findingDetail(finding, rules, checkers, plan, actions) {
     detail.append(make('p', 'muted', `and ${counted(finding.places.length - 100, 'further place')}`));
   if (finding.places.length === 0) detail.append(make('p', 'muted', 'This finding comes without a place.'));
   if (finding.facts.length > 0) {
-    const rows = finding.facts
+    const facts = finding.facts
       .slice(0, 200)
-      .map(([name, text]) =>
-        make(
-          'tr',
-          '',
-          make('th', name.length <= SHORT_NAME ? 'short' : '', ...breakable(name, 200)),
-          make('td', '', ...breakable(text, 2000)),
-        ),
-      );
-    detail.append(make('table', 'facts', make('tbody', '', ...rows)));
+      .flatMap(([name, text]) => [
+        make('dt', '', ...breakable(name, 200)),
+        make('dd', '', ...breakable(text, 2000)),
+      ]);
+    detail.append(make('dl', 'facts', ...facts));
   }
   const rule = rules[finding.rule];
   if (rule) detail.append(ruleElement(rule));

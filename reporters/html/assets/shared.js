@@ -135,7 +135,8 @@ function shortRule(uid) {
  * either end. A backtick within a word is of an id: it stays where it is, and so does any other without its partner, or
  * all code after it would be turned inside out. Of limited length, as text may consist of beginnings only.
  */
-const CODE = /((?<![\p{L}\p{N}_`])`(?!\s)(?:[^`\n]|(?<=[\p{L}\p{N}_])`(?=[\p{L}\p{N}_])){1,600}(?<!\s)`(?![\p{L}\p{N}_`]))/u;
+const CODE =
+  /((?<![\p{L}\p{N}_`])`(?!\s)(?:[^`\n]|(?<=[\p{L}\p{N}_])`(?=[\p{L}\p{N}_])){1,600}(?<!\s)`(?![\p{L}\p{N}_`]))/u;
 
 /**
  * Text of a finding; what stands between backticks is code.
@@ -150,11 +151,10 @@ function withCode(value, most) {
     .map((part, index) => (index % 2 === 1 ? make('code', '', part.slice(1, -1)) : part));
 }
 
-/** Parts of more than 32 characters may be broken anywhere: no column is wide enough for them. */
-const NAME_PARTS = /[^._]{1,32}[._]{0,32}|[._]{1,32}/gu;
+const NAME_PARTS = /[^._]+[._]*|[._]+/g;
 
 /**
- * A name that may be broken after dots and underscores only.
+ * A name that is broken after dots and underscores; elsewhere only where a part alone is wider than its column.
  *
  * @param {unknown} value
  * @param {number} [most]
@@ -178,7 +178,7 @@ function whereElement(where, className = 'where') {
   const element = make(
     'span',
     className,
-    make('span', 'directory', withAttributes(make('bdi', '', shown.slice(0, name)), { dir: 'ltr' })),
+    name > 0 ? make('span', 'directory', withAttributes(make('bdi', '', shown.slice(0, name)), { dir: 'ltr' })) : null,
     make('span', 'file-name', withAttributes(make('bdi', '', shown.slice(name)), { dir: 'ltr' })),
   );
   return withAttributes(element, { title: shown });
@@ -401,13 +401,23 @@ function whenParsed(start) {
 /** More rows than this take a browser a minute to put on pages, and nobody reads them. */
 const MOST_PRINTED = 2000;
 
-/** Heading of what is printed, with what is left out. @param {number} all @param {string} one @returns {HTMLElement[]} */
+/**
+ * Heading of what is printed, with what is left out.
+ *
+ * @param {number} all
+ * @param {string} one
+ * @returns {HTMLElement[]}
+ */
 function printedHead(all, one) {
   if (all <= MOST_PRINTED) return [make('h2', '', counted(all, one))];
   const left = all - MOST_PRINTED;
   return [
     make('h2', '', `${COUNT_FORMAT.format(MOST_PRINTED)} of ${counted(all, one)}`),
-    make('p', 'left-out', `${counted(left, one)} ${left === 1 ? 'is' : 'are'} not printed; the filters make them fewer.`),
+    make(
+      'p',
+      'left-out',
+      `${counted(left, one)} ${left === 1 ? 'is' : 'are'} not printed; the filters make them fewer.`,
+    ),
   ];
 }
 

@@ -251,15 +251,18 @@ describe('reading a page', { skip: findChromium() ? false : 'no Chromium' }, () 
             return lines;
           }),
         );
-      const [short, long, huge] = await linesOf('.facts th');
+      const [short, long, huge] = await linesOf('.facts dt');
       assert.deepEqual(short, ['qcbus.rule']);
       for (const line of long.slice(0, -1)) assert.match(line, /[._]$/);
       assert.ok(huge.length > 1 && huge.length < 12, `${huge.length} lines`);
       for (const lines of await linesOf('.checkers td.status')) assert.equal(lines.length, 1);
       for (const lines of await linesOf('.checkers td.name'))
         for (const line of lines.slice(0, -1)) assert.match(line, /[._]$/);
-      const wide = await page.locator('.facts').evaluate((table) => table.getBoundingClientRect().right);
-      assert.ok(wide <= (await page.locator('.detail').boundingBox().then((box) => box.x + box.width)), 'it fits');
+      const [facts, detail, text] = await Promise.all(
+        ['.facts', '.detail', '.facts dd >> nth=0'].map((selector) => page.locator(selector).boundingBox()),
+      );
+      assert.ok(facts.x + facts.width <= detail.x + detail.width, 'it fits');
+      assert.ok(text.width > facts.width * 0.3, `${text.width} of ${facts.width} are left for the text`);
     },
   );
 
