@@ -56,7 +56,7 @@
 //!
 //! Parameters: `OutputFile` (see [`Output`]; one file for several results is a sequence of JSON
 //! documents, as `jq` and streaming readers take it) and `Indent` (0 to 16 blanks, default 2; with
-//! 0, the default on a stream, each document is one line: JSON Lines).
+//! 0, the default on a stream and in one file for several, each document is one line: JSON Lines).
 
 mod document;
 mod issue;
