@@ -9,12 +9,18 @@ use super::action::Action;
 use super::files::FileId;
 use super::notice::Notice;
 use super::outcome::clip_text;
+use super::reporters::Reporter;
 use super::types::{Delivery, Reported, SessionId};
 use super::{Actions, State};
 
 /// Findings under way to one reporter. A result with more of them travels alone: otherwise a bundle
 /// that reports far too much would fill the broker with results that are waiting to be read.
 const FINDINGS_UNDER_WAY: u64 = 2_000;
+
+/// Reporters that may have a larger result at once: each of them is read back and kept until it is
+/// acknowledged, and there are as many reporters as somebody likes. More than one, so that one that is
+/// stopped does not hold up the others.
+const LARGE_AT_ONCE: usize = 2;
 
 /// A result that was sent and is not acknowledged.
 #[derive(Debug, Clone, Copy)]
@@ -23,7 +29,29 @@ pub(super) struct Sent {
     pub findings: u64,
 }
 
+impl Sent {
+    fn is_large(&self) -> bool {
+        self.findings > FINDINGS_UNDER_WAY
+    }
+}
+
 impl State {
+    /// Whether one more large result may be given to a reporter.
+    fn has_room_for_large(&self) -> bool {
+        let sent = self.reporters.iter().flat_map(|it| it.active.values());
+        sent.filter(|sent| sent.is_large()).count() < LARGE_AT_ONCE
+    }
+
+    /// Gives out what had to wait for other reporters.
+    pub(super) fn deliver_what_waited(&mut self, actions: &mut Actions) {
+        for index in 0..self.reporters.len() {
+            let waits = |it: &Reporter| it.active.is_empty() && !it.queue.is_empty();
+            if self.reporters.get(index).is_some_and(waits) {
+                self.deliver(u32::try_from(index).unwrap_or(u32::MAX), actions);
+            }
+        }
+    }
+
     /// Whether a result that was read back for a reporter is still to be sent: its file may have
     /// gone meanwhile.
     pub fn awaits_result(&self, session: SessionId, job: JobId) -> bool {
@@ -52,6 +80,7 @@ impl State {
     }
 
     pub(super) fn deliver(&mut self, index: u32, actions: &mut Actions) {
+        let mut has_room = self.has_room_for_large();
         while let Some(reporter) = self.reporters.get_mut(index as usize) {
             let Some(session) = reporter.session else {
                 return;
@@ -86,12 +115,17 @@ impl State {
                 continue;
             }
             let findings = judged.counts.iter().sum();
+            let sent = Sent { file, findings };
             let under_way: u64 = reporter.active.values().map(|sent| sent.findings).sum();
-            if !reporter.active.is_empty() && under_way + findings > FINDINGS_UNDER_WAY {
+            let has_others = !reporter.active.is_empty();
+            if (has_others && under_way + findings > FINDINGS_UNDER_WAY)
+                || (sent.is_large() && !has_room)
+            {
                 reporter.queue.push_front(file);
                 return;
             }
-            reporter.active.insert(judged.job, Sent { file, findings });
+            has_room &= !sent.is_large();
+            reporter.active.insert(judged.job, sent);
             reporter.moved = self.now;
             let delivery = Delivery {
                 job: judged.job,
@@ -119,9 +153,10 @@ impl State {
         let Some(reporter) = self.reporters.get_mut(index as usize) else {
             return;
         };
-        let Some(Sent { file, .. }) = reporter.active.remove(&job) else {
+        let Some(sent) = reporter.active.remove(&job) else {
             return;
         };
+        let file = sent.file;
         reporter.moved = now;
         reporter.done += 1;
         let name = reporter.name.clone();
@@ -148,6 +183,9 @@ impl State {
             }
         }
         self.deliver(index, actions);
+        if sent.is_large() {
+            self.deliver_what_waited(actions);
+        }
     }
 
     /// A reporter has taken back what it said of a file that has gone, or could not.

@@ -260,6 +260,8 @@ impl State {
     }
 
     pub(super) fn watch_reporters(&mut self, actions: &mut Actions) {
+        // One that had a large result may have gone.
+        self.deliver_what_waited(actions);
         let limit = self.settings.job_deadline;
         let silence = self.settings.silence_limit;
         let mut failing = Vec::new();
