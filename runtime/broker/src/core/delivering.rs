@@ -117,10 +117,8 @@ impl State {
             let findings = judged.counts.iter().sum();
             let sent = Sent { file, findings };
             let under_way: u64 = reporter.active.values().map(|sent| sent.findings).sum();
-            let has_others = !reporter.active.is_empty();
-            if (has_others && under_way + findings > FINDINGS_UNDER_WAY)
-                || (sent.is_large() && !has_room)
-            {
+            let crowded = !reporter.active.is_empty() && under_way + findings > FINDINGS_UNDER_WAY;
+            if crowded || (sent.is_large() && !has_room) {
                 reporter.queue.push_front(file);
                 return;
             }
