@@ -375,6 +375,33 @@ fn results_with_many_findings_travel_one_after_the_other() {
     assert_eq!(sent(&desk.say(session, written(11))), [12]);
 }
 
+/// Large results are read back and kept, and there may be many reporters: a broker with eight of them took
+/// 600 MiB while a bundle reported far too much.
+#[test]
+fn few_reporters_have_a_large_result_at_once() {
+    let mut desk = Desk::new(true);
+    more(&mut desk, &[3_000]);
+    let mut sessions = Vec::new();
+    let mut given = Vec::new();
+    for name in ["one", "two", "three", "four"] {
+        desk.sessions += 1;
+        let session = SessionId(desk.sessions);
+        let mut hello = hello(desk.sessions, None);
+        hello.name = name.to_owned();
+        let actions = desk.event(Event::Hello { session, hello });
+        sessions.push(session);
+        assert_eq!(sent(&actions), [7], "the small one reaches everybody");
+        let next = desk.say(session, written(7));
+        given.push(sent(&next) == [8]);
+    }
+    assert_eq!(given, [true, true, false, false]);
+    let next = desk.say(sessions[0], written(8));
+    assert_eq!(sent(&next), [8], "the third has it when the first is done");
+    assert!(sent(&desk.event(Event::Tick)).is_empty());
+    let next = desk.say(sessions[2], written(8));
+    assert_eq!(sent(&next), [8], "then the fourth");
+}
+
 #[test]
 fn a_reporter_has_no_more_under_way_than_it_said() {
     let mut desk = Desk::new(true);
