@@ -96,15 +96,16 @@ fn an_open_verdict_is_never_silent() {
     };
     assert_eq!(
         text(vec![blocked.clone(), failed]),
-        "a.xodr: undetermined: 2 checkers did not look, such as check_x: it died.\n"
+        "a.xodr: undetermined: 1 checker gave no answer (xodrBundle/check_x): it died.; \
+         1 checker gave no answer (xodrBundle/check_x): `check_y` failed.\n"
     );
     assert_eq!(
         text(vec![blocked]),
-        "a.xodr: undetermined: check_x did not look: `check_y` failed.\n"
+        "a.xodr: undetermined: 1 checker gave no answer (xodrBundle/check_x): `check_y` failed.\n"
     );
     assert_eq!(
         text(Vec::new()),
-        "a.xodr: undetermined: nobody has looked\n"
+        "a.xodr: undetermined: no checker has looked at the file\n"
     );
     assert_eq!(
         concise(
