@@ -128,6 +128,6 @@ pub struct Withdrawn {
 pub enum PeerReport {
     /// Written and safe.
     Written,
-    /// Not written, with the reason; not tried again.
+    /// Not written, with the reason; tried again by the next broker.
     Failed(String),
 }

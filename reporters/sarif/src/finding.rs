@@ -6,8 +6,8 @@ use qcbus_reporter_sdk::{IssueLocation, fingerprint, issue_locations};
 use crate::artifact::Paths;
 use crate::limits::MOST_PLACES;
 use crate::log::{
-    ArtifactLocation, FindingProperties, Fingerprints, Location, LogicalLocation, Message, Outcome,
-    PhysicalLocation, Region, Severity,
+    ArtifactLocation, FindingProperties, Fingerprints, Location, LogicalLocation, Message,
+    PhysicalLocation, Region, SarifResult, Severity,
 };
 use crate::text;
 
@@ -36,12 +36,12 @@ pub(crate) fn finding(
     paths: &Paths,
     checker: &Checker,
     issue: &Issue,
-) -> Outcome {
+) -> SarifResult {
     let places = issue_locations(issue);
     let rule_id = rule_id(checker, issue);
     let hash = fingerprint(display_path, &rule_id, issue, places.first());
     let (related_locations, left_out) = related(&places, paths);
-    Outcome {
+    SarifResult {
         level: severity(issue.level),
         message: plain(&text::message(&issue.description)),
         locations: vec![main(places.first(), paths)],

@@ -9,7 +9,7 @@ use flate2::write::GzEncoder;
 use qcbus_reporter_sdk::ReportError;
 
 use crate::finding::plain;
-use crate::log::{Found, Notification, Outcome, Severity};
+use crate::log::{Found, Notification, SarifResult, Severity};
 
 /// Results of a run that are taken.
 pub const MOST_RESULTS: usize = 25_000;
@@ -26,7 +26,7 @@ pub const MOST_PLACES: usize = 100;
 
 /// How many of these findings, which come in the order of importance, fit into a log that has `around`
 /// besides them.
-pub(crate) fn fitting(findings: &[Outcome], around: &[u8]) -> Result<usize, ReportError> {
+pub(crate) fn fitting(findings: &[SarifResult], around: &[u8]) -> Result<usize, ReportError> {
     let findings = findings.get(..MOST_RESULTS).unwrap_or(findings);
     if fits_unpacked(findings, around)? {
         return Ok(findings.len());
@@ -43,7 +43,7 @@ pub(crate) fn fitting(findings: &[Outcome], around: &[u8]) -> Result<usize, Repo
 }
 
 /// Whether they are so few that nobody has to pack them to know.
-fn fits_unpacked(findings: &[Outcome], around: &[u8]) -> Result<bool, ReportError> {
+fn fits_unpacked(findings: &[SarifResult], around: &[u8]) -> Result<bool, ReportError> {
     let mut size = Counted(around.len() as u64);
     for finding in findings {
         serde_json::to_writer(&mut size, finding).map_err(refused)?;

@@ -29,7 +29,7 @@ pub(crate) struct Run {
     pub original_uri_base_ids: BTreeMap<String, Base>,
     pub artifacts: Vec<Artifact>,
     pub column_kind: String,
-    pub results: Vec<Outcome>,
+    pub results: Vec<SarifResult>,
     pub properties: RunProperties,
 }
 
@@ -147,7 +147,7 @@ pub(crate) struct Found {
 /// A `result`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(crate) struct Outcome {
+pub(crate) struct SarifResult {
     pub rule_id: String,
     /// Where the rule stands; given when the log is put together.
     #[serde(default, skip_serializing_if = "Option::is_none")]

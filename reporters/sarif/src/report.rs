@@ -8,8 +8,8 @@ use qcbus_reporter_sdk::{Destination, Pages, Repeats, ReportError, ReportForm, S
 use crate::finding::plain;
 use crate::limits;
 use crate::log::{
-    Artifact, Base, Driver, Found, Invocation, Location, Log, Notification, Outcome, ROOT, Rule,
-    Run, RunProperties, SCHEMA, Tool,
+    Artifact, Base, Driver, Found, Invocation, Location, Log, Notification, ROOT, Rule, Run,
+    RunProperties, SCHEMA, SarifResult, Tool,
 };
 use crate::rules::rules;
 use crate::section::{RuleNote, Section};
@@ -72,7 +72,7 @@ impl ReportForm for Sarif {
 
 impl Sarif {
     /// The run around these findings, without them.
-    fn run(&self, sections: &BTreeMap<String, Section>, findings: &[Outcome]) -> Run {
+    fn run(&self, sections: &BTreeMap<String, Section>, findings: &[SarifResult]) -> Run {
         let artifacts = || sections.values().map(|section| &section.artifact);
         let found = artifacts().map(|artifact| artifact.properties.found);
         let found = found.fold(Found::default(), Found::plus);
@@ -125,7 +125,7 @@ fn written(run: Run) -> Result<String, ReportError> {
 
 /// The findings of all sections: the most severe first, then file by file. The first so many of them
 /// are the same ones as long as nothing more severe comes or goes, whatever a host takes.
-fn by_importance(sections: &BTreeMap<String, Section>) -> Vec<Outcome> {
+fn by_importance(sections: &BTreeMap<String, Section>) -> Vec<SarifResult> {
     let mut repeats = Repeats::default();
     let mut findings = Vec::new();
     for (index, section) in sections.values().enumerate() {

@@ -6,14 +6,14 @@ use qcbus_formats::pool::is_rule_uid;
 use qcbus_reporter_sdk::{Pages, rule_name};
 
 use crate::finding::plain;
-use crate::log::{Configuration, Message, Outcome, Rule, RuleProperties, Severity};
+use crate::log::{Configuration, Message, Rule, RuleProperties, SarifResult, Severity};
 use crate::section::{RuleNote, Section};
 use crate::text;
 
 /// The rules of these findings, by id. What two sections say differently is taken from the first.
 pub(crate) fn rules<'s>(
     sections: impl Iterator<Item = &'s Section>,
-    findings: &[Outcome],
+    findings: &[SarifResult],
     pages: Pages,
 ) -> Vec<Rule> {
     let mut levels: BTreeMap<&str, Severity> = BTreeMap::new();

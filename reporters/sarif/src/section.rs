@@ -7,7 +7,7 @@ use qcbus_messages::{Digest, ResultMessage};
 
 use crate::artifact::Paths;
 use crate::finding::{finding, rule_id};
-use crate::log::{Artifact, ArtifactProperties, Found, Notification, Outcome, Severity};
+use crate::log::{Artifact, ArtifactProperties, Found, Notification, SarifResult, Severity};
 use crate::text;
 use crate::unanswered::{self, UNANSWERED};
 
@@ -17,7 +17,7 @@ pub struct Section {
     pub(crate) artifact: Artifact,
     /// The most severe first, else in the order of the result; without indices and repeats, which
     /// depend on the other sections.
-    pub(crate) findings: Vec<Outcome>,
+    pub(crate) findings: Vec<SarifResult>,
     pub(crate) notifications: Vec<Notification>,
     pub(crate) rules: BTreeMap<String, RuleNote>,
 }
@@ -88,7 +88,7 @@ fn unanswered_rule() -> RuleNote {
 fn artifact(
     result: &ResultMessage,
     paths: &Paths,
-    findings: &[Outcome],
+    findings: &[SarifResult],
     answered: bool,
 ) -> Artifact {
     let known = (result.digest != Digest::default()).then(|| result.digest.to_string());
@@ -107,7 +107,7 @@ fn artifact(
 }
 
 impl Found {
-    pub(crate) fn of<'f>(findings: impl IntoIterator<Item = &'f Outcome>) -> Found {
+    pub(crate) fn of<'f>(findings: impl IntoIterator<Item = &'f SarifResult>) -> Found {
         let mut found = Found::default();
         for finding in findings {
             match finding.level {

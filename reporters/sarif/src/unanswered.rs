@@ -5,7 +5,7 @@ use qcbus_reporter_sdk::{fingerprint_of, silences};
 
 use crate::artifact::Paths;
 use crate::finding::{plain, whole_file};
-use crate::log::{FindingProperties, Fingerprints, Notification, Outcome, Severity};
+use crate::log::{FindingProperties, Fingerprints, Notification, SarifResult, Severity};
 use crate::text;
 
 /// The rule under which it is said that checkers gave no answer.
@@ -34,13 +34,13 @@ pub(crate) fn notification(result: &ResultMessage, paths: &Paths, reason: &str) 
 }
 
 /// All reasons for whoever looks at findings only.
-pub(crate) fn finding(result: &ResultMessage, paths: &Paths, reasons: &[String]) -> Outcome {
+pub(crate) fn finding(result: &ResultMessage, paths: &Paths, reasons: &[String]) -> SarifResult {
     let said = match result.verdict {
         Verdict::Undetermined => "The file is undetermined, not accepted: ",
         Verdict::Accepted | Verdict::Rejected => "The file was not looked at by all: ",
     };
     let hash = fingerprint_of(&[UNANSWERED, &result.display_path]);
-    Outcome {
+    SarifResult {
         rule_id: UNANSWERED.to_owned(),
         rule_index: None,
         level: Severity::Error,

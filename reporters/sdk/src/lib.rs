@@ -64,7 +64,8 @@ pub trait Reporter: Send {
     /// Writes one result. When this returns `Ok`, the report is where it belongs.
     ///
     /// # Errors
-    /// [`ReportError`] when it could not be written; it is told to the broker and not tried again.
+    /// [`ReportError`] when it could not be written; it is told to the broker, and tried
+    /// again by the next one.
     fn report(&mut self, result: &ResultMessage, sources: &dyn Sources) -> Result<(), ReportError>;
 
     /// A file has gone: takes back what was reported about it. Nothing may be there to take back.

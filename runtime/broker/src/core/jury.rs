@@ -6,14 +6,14 @@ use qcbus_messages::Catalogue;
 use sha2::{Digest as _, Sha256};
 
 /// Counts up with every change of who must judge, or of what is demanded of them. The upper half
-/// is the broker's generation, so that a number never comes back.
+/// is above all that the journal knows, so that a number never comes back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Epoch(pub u64);
 
 impl Epoch {
-    /// The first epoch of a broker's generation.
-    pub fn first_of(generation: u64) -> Epoch {
-        Epoch(generation << 32)
+    /// The first epoch of a broker's numbers (`Settings::numbers`).
+    pub fn first_of(numbers: u64) -> Epoch {
+        Epoch(numbers << 32)
     }
 
     pub(super) fn next(self) -> Epoch {

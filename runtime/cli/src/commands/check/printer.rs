@@ -334,6 +334,9 @@ impl Printer {
             lines.push_str(&self.last_line());
         }
         // What is printed for programs stays for programs.
+        if lines.is_empty() {
+            return;
+        }
         if self.terminal() == Terminal::Reporter {
             talk::say_lines(lines.trim_end());
         } else {

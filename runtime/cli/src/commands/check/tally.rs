@@ -4,10 +4,10 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
-use qcbus_formats::pool::{BLOCKED, NotAsked};
-use qcbus_formats::xqar::{Level, Status};
+use qcbus_formats::pool::NotAsked;
+use qcbus_formats::xqar::Level;
 use qcbus_messages::{ResultMessage, Verdict, shown};
-use qcbus_reporter_sdk::{not_listed, rule_name};
+use qcbus_reporter_sdk::{checkers, is_blocked, not_listed, rule_name};
 
 /// Rules that are named at the end of a run without `--statistics`.
 const FIRST: usize = 5;
@@ -48,10 +48,8 @@ impl Tally {
     pub(super) fn add(&mut self, result: &ResultMessage) {
         *self.verdicts.entry(result.verdict).or_default() += 1;
         let (mut worst, mut seen, mut blocked) = (None, BTreeSet::new(), 0);
-        let bundles = result.results.bundles.iter();
-        for checker in bundles.flat_map(|bundle| &bundle.checkers) {
-            let is_blocked = checker.metadata.iter().any(|fact| fact.key == BLOCKED);
-            blocked += usize::from(checker.status == Some(Status::Skipped) && is_blocked);
+        for (_, checker) in checkers(result) {
+            blocked += usize::from(is_blocked(checker));
             for issue in &checker.issues {
                 let name = rule_name(&issue.rule_uid, &checker.id).to_owned();
                 *self.levels.entry(issue.level).or_default() += 1;
