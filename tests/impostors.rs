@@ -65,6 +65,7 @@ fn hello(name: &str, pid: u32, launch: Option<u64>) -> Hello {
         pid,
         launch,
         capacity: 4,
+        threads: 1,
     }
 }
 

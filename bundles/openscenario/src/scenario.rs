@@ -1,6 +1,6 @@
 //! The whole: the document that is checked with its catalogs and its map.
 
-use std::cell::OnceCell;
+use std::sync::OnceLock;
 
 use foldhash::{HashMap, HashMapExt as _, HashSet};
 use qcbus_document::{Attribute, Document, FileKind, Named, Node};
@@ -33,14 +33,14 @@ pub struct Scenario<'d> {
     pub(crate) assignment_problems: Vec<AssignmentProblem<'d>>,
     declaration_problems: Vec<DeclarationProblem<'d>>,
     kind: FileKind,
-    typings: OnceCell<HashMap<*const u8, Option<Typing>>>,
-    variables: OnceCell<HashSet<&'d str>>,
-    with_dollar: OnceCell<Vec<Attribute<'d>>>,
-    faults: OnceCell<Vec<ValueFault<'d>>>,
+    typings: OnceLock<HashMap<usize, Option<Typing>>>,
+    variables: OnceLock<HashSet<&'d str>>,
+    with_dollar: OnceLock<Vec<Attribute<'d>>>,
+    faults: OnceLock<Vec<ValueFault<'d>>>,
     /// Each with the context of its entry.
-    entry_faults: OnceCell<Vec<(ContextId, ValueFault<'d>)>>,
-    entities: OnceCell<Entities<'d>>,
-    storyboard: OnceCell<Storyboard<'d>>,
+    entry_faults: OnceLock<Vec<(ContextId, ValueFault<'d>)>>,
+    entities: OnceLock<Entities<'d>>,
+    storyboard: OnceLock<Storyboard<'d>>,
 }
 
 /// Files that name no version are read as the newest.
@@ -73,17 +73,17 @@ impl<'d> Scenario<'d> {
             assignment_problems: Vec::new(),
             declaration_problems,
             kind: inputs.kind,
-            typings: OnceCell::new(),
-            variables: OnceCell::new(),
-            with_dollar: OnceCell::new(),
-            faults: OnceCell::new(),
-            entry_faults: OnceCell::new(),
-            entities: OnceCell::new(),
-            storyboard: OnceCell::new(),
+            typings: OnceLock::new(),
+            variables: OnceLock::new(),
+            with_dollar: OnceLock::new(),
+            faults: OnceLock::new(),
+            entry_faults: OnceLock::new(),
+            entities: OnceLock::new(),
+            storyboard: OnceLock::new(),
         };
         scenario.follow_references();
         // Names that are written as parameters were read before all documents were known.
-        scenario.typings = OnceCell::new();
+        scenario.typings = OnceLock::new();
         Some(scenario)
     }
 
@@ -138,7 +138,7 @@ impl<'d> Scenario<'d> {
     /// entry as often as it is referred to.
     pub fn elements_everywhere(&self, name: &str) -> impl Iterator<Item = Element<'_, 'd>> {
         // Thousands of references may lead to entries of the same few catalogs.
-        let mut known: Vec<(*const u8, Named<'d>)> = Vec::new();
+        let mut known: Vec<(usize, Named<'d>)> = Vec::new();
         self.tops().flat_map(move |top| {
             let document = top.node.document();
             let key = key(document);
@@ -201,7 +201,7 @@ impl<'d> Scenario<'d> {
             .as_ref()
     }
 
-    fn read_typings(&self) -> HashMap<*const u8, Option<Typing>> {
+    fn read_typings(&self) -> HashMap<usize, Option<Typing>> {
         let mut typings = HashMap::new();
         for context in &self.contexts {
             let document = context.top.document();
@@ -550,8 +550,8 @@ fn with_dollar<'d>(top: Node<'d>) -> impl Iterator<Item = Attribute<'d>> {
 }
 
 /// Tells documents apart: where the text of their path lies in memory.
-fn key(document: Document<'_>) -> *const u8 {
-    document.path().as_ptr()
+fn key(document: Document<'_>) -> usize {
+    document.path().as_ptr() as usize
 }
 
 /// Names of what is declared or assigned are names, also where old files write a `$` before them.

@@ -1,9 +1,9 @@
 //! Models of linked documents that are kept from job to job: a hundred scenarios on one map read
 //! its roads once.
 
-use std::any::Any;
+use std::any::{Any, TypeId};
 use std::fmt;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use qcbus_document::Image;
 
@@ -34,45 +34,80 @@ pub(crate) type ImageId = (u64, u64);
 
 /// The models of one process, or of one check where there is no next.
 #[derive(Clone, Default)]
-pub(crate) struct KeptModels(Arc<Mutex<Vec<Kept>>>);
+pub(crate) struct KeptModels(Arc<Mutex<Vec<Arc<Kept>>>>);
 
+/// The models of one job: those that it has asked for, as long as it lasts, whatever other jobs do
+/// meanwhile.
+#[derive(Clone, Default)]
+pub(crate) struct JobModels {
+    kept: KeptModels,
+    own: Arc<Mutex<Vec<Arc<Kept>>>>,
+}
+
+/// One model, for which those that ask for it at the same time have one place.
 struct Kept {
     of: ImageId,
+    kind: TypeId,
     bytes: usize,
-    model: Arc<dyn Any + Send + Sync>,
+    /// Built by the first who asks; `None` inside when nothing can be made of the image.
+    model: OnceLock<Option<Arc<dyn Any + Send + Sync>>>,
+}
+
+impl JobModels {
+    /// The model of an image, built if nobody has.
+    pub(crate) fn get<M: LinkedModel>(&self, of: ImageId, image: &Image) -> Option<Arc<M>> {
+        let place = {
+            let mut own = lock(&self.own);
+            match find::<M>(&own, of) {
+                Some(at) => own[at].clone(),
+                None => {
+                    let place = self.kept.place::<M>(of, image);
+                    own.push(place.clone());
+                    place
+                }
+            }
+        };
+        // Unlocked: a model may ask for another one, and may panic. Then the next who asks builds it.
+        let build = || Some(Arc::new(M::build(image.clone())?) as Arc<dyn Any + Send + Sync>);
+        place.model.get_or_init(build).clone()?.downcast().ok()
+    }
+
+    /// The job is over: what is worth its memory until the next one is kept.
+    pub(crate) fn keep(&self) {
+        self.kept.tidy();
+    }
 }
 
 impl KeptModels {
-    /// The model of an image, built if it is not there.
-    pub(crate) fn get<M: LinkedModel>(&self, of: ImageId, image: &Image) -> Option<Arc<M>> {
-        if let Some(model) = self.find(of) {
-            return Some(model);
+    /// For one job.
+    pub(crate) fn for_job(&self) -> JobModels {
+        JobModels {
+            kept: self.clone(),
+            own: Arc::default(),
         }
-        // Unlocked: a model may ask for another one, and may panic.
-        let model = Arc::new(M::build(image.clone())?);
-        self.lock().push(Kept {
-            of,
-            bytes: image.len(),
-            model: model.clone(),
-        });
-        Some(model)
     }
 
-    /// Finds a model and puts it last: the first were not used for longest.
-    fn find<M: LinkedModel>(&self, of: ImageId) -> Option<Arc<M>> {
-        let mut models = self.lock();
-        let is_it = |kept: &Kept| kept.of == of && kept.model.is::<M>();
-        let at = models.iter().position(is_it)?;
-        let kept = models.remove(at);
-        let model = kept.model.clone();
-        models.push(kept);
-        model.downcast().ok()
+    /// The place of a model, and puts it last: the first were not used for longest.
+    fn place<M: LinkedModel>(&self, of: ImageId, image: &Image) -> Arc<Kept> {
+        let mut models = lock(&self.0);
+        let place = match find::<M>(&models, of) {
+            Some(at) => models.remove(at),
+            None => Arc::new(Kept {
+                of,
+                kind: TypeId::of::<M>(),
+                bytes: image.len(),
+                model: OnceLock::new(),
+            }),
+        };
+        models.push(place.clone());
+        place
     }
 
-    /// A job is over: what is not worth its memory until the next one goes.
-    pub(crate) fn tidy(&self) {
-        let mut models = self.lock();
-        models.retain(|kept| kept.bytes >= WORTH_KEEPING);
+    /// What is not worth its memory until the next job goes.
+    fn tidy(&self) {
+        let mut models = lock(&self.0);
+        models
+            .retain(|kept| kept.bytes >= WORTH_KEEPING && !matches!(kept.model.get(), Some(None)));
         let surplus = models.len().saturating_sub(MOST);
         models.drain(..surplus);
         while models.iter().map(|kept| kept.bytes).sum::<usize>() > MOST_BYTES {
@@ -80,25 +115,36 @@ impl KeptModels {
         }
     }
 
-    /// Drops all models, and with them their hold on images.
+    /// Drops all models, and with them its hold on images. Jobs that are under way have theirs.
     pub(crate) fn clear(&self) {
-        self.lock().clear();
+        lock(&self.0).clear();
     }
 
     /// How many there are.
     #[cfg(test)]
     pub(crate) fn len(&self) -> usize {
-        self.lock().len()
+        lock(&self.0).len()
     }
+}
 
-    fn lock(&self) -> MutexGuard<'_, Vec<Kept>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
+fn find<M: LinkedModel>(models: &[Arc<Kept>], of: ImageId) -> Option<usize> {
+    let kind = TypeId::of::<M>();
+    models.iter().position(|it| it.of == of && it.kind == kind)
+}
+
+fn lock(models: &Mutex<Vec<Arc<Kept>>>) -> MutexGuard<'_, Vec<Arc<Kept>>> {
+    models.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl fmt::Debug for KeptModels {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("KeptModels").finish_non_exhaustive()
+    }
+}
+
+impl fmt::Debug for JobModels {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("JobModels").finish_non_exhaustive()
     }
 }
 
@@ -124,6 +170,18 @@ pub(crate) mod tests {
         }
     }
 
+    struct Slow;
+
+    impl LinkedModel for Slow {
+        fn build(_: Image) -> Option<Slow> {
+            // So that the others ask meanwhile.
+            for _ in 0..1000 {
+                std::thread::yield_now();
+            }
+            Some(Slow)
+        }
+    }
+
     struct Panics;
 
     impl LinkedModel for Panics {
@@ -146,25 +204,25 @@ pub(crate) mod tests {
     #[test]
     fn a_model_is_built_once_for_each_image() {
         let models = KeptModels::default();
-        let one = models.get::<First>((1, 1), &large(1)).unwrap();
+        let one = models.for_job().get::<First>((1, 1), &large(1)).unwrap();
         models.tidy();
         // Another generation has another document of that number.
-        let two = models.get::<First>((2, 1), &large(2)).unwrap();
+        let two = models.for_job().get::<First>((2, 1), &large(2)).unwrap();
         models.tidy();
         assert_eq!((&*one, &*two), (&First(1), &First(2)));
-        let again = models.get::<First>((1, 1), &large(1)).unwrap();
+        let job = models.for_job();
+        let again = job.get::<First>((1, 1), &large(1)).unwrap();
         assert!(Arc::ptr_eq(&one, &again));
-        assert_eq!(
-            models.get::<Len>((1, 1), &large(1)).unwrap().0,
-            large(1).len()
-        );
+        assert_eq!(job.get::<Len>((1, 1), &large(1)).unwrap().0, large(1).len());
     }
 
     #[test]
     fn the_images_used_last_are_kept() {
         let models = KeptModels::default();
         let id = |number: u8| (1, u64::from(number));
-        let get = |number: u8| models.get::<First>(id(number), &large(number)).unwrap();
+        let of =
+            |job: &JobModels, number: u8| job.get::<First>(id(number), &large(number)).unwrap();
+        let get = |number: u8| of(&models.for_job(), number);
         let one = get(1);
         get(2);
         get(1);
@@ -185,21 +243,36 @@ pub(crate) mod tests {
         for bytes in [1, WORTH_KEEPING - 1, MOST_BYTES + 1] {
             let models = KeptModels::default();
             let image = image(1, bytes);
-            let one = models.get::<First>((1, 1), &image).unwrap();
-            let again = models.get::<First>((1, 1), &image).unwrap();
-            assert!(Arc::ptr_eq(&one, &again));
-            models.tidy();
+            let job = models.for_job();
+            let one = job.get::<First>((1, 1), &image).unwrap();
+            // Another job ends meanwhile.
+            models.for_job().keep();
             assert_eq!(models.len(), 0, "{bytes}");
+            let again = job.get::<First>((1, 1), &image).unwrap();
+            assert!(Arc::ptr_eq(&one, &again));
         }
+    }
+
+    #[test]
+    fn two_jobs_that_ask_at_once_build_one_model() {
+        let models = KeptModels::default();
+        let image = large(1);
+        let got: Vec<Arc<Slow>> = std::thread::scope(|scope| {
+            let ask = || models.for_job().get::<Slow>((1, 1), &image).unwrap();
+            let threads: Vec<_> = (0..4).map(|_| scope.spawn(ask)).collect();
+            threads.into_iter().map(|it| it.join().unwrap()).collect()
+        });
+        assert!(got.iter().all(|it| Arc::ptr_eq(it, &got[0])));
     }
 
     #[test]
     fn without_a_model_there_is_nothing_to_keep() {
         let models = KeptModels::default();
-        assert!(models.get::<First>((1, 1), &image(1, 0)).is_none());
-        let asked = std::panic::AssertUnwindSafe(|| models.get::<Panics>((1, 1), &large(1)));
+        let job = models.for_job();
+        assert!(job.get::<First>((1, 1), &image(1, 0)).is_none());
+        let asked = std::panic::AssertUnwindSafe(|| job.get::<Panics>((1, 1), &large(1)));
         assert!(std::panic::catch_unwind(asked).is_err());
-        assert_eq!(models.len(), 0);
-        assert!(models.get::<First>((1, 1), &large(1)).is_some());
+        models.clear();
+        assert!(models.for_job().get::<First>((1, 1), &large(1)).is_some());
     }
 }

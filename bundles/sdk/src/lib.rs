@@ -9,6 +9,7 @@ pub mod basic;
 mod bundle;
 mod check;
 pub mod corpus;
+mod hands;
 mod kept;
 mod load;
 pub mod mutate;
@@ -26,7 +27,8 @@ mod subject;
 mod version;
 
 pub use bundle::{BACKPORT_SUFFIX, Bundle, Checker, Reads};
-pub use check::{Listener, Outcome, check};
+pub use check::{Listener, Outcome, check, check_with};
+pub use hands::Hands;
 pub use kept::LinkedModel;
 pub use load::{LoadError, Loaded};
 pub use param::{Default, MAX_ISSUES, Param, ParamError, Values};

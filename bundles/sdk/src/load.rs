@@ -10,7 +10,7 @@ use qcbus_ingest::{IngestError, Limits, Prepared, Reader, Source, Walking};
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Absence, Digest, DocumentRole, Link, MissingDocument};
 
-use crate::kept::KeptModels;
+use crate::kept::JobModels;
 use crate::subject::LinkedImage;
 use crate::{Bundle, Subject};
 
@@ -95,7 +95,7 @@ impl Loaded {
     pub fn subject(&self, bundle: &Bundle) -> Result<Subject<'_>, LoadError> {
         let root = Document::open(&self.root)?;
         // There is no next job: what is kept is for the rules of this one.
-        let models = KeptModels::default();
+        let models = JobModels::default();
         let linked = self.linked.iter().map(|linked| linked.open(&models));
         let linked = linked.collect::<Result<_, ImageError>>()?;
         let subject = Subject::new(root, self.kind, (bundle.version_of)(&root));

@@ -15,6 +15,8 @@ pub struct Plan {
     pub(crate) checkers: Vec<Checker>,
     /// By model; the order of checking.
     pub(crate) groups: Vec<Vec<usize>>,
+    /// Groups that may be checked side by side, because none of them rests on another of these.
+    pub(crate) batches: Vec<Vec<usize>>,
     /// In the order of `checkers`.
     pub(crate) entries: Vec<Entry>,
     /// What was made of the user's files.
@@ -53,9 +55,11 @@ impl Plan {
         });
         let mut entries: Vec<Entry> = entries.collect();
         mark_preconditions(&mut entries);
+        let groups = groups(&checkers);
         Plan {
             bundle,
-            groups: groups(&checkers),
+            batches: batches(&groups, &entries),
+            groups,
             checkers,
             entries,
             resources: Vec::new(),
@@ -159,6 +163,29 @@ fn value_of(
     seen.push(Seen::new(resource, path));
     let read = resource.read(path).map(Some);
     read.map_err(|error| format!("failed to {error}"))
+}
+
+/// Groups that follow each other and of which none rests on another, in any direction: that a checker
+/// does not look because it comes too early must not depend on how many threads there are.
+fn batches(groups: &[Vec<usize>], entries: &[Entry]) -> Vec<Vec<usize>> {
+    let rests_on = |group: &[usize], other: &[usize]| {
+        let after = group
+            .iter()
+            .flat_map(|&index| entries[index].after.iter().flatten());
+        after.into_iter().any(|before| other.contains(before))
+    };
+    let mut batches: Vec<Vec<usize>> = Vec::new();
+    for (number, group) in groups.iter().enumerate() {
+        let is_apart = |batch: &&mut Vec<usize>| {
+            let mut others = batch.iter().map(|&it| &groups[it]);
+            !others.any(|other| rests_on(group, other) || rests_on(other, group))
+        };
+        match batches.last_mut().filter(is_apart) {
+            Some(batch) => batch.push(number),
+            None => batches.push(vec![number]),
+        }
+    }
+    batches
 }
 
 fn preconditions(checkers: &[Checker], checker: &Checker) -> Result<Vec<usize>, String> {

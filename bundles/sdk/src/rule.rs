@@ -13,11 +13,12 @@ use crate::{Param, Resource, Sink, Subject};
 /// The type that implements it is only a name; the value that rules get is [`Model::Of`].
 pub trait Model: 'static {
     /// The model of a document that lives for `'d`.
-    type Of<'d>;
+    /// Threads share it: what it finds out when it is first asked is behind `OnceLock`s.
+    type Of<'d>: Sync;
 
     /// Names a part of the model at which several rules look in turn before they go on to the next
     /// part: small enough to stay in the processor's caches meanwhile.
-    type Part;
+    type Part: Sync;
 
     /// Builds the model. It should be lazy: most documents need little of it.
     ///
@@ -166,7 +167,7 @@ fn finds_nothing<M: Model>(_: &M::Of<'_>, _: &mut Sink<'_>) {}
 
 /// A model that was built, on which every rule of its kind can be run.
 #[doc(hidden)]
-pub trait Built<'d> {
+pub trait Built<'d>: Sync {
     /// How many parts the model has.
     fn parts(&self) -> usize;
     /// Has a rule look at one part.
@@ -207,6 +208,8 @@ pub trait AnyRule: Sync {
     fn model(&self) -> TypeId;
     /// Whether it looks at one part of the model after the other.
     fn goes_by_parts(&self) -> bool;
+    /// Whether it looks at the whole model. May be true of one that does nothing then.
+    fn looks_at_the_whole(&self) -> bool;
     /// Builds this rule's model and hands it on, for every rule of the same model.
     #[doc(hidden)]
     fn with_model<'d>(
@@ -257,6 +260,13 @@ impl<M: Model> AnyRule for Rule<M> {
 
     fn goes_by_parts(&self) -> bool {
         self.each.is_some()
+    }
+
+    fn looks_at_the_whole(&self) -> bool {
+        !std::ptr::fn_addr_eq(
+            self.run,
+            finds_nothing::<M> as fn(&M::Of<'_>, &mut Sink<'_>),
+        )
     }
 
     fn with_model<'d>(

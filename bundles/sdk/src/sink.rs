@@ -24,7 +24,9 @@ pub struct Sink<'d> {
     values: &'d Values,
     /// Said on every issue of a rule that is not normative for the document's version.
     not_normative: Option<String>,
-    kept: Vec<((usize, u32), Issue)>,
+    kept: Vec<Kept>,
+    /// What is looked at now: the part with this number, or the whole.
+    part: u32,
     suppressed: Option<Suppressed>,
     /// What was found behind references: by the text and where the document's path lies in memory.
     behind: HashMap<(String, usize, u32), Behind>,
@@ -35,6 +37,18 @@ pub struct Sink<'d> {
     /// all of theirs, and many are at work at the same time.
     scratch: Option<Box<Issue>>,
 }
+
+/// A finding that is listed.
+struct Kept {
+    /// What was being looked at: findings are made in this order.
+    part: u32,
+    /// Where it is in the document: findings are listed in this order.
+    order: (usize, u32),
+    issue: Issue,
+}
+
+/// Stands for the whole, which is looked at after all parts.
+pub(crate) const WHOLE: u32 = u32::MAX;
 
 /// A finding about something to which references lead.
 struct Behind {
@@ -72,6 +86,7 @@ impl<'d> Sink<'d> {
             values,
             not_normative,
             kept: Vec::new(),
+            part: WHOLE,
             suppressed: None,
             behind: HashMap::new(),
             metadata: Vec::new(),
@@ -107,10 +122,11 @@ impl<'d> Sink<'d> {
             self.suppress(place, level);
             scratch(&mut self.scratch)
         } else {
-            let issue = self.complete(place, text, level);
-            self.kept.push(issue);
+            let (order, issue) = self.complete(place, text, level);
+            let part = self.part;
+            self.kept.push(Kept { part, order, issue });
             match self.kept.last_mut() {
-                Some((_, issue)) => issue,
+                Some(kept) => &mut kept.issue,
                 None => scratch(&mut self.scratch),
             }
         };
@@ -160,10 +176,10 @@ impl<'d> Sink<'d> {
             let shown = known
                 .kept
                 .filter(|_| is_other && known.more <= MOST_REFERENCES);
-            if let Some((_, issue)) = shown.and_then(|kept| self.kept.get_mut(kept)) {
+            if let Some(kept) = shown.and_then(|kept| self.kept.get_mut(kept)) {
                 let what = "a further reference that leads there";
                 let spot = locate(self.subject, &Place::Node(reference), Some(what));
-                issue.locations.push(spot.locations);
+                kept.issue.locations.push(spot.locations);
             }
             return true;
         }
@@ -235,15 +251,37 @@ impl<'d> Sink<'d> {
                 .map_or(0, |suppressed| suppressed.count)
     }
 
+    /// Says what is looked at next: the part with this number, or the [`WHOLE`].
+    pub(crate) fn turn_to(&mut self, part: u32) {
+        self.part = part;
+    }
+
+    /// Takes in what other threads have found for the same checker, up to a part: then it has what it would have
+    /// if it had taken all parts in their order. `false` when that cannot be told: something is not listed, or is
+    /// counted.
+    pub(crate) fn take_in(&mut self, others: Vec<Sink<'d>>, last: u32) -> bool {
+        let plain = |sink: &Sink<'_>| {
+            sink.suppressed.is_none() && sink.behind.is_empty() && sink.metadata.is_empty()
+        };
+        if !plain(self) || !others.iter().all(plain) {
+            return false;
+        }
+        self.kept.extend(others.into_iter().flat_map(|it| it.kept));
+        // Every part was one thread's, and is in order.
+        self.kept.sort_by_key(|kept| kept.part);
+        self.kept.retain(|kept| kept.part <= last);
+        self.kept.len() <= self.limit()
+    }
+
     /// Takes out the findings in document order, and facts about those that are not listed.
     pub(crate) fn finish(&mut self) -> (Vec<Issue>, Vec<Metadata>) {
         let mut kept = std::mem::take(&mut self.kept);
         let mut behind: Vec<Behind> = std::mem::take(&mut self.behind).into_values().collect();
         behind.sort_unstable_by_key(|behind| behind.kept);
         for behind in behind {
-            let issue = behind.kept.and_then(|at| kept.get_mut(at));
+            let finding = behind.kept.and_then(|at| kept.get_mut(at));
             let unsaid = behind.more.saturating_sub(MOST_REFERENCES);
-            if let Some((_, issue)) = issue.filter(|_| unsaid > 0) {
+            if let Some(Kept { issue, .. }) = finding.filter(|_| unsaid > 0) {
                 let text = match unsaid {
                     1 => "; one more reference leads there".to_owned(),
                     unsaid => format!("; {unsaid} more references lead there"),
@@ -251,8 +289,8 @@ impl<'d> Sink<'d> {
                 issue.description.push_str(&text);
             }
         }
-        kept.sort_by_key(|(order, _)| *order);
-        let mut issues: Vec<Issue> = kept.into_iter().map(|(_, issue)| issue).collect();
+        kept.sort_by_key(|kept| kept.order);
+        let mut issues: Vec<Issue> = kept.into_iter().map(|kept| kept.issue).collect();
         let mut facts = std::mem::take(&mut self.metadata);
         let Some(suppressed) = self.suppressed.take() else {
             return (issues, facts);

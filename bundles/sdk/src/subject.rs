@@ -1,14 +1,13 @@
 //! What is checked: a root document and the documents that it refers to.
 
-use std::cell::RefCell;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use qcbus_document::{Document, FileKind, Image, ImageError, Node, XPaths};
 use qcbus_ingest::Limits;
 use qcbus_ingest::modular::{Expansion, Piece};
 use qcbus_messages::{DocumentRole, Link, MissingDocument};
 
-use crate::kept::{ImageId, KeptModels};
+use crate::kept::{ImageId, JobModels};
 use crate::{LinkedModel, Reads, ResourceValue, Version};
 
 /// The documents of one check.
@@ -23,7 +22,7 @@ pub struct Subject<'d> {
     linked: Vec<Linked<'d>>,
     missing: Vec<MissingDocument>,
     resources: Vec<ResourceValue>,
-    paths: RefCell<XPaths>,
+    paths: Arc<Mutex<XPaths>>,
 }
 
 /// A document that the root refers to.
@@ -40,7 +39,7 @@ pub struct Linked<'d> {
     /// Where its own references to maps and scenarios lead; the root counts as the first document.
     pub links: &'d [Link],
     image: &'d LinkedImage,
-    models: KeptModels,
+    models: JobModels,
 }
 
 /// A document that a root refers to, as whoever checks has it in hand.
@@ -56,7 +55,7 @@ pub(crate) struct LinkedImage {
 
 impl LinkedImage {
     /// The document, with models of it from among those that are kept.
-    pub(crate) fn open(&self, models: &KeptModels) -> Result<Linked<'_>, ImageError> {
+    pub(crate) fn open(&self, models: &JobModels) -> Result<Linked<'_>, ImageError> {
         Ok(Linked {
             document: self.image.document()?,
             role: self.role,
@@ -94,7 +93,7 @@ impl<'d> Subject<'d> {
             linked: Vec::new(),
             missing: Vec::new(),
             resources: Vec::new(),
-            paths: RefCell::new(XPaths::new(root)),
+            paths: Arc::new(Mutex::new(XPaths::new(root))),
         }
     }
 
@@ -122,7 +121,7 @@ impl<'d> Subject<'d> {
             let expanded = expanded.map(|expanded| expanded.document);
             self.is_expanded = expanded.is_some();
             self.root = expanded.unwrap_or(self.written);
-            self.paths = RefCell::new(XPaths::new(self.root));
+            self.paths = Arc::new(Mutex::new(XPaths::new(self.root)));
         }
         self
     }
@@ -196,7 +195,10 @@ impl<'d> Subject<'d> {
     /// The XPath of an element. Many findings within one large parent cost no more than few: what
     /// tells the root document's elements from their siblings is remembered.
     pub(crate) fn xpath(&self, node: Node<'_>) -> String {
-        self.paths.borrow_mut().xpath(node)
+        self.paths
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .xpath(node)
     }
 
     /// What the root refers to and could not be had.

@@ -1,7 +1,8 @@
-//! How long the rules take on maps, from the image of the document, in one thread.
+//! How long the rules take on maps, from the image of the document.
 //!
-//! `cargo run --release -p qcbus-xodr --example rule_times -- [--rules] [--runs N] MAP.xodr…` prints
-//! the CPU time of all rules together per map; with `--rules` what each took (on the clock on the
+//! `cargo run --release -p qcbus-xodr --example rule_times -- [--rules] [--runs N] [--threads N] MAP.xodr…`
+//! prints the time of all rules together per map: with one thread (unless told otherwise) its CPU time, with more
+//! the time on the clock on the wall; with `--rules` what each took (on the clock on the
 //! wall, the least of all runs), of the maps one after the other, sorted by the last. `tests/xodr_speed.py` makes large maps to measure.
 
 #![expect(
@@ -13,21 +14,22 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
-use qcbus_sdk::{Issue, Listener, Loaded, Outcome, Plan, check};
+use qcbus_sdk::{Hands, Issue, Listener, Loaded, Outcome, Plan, check_with};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
-    let (mut rules, mut runs, mut maps) = (false, 5, Vec::new());
+    let (mut rules, mut runs, mut threads, mut maps) = (false, 5, 1, Vec::new());
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--rules" => rules = true,
             "--runs" => runs = arguments.next().unwrap_or_default().parse()?,
+            "--threads" => threads = arguments.next().unwrap_or_default().parse()?,
             _ => maps.push(argument),
         }
     }
     let measured: Vec<Measured> = maps
         .iter()
-        .map(|map| measure(map, runs))
+        .map(|map| measure(map, runs, &Hands::new(threads)))
         .collect::<Result<_, _>>()?;
     for (map, measured) in maps.iter().zip(&measured) {
         let [best, median] = [measured.best, measured.median].map(milliseconds);
@@ -63,7 +65,7 @@ fn milliseconds(took: Duration) -> f64 {
 
 /// What was measured of one map.
 struct Measured {
-    /// CPU of all rules together.
+    /// All rules together.
     best: Duration,
     median: Duration,
     /// The least that each rule took.
@@ -71,7 +73,7 @@ struct Measured {
     issues: usize,
 }
 
-fn measure(map: &str, runs: usize) -> Result<Measured, Box<dyn std::error::Error>> {
+fn measure(map: &str, runs: usize, hands: &Hands) -> Result<Measured, Box<dyn std::error::Error>> {
     let path = Path::new(map);
     let loaded = Loaded::from_path(path, path.parent().unwrap_or(path))?;
     let plan = Plan::by_default(&qcbus_xodr::BUNDLE);
@@ -79,11 +81,11 @@ fn measure(map: &str, runs: usize) -> Result<Measured, Box<dyn std::error::Error
     let (mut totals, mut issues) = (Vec::new(), 0);
     for _ in 0..runs.max(1) {
         // As a bundle does it: what a subject remembers is not carried over to the next run.
-        let before = cpu();
+        let before = clock(hands);
         let subject = loaded.subject(&qcbus_xodr::BUNDLE)?;
         let mut times = Times::default();
-        check(&plan, &subject, &mut times);
-        totals.push(cpu().saturating_sub(before));
+        check_with(&plan, &subject, hands, &mut times);
+        totals.push(clock(hands).saturating_sub(before));
         issues = times.issues;
         for (checker, took) in times.took {
             let slot = rules.entry(plan.checkers()[checker].id.clone());
@@ -100,8 +102,12 @@ fn measure(map: &str, runs: usize) -> Result<Measured, Box<dyn std::error::Error
     })
 }
 
-/// The CPU time of this thread.
-fn cpu() -> Duration {
+/// The CPU time of this thread when it is alone, else the time on the wall.
+fn clock(hands: &Hands) -> Duration {
+    let clock = match hands.count() {
+        1 => libc::CLOCK_THREAD_CPUTIME_ID,
+        _ => libc::CLOCK_MONOTONIC,
+    };
     let mut time = libc::timespec {
         tv_sec: 0,
         tv_nsec: 0,
@@ -112,7 +118,7 @@ fn cpu() -> Duration {
     )]
     // SAFETY: `time` is a timespec that outlives the call.
     unsafe {
-        libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time);
+        libc::clock_gettime(clock, &raw mut time);
     }
     let seconds = u64::try_from(time.tv_sec).unwrap_or(0);
     Duration::from_secs(seconds) + Duration::from_nanos(u64::try_from(time.tv_nsec).unwrap_or(0))

@@ -33,6 +33,8 @@ pub struct Hello {
     pub launch: Option<u64>,
     /// How many jobs or results it takes at once.
     pub capacity: u16,
+    /// How many threads it works with, for people who look at its status.
+    pub threads: u16,
 }
 
 /// What a bundle can do; sent after the welcome, before its first job.

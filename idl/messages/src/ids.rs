@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// Version of the messages in this crate. Peers of another version are refused by name. Raised with
 /// every change of a message: one from before is read as something else, not as nothing.
-pub const PROTOCOL_VERSION: u32 = 4;
+pub const PROTOCOL_VERSION: u32 = 5;
 
 /// One check of one file's bytes under one configuration; unique within a broker generation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]

@@ -106,6 +106,7 @@ fn hello(identity: &Identity) -> Hello {
         pid: std::process::id(),
         launch: identity.launch,
         capacity: CAPACITY,
+        threads: 1,
     }
 }
 

@@ -77,6 +77,7 @@ fn hello() -> Hello {
         pid: 0,
         launch: None,
         capacity: 8,
+        threads: 1,
     }
 }
 

@@ -277,6 +277,7 @@ fn hello(animal: &Animal, args: &Args) -> Hello {
         pid: std::process::id(),
         launch: args.launch,
         capacity: 4,
+        threads: 1,
     }
 }
 

@@ -1,4 +1,5 @@
 use std::collections::HashMap;
+use std::sync::atomic::Ordering;
 
 use qcbus_document::Attribute;
 use qcbus_sdk::modular::{Key, Spot, Use, What};
@@ -34,7 +35,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
 
 /// Says which keys without an element give their value to different sorts of elements.
 fn spread(one: &Use<'_>, piece: usize, found: &mut Sink<'_>) {
-    let is_spread = |key: &&Key<'_>| !key.key.contains('.') && key.wins.get() > 1;
+    let is_spread = |key: &&Key<'_>| !key.key.contains('.') && key.wins.load(Ordering::Relaxed) > 1;
     let mut keys = one.keys.iter().filter(is_spread).peekable();
     if keys.peek().is_none() {
         return;

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use lexopt::ValueExt as _;
 
 use super::{BusOptions, Format, Mode};
+use crate::Hands;
 
 /// What a bundle's arguments are.
 pub const USAGE: &str = "\
@@ -18,6 +19,8 @@ usage:
   BUNDLE -c CONFIG
          run as a module of ASAM's quality checker framework
   each with [--schema-dir DIR]: XML schemas (.xsd, .tbl) to use instead of those it comes with
+  and [--threads N]: how many threads check at the same time; as many as there are processors for
+  this process, unless told otherwise
 exit codes: 0 accepted, 1 rejected, 2 usage, 3 undetermined, 4 no broker, 5 internal error
 ";
 
@@ -46,7 +49,7 @@ pub(super) fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Mode, U
     let mut parser = lexopt::Parser::from_args(arguments);
     let mut bus = BusOptions::default();
     let (mut on_bus, mut config, mut file, mut format) = (false, None, None, None);
-    let (mut schema_dir, mut timings) = (None, false);
+    let (mut schema_dir, mut timings, mut threads) = (None, false, None);
     while let Some(argument) = parser.next()? {
         on_bus |= matches!(argument, Long("instance" | "instance-dir" | "launch"));
         match argument {
@@ -55,6 +58,10 @@ pub(super) fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Mode, U
             Long("format") => {
                 let known = |text: &str| Format::of(text).ok_or("it is neither text nor json");
                 format = Some(parser.value()?.parse_with(known)?);
+            }
+            Long("threads") => {
+                let number = |text: &str| threads_of(text).ok_or("it is no number from 1 to 1024");
+                threads = Some(parser.value()?.parse_with(number)?);
             }
             Long("timings") => timings = true,
             Long("instance") => bus.instance = parser.value()?.string()?,
@@ -73,6 +80,7 @@ pub(super) fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Mode, U
     if timings && file.is_none() {
         return Err(UsageError::Lacks("--timings", "FILE"));
     }
+    let threads = threads.unwrap_or_else(Hands::available);
     match (file, config) {
         (Some(_), Some(_)) => Err(UsageError::Conflict("FILE", "-c")),
         (Some(_), None) if on_bus => Err(UsageError::Conflict("FILE", "--instance")),
@@ -82,10 +90,24 @@ pub(super) fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Mode, U
             format: format.unwrap_or_default(),
             timings,
             schema_dir,
+            threads,
         }),
-        (None, Some(config)) => Ok(Mode::Module { config, schema_dir }),
-        (None, None) => Ok(Mode::Bus(BusOptions { schema_dir, ..bus })),
+        (None, Some(config)) => Ok(Mode::Module {
+            config,
+            schema_dir,
+            threads,
+        }),
+        (None, None) => Ok(Mode::Bus(BusOptions {
+            schema_dir,
+            threads,
+            ..bus
+        })),
     }
+}
+
+fn threads_of(text: &str) -> Option<usize> {
+    let number = text.parse().ok();
+    number.filter(|number| (1..=crate::hands::MOST).contains(number))
 }
 
 #[cfg(test)]
@@ -105,7 +127,8 @@ mod tests {
                 path: "a.xodr".into(),
                 format: Format::Json,
                 timings: false,
-                schema_dir: None
+                schema_dir: None,
+                threads: Hands::available(),
             })
         );
         let timed = of(&["a.xodr", "--timings"]);
@@ -117,7 +140,8 @@ mod tests {
             of(&["--schema-dir", "own", "-c", "c.xml"]),
             Ok(Mode::Module {
                 config: "c.xml".into(),
-                schema_dir: Some("own".into())
+                schema_dir: Some("own".into()),
+                threads: Hands::available(),
             })
         );
         let Ok(Mode::Bus(options)) =
@@ -138,6 +162,8 @@ mod tests {
             &["-c"],
             &["--schema-dir"],
             &["--launch", "x"],
+            &["--threads", "0"],
+            &["--threads", "many"],
             &["--timings"],
             &["--timings", "-c", "b"],
             &["a", "b"],

@@ -1,4 +1,4 @@
-//! A bundle as a daemon on the bus: one loop that talks, one thread that checks.
+//! A bundle as a daemon on the bus: one loop that talks, threads that check.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::PathBuf;
@@ -21,10 +21,10 @@ use super::batches::batches;
 use super::file::complain;
 use super::module::configured;
 use super::stand::{Ended, Fence, Sessions, Stand, sandboxed};
-use super::worker::{self, CheckerAtWork, Order, Progress, Work};
+use super::worker::{CheckerAtWork, Progress, Work, Workers};
 use crate::kept::KeptModels;
 use crate::subject::LinkedImage;
-use crate::{Bundle, Outcome, Plan, UserFiles};
+use crate::{Bundle, Hands, Outcome, Plan, UserFiles};
 
 /// How a bundle joins the bus.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -41,6 +41,8 @@ pub struct BusOptions {
     pub schema_dir: Option<PathBuf>,
     /// Do not confine it.
     pub no_sandbox: bool,
+    /// Threads that check at the same time.
+    pub threads: usize,
 }
 
 impl Default for BusOptions {
@@ -52,12 +54,16 @@ impl Default for BusOptions {
             die_with_parent: false,
             schema_dir: None,
             no_sandbox: false,
+            threads: Hands::available(),
         }
     }
 }
 
-/// How many jobs the broker may send ahead: one is checked while the next ones are at hand.
-const CAPACITY: u16 = 8;
+/// How many jobs the broker may send ahead: some are checked while the next ones are at hand.
+fn capacity(threads: usize) -> u16 {
+    u16::try_from((2 * threads + 4).clamp(8, 64)).unwrap_or(64)
+}
+
 /// How often a sign of life is given, and missing documents are asked for again.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 /// How long a broker may take to tell its configuration after the welcome.
@@ -81,7 +87,8 @@ pub(super) fn run(bundle: &'static Bundle, options: BusOptions, given: Option<&U
         supervised,
         unfenced: options.no_sandbox,
     };
-    let hello = hello(bundle, options.launch);
+    let threads = options.threads;
+    let hello = hello(bundle, options.launch, threads);
     sandboxed(&instance, &sessions, |stand| {
         // A bundle is confined before its first thread is started, so the runtime must not start any.
         let runtime = tokio::runtime::Builder::new_current_thread()
@@ -111,7 +118,7 @@ fn follow_parent() -> bool {
     parent.is_some() && getppid() == parent
 }
 
-fn hello(bundle: &Bundle, launch: Option<u64>) -> Hello {
+fn hello(bundle: &Bundle, launch: Option<u64>, threads: usize) -> Hello {
     Hello {
         protocol: PROTOCOL_VERSION,
         role: Role::Bundle,
@@ -120,7 +127,8 @@ fn hello(bundle: &Bundle, launch: Option<u64>) -> Hello {
         incarnation: incarnation(),
         pid: std::process::id(),
         launch,
-        capacity: CAPACITY,
+        capacity: capacity(threads),
+        threads: u16::try_from(threads).unwrap_or(u16::MAX),
     }
 }
 
@@ -163,7 +171,7 @@ async fn serve(
     hello: Hello,
     mut stops: Stops,
 ) -> Ended {
-    let was_started = hello.launch.is_some();
+    let (was_started, threads) = (hello.launch.is_some(), hello.threads);
     let mut peer = match Peer::join(stand.instance, hello, stand.options()).await {
         Ok(peer) => peer,
         Err(error @ JoinError::NoBroker { .. }) => {
@@ -179,8 +187,10 @@ async fn serve(
     let heard = until_configured(&mut peer).await;
     let fence = stand.confine(peer.memory(), || files_of(bundle, given.as_ref(), &peer));
     let (sender, mut progress) = mpsc::unbounded_channel();
-    let works = match worker::start(KeptModels::default(), sender) {
-        Ok(works) => works,
+    let models = KeptModels::default();
+    let threads = usize::from(threads);
+    let workers = match Workers::start(threads, models.clone(), sender) {
+        Ok(workers) => workers,
         Err(error) => {
             let why = format!("failed to start a thread: {error}");
             return Ended::With(fail(&why, Exit::Internal));
@@ -190,10 +200,12 @@ async fn serve(
         bundle,
         given,
         peer,
-        works,
+        workers,
+        models,
         plans: BTreeMap::new(),
         waiting: VecDeque::new(),
-        running: None,
+        running: BTreeMap::new(),
+        runs: 0,
         asked_for: None,
         draining: false,
         stopped: false,
@@ -258,11 +270,15 @@ struct Daemon {
     bundle: &'static Bundle,
     given: Option<UserFiles>,
     peer: Peer,
-    works: std::sync::mpsc::Sender<Order>,
+    workers: Workers,
+    models: KeptModels,
     /// Each configuration and what it demands; made once, unless files that it names change.
     plans: BTreeMap<Digest, (Option<Config>, Arc<Plan>)>,
     waiting: VecDeque<Job>,
-    running: Option<Running>,
+    /// What the threads are at, by the number of the run.
+    running: BTreeMap<u64, Running>,
+    /// How many runs there have been.
+    runs: u64,
     /// The job for which missing documents were asked for since the last heartbeat, for want of another.
     asked_for: Option<JobId>,
     draining: bool,
@@ -323,11 +339,7 @@ impl Daemon {
                 if let Some(job) = cancelled.and_then(|at| self.waiting.remove(at)) {
                     self.finished_with(&job);
                 }
-                if let Some(running) = self
-                    .running
-                    .as_ref()
-                    .filter(|running| running.job.job == job)
-                {
+                for running in self.running.values().filter(|it| it.job.job == job) {
                     running.cancelled.store(true, Ordering::Relaxed);
                 }
             }
@@ -352,21 +364,21 @@ impl Daemon {
 
     /// Documents that no job is about any more are not kept for the next.
     fn keep_nothing(&self) {
-        // When the thread has ended, nothing is kept.
-        let _ = self.works.send(Order::LetGo);
+        self.models.clear();
     }
 
     /// A new session: nothing that was asked before counts any more.
     fn forget_everything(&mut self) {
         self.waiting.clear();
         self.keep_nothing();
-        if let Some(running) = &self.running {
+        for running in self.running.values() {
             running.cancelled.store(true, Ordering::Relaxed);
         }
     }
 
     fn tick(&mut self) {
-        let running = self.running.as_ref();
+        // The one that has been at work for longest.
+        let running = self.running.values().next();
         self.peer.send(&FromPeer::Heartbeat {
             job: running.map(|running| running.job.job),
             checker: running.and_then(|running| running.checker.get()),
@@ -402,37 +414,42 @@ impl Daemon {
         }
     }
 
-    /// Hands the first job that is complete to the thread, when it is free.
+    /// Hands jobs that are complete to threads, as long as there are idle ones.
     fn start_next(&mut self) {
-        if self.running.is_some() {
-            return;
+        while self.running.len() < self.workers.count() && !self.waiting.is_empty() {
+            if !self.start_one() {
+                self.ask_for_what_the_first_lacks();
+                return;
+            }
         }
+    }
+
+    /// Hands the first job that is complete to a thread. `false`: there is none.
+    fn start_one(&mut self) -> bool {
         for index in 0..self.waiting.len() {
-            let Some((plan, work)) = self
-                .waiting
-                .get(index)
-                .cloned()
-                .and_then(|job| self.prepare(&job))
-            else {
+            let job = self.waiting.get(index).cloned();
+            let Some((plan, work)) = job.and_then(|job| self.prepare(&job)) else {
                 continue;
             };
             let Some(job) = self.waiting.remove(index) else {
-                return;
+                return false;
             };
-            self.running = Some(Running {
+            self.runs += 1;
+            let running = Running {
                 job,
                 plan,
                 cancelled: work.cancelled.clone(),
                 checker: work.checker.clone(),
-            });
-            if self.works.send(Order::Check(Box::new(work))).is_err() {
-                tracing::error!("the checking thread has ended");
+            };
+            self.running.insert(self.runs, running);
+            if !self.workers.check(Box::new(work)) {
+                tracing::error!("the checking threads have ended");
                 self.draining = true;
-                self.running = None;
+                self.running.clear();
             }
-            return;
+            return true;
         }
-        self.ask_for_what_the_first_lacks();
+        false
     }
 
     /// The work of a job, once its configuration and all its documents are here.
@@ -457,7 +474,7 @@ impl Daemon {
         // Last: it may look at files.
         let plan = self.plan(job.config)?;
         let work = Work {
-            job: job.job,
+            run: self.runs + 1,
             kind: job.kind,
             plan: plan.clone(),
             root,
@@ -510,38 +527,36 @@ impl Daemon {
     fn progress(&mut self, event: Progress) {
         match event {
             Progress::Ended {
-                job,
+                run,
                 checker,
                 issues,
                 outcome,
             } => {
-                if self.counts(job) {
+                if let Some(job) = self.counts(run) {
                     self.send_outcome(job, checker, issues, outcome);
                 }
             }
             Progress::Finished {
-                job,
+                run,
                 micros,
                 failed,
             } => {
-                if self.counts(job) {
+                if let Some(job) = self.counts(run) {
                     if let Some(reason) = failed {
-                        self.send_failure(job, &reason);
+                        self.send_failure(run, &reason);
                     }
                     self.peer.send(&FromPeer::JobDone { job, micros });
                 }
-                self.let_go();
+                self.let_go(run);
             }
         }
     }
 
-    /// Whether the broker still wants to hear about the job.
-    fn counts(&self, job: JobId) -> bool {
-        let running = self
-            .running
-            .as_ref()
-            .filter(|running| running.job.job == job);
-        running.is_some_and(|running| !running.cancelled.load(Ordering::Relaxed))
+    /// The job of a run, if the broker still wants to hear about it.
+    fn counts(&self, run: u64) -> Option<JobId> {
+        let running = self.running.get(&run)?;
+        let counts = !running.cancelled.load(Ordering::Relaxed);
+        counts.then_some(running.job.job)
     }
 
     fn send_outcome(&mut self, job: JobId, checker: u32, issues: Vec<Issue>, outcome: Outcome) {
@@ -568,8 +583,9 @@ impl Daemon {
     }
 
     /// Nothing could be checked: every demanded checker has failed.
-    fn send_failure(&mut self, job: JobId, reason: &str) {
-        let Some(plan) = self.running.as_ref().map(|running| running.plan.clone()) else {
+    fn send_failure(&mut self, run: u64, reason: &str) {
+        let running = self.running.get(&run);
+        let Some((job, plan)) = running.map(|it| (it.job.job, it.plan.clone())) else {
             return;
         };
         let demanded = (0..plan.checkers().len()).filter(|&index| plan.is_demanded(index));
@@ -587,14 +603,14 @@ impl Daemon {
     }
 
     /// The job is over: its documents may go, unless another job waits for them.
-    fn let_go(&mut self) {
-        if let Some(running) = self.running.take() {
+    fn let_go(&mut self, run: u64) {
+        if let Some(running) = self.running.remove(&run) {
             self.finished_with(&running.job);
         }
     }
 
     fn finished_with(&mut self, job: &Job) {
-        let running = self.running.iter().map(|running| &running.job);
+        let running = self.running.values().map(|running| &running.job);
         let others = self.waiting.iter().chain(running);
         let needed: BTreeSet<DocId> = others
             .flat_map(|job| &job.documents)
@@ -608,7 +624,7 @@ impl Daemon {
     }
 
     fn is_idle(&self) -> bool {
-        self.waiting.is_empty() && self.running.is_none()
+        self.waiting.is_empty() && self.running.is_empty()
     }
 }
 

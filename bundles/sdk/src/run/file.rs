@@ -14,8 +14,9 @@ use qcbus_messages::path_text::to_text;
 use qcbus_messages::shown;
 
 use super::{Exit, Timings};
+use crate::Hands;
 use crate::pages::level_name;
-use crate::{BUILD_DATE, Bundle, Listener, Loaded, Outcome, Plan, UserFiles, check};
+use crate::{BUILD_DATE, Bundle, Listener, Loaded, Outcome, Plan, UserFiles, check_with};
 
 /// How findings are printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -41,7 +42,7 @@ pub(super) fn run(
     bundle: &'static Bundle,
     path: &Path,
     (format, timings): (Format, bool),
-    given: Option<&UserFiles>,
+    (hands, given): (&Hands, Option<&UserFiles>),
 ) -> Exit {
     let boundary = path
         .parent()
@@ -66,7 +67,7 @@ pub(super) fn run(
         pooled,
         reasons,
         took,
-    } = match judge(&plan, &loaded) {
+    } = match judge(&plan, &loaded, hands) {
         Ok(judged) => judged,
         Err(error) => {
             complain(&format!("failed to {error}\n"));
@@ -99,7 +100,7 @@ pub fn findings(
     loaded: &Loaded,
     from: Level,
 ) -> Result<(String, Verdict), crate::LoadError> {
-    let Judged { mut pooled, .. } = judge(plan, loaded)?;
+    let Judged { mut pooled, .. } = judge(plan, loaded, &Hands::new(1))?;
     let verdict = pooled.verdict();
     for bundle in &mut pooled.results.bundles {
         for checker in &mut bundle.checkers {
@@ -117,8 +118,8 @@ struct Judged {
 }
 
 /// Checks a file and pools what was found, as a broker does without a configuration.
-fn judge(plan: &Plan, loaded: &Loaded) -> Result<Judged, crate::LoadError> {
-    let (outcome, took) = examine_timed(plan, loaded)?;
+fn judge(plan: &Plan, loaded: &Loaded, hands: &Hands) -> Result<Judged, crate::LoadError> {
+    let (outcome, took) = examine_timed(plan, loaded, hands)?;
     let mut reasons: BTreeMap<String, String> = outcome
         .checkers
         .iter()
@@ -149,16 +150,17 @@ fn judge(plan: &Plan, loaded: &Loaded) -> Result<Judged, crate::LoadError> {
 /// # Errors
 /// When the image that was built cannot be opened.
 pub fn examine(plan: &Plan, loaded: &Loaded) -> Result<BundleOutcome, crate::LoadError> {
-    examine_timed(plan, loaded).map(|(outcome, _)| outcome)
+    examine_timed(plan, loaded, &Hands::new(1)).map(|(outcome, _)| outcome)
 }
 
-/// The same as [`examine`], with what every checker took.
+/// The same as [`examine`] with as many threads as there are `hands`, and what every checker took.
 ///
 /// # Errors
 /// When the image that was built cannot be opened.
 pub fn examine_timed(
     plan: &Plan,
     loaded: &Loaded,
+    hands: &Hands,
 ) -> Result<(BundleOutcome, Timings), crate::LoadError> {
     let bundle = plan.bundle();
     let start = Instant::now();
@@ -168,7 +170,7 @@ pub fn examine_timed(
         checkers: Vec::new(),
         timings: Timings::default(),
     };
-    check(plan, &subject, &mut collected);
+    check_with(plan, &subject, hands, &mut collected);
     let mut timings = collected.timings;
     timings.whole = start.elapsed();
     collected.checkers.sort_by_key(|(index, _)| *index);

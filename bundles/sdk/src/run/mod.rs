@@ -20,7 +20,7 @@ pub(crate) use file::complain;
 pub use file::{Format, examine, examine_timed, findings};
 pub use timings::Timings;
 
-use crate::{Bundle, UserFiles};
+use crate::{Bundle, Hands, UserFiles};
 
 /// How a bundle is to run.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -37,6 +37,8 @@ pub enum Mode {
         timings: bool,
         /// Schemas of the user.
         schema_dir: Option<PathBuf>,
+        /// Threads that check at the same time.
+        threads: usize,
     },
     /// Read ASAM's configuration, check its `InputFile`, write the bundle's own `.xqar`.
     Module {
@@ -44,6 +46,8 @@ pub enum Mode {
         config: PathBuf,
         /// Schemas of the user.
         schema_dir: Option<PathBuf>,
+        /// Threads that check at the same time.
+        threads: usize,
     },
     /// Print the usage.
     Help,
@@ -76,11 +80,17 @@ pub fn run(bundle: &'static Bundle, mode: Mode) -> Exit {
             format,
             timings,
             schema_dir,
+            threads,
         } => with_files(bundle, schema_dir.as_deref(), |given| {
-            file::run(bundle, &path, (format, timings), given)
+            let hands = Hands::new(threads);
+            file::run(bundle, &path, (format, timings), (&hands, given))
         }),
-        Mode::Module { config, schema_dir } => with_files(bundle, schema_dir.as_deref(), |given| {
-            module::run(bundle, &config, given)
+        Mode::Module {
+            config,
+            schema_dir,
+            threads,
+        } => with_files(bundle, schema_dir.as_deref(), |given| {
+            module::run(bundle, &config, &Hands::new(threads), given)
         }),
         Mode::Help => {
             // Whoever asked for it sees that it is not there.

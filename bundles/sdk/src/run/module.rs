@@ -8,8 +8,8 @@ use qcbus_formats::xqar::{self, Dialect};
 use qcbus_messages::path_text::to_text;
 
 use super::Exit;
-use super::file::{complain, examine};
-use crate::{BUILD_DATE, Bundle, Checker, Loaded, Plan, UserFiles};
+use super::file::{complain, examine_timed};
+use crate::{BUILD_DATE, Bundle, Checker, Hands, Loaded, Plan, UserFiles};
 
 /// The bundle's parameters that name its result, the framework's first.
 const RESULT_PARAMS: [&str; 2] = ["strResultFile", "resultFile"];
@@ -39,8 +39,13 @@ enum ModuleError {
 }
 
 /// Exit codes are the framework's: 0 when a result was written, whatever it says.
-pub(super) fn run(bundle: &'static Bundle, config: &Path, given: Option<&UserFiles>) -> Exit {
-    match module(bundle, config, given) {
+pub(super) fn run(
+    bundle: &'static Bundle,
+    config: &Path,
+    hands: &Hands,
+    given: Option<&UserFiles>,
+) -> Exit {
+    match module(bundle, config, hands, given) {
         Ok(()) => Exit::Accepted,
         Err(error) => {
             complain(&format!("failed to {error}\n"));
@@ -52,6 +57,7 @@ pub(super) fn run(bundle: &'static Bundle, config: &Path, given: Option<&UserFil
 fn module(
     bundle: &'static Bundle,
     path: &Path,
+    hands: &Hands,
     given: Option<&UserFiles>,
 ) -> Result<(), ModuleError> {
     let bytes = std::fs::read(path).map_err(|source| ModuleError::Unreadable {
@@ -80,7 +86,7 @@ fn module(
     } else {
         Plan::new(bundle, |_| false, |_, _| None)
     };
-    let bundles = vec![examine(&plan, &loaded)?];
+    let bundles = vec![examine_timed(&plan, &loaded, hands)?.0];
     let remarks = if bundle.kinds.contains(&loaded.kind()) {
         loaded.remarks(&bundles)?
     } else {

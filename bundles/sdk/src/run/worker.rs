@@ -1,31 +1,27 @@
-//! The thread that checks, so that the loop on the bus stays free to talk.
+//! The threads that check, so that the loop on the bus stays free to talk: each takes one job after the
+//! other. Those that have none lend a hand to large jobs (`crate::hands`).
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use qcbus_bus::Held;
 use qcbus_document::{Document, FileKind};
 use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::Issue;
-use qcbus_messages::{JobId, Link, MissingDocument};
+use qcbus_messages::{Link, MissingDocument};
 use tokio::sync::mpsc;
 
-use crate::kept::KeptModels;
+use crate::hands::Hands;
+use crate::kept::{JobModels, KeptModels};
 use crate::subject::LinkedImage;
-use crate::{Listener, Outcome, Plan, Subject, check};
-
-/// What the thread is told.
-pub(super) enum Order {
-    /// A job.
-    Check(Box<Work>),
-    /// The broker needs shared memory: documents that are only kept go.
-    LetGo,
-}
+use crate::{Listener, Outcome, Plan, Subject, check_with};
 
 /// One job, with everything that checking it takes.
 pub(super) struct Work {
-    pub job: JobId,
+    /// Tells apart two times that the same job is checked.
+    pub run: u64,
     pub kind: FileKind,
     pub plan: Arc<Plan>,
     pub root: Held,
@@ -36,7 +32,7 @@ pub(super) struct Work {
     pub checker: Arc<CheckerAtWork>,
 }
 
-/// Which checker the thread is at.
+/// Which checker was begun last.
 pub(super) struct CheckerAtWork(AtomicU32);
 
 impl CheckerAtWork {
@@ -52,65 +48,125 @@ impl Default for CheckerAtWork {
     }
 }
 
-/// What the thread has to say.
+/// What the threads have to say.
 pub(super) enum Progress {
     Ended {
-        job: JobId,
+        run: u64,
         checker: u32,
         issues: Vec<Issue>,
         outcome: Outcome,
     },
     /// The job is over: `failed` says why nothing was checked.
     Finished {
-        job: JobId,
+        run: u64,
         micros: u64,
         failed: Option<String>,
     },
 }
 
-/// Starts the thread. It ends when the sender of its orders is dropped.
-pub(super) fn start(
+/// The threads. They end when this is dropped and all that they were given is done.
+pub(super) struct Workers {
+    jobs: Sender<Box<Work>>,
+    shared: Arc<Shared>,
+    threads: usize,
+}
+
+struct Shared {
+    jobs: Mutex<Receiver<Box<Work>>>,
+    hands: Hands,
     models: KeptModels,
     progress: mpsc::UnboundedSender<Progress>,
-) -> std::io::Result<std::sync::mpsc::Sender<Order>> {
-    let (sender, orders) = std::sync::mpsc::channel::<Order>();
-    std::thread::Builder::new()
-        .name("checker".to_owned())
-        .spawn(move || {
-            for order in orders {
-                // The documents are let go before the broker hears that the job is done, but for
-                // those of a few models.
-                let finished = match order {
-                    Order::Check(work) => finish(&work, &models, &progress),
-                    Order::LetGo => {
-                        models.clear();
-                        continue;
-                    }
-                };
-                if progress.send(finished).is_err() {
-                    return;
-                }
+    /// Jobs that were given and are not done.
+    busy: AtomicUsize,
+}
+
+impl Workers {
+    /// As many threads as there are hands, of which the first is started now and the others when there are as many
+    /// jobs.
+    ///
+    /// # Errors
+    /// When no thread can be started.
+    pub fn start(
+        hands: usize,
+        models: KeptModels,
+        progress: mpsc::UnboundedSender<Progress>,
+    ) -> std::io::Result<Workers> {
+        let (jobs, receiver) = channel();
+        let shared = Arc::new(Shared {
+            jobs: Mutex::new(receiver),
+            hands: Hands::idle(hands),
+            models,
+            progress,
+            busy: AtomicUsize::new(0),
+        });
+        let mut workers = Workers {
+            jobs,
+            shared,
+            threads: 0,
+        };
+        workers.one_more()?;
+        Ok(workers)
+    }
+
+    /// How many jobs are checked at the same time.
+    pub fn count(&self) -> usize {
+        self.shared.hands.count()
+    }
+
+    /// Has a job checked. `false`: there is nobody who could.
+    pub fn check(&mut self, work: Box<Work>) -> bool {
+        let busy = self.shared.busy.fetch_add(1, Ordering::Relaxed) + 1;
+        if busy > self.threads && self.threads < self.count() {
+            // Where no further thread can be had, those that there are take the job in their turn.
+            let started = self.one_more();
+            let _ = started.inspect_err(|error| tracing::warn!(%error, "cannot start a thread"));
+        }
+        self.jobs.send(work).is_ok()
+    }
+
+    fn one_more(&mut self) -> std::io::Result<()> {
+        let shared = self.shared.clone();
+        let thread = std::thread::Builder::new().name("checker".to_owned());
+        thread.spawn(move || shared.work())?;
+        self.threads += 1;
+        Ok(())
+    }
+}
+
+impl Shared {
+    fn work(&self) {
+        loop {
+            let next = {
+                let jobs = self.jobs.lock().unwrap_or_else(PoisonError::into_inner);
+                jobs.recv()
+            };
+            let Ok(work) = next else { return };
+            // The documents are let go before the broker hears that the job is done, but for those of a
+            // few models.
+            let hand = self.hands.take();
+            let finished = finish(&work, self);
+            drop((hand, work));
+            self.busy.fetch_sub(1, Ordering::Relaxed);
+            if self.progress.send(finished).is_err() {
+                return;
             }
-        })?;
-    Ok(sender)
+        }
+    }
 }
 
 /// Does one job.
-fn finish(
-    work: &Work,
-    models: &KeptModels,
-    progress: &mpsc::UnboundedSender<Progress>,
-) -> Progress {
+fn finish(work: &Work, shared: &Shared) -> Progress {
     let start = Instant::now();
-    let outcome = one(work, models, progress);
+    let models = shared.models.for_job();
+    let outcome = one(work, &models, shared);
     // What was at hand when a rule or a model panicked is not given to the next job.
     if outcome == Ok(Trust::All) {
-        models.tidy();
+        models.keep();
     } else {
-        models.clear();
+        shared.models.clear();
     }
     Progress::Finished {
-        job: work.job,
+        run: work.run,
         micros: u64::try_from(start.elapsed().as_micros()).unwrap_or(u64::MAX),
         failed: outcome.err(),
     }
@@ -124,11 +180,7 @@ enum Trust {
     Nothing,
 }
 
-fn one(
-    work: &Work,
-    models: &KeptModels,
-    progress: &mpsc::UnboundedSender<Progress>,
-) -> Result<Trust, String> {
+fn one(work: &Work, models: &JobModels, shared: &Shared) -> Result<Trust, String> {
     let unopened = |what: &str, error| format!("failed to {error} ({what})");
     let root = Document::open(&work.root).map_err(|error| unopened("the root", error))?;
     let linked = work.linked.iter().map(|linked| {
@@ -143,10 +195,10 @@ fn one(
         .read(bundle.reads);
     let mut reporter = Reporter {
         work,
-        progress,
+        progress: &shared.progress,
         trust: Trust::All,
     };
-    check(&work.plan, &subject, &mut reporter);
+    check_with(&work.plan, &subject, &shared.hands, &mut reporter);
     Ok(reporter.trust)
 }
 
@@ -157,21 +209,21 @@ struct Reporter<'w> {
 }
 
 impl Listener for Reporter<'_> {
-    fn is_cancelled(&mut self) -> bool {
+    fn is_cancelled(&self) -> bool {
         self.work.cancelled.load(Ordering::Relaxed)
     }
 
-    fn begins(&mut self, checker: usize) {
+    fn begins(&self, checker: usize) {
         self.work.checker.0.store(index(checker), Ordering::Relaxed);
     }
 
     fn ended(&mut self, checker: usize, issues: Vec<Issue>, outcome: Outcome) {
-        let job = self.work.job;
+        let run = self.work.run;
         if matches!(outcome.ending, Ending::Failed { .. }) {
             self.trust = Trust::Nothing;
         }
         let _ = self.progress.send(Progress::Ended {
-            job,
+            run,
             checker: index(checker),
             issues,
             outcome,
@@ -181,23 +233,4 @@ impl Listener for Reporter<'_> {
 
 fn index(checker: usize) -> u32 {
     u32::try_from(checker).unwrap_or(u32::MAX)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::kept::tests::{First, image};
-
-    #[test]
-    fn what_is_only_kept_goes_when_the_broker_needs_memory() {
-        let models = KeptModels::default();
-        let (told, mut progress) = mpsc::unbounded_channel();
-        let orders = start(models.clone(), told).unwrap();
-        models.get::<First>((1, 1), &image(1, 1)).unwrap();
-        assert_eq!(models.len(), 1);
-        orders.send(Order::LetGo).unwrap();
-        drop(orders);
-        assert!(progress.blocking_recv().is_none(), "the thread has ended");
-        assert_eq!(models.len(), 0);
-    }
 }

@@ -108,6 +108,7 @@ fn hello(number: u64, launch: Option<u64>) -> Hello {
         pid: 100 + u32::try_from(number).unwrap(),
         launch,
         capacity: 4,
+        threads: 1,
     }
 }
 

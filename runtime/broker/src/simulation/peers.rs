@@ -139,6 +139,7 @@ impl Peers {
             pid,
             launch: process.launch,
             capacity: 2,
+            threads: 1,
         };
         self.words.push_back(HostEvent::Hello {
             peer,

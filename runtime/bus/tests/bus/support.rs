@@ -73,6 +73,7 @@ pub fn hello(name: &str) -> Hello {
         pid: 0,
         launch: None,
         capacity: 4,
+        threads: 1,
     }
 }
 

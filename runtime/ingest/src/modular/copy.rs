@@ -1,7 +1,7 @@
 //! A maneuver group on its way into the expanded scenario.
 
 use std::collections::BTreeMap;
-use std::rc::Rc;
+use std::sync::Arc;
 
 use qcbus_document::{Attribute, Node};
 
@@ -9,7 +9,7 @@ use qcbus_document::{Attribute, Node};
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Value {
     /// The value, entities resolved.
-    pub text: Rc<str>,
+    pub text: Arc<str>,
     /// The piece whose text has it.
     pub piece: usize,
     /// Where it is written in the text of the piece.

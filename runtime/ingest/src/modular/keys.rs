@@ -1,7 +1,7 @@
 //! Keys and the attributes that they fit.
 
-use std::cell::Cell;
 use std::collections::HashMap;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use qcbus_document::{Attribute, Node};
 
@@ -10,7 +10,7 @@ use super::copy::{Copy, Value};
 use super::problem::{Problem, Problems, Spot, What};
 
 /// A `ParameterReference` of a use.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Key<'d> {
     /// The element.
     pub node: Node<'d>,
@@ -19,9 +19,9 @@ pub struct Key<'d> {
     /// Its `value`.
     pub value: Attribute<'d>,
     /// How many attributes it fits.
-    pub fits: Cell<u32>,
+    pub fits: AtomicU32,
     /// How many attributes have its value now.
-    pub wins: Cell<u32>,
+    pub wins: AtomicU32,
 }
 
 /// Reads the `ParameterReference` elements of a use.
@@ -65,8 +65,8 @@ pub(super) fn read<'d>(within: Node<'d>, problems: &mut Problems<'d>) -> Vec<Key
             node,
             key,
             value,
-            fits: Cell::new(0),
-            wins: Cell::new(0),
+            fits: AtomicU32::new(0),
+            wins: AtomicU32::new(0),
         });
     }
     keys
@@ -102,7 +102,7 @@ pub(super) fn apply<'d>(
                 overlap(&keys[best[0]], &keys[other[0]], attribute, problems);
             }
             for &index in fitting.iter().copied().flatten() {
-                keys[index].fits.set(keys[index].fits.get() + 1);
+                keys[index].fits.fetch_add(1, Ordering::Relaxed);
             }
             // Of equal keys the last one, where they agree.
             let Some(&winner) = best.last() else { continue };
@@ -112,7 +112,7 @@ pub(super) fn apply<'d>(
                 tie(winner, &keys[other], attribute, problems);
                 continue;
             }
-            winner.wins.set(winner.wins.get() + 1);
+            winner.wins.fetch_add(1, Ordering::Relaxed);
             copy.edits
                 .insert(attribute.offset(), Value::of(piece, winner.value));
         }
@@ -121,7 +121,9 @@ pub(super) fn apply<'d>(
 
 /// Says which keys fit nothing in any of the copies of a use, of which `group` is the first.
 pub(super) fn say_unmatched<'d>(keys: &[Key<'d>], group: Node<'d>, problems: &mut Problems<'d>) {
-    let lost = keys.iter().filter(|key| key.fits.get() == 0);
+    let lost = keys
+        .iter()
+        .filter(|key| key.fits.load(Ordering::Relaxed) == 0);
     lost.for_each(|key| problems.push(unmatched(key, group)));
 }
 

@@ -1,7 +1,7 @@
 //! Which groups take the place of which references.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::rc::Rc;
+use std::sync::Arc;
 
 use qcbus_document::{Document, Node};
 use qcbus_formats::distance::{did_you_mean, some_of};
@@ -23,7 +23,7 @@ pub struct Expansion<'d> {
     /// What is wrong.
     pub problems: Vec<Problem<'d>>,
     /// What takes the place of groups of the root, by the index of their node.
-    pub(super) replaced: BTreeMap<u32, Vec<Rc<Copy<'d>>>>,
+    pub(super) replaced: BTreeMap<u32, Vec<Arc<Copy<'d>>>>,
     /// The pieces whose text is in the expanded scenario, the root first.
     pub(super) used: BTreeSet<usize>,
 }
@@ -65,7 +65,7 @@ pub struct Use<'d> {
     /// The keys that it gives.
     pub keys: Vec<Key<'d>>,
     /// The copies that take the place of the referring group.
-    pub copies: Vec<Rc<Copy<'d>>>,
+    pub copies: Vec<Arc<Copy<'d>>>,
 }
 
 impl<'d> Expansion<'d> {
@@ -111,7 +111,7 @@ pub fn expand(pieces: Vec<Piece<'_>>, max_text: u64) -> Expansion<'_> {
 
 struct Expander<'d> {
     /// The groups of each piece after its own expansion, once they have been asked for.
-    expanded: Vec<Option<Rc<Vec<Expanded<'d>>>>>,
+    expanded: Vec<Option<Arc<Vec<Expanded<'d>>>>>,
     /// The pieces that are being expanded, the root first.
     chain: Vec<usize>,
     /// Bytes and groups that may still be copied.
@@ -126,7 +126,7 @@ struct Expander<'d> {
 /// A group of a piece with what takes its place: itself, where it refers to nothing.
 struct Expanded<'d> {
     group: Node<'d>,
-    copies: Vec<Rc<Copy<'d>>>,
+    copies: Vec<Arc<Copy<'d>>>,
 }
 
 impl<'d> Expander<'d> {
@@ -178,7 +178,7 @@ impl<'d> Expander<'d> {
     }
 
     /// What takes the place of a group; `None` for one without references.
-    fn group(&mut self, piece: usize, group: Node<'d>) -> Option<Vec<Rc<Copy<'d>>>> {
+    fn group(&mut self, piece: usize, group: Node<'d>) -> Option<Vec<Arc<Copy<'d>>>> {
         let references: Vec<Node<'d>> = group.children_named("ScenarioReference").collect();
         let first = *references.first()?;
         let mut copies = Vec::new();
@@ -199,7 +199,7 @@ impl<'d> Expander<'d> {
         Some(copies)
     }
 
-    fn reference(&mut self, piece: usize, group: Node<'d>, node: Node<'d>) -> Vec<Rc<Copy<'d>>> {
+    fn reference(&mut self, piece: usize, group: Node<'d>, node: Node<'d>) -> Vec<Arc<Copy<'d>>> {
         let named: Vec<Node<'d>> = node.children_named("ManeuverGroupReference").collect();
         let form = match named.is_empty() {
             true => Form::Direct,
@@ -315,7 +315,7 @@ impl<'d> Expander<'d> {
     }
 
     /// The groups of a piece after its own expansion.
-    fn expanded(&mut self, piece: usize) -> Rc<Vec<Expanded<'d>>> {
+    fn expanded(&mut self, piece: usize) -> Arc<Vec<Expanded<'d>>> {
         if let Some(groups) = &self.expanded[piece] {
             return groups.clone();
         }
@@ -326,17 +326,17 @@ impl<'d> Expander<'d> {
         for group in document.elements("ManeuverGroup") {
             let copies = self
                 .group(piece, group)
-                .unwrap_or_else(|| vec![Rc::new(Copy::as_is(piece, group))]);
+                .unwrap_or_else(|| vec![Arc::new(Copy::as_is(piece, group))]);
             groups.push(Expanded { group, copies });
         }
         self.chain.pop();
-        let groups = Rc::new(groups);
+        let groups = Arc::new(groups);
         self.expanded[piece] = Some(groups.clone());
         groups
     }
 
     /// All groups of a piece.
-    fn all_copies(&mut self, piece: usize) -> Vec<Rc<Copy<'d>>> {
+    fn all_copies(&mut self, piece: usize) -> Vec<Arc<Copy<'d>>> {
         let groups = self.expanded(piece);
         groups.iter().flat_map(|it| it.copies.clone()).collect()
     }
@@ -344,7 +344,7 @@ impl<'d> Expander<'d> {
     /// The group of a name, the first one as the reference tool takes it, and another of that name if
     /// there is one. An archive offers the groups that it is expanded to. A plain file offers those that
     /// are written in it, and what is wrong with others of its groups does not matter here.
-    fn find(&mut self, target: usize, name: &str) -> (Vec<Rc<Copy<'d>>>, Option<Node<'d>>) {
+    fn find(&mut self, target: usize, name: &str) -> (Vec<Arc<Copy<'d>>>, Option<Node<'d>>) {
         let document = self.document(target);
         let is_archive = is_archive(document);
         let written = self.written.entry(target).or_insert_with(|| {
@@ -363,7 +363,7 @@ impl<'d> Expander<'d> {
         let written = written.get(name).copied().filter(|_| !is_archive);
         if let Some((first, second)) = written {
             if first.child("ScenarioReference").is_none() {
-                return (vec![Rc::new(Copy::as_is(target, first))], second);
+                return (vec![Arc::new(Copy::as_is(target, first))], second);
             }
             let groups = self.expanded(target);
             let own = groups.iter().find(|it| it.group == first);
@@ -464,7 +464,7 @@ impl<'d> Expander<'d> {
         group: &Copy<'d>,
         name: Value,
         keys: &[Key<'d>],
-    ) -> Option<Rc<Copy<'d>>> {
+    ) -> Option<Arc<Copy<'d>>> {
         let bytes = group
             .group
             .end_offset()
@@ -493,7 +493,7 @@ impl<'d> Expander<'d> {
             &mut self.problems,
         );
         keys::apply(&mut copy, referring.piece, keys, &mut self.problems);
-        Some(Rc::new(copy))
+        Some(Arc::new(copy))
     }
 
     fn say_twice(&mut self, named: &[Node<'d>]) {
@@ -521,7 +521,7 @@ impl<'d> Expander<'d> {
         names.dedup();
         let file = self.short_name(target);
         // There as written, but another name by the time it could be taken.
-        let inner = |copy: &&Rc<Copy<'d>>| {
+        let inner = |copy: &&Arc<Copy<'d>>| {
             let rest = copy.name().strip_prefix(name);
             rest.is_some_and(|rest| rest.starts_with('.'))
         };

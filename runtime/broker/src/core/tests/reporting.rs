@@ -111,6 +111,7 @@ impl World {
             pid: u32::try_from(self.sessions).unwrap() + 1000,
             launch: Some(launch.0),
             capacity: 2,
+            threads: 1,
         };
         self.event(Event::Hello { session, hello });
     }

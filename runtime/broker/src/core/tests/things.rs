@@ -27,6 +27,7 @@ pub fn hello(session: SessionId, name: &str, version: u8, launch: Option<u64>) -
         pid: u32::try_from(session.0).unwrap() + 1000,
         launch,
         capacity: u16::try_from(CAPACITY).unwrap(),
+        threads: 1,
     }
 }
 

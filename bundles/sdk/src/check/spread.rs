@@ -1,0 +1,274 @@
+//! Tasks of a strand, and the threads that take them.
+//!
+//! A task is a part of the model, at which all checkers that go by parts look in turn, or the whole of
+//! it, at which one checker looks. Every thread has sinks of its own for what its tasks find. What one
+//! thread alone would have listed is put together from them: findings in the order of their parts. Where
+//! that cannot be told from the sinks (a checker found more than it lists, or counts references) it looks
+//! once more, alone: rules give the same answer every time.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread::{Builder, Scope, ScopedJoinHandle};
+use std::time::{Duration, Instant};
+
+use qcbus_formats::pool::Ending;
+use qcbus_formats::xqar::Issue;
+
+use super::gates::Pass;
+use super::{Outcome, Work, catch};
+use crate::hands::Hand;
+use crate::rule::{Built, Facts};
+use crate::sink::WHOLE;
+use crate::{AnyRule, Sink};
+
+/// A checker that may look.
+pub(super) struct Turn<'r> {
+    pub index: usize,
+    pub rule: &'static dyn AnyRule,
+    pub facts: &'r Facts,
+    pub pass: Pass<'r>,
+}
+
+/// What a checker found, and how it ended.
+type Looked = (Vec<Issue>, Outcome);
+
+/// What one thread has of one checker.
+struct Share<'r> {
+    sink: Sink<'r>,
+    took: Duration,
+    /// Where it panicked and what that said; it is not asked again.
+    failed: Option<(u32, String)>,
+}
+
+/// The tasks, and which of them is next.
+struct Tasks<'t, 'r> {
+    work: Work<'r>,
+    turns: &'t [Turn<'r>],
+    /// By place in `turns`: those that go by parts.
+    by_parts: Vec<usize>,
+    /// Those that look at the whole only. Whoever does so after the parts may ask what was found in them.
+    wholes: Vec<usize>,
+    built: &'t dyn Built<'r>,
+    next: AtomicUsize,
+}
+
+/// How long a thread has been at tasks before it asks others: a few that are soon done are not worth it.
+/// Starting a thread takes a tenth of a millisecond.
+const WORTH_A_THREAD: Duration = Duration::from_micros(100);
+
+/// What one thread has found, by place in the turns.
+type Shares<'r> = Vec<Option<Share<'r>>>;
+
+impl<'r> Work<'r> {
+    /// Has checkers look at the parts of the model and at the whole: what they say, in their order. `None`
+    /// when the check was cancelled.
+    pub(super) fn look(self, turns: &[Turn<'r>], built: &dyn Built<'r>) -> Option<Vec<Looked>> {
+        let places = |asked: fn(&dyn AnyRule) -> bool| {
+            let all = turns.iter().enumerate();
+            let asked = all.filter(|(_, turn)| asked(turn.rule));
+            asked.map(|(place, _)| place).collect::<Vec<usize>>()
+        };
+        let tasks = Tasks {
+            work: self,
+            turns,
+            by_parts: places(|rule| rule.goes_by_parts()),
+            wholes: places(|rule| rule.looks_at_the_whole() && !rule.goes_by_parts()),
+            built,
+            next: AtomicUsize::new(0),
+        };
+        let mut shares = if self.spreads {
+            tasks.by_many()
+        } else {
+            let mut own = tasks.no_shares();
+            while tasks.one(&mut own) {}
+            vec![own]
+        };
+        if self.stops() {
+            return None;
+        }
+        let of = |place: usize| {
+            let of_all = shares.iter_mut();
+            let found = of_all.filter_map(|it| it.get_mut(place)?.take()).collect();
+            tasks.together(&turns[place], found)
+        };
+        Some((0..turns.len()).map(of).collect())
+    }
+}
+
+impl<'r> Tasks<'_, 'r> {
+    /// Takes tasks in this thread, and has others take some as long as there are hands to spare.
+    fn by_many(&self) -> Vec<Shares<'r>> {
+        let begun = Instant::now();
+        std::thread::scope(|scope| {
+            let mut others = Vec::new();
+            let mut own = self.no_shares();
+            loop {
+                while self.left() > 1
+                    && begun.elapsed() >= WORTH_A_THREAD
+                    && let Some(hand) = self.work.hands.spare()
+                {
+                    others.extend(beside(scope, move || self.lend(hand)));
+                }
+                if !self.one(&mut own) {
+                    break;
+                }
+            }
+            let mut shares = vec![own];
+            let end = || shares.extend(others.into_iter().map(joined));
+            self.work.hands.wait_for(end);
+            shares
+        })
+    }
+
+    /// Takes tasks with a hand that is lent: until a job wants it.
+    fn lend(&self, hand: Hand<'_>) -> Shares<'r> {
+        let mut own = self.no_shares();
+        while !self.work.hands.are_wanted() && self.one(&mut own) {}
+        drop(hand);
+        own
+    }
+
+    fn no_shares(&self) -> Shares<'r> {
+        self.turns.iter().map(|_| None).collect()
+    }
+
+    fn count(&self) -> usize {
+        self.built.parts() + self.wholes.len()
+    }
+
+    /// How many tasks nobody has taken.
+    fn left(&self) -> usize {
+        self.count()
+            .saturating_sub(self.next.load(Ordering::Relaxed))
+    }
+
+    /// Takes one task. `false`: there is none.
+    fn one(&self, own: &mut Shares<'r>) -> bool {
+        if self.work.stops() {
+            return false;
+        }
+        let task = self.next.fetch_add(1, Ordering::Relaxed);
+        let parts = self.built.parts();
+        if task < parts {
+            let mut clock = Instant::now();
+            for &place in &self.by_parts {
+                let (turn, share) = self.own(own, place);
+                self.look(turn, share, task, &mut clock);
+            }
+        } else if let Some(&place) = self.wholes.get(task - parts) {
+            let (turn, share) = self.own(own, place);
+            self.look(turn, share, usize::MAX, &mut Instant::now());
+        }
+        task < self.count()
+    }
+
+    /// A checker and what this thread has of it.
+    fn own<'s>(&self, own: &'s mut Shares<'r>, place: usize) -> (&Turn<'r>, &'s mut Share<'r>) {
+        let turn = &self.turns[place];
+        (turn, own[place].get_or_insert_with(|| self.share(turn)))
+    }
+
+    /// Has a checker look at a part, or at the whole ([`usize::MAX`]). `clock` is when that began, and then
+    /// when it ended.
+    fn look(&self, turn: &Turn<'r>, share: &mut Share<'r>, part: usize, clock: &mut Instant) {
+        if share.failed.is_some() {
+            return;
+        }
+        self.work.listener.begins(turn.index);
+        let number = u32::try_from(part).unwrap_or(WHOLE);
+        share.sink.turn_to(number);
+        let sink = &mut share.sink;
+        let looked = catch(|| match part {
+            usize::MAX => self.built.run(turn.rule, sink),
+            part => self.built.each(part, turn.rule, sink),
+        });
+        share.failed = looked.err().map(|panic| (number, panic));
+        let now = Instant::now();
+        share.took += now.duration_since(*clock);
+        *clock = now;
+    }
+
+    fn share(&self, turn: &Turn<'r>) -> Share<'r> {
+        let Pass {
+            values,
+            not_normative,
+        } = &turn.pass;
+        Share {
+            sink: Sink::new(self.work.subject, turn.facts, values, not_normative.clone()),
+            took: Duration::ZERO,
+            failed: None,
+        }
+    }
+
+    /// What a checker says, of which several threads have shares.
+    fn together(&self, turn: &Turn<'r>, mut shares: Vec<Share<'r>>) -> Looked {
+        let mut share = match shares.len() {
+            0 => self.share(turn),
+            1 => shares.remove(0),
+            _ => merged(shares).unwrap_or_else(|| self.alone(turn)),
+        };
+        if turn.rule.goes_by_parts() && turn.rule.looks_at_the_whole() {
+            self.look(turn, &mut share, usize::MAX, &mut Instant::now());
+        }
+        let Share {
+            mut sink,
+            failed,
+            took,
+        } = share;
+        // What was found before a panic is still true.
+        let (issues, metadata) = sink.finish();
+        let ending = match failed {
+            None => Ending::Completed,
+            Some((_, panic)) => Ending::Failed {
+                reason: format!("the rule panicked: {panic}"),
+            },
+        };
+        let outcome = Outcome {
+            ending,
+            params: turn.pass.values.listed(),
+            metadata,
+            took,
+        };
+        (issues, outcome)
+    }
+
+    /// Has a checker look at all parts, in this thread.
+    fn alone(&self, turn: &Turn<'r>) -> Share<'r> {
+        let mut share = self.share(turn);
+        let mut clock = Instant::now();
+        for part in 0..self.built.parts() {
+            self.look(turn, &mut share, part, &mut clock);
+        }
+        share
+    }
+}
+
+/// The shares of several threads as one, as one thread would have it. `None`: that cannot be told.
+fn merged(mut shares: Vec<Share<'_>>) -> Option<Share<'_>> {
+    let failed = shares.iter_mut().filter_map(|share| share.failed.take());
+    // One thread would have come no further than the first panic.
+    let failed = failed.min_by_key(|(part, _)| *part);
+    let last = failed.as_ref().map_or(WHOLE, |(part, _)| *part);
+    let took = shares.iter().map(|share| share.took).sum();
+    let mut shares = shares.into_iter();
+    let mut first = shares.next()?;
+    let rest = shares.map(|share| share.sink).collect();
+    first.sink.take_in(rest, last).then_some(())?;
+    (first.failed, first.took) = (failed, took);
+    Some(first)
+}
+
+/// Starts a thread. `None`: there is none to be had, and whoever asked does the work himself.
+pub(super) fn beside<'s, 'e, T: Send + 's>(
+    scope: &'s Scope<'s, 'e>,
+    work: impl FnOnce() -> T + Send + 's,
+) -> Option<ScopedJoinHandle<'s, T>> {
+    let thread = Builder::new().name("checker".to_owned());
+    thread.spawn_scoped(scope, work).ok()
+}
+
+/// What a thread has to give. Panics of rules and models are caught in it; any other goes on here.
+pub(super) fn joined<T>(thread: ScopedJoinHandle<'_, T>) -> T {
+    thread
+        .join()
+        .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+}

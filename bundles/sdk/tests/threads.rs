@@ -1,0 +1,284 @@
+//! What is found does not depend on how many threads look.
+
+#![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+
+mod common;
+
+use std::collections::HashSet;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread::ThreadId;
+use std::time::{Duration, Instant};
+
+use qcbus_document::{Document, Node};
+use qcbus_formats::xqar::{Issue, Status};
+use qcbus_sdk::{
+    AnyRule, Bundle, Hands, Listener, Loaded, MAX_ISSUES, Model, Outcome, Plan, Rule, Sink,
+    Subject, Unbuilt, check_with,
+};
+
+/// The roads of a file, each of which is a part.
+struct Roads<'d>(Vec<Node<'d>>);
+
+impl Model for Roads<'static> {
+    type Of<'d> = Roads<'d>;
+    type Part = usize;
+
+    fn build<'d>(subject: &'d Subject<'d>) -> Result<Roads<'d>, Unbuilt> {
+        Ok(Roads(subject.root().elements("road").collect()))
+    }
+
+    fn parts(roads: &Roads<'_>) -> Vec<usize> {
+        (0..roads.0.len()).collect()
+    }
+}
+
+/// How many roads the file has.
+const ROADS: usize = 300;
+
+type Report = fn(&Roads<'_>, &usize, &mut Sink<'_>);
+
+const fn by_parts(
+    id: &'static str,
+    uid: &'static [&'static str],
+    each: Report,
+) -> Rule<Roads<'static>> {
+    Rule {
+        id,
+        uids: uid,
+        each: Some(each),
+        ..Rule::DEFAULTS
+    }
+}
+
+/// So that others have the time to come.
+fn take_time() {
+    let begin = Instant::now();
+    while begin.elapsed() < Duration::from_micros(15) {
+        std::hint::spin_loop();
+    }
+}
+
+static FINDS: Rule<Roads> = by_parts("finds", &["x:xodr:1.0.0:a.a"], |roads, part, found| {
+    take_time();
+    let road = roads.0[*part];
+    found.issue(road, format!("road {part}"));
+    // At the same place as all the others of its kind: they stay in the order of their parts.
+    found.issue(
+        road.document().root().unwrap(),
+        format!("seen from road {part}"),
+    );
+});
+/// Lists fewer than it finds.
+static MANY: Rule<Roads> = by_parts("many", &["x:xodr:1.0.0:a.b"], |roads, part, found| {
+    found
+        .issue(roads.0[*part], format!("road {part}"))
+        .point(1.0, 2.0, 3.0);
+});
+static STATES: Rule<Roads> = by_parts("states", &["x:xodr:1.0.0:a.c"], |_, part, found| {
+    if part.is_multiple_of(50) {
+        found.fact("part", part.to_string(), "one in fifty");
+    }
+});
+static REFERS: Rule<Roads> = by_parts("refers", &["x:xodr:1.0.0:a.d"], |roads, part, found| {
+    found.issue_behind(roads.0[*part], roads.0[*part % 3], "all lead to three");
+});
+static PANICS: Rule<Roads> = by_parts("panics", &["x:xodr:1.0.0:a.e"], |roads, part, found| {
+    found.issue(roads.0[*part], format!("road {part}"));
+    assert!(*part % 100 != 71, "on purpose, at {part}");
+});
+static COUNTS: Rule<Roads> = Rule {
+    run: |_, found| found.fact("count", found.count().to_string(), "before the whole"),
+    ..by_parts("counts", &["x:xodr:1.0.0:a.f"], |roads, part, found| {
+        found.issue(roads.0[*part], "one");
+    })
+};
+static WHOLE: Rule<Roads> = Rule {
+    id: "whole",
+    uids: &["x:xodr:1.0.0:a.g"],
+    run: |roads, found| {
+        for road in roads.0.iter().rev() {
+            take_time();
+            found.issue(*road, "backwards");
+        }
+    },
+    ..Rule::DEFAULTS
+};
+static WHOLE_PANICS: Rule<Roads> = Rule {
+    id: "whole_panics",
+    uids: &["x:xodr:1.0.0:a.h"],
+    run: |roads, found| {
+        found.issue(roads.0[7], "before");
+        panic!("on purpose");
+    },
+    ..Rule::DEFAULTS
+};
+/// Does not look, because another has found errors.
+static AFTER_ERRORS: Rule<Roads> = Rule {
+    after: &["finds"],
+    ..by_parts("after_errors", &["x:xodr:1.0.0:a.i"], |_, _, _| {})
+};
+static AFTER_CLEAN: Rule<Roads> = Rule {
+    after: &["states"],
+    ..by_parts(
+        "after_clean",
+        &["x:xodr:1.0.0:a.j"],
+        |roads, part, found| {
+            found.issue(roads.0[*part], "after");
+        },
+    )
+};
+/// Of another model, which goes beside.
+static BESIDE: Rule<Document> = Rule {
+    id: "beside",
+    uids: &["x:xodr:1.0.0:a.k"],
+    run: |document, found| {
+        take_time();
+        found.issue(document.root().unwrap(), "beside");
+    },
+    ..Rule::DEFAULTS
+};
+
+static BUNDLE: Bundle = Bundle {
+    rules: &[
+        &FINDS as &dyn AnyRule,
+        &MANY,
+        &STATES,
+        &REFERS,
+        &PANICS,
+        &BESIDE,
+        &COUNTS,
+        &WHOLE,
+        &WHOLE_PANICS,
+        &AFTER_ERRORS,
+        &AFTER_CLEAN,
+    ],
+    ..common::BUNDLE
+};
+
+#[derive(Default)]
+struct Heard {
+    ended: Vec<(usize, Vec<Issue>, Outcome)>,
+    /// Cancel when this many have begun.
+    patience: Option<usize>,
+    begun: AtomicUsize,
+}
+
+impl Listener for Heard {
+    fn is_cancelled(&self) -> bool {
+        let begun = self.begun.load(Ordering::Relaxed);
+        self.patience.is_some_and(|patience| begun >= patience)
+    }
+
+    fn begins(&self, _: usize) {
+        self.begun.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn ended(&mut self, checker: usize, issues: Vec<Issue>, mut outcome: Outcome) {
+        outcome.took = Duration::ZERO;
+        self.ended.push((checker, issues, outcome));
+    }
+}
+
+fn map() -> Loaded {
+    let mut text = "<OpenDRIVE><header revMajor='1' revMinor='4'/>\n".to_owned();
+    for road in 0..ROADS {
+        let name = "so that it is worth more than one thread ".repeat(10);
+        writeln!(text, "<road id='{road}' name='{name}'/>").unwrap();
+    }
+    text.push_str("</OpenDRIVE>");
+    Loaded::from_bytes(Path::new("a.xodr"), text.into_bytes()).unwrap()
+}
+
+/// All checkers, of which one lists no more than 20 findings.
+fn plan(bundle: &'static Bundle) -> Plan {
+    Plan::new(
+        bundle,
+        |_| true,
+        |checker, name| (checker.id == "many" && name == MAX_ISSUES.name).then(|| "20".to_owned()),
+    )
+}
+
+fn heard(bundle: &'static Bundle, threads: usize, patience: Option<usize>) -> (bool, Heard) {
+    let map = map();
+    let subject = map.subject(bundle).unwrap();
+    let mut heard = Heard {
+        patience,
+        ..Heard::default()
+    };
+    let hands = Hands::new(threads);
+    let complete = check_with(&plan(bundle), &subject, &hands, &mut heard);
+    (complete, heard)
+}
+
+#[test]
+fn what_is_found_is_the_same_whatever_the_number_of_threads() {
+    let (_, alone) = heard(&BUNDLE, 1, None);
+    let of = |id: &str| {
+        let index = BUNDLE.rules.iter().position(|rule| rule.facts().id == id);
+        alone.ended.iter().find(|it| Some(it.0) == index).unwrap()
+    };
+    assert_eq!(of("finds").1.len(), 2 * ROADS);
+    assert_eq!(
+        of("many").1.len(),
+        21,
+        "twenty, and how many there are more"
+    );
+    assert_eq!(of("states").2.metadata.len(), ROADS / 50);
+    assert_eq!(of("refers").1.len(), 3);
+    let panicked = &of("panics");
+    assert_eq!(panicked.1.len(), 72, "what was found before is true");
+    assert!(
+        panicked.2.ending.reason().ends_with("at 71"),
+        "{:?}",
+        panicked.2
+    );
+    assert_eq!(of("counts").2.metadata[0].value, ROADS.to_string());
+    assert_eq!(of("after_errors").2.ending.status(), Status::Skipped);
+    assert_eq!(of("after_clean").1.len(), ROADS);
+    for threads in [2, 3, 8] {
+        for round in 0..5 {
+            let (complete, many) = heard(&BUNDLE, threads, None);
+            assert!(complete);
+            assert!(
+                many.ended == alone.ended,
+                "{threads} threads, round {round}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_check_is_cancelled_in_all_its_threads() {
+    for threads in [1, 4] {
+        let (complete, heard) = heard(&BUNDLE, threads, Some(60));
+        assert!(!complete);
+        let begun = heard.begun.load(Ordering::Relaxed);
+        // Everybody ends the part that he is at.
+        assert!(begun <= 60 + threads * BUNDLE.rules.len(), "{begun}");
+    }
+}
+
+/// The threads that have looked at a part.
+static THREADS: Mutex<Option<HashSet<ThreadId>>> = Mutex::new(None);
+
+static SLOW: Rule<Roads> = by_parts("slow", &["x:xodr:1.0.0:a.a"], |_, _, _| {
+    let me = std::thread::current().id();
+    THREADS.lock().unwrap().get_or_insert_default().insert(me);
+    std::thread::sleep(Duration::from_millis(1));
+});
+
+static SLOWLY: Bundle = Bundle {
+    rules: &[&SLOW as &dyn AnyRule],
+    ..common::BUNDLE
+};
+
+#[test]
+fn a_large_document_gets_the_hands_that_are_free() {
+    let (complete, _) = heard(&SLOWLY, 3, None);
+    assert!(complete);
+    let threads = THREADS.lock().unwrap().take().unwrap();
+    assert!((2..=3).contains(&threads.len()), "{}", threads.len());
+}
