@@ -1,0 +1,211 @@
+//! Several jobs at the same time in one bundle, against the bus's own host.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "tests fail by panicking, their helpers too"
+)]
+
+mod common;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use qcbus_bus::{Host, HostEvent, HostOptions, Instance, PeerId};
+use qcbus_document::{Document, FileKind};
+use qcbus_formats::config::Config;
+use qcbus_messages::{
+    Digest, DocId, DocumentRole, FromPeer, Job, JobDocument, JobId, ToPeer, codec,
+};
+use qcbus_sdk::run::BusOptions;
+use qcbus_sdk::{Bundle, Exit, Mode, Rule, Sink};
+
+/// How many jobs are in the rule now, and how many were at most.
+static NOW: AtomicUsize = AtomicUsize::new(0);
+static MOST: AtomicUsize = AtomicUsize::new(0);
+const THREADS: usize = 2;
+/// For machines on which nobody else is ever given time; nobody waits for so long elsewhere.
+const WATCHDOG: Duration = Duration::from_secs(20);
+
+static MEETS: Rule<Document> = Rule {
+    id: "meets",
+    uids: &["x:xodr:1.0.0:a.b"],
+    run: meets,
+    ..Rule::DEFAULTS
+};
+
+static BUNDLE: Bundle = Bundle {
+    rules: &[&MEETS],
+    ..common::BUNDLE
+};
+
+/// Waits until another job is at it, too. The job with the road `slow` waits for all others to be over.
+fn meets(document: &Document<'_>, found: &mut Sink<'_>) {
+    let now = NOW.fetch_add(1, Ordering::SeqCst) + 1;
+    MOST.fetch_max(now, Ordering::SeqCst);
+    let begin = Instant::now();
+    let is_slow = document
+        .elements("road")
+        .any(|it| it.attr("id") == Some("slow"));
+    while MOST.load(Ordering::SeqCst) < THREADS && begin.elapsed() < WATCHDOG {
+        std::thread::yield_now();
+    }
+    while is_slow && OVER.load(Ordering::SeqCst) < JOBS - 1 && begin.elapsed() < WATCHDOG {
+        std::thread::yield_now();
+    }
+    for road in document.elements("road") {
+        found.issue(road, road.attr("id").unwrap_or_default());
+    }
+    NOW.fetch_sub(1, Ordering::SeqCst);
+}
+
+/// Jobs that the host has heard the end of.
+static OVER: AtomicUsize = AtomicUsize::new(0);
+const JOBS: usize = 12;
+const CONFIG: Digest = Digest([7; 32]);
+
+#[test]
+fn jobs_are_checked_side_by_side_and_a_slow_one_holds_up_nobody() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("instance");
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .unwrap();
+    runtime.block_on(async {
+        let mut host = Host::start(&Instance::at(dir.clone()), HostOptions::default()).unwrap();
+        host.set_config(CONFIG, &codec::encode(&None::<Config>).unwrap());
+        let options = BusOptions {
+            instance_dir: Some(dir),
+            threads: THREADS,
+            ..BusOptions::default()
+        };
+        let daemon = std::thread::spawn(move || qcbus_sdk::run(&BUNDLE, Mode::Bus(options)));
+        let talk = tokio::time::timeout(Duration::from_secs(60), talk(&mut host)).await;
+        let (found, order) = talk.expect("the bundle answers");
+        for (job, texts) in &found {
+            assert_eq!(texts, &[road(job.0)], "{job:?}");
+        }
+        assert_eq!(found.len(), JOBS);
+        assert_eq!(
+            MOST.load(Ordering::SeqCst),
+            THREADS,
+            "as many at once as told"
+        );
+        assert_eq!(
+            order.last(),
+            Some(&JobId(0)),
+            "the slow one was first, and is over last"
+        );
+        while !daemon.is_finished() {
+            let _ = tokio::time::timeout(Duration::from_millis(20), host.next()).await;
+        }
+        assert_eq!(daemon.join().unwrap(), Exit::Accepted);
+    });
+}
+
+fn road(job: u64) -> String {
+    match job {
+        0 => "slow".to_owned(),
+        job => format!("of-{job}"),
+    }
+}
+
+type Found = BTreeMap<JobId, Vec<String>>;
+
+/// Plays the broker until the bundle leaves: what was found, and the order in which jobs were over.
+async fn talk(host: &mut Host) -> (Found, Vec<JobId>) {
+    let (mut found, mut order) = (Found::new(), Vec::new());
+    loop {
+        match host.next().await {
+            HostEvent::Hello { peer, hello, .. } => {
+                assert_eq!(usize::from(hello.threads), THREADS);
+                let generation = host.generation();
+                let config = CONFIG;
+                host.accept(peer, &ToPeer::Welcome { generation, config });
+            }
+            HostEvent::Message { peer, message } => {
+                if said(host, peer, message, &mut found, &mut order) {
+                    return (found, order);
+                }
+            }
+            HostEvent::Garbage { what, .. } | HostEvent::TurnedAway { why: what } => {
+                panic!("{what}")
+            }
+            HostEvent::Gone { .. } => panic!("the bundle went away"),
+        }
+    }
+}
+
+/// `true`: the bundle leaves.
+fn said(
+    host: &mut Host,
+    peer: PeerId,
+    message: FromPeer,
+    found: &mut Found,
+    order: &mut Vec<JobId>,
+) -> bool {
+    match message {
+        FromPeer::Catalogue(_) => {
+            for number in 0..JOBS as u64 {
+                publish(host, number);
+                host.send(peer, &ToPeer::Job(job(number)));
+            }
+        }
+        FromPeer::NeedDocument { doc } => publish(host, doc.0),
+        FromPeer::Issues { job, issues, .. } => {
+            let texts = issues.into_iter().map(|issue| issue.description);
+            found.entry(job).or_default().extend(texts);
+        }
+        FromPeer::JobDone { job, .. } => {
+            order.push(job);
+            OVER.fetch_add(1, Ordering::SeqCst);
+            let all: BTreeSet<&JobId> = order.iter().collect();
+            assert_eq!(all.len(), order.len(), "a job is over once");
+            if order.len() == JOBS {
+                host.send(peer, &ToPeer::Drain);
+            }
+        }
+        FromPeer::Leaving => return true,
+        FromPeer::CheckerDone { .. }
+        | FromPeer::Heartbeat { .. }
+        | FromPeer::ResultDone { .. }
+        | FromPeer::WithdrawalDone { .. } => {}
+    }
+    false
+}
+
+fn publish(host: &Host, number: u64) {
+    let text = format!(
+        "<OpenDRIVE><header/><road id='{}'/></OpenDRIVE>",
+        road(number)
+    );
+    let limits = qcbus_ingest::Limits::default();
+    let image =
+        qcbus_ingest::prepare_bytes(Path::new("/a.xodr"), text.into_bytes(), &limits).build();
+    let mut loan = host.documents().loan(image.len()).unwrap();
+    loan[..image.len()].copy_from_slice(&image);
+    let digest = Digest([1; 32]);
+    let published = loan.publish(DocId(number), image.len(), digest, FileKind::Xodr);
+    drop(published.unwrap());
+}
+
+fn job(number: u64) -> Job {
+    let root = JobDocument {
+        doc: DocId(number),
+        role: DocumentRole::Root,
+        path: "/a.xodr".to_owned(),
+        digest: Digest([1; 32]),
+        referred_at: 0,
+        links: Vec::new(),
+    };
+    Job {
+        job: JobId(number),
+        config: CONFIG,
+        kind: FileKind::Xodr,
+        documents: vec![root],
+        missing: Vec::new(),
+    }
+}
