@@ -252,6 +252,9 @@ pub struct PeerStatus {
     pub checkers: u64,
     /// Jobs that it is working on.
     pub active: u64,
+    /// Threads that it works with, as it says itself.
+    #[serde(default)]
+    pub threads: u64,
     /// Jobs or results done since it joined.
     pub done: u64,
     /// Times that it was started again.

@@ -36,6 +36,8 @@ pub(super) struct Bundle {
     pub mark: Option<Mark>,
     pub ready: bool,
     pub capacity: usize,
+    /// As it says; only told.
+    pub threads: u16,
     /// The process has not been given any job yet.
     pub fresh_process: bool,
     /// The process has finished a job, so it is not broken from the start.
@@ -253,6 +255,7 @@ impl State {
         bundle.announced = None;
         bundle.lacks.clear();
         bundle.capacity = usize::from(hello.capacity).clamp(1, 64);
+        bundle.threads = hello.threads;
         bundle.fresh_process = true;
         bundle.proved = false;
         bundle.leaving = false;

@@ -154,6 +154,7 @@ impl State {
             .to_owned(),
             checkers: 0,
             active: it.active.len() as u64,
+            threads: 0,
             done: it.done,
             restarts: self.restarts(&it.name),
             note: if it.failed > 0 {
@@ -217,6 +218,7 @@ impl State {
                 .as_ref()
                 .map_or(0, |it| it.checkers.len() as u64),
             active: bundle.active.len() as u64,
+            threads: bundle.threads.into(),
             done: bundle.done,
             restarts: self.restarts(name),
             note,

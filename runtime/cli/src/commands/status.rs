@@ -131,6 +131,10 @@ fn peer_line(peer: &PeerStatus) -> String {
     if peer.checkers > 0 {
         let _ = write!(line, ", {} checkers", peer.checkers);
     }
+    if peer.threads > 0 {
+        let plural = if peer.threads == 1 { "" } else { "s" };
+        let _ = write!(line, ", {} thread{plural}", peer.threads);
+    }
     let _ = write!(line, ", {} done", peer.done);
     if peer.restarts > 0 {
         let _ = write!(line, ", started again {} times", peer.restarts);
@@ -196,6 +200,7 @@ mod tests {
                 state: "busy".into(),
                 checkers: 26,
                 active: 2,
+                threads: 4,
                 done: 99,
                 restarts: 1,
                 note: "slow: 16 jobs wait for it and for nobody else".into(),
