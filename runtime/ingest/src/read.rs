@@ -63,12 +63,35 @@ pub(crate) struct RawFile {
     pub stamp: FileStamp,
 }
 
+impl RawFile {
+    /// Takes the digest of the bytes, which a file that was just read lacks.
+    pub fn hash(&mut self) {
+        self.stamp.hash(&self.bytes);
+    }
+}
+
+impl FileStamp {
+    /// Takes the digest of these bytes, which are the file's.
+    pub(crate) fn hash(&mut self, bytes: &[u8]) {
+        if let Some(content) = &mut self.content {
+            content.digest = sha256(bytes);
+        }
+    }
+}
+
 /// Attempts at a file that changes under our hands before it is given up.
 const ATTEMPTS: usize = 3;
 
 /// Reads a whole file and proves, by its metadata before and after, that nobody wrote to it
 /// meanwhile.
 pub(crate) fn read_file(path: &Path, limits: &Limits) -> Result<RawFile, IngestError> {
+    let mut raw = read_unhashed(path, limits)?;
+    raw.hash();
+    Ok(raw)
+}
+
+/// As [`read_file`]; the digest is still to be taken.
+pub(crate) fn read_unhashed(path: &Path, limits: &Limits) -> Result<RawFile, IngestError> {
     let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     let mut outcome = "changed";
     for _ in 0..ATTEMPTS {
@@ -144,7 +167,7 @@ fn read_once(
     let content = Content {
         size: after.len(),
         stat: Some(Stat::of(&after)),
-        digest: sha256(&bytes),
+        digest: [0; 32],
     };
     let stamp = FileStamp {
         path: path.to_path_buf(),
