@@ -148,6 +148,7 @@ fn read_once(
     Exceeded::check("max_file", "bytes on disk", before.len(), limits.max_file)
         .map_err(too_large)?;
     let mut bytes = Vec::with_capacity(usize::try_from(before.len()).unwrap_or(0) + 1);
+    ask_for_huge_pages(&mut bytes);
     fill(&mut file, &mut bytes, limits.max_file.saturating_add(1)).map_err(fail)?;
     Exceeded::check(
         "max_file",
@@ -174,6 +175,27 @@ fn read_once(
         content: Some(content),
     };
     Ok(Attempt::Stable(RawFile { bytes, stamp }))
+}
+
+/// From this size on, glibc maps what is allocated by itself, and unmaps it when it is freed.
+const OWN_MAPPING: usize = 32 << 20;
+
+/// Has the kernel back a large buffer with huge pages: taking it page by page costs three times as much
+/// as reading into it. A smaller one may lie in a heap, which would keep the advice for all that follows.
+fn ask_for_huge_pages(bytes: &mut Vec<u8>) {
+    let room = bytes.spare_capacity_mut();
+    if room.len() < OWN_MAPPING {
+        return;
+    }
+    let page = rustix::param::page_size();
+    let start = room.as_mut_ptr();
+    let lead = start.addr().next_multiple_of(page) - start.addr();
+    let whole = (room.len() - lead) / page * page;
+    let first: *mut std::ffi::c_void = start.wrapping_add(lead).cast();
+    // Where there are none, small ones do.
+    #[expect(unsafe_code, reason = "madvise takes raw pointers")]
+    // SAFETY: the pages lie wholly in the buffer. The advice changes no byte of them.
+    let _ = unsafe { rustix::mm::madvise(first, whole, rustix::mm::Advice::LinuxHugepage) };
 }
 
 fn refused(path: &Path, refused: Refused) -> IngestError {
