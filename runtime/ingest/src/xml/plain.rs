@@ -71,9 +71,21 @@ pub(crate) fn end_tag(text: &[u8], from: usize, name: &str) -> Option<usize> {
     (text.get(end) == Some(&b'>') && written == name.as_bytes()).then_some(end + 1)
 }
 
-/// The first byte from `at` on that is no white space, or the end.
+/// The first byte from `at` on that is no white space, or the end; where a row of blanks is likely.
 #[inline]
-pub(crate) fn skip_blanks(text: &[u8], mut at: usize) -> usize {
+pub(crate) fn skip_indent(text: &[u8], mut at: usize) -> usize {
+    const BLANKS: [u8; 8] = [b' '; 8];
+    if text.get(at) == Some(&b'\n') {
+        at += 1;
+    }
+    while text.get(at..).and_then(|rest| rest.first_chunk::<8>()) == Some(&BLANKS) {
+        at += 8;
+    }
+    skip_blanks(text, at)
+}
+
+#[inline]
+fn skip_blanks(text: &[u8], mut at: usize) -> usize {
     while text.get(at).is_some_and(|&byte| is(byte, BLANK)) {
         at += 1;
     }

@@ -1,7 +1,7 @@
 //! Plain tags, which are nearly all that a file has, without a call of quick-xml for each.
 
 use super::{File, Open, Parser, Stop, narrow};
-use crate::xml::plain::{PlainTag, end_tag, skip_blanks, start_tag};
+use crate::xml::plain::{PlainTag, end_tag, skip_indent, start_tag};
 use crate::xml::sink::Sink;
 use crate::xml::tag::RawAttribute;
 
@@ -14,7 +14,7 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
         let depth = usize::from(self.input.limits.max_depth);
         // White space is part of a run of character data that has begun.
         while !self.run.active && self.stack.len() > file.floor {
-            let from = skip_blanks(text, at);
+            let from = skip_indent(text, at);
             if text.get(from) != Some(&b'<') {
                 break;
             }
