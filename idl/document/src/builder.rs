@@ -302,7 +302,12 @@ impl<'out> ImageBuilder<'out> {
 }
 
 /// What follows the first colon of a name that has a prefix.
+#[inline]
 pub(crate) fn local_name(name: &str) -> &str {
+    // Few names have one, and all are short.
+    if !name.bytes().any(|byte| byte == b':') {
+        return name;
+    }
     match name.split_once(':') {
         Some((prefix, local)) if !prefix.is_empty() && !local.is_empty() => local,
         _ => name,

@@ -14,6 +14,7 @@ use tokio::sync::Notify;
 
 use crate::held::{Block, DocumentHeader, Held, LET_GO, Ticket, kind_code};
 use crate::memory::{SharedMemory, Turns, free_shared_memory};
+use crate::pages::{back_with_memory, take_memory_from};
 use crate::ports::{self, Hub, PortError, Pub, Service, Sub, TopicService};
 
 /// Largest image, in bytes: offsets within an image are 32 bits wide.
@@ -372,52 +373,6 @@ impl Documents {
 fn limited_addresses(needed: u64) -> Option<LoanError> {
     let limit = rustix::process::getrlimit(rustix::process::Resource::As).current;
     limit.map(|limit| LoanError::AddressSpace { needed, limit })
-}
-
-/// Has the kernel back the pages now. Without it the first write to a page that cannot be had
-/// is a SIGBUS; here it is an error. Kernels before 5.14 do not know the request: there the
-/// reserve alone has to do.
-fn back_with_memory<T>(blocks: &mut [T]) -> Result<(), ()> {
-    let page = rustix::param::page_size();
-    let start = blocks.as_mut_ptr().addr();
-    let lead = start % page;
-    let first: *mut std::ffi::c_void = blocks.as_mut_ptr().cast::<u8>().wrapping_sub(lead).cast();
-    let len = (lead + size_of_val(blocks)).next_multiple_of(page);
-    #[expect(unsafe_code, reason = "madvise takes raw pointers")]
-    // SAFETY: populating pages changes no byte. The range is the lent slot, widened to whole
-    // pages, which belong to the same mapping.
-    let done = unsafe { rustix::mm::madvise(first, len, rustix::mm::Advice::LinuxPopulateWrite) };
-    match done {
-        Ok(()) | Err(rustix::io::Errno::INVAL) => Ok(()),
-        Err(error) => {
-            tracing::debug!(%error, "shared memory cannot be had");
-            give_up(blocks);
-            Err(())
-        }
-    }
-}
-
-/// Gives back what was had of a slot that is too large.
-fn give_up<T>(blocks: &mut [T]) {
-    take_memory_from(blocks.as_mut_ptr().cast(), size_of_val(blocks));
-}
-
-/// Has the kernel take the pages that are a slot's alone; they read as zeroes until they are written again.
-fn take_memory_from(start: *mut u8, len: usize) {
-    let page = rustix::param::page_size();
-    let lead = start.addr().next_multiple_of(page) - start.addr();
-    let whole = len.saturating_sub(lead) / page * page;
-    if whole == 0 {
-        return;
-    }
-    let first: *mut std::ffi::c_void = start.wrapping_add(lead).cast();
-    #[expect(unsafe_code, reason = "madvise takes raw pointers")]
-    // SAFETY: the pages lie wholly in a slot that is lent to us, of which at least this much was asked for before;
-    // nobody else reads or writes it. The kernel zeroes them, which is a valid value of every block.
-    let done = unsafe { rustix::mm::madvise(first, whole, rustix::mm::Advice::LinuxRemove) };
-    if let Err(error) = done {
-        tracing::warn!(%error, "cannot give shared memory back");
-    }
 }
 
 type Uninit = iceoryx2::sample_mut_uninit::SampleMutUninit<

@@ -30,6 +30,7 @@ mod link;
 mod membership;
 mod memory;
 mod options;
+mod pages;
 mod peer;
 mod ports;
 mod presence;

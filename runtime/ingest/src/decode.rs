@@ -12,6 +12,8 @@ use crate::text_fault::{Code, TextFault};
 pub(crate) struct Decoded {
     pub text: String,
     pub faults: Vec<TextFault>,
+    /// The bytes on disk, where the text is not made of the very same ones.
+    pub source: Option<Vec<u8>>,
 }
 
 /// How the bytes are to be read.
@@ -37,12 +39,13 @@ struct Opening {
 pub(crate) fn decode(bytes: Vec<u8>, limits: &Limits) -> Decoded {
     let opening = open(&bytes);
     let mut faults: Vec<TextFault> = opening.fault.into_iter().collect();
-    let text = match opening.charset {
+    let (text, source) = match opening.charset {
         Charset::Utf8 => utf8(bytes, &mut faults),
         Charset::Ascii => ascii(bytes, &mut faults),
         Charset::Latin1 => {
             faults.push(transcoded("ISO-8859-1"));
-            bytes.iter().map(|&byte| char::from(byte)).collect()
+            let text = bytes.iter().map(|&byte| char::from(byte)).collect();
+            (text, Some(bytes))
         }
         Charset::Table(encoding) => {
             faults.push(transcoded(encoding.name()));
@@ -54,7 +57,7 @@ pub(crate) fn decode(bytes: Vec<u8>, limits: &Limits) -> Decoded {
             if is_utf16(encoding) {
                 check_utf16_declaration(&text, &mut faults);
             }
-            text
+            (text, Some(bytes))
         }
     };
     let size = text.len() as u64;
@@ -64,12 +67,17 @@ pub(crate) fn decode(bytes: Vec<u8>, limits: &Limits) -> Decoded {
         size,
         limits.max_unpacked,
     ) {
-        Ok(()) => Decoded { text, faults },
+        Ok(()) => Decoded {
+            text,
+            faults,
+            source,
+        },
         Err(exceeded) => {
             let fault = TextFault::new(Code::UnpackedLimit, 0, format!("the text has {exceeded}"));
             Decoded {
                 text: String::new(),
                 faults: vec![fault],
+                source: Some(source.unwrap_or_else(|| text.into_bytes())),
             }
         }
     }
@@ -224,9 +232,10 @@ fn declared(bytes: &[u8]) -> Option<(String, usize)> {
 /// Most places of unreadable bytes that are named one by one.
 const NAMED_PLACES: usize = 8;
 
-fn utf8(bytes: Vec<u8>, faults: &mut Vec<TextFault>) -> String {
+/// The text, and the bytes where they are no UTF-8.
+fn utf8(bytes: Vec<u8>, faults: &mut Vec<TextFault>) -> (String, Option<Vec<u8>>) {
     let bytes = match String::from_utf8(bytes) {
-        Ok(text) => return text,
+        Ok(text) => return (text, None),
         Err(error) => error.into_bytes(),
     };
     let mut text = String::with_capacity(bytes.len() + 64);
@@ -249,7 +258,7 @@ fn utf8(bytes: Vec<u8>, faults: &mut Vec<TextFault>) -> String {
         }
         text.push(char::REPLACEMENT_CHARACTER);
     }
-    text
+    (text, Some(bytes))
 }
 
 fn hex(bytes: &[u8]) -> String {
@@ -261,7 +270,7 @@ fn hex(bytes: &[u8]) -> String {
     }
 }
 
-fn ascii(bytes: Vec<u8>, faults: &mut Vec<TextFault>) -> String {
+fn ascii(bytes: Vec<u8>, faults: &mut Vec<TextFault>) -> (String, Option<Vec<u8>>) {
     let before = faults.len();
     if let Some(offset) = bytes.iter().position(|byte| !byte.is_ascii()) {
         let text = format!(
@@ -270,9 +279,9 @@ fn ascii(bytes: Vec<u8>, faults: &mut Vec<TextFault>) -> String {
         );
         faults.push(TextFault::new(Code::EncodingMismatch, offset, text));
     }
-    let text = utf8(bytes, faults);
+    let read = utf8(bytes, faults);
     faults.truncate(before + 1);
-    text
+    read
 }
 
 /// Decodes by one of the web's tables; unmappable bytes are found again as U+FFFD in the result.

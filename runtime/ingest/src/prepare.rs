@@ -14,7 +14,7 @@ use crate::decode::decode;
 use crate::error::IngestError;
 use crate::limits::Limits;
 use crate::prepared::{NamedText, Prepared};
-use crate::read::{FileStamp, RawFile, read_file, stamp_of_bytes};
+use crate::read::{FileStamp, RawFile, read_file, read_unhashed, stamp_of_bytes};
 use crate::text_fault::TextFault;
 use crate::unpack::{InflateError, gunzip, is_gzip};
 use crate::xml::escape_into;
@@ -35,6 +35,10 @@ pub fn prepare(path: &Path, boundary: &Path, limits: &Limits) -> Result<Prepared
 pub fn prepare_bytes(path: &Path, bytes: Vec<u8>, limits: &Limits) -> Prepared {
     Reader::new(*limits).prepare_bytes(path, bytes)
 }
+
+/// From so many bytes on, the digest of a file is taken beside the building of its image: a thread costs
+/// as much as hashing 100 KB.
+const LARGE: usize = 1 << 20;
 
 /// Reads files for one set of documents: an archive is read and looked through once, however many
 /// of its members belong to the set.
@@ -62,17 +66,13 @@ impl Reader {
     /// As [`prepare`].
     pub fn prepare(&mut self, path: &Path, boundary: &Path) -> Result<Prepared, IngestError> {
         let (file, members) = split_members(path);
-        let (stamp, root) = match self.archives.get(&file) {
+        let (stamp, root, hashed) = match self.archives.get(&file) {
             Some((stamp, _)) => {
                 let stamp = stamp.clone();
                 let root = self.open_archive(&stamp.path, &members);
-                (stamp, root)
+                (stamp, root, true)
             }
-            None => {
-                let RawFile { bytes, stamp } = read_file(&file, &self.limits)?;
-                let root = self.open(&stamp, bytes, &members);
-                (stamp, root)
-            }
+            None => self.read(&file, &members)?,
         };
         let asked = members.iter().any(|member| !member.is_empty());
         // An archive that is there and has no main scenario is there all the same.
@@ -84,7 +84,31 @@ impl Reader {
             });
         }
         let boundary = std::path::absolute(boundary).unwrap_or_else(|_| boundary.to_path_buf());
-        Ok(assemble(stamp, root, Some(&boundary), &self.limits))
+        Ok(assemble(stamp, root, hashed, Some(&boundary), &self.limits))
+    }
+
+    /// Reads a file and opens it. Of a large one that is its own text, the digest may come later: says
+    /// whether it has been taken.
+    fn read(
+        &mut self,
+        file: &Path,
+        members: &[String],
+    ) -> Result<(FileStamp, NamedText, bool), IngestError> {
+        let mut raw = read_unhashed(file, &self.limits)?;
+        let later = raw.bytes.len() >= LARGE
+            && FileKind::of_path(file) != Some(FileKind::Mosc)
+            && !is_gzip(&raw.bytes)
+            && !is_zip(&raw.bytes);
+        if !later {
+            raw.hash();
+        }
+        let RawFile { bytes, mut stamp } = raw;
+        let mut root = self.open(&stamp, bytes, members);
+        let source = root.source.take().filter(|_| later);
+        if let Some(source) = &source {
+            stamp.hash(source);
+        }
+        Ok((stamp, root, !later || source.is_some()))
     }
 
     /// See [`prepare_bytes`]; members of an archive can be prepared after it.
@@ -92,7 +116,7 @@ impl Reader {
         let (file, members) = split_members(path);
         let stamp = stamp_of_bytes(&file, &bytes);
         let root = self.open(&stamp, bytes, &members);
-        assemble(stamp, root, None, &self.limits)
+        assemble(stamp, root, true, None, &self.limits)
     }
 
     /// What lies in an archive, as a document: see [`qcbus_messages::DocumentRole::Listing`]. `None`
@@ -119,8 +143,10 @@ impl Reader {
             path: archive.to_path_buf(),
             text,
             faults: Vec::new(),
+            source: None,
         };
-        Ok(Some(assemble(stamp.clone(), root, None, &self.limits)))
+        let stamp = stamp.clone();
+        Ok(Some(assemble(stamp, root, true, None, &self.limits)))
     }
 
     /// Unpacks and decodes one file.
@@ -175,6 +201,7 @@ fn empty(path: PathBuf, faults: Vec<TextFault>) -> NamedText {
         path,
         text: String::new(),
         faults,
+        source: None,
     }
 }
 
@@ -216,14 +243,14 @@ fn member_of(archive: &Path, name: &str) -> PathBuf {
 
 fn assemble(
     stamp: FileStamp,
-    root: NamedText,
+    mut root: NamedText,
+    hashed: bool,
     boundary: Option<&Path>,
     limits: &Limits,
 ) -> Prepared {
-    let digest = stamp
-        .content
-        .as_ref()
-        .map_or([0; 32], |content| content.digest);
+    root.source = None;
+    let content = stamp.content.as_ref();
+    let digest = hashed.then(|| content.map_or([0; 32], |content| content.digest));
     let mut reader = Includes {
         limits,
         boundary,
@@ -269,6 +296,7 @@ fn decoded(
         path,
         text: decoded.text,
         faults,
+        source: decoded.source,
     }
 }
 
@@ -412,7 +440,8 @@ impl Includes<'_> {
         }
         match read_file(&path, self.limits) {
             Ok(RawFile { bytes, stamp }) => {
-                let text = open(&stamp.path, bytes, self.limits);
+                let mut text = open(&stamp.path, bytes, self.limits);
+                text.source = None;
                 self.files.push(stamp);
                 self.texts.push(text);
                 self.known.insert(canonical, self.texts.len() - 1);

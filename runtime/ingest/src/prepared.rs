@@ -2,13 +2,15 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::thread;
 
 use qcbus_document::{BuildError, Capacities, FaultCode, ImageBuilder};
 use qcbus_messages::path_text::to_text;
 
 use crate::count;
 use crate::limits::{Exceeded, Limits};
-use crate::read::FileStamp;
+use crate::read::{FileStamp, sha256};
 use crate::text_fault::TextFault;
 use crate::xml::{Counter, Halt, Input, SourceText, Splice, SpliceKey, parse};
 
@@ -20,8 +22,11 @@ const FAULT_TEXT: usize = 512;
 #[derive(Debug)]
 pub struct Prepared {
     limits: Limits,
-    digest: [u8; 32],
-    files: Vec<FileStamp>,
+    /// Until it is asked for, that of the root's text may be missing.
+    digest: OnceLock<[u8; 32]>,
+    /// The files as they were read; the root's digest may be missing.
+    read: Vec<FileStamp>,
+    files: OnceLock<Vec<FileStamp>>,
     texts: Vec<NamedText>,
     splices: HashMap<SpliceKey, Splice>,
     /// In the image's offsets.
@@ -37,14 +42,17 @@ pub(crate) struct NamedText {
     pub path: PathBuf,
     pub text: String,
     pub faults: Vec<TextFault>,
+    /// The bytes on disk, where the text is not made of the very same ones and they are still needed.
+    pub source: Option<Vec<u8>>,
 }
 
 impl Prepared {
-    /// Puts the parts together and counts how large the image may become.
+    /// Puts the parts together and counts how large the image may become. Without a digest, the first
+    /// text is made of the very bytes on disk.
     pub(crate) fn new(
         limits: &Limits,
-        digest: [u8; 32],
-        files: Vec<FileStamp>,
+        digest: Option<[u8; 32]>,
+        read: Vec<FileStamp>,
         mut texts: Vec<NamedText>,
         splices: HashMap<SpliceKey, Splice>,
     ) -> Prepared {
@@ -62,8 +70,9 @@ impl Prepared {
         let capacities = Capacities::default();
         let mut prepared = Prepared {
             limits: *limits,
-            digest,
-            files,
+            digest: digest.map_or_else(OnceLock::new, OnceLock::from),
+            read,
+            files: OnceLock::new(),
             texts,
             splices,
             faults,
@@ -77,13 +86,22 @@ impl Prepared {
     /// SHA-256 of the root file's bytes on disk (packed, if it is packed; for the member of an
     /// archive, of the archive).
     pub fn digest(&self) -> [u8; 32] {
-        self.digest
+        *self.digest.get_or_init(|| {
+            let text = self.texts.first().map_or("", |root| &root.text);
+            sha256(text.as_bytes())
+        })
     }
 
     /// Every file that was read or looked for, the root file first. Whoever watches them knows
     /// when this document is out of date; together with their digests they identify it.
     pub fn files(&self) -> &[FileStamp] {
-        &self.files
+        self.files.get_or_init(|| {
+            let mut files = self.read.clone();
+            if let Some(root) = files.first_mut().and_then(|root| root.content.as_mut()) {
+                root.digest = self.digest();
+            }
+            files
+        })
     }
 
     /// The path by which the document names its root file: `archive!member` for a member.
@@ -104,6 +122,18 @@ impl Prepared {
     /// enough for the next attempt. It may be less than [`Prepared::upper_bound`], and it may be
     /// more, when a text holds uncommonly many values that have to be resolved.
     pub fn build_into(&self, out: &mut [u8]) -> Result<usize, BuildError> {
+        if self.digest.get().is_some() || !has_cores() {
+            return self.build_here(out);
+        }
+        thread::scope(|scope| {
+            // Without a thread to be had, the digest is taken when the image needs it.
+            let digest = thread::Builder::new().name("qcbus-digest".to_owned());
+            let _beside = digest.spawn_scoped(scope, || self.digest());
+            self.build_here(out)
+        })
+    }
+
+    fn build_here(&self, out: &mut [u8]) -> Result<usize, BuildError> {
         match self.attempt(out, &self.capacities) {
             Err(BuildError::NoRoom { .. } | BuildError::SmallBuffer { .. }) => match self.exact() {
                 Ok(exact) => self.attempt(out, &exact),
@@ -191,6 +221,8 @@ impl Prepared {
 
     /// Gives the document up but for one fault.
     fn refuse(&mut self, found: usize) {
+        // As long as the text is there.
+        self.digest();
         let exceeded = Exceeded {
             limit: "max_image",
             what: "bytes or more",
@@ -237,19 +269,21 @@ impl Prepared {
                 text,
             )?;
         }
-        builder.finish(self.digest)
+        builder.finish(self.digest())
     }
 
     /// The image of a document that turned out too large only when its values were resolved.
     fn attempt_refused(&self, out: &mut [u8]) -> Result<usize, BuildError> {
         let mut refused = Prepared {
             limits: self.limits,
-            digest: self.digest,
-            files: Vec::new(),
+            digest: OnceLock::from(self.digest()),
+            read: Vec::new(),
+            files: OnceLock::new(),
             texts: vec![NamedText {
                 path: self.path().to_path_buf(),
                 text: String::new(),
                 faults: Vec::new(),
+                source: None,
             }],
             splices: HashMap::new(),
             faults: Vec::new(),
@@ -283,6 +317,12 @@ impl Prepared {
             limits: &self.limits,
         }
     }
+}
+
+/// Whether something can be done beside something else.
+fn has_cores() -> bool {
+    static SEVERAL: OnceLock<bool> = OnceLock::new();
+    *SEVERAL.get_or_init(|| thread::available_parallelism().is_ok_and(|cores| cores.get() > 1))
 }
 
 fn add(sum: Capacities, other: Capacities) -> Capacities {

@@ -63,12 +63,35 @@ pub(crate) struct RawFile {
     pub stamp: FileStamp,
 }
 
+impl RawFile {
+    /// Takes the digest of the bytes, which a file that was just read lacks.
+    pub fn hash(&mut self) {
+        self.stamp.hash(&self.bytes);
+    }
+}
+
+impl FileStamp {
+    /// Takes the digest of these bytes, which are the file's.
+    pub(crate) fn hash(&mut self, bytes: &[u8]) {
+        if let Some(content) = &mut self.content {
+            content.digest = sha256(bytes);
+        }
+    }
+}
+
 /// Attempts at a file that changes under our hands before it is given up.
 const ATTEMPTS: usize = 3;
 
 /// Reads a whole file and proves, by its metadata before and after, that nobody wrote to it
 /// meanwhile.
 pub(crate) fn read_file(path: &Path, limits: &Limits) -> Result<RawFile, IngestError> {
+    let mut raw = read_unhashed(path, limits)?;
+    raw.hash();
+    Ok(raw)
+}
+
+/// As [`read_file`]; the digest is still to be taken.
+pub(crate) fn read_unhashed(path: &Path, limits: &Limits) -> Result<RawFile, IngestError> {
     let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     let mut outcome = "changed";
     for _ in 0..ATTEMPTS {
@@ -125,6 +148,7 @@ fn read_once(
     Exceeded::check("max_file", "bytes on disk", before.len(), limits.max_file)
         .map_err(too_large)?;
     let mut bytes = Vec::with_capacity(usize::try_from(before.len()).unwrap_or(0) + 1);
+    ask_for_huge_pages(&mut bytes);
     fill(&mut file, &mut bytes, limits.max_file.saturating_add(1)).map_err(fail)?;
     Exceeded::check(
         "max_file",
@@ -144,13 +168,34 @@ fn read_once(
     let content = Content {
         size: after.len(),
         stat: Some(Stat::of(&after)),
-        digest: sha256(&bytes),
+        digest: [0; 32],
     };
     let stamp = FileStamp {
         path: path.to_path_buf(),
         content: Some(content),
     };
     Ok(Attempt::Stable(RawFile { bytes, stamp }))
+}
+
+/// From this size on, glibc maps what is allocated by itself, and unmaps it when it is freed.
+const OWN_MAPPING: usize = 32 << 20;
+
+/// Has the kernel back a large buffer with huge pages: taking it page by page costs three times as much
+/// as reading into it. A smaller one may lie in a heap, which would keep the advice for all that follows.
+fn ask_for_huge_pages(bytes: &mut Vec<u8>) {
+    let room = bytes.spare_capacity_mut();
+    if room.len() < OWN_MAPPING {
+        return;
+    }
+    let page = rustix::param::page_size();
+    let start = room.as_mut_ptr();
+    let lead = start.addr().next_multiple_of(page) - start.addr();
+    let whole = (room.len() - lead) / page * page;
+    let first: *mut std::ffi::c_void = start.wrapping_add(lead).cast();
+    // Where there are none, small ones do.
+    #[expect(unsafe_code, reason = "madvise takes raw pointers")]
+    // SAFETY: the pages lie wholly in the buffer. The advice changes no byte of them.
+    let _ = unsafe { rustix::mm::madvise(first, whole, rustix::mm::Advice::LinuxHugepage) };
 }
 
 fn refused(path: &Path, refused: Refused) -> IngestError {

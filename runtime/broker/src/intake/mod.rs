@@ -208,22 +208,25 @@ impl Intake {
     ) -> Result<Published, Failure> {
         self.shared.get(path, asked, |before| {
             let prepared = self.read(reader, path)?;
+            // The digest of a new one is taken while its image is built.
+            let Some(before) = before else {
+                return self.publish(path, &prepared);
+            };
             let inputs = inputs_of(&prepared, &self.limits);
-            match before.filter(|before| same_bytes(&before.inputs, &inputs)) {
-                Some(before) => Ok(Published {
-                    racy: inputs.iter().any(was_racy),
-                    inputs,
-                    ..before.clone()
-                }),
-                None => self.publish(path, &prepared, inputs),
+            if !same_bytes(&before.inputs, &inputs) {
+                return self.publish(path, &prepared);
             }
+            Ok(Published {
+                racy: inputs.iter().any(was_racy),
+                inputs,
+                ..before.clone()
+            })
         })
     }
 
     fn publish_fresh(&self, reader: &RefCell<Reader>, path: &Path) -> Result<Published, Failure> {
         let prepared = self.read(reader, path)?;
-        let inputs = inputs_of(&prepared, &self.limits);
-        self.publish(path, &prepared, inputs)
+        self.publish(path, &prepared)
     }
 
     /// What lies in an archive of a job.
@@ -236,8 +239,7 @@ impl Intake {
         let Some(prepared) = listing else {
             return Ok(None);
         };
-        let inputs = inputs_of(&prepared, &self.limits);
-        self.publish(archive, &prepared, inputs).map(Some)
+        self.publish(archive, &prepared).map(Some)
     }
 
     /// What a modular scenario was expanded to. It depends on nothing that its documents do not.
@@ -256,15 +258,11 @@ impl Intake {
         Ok(prepared)
     }
 
-    fn publish(
-        &self,
-        path: &Path,
-        prepared: &Prepared,
-        inputs: Vec<Input>,
-    ) -> Result<Published, Failure> {
+    fn publish(&self, path: &Path, prepared: &Prepared) -> Result<Published, Failure> {
         let kind = FileKind::of_path(path).unwrap_or(FileKind::Xosc);
         let (loan, used) = self.build(prepared)?;
         reached("built", path);
+        let inputs = inputs_of(prepared, &self.limits);
         let published = self.give_out(loan, used, Digest(prepared.digest()), kind, inputs)?;
         reached("published", path);
         Ok(published)

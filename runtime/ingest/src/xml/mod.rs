@@ -1,11 +1,12 @@
-//! From text to the events of a tree: quick-xml finds the markup, the checks that it leaves out
-//! are made here.
+//! From text to the events of a tree: quick-xml finds the markup that is not spelt as nearly all is, the
+//! checks that it leaves out are made here.
 
 pub(crate) mod chars;
 mod escape;
 mod includes;
 mod namespaces;
 mod parser;
+mod plain;
 mod sink;
 mod tag;
 mod value;

@@ -2,6 +2,7 @@
 
 mod character_data;
 mod misc;
+mod plain;
 
 use std::collections::HashMap;
 
@@ -48,7 +49,10 @@ pub(crate) enum Splice {
 /// Parses a whole document into `sink`; gives the faults in the order of their discovery, with
 /// offsets of the image's text. However faulty the text is, what could be read reaches the sink.
 pub(crate) fn parse<S: Sink>(input: &Input<'_>, sink: &mut S) -> Result<Vec<TextFault>, Halt> {
-    let mut parser = Parser::new(input, sink);
+    parse_by(Parser::new(input, sink))
+}
+
+fn parse_by<S: Sink>(mut parser: Parser<'_, '_, S>) -> Result<Vec<TextFault>, Halt> {
     match parser.file(0, None) {
         Ok(()) | Err(Stop::File | Stop::All) => Ok(parser.faults),
         Err(Stop::Sink(Halt::Build(BuildError::TooManyNames))) => {
@@ -133,6 +137,10 @@ struct Parser<'p, 't, S> {
     prefixes: Prefixes<'t>,
     /// Attributes of the current tag.
     names: Vec<&'t str>,
+    /// The same, where the tag is spelt plainly.
+    attributes: Vec<RawAttribute>,
+    /// Plain tags are read without quick-xml; the same comes of it with them.
+    plainly: bool,
     scratch: String,
     bad: Vec<BadReference>,
 }
@@ -152,6 +160,8 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
             run: Run::default(),
             prefixes: Prefixes::default(),
             names: Vec::new(),
+            attributes: Vec::new(),
+            plainly: true,
             scratch: String::new(),
             bad: Vec::new(),
         }
@@ -190,7 +200,7 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
         &mut self,
         file: File<'t>,
         reader: &mut Reader<&'t [u8]>,
-        body: usize,
+        mut body: usize,
         mark: usize,
     ) -> Result<(), Stop> {
         let mut seen_root = false;
@@ -199,6 +209,8 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
             let event = reader.read_event();
             let to = body + offset(reader.buffer_position());
             let outside = self.stack.len() == file.floor;
+            // Behind text quick-xml already knows what comes.
+            let markup = !matches!(event, Ok(Event::Text(_) | Event::GeneralRef(_)));
             match event {
                 Ok(Event::Start(tag)) => {
                     self.start_tag(file, from, tag.name().as_ref().len(), to, false, seen_root)?;
@@ -218,6 +230,11 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
                 Ok(Event::DocType(_)) => self.doctype(file, from, to, seen_root)?,
                 Ok(Event::Eof) => return self.end_of_file(file, seen_root),
                 Err(error) => return self.broken(file, from, &error),
+            }
+            if markup && self.plainly {
+                let read = self.plain_tags(file, to)?;
+                *reader.get_mut() = &file.text.as_bytes()[read..];
+                body += read - to;
             }
         }
     }
@@ -259,20 +276,17 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
         }
         let include =
             (self.splices && !outside && name == "include").then_some((file.number, from));
-        if empty {
-            self.prefixes.forget(prefixes);
-            if !transparent {
-                self.sink.close(file.start + narrow(to))?;
-            }
-            return include.map_or(Ok(()), |key| self.splice(file, key));
-        }
-        self.stack.push(Open {
+        let open = Open {
             name,
             at: from,
             transparent,
             prefixes,
             include,
-        });
+        };
+        if empty {
+            return self.end(file, &open, to);
+        }
+        self.stack.push(open);
         Ok(())
     }
 
@@ -419,7 +433,7 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
 
     /// Few attributes are compared each with each, many are sorted: never quadratic.
     fn check_duplicates(&mut self, file: File<'t>) -> Result<(), Stop> {
-        const FEW: usize = 12;
+        const FEW: usize = 24;
         let names = &self.names;
         let repeated: Option<&'t str> = if names.len() <= FEW {
             (1..names.len())
@@ -469,9 +483,15 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
     }
 
     fn close(&mut self, file: File<'t>, to: usize) -> Result<(), Stop> {
-        let Some(open) = self.stack.pop() else {
-            return Ok(());
-        };
+        match self.stack.pop() {
+            Some(open) => self.end(file, &open, to),
+            None => Ok(()),
+        }
+    }
+
+    /// An element ends, and with it what it included.
+    #[inline]
+    fn end(&mut self, file: File<'t>, open: &Open<'t>, to: usize) -> Result<(), Stop> {
         self.prefixes.forget(open.prefixes);
         if !open.transparent {
             self.sink.close(file.start + narrow(to))?;
