@@ -145,10 +145,10 @@ pub(crate) struct Catalogs<'d> {
 }
 
 /// A node by document and place.
-type Node2 = (*const u8, u32);
+type Node2 = (usize, u32);
 
 fn place(node: Node<'_>) -> Node2 {
-    (node.document().path().as_ptr(), node.index())
+    (node.document().path().as_ptr() as usize, node.index())
 }
 
 /// References that lead from entry to entry are followed this far.
