@@ -6,7 +6,7 @@ use std::ops::Deref;
 use std::time::SystemTime;
 
 use qcbus_document::Document;
-use qcbus_ingest::Limits;
+use qcbus_ingest::{Limits, Prepared};
 use qcbus_messages::path_text::from_text;
 use qcbus_messages::{Digest, ResultMessage};
 
@@ -172,7 +172,14 @@ pub struct FileSources {
     input: String,
     digest: Digest,
     written: Option<SystemTime>,
-    images: RefCell<BTreeMap<String, Option<ImageSources<Vec<u8>>>>>,
+    files: RefCell<BTreeMap<String, Option<FileSource>>>,
+}
+
+/// A file on disk. Who asks for its lines only needs no image of it.
+struct FileSource {
+    prepared: Prepared,
+    index: Index,
+    image: Option<Vec<u8>>,
 }
 
 impl FileSources {
@@ -182,11 +189,20 @@ impl FileSources {
             input: result.input.clone(),
             digest: result.digest,
             written: modified(&result.xqar),
-            images: RefCell::default(),
+            files: RefCell::default(),
         }
     }
 
-    fn open(&self, path: &str) -> Option<ImageSources<Vec<u8>>> {
+    /// Gives `look` the file, if it is what it was.
+    fn with<T>(&self, path: &str, look: impl FnOnce(&mut FileSource) -> T) -> Option<T> {
+        let mut files = self.files.borrow_mut();
+        let file = files
+            .entry(path.to_owned())
+            .or_insert_with(|| self.open(path));
+        file.as_mut().map(look)
+    }
+
+    fn open(&self, path: &str) -> Option<FileSource> {
         let file = from_text(path);
         // A member of an archive is as old as the archive.
         let on_disk = if file.is_file() {
@@ -206,27 +222,29 @@ impl FileSources {
         if known && Digest(prepared.digest()) != self.digest {
             return None;
         }
-        Some(ImageSources::new(prepared.build(), path))
+        Some(FileSource {
+            index: Index::of(prepared.text().as_bytes()),
+            prepared,
+            image: None,
+        })
     }
 }
 
 impl Sources for FileSources {
     fn line(&self, path: &str, row: u64, near: u64) -> Option<Line> {
-        let mut images = self.images.borrow_mut();
-        let image = images
-            .entry(path.to_owned())
-            .or_insert_with(|| self.open(path));
-        image.as_ref()?.line(path, row, near)
+        self.with(path, |file| {
+            let line = file.index.line(file.prepared.text().as_bytes(), row)?;
+            Some(file.index.part(line, near))
+        })?
     }
 
     fn image(&self, path: &str, look: &mut dyn FnMut(&[u8])) {
-        let mut images = self.images.borrow_mut();
-        let image = images
-            .entry(path.to_owned())
-            .or_insert_with(|| self.open(path));
-        if let Some(image) = image {
-            image.image(path, look);
-        }
+        self.with(path, |file| {
+            let FileSource {
+                prepared, image, ..
+            } = file;
+            look(image.get_or_insert_with(|| prepared.build()));
+        });
     }
 }
 
@@ -242,8 +260,8 @@ struct Index {
 
 impl Index {
     fn of(text: &[u8]) -> Index {
-        let feeds = text.iter().enumerate().filter(|&(_, byte)| *byte == b'\n');
-        let after = feeds.filter_map(|(at, _)| u32::try_from(at + 1).ok());
+        let feeds = memchr::memchr_iter(b'\n', text);
+        let after = feeds.filter_map(|at| u32::try_from(at + 1).ok());
         Index {
             starts: std::iter::once(0).chain(after).collect(),
             ascii: text.is_ascii(),

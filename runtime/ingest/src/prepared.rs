@@ -86,10 +86,7 @@ impl Prepared {
     /// SHA-256 of the root file's bytes on disk (packed, if it is packed; for the member of an
     /// archive, of the archive).
     pub fn digest(&self) -> [u8; 32] {
-        *self.digest.get_or_init(|| {
-            let text = self.texts.first().map_or("", |root| &root.text);
-            sha256(text.as_bytes())
-        })
+        *self.digest.get_or_init(|| sha256(self.text().as_bytes()))
     }
 
     /// Every file that was read or looked for, the root file first. Whoever watches them knows
@@ -107,6 +104,11 @@ impl Prepared {
     /// The path by which the document names its root file: `archive!member` for a member.
     pub fn path(&self) -> &Path {
         self.texts.first().map_or(Path::new(""), |text| &text.path)
+    }
+
+    /// The text of the root file, decoded; for a member of an archive, that of the member.
+    pub fn text(&self) -> &str {
+        self.texts.first().map_or("", |root| &root.text)
     }
 
     /// Bytes that [`Prepared::build_into`] needs. The image itself is shorter.
