@@ -532,6 +532,7 @@ impl Host {
                 return self.entrance.keep(key, known, now);
             }
         };
+        known.tell();
         session.is_known(known);
         let peer = self.number();
         let full = self.sessions.len() >= self.limits.peers;
