@@ -11,7 +11,7 @@ use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::*;
 use qcbus_messages::codec;
 use qcbus_messages::services::{
-    FRAME_BUFFER, HELLO_BYTES, Limits, SPARE_SESSIONS, Services, Topic,
+    FRAME_BUFFER, Growth, HELLO_BYTES, Limits, SPARE_SESSIONS, Services, Topic,
 };
 use qcbus_messages::{Digest, FromPeer, Hello, ToPeer};
 
@@ -191,7 +191,10 @@ impl Host {
         };
         let space = rustix::process::getrlimit(rustix::process::Resource::As).current;
         let limits = options.limits_within(space)?;
-        let services = Services::new(&limits);
+        let mut services = Services::new(&limits);
+        if !options.config_grows {
+            services.config.growth = Growth::Fixed;
+        }
         let turns = Turns::new();
         let turn = turns.take();
         let expected = options.expected_peers.min(limits.peers) as u64;

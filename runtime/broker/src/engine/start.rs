@@ -311,6 +311,8 @@ fn shape(options: &Options, loaded: &Loaded) -> HostOptions {
     HostOptions {
         expected_peers,
         max_peers: options.host.max_peers.min(most),
+        // Where there is none, none comes.
+        config_grows: options.watch || options.config.is_some(),
         ..options.host
     }
 }
