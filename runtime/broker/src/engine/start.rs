@@ -47,6 +47,8 @@ impl Broker {
         let sources = sources_of(&options);
         let loaded = sources.load()?;
         let (descriptors, limited) = Descriptors::for_peers(&mut options.host.max_peers);
+        let (inbox, senders) = Inbox::new();
+        let early = early_children(&mut options, &loaded, descriptors, &inbox);
         let mut host = Host::start(&options.instance, shape(&options, &loaded))?;
         options.settings.generation = host.generation();
         let journal = journal_of(&options)?;
@@ -56,14 +58,16 @@ impl Broker {
         let in_force = Arc::new(InForce::of(&sources, &loaded)?);
         host.set_config(in_force.digest, &in_force.encoded);
         let state = State::new(options.settings.clone(), in_force.digest, in_force.demand());
-        let (inbox, senders) = Inbox::new();
         let control = control_of(&options, senders.asked)?;
         let looks = Looks::default();
         let store = Arc::new(store(&options, journal, looks.scouts(), &senders.notices)?);
         let reconciled = reconcile(&options, &loaded, &store)?;
         let writers = writers(&options, &store, &inbox, &senders.notices)?;
         let intake = intake(&options, &host, &in_force);
-        let children = children(&options, descriptors, &inbox)?;
+        let children = match early.filter(|it| it.are_of(host.generation())) {
+            Some(children) => children,
+            None => children(&options, descriptors, &inbox)?,
+        };
         let mut broker = Broker {
             started: now(),
             clock: AttendedTime::new(),
@@ -327,6 +331,26 @@ fn intake(options: &Options, host: &Host, in_force: &InForce) -> Arc<Intake> {
     );
     intake.search_in(in_force.search.clone());
     Arc::new(intake)
+}
+
+/// The first generation of an instance that nobody has used.
+const FIRST_GENERATION: u64 = 1;
+
+/// Where a broker is the first and the last of its instance, what it is going to start is known beforehand. When it
+/// cannot be started yet, or the broker is not the first, it is started later.
+fn early_children(
+    options: &mut Options,
+    loaded: &Loaded,
+    descriptors: Descriptors,
+    inbox: &Inbox,
+) -> Option<Children> {
+    if options.watch || !options.die_with_broker {
+        return None;
+    }
+    options.settings.generation = FIRST_GENERATION;
+    let mut children = children(options, descriptors, inbox).ok()?;
+    children.start_early(&loaded.children);
+    Some(children)
 }
 
 fn children(

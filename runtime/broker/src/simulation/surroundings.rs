@@ -127,6 +127,19 @@ impl Children {
         }
     }
 
+    pub fn start_early(&mut self, specs: &[ChildSpec]) {
+        if let Children::Real(real) = self {
+            real.start_early(specs);
+        }
+    }
+
+    pub fn are_of(&self, generation: u64) -> bool {
+        match self {
+            Children::Real(real) => real.are_of(generation),
+            Children::Simulated(_) => true,
+        }
+    }
+
     pub fn ended(&mut self, launch: Launch) {
         if let Children::Real(real) = self {
             real.ended(launch);
