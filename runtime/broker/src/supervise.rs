@@ -509,17 +509,21 @@ mod tests {
         children.start_early(std::slice::from_ref(&spec));
         let launch = Launch::first_of(2).next(&spec);
         children.spawn(launch, &spec);
-        let (ended, end) = end(&mut inbox).await;
+        let (ended, how) = end(&mut inbox).await;
         assert_eq!(ended, launch);
-        assert!(matches!(end, ChildEnd::Failed(_)), "{end:?}");
-        // And what could not be started is told when it is asked for.
-        let spec = super::tests::spec(&["/nowhere/at/all"]);
+        assert!(matches!(how, ChildEnd::Failed(_)), "{how:?}");
+    }
+
+    #[tokio::test]
+    async fn what_cannot_be_started_early_is_told_when_it_is_asked_for() {
+        let (mut children, mut inbox) = children();
+        let spec = spec(&["/nowhere/at/all"]);
         children.start_early(std::slice::from_ref(&spec));
         let launch = Launch::first_of(2).next(&spec);
         children.spawn(launch, &spec);
-        let (ended, end) = super::tests::end(&mut inbox).await;
+        let (ended, how) = end(&mut inbox).await;
         assert_eq!(ended, launch);
-        assert!(matches!(end, ChildEnd::NotStarted(_)), "{end:?}");
+        assert!(matches!(how, ChildEnd::NotStarted(_)), "{how:?}");
     }
 
     #[tokio::test]
