@@ -277,11 +277,15 @@ impl Children {
         may_be.then(|| Former::of(&self.launches, self.first))
     }
 
-    /// Kills whatever is left, also what it has started.
+    /// Kills whatever is left, also what it has started. [`Children::bury_all`] sees to it that nothing has escaped.
     pub fn kill_all(&self) {
         for launch in self.own.keys() {
             self.kill(*launch);
         }
+    }
+
+    /// Waits until nobody is left of those who were killed, and of those who have come to us by that.
+    pub fn bury_all(&self) {
         let until = Instant::now() + DIES_WITHIN;
         for (_, process) in self.own.values() {
             let left = until.saturating_duration_since(Instant::now());

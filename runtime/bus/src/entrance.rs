@@ -186,6 +186,12 @@ impl Entrance {
         self.known.push_back((key, known, now));
     }
 
+    /// Nobody finds it any more.
+    pub(crate) fn close(&self) {
+        // The directory may have been removed already.
+        let _ = std::fs::remove_file(self.directory.join(SOCKET));
+    }
+
     /// Opens the socket again when its file was removed: by a cleaner of temporary files, say.
     fn stay_open(&mut self) {
         if file_of(&self.directory).is_some_and(|file| Some(file) == self.file) {
@@ -206,8 +212,7 @@ impl Entrance {
 
 impl Drop for Entrance {
     fn drop(&mut self) {
-        // The directory may have been removed already.
-        let _ = std::fs::remove_file(self.directory.join(SOCKET));
+        self.close();
     }
 }
 

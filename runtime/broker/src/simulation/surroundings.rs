@@ -82,6 +82,10 @@ impl Host {
         None
     }
 
+    pub fn end_with_process(self) -> bool {
+        false
+    }
+
     pub fn documents(&self) -> Documents {
         self.simulation.documents.clone()
     }
@@ -207,6 +211,12 @@ impl Children {
     pub fn kill_all(&self) {
         if let Children::Real(real) = self {
             real.kill_all();
+        }
+    }
+
+    pub fn bury_all(&self) {
+        if let Children::Real(real) = self {
+            real.bury_all();
         }
     }
 }
