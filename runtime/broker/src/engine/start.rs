@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 
-use qcbus_bus::HostOptions;
+use qcbus_bus::{HostOptions, SharedMemory};
 use qcbus_messages::Role;
 use qcbus_messages::control::Unseen;
 use tokio::sync::mpsc;
@@ -337,7 +337,8 @@ fn intake(options: &Options, host: &Host, in_force: &InForce) -> Arc<Intake> {
 const FIRST_GENERATION: u64 = 1;
 
 /// Where a broker is the first and the last of its instance, what it is going to start is known beforehand. When it
-/// cannot be started yet, or the broker is not the first, it is started later.
+/// cannot be started yet, or the broker is not the first, it is started later; and nothing is where the bus has no
+/// room, which is waited for and tried again and again.
 fn early_children(
     options: &mut Options,
     loaded: &Loaded,
@@ -345,6 +346,11 @@ fn early_children(
     inbox: &Inbox,
 ) -> Option<Children> {
     if options.watch || !options.die_with_broker {
+        return None;
+    }
+    let needed = shape(options, loaded).shared_memory_bytes();
+    let memory = SharedMemory::now().ok()?;
+    if memory.size > 0 && memory.free < needed {
         return None;
     }
     options.settings.generation = FIRST_GENERATION;
