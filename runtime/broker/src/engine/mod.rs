@@ -2,6 +2,7 @@
 
 mod act;
 mod asked;
+mod early;
 mod looks;
 #[cfg(test)]
 mod simulated;

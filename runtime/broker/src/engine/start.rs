@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 
-use qcbus_bus::{HostOptions, SharedMemory};
+use qcbus_bus::HostOptions;
 use qcbus_messages::Role;
 use qcbus_messages::control::Unseen;
 use tokio::sync::mpsc;
 
+use super::early::{early_children, early_or_now};
 use super::looks::Looks;
 use super::watching::Watching;
 use super::{AttendedTime, Broker, Inbox, Sessions, StartError, Told};
@@ -57,22 +58,18 @@ impl Broker {
         let members = journal.members()?;
         let in_force = Arc::new(InForce::of(&sources, &loaded)?);
         host.set_config(in_force.digest, &in_force.encoded);
-        let state = State::new(options.settings.clone(), in_force.digest, in_force.demand());
         let control = control_of(&options, senders.asked)?;
         let looks = Looks::default();
         let store = Arc::new(store(&options, journal, looks.scouts(), &senders.notices)?);
         let reconciled = reconcile(&options, &loaded, &store)?;
         let writers = writers(&options, &store, &inbox, &senders.notices)?;
         let intake = intake(&options, &host, &in_force);
-        let children = match early.filter(|it| it.are_of(host.generation())) {
-            Some(children) => children,
-            None => children(&options, descriptors, &inbox)?,
-        };
+        let children = early_or_now(early, &options, descriptors, &inbox)?;
         let mut broker = Broker {
             started: now(),
             clock: AttendedTime::new(),
             host,
-            state,
+            state: State::new(options.settings.clone(), in_force.digest, in_force.demand()),
             intake,
             store,
             writers,
@@ -306,7 +303,7 @@ fn reconcile(options: &Options, loaded: &Loaded, store: &Store) -> Result<Reconc
 
 /// The bus is made for those who are expected. Nobody else joins what ends by itself; a newer process
 /// may stand beside each that was started.
-fn shape(options: &Options, loaded: &Loaded) -> HostOptions {
+pub(super) fn shape(options: &Options, loaded: &Loaded) -> HostOptions {
     let expected_peers = loaded.children.len();
     let most = match options.watch {
         true => options.host.max_peers,
@@ -333,33 +330,7 @@ fn intake(options: &Options, host: &Host, in_force: &InForce) -> Arc<Intake> {
     Arc::new(intake)
 }
 
-/// The first generation of an instance that nobody has used.
-const FIRST_GENERATION: u64 = 1;
-
-/// Where a broker is the first and the last of its instance, what it is going to start is known beforehand. When it
-/// cannot be started yet, or the broker is not the first, it is started later; and nothing is where the bus has no
-/// room, which is waited for and tried again and again.
-fn early_children(
-    options: &mut Options,
-    loaded: &Loaded,
-    descriptors: Descriptors,
-    inbox: &Inbox,
-) -> Option<Children> {
-    if options.watch || !options.die_with_broker {
-        return None;
-    }
-    let needed = shape(options, loaded).shared_memory_bytes();
-    let memory = SharedMemory::now().ok()?;
-    if memory.size > 0 && memory.free < needed {
-        return None;
-    }
-    options.settings.generation = FIRST_GENERATION;
-    let mut children = children(options, descriptors, inbox).ok()?;
-    children.start_early(&loaded.children);
-    Some(children)
-}
-
-fn children(
+pub(super) fn children(
     options: &Options,
     descriptors: Descriptors,
     inbox: &Inbox,
