@@ -38,6 +38,9 @@ pub struct Bundle {
     pub templates: &'static [Template],
 }
 
+/// Checkers by where the list of their rules lies, and how long it is.
+type KnownCheckers = BTreeMap<(usize, usize), Arc<[Checker]>>;
+
 /// What a bundle looks at where the root is a modular scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reads {
@@ -74,7 +77,7 @@ impl Bundle {
     /// They are made out of the pages of all rules, and asked for several times in every start of a bundle: made
     /// once for each list of rules, which stays where it is as long as the process.
     fn known_checkers(&self) -> Arc<[Checker]> {
-        static KNOWN: Mutex<BTreeMap<(usize, usize), Arc<[Checker]>>> = Mutex::new(BTreeMap::new());
+        static KNOWN: Mutex<KnownCheckers> = Mutex::new(BTreeMap::new());
         let rules = (self.rules.as_ptr().addr(), self.rules.len());
         // What a panic left there is whole: it is put in when it is made.
         let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
