@@ -1,6 +1,8 @@
 //! A bundle: rules under one name, and the checkers that follow from them.
 
 use std::any::TypeId;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use qcbus_document::{Document, FileKind};
 use qcbus_formats::xqar::Level;
@@ -36,6 +38,9 @@ pub struct Bundle {
     pub templates: &'static [Template],
 }
 
+/// Checkers by where the list of their rules lies, and how long it is.
+type KnownCheckers = BTreeMap<(usize, usize), Arc<[Checker]>>;
+
 /// What a bundle looks at where the root is a modular scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reads {
@@ -66,10 +71,23 @@ pub struct Checker {
 impl Bundle {
     /// The checkers in the order of the result.
     pub fn checkers(&self) -> Vec<Checker> {
-        self.rules
-            .iter()
-            .flat_map(|rule| checkers_of(*rule))
-            .collect()
+        self.known_checkers().to_vec()
+    }
+
+    /// They are made out of the pages of all rules, and asked for several times in every start of a bundle: made
+    /// once for each list of rules, which stays where it is as long as the process.
+    fn known_checkers(&self) -> Arc<[Checker]> {
+        static KNOWN: Mutex<KnownCheckers> = Mutex::new(BTreeMap::new());
+        let rules = (self.rules.as_ptr().addr(), self.rules.len());
+        // What a panic left there is whole: it is put in when it is made.
+        let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(checkers) = known.get(&rules) {
+            return checkers.clone();
+        }
+        let rules_of = self.rules.iter();
+        let checkers: Arc<[Checker]> = rules_of.flat_map(|rule| checkers_of(*rule)).collect();
+        known.insert(rules, checkers.clone());
+        checkers
     }
 
     /// What the bundle tells the broker.
@@ -80,7 +98,7 @@ impl Bundle {
             build_date: BUILD_DATE.to_owned(),
             kinds: self.kinds.to_vec(),
             checkers: self
-                .checkers()
+                .known_checkers()
                 .iter()
                 .map(|checker| self.info(checker))
                 .collect(),

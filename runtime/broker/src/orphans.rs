@@ -72,14 +72,31 @@ pub fn kill_below(process: &Process) {
     // What is started while we look is found by looking again; a hostile one may go on for as long as it likes,
     // so not for ever.
     for _ in 0..8 {
-        let all = processes();
-        let below = below(&all, process.id().cast_signed());
-        let living: Vec<i32> = below.into_iter().filter(|it| !all[it].is_dead).collect();
+        let living = living_below(process.id().cast_signed());
         if living.is_empty() {
             return;
         }
         living.into_iter().for_each(kill);
     }
+}
+
+/// Those who live of what a process has started, and of what that has started. By the kernel's lists of children
+/// where it keeps some: to look through all processes of a machine takes milliseconds. A list may lack one while
+/// others of it end; whoever is missed so comes to us when its parent ends, and is found then.
+fn living_below(root: i32) -> Vec<i32> {
+    let is_alive = |pid: &i32| listed(*pid).is_some_and(|it| !it.is_dead);
+    let mut found = BTreeSet::from([root]);
+    let mut open = vec![root];
+    while let Some(parent) = open.pop() {
+        let Some(children) = children_of(&parent.to_string()) else {
+            let all = processes();
+            let below = below(&all, root).into_iter();
+            return below.filter(|it| !all[it].is_dead).collect();
+        };
+        open.extend(children.into_iter().filter(|it| found.insert(*it)));
+    }
+    found.remove(&root);
+    found.into_iter().filter(is_alive).collect()
 }
 
 /// Whether a process was started by another one, or by what that has started.
@@ -136,7 +153,7 @@ pub fn sweep(
         if is_left {
             left += 1;
             // With what it has started in turn, or that would only be an orphan at the next look.
-            below(&processes(), pid).into_iter().for_each(kill);
+            living_below(pid).into_iter().for_each(kill);
             kill(pid);
         }
     }
@@ -152,12 +169,22 @@ pub fn are_listed() -> bool {
         .exists()
 }
 
-/// All children of this process, whichever of its threads they are listed with.
+/// All children of this process.
 fn children() -> BTreeSet<i32> {
-    let threads = std::fs::read_dir("/proc/self/task")
-        .into_iter()
-        .flatten()
-        .flatten();
+    children_of("self").unwrap_or_else(|| {
+        let own = std::process::id().cast_signed();
+        let all = processes().into_iter();
+        all.filter(|(_, it)| it.parent == own)
+            .map(|(pid, _)| pid)
+            .collect()
+    })
+}
+
+/// All children of a process, whichever of its threads they are listed with. `None`: kernels are built without these
+/// lists, too.
+fn children_of(process: &str) -> Option<BTreeSet<i32>> {
+    let threads = Path::new("/proc").join(process).join("task");
+    let threads = std::fs::read_dir(threads).into_iter().flatten().flatten();
     let lists = threads.map(|thread| std::fs::read_to_string(thread.path().join("children")));
     let mut found = BTreeSet::new();
     for list in lists {
@@ -168,18 +195,11 @@ fn children() -> BTreeSet<i32> {
             ),
             // The thread has ended meanwhile.
             Err(error) if error.raw_os_error() == Some(ESRCH) => {}
-            // Kernels are built without these lists, too.
-            Err(_) => {
-                let own = std::process::id().cast_signed();
-                let all = processes().into_iter();
-                return all
-                    .filter(|(_, it)| it.parent == own)
-                    .map(|(pid, _)| pid)
-                    .collect();
-            }
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound && are_listed() => {}
+            Err(_) => return None,
         }
     }
-    found
+    Some(found)
 }
 
 const ESRCH: i32 = rustix::io::Errno::SRCH.raw_os_error();

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::os::fd::AsFd as _;
 use std::path::PathBuf;
 use std::process::Stdio;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use qcbus_bus::{LAUNCH, Process};
 use qcbus_confine::{Looks, Orders, Outer, SandboxError, kernel_level, looks, own_filters};
@@ -22,6 +22,8 @@ use crate::reload::ready;
 
 /// Looks for orphans at the end, two milliseconds apart.
 const ORPHANS_AT_MOST: u32 = 500;
+/// How long one that is killed is waited for before orphans are looked for.
+const DIES_WITHIN: Duration = Duration::from_millis(20);
 
 /// What every child is given.
 #[derive(Debug, Clone)]
@@ -46,6 +48,8 @@ pub struct Children {
     surroundings: Surroundings,
     launches: Launches,
     first: Launch,
+    /// What was started before the state machine has asked for it, see [`Children::start_early`].
+    early: BTreeMap<Launch, (ChildSpec, Child)>,
     /// What this broker has started, by its name and with a handle on the process.
     own: BTreeMap<Launch, (String, Option<Process>)>,
     /// What former brokers have started and has joined this one.
@@ -67,15 +71,44 @@ impl Children {
             surroundings,
             launches,
             first: Launch::first_of(generation),
+            early: BTreeMap::new(),
             own: BTreeMap::new(),
             adopted: BTreeMap::new(),
             events,
         }
     }
 
+    /// Starts what the state machine is going to ask for first, as it will number it: processes get ready while the
+    /// bus is set up, and wait for it. What it does not ask for ends with this; what cannot be started now is tried
+    /// when it does.
+    pub fn start_early(&mut self, specs: &[ChildSpec]) {
+        let specs: BTreeMap<&str, &ChildSpec> =
+            specs.iter().map(|it| (it.name.as_str(), it)).collect();
+        let mut launch = self.first;
+        for spec in specs.into_values() {
+            launch = launch.next(spec);
+            if let Ok(child) = self.start(launch, spec) {
+                self.early.insert(launch, (spec.clone(), child));
+            }
+        }
+    }
+
+    /// Whether these are the children of the broker of this generation.
+    pub fn are_of(&self, generation: u64) -> bool {
+        self.first == Launch::first_of(generation)
+    }
+
     /// Starts a child in a process group of its own.
     pub fn spawn(&mut self, launch: Launch, spec: &ChildSpec) {
-        match self.start(launch, spec) {
+        let started = match self.early.remove(&launch) {
+            Some((early, child)) if early == *spec => Ok(child),
+            Some((_, child)) => {
+                kill_early(&child);
+                self.start(launch, spec)
+            }
+            None => self.start(launch, spec),
+        };
+        match started {
             Ok(child) => {
                 // Nobody has waited for it yet, so the id is its own.
                 let process = child.id().and_then(|id| Process::open(id, None));
@@ -244,10 +277,22 @@ impl Children {
         may_be.then(|| Former::of(&self.launches, self.first))
     }
 
-    /// Kills whatever is left, also what it has started.
+    /// Kills whatever is left, also what it has started. [`Children::bury_all`] sees to it that nothing has escaped.
     pub fn kill_all(&self) {
         for launch in self.own.keys() {
             self.kill(*launch);
+        }
+    }
+
+    /// Waits until nobody is left of those who were killed, and of those who have come to us by that.
+    pub fn bury_all(&self) {
+        let until = Instant::now() + DIES_WITHIN;
+        for (_, process) in self.own.values() {
+            let left = until.saturating_duration_since(Instant::now());
+            if let Some(process) = process {
+                // One that does not is looked at below.
+                let _ = process.ends_within(left);
+            }
         }
         // One that ends hands over what it has started; hence more than one look, but not for ever.
         let nobody = BTreeMap::new();
@@ -271,6 +316,18 @@ impl Children {
     pub fn forget_launches(&self) {
         self.launches.forget();
     }
+}
+
+impl Drop for Children {
+    fn drop(&mut self) {
+        self.early.values().for_each(|(_, child)| kill_early(child));
+    }
+}
+
+fn kill_early(child: &Child) {
+    // Nobody has waited for it yet, so the id is its own; the runtime does.
+    let process = child.id().and_then(|id| Process::open(id, None));
+    process.iter().for_each(Process::kill);
 }
 
 async fn watch(launch: Launch, mut child: Child, events: UnboundedSender<Event>) {
@@ -414,6 +471,75 @@ mod tests {
             assert!(is_told(&end), "{spec:?}: {end:?}");
             assert!(!end.how().is_empty());
         }
+    }
+
+    fn pids_of(children: &Children) -> Vec<u32> {
+        let early = children.early.values();
+        early.filter_map(|(_, child)| child.id()).collect()
+    }
+
+    async fn is_gone(pid: u32) {
+        let stat = PathBuf::from(format!("/proc/{pid}/stat"));
+        let gone = async {
+            // A zombie that nobody has buried yet is as good as gone.
+            let runs = || std::fs::read_to_string(&stat).is_ok_and(|it| !it.contains(") Z "));
+            while runs() {
+                tokio::task::yield_now().await;
+            }
+        };
+        let watchdog = Duration::from_secs(60);
+        tokio::time::timeout(watchdog, gone).await.unwrap();
+    }
+
+    #[tokio::test]
+    async fn what_was_started_early_is_what_is_asked_for() {
+        let (mut children, mut inbox) = children();
+        let spec = spec(&["sh", "-c", "exec sleep 1000", "sh"]);
+        children.start_early(std::slice::from_ref(&spec));
+        let early = pids_of(&children);
+        let launch = Launch::first_of(2).next(&spec);
+        children.spawn(launch, &spec);
+        let own = children.own[&launch].1.clone().unwrap();
+        assert_eq!(early, [own.id()], "one process");
+        assert!(children.early.is_empty());
+        children.kill(launch);
+        assert_eq!(end(&mut inbox).await.0, launch);
+    }
+
+    #[tokio::test]
+    async fn what_was_started_early_and_died_is_noticed() {
+        let (mut children, mut inbox) = children();
+        let spec = spec(&["sh", "-c", "exit 3", "sh"]);
+        children.start_early(std::slice::from_ref(&spec));
+        let launch = Launch::first_of(2).next(&spec);
+        children.spawn(launch, &spec);
+        let (ended, how) = end(&mut inbox).await;
+        assert_eq!(ended, launch);
+        assert!(matches!(how, ChildEnd::Failed(_)), "{how:?}");
+    }
+
+    #[tokio::test]
+    async fn what_cannot_be_started_early_is_told_when_it_is_asked_for() {
+        let (mut children, mut inbox) = children();
+        let spec = spec(&["/nowhere/at/all"]);
+        children.start_early(std::slice::from_ref(&spec));
+        let launch = Launch::first_of(2).next(&spec);
+        children.spawn(launch, &spec);
+        let (ended, how) = end(&mut inbox).await;
+        assert_eq!(ended, launch);
+        assert!(matches!(how, ChildEnd::NotStarted(_)), "{how:?}");
+    }
+
+    #[tokio::test]
+    async fn what_was_started_early_for_nothing_ends() {
+        let (mut children, _inbox) = children();
+        let spec = spec(&["sh", "-c", "exec sleep 1000", "sh"]);
+        children.start_early(std::slice::from_ref(&spec));
+        let [unasked] = pids_of(&children)[..] else {
+            panic!("one is started");
+        };
+        drop(children);
+        is_gone(unasked).await;
     }
 
     #[tokio::test]

@@ -125,8 +125,11 @@ impl Writers {
         let end = Instant::now() + limit;
         let mut hung = Vec::new();
         for (number, thread) in self.threads.drain(..).enumerate() {
+            // Most have nothing left to do and end at once.
+            let mut pause = Duration::from_micros(50);
             while !thread.is_finished() && Instant::now() < end {
-                thread::sleep(Duration::from_millis(1));
+                thread::sleep(pause);
+                pause = (2 * pause).min(Duration::from_millis(1));
             }
             if thread.is_finished() {
                 let _ = thread.join();

@@ -221,6 +221,15 @@ impl Documents {
         })
     }
 
+    /// Bytes of shared memory that slots have, at most.
+    pub(crate) fn bytes(&self) -> usize {
+        let of = |class: &Class| -> usize {
+            let slots = class.slots.lock().unwrap_or_else(PoisonError::into_inner);
+            slots.values().sum()
+        };
+        self.shared.classes.iter().map(of).sum()
+    }
+
     /// Lends at least `len` bytes, zero or not: write before you read. All of it is backed by
     /// memory when this returns, so writing cannot fail.
     ///

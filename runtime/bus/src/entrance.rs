@@ -64,6 +64,13 @@ impl Known {
         }
     }
 
+    /// Tells the peer, which may be waiting for it, that its session is there. One that does not listen
+    /// looks for it now and then, so this need not arrive.
+    pub(crate) fn tell(&self) {
+        // Never waits: the stream does not block, and one byte finds room.
+        let _ = (&self.stream).write(&[0]);
+    }
+
     /// Whether two were told of by the same process. Where processes cannot be seen, nobody knows.
     pub(crate) fn is_same(&self, other: &Known) -> bool {
         let id = |it: &Known| it.process.as_ref().map(Process::id);
@@ -179,6 +186,12 @@ impl Entrance {
         self.known.push_back((key, known, now));
     }
 
+    /// Nobody finds it any more.
+    pub(crate) fn close(&self) {
+        // The directory may have been removed already.
+        let _ = std::fs::remove_file(self.directory.join(SOCKET));
+    }
+
     /// Opens the socket again when its file was removed: by a cleaner of temporary files, say.
     fn stay_open(&mut self) {
         if file_of(&self.directory).is_some_and(|file| Some(file) == self.file) {
@@ -199,8 +212,7 @@ impl Entrance {
 
 impl Drop for Entrance {
     fn drop(&mut self) {
-        // The directory may have been removed already.
-        let _ = std::fs::remove_file(self.directory.join(SOCKET));
+        self.close();
     }
 }
 
@@ -242,6 +254,27 @@ pub(crate) fn introduce(instance: &Instance, key: SessionKey) -> io::Result<Unix
     let mut stream = UnixStream::from(socket);
     stream.write_all(&statement(key, &std::env::var(LAUNCH).unwrap_or_default()))?;
     Ok(stream)
+}
+
+/// What was said to the broker, on the connection on which it answers that the session is there. To be kept as
+/// long as the session lasts.
+pub(crate) struct Statement(tokio::net::UnixStream);
+
+impl Statement {
+    /// Must be called within a tokio runtime.
+    pub(crate) fn new(stream: UnixStream) -> io::Result<Statement> {
+        tokio::net::UnixStream::from_std(stream).map(Statement)
+    }
+
+    /// Returns when the broker has answered, or after `limit`. Cancel-safe.
+    pub(crate) async fn answered(&self, limit: Duration) {
+        let readable = tokio::time::timeout(limit, self.0.readable()).await;
+        let answered = matches!(readable, Ok(Ok(()))).then(|| self.0.try_read(&mut [0; 16]));
+        // A broker that has gone has nothing to say at once, again and again.
+        if matches!(answered, Some(Ok(0) | Err(_))) {
+            tokio::time::sleep(limit).await;
+        }
+    }
 }
 
 fn statement(key: SessionKey, launch: &str) -> [u8; STATEMENT] {

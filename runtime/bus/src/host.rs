@@ -11,7 +11,7 @@ use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::*;
 use qcbus_messages::codec;
 use qcbus_messages::services::{
-    FRAME_BUFFER, HELLO_BYTES, Limits, SPARE_SESSIONS, Services, Topic,
+    FRAME_BUFFER, Growth, HELLO_BYTES, Limits, SPARE_SESSIONS, Services, Topic,
 };
 use qcbus_messages::{Digest, FromPeer, Hello, ToPeer};
 
@@ -47,6 +47,8 @@ const STRANGE_FOR: Duration = Duration::from_secs(60);
 const MAX_TOLD: usize = 4;
 /// Processes whose attempts are remembered; beyond that, only those in session.
 const MAX_REMEMBERED: usize = 4096;
+/// Bytes of documents that may stay until the process ends.
+const LEFT_TO_THE_END: usize = 16 << 20;
 /// How often processes are looked at.
 const WATCH_EVERY: Duration = Duration::from_millis(20);
 
@@ -128,10 +130,10 @@ pub struct Host {
     hello: Sub<u8, HelloHeader>,
     config: Pub<u8, ConfigHeader>,
     documents: Documents,
-    _janitor: Janitor,
+    janitor: Option<Janitor>,
     hub: Hub,
     _memory_lock: File,
-    _remains: Remains,
+    remains: Option<Remains>,
 }
 
 /// Dropped last: unlinks what is still there, and only then gives the instance up.
@@ -191,7 +193,10 @@ impl Host {
         };
         let space = rustix::process::getrlimit(rustix::process::Resource::As).current;
         let limits = options.limits_within(space)?;
-        let services = Services::new(&limits);
+        let mut services = Services::new(&limits);
+        if !options.config_grows {
+            services.config.growth = Growth::Fixed;
+        }
         let turns = Turns::new();
         let turn = turns.take();
         let expected = options.expected_peers.min(limits.peers) as u64;
@@ -221,7 +226,11 @@ impl Host {
             hello,
             config,
             waker,
-            _janitor: Janitor::start(instance, &generation, Arc::clone(&presence))?,
+            janitor: Some(Janitor::start(
+                instance,
+                &generation,
+                Arc::clone(&presence),
+            )?),
             presence,
             documents,
             hub,
@@ -235,7 +244,7 @@ impl Host {
             last_turn: Instant::now(),
             last_tick: Instant::now(),
             last_watch: Instant::now(),
-            _remains: remains,
+            remains: Some(remains),
             _memory_lock: memory_lock,
             generation,
             limits,
@@ -244,6 +253,31 @@ impl Host {
         drop(turn);
         host.presence.announce()?;
         Ok(host)
+    }
+
+    /// Ends for everybody else as when it is dropped: peers are told, all files go, the instance is free. What only
+    /// this process has is left to the kernel, which takes it when the process ends, as it is about to: to close and
+    /// unmap it port by port takes longer than many a file to check. Much shared memory is not kept so long: others
+    /// may wait for it. `false`: it was dropped.
+    pub fn end_with_process(mut self) -> bool {
+        if self.documents.bytes() > LEFT_TO_THE_END {
+            return false;
+        }
+        self.say_goodbye();
+        self.entrance.close();
+        // Or it would make again what goes now.
+        self.janitor = None;
+        self.remains = None;
+        std::mem::forget(self);
+        true
+    }
+
+    fn say_goodbye(&mut self) {
+        self.presence.withdraw();
+        self.documents.stop();
+        for session in self.sessions.values_mut() {
+            session.link.farewell("");
+        }
     }
 
     /// Number of this start of a broker on this instance.
@@ -532,6 +566,7 @@ impl Host {
                 return self.entrance.keep(key, known, now);
             }
         };
+        known.tell();
         session.is_known(known);
         let peer = self.number();
         let full = self.sessions.len() >= self.limits.peers;
@@ -635,11 +670,7 @@ impl Host {
 
 impl Drop for Host {
     fn drop(&mut self) {
-        self.presence.withdraw();
-        self.documents.stop();
-        for session in self.sessions.values_mut() {
-            session.link.farewell("");
-        }
+        self.say_goodbye();
         self.sessions.clear();
     }
 }

@@ -1,7 +1,6 @@
 //! A peer's side of one session, from the introduction to its end.
 
 use std::collections::VecDeque;
-use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -10,7 +9,7 @@ use iceoryx2::prelude::*;
 use qcbus_messages::services::{HELLO_BYTES, Services};
 use qcbus_messages::{Digest, Hello, ToPeer, codec};
 
-use crate::entrance::introduce;
+use crate::entrance::{Statement, introduce};
 use crate::generation::Generation;
 use crate::host::{ConfigHeader, HelloHeader};
 use crate::instance::Instance;
@@ -76,7 +75,7 @@ pub(crate) struct Membership {
     proves: bool,
     instance: Instance,
     /// Where we have said who we are; the broker sees by them whether we live.
-    said: Vec<UnixStream>,
+    said: Vec<Statement>,
     last_tick: Instant,
     welcome: bool,
     refused: Option<String>,
@@ -196,11 +195,15 @@ impl Membership {
         }
     }
 
-    /// Returns when the broker has woken us, or after `limit`. Cancel-safe.
+    /// Returns when the broker has woken us or, before there are channels, has made them, or after `limit`.
+    /// Cancel-safe.
     pub(crate) async fn wait(&self, limit: Duration) {
         match &self.channels {
             Some(channels) => channels.waker.wait(limit).await,
-            None => tokio::time::sleep(limit).await,
+            None => match self.said.last() {
+                Some(said) => said.answered(limit).await,
+                None => tokio::time::sleep(limit).await,
+            },
         }
     }
 
@@ -355,7 +358,7 @@ impl Membership {
 
     fn introduce(&mut self) -> Result<(), String> {
         if self.proves && self.hellos.is_multiple_of(PROVE_EVERY) {
-            let said = introduce(&self.instance, self.key);
+            let said = introduce(&self.instance, self.key).and_then(Statement::new);
             self.said.push(said.map_err(|error| {
                 format!("cannot say to the broker which process this is: {error}")
             })?);

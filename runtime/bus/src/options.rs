@@ -23,6 +23,9 @@ pub struct HostOptions {
     /// Bundles and reporters that are expected: for so many there is shared memory from the
     /// beginning.
     pub expected_peers: usize,
+    /// Whether a configuration may come that is larger than 64 KiB. Being ready for it takes a megabyte
+    /// of private memory, in every peer, too.
+    pub config_grows: bool,
 }
 
 impl Default for HostOptions {
@@ -35,6 +38,7 @@ impl Default for HostOptions {
             small_class_bytes: limits.small_bytes,
             shm_reserve_bytes: 64 << 20,
             expected_peers: 0,
+            config_grows: true,
         }
     }
 }

@@ -16,6 +16,10 @@ use crate::wake::TICK;
 
 /// How often somebody without a session looks for one.
 const SEEK_EVERY: Duration = Duration::from_millis(3);
+/// How long somebody who comes looks again and again without giving the processor away for longer than
+/// [`EAGER_EVERY`]: who is started beside its broker comes when that is nearly there, and a timer takes milliseconds.
+const EAGER_FOR: Duration = Duration::from_millis(60);
+const EAGER_EVERY: Duration = Duration::from_micros(200);
 /// How long to wait after an attempt that failed on this side.
 const SEEK_AGAIN_AFTER: Duration = Duration::from_millis(50);
 /// How often a peer looks whether its broker is still there.
@@ -358,8 +362,18 @@ impl Peer {
         match &self.state {
             State::Member(membership) if membership.is_welcome() => membership.wait(TICK).await,
             State::Member(membership) => membership.wait(SEEK_EVERY).await,
+            _ if self.is_eager() => {
+                std::thread::sleep(EAGER_EVERY);
+                tokio::task::yield_now().await;
+            }
             _ => tokio::time::sleep(SEEK_EVERY).await,
         }
+    }
+
+    /// Whether it has just begun to look for a broker, and no attempt to join one has failed.
+    fn is_eager(&self) -> bool {
+        let since = self.lost.filter(|_| !self.joined_before);
+        since.is_some_and(|since| since.elapsed() < EAGER_FOR) && self.seek_at <= Instant::now()
     }
 
     fn close(&mut self, reason: String) {

@@ -40,11 +40,11 @@ pub fn bundle_specs(
         .filter(|bundle| bundle.kinds.iter().any(|kind| kinds.contains(kind)));
     let specs = wanted.map(|bundle| {
         let mut spec = spec(program, "bundle", bundle.alias, bundle.name, Role::Bundle);
-        let takes_files = bundle
-            .rules
-            .iter()
-            .any(|rule| rule.facts().resource.is_some());
-        if let Some(directory) = schema_dir.filter(|_| takes_files) {
+        let takes_files = |_: &&Path| {
+            let mut rules = bundle.rules.iter();
+            rules.any(|rule| rule.facts().resource.is_some())
+        };
+        if let Some(directory) = schema_dir.filter(takes_files) {
             let directory = std::path::absolute(directory).map_err(|error| error.to_string())?;
             UserFiles::read(bundle, &directory)
                 .map_err(|error| format!("--schema-dir: failed to {error}"))?;

@@ -25,13 +25,16 @@ pub(super) struct Stand<'a> {
     number: u32,
     /// What its manifest declares. `None`: it is not to be confined.
     may: Option<&'a May>,
+    /// A broker has started it that it ends with.
+    is_bound: bool,
 }
 
 impl Stand<'_> {
-    /// How patient it is. After a session was lost, another broker is waited for.
+    /// How patient it is. After a session was lost, another broker is waited for; and one that has started this
+    /// process and is there may not have got ready itself.
     pub(super) fn options(&self) -> PeerOptions {
         let usual = PeerOptions::default();
-        let patience: Duration = if self.number == 0 {
+        let patience: Duration = if self.number == 0 && !self.is_bound {
             usual.patience
         } else {
             usual.grace
@@ -118,6 +121,7 @@ pub(super) fn sandboxed(
         instance,
         number,
         may,
+        is_bound: sessions.only_one,
     };
     let once = |may| match session(stand(0, may)) {
         Ended::With(exit) => exit,

@@ -2,6 +2,7 @@
 
 mod act;
 mod asked;
+mod early;
 mod looks;
 #[cfg(test)]
 mod simulated;
@@ -244,6 +245,8 @@ impl Broker {
         // From before it was read: what has changed since is not in force.
         let mut fingerprint = self.loaded.read.clone();
         let mut next_reload = now() + RELOAD_INTERVAL;
+        // What is remembered for one run has no history.
+        let lasts = self.options.state.is_some();
         let mut next_prune = now();
         let mut next_trim = now() + TRIM_INTERVAL;
         let mut quit = false;
@@ -272,7 +275,7 @@ impl Broker {
                 self.notify_watchdog();
                 self.children.look_for_orphans();
             }
-            if now() >= next_prune {
+            if lasts && now() >= next_prune {
                 next_prune = now() + PRUNE_INTERVAL;
                 self.prune();
             }
@@ -289,7 +292,6 @@ impl Broker {
         self.watcher = None;
         self.children.kill_all();
         self.children.kill_what_they_started();
-        self.children.forget_launches();
         if !quit {
             // A disk that does not answer must not keep anybody from stopping.
             for writer in self.writers.finish(self.options.settings.drain_limit) {
@@ -298,12 +300,19 @@ impl Broker {
                 (self.tell)(Told::Notice(Notice::Storing(what)));
             }
         }
+        // They have had the time to die.
+        self.children.bury_all();
+        self.children.forget_launches();
         for down in self.downs.drain(..) {
             // A client that has left needs no answer.
             let _ = down.send(Response::Stopped);
         }
         self.tickets.clear();
         self.control.flush().await;
+        // Nothing is to outlive the process, which ends now: its documents go with it, too.
+        if self.options.die_with_broker && self.host.end_with_process() {
+            std::mem::forget(self.intake);
+        }
     }
 
     /// Forgets the history of jobs beyond the retention time, off the loop.

@@ -10,6 +10,7 @@ use qcbus_messages::Role;
 use qcbus_messages::control::Unseen;
 use tokio::sync::mpsc;
 
+use super::early::{early_children, early_or_now};
 use super::looks::Looks;
 use super::watching::Watching;
 use super::{AttendedTime, Broker, Inbox, Sessions, StartError, Told};
@@ -47,6 +48,8 @@ impl Broker {
         let sources = sources_of(&options);
         let loaded = sources.load()?;
         let (descriptors, limited) = Descriptors::for_peers(&mut options.host.max_peers);
+        let (inbox, senders) = Inbox::new();
+        let early = early_children(&mut options, &loaded, descriptors, &inbox);
         let mut host = Host::start(&options.instance, shape(&options, &loaded))?;
         options.settings.generation = host.generation();
         let journal = journal_of(&options)?;
@@ -55,20 +58,18 @@ impl Broker {
         let members = journal.members()?;
         let in_force = Arc::new(InForce::of(&sources, &loaded)?);
         host.set_config(in_force.digest, &in_force.encoded);
-        let state = State::new(options.settings.clone(), in_force.digest, in_force.demand());
-        let (inbox, senders) = Inbox::new();
         let control = control_of(&options, senders.asked)?;
         let looks = Looks::default();
         let store = Arc::new(store(&options, journal, looks.scouts(), &senders.notices)?);
         let reconciled = reconcile(&options, &loaded, &store)?;
         let writers = writers(&options, &store, &inbox, &senders.notices)?;
         let intake = intake(&options, &host, &in_force);
-        let children = children(&options, descriptors, &inbox)?;
+        let children = early_or_now(early, &options, descriptors, &inbox)?;
         let mut broker = Broker {
             started: now(),
             clock: AttendedTime::new(),
             host,
-            state,
+            state: State::new(options.settings.clone(), in_force.digest, in_force.demand()),
             intake,
             store,
             writers,
@@ -302,7 +303,7 @@ fn reconcile(options: &Options, loaded: &Loaded, store: &Store) -> Result<Reconc
 
 /// The bus is made for those who are expected. Nobody else joins what ends by itself; a newer process
 /// may stand beside each that was started.
-fn shape(options: &Options, loaded: &Loaded) -> HostOptions {
+pub(super) fn shape(options: &Options, loaded: &Loaded) -> HostOptions {
     let expected_peers = loaded.children.len();
     let most = match options.watch {
         true => options.host.max_peers,
@@ -311,6 +312,8 @@ fn shape(options: &Options, loaded: &Loaded) -> HostOptions {
     HostOptions {
         expected_peers,
         max_peers: options.host.max_peers.min(most),
+        // Where there is none, none comes.
+        config_grows: options.watch || options.config.is_some(),
         ..options.host
     }
 }
@@ -327,7 +330,7 @@ fn intake(options: &Options, host: &Host, in_force: &InForce) -> Arc<Intake> {
     Arc::new(intake)
 }
 
-fn children(
+pub(super) fn children(
     options: &Options,
     descriptors: Descriptors,
     inbox: &Inbox,

@@ -82,6 +82,10 @@ impl Host {
         None
     }
 
+    pub fn end_with_process(self) -> bool {
+        false
+    }
+
     pub fn documents(&self) -> Documents {
         self.simulation.documents.clone()
     }
@@ -124,6 +128,19 @@ impl Children {
         match self {
             Children::Real(real) => real.spawn(launch, spec),
             Children::Simulated(it) => it.world().peers.launched(launch, spec),
+        }
+    }
+
+    pub fn start_early(&mut self, specs: &[ChildSpec]) {
+        if let Children::Real(real) = self {
+            real.start_early(specs);
+        }
+    }
+
+    pub fn are_of(&self, generation: u64) -> bool {
+        match self {
+            Children::Real(real) => real.are_of(generation),
+            Children::Simulated(_) => true,
         }
     }
 
@@ -194,6 +211,12 @@ impl Children {
     pub fn kill_all(&self) {
         if let Children::Real(real) = self {
             real.kill_all();
+        }
+    }
+
+    pub fn bury_all(&self) {
+        if let Children::Real(real) = self {
+            real.bury_all();
         }
     }
 }

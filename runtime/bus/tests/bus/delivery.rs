@@ -435,3 +435,28 @@ fn the_configuration_reaches_everyone_and_the_latest_wins() {
         }
     });
 }
+
+#[test]
+fn a_bus_that_expects_no_configuration_still_has_a_small_one() {
+    run(async {
+        let site = Site::new();
+        let options = HostOptions {
+            config_grows: false,
+            ..HostOptions::default()
+        };
+        let mut host = Host::start(&site.instance, options).unwrap();
+        host.set_config(Digest([1; 32]), &[7; 60_000]);
+        let (_, mut peer) = join(&mut host, &site, "peer").await;
+        // One that is too large is not published, and takes nothing away.
+        host.set_config(Digest([2; 32]), &[8; 100_000]);
+        let config = tokio::select! {
+            event = host.next() => panic!("{event:?}"),
+            event = peer.next() => event,
+        };
+        assert!(
+            matches!(config, PeerEvent::Config(Digest([1, ..]))),
+            "{config:?}"
+        );
+        assert_eq!(&*peer.config().unwrap().1, &[7; 60_000][..]);
+    });
+}

@@ -17,9 +17,30 @@ mod settings;
 mod status;
 mod stops;
 
+use std::ffi::OsString;
+
 use qcbus_messages::Exit;
 
-use crate::args::{Args, BundleCommand, Command, ConfigCommand, ReporterCommand, SchemaCommand};
+use crate::args::{
+    Args, BundleCommand, BundleRunArgs, Command, ConfigCommand, ReporterCommand, SchemaCommand,
+};
+use crate::standard;
+
+/// What a broker starts a standard bundle with, `bundle run NAME … --launch N`: read by hand, for the tree of all
+/// commands takes as long to build as such a bundle may take to start. Everything else is for the parser.
+pub fn started_bundle(arguments: impl Iterator<Item = OsString>) -> Option<impl FnOnce() -> Exit> {
+    let mut words = arguments;
+    let is = |word: Option<OsString>, wanted: &str| word.is_some_and(|it| it == wanted);
+    if !is(words.next(), "bundle") || !is(words.next(), "run") {
+        return None;
+    }
+    let name = words.next()?.into_string().ok()?;
+    let is_standard = standard::BUNDLES.iter().any(|it| it.alias == name);
+    let arguments: Vec<OsString> = words.collect();
+    let is_started = arguments.iter().any(|it| it == "--launch");
+    let run = BundleRunArgs { name, arguments };
+    (is_standard && is_started).then_some(move || bundle::run(run))
+}
 
 /// Does what the command line says.
 pub fn run(args: Args) -> Exit {
@@ -44,5 +65,32 @@ pub fn run(args: Args) -> Exit {
         Command::Expand(args) => expand::run(&args),
         Command::Pack(args) => pack::run(&args),
         Command::Doctor(args) => doctor::run(&args),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_broker_starts_is_for_the_parser() {
+        let is_started = |line: &str| {
+            let words = line.split_whitespace().map(OsString::from);
+            started_bundle(words).is_some()
+        };
+        assert!(is_started("bundle run xodr --instance-dir /d --launch 7"));
+        assert!(is_started("bundle run xosc --schema-dir s --launch 7"));
+        for other in [
+            "",
+            "check a.xodr",
+            "bundle run",
+            "bundle run xodr",
+            "bundle run xodr --help",
+            "bundle run --launch 7",
+            "bundle run ./mine --launch 7",
+            "bundle add xodr --launch 7",
+        ] {
+            assert!(!is_started(other), "{other}");
+        }
     }
 }

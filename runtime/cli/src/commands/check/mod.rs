@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use qcbus_broker::{Broker, Options, Outside, ResultPaths, Settings, StartError, Stop};
 use qcbus_bus::{HostOptions, Instance, SharedMemory, StartError as BusError};
 use qcbus_document::FileKind;
-use qcbus_formats::config::{Choice, Config};
+use qcbus_formats::config::{Choice, Config, Known};
 use qcbus_messages::Exit;
 use qcbus_messages::path_text::to_text;
 use tokio::sync::mpsc;
@@ -67,6 +67,12 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
     let bundles_d = args.bundles_d.as_deref().map(manifest_directory);
     let bundles_d = bundles_d.transpose().map_err(usage)?;
     let (roots, files) = targets(args, config.as_deref(), parsed.as_ref())?;
+    // A directory may have any number of them.
+    let several = if roots.is_empty() {
+        files.len()
+    } else {
+        usize::MAX
+    };
     let asam = config.is_some() && roots.is_empty() && files.len() == 1;
     let out = absolute(args.output.out.as_deref().unwrap_or(Path::new(if asam {
         "."
@@ -105,23 +111,34 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         bundles_d,
         standard: wanted_bundles(bundles.map_err(usage)?, parsed.as_ref()),
         reporters: standard::reporter_specs(&program),
-        known: standard::known(),
+        // Only configurations are compared with it.
+        known: match config_named {
+            true => standard::known(),
+            false => Known::default(),
+        },
         die_with_broker: true,
         sandbox: !args.no_sandbox,
         memory_limit: memory_limit(&args.limits),
         limits: limits(&args.limits),
         host: HostOptions::default(),
-        settings: Settings {
-            once: true,
-            collect: Duration::ZERO,
-            ..settings(&args.limits)
-        },
+        settings: run_settings(args, several),
     };
     Ok(Prepared {
         options,
         config: parsed.map(Arc::new),
         outputs,
     })
+}
+
+/// The state machine of a run that ends by itself. There are no more writers than files to write.
+fn run_settings(args: &CheckArgs, files: usize) -> Settings {
+    let settings = settings(&args.limits);
+    Settings {
+        once: true,
+        collect: Duration::ZERO,
+        max_storing: settings.max_storing.min(files.max(1)),
+        ..settings
+    }
 }
 
 /// What is to be asked, if somebody narrows it. A name that fits nothing is a mistake: what it was to

@@ -127,6 +127,11 @@ impl Outputs {
         Ok(())
     }
 
+    /// Whether results are printed in our own words alone.
+    pub(super) fn are_none(&self) -> bool {
+        self.reporters.is_empty()
+    }
+
     /// Gives a result to all of them.
     pub(super) fn report(&mut self, message: &mut ResultMessage, sources: &FileSources) {
         for output in &mut self.reporters {

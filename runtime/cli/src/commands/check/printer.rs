@@ -42,6 +42,8 @@ pub(super) struct Printer {
     /// The directories that are checked.
     roots: Vec<PathBuf>,
     config: Option<Arc<Config>>,
+    /// The command line names what is to be asked.
+    has_choice: bool,
     outputs: Outputs,
     args: PrintArgs,
     progress: talk::Progress,
@@ -74,6 +76,7 @@ impl Printer {
             places,
             roots,
             config,
+            has_choice: !args.select.is_empty() || !args.ignore.is_empty(),
             outputs,
             args: args.print.clone(),
             progress: talk::Progress::new(!args.print.quiet),
@@ -157,6 +160,10 @@ impl Printer {
             let why = judged.why.join("; ");
             talk::fail(&format!("{} has no result: {why}", to_text(&shown)));
         }
+        if self.has_nothing_to_say(&judged) {
+            self.tally.add_verdict(judged.verdict);
+            return;
+        }
         let verdict = judged.verdict;
         let delivery = Delivery {
             job: judged.job,
@@ -209,6 +216,21 @@ impl Printer {
         }
         choice.put_back(message);
         self.outputs.report(message, &sources);
+    }
+
+    /// Whether nothing of a result is printed but that there is one more accepted: most are so, and reading a result
+    /// back takes longer than checking a small file. Who configures or chooses is told in the result what was left
+    /// out, and reports are made of whole results.
+    fn has_nothing_to_say(&self, judged: &Judged) -> bool {
+        let is_clean = judged.is_accepted() && judged.counts == [0; 3];
+        let is_whole = self.config.is_none() && !self.has_choice;
+        let unread = !self.args.verbose && self.outputs.are_none();
+        // One that is not there any more cannot be read back, which is said where it is tried.
+        let is_there = |xqar: &PathBuf| {
+            let found = std::fs::symlink_metadata(xqar);
+            found.is_ok_and(|it| it.is_file() && it.len() > 0)
+        };
+        is_clean && is_whole && unread && judged.xqar.as_ref().is_some_and(is_there)
     }
 
     /// What stdout is for: of one file there is room for everything.

@@ -79,7 +79,7 @@ impl Tally {
         }
     }
 
-    /// A file whose result could not be read back.
+    /// A file whose result says nothing beside its verdict, or could not be read back.
     pub(super) fn add_verdict(&mut self, verdict: Verdict) {
         *self.verdicts.entry(verdict).or_default() += 1;
     }
