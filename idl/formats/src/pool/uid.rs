@@ -3,8 +3,22 @@
 /// Whether the text is a rule UID as ASAM's readers accept it:
 /// `entity.tld:standard:1.2.3:set.of.rules.name`.
 pub fn is_rule_uid(text: &str) -> bool {
-    let parts: Vec<&str> = text.split(':').collect();
-    let [entity, standard, setting, name] = parts[..] else {
+    let mut parts = text.split(':');
+    let parts = [
+        parts.next(),
+        parts.next(),
+        parts.next(),
+        parts.next(),
+        parts.next(),
+    ];
+    let [
+        Some(entity),
+        Some(standard),
+        Some(setting),
+        Some(name),
+        None,
+    ] = parts
+    else {
         return false;
     };
     words(entity, is_word) >= 2
@@ -20,12 +34,19 @@ pub fn is_rule_uid(text: &str) -> bool {
 
 /// The number of words between dots; 0 when one is empty or not as it should be.
 fn words(text: &str, good: impl Fn(&str) -> bool) -> usize {
-    let fine = text.split('.').all(|word| !word.is_empty() && good(word));
-    if fine { text.split('.').count() } else { 0 }
+    let mut count = 0;
+    for word in text.split('.') {
+        if word.is_empty() || !good(word) {
+            return 0;
+        }
+        count += 1;
+    }
+    count
 }
 
 fn is_word(word: &str) -> bool {
-    word.chars().all(|c| c.is_alphanumeric() || c == '_')
+    let plain = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'_';
+    word.bytes().all(plain) || word.chars().all(|c| c.is_alphanumeric() || c == '_')
 }
 
 #[cfg(test)]
