@@ -1,6 +1,6 @@
 //! The journal: what must survive the broker, in SQLite. The schema is in `journal.sql`.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,18 +15,20 @@ use qcbus_disk::{FileMark, trust};
 
 mod error;
 mod rows;
+mod shared;
 #[cfg(test)]
 mod tests;
 mod write;
 
 pub use error::JournalError;
+pub use shared::SharedJournal;
 
 use error::classify;
 use rows::{judged_of, millis, number};
-use write::put;
+use write::{Change, changes};
 
 /// Version of the schema, kept in SQLite's `user_version`.
-pub const SCHEMA_VERSION: i64 = 3;
+pub const SCHEMA_VERSION: i64 = 4;
 
 const SCHEMA: &str = include_str!("journal.sql");
 
@@ -63,8 +65,10 @@ pub struct History {
     pub micros: u64,
     /// By bundle: name, version, microseconds, failure.
     pub bundles: Vec<(String, String, u64, String)>,
-    /// Bundle, checker, status, number of issues, of checkers worth mentioning.
+    /// Bundle, checker, status, number of issues, of those that failed or have findings.
     pub checkers: Vec<(String, String, String, u64)>,
+    /// By bundle the checkers that were skipped.
+    pub skipped: Vec<(String, Vec<String>)>,
 }
 
 /// Something to remember.
@@ -127,6 +131,8 @@ pub enum Entry {
 pub struct Journal {
     connection: Connection,
     path: PathBuf,
+    /// Lists of checkers that are in it for certain.
+    lists: HashSet<i64>,
     /// Kept as long as the journal is.
     _lock: Option<DirectoryLock>,
 }
@@ -162,6 +168,7 @@ impl Journal {
         Ok(Journal {
             connection,
             path,
+            lists: HashSet::new(),
             _lock: Some(lock),
         })
     }
@@ -177,6 +184,7 @@ impl Journal {
         Ok(Journal {
             connection,
             path,
+            lists: HashSet::new(),
             _lock: None,
         })
     }
@@ -315,27 +323,43 @@ impl Journal {
     /// # Errors
     /// When SQLite cannot write, a full disk for instance; the entries are the caller's to keep.
     pub fn write(&mut self, entries: &[Entry]) -> Result<(), JournalError> {
-        let written = self.try_to_write(entries);
+        let all: Vec<Change> = entries.iter().flat_map(changes).collect();
+        self.make(&[&all])
+    }
+
+    /// Makes changes in one transaction: all of them or none.
+    fn make(&mut self, changes: &[&[Change]]) -> Result<(), JournalError> {
+        let made = self.try_to_make(changes);
         // What was written before may take twice its room until it is put where it belongs.
         let full = |error: &rusqlite::Error| {
             error.sqlite_error_code() == Some(rusqlite::ErrorCode::DiskFull)
         };
-        let written = match written {
+        let made = match made {
             Err(error) if full(&error) => self
                 .connection
                 .execute_batch("PRAGMA wal_checkpoint(TRUNCATE)")
-                .and_then(|()| self.try_to_write(entries)),
-            written => written,
+                .and_then(|()| self.try_to_make(changes)),
+            made => made,
         };
-        written.map_err(|source| classify(&self.path, source))
+        made.map_err(|source| classify(&self.path, source))
     }
 
-    fn try_to_write(&mut self, entries: &[Entry]) -> rusqlite::Result<()> {
+    fn try_to_make(&mut self, changes: &[&[Change]]) -> rusqlite::Result<()> {
         let transaction = self.connection.transaction()?;
-        for entry in entries {
-            put(&transaction, entry)?;
+        let mut lists = Vec::new();
+        for change in changes.iter().copied().flatten() {
+            if change.list.is_some_and(|it| self.lists.contains(&it)) {
+                continue;
+            }
+            change.make(&transaction)?;
+            lists.extend(change.list);
         }
-        transaction.commit()
+        transaction.commit()?;
+        if self.lists.len() > MOST_LISTS {
+            self.lists.clear();
+        }
+        self.lists.extend(lists);
+        Ok(())
     }
 
     /// Forgets the history of jobs older than `keep`.
@@ -344,11 +368,28 @@ impl Journal {
     /// When SQLite cannot write.
     pub fn prune(&mut self, keep: Duration) -> Result<usize, JournalError> {
         let before = millis().saturating_sub(i64::try_from(keep.as_millis()).unwrap_or(i64::MAX));
-        self.connection
-            .execute("DELETE FROM jobs WHERE at < ?1", params![before])
-            .map_err(|source| classify(&self.path, source))
+        // Lists that no job has any more go, too, so that none is known for certain.
+        self.lists.clear();
+        let mut prune = || -> rusqlite::Result<usize> {
+            let transaction = self.connection.transaction()?;
+            let pruned = transaction.execute("DELETE FROM jobs WHERE at < ?1", params![before])?;
+            if pruned > 0 {
+                let unused =
+                    "DELETE FROM checker_lists WHERE list NOT IN (SELECT list FROM job_skipped)";
+                transaction.execute(unused, [])?;
+            }
+            transaction.commit()?;
+            Ok(pruned)
+        };
+        prune().map_err(|source| classify(&self.path, source))
     }
 }
+
+/// Lists of checkers that are remembered as being in the journal.
+const MOST_LISTS: usize = 10_000;
+
+/// Statements that are kept ready: as many as there are for entries.
+const STATEMENTS: usize = 24;
 
 fn prepare(connection: &Connection, path: &Path) -> Result<(), JournalError> {
     let fail = |source| classify(path, source);
@@ -374,6 +415,13 @@ fn prepare(connection: &Connection, path: &Path) -> Result<(), JournalError> {
                      PRAGMA user_version = 3; COMMIT;";
         connection.execute_batch(newer).map_err(fail)?;
     }
+    if (1..=3).contains(&found) {
+        // What was skipped stays in it as it is, row by row.
+        connection
+            .execute_batch("BEGIN; ALTER TABLE job_checkers RENAME TO job_findings; PRAGMA user_version = 4; COMMIT;")
+            .map_err(fail)?;
+    }
+    connection.set_prepared_statement_cache_capacity(STATEMENTS);
     // WAL with synchronous=NORMAL survives a killed process; after a power cut the last verdicts
     // may be missing, and their files are judged anew.
     connection

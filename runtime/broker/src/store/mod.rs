@@ -9,8 +9,8 @@ mod withdraw;
 
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use qcbus_formats::config::{Choice, Config};
 use qcbus_formats::pool::{BundleOutcome, Pooled};
@@ -18,9 +18,9 @@ use qcbus_formats::xqar::{self, Dialect, Status};
 use qcbus_messages::Verdict;
 use qcbus_messages::path_text::to_text;
 
-use crate::core::{FinishedJob, Judged, StoreOutcome};
+use crate::core::{FinishedJob, Judged, ShareOutcome, StoreOutcome};
 use crate::gate::Gate;
-use crate::journal::{Entry, History, Journal, JournalError, Remembered, Void};
+use crate::journal::{Entry, History, JournalError, Remembered, SharedJournal, Void};
 use crate::result_paths::ResultPaths;
 use crate::scouts::Scouts;
 use crate::seams::{disk, step};
@@ -30,7 +30,7 @@ use crate::verdict_file;
 use qcbus_disk::{FileMark, is_for_good, write_both, write_whole};
 
 pub use earlier::remove_earlier_results;
-use pooling::{reasons, taken};
+use pooling::reasons;
 pub use reconcile::Reconciled;
 pub use refresh::digest_of;
 use refresh::refreshed;
@@ -55,13 +55,13 @@ pub struct Store {
     /// Who looks at files.
     pub scouts: Scouts,
     /// What is remembered.
-    pub journal: Mutex<Journal>,
+    pub journal: SharedJournal,
     /// The epoch of who must judge: what was judged in an earlier one is not stored.
     pub epoch: AtomicU64,
 }
 
 impl Store {
-    /// Pools, writes, publishes, records. The findings are taken out of the job.
+    /// Pools, writes, publishes, records.
     pub fn store(
         &self,
         job: &mut FinishedJob,
@@ -74,7 +74,7 @@ impl Store {
             Ok(false) => return StoreOutcome::Stale,
             Err(error) => return StoreOutcome::Failed(unlooked(&job.path, &error)),
         }
-        let outcomes: Vec<BundleOutcome> = job.bundles.iter_mut().map(taken).collect();
+        let outcomes: Vec<BundleOutcome> = job.bundles.iter().map(ShareOutcome::said).collect();
         let pooled = self.pool(job, outcomes, config, root);
         reached("pooled", &job.path);
         let verdict = pooled.verdict();
@@ -243,8 +243,11 @@ impl Store {
     /// What a person should know; the entries are not written then.
     pub fn record(&self, entries: &[Entry]) -> Result<(), String> {
         disk().map_err(|error| format!("the journal cannot be written: {error}"))?;
-        let written = self.journal().write(entries);
-        written.map_err(|error| error.to_string())
+        let noted = self.journal.note(entries);
+        if let Some(path) = entries.first().and_then(Entry::path) {
+            step("noted", path);
+        }
+        self.journal.settle(&noted)
     }
 
     /// Everything that is remembered of files.
@@ -252,7 +255,7 @@ impl Store {
     /// # Errors
     /// When the journal cannot be read.
     pub fn remembered(&self) -> Result<Vec<Remembered>, JournalError> {
-        self.journal().remembered()
+        self.journal.get().remembered()
     }
 
     /// What reporters are still to take back.
@@ -260,7 +263,7 @@ impl Store {
     /// # Errors
     /// When the journal cannot be read.
     pub fn voids(&self) -> Result<Vec<Void>, JournalError> {
-        self.journal().voids()
+        self.journal.get().voids()
     }
 
     /// Forgets the history of jobs older than `keep`.
@@ -268,12 +271,8 @@ impl Store {
     /// # Errors
     /// What a person should know.
     pub fn prune(&self, keep: std::time::Duration) -> Result<(), String> {
-        let pruned = self.journal().prune(keep);
+        let pruned = self.journal.get().prune(keep);
         pruned.map(|_| ()).map_err(|error| error.to_string())
-    }
-
-    fn journal(&self) -> MutexGuard<'_, Journal> {
-        self.journal.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -358,21 +357,28 @@ fn judged(
 fn history(job: &FinishedJob, pooled: &Pooled) -> History {
     let bundles = job.bundles.iter().map(|it| {
         (
-            it.said.name.clone(),
-            it.said.version.clone(),
+            it.name.clone(),
+            it.version.clone(),
             it.micros,
             it.failure.clone().unwrap_or_default(),
         )
     });
-    let mut checkers = Vec::new();
+    let (mut checkers, mut skipped) = (Vec::new(), Vec::new());
     for bundle in &pooled.results.bundles {
+        let mut left_out = Vec::new();
         for checker in &bundle.checkers {
-            let status = checker.status.unwrap_or(Status::Error);
-            if status != Status::Completed || !checker.issues.is_empty() {
-                let status = format!("{status:?}").to_lowercase();
-                let issues = checker.issues.len() as u64;
-                checkers.push((bundle.name.clone(), checker.id.clone(), status, issues));
+            let issues = checker.issues.len() as u64;
+            match checker.status.unwrap_or(Status::Error) {
+                Status::Completed if issues == 0 => {}
+                Status::Skipped if issues == 0 => left_out.push(checker.id.clone()),
+                status => {
+                    let (bundle, checker) = (bundle.name.clone(), checker.id.clone());
+                    checkers.push((bundle, checker, status.as_str().to_owned(), issues));
+                }
             }
+        }
+        if !left_out.is_empty() {
+            skipped.push((bundle.name.clone(), left_out));
         }
     }
     History {
@@ -380,5 +386,6 @@ fn history(job: &FinishedJob, pooled: &Pooled) -> History {
         micros: u64::try_from(job.elapsed.as_micros()).unwrap_or(u64::MAX),
         bundles: bundles.collect(),
         checkers,
+        skipped,
     }
 }
