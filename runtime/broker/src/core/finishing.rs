@@ -94,7 +94,7 @@ impl State {
             }
             let checkers = self.demand.checkers(name, catalogue, kind);
             let version = &bundle.version;
-            outcomes.push(not_applicable(name, version, catalogue, &checkers, kind));
+            outcomes.push(not_applicable(name, version, catalogue, checkers, kind));
         }
         outcomes
     }

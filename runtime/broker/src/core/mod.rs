@@ -51,6 +51,7 @@ pub use jury::{Epoch, Juror, Jury, Mark, Member, Origin};
 pub use notice::Notice;
 pub(crate) use outcome::{facts_weight, weight};
 pub use settings::Settings;
+pub use staging::Staged;
 pub use types::*;
 
 use announcing::Unrest;

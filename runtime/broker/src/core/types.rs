@@ -1,12 +1,12 @@
 //! The words of the state machine.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
 use qcbus_document::FileKind;
 use qcbus_formats::manifest::May;
-use qcbus_formats::pool::BundleOutcome;
 use qcbus_messages::control::FileVerdict;
 use qcbus_messages::{Catalogue, Digest, Job, JobDocument, JobId, MissingDocument, Role, Verdict};
 
@@ -220,14 +220,29 @@ pub enum Reported {
 /// What one bundle's share of a job came to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShareOutcome {
-    /// What it said, as it goes into the result.
-    pub said: BundleOutcome,
-    /// What it offers; `None` for a bundle that was demanded and never seen.
-    pub catalogue: Option<Arc<Catalogue>>,
+    /// The bundle.
+    pub name: String,
+    /// Its version.
+    pub version: String,
     /// Why the whole bundle failed, if it did.
     pub failure: Option<String>,
+    /// The checkers that had to look, as the catalogue numbers them.
+    pub demanded: Arc<[u32]>,
+    /// What it said; see [`ShareOutcome::said`].
+    pub answer: Answer,
+    /// What it offers; `None` for a bundle that was demanded and never seen.
+    pub catalogue: Option<Arc<Catalogue>>,
     /// Time spent checking, in microseconds, as the bundle says.
     pub micros: u64,
+}
+
+/// What a bundle said of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Answer {
+    /// By checker.
+    Said(Arc<BTreeMap<u32, super::Staged>>),
+    /// It was not asked, for it does not take files of this kind.
+    OtherKind(FileKind),
 }
 
 /// A job whose checking is over, ready to be pooled and stored.
