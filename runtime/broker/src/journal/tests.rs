@@ -134,7 +134,9 @@ fn a_journal_of_schema_1_opens_and_its_stamps_fit_nothing() {
     journal
         .connection
         .execute_batch(
-            "ALTER TABLE files RENAME COLUMN jury TO bundles; \
+            "DROP VIEW job_checkers; DROP TABLE job_skipped; DROP TABLE checker_lists; \
+             ALTER TABLE job_findings RENAME TO job_checkers; \
+             ALTER TABLE files RENAME COLUMN jury TO bundles; \
              ALTER TABLE files DROP COLUMN epoch; ALTER TABLE files DROP COLUMN written; \
              UPDATE files SET bundles = 'ffffffffffffffff'; \
              INSERT INTO deliveries VALUES ('/a.xosc', 'json', 5), ('/a.xosc', 'text', 0); \
