@@ -32,8 +32,15 @@ pub enum Dialect {
 /// because ASAM's readers refuse the whole file otherwise, and an issue's place without any
 /// location that the form knows is written as row 1, column 1.
 pub fn write(results: &Results, dialect: Dialect) -> String {
+    write_into(String::new(), results, dialect)
+}
+
+/// As [`write`], in the memory of a text that nobody needs any more.
+pub fn write_into(mut memory: String, results: &Results, dialect: Dialect) -> String {
+    memory.clear();
+    memory.reserve(room(results));
     let mut writer = Writer {
-        out: Markup::new(room(results)),
+        out: Markup::new(memory),
         dialect,
         file_type: "1",
     };

@@ -29,9 +29,8 @@ pub(super) struct Markup {
 }
 
 impl Markup {
-    /// `room` is about how many bytes will be written.
-    pub fn new(room: usize) -> Markup {
-        let mut text = String::with_capacity(room);
+    /// Begins at the end of a text.
+    pub fn new(mut text: String) -> Markup {
         text.push_str("<?xml version=\"1.0\" encoding=\"UTF-8\" standalone=\"no\"?>\n");
         Markup { text, depth: 0 }
     }
