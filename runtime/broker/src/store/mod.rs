@@ -7,6 +7,7 @@ mod reconcile;
 mod refresh;
 mod withdraw;
 
+use std::cell::Cell;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -185,7 +186,22 @@ impl Store {
         pooled: &Pooled,
         judged: &Judged,
     ) -> Result<Option<FileMark>, Unwritten> {
-        let text = xqar::write(&pooled.results, self.dialect);
+        let memory = TEXT.take();
+        let text = xqar::write_into(memory, &pooled.results, self.dialect);
+        let written = self.write_texts(job, pooled, judged, &text);
+        if text.capacity() <= MOST_KEPT {
+            TEXT.set(text);
+        }
+        written
+    }
+
+    fn write_texts(
+        &self,
+        job: &FinishedJob,
+        pooled: &Pooled,
+        judged: &Judged,
+        text: &str,
+    ) -> Result<Option<FileMark>, Unwritten> {
         let xqar = self.places.xqar(&job.path);
         let result = (&*xqar, text.as_bytes());
         disk().map_err(|error| unwritten(&xqar, &error))?;
@@ -275,6 +291,15 @@ impl Store {
         pruned.map(|_| ()).map_err(|error| error.to_string())
     }
 }
+
+thread_local! {
+    /// The memory of the last result's text: to have as much anew for every small file costs more than to
+    /// write the text.
+    static TEXT: Cell<String> = const { Cell::new(String::new()) };
+}
+
+/// Bytes that a thread keeps for the next text.
+const MOST_KEPT: usize = 1 << 20;
 
 /// Why something that is to be tried again could not be done.
 #[derive(Debug)]
