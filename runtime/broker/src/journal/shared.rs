@@ -1,8 +1,8 @@
-//! The journal among the threads that write: whoever holds it writes what all others have for it who wait,
-//! in one transaction. So many verdicts cost little more than one, and a single one waits for nobody.
+//! The journal among the threads that write: whoever writes writes what all others have noted meanwhile,
+//! too, in one transaction. So many verdicts cost little more than one, and a single one waits for nobody.
 
 use std::path::Path;
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::write::{Change, changes};
 use super::{Entry, Journal};
@@ -13,9 +13,18 @@ type Answer = Result<(), String>;
 /// A journal that several threads write.
 #[derive(Debug)]
 pub struct SharedJournal {
-    /// In the order in which they came.
-    waiting: Mutex<Vec<Note>>,
+    queue: Mutex<Queue>,
+    /// Somebody has written.
+    written: Condvar,
     journal: Mutex<Journal>,
+}
+
+#[derive(Debug, Default)]
+struct Queue {
+    /// In the order in which they came.
+    waiting: Vec<Note>,
+    /// Somebody is writing.
+    is_led: bool,
 }
 
 /// Entries that are to be written.
@@ -25,7 +34,7 @@ struct Note {
     answer: Arc<OnceLock<Answer>>,
 }
 
-/// Entries that somebody will write: who has noted them, or who holds the journal before him.
+/// Entries that somebody will write: who has noted them, or who writes before him.
 #[derive(Debug)]
 #[must_use = "nothing is written before it is settled"]
 pub struct Noted(Arc<OnceLock<Answer>>);
@@ -33,7 +42,8 @@ pub struct Noted(Arc<OnceLock<Answer>>);
 impl From<Journal> for SharedJournal {
     fn from(journal: Journal) -> SharedJournal {
         SharedJournal {
-            waiting: Mutex::default(),
+            queue: Mutex::default(),
+            written: Condvar::new(),
             journal: Mutex::new(journal),
         }
     }
@@ -45,7 +55,7 @@ impl SharedJournal {
         let changes = entries.iter().flat_map(changes).collect();
         let answer = Arc::new(OnceLock::new());
         let noted = Noted(answer.clone());
-        self.waiting().push(Note { changes, answer });
+        self.queue().waiting.push(Note { changes, answer });
         noted
     }
 
@@ -54,12 +64,24 @@ impl SharedJournal {
     /// # Errors
     /// For a person.
     pub fn settle(&self, noted: &Noted) -> Answer {
-        let mut journal = self.get();
-        if noted.0.get().is_none() {
-            let together = std::mem::take(&mut *self.waiting());
-            write(&mut journal, &together);
+        let mut queue = self.queue();
+        loop {
+            if let Some(answer) = noted.0.get() {
+                return answer.clone();
+            }
+            if !queue.is_led {
+                break;
+            }
+            let woken = self.written.wait(queue);
+            queue = woken.unwrap_or_else(PoisonError::into_inner);
         }
-        // Who panicked while he wrote for others leaves them without an answer, and nothing written.
+        queue.is_led = true;
+        let together = std::mem::take(&mut queue.waiting);
+        drop(queue);
+        let lead = Lead(self);
+        write(&mut self.get(), &together);
+        drop(lead);
+        // Who panicked while he wrote for others leaves them without an answer.
         let lost = || Err("the journal was not written: a writer has panicked".to_owned());
         noted.0.get().cloned().unwrap_or_else(lost)
     }
@@ -69,8 +91,18 @@ impl SharedJournal {
         self.journal.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn waiting(&self) -> MutexGuard<'_, Vec<Note>> {
-        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    fn queue(&self) -> MutexGuard<'_, Queue> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Who writes for others; the next may when this is dropped, also by a panic.
+struct Lead<'a>(&'a SharedJournal);
+
+impl Drop for Lead<'_> {
+    fn drop(&mut self) {
+        self.0.queue().is_led = false;
+        self.0.written.notify_all();
     }
 }
 
