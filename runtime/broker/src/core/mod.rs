@@ -49,9 +49,9 @@ pub use action::Action;
 pub use event::Event;
 pub use jury::{Epoch, Juror, Jury, Mark, Member, Origin};
 pub use notice::Notice;
+pub use outcome::ShareOutcome;
 pub(crate) use outcome::{facts_weight, weight};
 pub use settings::Settings;
-pub use staging::Staged;
 pub use types::*;
 
 use announcing::Unrest;

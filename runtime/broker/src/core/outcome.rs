@@ -10,7 +10,34 @@ use qcbus_messages::{Catalogue, CheckerInfo};
 
 use super::jobs::{Share, ShareState};
 use super::staging::Staged;
-use super::types::{Answer, ShareOutcome};
+
+/// What one bundle's share of a job came to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShareOutcome {
+    /// The bundle.
+    pub name: String,
+    /// Its version.
+    pub version: String,
+    /// Why the whole bundle failed, if it did.
+    pub failure: Option<String>,
+    /// The checkers that had to look, as the catalogue numbers them.
+    pub demanded: Arc<[u32]>,
+    /// What it said; see [`ShareOutcome::said`].
+    pub answer: Answer,
+    /// What it offers; `None` for a bundle that was demanded and never seen.
+    pub catalogue: Option<Arc<Catalogue>>,
+    /// Time spent checking, in microseconds, as the bundle says.
+    pub micros: u64,
+}
+
+/// What a bundle said of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Answer {
+    /// By checker.
+    Said(Arc<BTreeMap<u32, Staged>>),
+    /// It was not asked, for it does not take files of this kind.
+    OtherKind(FileKind),
+}
 
 /// What one share comes to. It is put in the form of a result by whoever stores it, and not in the loop.
 pub(super) fn outcome(name: &str, share: &Share) -> ShareOutcome {

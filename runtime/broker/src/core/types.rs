@@ -1,6 +1,5 @@
 //! The words of the state machine.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -13,6 +12,7 @@ use qcbus_messages::{Catalogue, Digest, Job, JobDocument, JobId, MissingDocument
 use sha2::{Digest as _, Sha256};
 
 use super::jury::{Epoch, Jury};
+use super::outcome::ShareOutcome;
 
 /// A peer's session on the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -215,34 +215,6 @@ pub enum Reported {
     Of(JobId),
     /// The file had gone, and the report is not known to have been taken back.
     OfGone,
-}
-
-/// What one bundle's share of a job came to.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ShareOutcome {
-    /// The bundle.
-    pub name: String,
-    /// Its version.
-    pub version: String,
-    /// Why the whole bundle failed, if it did.
-    pub failure: Option<String>,
-    /// The checkers that had to look, as the catalogue numbers them.
-    pub demanded: Arc<[u32]>,
-    /// What it said; see [`ShareOutcome::said`].
-    pub answer: Answer,
-    /// What it offers; `None` for a bundle that was demanded and never seen.
-    pub catalogue: Option<Arc<Catalogue>>,
-    /// Time spent checking, in microseconds, as the bundle says.
-    pub micros: u64,
-}
-
-/// What a bundle said of a file.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Answer {
-    /// By checker.
-    Said(Arc<BTreeMap<u32, super::Staged>>),
-    /// It was not asked, for it does not take files of this kind.
-    OtherKind(FileKind),
 }
 
 /// A job whose checking is over, ready to be pooled and stored.

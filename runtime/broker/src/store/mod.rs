@@ -1,6 +1,7 @@
 //! From outcomes to files on disk: pooling, the result, the verdict file, the gate.
 
 mod earlier;
+mod history;
 mod leftovers;
 mod pooling;
 mod reconcile;
@@ -15,13 +16,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use qcbus_formats::config::{Choice, Config};
 use qcbus_formats::pool::{BundleOutcome, Pooled};
-use qcbus_formats::xqar::{self, Dialect, Status};
+use qcbus_formats::xqar::{self, Dialect};
 use qcbus_messages::Verdict;
 use qcbus_messages::path_text::to_text;
 
 use crate::core::{FinishedJob, Judged, ShareOutcome, StoreOutcome};
 use crate::gate::Gate;
-use crate::journal::{Entry, History, JournalError, Remembered, SharedJournal, Void};
+use crate::journal::{Entry, JournalError, Remembered, SharedJournal, Void};
 use crate::result_paths::ResultPaths;
 use crate::scouts::Scouts;
 use crate::seams::{disk, step};
@@ -31,6 +32,7 @@ use crate::verdict_file;
 use qcbus_disk::{FileMark, is_for_good, write_both, write_whole};
 
 pub use earlier::remove_earlier_results;
+use history::history;
 use pooling::reasons;
 pub use reconcile::Reconciled;
 pub use refresh::digest_of;
@@ -376,41 +378,5 @@ fn judged(
         ],
         why,
         xqar: Some(xqar),
-    }
-}
-
-fn history(job: &FinishedJob, pooled: &Pooled) -> History {
-    let bundles = job.bundles.iter().map(|it| {
-        (
-            it.name.clone(),
-            it.version.clone(),
-            it.micros,
-            it.failure.clone().unwrap_or_default(),
-        )
-    });
-    let (mut checkers, mut skipped) = (Vec::new(), Vec::new());
-    for bundle in &pooled.results.bundles {
-        let mut left_out = Vec::new();
-        for checker in &bundle.checkers {
-            let issues = checker.issues.len() as u64;
-            match checker.status.unwrap_or(Status::Error) {
-                Status::Completed if issues == 0 => {}
-                Status::Skipped if issues == 0 => left_out.push(checker.id.clone()),
-                status => {
-                    let (bundle, checker) = (bundle.name.clone(), checker.id.clone());
-                    checkers.push((bundle, checker, status.as_str().to_owned(), issues));
-                }
-            }
-        }
-        if !left_out.is_empty() {
-            skipped.push((bundle.name.clone(), left_out));
-        }
-    }
-    History {
-        bytes: job.prepared.as_ref().map_or(0, |it| it.bytes),
-        micros: u64::try_from(job.elapsed.as_micros()).unwrap_or(u64::MAX),
-        bundles: bundles.collect(),
-        checkers,
-        skipped,
     }
 }
