@@ -1,8 +1,8 @@
 //! What is written when, and what is not.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
-use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use qcbus_document::FileKind;
@@ -31,7 +31,7 @@ fn store_in(dir: &Path) -> Store {
         verdict_files: true,
         retries: true,
         gate: None,
-        journal: Mutex::new(Journal::open(&dir.join("state"), "test").unwrap()),
+        journal: Journal::open(&dir.join("state"), "test").unwrap().into(),
         epoch: AtomicU64::new(NOW),
     }
 }

@@ -151,14 +151,7 @@ impl Order {
             | Order::CloseGate { path }
             | Order::OpenGate { path, .. }
             | Order::Follow { path } => Some(path),
-            Order::Record(
-                Entry::Judged { path, .. }
-                | Entry::Withdrawn { path, .. }
-                | Entry::Left { path, .. }
-                | Entry::Voided { path, .. }
-                | Entry::Delivered { path, .. },
-            ) => Some(path),
-            Order::Record(Entry::Enrolled(_) | Entry::Struck { .. }) => None,
+            Order::Record(entry) => entry.path(),
         }
     }
 }

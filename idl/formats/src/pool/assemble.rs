@@ -330,6 +330,10 @@ impl<'a> Pool<'a, '_> {
 
 /// Checkers of one id become one: ids are unique in a result, and no issue is dropped for it.
 fn merged(outcomes: Vec<CheckerOutcome>) -> Vec<CheckerOutcome> {
+    let mut ids = std::collections::HashSet::with_capacity(outcomes.len());
+    if outcomes.iter().all(|it| ids.insert(it.id.as_str())) {
+        return outcomes;
+    }
     let mut all: Vec<CheckerOutcome> = Vec::with_capacity(outcomes.len());
     let mut seen: std::collections::HashMap<String, usize> = std::collections::HashMap::new();
     for outcome in outcomes {

@@ -14,4 +14,4 @@ pub use model::{
     Param, Results, Status,
 };
 pub use read::{ReadError, read};
-pub use write::{Dialect, FORMAT_VERSION, write};
+pub use write::{Dialect, FORMAT_VERSION, write, write_into};

@@ -32,13 +32,32 @@ pub enum Dialect {
 /// because ASAM's readers refuse the whole file otherwise, and an issue's place without any
 /// location that the form knows is written as row 1, column 1.
 pub fn write(results: &Results, dialect: Dialect) -> String {
+    write_into(String::new(), results, dialect)
+}
+
+/// As [`write`], in the memory of a text that nobody needs any more.
+pub fn write_into(mut memory: String, results: &Results, dialect: Dialect) -> String {
+    memory.clear();
+    memory.reserve(room(results));
     let mut writer = Writer {
-        out: Markup::new(),
+        out: Markup::new(memory),
         dialect,
         file_type: "1",
     };
     writer.results(results);
     writer.out.finish()
+}
+
+/// About how many bytes a result has as text, on the safe side for most.
+fn room(results: &Results) -> usize {
+    let checkers = results.bundles.iter().flat_map(|it| &it.checkers);
+    let rows = |it: &Checker| {
+        let of_rules: usize = it.addressed_rules.iter().map(|uid| 40 + uid.len()).sum();
+        of_rules + 64 * it.params.len() + 128 * it.metadata.len() + 1024 * it.issues.len()
+    };
+    let room =
+        |it: &Checker| 128 + it.id.len() + it.description.len() + it.summary.len() + rows(it);
+    1024 + checkers.map(room).sum::<usize>()
 }
 
 struct Writer {
@@ -85,15 +104,16 @@ impl Writer {
     }
 
     fn checker(&mut self, checker: &Checker) {
-        let mut attributes = vec![
-            ("checkerId", checker.id.as_str()),
-            ("description", &checker.description),
-            ("summary", &checker.summary),
-        ];
+        let id = ("checkerId", checker.id.as_str());
+        let description = ("description", checker.description.as_str());
+        let summary = ("summary", checker.summary.as_str());
         if let (Some(status), Dialect::Current) = (checker.status, self.dialect) {
-            attributes.insert(2, ("status", status.as_str()));
+            let status = ("status", status.as_str());
+            self.out
+                .open("Checker", &[id, description, status, summary]);
+        } else {
+            self.out.open("Checker", &[id, description, summary]);
         }
-        self.out.open("Checker", &attributes);
         self.params(&checker.params);
         for issue in &checker.issues {
             self.issue(issue);
@@ -118,13 +138,17 @@ impl Writer {
     }
 
     fn rules(&mut self, checker: &Checker) {
-        let mut written: Vec<&str> = Vec::with_capacity(checker.addressed_rules.len());
-        let listed = checker.addressed_rules.iter().map(String::as_str);
-        let broken = checker.issues.iter().map(|issue| issue.rule_uid.as_str());
-        for uid in listed.chain(broken.filter(|uid| !uid.is_empty())) {
-            if !written.contains(&uid) {
+        let listed = &checker.addressed_rules;
+        for (at, uid) in listed.iter().enumerate() {
+            if !listed[..at].contains(uid) {
                 self.out.empty("AddressedRule", &[("ruleUID", uid)]);
-                written.push(uid);
+            }
+        }
+        let mut besides: Vec<&String> = Vec::new();
+        for uid in checker.issues.iter().map(|issue| &issue.rule_uid) {
+            if !uid.is_empty() && !listed.contains(uid) && !besides.contains(&uid) {
+                self.out.empty("AddressedRule", &[("ruleUID", uid)]);
+                besides.push(uid);
             }
         }
     }

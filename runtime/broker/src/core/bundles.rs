@@ -265,7 +265,7 @@ impl State {
         bundle.offences = 0;
         bundle.note.clear();
         self.sessions
-            .insert(session, (Role::Bundle, hello.name.clone()));
+            .insert(session, (Role::Bundle, hello.name.as_str().into()));
         actions.push(Action::Accept { session });
         self.drain_unwanted(&hello.name, launch, actions);
     }
@@ -292,18 +292,30 @@ impl State {
         }
     }
 
-    /// Something from a bundle.
-    pub(super) fn bundle_says(&mut self, name: &str, message: FromPeer, actions: &mut Actions) {
+    /// Something from a bundle. `false`: it was only put aside.
+    pub(super) fn bundle_says(
+        &mut self,
+        name: &str,
+        message: FromPeer,
+        actions: &mut Actions,
+    ) -> bool {
         let now = self.now;
         let Some(bundle) = self.bundles.get_mut(name) else {
-            return;
+            return true;
         };
         bundle.heard = now;
         match about(&message).map(|job| bundle.word(job)) {
             None | Some(Word::Due) => {}
-            Some(Word::Late) => return,
-            Some(Word::Lie) => return self.lie(name, actions),
+            Some(Word::Late) => return true,
+            Some(Word::Lie) => {
+                self.lie(name, actions);
+                return true;
+            }
         }
+        let put_aside = matches!(
+            message,
+            FromPeer::Issues { .. } | FromPeer::CheckerDone { .. }
+        );
         let is_true = match message {
             FromPeer::Catalogue(catalogue) => {
                 self.catalogue(name, *catalogue, actions);
@@ -336,6 +348,7 @@ impl State {
         if !is_true {
             self.lie(name, actions);
         }
+        !(put_aside && is_true)
     }
 
     fn lie(&mut self, name: &str, actions: &mut Actions) {

@@ -79,7 +79,7 @@ impl State {
     fn kill_ours(&self, actions: &mut Actions) {
         for (role, name) in self.sessions.values() {
             let launch = match role {
-                Role::Bundle => self.bundles.get(name).and_then(|it| it.launch),
+                Role::Bundle => self.bundles.get(&**name).and_then(|it| it.launch),
                 Role::Reporter => self.reporter_named(name).and_then(|it| it.launch),
             };
             actions.extend(launch.map(|launch| Action::Kill { launch }));

@@ -10,8 +10,8 @@ use super::action::Action;
 use super::files::{FileId, Priority, Stage};
 use super::jobs::{ActiveJob, JobStage, Share};
 use super::notice::Notice;
-use super::outcome::{not_applicable, outcome};
-use super::types::{FinishedJob, Judged, ShareOutcome, StoreOutcome};
+use super::outcome::{ShareOutcome, not_applicable, outcome};
+use super::types::{FinishedJob, Judged, StoreOutcome};
 use super::{Actions, State};
 
 impl State {
@@ -94,7 +94,7 @@ impl State {
             }
             let checkers = self.demand.checkers(name, catalogue, kind);
             let version = &bundle.version;
-            outcomes.push(not_applicable(name, version, catalogue, &checkers, kind));
+            outcomes.push(not_applicable(name, version, catalogue, checkers, kind));
         }
         outcomes
     }

@@ -65,8 +65,9 @@ pub(super) struct Share {
     /// As it was when the job was given out; `None` for a bundle that was never seen.
     pub catalogue: Option<Arc<Catalogue>>,
     pub mark: Option<Mark>,
-    pub demanded: Vec<u32>,
-    pub staged: BTreeMap<u32, Staged>,
+    pub demanded: Arc<[u32]>,
+    /// Nobody else has it before it goes to a writer.
+    pub staged: Arc<BTreeMap<u32, Staged>>,
     pub staged_bytes: usize,
     pub micros: u64,
     /// It was with a bundle that died; it is tried alone from now on.
@@ -96,7 +97,7 @@ impl Share {
             catalogue: seat.catalogue.clone(),
             mark: seat.mark,
             demanded: seat.demanded.clone(),
-            staged: BTreeMap::new(),
+            staged: Arc::default(),
             staged_bytes: 0,
             micros: 0,
             suspect: false,
@@ -111,7 +112,7 @@ impl Share {
 
     /// Forgets what a session that has ended said.
     pub fn unstage(&mut self) {
-        self.staged.clear();
+        self.staged = Arc::default();
         self.staged_bytes = 0;
     }
 }

@@ -79,7 +79,7 @@ pub(super) struct Seat {
     pub catalogue: Option<Arc<Catalogue>>,
     pub mark: Option<Mark>,
     /// Indexes of the checkers that are to run.
-    pub demanded: Vec<u32>,
+    pub demanded: Arc<[u32]>,
 }
 
 /// What brought a bundle onto the roster.

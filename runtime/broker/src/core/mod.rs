@@ -49,6 +49,7 @@ pub use action::Action;
 pub use event::Event;
 pub use jury::{Epoch, Juror, Jury, Mark, Member, Origin};
 pub use notice::Notice;
+pub use outcome::ShareOutcome;
 pub(crate) use outcome::{facts_weight, weight};
 pub use settings::Settings;
 pub use types::*;
@@ -78,7 +79,7 @@ pub struct State {
     reporters: Vec<Reporter>,
     /// By name, how often bundles have changed lately.
     unrest: BTreeMap<String, Unrest>,
-    sessions: BTreeMap<SessionId, (Role, String)>,
+    sessions: BTreeMap<SessionId, (Role, Arc<str>)>,
     children: BTreeMap<String, Child>,
     retired: BTreeMap<SessionId, Retired>,
     /// What former brokers started has joined or been killed.
@@ -210,11 +211,11 @@ impl State {
             Event::Stored { job, outcome } => self.stored(job, outcome, &mut actions),
             Event::Withdrawn { path } => self.withdrawn(&path, &mut actions),
             Event::Hello { session, hello } => self.hello(session, &hello, &mut actions),
-            Event::Message { session, message } => match self.sessions.get(&session).cloned() {
-                Some((Role::Bundle, name)) => self.bundle_says(&name, message, &mut actions),
-                Some((Role::Reporter, name)) => self.reporter_says(&name, message, &mut actions),
-                None => self.retired_says(session, &message, &mut actions),
-            },
+            Event::Message { session, message } => {
+                if !self.message(session, message, &mut actions) {
+                    return actions;
+                }
+            }
             Event::Garbage { session, what } => self.garbage(session, &what, &mut actions),
             Event::Gone { session } => self.gone(session, "its process has died", &mut actions),
             Event::Undeliverable { session, job, why } => {
@@ -245,6 +246,22 @@ impl State {
         self.store_finished(&mut actions);
         self.wind_down(&mut actions);
         actions
+    }
+
+    /// A peer says something. `false`: nothing follows from it for anybody else, as from most of what bundles
+    /// say, which is said hundreds of times for every file.
+    fn message(
+        &mut self,
+        session: SessionId,
+        message: qcbus_messages::FromPeer,
+        actions: &mut Actions,
+    ) -> bool {
+        match self.sessions.get(&session).cloned() {
+            Some((Role::Bundle, name)) => return self.bundle_says(&name, message, actions),
+            Some((Role::Reporter, name)) => self.reporter_says(&name, message, actions),
+            None => self.retired_says(session, &message, actions),
+        }
+        true
     }
 
     fn garbage(&mut self, session: SessionId, what: &str, actions: &mut Actions) {

@@ -10,48 +10,47 @@ use qcbus_messages::{Catalogue, CheckerInfo};
 
 use super::jobs::{Share, ShareState};
 use super::staging::Staged;
-use super::types::ShareOutcome;
 
-/// What one share comes to: every demanded checker, and those besides that kept one from looking.
+/// What one bundle's share of a job came to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShareOutcome {
+    /// The bundle.
+    pub name: String,
+    /// Its version.
+    pub version: String,
+    /// Why the whole bundle failed, if it did.
+    pub failure: Option<String>,
+    /// The checkers that had to look, as the catalogue numbers them.
+    pub demanded: Arc<[u32]>,
+    /// What it said; see [`ShareOutcome::said`].
+    pub answer: Answer,
+    /// What it offers; `None` for a bundle that was demanded and never seen.
+    pub catalogue: Option<Arc<Catalogue>>,
+    /// Time spent checking, in microseconds, as the bundle says.
+    pub micros: u64,
+}
+
+/// What a bundle said of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Answer {
+    /// By checker.
+    Said(Arc<BTreeMap<u32, Staged>>),
+    /// It was not asked, for it does not take files of this kind.
+    OtherKind(FileKind),
+}
+
+/// What one share comes to. It is put in the form of a result by whoever stores it, and not in the loop.
 pub(super) fn outcome(name: &str, share: &Share) -> ShareOutcome {
-    let failure = match &share.state {
-        ShareState::Failed(why) => Some(why.clone()),
-        _ => None,
-    };
-    let nothing = BTreeMap::new();
-    let staged = match failure {
-        Some(_) => &nothing,
-        None => &share.staged,
-    };
-    let catalogue = share.catalogue.as_deref();
-    let demanded: BTreeSet<u32> = share.demanded.iter().copied().collect();
-    let told = staged.iter().filter(|(_, staged)| staged.done.is_some());
-    let all: BTreeSet<u32> = told
-        .map(|(checker, _)| *checker)
-        .chain(demanded.clone())
-        .collect();
-    let mut asked = BTreeSet::new();
-    let mut checkers = Vec::with_capacity(all.len());
-    for index in all {
-        let Some(offered) = offered(catalogue, index) else {
-            continue;
-        };
-        if demanded.contains(&index) {
-            asked.insert(offered.id.as_str());
-        }
-        checkers.push(said(offered, staged.get(&index), failure.as_deref()));
-    }
-    let mut kept = in_the_answer(&checkers, |id| asked.contains(id)).into_iter();
-    checkers.retain(|_| kept.next().unwrap_or(true));
-    let mut said = bundle(name, &share.version, catalogue, &demanded, checkers);
-    if catalogue.is_none() {
-        let why = failure.clone();
-        said.absent = Some(why.unwrap_or_else(|| format!("{name} has never been seen")));
-    }
     ShareOutcome {
-        said,
+        name: name.to_owned(),
+        version: share.version.clone(),
+        failure: match &share.state {
+            ShareState::Failed(why) => Some(why.clone()),
+            _ => None,
+        },
+        demanded: share.demanded.clone(),
+        answer: Answer::Said(share.staged.clone()),
         catalogue: share.catalogue.clone(),
-        failure,
         micros: share.micros,
     }
 }
@@ -61,25 +60,83 @@ pub(super) fn not_applicable(
     name: &str,
     version: &str,
     catalogue: &Arc<Catalogue>,
-    demanded: &[u32],
+    demanded: Vec<u32>,
     kind: FileKind,
 ) -> ShareOutcome {
-    let offered = demanded
-        .iter()
-        .filter_map(|index| offered(Some(catalogue), *index));
-    let checkers = offered.map(|offered| CheckerOutcome {
-        ending: Some(Ending::NotApplicable {
-            reason: format!("{name} does not check .{} files", kind.as_str()),
-        }),
-        ..described(offered)
-    });
-    let checkers = checkers.collect();
-    let demanded = demanded.iter().copied().collect();
     ShareOutcome {
-        said: bundle(name, version, Some(catalogue), &demanded, checkers),
-        catalogue: Some(catalogue.clone()),
+        name: name.to_owned(),
+        version: version.to_owned(),
         failure: None,
+        demanded: demanded.into(),
+        answer: Answer::OtherKind(kind),
+        catalogue: Some(catalogue.clone()),
         micros: 0,
+    }
+}
+
+impl ShareOutcome {
+    /// In the form of a result: every demanded checker, and those besides that kept one from looking.
+    pub fn said(&self) -> BundleOutcome {
+        let mut demanded = self.demanded.to_vec();
+        demanded.sort_unstable();
+        demanded.dedup();
+        let checkers = match &self.answer {
+            Answer::Said(staged) => self.of_staged(staged, &demanded),
+            Answer::OtherKind(kind) => self.of_other_kind(*kind, &demanded),
+        };
+        let mut said = bundle(self, &demanded, checkers);
+        if self.catalogue.is_none() {
+            let name = &self.name;
+            let why = self.failure.clone();
+            said.absent = Some(why.unwrap_or_else(|| format!("{name} has never been seen")));
+        }
+        said
+    }
+
+    fn of_staged(&self, staged: &BTreeMap<u32, Staged>, demanded: &[u32]) -> Vec<CheckerOutcome> {
+        let failure = self.failure.as_deref();
+        // A bundle that has failed has said nothing.
+        let staged_of = |index| staged.get(&index).filter(|_| failure.is_none());
+        let is_demanded = |index: &u32| demanded.binary_search(index).is_ok();
+        let told = staged.iter().filter(|(_, staged)| staged.done.is_some());
+        let told = told.map(|(checker, _)| *checker);
+        let mut besides: Vec<u32> = told.filter(|index| !is_demanded(index)).collect();
+        if failure.is_some() {
+            besides.clear();
+        }
+        let mut all = [demanded, &besides].concat();
+        all.sort_unstable();
+        let catalogue = self.catalogue.as_deref();
+        let mut asked = BTreeSet::new();
+        let mut checkers = Vec::with_capacity(all.len());
+        for index in all {
+            let Some(offered) = offered(catalogue, index) else {
+                continue;
+            };
+            if !besides.is_empty() && is_demanded(&index) {
+                asked.insert(offered.id.as_str());
+            }
+            checkers.push(said(offered, staged_of(index), failure));
+        }
+        if !besides.is_empty() {
+            let mut kept = in_the_answer(&checkers, |id| asked.contains(id)).into_iter();
+            checkers.retain(|_| kept.next().unwrap_or(true));
+        }
+        checkers
+    }
+
+    fn of_other_kind(&self, kind: FileKind, demanded: &[u32]) -> Vec<CheckerOutcome> {
+        let catalogue = self.catalogue.as_deref();
+        let offered = demanded
+            .iter()
+            .filter_map(|index| offered(catalogue, *index));
+        let checkers = offered.map(|offered| CheckerOutcome {
+            ending: Some(Ending::NotApplicable {
+                reason: format!("{} does not check .{} files", self.name, kind.as_str()),
+            }),
+            ..described(offered)
+        });
+        checkers.collect()
     }
 }
 
@@ -96,17 +153,12 @@ fn described(offered: &CheckerInfo) -> CheckerOutcome {
     }
 }
 
-fn bundle(
-    name: &str,
-    version: &str,
-    catalogue: Option<&Catalogue>,
-    demanded: &BTreeSet<u32>,
-    checkers: Vec<CheckerOutcome>,
-) -> BundleOutcome {
+fn bundle(share: &ShareOutcome, demanded: &[u32], checkers: Vec<CheckerOutcome>) -> BundleOutcome {
+    let catalogue = share.catalogue.as_deref();
     BundleOutcome {
-        name: name.to_owned(),
+        name: share.name.clone(),
         alias: catalogue.map_or_else(String::new, |it| it.alias.clone()),
-        version: version.to_owned(),
+        version: share.version.clone(),
         build_date: catalogue.map_or_else(String::new, |it| it.build_date.clone()),
         description: catalogue.map_or_else(String::new, |it| it.description.clone()),
         params: Vec::new(),
@@ -120,9 +172,10 @@ fn bundle(
 }
 
 /// How many checkers there are to be asked: what is off by default is left out by nobody.
-fn in_question(catalogue: &Catalogue, demanded: &BTreeSet<u32>) -> usize {
+fn in_question(catalogue: &Catalogue, demanded: &[u32]) -> usize {
+    let is_demanded = |index: &u32| demanded.binary_search(index).is_ok();
     let checkers = (0..).zip(&catalogue.checkers);
-    let counted = checkers.filter(|(index, it)| it.default_on || demanded.contains(index));
+    let counted = checkers.filter(|(index, it)| it.default_on || is_demanded(index));
     counted.count()
 }
 

@@ -28,8 +28,8 @@ fn share(staged: BTreeMap<u32, Staged>) -> Share {
         version: "1".to_owned(),
         catalogue: Some(offers()),
         mark: None,
-        demanded: vec![0],
-        staged,
+        demanded: [0].into(),
+        staged: Arc::new(staged),
         staged_bytes: 0,
         micros: 7,
         suspect: false,
@@ -65,12 +65,12 @@ fn a_result_has_what_a_checker_said_and_what_is_known_of_it() {
         metadata: vec![fact],
         ..CheckerOutcome::default()
     };
-    assert_eq!(outcome.said.checkers, [expected]);
+    assert_eq!(outcome.said().checkers, [expected]);
     let asked = Asked {
         asked: 1,
         offered: 2,
     };
-    assert_eq!(outcome.said.asked, Some(asked));
+    assert_eq!(outcome.said().asked, Some(asked));
     assert_eq!(outcome.micros, 7);
 }
 
@@ -98,7 +98,7 @@ fn in_the_result(ending: Ending, issues: Vec<Issue>) -> (Status, String, Vec<Str
     let input = PoolInput {
         input_file: "/farm/a.xodr",
         config: None,
-        bundles: vec![outcome.said],
+        bundles: vec![outcome.said()],
         remarks: Vec::new(),
         scope: Scope::Alone,
         version: "1",
@@ -143,10 +143,11 @@ fn what_a_failed_checker_had_found_is_kept() {
 
 #[test]
 fn a_bundle_that_takes_no_such_files_says_so_of_each_checker_asked() {
-    let outcome = not_applicable("Bundle", "1", &offers(), &[1], FileKind::Xosc);
+    let outcome = not_applicable("Bundle", "1", &offers(), vec![1], FileKind::Xosc);
     let reason = "Bundle does not check .xosc files".to_owned();
-    let [only] = outcome.said.checkers.as_slice() else {
-        panic!("{:?}", outcome.said.checkers);
+    let said = outcome.said();
+    let [only] = said.checkers.as_slice() else {
+        panic!("{:?}", said.checkers);
     };
     assert_eq!(only.id, "second");
     assert_eq!(only.ending, Some(Ending::NotApplicable { reason }));

@@ -120,7 +120,7 @@ impl State {
             self.reporter_is_replaced(index, old, same_process, actions);
         }
         self.sessions
-            .insert(session, (Role::Reporter, hello.name.clone()));
+            .insert(session, (Role::Reporter, hello.name.as_str().into()));
         actions.push(Action::Accept { session });
         self.drain_unwanted(&hello.name, launch, actions);
         self.queue_undelivered(index);

@@ -192,7 +192,7 @@ impl State {
                 version: String::new(),
                 catalogue: None,
                 mark: None,
-                demanded: Vec::new(),
+                demanded: Arc::default(),
             };
             seats.entry(name).or_insert(seat);
         }
@@ -218,7 +218,7 @@ impl State {
             version: bundle.version.clone(),
             catalogue: bundle.catalogue.clone(),
             mark: bundle.mark,
-            demanded,
+            demanded: demanded.into(),
         })
     }
 

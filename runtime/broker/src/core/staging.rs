@@ -1,5 +1,7 @@
 //! What bundles have said about jobs that are not stored yet, and how much of it there may be.
 
+use std::sync::Arc;
+
 use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::{Issue, Metadata, Param};
 use qcbus_messages::JobId;
@@ -15,12 +17,15 @@ const MOST_IN_THE_WAY: usize = 64;
 const MOST_OF_AN_ID: usize = 512;
 
 /// What one checker has said so far.
-#[derive(Debug, Default)]
-pub(super) struct Staged {
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Staged {
+    /// Its findings.
     pub issues: Vec<Issue>,
+    /// How many more there are than may be kept.
     pub withheld: u64,
     /// Bytes that what it said of its end takes of its share's.
     pub done_bytes: usize,
+    /// How it ended, its parameters and metadata.
     pub done: Option<(Ending, Vec<Param>, Vec<Metadata>)>,
 }
 
@@ -69,7 +74,7 @@ impl State {
             clip(&mut issue, max_text);
             let size = weight(&issue);
             let full = share.staged_bytes + size > max_bytes;
-            let staged = share.staged.entry(checker).or_default();
+            let staged = Arc::make_mut(&mut share.staged).entry(checker).or_default();
             if full || staged.issues.len() >= max_issues {
                 staged.withheld += 1;
             } else {
@@ -105,7 +110,7 @@ impl State {
             by.iter_mut().for_each(|id| clip_text(id, MOST_OF_AN_ID));
             by.shrink_to_fit();
         }
-        let staged = share.staged.entry(checker).or_default();
+        let staged = Arc::make_mut(&mut share.staged).entry(checker).or_default();
         // What it says of its end a second time is said in the place of the first.
         let others = share.staged_bytes - staged.done_bytes;
         let facts = facts_weight(&params, &metadata);

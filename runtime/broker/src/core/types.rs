@@ -6,13 +6,13 @@ use std::time::Duration;
 
 use qcbus_document::FileKind;
 use qcbus_formats::manifest::May;
-use qcbus_formats::pool::BundleOutcome;
 use qcbus_messages::control::FileVerdict;
 use qcbus_messages::{Catalogue, Digest, Job, JobDocument, JobId, MissingDocument, Role, Verdict};
 
 use sha2::{Digest as _, Sha256};
 
 use super::jury::{Epoch, Jury};
+use super::outcome::ShareOutcome;
 
 /// A peer's session on the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -215,19 +215,6 @@ pub enum Reported {
     Of(JobId),
     /// The file had gone, and the report is not known to have been taken back.
     OfGone,
-}
-
-/// What one bundle's share of a job came to.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ShareOutcome {
-    /// What it said, as it goes into the result.
-    pub said: BundleOutcome,
-    /// What it offers; `None` for a bundle that was demanded and never seen.
-    pub catalogue: Option<Arc<Catalogue>>,
-    /// Why the whole bundle failed, if it did.
-    pub failure: Option<String>,
-    /// Time spent checking, in microseconds, as the bundle says.
-    pub micros: u64,
 }
 
 /// A job whose checking is over, ready to be pooled and stored.

@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
-use std::sync::{Arc, Mutex};
 
 use qcbus_bus::HostOptions;
 use qcbus_messages::Role;
@@ -244,7 +244,7 @@ fn store(
         retries: options.watch,
         gate: gate.transpose()?,
         scouts,
-        journal: Mutex::new(journal),
+        journal: journal.into(),
         epoch: AtomicU64::new(0),
     })
 }

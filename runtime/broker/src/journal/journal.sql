@@ -65,8 +65,8 @@ CREATE TABLE IF NOT EXISTS job_bundles (
     PRIMARY KEY (job, bundle)
 ) WITHOUT ROWID;
 
--- Checkers with findings, or that did not complete.
-CREATE TABLE IF NOT EXISTS job_checkers (
+-- Checkers with findings, or that failed.
+CREATE TABLE IF NOT EXISTS job_findings (
     job      INTEGER NOT NULL REFERENCES jobs (job) ON DELETE CASCADE,
     bundle   TEXT NOT NULL,
     checker  TEXT NOT NULL,
@@ -74,6 +74,27 @@ CREATE TABLE IF NOT EXISTS job_checkers (
     issues   INTEGER NOT NULL,
     PRIMARY KEY (job, bundle, checker)
 ) WITHOUT ROWID;
+
+-- The checkers that were skipped, as a list of which there is one for all jobs that skip the same: most
+-- files of one version do, and it is a hundred checkers.
+CREATE TABLE IF NOT EXISTS job_skipped (
+    job      INTEGER NOT NULL REFERENCES jobs (job) ON DELETE CASCADE,
+    bundle   TEXT NOT NULL,
+    list     INTEGER NOT NULL,      -- of checker_lists
+    PRIMARY KEY (job, bundle)
+) WITHOUT ROWID;
+
+CREATE TABLE IF NOT EXISTS checker_lists (
+    list     INTEGER PRIMARY KEY,   -- the first eight bytes of the digest of what is in it
+    checkers TEXT NOT NULL          -- JSON list of checkers
+);
+
+-- Checkers with findings, or that did not complete.
+CREATE VIEW IF NOT EXISTS job_checkers AS
+    SELECT job, bundle, checker, status, issues FROM job_findings
+    UNION ALL
+    SELECT job, bundle, value AS checker, 'skipped' AS status, 0 AS issues
+    FROM job_skipped JOIN checker_lists USING (list), json_each(checkers);
 
 -- What each reporter has said of a file.
 CREATE TABLE IF NOT EXISTS deliveries (

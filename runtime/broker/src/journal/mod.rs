@@ -1,6 +1,6 @@
 //! The journal: what must survive the broker, in SQLite. The schema is in `journal.sql`.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,20 +15,22 @@ use qcbus_disk::{FileMark, trust};
 
 mod error;
 mod rows;
+mod schema;
+mod shared;
 #[cfg(test)]
 mod tests;
 mod write;
 
 pub use error::JournalError;
+pub use shared::SharedJournal;
 
 use error::classify;
 use rows::{judged_of, millis, number};
-use write::put;
+use schema::prepare;
+use write::{Change, changes};
 
 /// Version of the schema, kept in SQLite's `user_version`.
-pub const SCHEMA_VERSION: i64 = 3;
-
-const SCHEMA: &str = include_str!("journal.sql");
+pub const SCHEMA_VERSION: i64 = 4;
 
 /// A file with its verdict, as the journal remembers it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -63,8 +65,10 @@ pub struct History {
     pub micros: u64,
     /// By bundle: name, version, microseconds, failure.
     pub bundles: Vec<(String, String, u64, String)>,
-    /// Bundle, checker, status, number of issues, of checkers worth mentioning.
+    /// Bundle, checker, status, number of issues, of those that failed or have findings.
     pub checkers: Vec<(String, String, String, u64)>,
+    /// By bundle the checkers that were skipped.
+    pub skipped: Vec<(String, Vec<String>)>,
 }
 
 /// Something to remember.
@@ -127,6 +131,8 @@ pub enum Entry {
 pub struct Journal {
     connection: Connection,
     path: PathBuf,
+    /// Lists of checkers that are in it for certain.
+    lists: HashSet<i64>,
     /// Kept as long as the journal is.
     _lock: Option<DirectoryLock>,
 }
@@ -162,6 +168,7 @@ impl Journal {
         Ok(Journal {
             connection,
             path,
+            lists: HashSet::new(),
             _lock: Some(lock),
         })
     }
@@ -177,6 +184,7 @@ impl Journal {
         Ok(Journal {
             connection,
             path,
+            lists: HashSet::new(),
             _lock: None,
         })
     }
@@ -315,27 +323,43 @@ impl Journal {
     /// # Errors
     /// When SQLite cannot write, a full disk for instance; the entries are the caller's to keep.
     pub fn write(&mut self, entries: &[Entry]) -> Result<(), JournalError> {
-        let written = self.try_to_write(entries);
+        let all: Vec<Change> = entries.iter().flat_map(changes).collect();
+        self.make(&[&all])
+    }
+
+    /// Makes changes in one transaction: all of them or none.
+    fn make(&mut self, changes: &[&[Change]]) -> Result<(), JournalError> {
+        let made = self.try_to_make(changes);
         // What was written before may take twice its room until it is put where it belongs.
         let full = |error: &rusqlite::Error| {
             error.sqlite_error_code() == Some(rusqlite::ErrorCode::DiskFull)
         };
-        let written = match written {
+        let made = match made {
             Err(error) if full(&error) => self
                 .connection
                 .execute_batch("PRAGMA wal_checkpoint(TRUNCATE)")
-                .and_then(|()| self.try_to_write(entries)),
-            written => written,
+                .and_then(|()| self.try_to_make(changes)),
+            made => made,
         };
-        written.map_err(|source| classify(&self.path, source))
+        made.map_err(|source| classify(&self.path, source))
     }
 
-    fn try_to_write(&mut self, entries: &[Entry]) -> rusqlite::Result<()> {
+    fn try_to_make(&mut self, changes: &[&[Change]]) -> rusqlite::Result<()> {
         let transaction = self.connection.transaction()?;
-        for entry in entries {
-            put(&transaction, entry)?;
+        let mut lists = Vec::new();
+        for change in changes.iter().copied().flatten() {
+            if change.list.is_some_and(|it| self.lists.contains(&it)) {
+                continue;
+            }
+            change.make(&transaction)?;
+            lists.extend(change.list);
         }
-        transaction.commit()
+        transaction.commit()?;
+        if self.lists.len() > MOST_LISTS {
+            self.lists.clear();
+        }
+        self.lists.extend(lists);
+        Ok(())
     }
 
     /// Forgets the history of jobs older than `keep`.
@@ -344,42 +368,22 @@ impl Journal {
     /// When SQLite cannot write.
     pub fn prune(&mut self, keep: Duration) -> Result<usize, JournalError> {
         let before = millis().saturating_sub(i64::try_from(keep.as_millis()).unwrap_or(i64::MAX));
-        self.connection
-            .execute("DELETE FROM jobs WHERE at < ?1", params![before])
-            .map_err(|source| classify(&self.path, source))
+        // Lists that no job has any more go, too, so that none is known for certain.
+        self.lists.clear();
+        let mut prune = || -> rusqlite::Result<usize> {
+            let transaction = self.connection.transaction()?;
+            let pruned = transaction.execute("DELETE FROM jobs WHERE at < ?1", params![before])?;
+            if pruned > 0 {
+                let unused =
+                    "DELETE FROM checker_lists WHERE list NOT IN (SELECT list FROM job_skipped)";
+                transaction.execute(unused, [])?;
+            }
+            transaction.commit()?;
+            Ok(pruned)
+        };
+        prune().map_err(|source| classify(&self.path, source))
     }
 }
 
-fn prepare(connection: &Connection, path: &Path) -> Result<(), JournalError> {
-    let fail = |source| classify(path, source);
-    let found: i64 = connection
-        .query_row("PRAGMA user_version", [], |row| row.get(0))
-        .map_err(fail)?;
-    if found > SCHEMA_VERSION {
-        return Err(JournalError::Newer {
-            path: path.to_path_buf(),
-            found,
-        });
-    }
-    if found == 1 || found == 2 {
-        // What is in the old column is no jury, so that every verdict is looked at again.
-        let newer = "BEGIN; ALTER TABLE files RENAME COLUMN bundles TO jury; \
-                     ALTER TABLE files ADD COLUMN epoch INTEGER NOT NULL DEFAULT 0; \
-                     ALTER TABLE files ADD COLUMN written TEXT NOT NULL DEFAULT ''; \
-                     ALTER TABLE deliveries RENAME TO deliveries_before; \
-                     CREATE TABLE deliveries (path TEXT NOT NULL, reporter TEXT NOT NULL, \
-                     job INTEGER, PRIMARY KEY (path, reporter)) WITHOUT ROWID; \
-                     INSERT INTO deliveries SELECT path, reporter, nullif(job, 0) \
-                     FROM deliveries_before; DROP TABLE deliveries_before; \
-                     PRAGMA user_version = 3; COMMIT;";
-        connection.execute_batch(newer).map_err(fail)?;
-    }
-    // WAL with synchronous=NORMAL survives a killed process; after a power cut the last verdicts
-    // may be missing, and their files are judged anew.
-    connection
-        .execute_batch(&format!(
-            "PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL; PRAGMA foreign_keys = ON; \
-             {SCHEMA} PRAGMA user_version = {SCHEMA_VERSION};"
-        ))
-        .map_err(fail)
-}
+/// Lists of checkers that are remembered as being in the journal.
+const MOST_LISTS: usize = 10_000;

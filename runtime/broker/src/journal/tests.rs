@@ -1,5 +1,7 @@
 //! What was written is remembered, also of earlier schemas.
 
+mod history;
+
 use qcbus_messages::{Catalogue, Digest, Verdict};
 
 use std::sync::Arc;
@@ -134,7 +136,9 @@ fn a_journal_of_schema_1_opens_and_its_stamps_fit_nothing() {
     journal
         .connection
         .execute_batch(
-            "ALTER TABLE files RENAME COLUMN jury TO bundles; \
+            "DROP VIEW job_checkers; DROP TABLE job_skipped; DROP TABLE checker_lists; \
+             ALTER TABLE job_findings RENAME TO job_checkers; \
+             ALTER TABLE files RENAME COLUMN jury TO bundles; \
              ALTER TABLE files DROP COLUMN epoch; ALTER TABLE files DROP COLUMN written; \
              UPDATE files SET bundles = 'ffffffffffffffff'; \
              INSERT INTO deliveries VALUES ('/a.xosc', 'json', 5), ('/a.xosc', 'text', 0); \

@@ -1,16 +1,47 @@
-//! How entries become rows.
+//! How entries become rows. All that can be made ready without the journal is: what is done under its
+//! lock, everybody waits for.
 
 use std::path::Path;
 
 use qcbus_messages::path_text::to_text as text;
-use rusqlite::{Transaction, params};
+use rusqlite::types::Value;
+use rusqlite::{Transaction, params_from_iter};
 
 use super::rows::{inputs_to_text, jury_to_text, millis, signed};
 use super::{Entry, History};
 use crate::core::{Judged, Member, Reported};
+use crate::store::digest_of;
 use qcbus_disk::FileMark;
 
-pub(super) fn put(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> {
+/// A statement with its values.
+#[derive(Debug)]
+pub(super) struct Change {
+    sql: &'static str,
+    values: Vec<Value>,
+    /// It puts in the list of this number, which is there already more often than not.
+    pub list: Option<i64>,
+}
+
+impl Change {
+    fn new(sql: &'static str, values: impl Into<Vec<Value>>) -> Change {
+        Change {
+            sql,
+            values: values.into(),
+            list: None,
+        }
+    }
+
+    pub fn make(&self, transaction: &Transaction<'_>) -> rusqlite::Result<()> {
+        let mut statement = transaction.prepare_cached(self.sql)?;
+        statement
+            .execute(params_from_iter(&self.values))
+            .map(|_| ())
+    }
+}
+
+/// What is to be written for an entry, in order.
+pub(super) fn changes(entry: &Entry) -> Vec<Change> {
+    let mut changes = Vec::new();
     match entry {
         Entry::Judged {
             path,
@@ -18,185 +49,189 @@ pub(super) fn put(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Res
             history,
             written,
         } => {
-            put_file(transaction, path, judged, written.as_ref())?;
+            changes.push(file(path, judged, written.as_ref()));
             if let Some(history) = history {
-                put_history(transaction, path, judged, history)?;
+                put_history(&mut changes, path, judged, history);
             }
         }
-        Entry::Withdrawn { path, reporters } => withdraw(transaction, &text(path), reporters)?,
+        Entry::Withdrawn { path, reporters } => withdraw(&mut changes, &text(path), reporters),
         Entry::Left {
             path,
             xqar,
             reporters,
         } => {
+            let (path, xqar) = (text(path), text(xqar));
             for reporter in reporters {
-                put_gone(transaction, &text(path), &text(xqar), reporter)?;
+                let gone = "INSERT OR REPLACE INTO gone (path, xqar) VALUES (?1, ?2)";
+                changes.push(Change::new(gone, [word(&path), word(&xqar)]));
+                changes.push(delivery(&path, reporter, Reported::OfGone));
             }
         }
-        Entry::Voided { path, reporter } => voided(transaction, &text(path), reporter)?,
-        Entry::Enrolled(member) => put_member(transaction, member)?,
+        Entry::Voided { path, reporter } => voided(&mut changes, &text(path), reporter),
+        Entry::Enrolled(it) => changes.push(member(it)),
         Entry::Struck { name } => {
-            transaction.execute("DELETE FROM members WHERE name = ?1", params![name])?;
+            let struck = "DELETE FROM members WHERE name = ?1";
+            changes.push(Change::new(struck, [word(name)]));
         }
         Entry::Delivered {
             path,
             reporter,
             job,
-        } => {
-            deliver(transaction, &text(path), reporter, Reported::Of(*job))?;
-        }
+        } => changes.push(delivery(&text(path), reporter, Reported::Of(*job))),
     }
-    Ok(())
+    changes
+}
+
+fn word(text: &str) -> Value {
+    Value::Text(text.to_owned())
+}
+
+fn count(number: u64) -> Value {
+    Value::Integer(signed(number))
 }
 
 /// The file has gone, and with it all but where its result lay, for those who reported about it.
-fn withdraw(
-    transaction: &Transaction<'_>,
-    path: &str,
-    reporters: &[String],
-) -> rusqlite::Result<()> {
+fn withdraw(changes: &mut Vec<Change>, path: &str, reporters: &[String]) {
+    let mut of_path = |sql| changes.push(Change::new(sql, [word(path)]));
     if !reporters.is_empty() {
-        transaction.execute(
+        of_path(
             "INSERT OR REPLACE INTO gone (path, xqar) \
              SELECT path, xqar FROM files WHERE path = ?1",
-            params![path],
-        )?;
+        );
     }
-    transaction.execute("DELETE FROM files WHERE path = ?1", params![path])?;
-    transaction.execute("DELETE FROM deliveries WHERE path = ?1", params![path])?;
+    of_path("DELETE FROM files WHERE path = ?1");
+    of_path("DELETE FROM deliveries WHERE path = ?1");
     for reporter in reporters {
-        deliver(transaction, path, reporter, Reported::OfGone)?;
+        changes.push(delivery(path, reporter, Reported::OfGone));
     }
-    Ok(())
-}
-
-fn put_gone(
-    transaction: &Transaction<'_>,
-    path: &str,
-    xqar: &str,
-    reporter: &str,
-) -> rusqlite::Result<()> {
-    transaction.execute(
-        "INSERT OR REPLACE INTO gone (path, xqar) VALUES (?1, ?2)",
-        params![path, xqar],
-    )?;
-    deliver(transaction, path, reporter, Reported::OfGone)
 }
 
 /// A reporter has taken back what it said. Once all have, nobody asks where the result lay.
-fn voided(transaction: &Transaction<'_>, path: &str, reporter: &str) -> rusqlite::Result<()> {
-    transaction.execute(
+fn voided(changes: &mut Vec<Change>, path: &str, reporter: &str) {
+    changes.push(Change::new(
         "DELETE FROM deliveries WHERE path = ?1 AND reporter = ?2 AND job IS NULL",
-        params![path, reporter],
-    )?;
-    transaction.execute(
+        [word(path), word(reporter)],
+    ));
+    changes.push(Change::new(
         "DELETE FROM gone WHERE path = ?1 AND path NOT IN \
          (SELECT path FROM deliveries WHERE path = ?1 AND job IS NULL)",
-        params![path],
-    )?;
-    Ok(())
+        [word(path)],
+    ));
 }
 
-fn deliver(
-    transaction: &Transaction<'_>,
-    path: &str,
-    reporter: &str,
-    reported: Reported,
-) -> rusqlite::Result<()> {
-    let mut statement = transaction.prepare_cached(
-        "INSERT OR REPLACE INTO deliveries (path, reporter, job) VALUES (?1, ?2, ?3)",
-    )?;
+fn delivery(path: &str, reporter: &str, reported: Reported) -> Change {
     let job = match reported {
-        Reported::Of(job) => Some(signed(job.0)),
-        Reported::OfGone => None,
+        Reported::Of(job) => count(job.0),
+        Reported::OfGone => Value::Null,
     };
-    statement.execute(params![path, reporter, job]).map(|_| ())
+    Change::new(
+        "INSERT OR REPLACE INTO deliveries (path, reporter, job) VALUES (?1, ?2, ?3)",
+        [word(path), word(reporter), job],
+    )
 }
 
-fn put_file(
-    transaction: &Transaction<'_>,
-    path: &Path,
-    judged: &Judged,
-    written: Option<&FileMark>,
-) -> rusqlite::Result<()> {
+fn file(path: &Path, judged: &Judged, written: Option<&FileMark>) -> Change {
     // Whoever writes no verdict file leaves the mark of the one that is there.
-    let mut statement = transaction.prepare_cached(
-        "INSERT OR REPLACE INTO files (path, job, verdict, digest, basis, config, jury, errors, \
+    let sql = "INSERT OR REPLACE INTO files (path, job, verdict, digest, basis, config, jury, errors, \
          warnings, information, why, xqar, inputs, racy, at, epoch, written) \
          VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, \
-         coalesce(?17, (SELECT written FROM files WHERE path = ?1), ''))",
-    )?;
-    statement.execute(params![
-        text(path),
-        signed(judged.job.0),
-        judged.verdict.as_str(),
-        judged.digest.to_string(),
-        judged.basis.to_string(),
-        judged.config.to_string(),
-        jury_to_text(&judged.jury),
-        signed(judged.counts[0]),
-        signed(judged.counts[1]),
-        signed(judged.counts[2]),
-        serde_json::to_string(&judged.why).unwrap_or_default(),
-        judged.xqar.as_deref().map(text).unwrap_or_default(),
-        inputs_to_text(&judged.inputs),
-        judged.racy,
-        millis(),
-        signed(judged.epoch.0),
-        written.map(|it| &it.0),
-    ])?;
-    Ok(())
+         coalesce(?17, (SELECT written FROM files WHERE path = ?1), ''))";
+    let values = [
+        Value::Text(text(path)),
+        count(judged.job.0),
+        word(judged.verdict.as_str()),
+        Value::Text(judged.digest.to_string()),
+        Value::Text(judged.basis.to_string()),
+        Value::Text(judged.config.to_string()),
+        Value::Text(jury_to_text(&judged.jury)),
+        count(judged.counts[0]),
+        count(judged.counts[1]),
+        count(judged.counts[2]),
+        Value::Text(serde_json::to_string(&judged.why).unwrap_or_default()),
+        Value::Text(judged.xqar.as_deref().map(text).unwrap_or_default()),
+        Value::Text(inputs_to_text(&judged.inputs)),
+        Value::Integer(judged.racy.into()),
+        Value::Integer(millis()),
+        count(judged.epoch.0),
+        written.map_or(Value::Null, |it| word(&it.0)),
+    ];
+    Change::new(sql, values)
 }
 
-fn put_member(transaction: &Transaction<'_>, member: &Member) -> rusqlite::Result<()> {
+fn member(member: &Member) -> Change {
     let catalogue = serde_json::to_string(&member.catalogue.as_deref()).unwrap_or_default();
-    transaction.execute(
+    Change::new(
         "INSERT OR REPLACE INTO members (name, version, origin, catalogue, at) \
          VALUES (?1, ?2, ?3, ?4, ?5)",
-        params![
-            member.name,
-            member.version,
-            member.origin.as_str(),
-            catalogue,
-            millis()
+        [
+            word(&member.name),
+            word(&member.version),
+            word(member.origin.as_str()),
+            Value::Text(catalogue),
+            Value::Integer(millis()),
         ],
-    )?;
-    Ok(())
+    )
 }
 
-fn put_history(
-    transaction: &Transaction<'_>,
-    path: &Path,
-    judged: &Judged,
-    history: &History,
-) -> rusqlite::Result<()> {
-    let job = signed(judged.job.0);
-    let mut statement = transaction.prepare_cached(
-        "INSERT OR REPLACE INTO jobs (job, path, digest, config, verdict, errors, warnings, \
-         information, bytes, micros, at) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
-    )?;
-    statement.execute(params![
-        job,
-        text(path),
-        judged.digest.to_string(),
-        judged.config.to_string(),
-        judged.verdict.as_str(),
-        signed(judged.counts[0]),
-        signed(judged.counts[1]),
-        signed(judged.counts[2]),
-        signed(history.bytes),
-        signed(history.micros),
-        millis(),
-    ])?;
-    let mut bundles = transaction
-        .prepare_cached("INSERT OR REPLACE INTO job_bundles VALUES (?1, ?2, ?3, ?4, ?5)")?;
+fn put_history(changes: &mut Vec<Change>, path: &Path, judged: &Judged, history: &History) {
+    let job = || count(judged.job.0);
+    let sql = "INSERT OR REPLACE INTO jobs (job, path, digest, config, verdict, errors, warnings, \
+               information, bytes, micros, at) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)";
+    let values = [
+        job(),
+        Value::Text(text(path)),
+        Value::Text(judged.digest.to_string()),
+        Value::Text(judged.config.to_string()),
+        word(judged.verdict.as_str()),
+        count(judged.counts[0]),
+        count(judged.counts[1]),
+        count(judged.counts[2]),
+        count(history.bytes),
+        count(history.micros),
+        Value::Integer(millis()),
+    ];
+    changes.push(Change::new(sql, values));
     for (bundle, version, micros, failure) in &history.bundles {
-        bundles.execute(params![job, bundle, version, signed(*micros), failure])?;
+        let sql = "INSERT OR REPLACE INTO job_bundles VALUES (?1, ?2, ?3, ?4, ?5)";
+        let values = [
+            job(),
+            word(bundle),
+            word(version),
+            count(*micros),
+            word(failure),
+        ];
+        changes.push(Change::new(sql, values));
     }
-    let mut checkers = transaction
-        .prepare_cached("INSERT OR REPLACE INTO job_checkers VALUES (?1, ?2, ?3, ?4, ?5)")?;
     for (bundle, checker, status, issues) in &history.checkers {
-        checkers.execute(params![job, bundle, checker, status, signed(*issues)])?;
+        let sql = "INSERT OR REPLACE INTO job_findings VALUES (?1, ?2, ?3, ?4, ?5)";
+        let values = [
+            job(),
+            word(bundle),
+            word(checker),
+            word(status),
+            count(*issues),
+        ];
+        changes.push(Change::new(sql, values));
     }
-    Ok(())
+    for (bundle, checkers) in &history.skipped {
+        let list = serde_json::to_string(checkers).unwrap_or_default();
+        let number = number_of(&list);
+        changes.push(Change {
+            list: Some(number),
+            ..Change::new(
+                "INSERT OR IGNORE INTO checker_lists VALUES (?1, ?2)",
+                [Value::Integer(number), Value::Text(list)],
+            )
+        });
+        let sql = "INSERT OR REPLACE INTO job_skipped VALUES (?1, ?2, ?3)";
+        let values = [job(), word(bundle), Value::Integer(number)];
+        changes.push(Change::new(sql, values));
+    }
+}
+
+/// The number of a list follows from what is in it, so that nobody need look for it.
+fn number_of(list: &str) -> i64 {
+    let digest = digest_of(list.as_bytes());
+    let first = digest.0.iter().take(8);
+    first.fold(0, |number, byte| number << 8 | i64::from(*byte))
 }

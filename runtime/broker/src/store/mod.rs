@@ -1,26 +1,28 @@
 //! From outcomes to files on disk: pooling, the result, the verdict file, the gate.
 
 mod earlier;
+mod history;
 mod leftovers;
 mod pooling;
 mod reconcile;
 mod refresh;
 mod withdraw;
 
+use std::cell::Cell;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use qcbus_formats::config::{Choice, Config};
 use qcbus_formats::pool::{BundleOutcome, Pooled};
-use qcbus_formats::xqar::{self, Dialect, Status};
+use qcbus_formats::xqar::{self, Dialect};
 use qcbus_messages::Verdict;
 use qcbus_messages::path_text::to_text;
 
-use crate::core::{FinishedJob, Judged, StoreOutcome};
+use crate::core::{FinishedJob, Judged, ShareOutcome, StoreOutcome};
 use crate::gate::Gate;
-use crate::journal::{Entry, History, Journal, JournalError, Remembered, Void};
+use crate::journal::{Entry, JournalError, Remembered, SharedJournal, Void};
 use crate::result_paths::ResultPaths;
 use crate::scouts::Scouts;
 use crate::seams::{disk, step};
@@ -30,7 +32,8 @@ use crate::verdict_file;
 use qcbus_disk::{FileMark, is_for_good, write_both, write_whole};
 
 pub use earlier::remove_earlier_results;
-use pooling::{reasons, taken};
+use history::history;
+use pooling::reasons;
 pub use reconcile::Reconciled;
 pub use refresh::digest_of;
 use refresh::refreshed;
@@ -55,13 +58,13 @@ pub struct Store {
     /// Who looks at files.
     pub scouts: Scouts,
     /// What is remembered.
-    pub journal: Mutex<Journal>,
+    pub journal: SharedJournal,
     /// The epoch of who must judge: what was judged in an earlier one is not stored.
     pub epoch: AtomicU64,
 }
 
 impl Store {
-    /// Pools, writes, publishes, records. The findings are taken out of the job.
+    /// Pools, writes, publishes, records.
     pub fn store(
         &self,
         job: &mut FinishedJob,
@@ -74,7 +77,7 @@ impl Store {
             Ok(false) => return StoreOutcome::Stale,
             Err(error) => return StoreOutcome::Failed(unlooked(&job.path, &error)),
         }
-        let outcomes: Vec<BundleOutcome> = job.bundles.iter_mut().map(taken).collect();
+        let outcomes: Vec<BundleOutcome> = job.bundles.iter().map(ShareOutcome::said).collect();
         let pooled = self.pool(job, outcomes, config, root);
         reached("pooled", &job.path);
         let verdict = pooled.verdict();
@@ -185,7 +188,22 @@ impl Store {
         pooled: &Pooled,
         judged: &Judged,
     ) -> Result<Option<FileMark>, Unwritten> {
-        let text = xqar::write(&pooled.results, self.dialect);
+        let memory = TEXT.take();
+        let text = xqar::write_into(memory, &pooled.results, self.dialect);
+        let written = self.write_texts(job, pooled, judged, &text);
+        if text.capacity() <= MOST_KEPT {
+            TEXT.set(text);
+        }
+        written
+    }
+
+    fn write_texts(
+        &self,
+        job: &FinishedJob,
+        pooled: &Pooled,
+        judged: &Judged,
+        text: &str,
+    ) -> Result<Option<FileMark>, Unwritten> {
         let xqar = self.places.xqar(&job.path);
         let result = (&*xqar, text.as_bytes());
         disk().map_err(|error| unwritten(&xqar, &error))?;
@@ -243,8 +261,11 @@ impl Store {
     /// What a person should know; the entries are not written then.
     pub fn record(&self, entries: &[Entry]) -> Result<(), String> {
         disk().map_err(|error| format!("the journal cannot be written: {error}"))?;
-        let written = self.journal().write(entries);
-        written.map_err(|error| error.to_string())
+        let noted = self.journal.note(entries);
+        if let Some(path) = entries.first().and_then(Entry::path) {
+            step("noted", path);
+        }
+        self.journal.settle(&noted)
     }
 
     /// Everything that is remembered of files.
@@ -252,7 +273,7 @@ impl Store {
     /// # Errors
     /// When the journal cannot be read.
     pub fn remembered(&self) -> Result<Vec<Remembered>, JournalError> {
-        self.journal().remembered()
+        self.journal.get().remembered()
     }
 
     /// What reporters are still to take back.
@@ -260,7 +281,7 @@ impl Store {
     /// # Errors
     /// When the journal cannot be read.
     pub fn voids(&self) -> Result<Vec<Void>, JournalError> {
-        self.journal().voids()
+        self.journal.get().voids()
     }
 
     /// Forgets the history of jobs older than `keep`.
@@ -268,14 +289,19 @@ impl Store {
     /// # Errors
     /// What a person should know.
     pub fn prune(&self, keep: std::time::Duration) -> Result<(), String> {
-        let pruned = self.journal().prune(keep);
+        let pruned = self.journal.get().prune(keep);
         pruned.map(|_| ()).map_err(|error| error.to_string())
     }
-
-    fn journal(&self) -> MutexGuard<'_, Journal> {
-        self.journal.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
+
+thread_local! {
+    /// The memory of the last result's text: to have as much anew for every small file costs more than to
+    /// write the text.
+    static TEXT: Cell<String> = const { Cell::new(String::new()) };
+}
+
+/// Bytes that a thread keeps for the next text.
+const MOST_KEPT: usize = 1 << 20;
 
 /// Why something that is to be tried again could not be done.
 #[derive(Debug)]
@@ -352,33 +378,5 @@ fn judged(
         ],
         why,
         xqar: Some(xqar),
-    }
-}
-
-fn history(job: &FinishedJob, pooled: &Pooled) -> History {
-    let bundles = job.bundles.iter().map(|it| {
-        (
-            it.said.name.clone(),
-            it.said.version.clone(),
-            it.micros,
-            it.failure.clone().unwrap_or_default(),
-        )
-    });
-    let mut checkers = Vec::new();
-    for bundle in &pooled.results.bundles {
-        for checker in &bundle.checkers {
-            let status = checker.status.unwrap_or(Status::Error);
-            if status != Status::Completed || !checker.issues.is_empty() {
-                let status = format!("{status:?}").to_lowercase();
-                let issues = checker.issues.len() as u64;
-                checkers.push((bundle.name.clone(), checker.id.clone(), status, issues));
-            }
-        }
-    }
-    History {
-        bytes: job.prepared.as_ref().map_or(0, |it| it.bytes),
-        micros: u64::try_from(job.elapsed.as_micros()).unwrap_or(u64::MAX),
-        bundles: bundles.collect(),
-        checkers,
     }
 }

@@ -108,15 +108,6 @@ pub(super) fn reasons(job: &FinishedJob, pooled: &Pooled, verdict: Verdict) -> V
     why
 }
 
-/// What a bundle said, taken out of the job: there can be megabytes of it.
-pub(super) fn taken(share: &mut ShareOutcome) -> BundleOutcome {
-    let checkers = std::mem::take(&mut share.said.checkers);
-    BundleOutcome {
-        checkers,
-        ..share.said.clone()
-    }
-}
-
 /// Finds the row and column of an XPath in the image.
 struct InDocument<'a> {
     document: Document<'a>,

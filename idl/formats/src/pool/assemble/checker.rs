@@ -78,12 +78,17 @@ pub(super) fn finish(
 /// The rules of a checker, with those that its issues name besides. UIDs that make readers refuse
 /// the whole file are kept where they do no harm.
 fn rules(outcome: &mut CheckerOutcome) -> Vec<String> {
-    let mut rules: Vec<String> = Vec::with_capacity(outcome.rule_uids.len());
-    for uid in std::mem::take(&mut outcome.rule_uids) {
-        if !is_rule_uid(&uid) {
-            outcome.metadata.push(unreadable(uid));
-        } else if !rules.contains(&uid) {
-            rules.push(uid);
+    let mut rules = std::mem::take(&mut outcome.rule_uids);
+    let is_good = |at: usize| is_rule_uid(&rules[at]) && !rules[..at].contains(&rules[at]);
+    // As a catalogue has them they are good, nearly always.
+    if !(0..rules.len()).all(is_good) {
+        let given = std::mem::take(&mut rules);
+        for uid in given {
+            if !is_rule_uid(&uid) {
+                outcome.metadata.push(unreadable(uid));
+            } else if !rules.contains(&uid) {
+                rules.push(uid);
+            }
         }
     }
     for issue in &mut outcome.issues {

@@ -22,23 +22,36 @@ pub(super) fn of_bundle(checkers: &[Checker]) -> String {
 /// `Skipped: the file is OpenDRIVE 1.4. 0 issues.`
 pub(super) fn of_checker(outcome: &CheckerOutcome, removed: Counts) -> String {
     let status = outcome.status();
+    // Most say this, of hundreds for every file.
+    if status == Status::Completed && outcome.issues.is_empty() && removed.total() == 0 {
+        return String::from("0 issues.");
+    }
     let word = match status {
         Status::Completed => "Completed",
         Status::Skipped => "Skipped",
         Status::Error => "Error",
     };
     let reason = outcome.reason().trim();
-    let head = match reason {
-        "" if status == Status::Completed => String::new(),
-        "" => format!("{word}. "),
-        reason if reason.ends_with(['.', '?', '!']) => format!("{word}: {reason} "),
-        reason => format!("{word}: {reason}. "),
-    };
-    let removed = match removed.total() {
-        0 => String::new(),
-        n => format!(", {n} more removed by the configuration"),
-    };
-    format!("{head}{}{removed}.", number(outcome.issues.len(), "issue"))
+    let issues = number(outcome.issues.len(), "issue");
+    let mut summary = String::with_capacity(word.len() + reason.len() + issues.len() + 8);
+    if !(reason.is_empty() && status == Status::Completed) {
+        summary.push_str(word);
+        if !reason.is_empty() {
+            summary.push_str(": ");
+            summary.push_str(reason);
+        }
+        let ends = !reason.is_empty() && reason.ends_with(['.', '?', '!']);
+        summary.push_str(if ends { " " } else { ". " });
+    }
+    summary.push_str(&issues);
+    if removed.total() > 0 {
+        summary.push_str(&format!(
+            ", {} more removed by the configuration",
+            removed.total()
+        ));
+    }
+    summary.push('.');
+    summary
 }
 
 /// `1 issue`, `2 issues`.

@@ -4,6 +4,24 @@ use std::fmt::Write as _;
 
 use crate::xml::is_xml_char;
 
+/// The first bytes of characters that are to be looked at: control characters, those with a meaning in
+/// markup, and of those beyond ASCII the few among which there are two that XML does not allow
+/// (U+FFFE and U+FFFF begin with this byte, as all from U+F000 do). No byte in the middle of a character is one of them.
+static SPECIAL: [bool; 256] = {
+    let mut special = [false; 256];
+    let mut control = 0;
+    while control < b' ' {
+        special[control as usize] = true;
+        control += 1;
+    }
+    special[b'<' as usize] = true;
+    special[b'>' as usize] = true;
+    special[b'&' as usize] = true;
+    special[b'"' as usize] = true;
+    special[0xEF] = true;
+    special
+};
+
 /// Text that grows by elements, two spaces deeper with every level.
 pub(super) struct Markup {
     text: String,
@@ -11,8 +29,9 @@ pub(super) struct Markup {
 }
 
 impl Markup {
-    pub fn new() -> Markup {
-        let text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\" standalone=\"no\"?>\n");
+    /// Begins at the end of a text.
+    pub fn new(mut text: String) -> Markup {
+        text.push_str("<?xml version=\"1.0\" encoding=\"UTF-8\" standalone=\"no\"?>\n");
         Markup { text, depth: 0 }
     }
 
@@ -77,10 +96,8 @@ impl Markup {
     /// Escapes what has a meaning in markup. White space in attributes is written by number,
     /// because readers turn it into spaces otherwise; so is a carriage return in text.
     fn escape(&mut self, value: &str, attribute: bool) {
-        let special =
-            |c: char| c < ' ' || matches!(c, '<' | '>' | '&' | '"' | '\u{FFFE}'..='\u{FFFF}');
         let mut rest = value;
-        while let Some(at) = rest.find(special) {
+        while let Some(at) = rest.bytes().position(|byte| SPECIAL[usize::from(byte)]) {
             self.text.push_str(&rest[..at]);
             let Some(c) = rest[at..].chars().next() else {
                 break;

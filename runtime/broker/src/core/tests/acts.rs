@@ -97,19 +97,16 @@ impl World {
     }
 
     fn is_to_be_stored(&mut self, job: FinishedJob) {
-        let names: BTreeSet<_> = job.bundles.iter().map(|it| it.said.name.clone()).collect();
+        let names: BTreeSet<_> = job.bundles.iter().map(|it| it.name.clone()).collect();
         assert_eq!(
             names.len(),
             job.bundles.len(),
             "no bundle is in a result twice"
         );
         for bundle in job.bundles.iter().filter(|it| it.catalogue.is_some()) {
-            assert_eq!(
-                bundle.said.checkers.len(),
-                2,
-                "every demanded checker is there"
-            );
-            let mut checkers = bundle.said.checkers.iter();
+            let said = bundle.said();
+            assert_eq!(said.checkers.len(), 2, "every demanded checker is there");
+            let mut checkers = said.checkers.iter();
             assert!(
                 checkers.all(|it| it.issues.len() <= 2),
                 "what a session said that has ended counts for nothing"

@@ -285,7 +285,7 @@ fn what_an_absent_bundle_would_check_is_in_the_result() {
     world.write(0);
     world.prepare(0, true);
     world.pass(world.state.settings.absence_limit);
-    let said = &world.storing[0].bundles[0].said;
+    let said = &world.storing[0].bundles[0].said();
     assert_eq!((said.name.as_str(), said.version.as_str()), ("Second", "3"));
     assert_eq!(said.checkers.len(), 2);
 }

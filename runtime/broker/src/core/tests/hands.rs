@@ -87,7 +87,7 @@ impl World {
             let maps = job.rejected_maps.iter();
             let maps = maps.map(|map| file_of(Path::new(&map.path))).collect();
             self.said_of_maps.insert(file, maps);
-            let names = job.bundles.iter().map(|it| it.said.name.clone());
+            let names = job.bundles.iter().map(|it| it.name.clone());
             self.judges.insert(file, names.collect());
             let why = job.bundles.iter().filter_map(|it| it.failure.clone());
             let why: Vec<String> = why.collect();

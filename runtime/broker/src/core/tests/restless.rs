@@ -76,7 +76,7 @@ fn while_it_is_not_believed_others_are_judged_without_it_and_accepted_by_nobody(
     assert!(world.peers[&session].jobs.is_empty());
     world.say(second, FromPeer::JobDone { job, micros: 1 });
     let finished = world.storing.first().expect("nobody waits for it");
-    let first = finished.bundles.iter().find(|it| it.said.name == "First");
+    let first = finished.bundles.iter().find(|it| it.name == "First");
     let why = first.unwrap().failure.clone().unwrap();
     assert!(why.contains("not asked for the time being"), "{why}");
 }

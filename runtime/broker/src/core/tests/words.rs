@@ -324,7 +324,7 @@ fn more_findings_than_a_checker_may_report_are_no_judgement() {
         world.prepare(0, true);
         world.answer(findings);
         let finished = world.storing.pop().unwrap();
-        for checker in &finished.bundles[0].said.checkers {
+        for checker in finished.bundles[0].said().checkers {
             assert_eq!(checker.issues.len(), 1);
             let ending = checker.ending.as_ref().unwrap();
             let is_completed = *ending == qcbus_formats::pool::Ending::Completed;
@@ -501,7 +501,7 @@ fn what_a_process_said_before_it_died_is_not_said_twice() {
     world.join("First");
     world.pass(Duration::from_secs(1));
     world.answer(0);
-    let said = &world.storing[0].bundles[0].said;
+    let said = &world.storing[0].bundles[0].said();
     let found: Vec<usize> = said.checkers.iter().map(|it| it.issues.len()).collect();
     assert_eq!(found, [0, 0], "the second process has found nothing");
 }

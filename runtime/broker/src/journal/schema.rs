@@ -1,0 +1,55 @@
+//! How a database becomes a journal of this schema.
+
+use std::path::Path;
+
+use rusqlite::Connection;
+
+use super::error::classify;
+use super::{JournalError, SCHEMA_VERSION};
+
+const SCHEMA: &str = include_str!("journal.sql");
+
+/// Statements that are kept ready: as many as there are for entries.
+const STATEMENTS: usize = 24;
+
+/// Makes a database a journal, or one of an earlier schema one of ours.
+pub(super) fn prepare(connection: &Connection, path: &Path) -> Result<(), JournalError> {
+    let fail = |source| classify(path, source);
+    let found: i64 = connection
+        .query_row("PRAGMA user_version", [], |row| row.get(0))
+        .map_err(fail)?;
+    if found > SCHEMA_VERSION {
+        return Err(JournalError::Newer {
+            path: path.to_path_buf(),
+            found,
+        });
+    }
+    if found == 1 || found == 2 {
+        // What is in the old column is no jury, so that every verdict is looked at again.
+        let newer = "BEGIN; ALTER TABLE files RENAME COLUMN bundles TO jury; \
+                     ALTER TABLE files ADD COLUMN epoch INTEGER NOT NULL DEFAULT 0; \
+                     ALTER TABLE files ADD COLUMN written TEXT NOT NULL DEFAULT ''; \
+                     ALTER TABLE deliveries RENAME TO deliveries_before; \
+                     CREATE TABLE deliveries (path TEXT NOT NULL, reporter TEXT NOT NULL, \
+                     job INTEGER, PRIMARY KEY (path, reporter)) WITHOUT ROWID; \
+                     INSERT INTO deliveries SELECT path, reporter, nullif(job, 0) \
+                     FROM deliveries_before; DROP TABLE deliveries_before; \
+                     PRAGMA user_version = 3; COMMIT;";
+        connection.execute_batch(newer).map_err(fail)?;
+    }
+    if (1..=3).contains(&found) {
+        // What was skipped stays in it as it is, row by row.
+        connection
+            .execute_batch("BEGIN; ALTER TABLE job_checkers RENAME TO job_findings; PRAGMA user_version = 4; COMMIT;")
+            .map_err(fail)?;
+    }
+    connection.set_prepared_statement_cache_capacity(STATEMENTS);
+    // WAL with synchronous=NORMAL survives a killed process; after a power cut the last verdicts
+    // may be missing, and their files are judged anew.
+    connection
+        .execute_batch(&format!(
+            "PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL; PRAGMA foreign_keys = ON; \
+             {SCHEMA} PRAGMA user_version = {SCHEMA_VERSION};"
+        ))
+        .map_err(fail)
+}
