@@ -1,4 +1,5 @@
 use std::collections::HashMap;
+use std::sync::atomic::Ordering;
 
 use qcbus_document::{Attribute, Node};
 use qcbus_formats::distance::did_you_mean;
@@ -61,7 +62,7 @@ fn loose_keys(one: &Use<'_>, found: &mut Sink<'_>) {
 fn say_loose(key: &Key<'_>, taken: Attribute<'_>, found: &mut Sink<'_>) {
     let exact = path(taken, key.key.split('.').count());
     let of = format!("`{}` of `{}`", taken.name(), taken.node().name());
-    let text = match key.fits.get() {
+    let text = match key.fits.load(Ordering::Relaxed) {
         0 => format!(
             "the key `{}` is not the path of {of}, which is `{exact}`; the reference tool does not compare the elements \
              in the middle and replaces it",
