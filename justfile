@@ -39,6 +39,10 @@ bench-rivals *ARGS:
     cargo build --release -p qcbus
     python3 tests/rivals.py {{ARGS}}
 
+# Instructions of the hot paths beside the last ones; needs valgrind. QCBUS_BLESS=1 keeps the new ones.
+figures:
+    cargo bench -p qcbus-benches --bench instructions
+
 # Advisories, licences and bans of dependencies; needs cargo-deny.
 deny:
     cargo deny --all-features check
