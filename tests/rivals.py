@@ -243,10 +243,10 @@ class Arrivals:
                 missing -= self.heard()
             else:  # an event may be lost, a file is not
                 missing -= {name for name in missing if (self.directory / name).exists()}
-            if not alive():
+            if missing and not alive():
                 raise Failed("the broker has ended")
-            if now > end:
-                raise Failed(f"{len(missing)} of {len(names)} files have no verdict, {min(missing, default='')} for one")
+            if missing and now > end:
+                raise Failed(f"{len(missing)} of {len(names)} files are not there, such as {min(missing)}")
         return now
 
     def heard(self):
