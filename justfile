@@ -34,6 +34,15 @@ browser:
     -target/debug/qcbus check tests/farm --quiet --out target/pages/out --output-format html=target/pages/farm.html
     reporters/html/browser/run target/pages
 
+# Times beside a rival, whose command line is in QCBUS_RIVAL: 'PROGRAM ARGS {}'.
+bench-rivals *ARGS:
+    cargo build --release -p qcbus
+    python3 tests/rivals.py {{ARGS}}
+
+# Instructions of the hot paths beside the last ones; needs valgrind. QCBUS_BLESS=1 keeps the new ones.
+figures:
+    cargo bench -p qcbus-benches --bench instructions
+
 # Advisories, licences and bans of dependencies; needs cargo-deny.
 deny:
     cargo deny --all-features check

@@ -11,6 +11,7 @@ Not part of CI: it measures.
 """
 
 import argparse
+import math
 import os
 import pathlib
 import re
@@ -86,24 +87,77 @@ def repeated(text, size=0, copies=0):
     return "".join(parts) + tail
 
 
+# What is made of which map, and how; `tests/rivals.py` measures some of them, too.
+MADE = {
+    "motorway-x4.xodr": (MOTORWAY, {"copies": 4}),
+    "town-10MB.xodr": (TOWN, {"size": 10 * MEGABYTE}),
+    "town-20MB.xodr": (TOWN, {"size": 20 * MEGABYTE}),
+    "town-100MB.xodr": (TOWN, {"size": 100 * MEGABYTE}),
+    "motorway-10MB.xodr": (MOTORWAY, {"size": 10 * MEGABYTE}),
+    "motorway-20MB.xodr": (MOTORWAY, {"size": 20 * MEGABYTE}),
+}
+
+
+def make_map(cases, directory, name):
+    """The path of a large map, which is made if it is not there. Whoever breaks off leaves no half one."""
+    path = directory / name
+    if not path.exists():
+        source, how = MADE[name]
+        text = repeated((cases / source).read_text(encoding="utf-8"), **how)
+        half = directory / f".{name}.{os.getpid()}"
+        half.write_text(text, encoding="utf-8")
+        half.rename(path)
+    return path
+
+
 def make_maps(cases, directory):
-    """The maps to measure: name and path, small ones first."""
-    read = lambda path: (cases / path).read_text(encoding="utf-8")
-    town, motorway = read(TOWN), read(MOTORWAY)
-    made = {
-        "motorway-x4.xodr": lambda: repeated(motorway, copies=4),
-        "town-10MB.xodr": lambda: repeated(town, size=10 * MEGABYTE),
-        "town-20MB.xodr": lambda: repeated(town, size=20 * MEGABYTE),
-        "motorway-10MB.xodr": lambda: repeated(motorway, size=10 * MEGABYTE),
-        "motorway-20MB.xodr": lambda: repeated(motorway, size=20 * MEGABYTE),
-    }
-    maps = [cases / SMALL, cases / TOWN, cases / MOTORWAY]
-    for name, make in made.items():
-        path = directory / name
-        if not path.exists():
-            path.write_text(make(), encoding="utf-8")
-        maps.append(path)
-    return maps
+    """The maps to measure, small ones first."""
+    large = ("motorway-x4", "town-10MB", "town-20MB", "motorway-10MB", "motorway-20MB")
+    made = [make_map(cases, directory, f"{name}.xodr") for name in large]
+    return [cases / SMALL, cases / TOWN, cases / MOTORWAY, *made]
+
+
+ROAD = """    <road name="Road {id}" length="{length}" id="{id}" junction="-1">
+        <planView>
+{geometries}        </planView>
+        <lanes>
+            <laneSection s="0">
+                <center>
+                    <lane id="0" type="none" level="false"/>
+                </center>
+                <right>
+                    <lane id="-1" type="driving" level="false">
+                        <width sOffset="0" a="3.5" b="0" c="0" d="0"/>
+                    </lane>
+                </right>
+            </laneSection>
+        </lanes>
+    </road>
+"""
+GEOMETRY = """            <geometry s="{s!r}" x="{x!r}" y="{y!r}" hdg="{hdg!r}" length="{length!r}">
+                <line/>
+            </geometry>
+"""
+
+
+def generated(size, name):
+    """A map of about that size, without faults, for which no corpus is needed. One bend after the other."""
+    parts = [
+        '<?xml version="1.0" encoding="UTF-8"?>\n<OpenDRIVE>\n'
+        f'    <header revMajor="1" revMinor="7" name="{name}" version="1" date="2026-03-02T08:00:00"\n'
+        '            north="9000" south="-100" east="9000" west="-100" vendor="qcbus"/>\n'
+    ]
+    length, road, step = len(parts[0]), 0, 12.345678901234
+    while length < size - 1000 or road == 0:
+        x, y, geometries = 131.4 * (road % 64), 53.1 * (road // 64), ""
+        for part in range(8):
+            hdg = 0.01 * part
+            geometries += GEOMETRY.format(s=step * part, x=x, y=y, hdg=hdg, length=step)
+            x, y = x + step * math.cos(hdg), y + step * math.sin(hdg)
+        road += 1
+        parts.append(ROAD.format(id=road, length=repr(8 * step), geometries=geometries))
+        length += len(parts[-1])
+    return "".join(parts) + "</OpenDRIVE>\n"
 
 
 def ours(maps, runs):

@@ -1,8 +1,9 @@
-//! What the benches share: generated maps, peers that only answer, figures and tables.
+//! What the benches share: generated maps and answers, peers that only answer, figures and tables.
 //!
 //! Every bench is a program of its own (`cargo bench -p qcbus-benches --bench NAME`) and prints
 //! Markdown, so that the tables of `docs/evidence/performance.md` can be made again.
 
+pub mod answers;
 pub mod farm;
 pub mod figures;
 pub mod machine;
