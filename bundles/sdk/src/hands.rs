@@ -26,10 +26,10 @@ struct State {
 #[derive(Debug)]
 pub struct Hand<'h>(&'h Hands);
 
-/// More threads than this help nobody, and are a slip of the finger.
-pub const MOST: usize = 1024;
-
 impl Hands {
+    /// More threads than this help nobody, and are a slip of the finger.
+    pub const MOST: usize = 1024;
+
     /// That many hands, one of which is taken: that of the thread which checks.
     pub fn new(count: usize) -> Hands {
         let hands = Hands::idle(count);
@@ -39,7 +39,7 @@ impl Hands {
 
     /// That many hands, none of which is taken.
     pub(crate) fn idle(count: usize) -> Hands {
-        let count = count.clamp(1, MOST);
+        let count = count.clamp(1, Hands::MOST);
         let hands = Hands {
             count,
             state: Mutex::new(State {
@@ -161,7 +161,7 @@ mod tests {
     #[test]
     fn there_is_always_one_hand_and_never_too_many() {
         assert_eq!(Hands::new(0).count(), 1);
-        assert_eq!(Hands::new(usize::MAX).count(), MOST);
+        assert_eq!(Hands::new(usize::MAX).count(), Hands::MOST);
         assert!(Hands::new(1).spare().is_none(), "the only one is taken");
         assert!(Hands::available() >= 1);
     }

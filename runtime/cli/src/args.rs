@@ -7,6 +7,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
 
 use qcbus_reporter_sdk::Registration;
+use qcbus_sdk::Hands;
 
 use crate::standard::REPORTERS;
 
@@ -130,6 +131,10 @@ pub struct LimitArgs {
     /// A file without room in shared memory is waited for this long while nothing moves
     #[arg(long, value_name = "TIME", value_parser = duration, hide_short_help = true)]
     pub room_limit: Option<Duration>,
+    /// Threads with which a bundle that comes with qcbus checks; unless told otherwise, as many as this process may
+    /// use processors
+    #[arg(long, value_name = "N", value_parser = threads, hide_short_help = true)]
+    pub threads: Option<usize>,
     /// Most private memory of a bundle, in MiB
     #[arg(long, value_name = "MIB", hide_short_help = true)]
     pub memory_limit: Option<u64>,
@@ -657,6 +662,13 @@ fn name_value(text: &str) -> Result<(String, String), String> {
         Some((name, value)) if !name.is_empty() => Ok((name.to_owned(), value.to_owned())),
         _ => Err("write NAME=VALUE".to_owned()),
     }
+}
+
+/// A number of threads.
+fn threads(text: &str) -> Result<usize, String> {
+    let number = text.parse().ok();
+    let number = number.filter(|it| (1..=Hands::MOST).contains(it));
+    number.ok_or_else(|| format!("`{text}` is no number from 1 to {}", Hands::MOST))
 }
 
 /// Reads `250ms`, `30s`, `5m`, `2h`, `90d`; a number alone is seconds.

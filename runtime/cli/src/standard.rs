@@ -26,7 +26,7 @@ pub fn bundle(name: &str) -> Option<&'static Bundle> {
 }
 
 /// How to start the standard bundles that take any of these kinds of files, with the user's
-/// schemas.
+/// schemas, and with how many threads if somebody says so.
 ///
 /// # Errors
 /// When the schemas are of no use: said here, before a bundle is started that would end at once.
@@ -34,6 +34,7 @@ pub fn bundle_specs(
     program: &Path,
     kinds: &BTreeSet<FileKind>,
     schema_dir: Option<&Path>,
+    threads: Option<usize>,
 ) -> Result<Vec<ChildSpec>, String> {
     let wanted = BUNDLES
         .iter()
@@ -50,6 +51,10 @@ pub fn bundle_specs(
                 .map_err(|error| format!("--schema-dir: failed to {error}"))?;
             let directory = directory.to_string_lossy().into_owned();
             spec.command.extend(["--schema-dir".to_owned(), directory]);
+        }
+        if let Some(threads) = threads {
+            let threads = threads.to_string();
+            spec.command.extend(["--threads".to_owned(), threads]);
         }
         Ok(spec)
     });

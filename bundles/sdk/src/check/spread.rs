@@ -32,7 +32,7 @@ pub(super) struct Turn<'r> {
 type Looked = (Vec<Issue>, Outcome);
 
 /// What one thread has of one checker.
-struct Share<'r> {
+struct Had<'r> {
     sink: Sink<'r>,
     took: Duration,
     /// Where it panicked and what that said; it is not asked again.
@@ -56,7 +56,7 @@ struct Tasks<'t, 'r> {
 const WORTH_A_THREAD: Duration = Duration::from_micros(100);
 
 /// What one thread has found, by place in the turns.
-type Shares<'r> = Vec<Option<Share<'r>>>;
+type Pile<'r> = Vec<Option<Had<'r>>>;
 
 impl<'r> Work<'r> {
     /// Has checkers look at the parts of the model and at the whole: what they say, in their order. `None`
@@ -75,10 +75,10 @@ impl<'r> Work<'r> {
             built,
             next: AtomicUsize::new(0),
         };
-        let mut shares = if self.spreads {
+        let mut piles = if self.spreads {
             tasks.by_many()
         } else {
-            let mut own = tasks.no_shares();
+            let mut own = tasks.empty_pile();
             while tasks.one(&mut own) {}
             vec![own]
         };
@@ -86,7 +86,7 @@ impl<'r> Work<'r> {
             return None;
         }
         let of = |place: usize| {
-            let of_all = shares.iter_mut();
+            let of_all = piles.iter_mut();
             let found = of_all.filter_map(|it| it.get_mut(place)?.take()).collect();
             tasks.together(&turns[place], found)
         };
@@ -96,11 +96,11 @@ impl<'r> Work<'r> {
 
 impl<'r> Tasks<'_, 'r> {
     /// Takes tasks in this thread, and has others take some as long as there are hands to spare.
-    fn by_many(&self) -> Vec<Shares<'r>> {
+    fn by_many(&self) -> Vec<Pile<'r>> {
         let begun = Instant::now();
         std::thread::scope(|scope| {
             let mut others = Vec::new();
-            let mut own = self.no_shares();
+            let mut own = self.empty_pile();
             loop {
                 while self.left() > 1
                     && begun.elapsed() >= WORTH_A_THREAD
@@ -112,22 +112,22 @@ impl<'r> Tasks<'_, 'r> {
                     break;
                 }
             }
-            let mut shares = vec![own];
-            let end = || shares.extend(others.into_iter().map(joined));
+            let mut piles = vec![own];
+            let end = || piles.extend(others.into_iter().map(joined));
             self.work.hands.wait_for(end);
-            shares
+            piles
         })
     }
 
     /// Takes tasks with a hand that is lent: until a job wants it.
-    fn lend(&self, hand: Hand<'_>) -> Shares<'r> {
-        let mut own = self.no_shares();
+    fn lend(&self, hand: Hand<'_>) -> Pile<'r> {
+        let mut own = self.empty_pile();
         while !self.work.hands.are_wanted() && self.one(&mut own) {}
         drop(hand);
         own
     }
 
-    fn no_shares(&self) -> Shares<'r> {
+    fn empty_pile(&self) -> Pile<'r> {
         self.turns.iter().map(|_| None).collect()
     }
 
@@ -142,7 +142,7 @@ impl<'r> Tasks<'_, 'r> {
     }
 
     /// Takes one task. `false`: there is none.
-    fn one(&self, own: &mut Shares<'r>) -> bool {
+    fn one(&self, own: &mut Pile<'r>) -> bool {
         if self.work.stops() {
             return false;
         }
@@ -151,69 +151,72 @@ impl<'r> Tasks<'_, 'r> {
         if task < parts {
             let mut clock = Instant::now();
             for &place in &self.by_parts {
-                let (turn, share) = self.own(own, place);
-                self.look(turn, share, task, &mut clock);
+                let (turn, had) = self.own(own, place);
+                self.look(turn, had, task, &mut clock);
             }
         } else if let Some(&place) = self.wholes.get(task - parts) {
-            let (turn, share) = self.own(own, place);
-            self.look(turn, share, usize::MAX, &mut Instant::now());
+            let (turn, had) = self.own(own, place);
+            self.look(turn, had, usize::MAX, &mut Instant::now());
         }
         task < self.count()
     }
 
     /// A checker and what this thread has of it.
-    fn own<'s>(&self, own: &'s mut Shares<'r>, place: usize) -> (&Turn<'r>, &'s mut Share<'r>) {
+    fn own<'s>(&self, own: &'s mut Pile<'r>, place: usize) -> (&Turn<'r>, &'s mut Had<'r>) {
         let turn = &self.turns[place];
-        (turn, own[place].get_or_insert_with(|| self.share(turn)))
+        (
+            turn,
+            own[place].get_or_insert_with(|| self.nothing_yet(turn)),
+        )
     }
 
     /// Has a checker look at a part, or at the whole ([`usize::MAX`]). `clock` is when that began, and then
     /// when it ended.
-    fn look(&self, turn: &Turn<'r>, share: &mut Share<'r>, part: usize, clock: &mut Instant) {
-        if share.failed.is_some() {
+    fn look(&self, turn: &Turn<'r>, had: &mut Had<'r>, part: usize, clock: &mut Instant) {
+        if had.failed.is_some() {
             return;
         }
         self.work.listener.begins(turn.index);
         let number = u32::try_from(part).unwrap_or(WHOLE);
-        share.sink.turn_to(number);
-        let sink = &mut share.sink;
+        had.sink.turn_to(number);
+        let sink = &mut had.sink;
         let looked = catch(|| match part {
             usize::MAX => self.built.run(turn.rule, sink),
             part => self.built.each(part, turn.rule, sink),
         });
-        share.failed = looked.err().map(|panic| (number, panic));
+        had.failed = looked.err().map(|panic| (number, panic));
         let now = Instant::now();
-        share.took += now.duration_since(*clock);
+        had.took += now.duration_since(*clock);
         *clock = now;
     }
 
-    fn share(&self, turn: &Turn<'r>) -> Share<'r> {
+    fn nothing_yet(&self, turn: &Turn<'r>) -> Had<'r> {
         let Pass {
             values,
             not_normative,
         } = &turn.pass;
-        Share {
+        Had {
             sink: Sink::new(self.work.subject, turn.facts, values, not_normative.clone()),
             took: Duration::ZERO,
             failed: None,
         }
     }
 
-    /// What a checker says, of which several threads have shares.
-    fn together(&self, turn: &Turn<'r>, mut shares: Vec<Share<'r>>) -> Looked {
-        let mut share = match shares.len() {
-            0 => self.share(turn),
-            1 => shares.remove(0),
-            _ => merged(shares).unwrap_or_else(|| self.alone(turn)),
+    /// What a checker says, of which several threads may have something.
+    fn together(&self, turn: &Turn<'r>, mut piles: Vec<Had<'r>>) -> Looked {
+        let mut had = match piles.len() {
+            0 => self.nothing_yet(turn),
+            1 => piles.remove(0),
+            _ => merged(piles).unwrap_or_else(|| self.alone(turn)),
         };
         if turn.rule.goes_by_parts() && turn.rule.looks_at_the_whole() {
-            self.look(turn, &mut share, usize::MAX, &mut Instant::now());
+            self.look(turn, &mut had, usize::MAX, &mut Instant::now());
         }
-        let Share {
+        let Had {
             mut sink,
             failed,
             took,
-        } = share;
+        } = had;
         // What was found before a panic is still true.
         let (issues, metadata) = sink.finish();
         let ending = match failed {
@@ -232,26 +235,26 @@ impl<'r> Tasks<'_, 'r> {
     }
 
     /// Has a checker look at all parts, in this thread.
-    fn alone(&self, turn: &Turn<'r>) -> Share<'r> {
-        let mut share = self.share(turn);
+    fn alone(&self, turn: &Turn<'r>) -> Had<'r> {
+        let mut had = self.nothing_yet(turn);
         let mut clock = Instant::now();
         for part in 0..self.built.parts() {
-            self.look(turn, &mut share, part, &mut clock);
+            self.look(turn, &mut had, part, &mut clock);
         }
-        share
+        had
     }
 }
 
-/// The shares of several threads as one, as one thread would have it. `None`: that cannot be told.
-fn merged(mut shares: Vec<Share<'_>>) -> Option<Share<'_>> {
-    let failed = shares.iter_mut().filter_map(|share| share.failed.take());
+/// What several threads have, as one, as one thread would have it. `None`: that cannot be told.
+fn merged(mut piles: Vec<Had<'_>>) -> Option<Had<'_>> {
+    let failed = piles.iter_mut().filter_map(|had| had.failed.take());
     // One thread would have come no further than the first panic.
     let failed = failed.min_by_key(|(part, _)| *part);
     let last = failed.as_ref().map_or(WHOLE, |(part, _)| *part);
-    let took = shares.iter().map(|share| share.took).sum();
-    let mut shares = shares.into_iter();
-    let mut first = shares.next()?;
-    let rest = shares.map(|share| share.sink).collect();
+    let took = piles.iter().map(|had| had.took).sum();
+    let mut piles = piles.into_iter();
+    let mut first = piles.next()?;
+    let rest = piles.map(|had| had.sink).collect();
     first.sink.take_in(rest, last).then_some(())?;
     (first.failed, first.took) = (failed, took);
     Some(first)

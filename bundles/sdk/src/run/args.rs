@@ -107,7 +107,7 @@ pub(super) fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Mode, U
 
 fn threads_of(text: &str) -> Option<usize> {
     let number = text.parse().ok();
-    number.filter(|number| (1..=crate::hands::MOST).contains(number))
+    number.filter(|number| (1..=Hands::MOST).contains(number))
 }
 
 #[cfg(test)]

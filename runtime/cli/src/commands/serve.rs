@@ -193,7 +193,12 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
     let mut children = if args.no_standard_bundles {
         Vec::new()
     } else {
-        standard::bundle_specs(&program, &every_kind, args.schema_dir.as_deref())?
+        standard::bundle_specs(
+            &program,
+            &every_kind,
+            args.schema_dir.as_deref(),
+            args.limits.threads,
+        )?
     };
     let reporters = standard::reporter_specs(&program);
     let asked = args.report.iter();

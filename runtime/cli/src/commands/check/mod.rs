@@ -88,7 +88,12 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
     } else {
         kinds
     };
-    let bundles = standard::bundle_specs(&program, &kinds, args.schema_dir.as_deref());
+    let bundles = standard::bundle_specs(
+        &program,
+        &kinds,
+        args.schema_dir.as_deref(),
+        args.limits.threads,
+    );
     let options = Options {
         instance: private_instance()?,
         roots,
