@@ -169,7 +169,7 @@ fn said(
             }
         }
         FromPeer::Leaving => return true,
-        FromPeer::CheckerDone { .. }
+        FromPeer::CheckersDone { .. }
         | FromPeer::Heartbeat { .. }
         | FromPeer::ResultDone { .. }
         | FromPeer::WithdrawalDone { .. } => {}

@@ -99,7 +99,7 @@ async fn talk(host: &mut Host) -> (usize, Status) {
                     assert_eq!(job, JOB);
                     issues += batch.len();
                 }
-                FromPeer::CheckerDone { ending, .. } => status = ending.status(),
+                FromPeer::CheckersDone { ended, .. } => status = ended[0].ending.status(),
                 FromPeer::JobDone { .. } => host.send(peer, &ToPeer::Drain),
                 FromPeer::Leaving => return (issues, status),
                 FromPeer::Heartbeat { .. }

@@ -26,7 +26,7 @@ pub use catalogue::{Catalogue, CheckerInfo, Hello, ParamInfo, Role};
 pub use exit::Exit;
 pub use ids::{Digest, DocId, DocumentRole, JobId, PROTOCOL_VERSION};
 pub use missing::{Absence, MissingDocument, Within};
-pub use peer_to_broker::FromPeer;
+pub use peer_to_broker::{CheckerEnd, FromPeer};
 pub use qcbus_formats::Verdict;
 
 #[cfg(test)]

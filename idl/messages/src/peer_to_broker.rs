@@ -6,6 +6,19 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Catalogue, DocId, JobId, PeerReport};
 
+/// How one checker has ended.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CheckerEnd {
+    /// Index into the catalogue.
+    pub checker: u32,
+    /// How.
+    pub ending: Ending,
+    /// The parameters that it used.
+    pub params: Vec<Param>,
+    /// Further facts.
+    pub metadata: Vec<Metadata>,
+}
+
 /// Bundle or reporter → broker. Nothing said for a job counts before its `JobDone`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum FromPeer {
@@ -25,18 +38,13 @@ pub enum FromPeer {
         /// The findings, ids still 0.
         issues: Vec<Issue>,
     },
-    /// One checker has ended: a demanded one, or one besides that kept it from looking.
-    CheckerDone {
+    /// Checkers have ended: demanded ones, or others besides that kept them from looking. Any number at
+    /// once: there are hundreds in a job.
+    CheckersDone {
         /// The job.
         job: JobId,
-        /// Index into the catalogue.
-        checker: u32,
-        /// How.
-        ending: Ending,
-        /// The parameters that it used.
-        params: Vec<Param>,
-        /// Further facts.
-        metadata: Vec<Metadata>,
+        /// The checkers.
+        ended: Vec<CheckerEnd>,
     },
     /// All demanded checkers of the bundle have ended.
     JobDone {

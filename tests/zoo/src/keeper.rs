@@ -12,8 +12,8 @@ use qcbus_formats::manifest::May;
 use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::Level;
 use qcbus_messages::{
-    Catalogue, CheckerInfo, FromPeer, Hello, Job, JobDocument, JobId, PROTOCOL_VERSION, PeerReport,
-    Role, ToPeer,
+    Catalogue, CheckerEnd, CheckerInfo, FromPeer, Hello, Job, JobDocument, JobId, PROTOCOL_VERSION,
+    PeerReport, Role, ToPeer,
 };
 
 use crate::{Args, complain};
@@ -100,12 +100,14 @@ pub fn answer(peer: &mut Peer, job: JobId) {
 
 /// One checker has ended without findings.
 pub fn checker_done(peer: &mut Peer, job: JobId, checker: u32) {
-    peer.send(&FromPeer::CheckerDone {
+    peer.send(&FromPeer::CheckersDone {
         job,
-        checker,
-        ending: Ending::Completed,
-        params: Vec::new(),
-        metadata: Vec::new(),
+        ended: vec![CheckerEnd {
+            checker,
+            ending: Ending::Completed,
+            params: Vec::new(),
+            metadata: Vec::new(),
+        }],
     });
 }
 

@@ -1,6 +1,8 @@
 //! Findings on their way to the broker: in messages of which none is larger than a broker takes.
 
+use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::{InfoElement, Issue, Location, Locations};
+use qcbus_messages::CheckerEnd;
 use qcbus_messages::codec::MAX_FROM_PEER;
 
 /// Issues per message: large enough to be cheap, small enough to interleave with other traffic.
@@ -32,6 +34,43 @@ pub(super) fn batches(issues: Vec<Issue>) -> Vec<Vec<Issue>> {
         batches.push(batch);
     }
     batches
+}
+
+/// The ends of checkers in order, in batches.
+pub(super) fn batches_of_ends(ends: Vec<CheckerEnd>) -> Vec<Vec<CheckerEnd>> {
+    let mut batches = Vec::new();
+    let (mut batch, mut bytes) = (Vec::new(), 0);
+    for end in ends {
+        let more = size_of_end(&end);
+        if !batch.is_empty() && bytes + more > BATCH_BYTES {
+            batches.push(std::mem::take(&mut batch));
+            bytes = 0;
+        }
+        bytes += more;
+        batch.push(end);
+    }
+    if !batch.is_empty() {
+        batches.push(batch);
+    }
+    batches
+}
+
+/// At least the bytes of an end in a message.
+fn size_of_end(end: &CheckerEnd) -> usize {
+    const NUMBERS: usize = 32;
+    let ending = match &end.ending {
+        Ending::Completed => 0,
+        Ending::NotApplicable { reason } | Ending::Failed { reason } => reason.len(),
+        Ending::Blocked { by, reason } => {
+            reason.len() + by.iter().map(|id| NUMBERS + id.len()).sum::<usize>()
+        }
+    };
+    let params = end.params.iter();
+    let params = params.map(|it| NUMBERS + it.name.len() + it.value.len());
+    let metadata = end.metadata.iter();
+    let metadata =
+        metadata.map(|it| NUMBERS + it.key.len() + it.value.len() + it.description.len());
+    NUMBERS + ending + params.sum::<usize>() + metadata.sum::<usize>()
 }
 
 /// At least the bytes of an issue in a message.

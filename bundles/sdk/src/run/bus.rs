@@ -12,16 +12,17 @@ use qcbus_formats::config::Config;
 use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::Issue;
 use qcbus_messages::{
-    Digest, DocId, FromPeer, Hello, IS_STOPPING, Job, JobId, PROTOCOL_VERSION, Role, ToPeer, codec,
+    CheckerEnd, Digest, DocId, FromPeer, Hello, IS_STOPPING, Job, JobId, PROTOCOL_VERSION, Role,
+    ToPeer, codec,
 };
 use tokio::sync::mpsc;
 
 use super::Exit;
-use super::batches::batches;
+use super::batches::{batches, batches_of_ends};
 use super::file::complain;
 use super::module::configured;
 use super::stand::{Ended, Fence, Sessions, Stand, sandboxed};
-use super::worker::{CheckerAtWork, Progress, Work, Workers};
+use super::worker::{CheckerAtWork, Finished, Work, Workers};
 use crate::kept::KeptModels;
 use crate::subject::LinkedImage;
 use crate::{Bundle, Hands, Outcome, Plan, UserFiles};
@@ -222,7 +223,7 @@ async fn serve(
     loop {
         let ended = tokio::select! {
             event = daemon.peer.next() => daemon.hear(event),
-            Some(event) = progress.recv() => { daemon.progress(event); None }
+            Some(finished) = progress.recv() => { daemon.finished(finished); None }
             _ = ticks.tick() => { daemon.tick(); None }
             () = stops.next() => daemon.stop(),
         };
@@ -524,32 +525,20 @@ impl Daemon {
         config.ok()
     }
 
-    fn progress(&mut self, event: Progress) {
-        match event {
-            Progress::Ended {
-                run,
-                checker,
-                issues,
-                outcome,
-            } => {
-                if let Some(job) = self.counts(run) {
-                    self.send_outcome(job, checker, issues, outcome);
-                }
+    fn finished(&mut self, finished: Finished) {
+        let Finished {
+            run,
+            micros,
+            outcome,
+        } = finished;
+        if let Some(job) = self.counts(run) {
+            match outcome {
+                Ok(ended) => self.send_outcome(job, ended),
+                Err(reason) => self.send_failure(run, &reason),
             }
-            Progress::Finished {
-                run,
-                micros,
-                failed,
-            } => {
-                if let Some(job) = self.counts(run) {
-                    if let Some(reason) = failed {
-                        self.send_failure(run, &reason);
-                    }
-                    self.peer.send(&FromPeer::JobDone { job, micros });
-                }
-                self.let_go(run);
-            }
+            self.peer.send(&FromPeer::JobDone { job, micros });
         }
+        self.let_go(run);
     }
 
     /// The job of a run, if the broker still wants to hear about it.
@@ -559,27 +548,30 @@ impl Daemon {
         counts.then_some(running.job.job)
     }
 
-    fn send_outcome(&mut self, job: JobId, checker: u32, issues: Vec<Issue>, outcome: Outcome) {
-        for issues in batches(issues) {
-            self.peer.send(&FromPeer::Issues {
-                job,
+    fn send_outcome(&mut self, job: JobId, ended: Vec<(u32, Vec<Issue>, Outcome)>) {
+        let mut ends = Vec::with_capacity(ended.len());
+        for (checker, issues, outcome) in ended {
+            for issues in batches(issues) {
+                self.peer.send(&FromPeer::Issues {
+                    job,
+                    checker,
+                    issues,
+                });
+            }
+            ends.push(CheckerEnd {
                 checker,
-                issues,
+                ending: outcome.ending,
+                params: outcome.params,
+                metadata: outcome.metadata,
             });
         }
-        let Outcome {
-            ending,
-            params,
-            metadata,
-            ..
-        } = outcome;
-        self.peer.send(&FromPeer::CheckerDone {
-            job,
-            checker,
-            ending,
-            params,
-            metadata,
-        });
+        self.send_ends(job, ends);
+    }
+
+    fn send_ends(&mut self, job: JobId, ends: Vec<CheckerEnd>) {
+        for ended in batches_of_ends(ends) {
+            self.peer.send(&FromPeer::CheckersDone { job, ended });
+        }
     }
 
     /// Nothing could be checked: every demanded checker has failed.
@@ -589,17 +581,16 @@ impl Daemon {
             return;
         };
         let demanded = (0..plan.checkers().len()).filter(|&index| plan.is_demanded(index));
-        for checker in demanded.filter_map(|index| u32::try_from(index).ok()) {
-            self.peer.send(&FromPeer::CheckerDone {
-                job,
-                checker,
-                ending: Ending::Failed {
-                    reason: reason.to_owned(),
-                },
-                params: Vec::new(),
-                metadata: Vec::new(),
-            });
-        }
+        let demanded = demanded.filter_map(|index| u32::try_from(index).ok());
+        let ends = demanded.map(|checker| CheckerEnd {
+            checker,
+            ending: Ending::Failed {
+                reason: reason.to_owned(),
+            },
+            params: Vec::new(),
+            metadata: Vec::new(),
+        });
+        self.send_ends(job, ends.collect());
     }
 
     /// The job is over: its documents may go, unless another job waits for them.

@@ -48,20 +48,12 @@ impl Default for CheckerAtWork {
     }
 }
 
-/// What the threads have to say.
-pub(super) enum Progress {
-    Ended {
-        run: u64,
-        checker: u32,
-        issues: Vec<Issue>,
-        outcome: Outcome,
-    },
-    /// The job is over: `failed` says why nothing was checked.
-    Finished {
-        run: u64,
-        micros: u64,
-        failed: Option<String>,
-    },
+/// What a thread says of a job that is over.
+pub(super) struct Finished {
+    pub run: u64,
+    pub micros: u64,
+    /// What the checkers found, by their index, and how they ended; or why nothing was checked.
+    pub outcome: Result<Vec<(u32, Vec<Issue>, Outcome)>, String>,
 }
 
 /// The threads. They end when this is dropped and all that they were given is done.
@@ -75,7 +67,7 @@ struct Shared {
     jobs: Mutex<Receiver<Box<Work>>>,
     hands: Hands,
     models: KeptModels,
-    progress: mpsc::UnboundedSender<Progress>,
+    progress: mpsc::UnboundedSender<Finished>,
     /// Jobs that were given and are not done.
     busy: AtomicUsize,
 }
@@ -89,7 +81,7 @@ impl Workers {
     pub fn start(
         hands: usize,
         models: KeptModels,
-        progress: mpsc::UnboundedSender<Progress>,
+        progress: mpsc::UnboundedSender<Finished>,
     ) -> std::io::Result<Workers> {
         let (jobs, receiver) = channel();
         let shared = Arc::new(Shared {
@@ -155,32 +147,34 @@ impl Shared {
 }
 
 /// Does one job.
-fn finish(work: &Work, shared: &Shared) -> Progress {
+fn finish(work: &Work, shared: &Shared) -> Finished {
     let start = Instant::now();
     let models = shared.models.for_job();
     let outcome = one(work, &models, shared);
     // What was at hand when a rule or a model panicked is not given to the next job.
-    if outcome == Ok(Trust::All) {
+    let is_failed = |(_, _, outcome): &(u32, Vec<Issue>, Outcome)| {
+        matches!(outcome.ending, Ending::Failed { .. })
+    };
+    if outcome
+        .as_ref()
+        .is_ok_and(|ended| !ended.iter().any(is_failed))
+    {
         models.keep();
     } else {
         shared.models.clear();
     }
-    Progress::Finished {
+    Finished {
         run: work.run,
         micros: u64::try_from(start.elapsed().as_micros()).unwrap_or(u64::MAX),
-        failed: outcome.err(),
+        outcome,
     }
 }
 
-/// What may be used again.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Trust {
-    All,
-    /// A checker has failed.
-    Nothing,
-}
-
-fn one(work: &Work, models: &JobModels, shared: &Shared) -> Result<Trust, String> {
+fn one(
+    work: &Work,
+    models: &JobModels,
+    shared: &Shared,
+) -> Result<Vec<(u32, Vec<Issue>, Outcome)>, String> {
     let unopened = |what: &str, error| format!("failed to {error} ({what})");
     let root = Document::open(&work.root).map_err(|error| unopened("the root", error))?;
     let linked = work.linked.iter().map(|linked| {
@@ -193,22 +187,20 @@ fn one(work: &Work, models: &JobModels, shared: &Shared) -> Result<Trust, String
         .with(linked, work.missing.clone())
         .with_links(work.links.clone())
         .read(bundle.reads);
-    let mut reporter = Reporter {
+    let mut heard = Heard {
         work,
-        progress: &shared.progress,
-        trust: Trust::All,
+        ended: Vec::new(),
     };
-    check_with(&work.plan, &subject, &shared.hands, &mut reporter);
-    Ok(reporter.trust)
+    check_with(&work.plan, &subject, &shared.hands, &mut heard);
+    Ok(heard.ended)
 }
 
-struct Reporter<'w> {
+struct Heard<'w> {
     work: &'w Work,
-    progress: &'w mpsc::UnboundedSender<Progress>,
-    trust: Trust,
+    ended: Vec<(u32, Vec<Issue>, Outcome)>,
 }
 
-impl Listener for Reporter<'_> {
+impl Listener for Heard<'_> {
     fn is_cancelled(&self) -> bool {
         self.work.cancelled.load(Ordering::Relaxed)
     }
@@ -218,16 +210,7 @@ impl Listener for Reporter<'_> {
     }
 
     fn ended(&mut self, checker: usize, issues: Vec<Issue>, outcome: Outcome) {
-        let run = self.work.run;
-        if matches!(outcome.ending, Ending::Failed { .. }) {
-            self.trust = Trust::Nothing;
-        }
-        let _ = self.progress.send(Progress::Ended {
-            run,
-            checker: index(checker),
-            issues,
-            outcome,
-        });
+        self.ended.push((index(checker), issues, outcome));
     }
 }
 

@@ -314,7 +314,7 @@ impl State {
         }
         let put_aside = matches!(
             message,
-            FromPeer::Issues { .. } | FromPeer::CheckerDone { .. }
+            FromPeer::Issues { .. } | FromPeer::CheckersDone { .. }
         );
         let is_true = match message {
             FromPeer::Catalogue(catalogue) => {
@@ -330,13 +330,11 @@ impl State {
                 checker,
                 issues,
             } => self.issues(name, job, checker, issues),
-            FromPeer::CheckerDone {
-                job,
-                checker,
-                ending,
-                params,
-                metadata,
-            } => self.checker_done(name, job, checker, ending, (params, metadata)),
+            FromPeer::CheckersDone { job, ended } => {
+                let ended = ended.into_iter();
+                let said = ended.map(|end| self.checker_done(name, job, end));
+                said.fold(true, |all, one| all && one)
+            }
             FromPeer::JobDone { job, micros } => self.job_done(name, job, micros, actions),
             FromPeer::Heartbeat { .. } => true,
             FromPeer::Leaving => {
@@ -475,7 +473,7 @@ impl State {
 fn about(message: &FromPeer) -> Option<JobId> {
     match message {
         FromPeer::Issues { job, .. }
-        | FromPeer::CheckerDone { job, .. }
+        | FromPeer::CheckersDone { job, .. }
         | FromPeer::JobDone { job, .. } => Some(*job),
         _ => None,
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::{Issue, Metadata, Param};
-use qcbus_messages::JobId;
+use qcbus_messages::{CheckerEnd, JobId};
 
 use super::State;
 use super::bundles::Bundle;
@@ -86,14 +86,13 @@ impl State {
     }
 
     /// One checker has ended.
-    pub(super) fn checker_done(
-        &mut self,
-        name: &str,
-        id: JobId,
-        checker: u32,
-        mut ending: Ending,
-        (params, metadata): (Vec<Param>, Vec<Metadata>),
-    ) -> bool {
+    pub(super) fn checker_done(&mut self, name: &str, id: JobId, end: CheckerEnd) -> bool {
+        let CheckerEnd {
+            checker,
+            mut ending,
+            params,
+            metadata,
+        } = end;
         let (max_text, max_facts, max_bytes) = (
             self.settings.max_text,
             self.settings.max_facts,

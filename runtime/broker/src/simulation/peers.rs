@@ -9,7 +9,8 @@ use qcbus_formats::manifest::May;
 use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::{Issue, Level};
 use qcbus_messages::{
-    Catalogue, CheckerInfo, DocId, FromPeer, Hello, Job, JobId, PROTOCOL_VERSION, PeerReport, Role,
+    Catalogue, CheckerEnd, CheckerInfo, DocId, FromPeer, Hello, Job, JobId, PROTOCOL_VERSION,
+    PeerReport, Role,
 };
 use tokio::sync::mpsc::UnboundedSender;
 
@@ -307,12 +308,14 @@ impl Peers {
                 return format!("{name} begins job {}", job.0);
             }
         }
-        say(FromPeer::CheckerDone {
+        say(FromPeer::CheckersDone {
             job,
-            checker: 0,
-            ending: Ending::Completed,
-            params: Vec::new(),
-            metadata: Vec::new(),
+            ended: vec![CheckerEnd {
+                checker: 0,
+                ending: Ending::Completed,
+                params: Vec::new(),
+                metadata: Vec::new(),
+            }],
         });
         say(FromPeer::JobDone { job, micros: 1 });
         process.works.remove(at);

@@ -7,7 +7,8 @@ use qcbus_bus::{Host, HostEvent, HostOptions, Instance, Peer, PeerEvent, PeerId,
 use qcbus_document::FileKind;
 use qcbus_formats::xqar::Level;
 use qcbus_messages::{
-    Absence, Digest, DocumentRole, FromPeer, Hello, Job, JobId, MissingDocument, Role, ToPeer,
+    Absence, CheckerEnd, Digest, DocumentRole, FromPeer, Hello, Job, JobId, MissingDocument, Role,
+    ToPeer,
 };
 use tempfile::TempDir;
 
@@ -125,16 +126,18 @@ pub async fn join_with(
 
 /// A message whose size and content follow from `number` and `len`.
 pub fn numbered(number: u64, len: usize) -> FromPeer {
-    FromPeer::CheckerDone {
+    FromPeer::CheckersDone {
         job: JobId(number),
-        checker: 0,
-        ending: qcbus_formats::pool::Ending::Failed {
-            reason: char::from(b'a' + (number % 26) as u8)
-                .to_string()
-                .repeat(len),
-        },
-        params: Vec::new(),
-        metadata: Vec::new(),
+        ended: vec![CheckerEnd {
+            checker: 0,
+            ending: qcbus_formats::pool::Ending::Failed {
+                reason: char::from(b'a' + (number % 26) as u8)
+                    .to_string()
+                    .repeat(len),
+            },
+            params: Vec::new(),
+            metadata: Vec::new(),
+        }],
     }
 }
 

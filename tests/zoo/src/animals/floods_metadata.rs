@@ -3,7 +3,7 @@
 use qcbus_bus::Peer;
 use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::Metadata;
-use qcbus_messages::{FromPeer, Job};
+use qcbus_messages::{CheckerEnd, FromPeer, Job};
 
 use crate::keeper::{Animal, CHECKERS, GOOD, Manners, Mood};
 
@@ -34,12 +34,14 @@ pub(super) fn say(peer: &mut Peer, job: &Job, bytes: usize) {
         description: String::new(),
     };
     for number in 0..MESSAGES {
-        peer.send(&FromPeer::CheckerDone {
+        peer.send(&FromPeer::CheckersDone {
             job: job.job,
-            checker: number % CHECKERS,
-            ending: Ending::Completed,
-            params: Vec::new(),
-            metadata: vec![fact.clone()],
+            ended: vec![CheckerEnd {
+                checker: number % CHECKERS,
+                ending: Ending::Completed,
+                params: Vec::new(),
+                metadata: vec![fact.clone()],
+            }],
         });
     }
     peer.send(&FromPeer::JobDone {

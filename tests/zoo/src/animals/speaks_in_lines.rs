@@ -4,7 +4,7 @@ use qcbus_bus::Peer;
 use qcbus_formats::location::OtherPlace;
 use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::{Issue, Level, Locations};
-use qcbus_messages::{FromPeer, Job};
+use qcbus_messages::{CheckerEnd, FromPeer, Job};
 
 use crate::keeper::{Animal, CHECKERS, GOOD, Manners, Mood};
 
@@ -45,14 +45,16 @@ fn job(peer: &mut Peer, job: &Job) -> Mood {
         issues: vec![issue],
     });
     for checker in 0..CHECKERS {
-        peer.send(&FromPeer::CheckerDone {
+        peer.send(&FromPeer::CheckersDone {
             job: job.job,
-            checker,
-            ending: Ending::Failed {
-                reason: LINES.to_owned(),
-            },
-            params: Vec::new(),
-            metadata: Vec::new(),
+            ended: vec![CheckerEnd {
+                checker,
+                ending: Ending::Failed {
+                    reason: LINES.to_owned(),
+                },
+                params: Vec::new(),
+                metadata: Vec::new(),
+            }],
         });
     }
     peer.send(&FromPeer::JobDone {

@@ -5,6 +5,8 @@ use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::Metadata;
 use qcbus_messages::Catalogue;
 
+use qcbus_messages::CheckerEnd;
+
 use super::*;
 
 /// A world in which a bundle has one job.
@@ -194,12 +196,14 @@ fn done(job: JobId, checker: u32, value: &str, facts: usize) -> FromPeer {
         value: value.to_owned(),
         description: String::new(),
     };
-    FromPeer::CheckerDone {
+    FromPeer::CheckersDone {
         job,
-        checker,
-        ending: Ending::Completed,
-        params: Vec::new(),
-        metadata: vec![fact; facts],
+        ended: vec![CheckerEnd {
+            checker,
+            ending: Ending::Completed,
+            params: Vec::new(),
+            metadata: vec![fact; facts],
+        }],
     }
 }
 
@@ -271,12 +275,14 @@ fn reasons_and_who_is_in_the_way_count_too() {
         };
         world.say(
             session,
-            FromPeer::CheckerDone {
+            FromPeer::CheckersDone {
                 job,
-                checker: 0,
-                ending,
-                params: Vec::new(),
-                metadata: Vec::new(),
+                ended: vec![CheckerEnd {
+                    checker: 0,
+                    ending,
+                    params: Vec::new(),
+                    metadata: Vec::new(),
+                }],
             },
         );
         let share = &world.state.jobs[&job].shares["First"];

@@ -6,7 +6,7 @@ use super::super::*;
 use super::reporting::{REPORTER, reporter};
 use super::things::*;
 use qcbus_formats::pool::Ending;
-use qcbus_messages::{FromPeer, JobId};
+use qcbus_messages::{CheckerEnd, FromPeer, JobId};
 
 use super::world::{Launched, Process, World};
 
@@ -186,12 +186,14 @@ impl World {
         );
         self.say(
             session,
-            FromPeer::CheckerDone {
+            FromPeer::CheckersDone {
                 job,
-                checker,
-                ending: Ending::Completed,
-                params: Vec::new(),
-                metadata: Vec::new(),
+                ended: vec![CheckerEnd {
+                    checker,
+                    ending: Ending::Completed,
+                    params: Vec::new(),
+                    metadata: Vec::new(),
+                }],
             },
         );
     }
