@@ -1,6 +1,10 @@
 //! What is found does not depend on how many threads look.
 
-#![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "tests fail by panicking, and rules for tests"
+)]
 
 mod common;
 
