@@ -308,18 +308,20 @@ impl Peers {
                 return format!("{name} begins job {}", job.0);
             }
         }
-        say(FromPeer::CheckersDone {
-            job,
-            ended: vec![CheckerEnd {
-                checker: 0,
-                ending: Ending::Completed,
-                params: Vec::new(),
-                metadata: Vec::new(),
-            }],
-        });
+        let ended = vec![completed()];
+        say(FromPeer::CheckersDone { job, ended });
         say(FromPeer::JobDone { job, micros: 1 });
         process.works.remove(at);
         format!("{name} ends job {}", job.0)
+    }
+}
+
+fn completed() -> CheckerEnd {
+    CheckerEnd {
+        checker: 0,
+        ending: Ending::Completed,
+        params: Vec::new(),
+        metadata: Vec::new(),
     }
 }
 
