@@ -1,5 +1,6 @@
 //! How many threads may check at the same time in this process.
 
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
@@ -99,9 +100,10 @@ impl Hands {
     /// Waits for other threads, and lends the own hand meanwhile.
     pub(crate) fn wait_for<T>(&self, others: impl FnOnce() -> T) -> T {
         drop(Hand(self));
-        let done = others();
+        // Whatever becomes of them, this thread goes on with a hand.
+        let done = catch_unwind(AssertUnwindSafe(others));
         std::mem::forget(self.take());
-        done
+        done.unwrap_or_else(|panic| resume_unwind(panic))
     }
 
     /// Whether a job waits for a hand.

@@ -7,18 +7,17 @@
 )]
 
 mod common;
+#[path = "common/on_bus.rs"]
+mod on_bus;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use qcbus_bus::{Host, HostEvent, HostOptions, Instance, PeerId};
-use qcbus_document::{Document, FileKind};
-use qcbus_formats::config::Config;
-use qcbus_messages::{
-    Digest, DocId, DocumentRole, FromPeer, Job, JobDocument, JobId, ToPeer, codec,
-};
+use on_bus::CONFIG;
+use qcbus_bus::{Host, HostEvent, PeerId};
+use qcbus_document::Document;
+use qcbus_messages::{DocId, FromPeer, JobId, ToPeer};
 use qcbus_sdk::run::BusOptions;
 use qcbus_sdk::{Bundle, Exit, Mode, Rule, Sink};
 
@@ -64,7 +63,6 @@ fn meets(document: &Document<'_>, found: &mut Sink<'_>) {
 /// Jobs that the host has heard the end of.
 static OVER: AtomicUsize = AtomicUsize::new(0);
 const JOBS: usize = 12;
-const CONFIG: Digest = Digest([7; 32]);
 
 #[test]
 fn jobs_are_checked_side_by_side_and_a_slow_one_holds_up_nobody() {
@@ -75,8 +73,7 @@ fn jobs_are_checked_side_by_side_and_a_slow_one_holds_up_nobody() {
         .build()
         .unwrap();
     runtime.block_on(async {
-        let mut host = Host::start(&Instance::at(dir.clone()), HostOptions::default()).unwrap();
-        host.set_config(CONFIG, &codec::encode(&None::<Config>).unwrap());
+        let mut host = on_bus::host(&dir);
         let options = BusOptions {
             instance_dir: Some(dir),
             threads: THREADS,
@@ -151,7 +148,10 @@ fn said(
         FromPeer::Catalogue(_) => {
             for number in 0..JOBS as u64 {
                 publish(host, number);
-                host.send(peer, &ToPeer::Job(job(number)));
+                host.send(
+                    peer,
+                    &ToPeer::Job(on_bus::job(JobId(number), DocId(number))),
+                );
             }
         }
         FromPeer::NeedDocument { doc } => publish(host, doc.0),
@@ -178,34 +178,9 @@ fn said(
 }
 
 fn publish(host: &Host, number: u64) {
-    let text = format!(
+    let map = format!(
         "<OpenDRIVE><header/><road id='{}'/></OpenDRIVE>",
         road(number)
     );
-    let limits = qcbus_ingest::Limits::default();
-    let image =
-        qcbus_ingest::prepare_bytes(Path::new("/a.xodr"), text.into_bytes(), &limits).build();
-    let mut loan = host.documents().loan(image.len()).unwrap();
-    loan[..image.len()].copy_from_slice(&image);
-    let digest = Digest([1; 32]);
-    let published = loan.publish(DocId(number), image.len(), digest, FileKind::Xodr);
-    drop(published.unwrap());
-}
-
-fn job(number: u64) -> Job {
-    let root = JobDocument {
-        doc: DocId(number),
-        role: DocumentRole::Root,
-        path: "/a.xodr".to_owned(),
-        digest: Digest([1; 32]),
-        referred_at: 0,
-        links: Vec::new(),
-    };
-    Job {
-        job: JobId(number),
-        config: CONFIG,
-        kind: FileKind::Xodr,
-        documents: vec![root],
-        missing: Vec::new(),
-    }
+    on_bus::publish(host, DocId(number), &map);
 }

@@ -7,17 +7,16 @@
 )]
 
 mod common;
+#[path = "common/on_bus.rs"]
+mod on_bus;
 
-use std::path::Path;
 use std::time::Duration;
 
-use qcbus_bus::{Host, HostEvent, HostOptions, Instance};
-use qcbus_document::{Document, FileKind};
-use qcbus_formats::config::Config;
+use on_bus::CONFIG;
+use qcbus_bus::{Host, HostEvent};
+use qcbus_document::Document;
 use qcbus_formats::xqar::Status;
-use qcbus_messages::{
-    Digest, DocId, DocumentRole, FromPeer, Job, JobDocument, JobId, ToPeer, codec,
-};
+use qcbus_messages::{DocId, FromPeer, JobId, ToPeer};
 use qcbus_sdk::run::BusOptions;
 use qcbus_sdk::{Bundle, Exit, Mode, Rule, Sink};
 
@@ -39,7 +38,6 @@ fn every_road(document: &Document<'_>, found: &mut Sink<'_>) {
     }
 }
 
-const CONFIG: Digest = Digest([7; 32]);
 const DOC: DocId = DocId(1);
 const JOB: JobId = JobId(5);
 
@@ -52,8 +50,7 @@ fn a_job_is_checked_and_the_bundle_leaves_when_drained() {
         .build()
         .unwrap();
     let daemon = runtime.block_on(async {
-        let mut host = Host::start(&Instance::at(dir.clone()), HostOptions::default()).unwrap();
-        host.set_config(CONFIG, &codec::encode(&None::<Config>).unwrap());
+        let mut host = on_bus::host(&dir);
         let options = BusOptions {
             instance_dir: Some(dir),
             ..BusOptions::default()
@@ -90,9 +87,13 @@ async fn talk(host: &mut Host) -> (usize, Status) {
             HostEvent::Message { peer, message } => match message {
                 FromPeer::Catalogue(catalogue) => {
                     assert_eq!(catalogue.checkers[0].id, "roads");
-                    host.send(peer, &ToPeer::Job(job()));
+                    host.send(peer, &ToPeer::Job(on_bus::job(JOB, DOC)));
                 }
-                FromPeer::NeedDocument { doc } => publish(host, doc),
+                FromPeer::NeedDocument { doc } => {
+                    assert_eq!(doc, DOC);
+                    let map = "<OpenDRIVE><header/><road id='1'/><road id='2'/></OpenDRIVE>";
+                    on_bus::publish(host, doc, map);
+                }
                 FromPeer::Issues {
                     job, issues: batch, ..
                 } => {
@@ -111,38 +112,5 @@ async fn talk(host: &mut Host) -> (usize, Status) {
             }
             HostEvent::Gone { .. } => panic!("the bundle went away"),
         }
-    }
-}
-
-fn publish(host: &Host, doc: DocId) {
-    assert_eq!(doc, DOC);
-    let map = b"<OpenDRIVE><header/><road id='1'/><road id='2'/></OpenDRIVE>".to_vec();
-    let image =
-        qcbus_ingest::prepare_bytes(Path::new("/a.xodr"), map, &qcbus_ingest::Limits::default())
-            .build();
-    let mut loan = host.documents().loan(image.len()).unwrap();
-    loan[..image.len()].copy_from_slice(&image);
-    // Held by the bus's history; the broker would keep it for as long as the job lasts.
-    drop(
-        loan.publish(doc, image.len(), Digest([1; 32]), FileKind::Xodr)
-            .unwrap(),
-    );
-}
-
-fn job() -> Job {
-    let root = JobDocument {
-        doc: DOC,
-        role: DocumentRole::Root,
-        path: "/a.xodr".to_owned(),
-        digest: Digest([1; 32]),
-        referred_at: 0,
-        links: Vec::new(),
-    };
-    Job {
-        job: JOB,
-        config: CONFIG,
-        kind: FileKind::Xodr,
-        documents: vec![root],
-        missing: Vec::new(),
     }
 }

@@ -3,31 +3,15 @@
 #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
 mod common;
+#[path = "common/roads.rs"]
+mod roads;
 
 use std::path::Path;
 use std::sync::Mutex;
 
-use qcbus_document::Node;
 use qcbus_formats::xqar::{Issue, Status};
-use qcbus_sdk::{
-    AnyRule, Bundle, Listener, Loaded, Model, Outcome, Plan, Rule, Sink, Subject, Unbuilt, check,
-};
-
-/// The roads of a file, each of which is a part.
-struct Roads<'d>(Vec<Node<'d>>);
-
-impl Model for Roads<'static> {
-    type Of<'d> = Roads<'d>;
-    type Part = usize;
-
-    fn build<'d>(subject: &'d Subject<'d>) -> Result<Roads<'d>, Unbuilt> {
-        Ok(Roads(subject.root().elements("road").collect()))
-    }
-
-    fn parts(roads: &Roads<'_>) -> Vec<usize> {
-        (0..roads.0.len()).collect()
-    }
-}
+use qcbus_sdk::{AnyRule, Bundle, Listener, Loaded, Outcome, Plan, Rule, Sink, check};
+use roads::Roads;
 
 static FINDS: Rule<Roads> = Rule {
     id: "finds",

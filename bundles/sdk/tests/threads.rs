@@ -7,6 +7,8 @@
 )]
 
 mod common;
+#[path = "common/roads.rs"]
+mod roads;
 
 use std::collections::HashSet;
 use std::fmt::Write as _;
@@ -16,28 +18,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::ThreadId;
 use std::time::{Duration, Instant};
 
-use qcbus_document::{Document, Node};
+use qcbus_document::Document;
 use qcbus_formats::xqar::{Issue, Status};
 use qcbus_sdk::{
-    AnyRule, Bundle, Hands, Listener, Loaded, MAX_ISSUES, Model, Outcome, Plan, Rule, Sink,
-    Subject, Unbuilt, check_with,
+    AnyRule, Bundle, Hands, Listener, Loaded, MAX_ISSUES, Outcome, Plan, Rule, Sink, check_with,
 };
-
-/// The roads of a file, each of which is a part.
-struct Roads<'d>(Vec<Node<'d>>);
-
-impl Model for Roads<'static> {
-    type Of<'d> = Roads<'d>;
-    type Part = usize;
-
-    fn build<'d>(subject: &'d Subject<'d>) -> Result<Roads<'d>, Unbuilt> {
-        Ok(Roads(subject.root().elements("road").collect()))
-    }
-
-    fn parts(roads: &Roads<'_>) -> Vec<usize> {
-        (0..roads.0.len()).collect()
-    }
-}
+use roads::Roads;
 
 /// How many roads the file has.
 const ROADS: usize = 300;

@@ -268,7 +268,7 @@ impl Outcome {
 }
 
 /// Runs something that may panic; what a panic said becomes the error.
-fn catch<T>(run: impl FnOnce() -> T) -> Result<T, String> {
+pub(crate) fn catch<T>(run: impl FnOnce() -> T) -> Result<T, String> {
     // What the closure leaves half done is either dropped or a list of finished findings.
     catch_unwind(AssertUnwindSafe(run)).map_err(|payload| {
         let text = payload

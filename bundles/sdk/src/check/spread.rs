@@ -151,38 +151,36 @@ impl<'r> Tasks<'_, 'r> {
         if task < parts {
             let mut clock = Instant::now();
             for &place in &self.by_parts {
-                let (turn, had) = self.own(own, place);
-                self.look(turn, had, task, &mut clock);
+                let (turn, had) = self.in_pile(own, place);
+                self.look(turn, had, Some(task), &mut clock);
             }
         } else if let Some(&place) = self.wholes.get(task - parts) {
-            let (turn, had) = self.own(own, place);
-            self.look(turn, had, usize::MAX, &mut Instant::now());
+            let (turn, had) = self.in_pile(own, place);
+            self.look(turn, had, None, &mut Instant::now());
         }
         task < self.count()
     }
 
     /// A checker and what this thread has of it.
-    fn own<'s>(&self, own: &'s mut Pile<'r>, place: usize) -> (&Turn<'r>, &'s mut Had<'r>) {
+    fn in_pile<'p>(&self, pile: &'p mut Pile<'r>, place: usize) -> (&Turn<'r>, &'p mut Had<'r>) {
         let turn = &self.turns[place];
-        (
-            turn,
-            own[place].get_or_insert_with(|| self.nothing_yet(turn)),
-        )
+        let had = pile[place].get_or_insert_with(|| self.nothing_yet(turn));
+        (turn, had)
     }
 
-    /// Has a checker look at a part, or at the whole ([`usize::MAX`]). `clock` is when that began, and then
-    /// when it ended.
-    fn look(&self, turn: &Turn<'r>, had: &mut Had<'r>, part: usize, clock: &mut Instant) {
+    /// Has a checker look at a part, or at the whole (`None`). `clock` is when that began, and then when it
+    /// ended.
+    fn look(&self, turn: &Turn<'r>, had: &mut Had<'r>, part: Option<usize>, clock: &mut Instant) {
         if had.failed.is_some() {
             return;
         }
         self.work.listener.begins(turn.index);
-        let number = u32::try_from(part).unwrap_or(WHOLE);
+        let number = part.map_or(WHOLE, |part| u32::try_from(part).unwrap_or(WHOLE));
         had.sink.turn_to(number);
         let sink = &mut had.sink;
         let looked = catch(|| match part {
-            usize::MAX => self.built.run(turn.rule, sink),
-            part => self.built.each(part, turn.rule, sink),
+            None => self.built.run(turn.rule, sink),
+            Some(part) => self.built.each(part, turn.rule, sink),
         });
         had.failed = looked.err().map(|panic| (number, panic));
         let now = Instant::now();
@@ -203,14 +201,14 @@ impl<'r> Tasks<'_, 'r> {
     }
 
     /// What a checker says, of which several threads may have something.
-    fn together(&self, turn: &Turn<'r>, mut piles: Vec<Had<'r>>) -> Looked {
-        let mut had = match piles.len() {
+    fn together(&self, turn: &Turn<'r>, mut found: Vec<Had<'r>>) -> Looked {
+        let mut had = match found.len() {
             0 => self.nothing_yet(turn),
-            1 => piles.remove(0),
-            _ => merged(piles).unwrap_or_else(|| self.alone(turn)),
+            1 => found.remove(0),
+            _ => merged(found).unwrap_or_else(|| self.alone(turn)),
         };
         if turn.rule.goes_by_parts() && turn.rule.looks_at_the_whole() {
-            self.look(turn, &mut had, usize::MAX, &mut Instant::now());
+            self.look(turn, &mut had, None, &mut Instant::now());
         }
         let Had {
             mut sink,
@@ -239,22 +237,22 @@ impl<'r> Tasks<'_, 'r> {
         let mut had = self.nothing_yet(turn);
         let mut clock = Instant::now();
         for part in 0..self.built.parts() {
-            self.look(turn, &mut had, part, &mut clock);
+            self.look(turn, &mut had, Some(part), &mut clock);
         }
         had
     }
 }
 
 /// What several threads have, as one, as one thread would have it. `None`: that cannot be told.
-fn merged(mut piles: Vec<Had<'_>>) -> Option<Had<'_>> {
-    let failed = piles.iter_mut().filter_map(|had| had.failed.take());
+fn merged(mut found: Vec<Had<'_>>) -> Option<Had<'_>> {
+    let failed = found.iter_mut().filter_map(|had| had.failed.take());
     // One thread would have come no further than the first panic.
     let failed = failed.min_by_key(|(part, _)| *part);
     let last = failed.as_ref().map_or(WHOLE, |(part, _)| *part);
-    let took = piles.iter().map(|had| had.took).sum();
-    let mut piles = piles.into_iter();
-    let mut first = piles.next()?;
-    let rest = piles.map(|had| had.sink).collect();
+    let took = found.iter().map(|had| had.took).sum();
+    let mut found = found.into_iter();
+    let mut first = found.next()?;
+    let rest = found.map(|had| had.sink).collect();
     first.sink.take_in(rest, last).then_some(())?;
     (first.failed, first.took) = (failed, took);
     Some(first)

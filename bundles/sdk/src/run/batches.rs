@@ -15,39 +15,29 @@ const TEXT: usize = 8 << 10;
 const PLACES: usize = 64;
 
 /// The findings in order, in batches.
-pub(super) fn batches(issues: Vec<Issue>) -> Vec<Vec<Issue>> {
-    let mut batches = Vec::new();
-    let (mut batch, mut bytes) = (Vec::new(), 0);
-    for mut issue in issues {
-        if size(&issue) > BATCH_BYTES {
-            cut(&mut issue);
-        }
-        let more = size(&issue);
-        if !batch.is_empty() && (batch.len() == BATCH || bytes + more > BATCH_BYTES) {
-            batches.push(std::mem::take(&mut batch));
-            bytes = 0;
-        }
-        bytes += more;
-        batch.push(issue);
-    }
-    if !batch.is_empty() {
-        batches.push(batch);
-    }
-    batches
+pub(super) fn batches(mut issues: Vec<Issue>) -> Vec<Vec<Issue>> {
+    let large = issues.iter_mut().filter(|it| size(it) > BATCH_BYTES);
+    large.for_each(cut);
+    by_size(issues, BATCH, size)
 }
 
 /// The ends of checkers in order, in batches.
 pub(super) fn batches_of_ends(ends: Vec<CheckerEnd>) -> Vec<Vec<CheckerEnd>> {
+    by_size(ends, usize::MAX, size_of_end)
+}
+
+/// At most so many at once, and as many as fit into a message; one that does not fit is alone.
+fn by_size<T>(all: Vec<T>, most: usize, size: fn(&T) -> usize) -> Vec<Vec<T>> {
     let mut batches = Vec::new();
     let (mut batch, mut bytes) = (Vec::new(), 0);
-    for end in ends {
-        let more = size_of_end(&end);
-        if !batch.is_empty() && bytes + more > BATCH_BYTES {
+    for one in all {
+        let more = size(&one);
+        if !batch.is_empty() && (batch.len() == most || bytes + more > BATCH_BYTES) {
             batches.push(std::mem::take(&mut batch));
             bytes = 0;
         }
         bytes += more;
-        batch.push(end);
+        batch.push(one);
     }
     if !batch.is_empty() {
         batches.push(batch);
@@ -190,6 +180,31 @@ mod tests {
             saying(100),
         ];
         assert_eq!(lengths(mixed), [2, 2]);
+    }
+
+    #[test]
+    fn ends_of_hundreds_of_checkers_are_one_message_and_long_ones_several() {
+        let end = |bytes: usize| CheckerEnd {
+            checker: 1,
+            ending: Ending::NotApplicable {
+                reason: "x".repeat(bytes),
+            },
+            params: Vec::new(),
+            metadata: Vec::new(),
+        };
+        let lengths = |ends| {
+            batches_of_ends(ends)
+                .iter()
+                .map(Vec::len)
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(lengths(vec![end(60); 323]), [323]);
+        assert_eq!(lengths(vec![end(400 << 10); 5]), [2, 2, 1]);
+        for ended in batches_of_ends(vec![end(30 << 10); 200]) {
+            let job = JobId(1);
+            let message = codec::encode(&FromPeer::CheckersDone { job, ended }).unwrap();
+            assert!(message.len() <= MAX_FROM_PEER, "{}", message.len());
+        }
     }
 
     #[test]

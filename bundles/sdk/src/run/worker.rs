@@ -13,6 +13,7 @@ use qcbus_formats::xqar::Issue;
 use qcbus_messages::{Link, MissingDocument};
 use tokio::sync::mpsc;
 
+use crate::check::catch;
 use crate::hands::Hands;
 use crate::kept::{JobModels, KeptModels};
 use crate::subject::LinkedImage;
@@ -136,7 +137,12 @@ impl Shared {
             // The documents are let go before the broker hears that the job is done, but for those of a
             // few models.
             let hand = self.hands.take();
-            let finished = finish(&work, self);
+            // Rules and models may panic, which is theirs. Should anything else, the job has an answer all the same.
+            let finished = catch(|| finish(&work, self)).unwrap_or_else(|panic| Finished {
+                run: work.run,
+                micros: 0,
+                outcome: Err(format!("the bundle panicked: {panic}")),
+            });
             drop((hand, work));
             self.busy.fetch_sub(1, Ordering::Relaxed);
             if self.progress.send(finished).is_err() {
