@@ -118,6 +118,7 @@ impl State {
                 if let Some(entry) = self.files.get_mut(file) {
                     entry.doubted = true;
                 }
+                self.shut_unstored(file, actions);
                 self.end_job(id, actions);
             }
             StoreOutcome::Outdated if job.config == self.config => {
@@ -132,6 +133,7 @@ impl State {
                 }
                 job.stage = JobStage::Finished(self.now + self.settings.retry_after);
                 let same = job.config == self.config;
+                self.shut_unstored(file, actions);
                 self.notice(Notice::NotWritten(why), actions);
                 if same {
                     self.reseat(id, actions);
@@ -139,6 +141,21 @@ impl State {
                     self.begin_anew(id, actions);
                 }
             }
+        }
+    }
+
+    /// What was not stored may lie behind the gate all the same, because the journal is written last. It stays only
+    /// where the file was accepted before and that stands; nobody would take it away otherwise when the file changes.
+    fn shut_unstored(&mut self, file: FileId, actions: &mut Actions) {
+        let Some(entry) = self.files.get_mut(file) else {
+            return;
+        };
+        let accepted = |judged: &Arc<Judged>| judged.verdict == Verdict::Accepted;
+        let stands = !entry.shut && !entry.doubted && entry.judged.as_ref().is_some_and(accepted);
+        if !stands {
+            entry.shut = true;
+            let path = entry.path.clone();
+            actions.push(Action::CloseGate { path });
         }
     }
 

@@ -81,6 +81,11 @@ impl World {
         } else if job.epoch != self.state.epoch() {
             StoreOutcome::Outdated
         } else if !room {
+            // The journal comes last: by then an acceptance lies behind the gate.
+            let failed = job.bundles.iter().any(|it| it.failure.is_some());
+            if !failed && !self.rejected.contains(&file) {
+                self.gate.insert(file, prepared.inputs.clone());
+            }
             StoreOutcome::Failed("full".to_owned())
         } else {
             self.stored.push(file);
