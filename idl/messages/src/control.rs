@@ -1,5 +1,6 @@
 //! What short-lived commands say to the broker over `control.sock`: one JSON object per line.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
@@ -19,6 +20,14 @@ pub enum Request {
         file: PathBuf,
         /// Give up after this many milliseconds; never, when absent.
         timeout_ms: Option<u64>,
+    },
+    /// Check a file for me, watched or not, and give me the result; nothing of it is kept.
+    Check {
+        /// Absolute path of the file.
+        #[serde(with = "path_text::one")]
+        file: PathBuf,
+        /// Under what.
+        terms: Terms,
     },
     /// Drain and stop.
     Down,
@@ -53,6 +62,14 @@ pub enum Response {
         /// For a person.
         reason: String,
     },
+    /// Answer to `Check`.
+    Checked(Box<Checked>),
+    /// Answer to `Check`: this broker would not find what whoever asks would find, or cannot say; he is to check the
+    /// file himself.
+    Elsewhere {
+        /// For a person.
+        reason: String,
+    },
     /// Answer to `Down`, sent when everything has been drained.
     Stopped,
     /// Answer to `Reload`: what changed, line by line; nothing when nothing did.
@@ -73,6 +90,24 @@ pub enum Response {
         /// For a person.
         reason: String,
     },
+}
+
+/// Under what a file is checked. A broker of the same program that works under equal terms finds the same.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Terms {
+    /// Digest over the configuration, the form of results, and all limits.
+    pub general: String,
+    /// The bundles that are to look at the file, each with a digest over how it is started.
+    pub bundles: BTreeMap<String, String>,
+}
+
+/// A result that was made for whoever asked.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Checked {
+    /// The verdict; there is no result file.
+    pub verdict: FileVerdict,
+    /// The result, as its file is to have it.
+    pub result: String,
 }
 
 /// The verdict on one file.

@@ -11,8 +11,9 @@ use tokio::task::AbortHandle;
 mod ask;
 mod clients;
 mod place;
+mod same;
 
-pub use self::ask::{AskError, ask_broker};
+pub use self::ask::{AskError, Line, ask_broker};
 use self::clients::{Bounds, Clients};
 
 /// File name of the socket in the instance's directory.

@@ -31,6 +31,7 @@ mod stages;
 mod stamp;
 mod store;
 mod supervise;
+mod terms;
 mod verdict_file;
 pub mod watch;
 #[cfg(test)]
@@ -44,3 +45,5 @@ pub use engine::{Announcement, Broker, StartError, Stop, Told};
 pub use gate::{GateError, Outside};
 pub use options::Options;
 pub use result_paths::ResultPaths;
+pub use store::GivenResults;
+pub use terms::terms;

@@ -173,6 +173,12 @@ pub struct CheckArgs {
     /// Do not confine bundles: they may write, connect and signal as you may
     #[arg(long, hide_short_help = true)]
     pub no_sandbox: bool,
+    /// Do not ask a broker that runs already: start bundles of its own
+    #[arg(long)]
+    pub cold: bool,
+    /// Whom to ask.
+    #[command(flatten)]
+    pub instance: InstanceArgs,
     /// Caps.
     #[command(flatten)]
     pub limits: LimitArgs,

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use qcbus_bus::Process;
 use qcbus_messages::control::{Request, Response};
 
-use super::{SOCKET, place};
+use super::{SOCKET, place, same};
 
 /// Why a broker could not be asked.
 #[derive(Debug, thiserror::Error)]
@@ -29,46 +29,76 @@ pub enum AskError {
     NoAnswer(String),
 }
 
+/// A broker that listens.
+#[derive(Debug)]
+pub struct Line {
+    stream: BufReader<UnixStream>,
+    /// Who listens; `None` where it cannot be seen, in another container for instance.
+    process: Option<Process>,
+}
+
 /// Asks a broker one thing. Blocks until it answers.
 ///
 /// # Errors
 /// See [`AskError`].
 pub fn ask_broker(directory: &Path, request: &Request) -> Result<Response, AskError> {
     let path = directory.join(SOCKET);
-    let mut stream = place::connect(directory).map_err(|_| AskError::NoBroker { path })?;
-    let process = broker_behind(&stream);
-    let lost = |error: io::Error| AskError::Left(error.to_string());
-    let mut text =
-        serde_json::to_vec(request).map_err(|error| AskError::NoAnswer(error.to_string()))?;
-    text.push(b'\n');
-    stream.write_all(&text).map_err(lost)?;
-    let answer = answer(stream, request, process.as_ref())?;
-    if let (Response::Stopped, Some(process)) = (&answer, &process)
-        && !process.ends_within(END_WITHIN)
-    {
-        let (id, seconds) = (process.id(), END_WITHIN.as_secs());
-        let why = format!("it has stopped, but its process {id} is still there after {seconds} s");
-        return Err(AskError::NoAnswer(why));
-    }
-    Ok(answer)
+    let stream = place::connect(directory).map_err(|_| AskError::NoBroker { path })?;
+    Line::on(stream).ask(request)
 }
 
-/// Who listens there; `None` where it cannot be seen, in another container for instance.
-fn broker_behind(stream: &UnixStream) -> Option<Process> {
-    // Nobody waits for his own end.
-    Process::behind(stream).filter(|it| it.id() != std::process::id())
+impl Line {
+    /// Connects to the broker of an instance; `None` if there is none that listens at this moment.
+    pub fn to(directory: &Path) -> Option<Line> {
+        place::connect_at_once(directory).ok().map(Line::on)
+    }
+
+    fn on(stream: UnixStream) -> Line {
+        // Nobody waits for his own end.
+        let process = Process::behind(&stream).filter(|it| it.id() != std::process::id());
+        let stream = BufReader::new(stream);
+        Line { stream, process }
+    }
+
+    /// Whether the broker is this very program, run by this user, and sees the files that this process sees.
+    pub fn is_like_us(&self) -> bool {
+        self.process.as_ref().is_some_and(same::is_like_us)
+    }
+
+    /// Asks one thing after the other. Blocks until it is answered.
+    ///
+    /// # Errors
+    /// See [`AskError`]; nothing more can be asked then.
+    pub fn ask(&mut self, request: &Request) -> Result<Response, AskError> {
+        let mut text =
+            serde_json::to_vec(request).map_err(|error| AskError::NoAnswer(error.to_string()))?;
+        text.push(b'\n');
+        let written = self.stream.get_mut().write_all(&text);
+        written.map_err(|error| AskError::Left(error.to_string()))?;
+        let answer = answer(&mut self.stream, request, self.process.as_ref())?;
+        if let (Response::Stopped, Some(process)) = (&answer, &self.process)
+            && !process.ends_within(END_WITHIN)
+        {
+            let (id, seconds) = (process.id(), END_WITHIN.as_secs());
+            let why =
+                format!("it has stopped, but its process {id} is still there after {seconds} s");
+            return Err(AskError::NoAnswer(why));
+        }
+        Ok(answer)
+    }
 }
 
 fn answer(
-    stream: UnixStream,
+    reader: &mut BufReader<UnixStream>,
     request: &Request,
     process: Option<&Process>,
 ) -> Result<Response, AskError> {
     let lost = |error: io::Error| AskError::Left(error.to_string());
     let (begin, limit) = (Instant::now(), limit_of(request));
     let mut stopped = 0;
-    stream.set_read_timeout(Some(SLICE)).map_err(lost)?;
-    let (mut reader, mut line) = (BufReader::new(stream), Vec::new());
+    let timeout = reader.get_ref().set_read_timeout(Some(SLICE));
+    timeout.map_err(lost)?;
+    let mut line = Vec::new();
     // What has been read of the line is kept when the time is over.
     while let Err(error) = reader.read_until(b'\n', &mut line) {
         if !is_timeout(&error) {
@@ -106,6 +136,8 @@ const STOPPED_FOR: u32 = 6;
 const END_WITHIN: Duration = Duration::from_secs(30);
 /// Beyond its own limit, how long a request waits for a broker that stands still.
 const GRACE: Duration = Duration::from_secs(2);
+/// How long a broker may take to check a file for somebody who can do it himself.
+const CHECKED_WITHIN: Duration = Duration::from_secs(60);
 /// How long a broker may take for what needs no waiting.
 const AT_ONCE: Duration = Duration::from_secs(30);
 
@@ -127,6 +159,7 @@ fn limit_of(request: &Request) -> Option<Duration> {
             timeout_ms.map(|limit| Duration::from_millis(limit) + GRACE)
         }
         Request::Status | Request::Reload | Request::RemoveBundle { .. } => Some(AT_ONCE),
+        Request::Check { .. } => Some(CHECKED_WITHIN),
         Request::Down => None,
     }
 }

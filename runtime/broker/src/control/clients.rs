@@ -278,14 +278,21 @@ async fn answer(visit: &Visit, line: &[u8], stream: &UnixStream) -> Option<Respo
             return Some(Response::Failed { reason });
         }
     };
-    let takes_long = matches!(request, Request::Wait { .. } | Request::Down);
-    if matches!(request, Request::Wait { .. }) && !visit.may_wait() {
+    let takes_long = matches!(
+        request,
+        Request::Wait { .. } | Request::Check { .. } | Request::Down
+    );
+    if takes_long && !visit.may_wait() {
         let waiting = visit.clients.bounds.waiting;
         let reason = format!(
             "{waiting} clients wait for verdicts already, as many as this broker may have; ask again when \
              some have theirs, or start the broker with a higher limit of open files (`ulimit -n`)"
         );
-        return Some(Response::Failed { reason });
+        match request {
+            Request::Wait { .. } => return Some(Response::Failed { reason }),
+            Request::Check { .. } => return Some(Response::Elsewhere { reason }),
+            _ => {}
+        }
     }
     visit.enter(if takes_long {
         Stage::Waiting

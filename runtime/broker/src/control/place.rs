@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use rustix::fs::{Mode, OFlags, open};
+use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType, socket_with};
 use tokio::net::UnixListener;
 use tokio::task::AbortHandle;
 
@@ -45,6 +46,17 @@ pub(super) fn listen(directory: &Path) -> io::Result<UnixListener> {
 pub(super) fn connect(directory: &Path) -> io::Result<UnixStream> {
     let (_directory, path) = short(directory)?;
     UnixStream::connect(path)
+}
+
+/// Connects to whoever listens, if he takes a client at this moment: one that is stopped lets clients wait.
+pub(super) fn connect_at_once(directory: &Path) -> io::Result<UnixStream> {
+    let (_directory, path) = short(directory)?;
+    let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
+    let socket = socket_with(AddressFamily::UNIX, SocketType::STREAM, flags, None)?;
+    rustix::net::connect(&socket, &SocketAddrUnix::new(path)?)?;
+    let stream = UnixStream::from(socket);
+    stream.set_nonblocking(false)?;
+    Ok(stream)
 }
 
 /// Listens again whenever the socket has gone. `serve` starts to take clients from a listener, and

@@ -79,6 +79,8 @@ pub enum Action {
     },
     /// Pool, write, record.
     Store(Box<FinishedJob>),
+    /// Pool what was found for an errand.
+    Pool(Box<FinishedJob>),
     /// Remove the result of a file that has gone.
     Withdraw {
         /// The file.

@@ -103,8 +103,11 @@ impl Bundle {
     }
 
     /// A job waits for this bundle.
-    pub fn expect(&mut self, id: JobId) {
-        self.queue.push_back(id);
+    pub fn expect(&mut self, id: JobId, hurried: bool) {
+        match hurried {
+            true => self.queue.push_front(id),
+            false => self.queue.push_back(id),
+        }
     }
 
     /// Notes that the bundle has got a job.

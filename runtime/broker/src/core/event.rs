@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use qcbus_messages::{Digest, FromPeer, Hello, JobId};
 
+use super::errands::{Errand, ErrandOutcome};
 use super::types::{
     ChildEnd, ChildSpec, Demand, Launch, PrepareFailure, PreparedJob, SessionId, Stamp,
     StoreOutcome, Ticket,
@@ -126,6 +127,20 @@ pub enum Event {
         unwatched: Option<String>,
         /// When to give up.
         timeout: Option<Duration>,
+    },
+    /// A client wants a file checked for itself alone.
+    Check {
+        /// The file.
+        path: Arc<Path>,
+        /// Who wants it, and by whom.
+        errand: Errand,
+    },
+    /// What was found for an errand is pooled.
+    Pooled {
+        /// The job.
+        job: JobId,
+        /// What it gave.
+        outcome: ErrandOutcome,
     },
     /// A client that waited has left without its answer.
     ClientLeft {

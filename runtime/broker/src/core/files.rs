@@ -10,6 +10,7 @@ use std::time::Duration;
 use qcbus_document::FileKind;
 use qcbus_messages::JobId;
 
+use super::errands::Errand;
 use super::types::{Judged, Reported, Stamp};
 
 /// Index of a file in the table; never reused within a generation.
@@ -18,6 +19,8 @@ pub type FileId = u32;
 /// Which queue a file waits in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Priority {
+    /// Asked for by somebody who waits for it and for nothing else.
+    Errand,
     /// New or changed: somebody waits for the verdict.
     Fresh,
     /// Judged already, to be judged again because bundles or configuration changed.
@@ -75,6 +78,8 @@ pub struct FileEntry {
     depends_on: Vec<Arc<Path>>,
     /// What reporters have said of it, by index into the reporters' table.
     pub delivered: Vec<(u32, Reported)>,
+    /// It is here for a client that waits for its result, and nothing of it is kept.
+    pub errand: Option<Errand>,
 }
 
 impl FileEntry {
@@ -93,16 +98,19 @@ pub struct Files {
     /// Paths that nobody depends on any more, until somebody asks.
     forgotten: BTreeSet<Arc<Path>>,
     next: FileId,
+    errands: VecDeque<FileId>,
     fresh: VecDeque<FileId>,
     background: VecDeque<FileId>,
     since_background: u8,
+    /// The last that was taken was an errand.
+    was_errand: bool,
     counts: Counts,
 }
 
 /// How many files are in which stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
-    /// In the fresh queue.
+    /// In the fresh queue, or for an errand.
     pub fresh: u64,
     /// In the background queue.
     pub background: u64,
@@ -116,7 +124,7 @@ impl Counts {
     fn of(&mut self, stage: &Stage) -> &mut u64 {
         match stage {
             Stage::Idle => &mut self.idle,
-            Stage::Waiting(Priority::Fresh, _) => &mut self.fresh,
+            Stage::Waiting(Priority::Errand | Priority::Fresh, _) => &mut self.fresh,
             Stage::Waiting(Priority::Background, _) => &mut self.background,
             Stage::Active(_) => &mut self.active,
         }
@@ -124,6 +132,29 @@ impl Counts {
 }
 
 impl FileEntry {
+    fn new(path: &Arc<Path>, kind: FileKind, stamp: Stamp) -> FileEntry {
+        FileEntry {
+            path: path.clone(),
+            kind,
+            stamp,
+            present: true,
+            stage: Stage::Idle,
+            doubted: false,
+            touched: false,
+            shut: false,
+            anew: false,
+            half_written: false,
+            not_before: Duration::ZERO,
+            in_line: false,
+            hindered: 0,
+            asked: Duration::ZERO,
+            judged: None,
+            depends_on: Vec::new(),
+            delivered: Vec::new(),
+            errand: None,
+        }
+    }
+
     /// Where it stands.
     pub fn stage(&self) -> &Stage {
         &self.stage
@@ -157,32 +188,24 @@ impl Files {
 
     /// Adds a file that is not yet in the table.
     pub fn insert(&mut self, path: &Arc<Path>, kind: FileKind, stamp: Stamp) -> FileId {
+        let id = self.add(FileEntry::new(path, kind, stamp));
+        self.by_path.insert(path.clone(), id);
+        id
+    }
+
+    /// Adds a file for an errand. Nobody finds it by its path, under which another may be watched.
+    pub fn insert_errand(&mut self, path: &Arc<Path>, kind: FileKind, errand: Errand) -> FileId {
+        self.add(FileEntry {
+            errand: Some(errand),
+            ..FileEntry::new(path, kind, Stamp::default())
+        })
+    }
+
+    fn add(&mut self, entry: FileEntry) -> FileId {
         let id = self.next;
         self.next += 1;
-        self.by_path.insert(path.clone(), id);
         self.counts.idle += 1;
-        self.entries.insert(
-            id,
-            FileEntry {
-                path: path.clone(),
-                kind,
-                stamp,
-                present: true,
-                stage: Stage::Idle,
-                doubted: false,
-                touched: false,
-                shut: false,
-                anew: false,
-                half_written: false,
-                not_before: Duration::ZERO,
-                in_line: false,
-                hindered: 0,
-                asked: Duration::ZERO,
-                judged: None,
-                depends_on: Vec::new(),
-                delivered: Vec::new(),
-            },
-        );
+        self.entries.insert(id, entry);
         id
     }
 
@@ -212,8 +235,8 @@ impl Files {
                 self.fresh.push_back(id);
             }
             Some(Stage::Idle) => {
-                self.set_stage(id, Stage::Waiting(Priority::Background, now));
-                self.background.push_back(id);
+                self.set_stage(id, Stage::Waiting(priority, now));
+                self.queue(priority).push_back(id);
             }
             _ => {}
         }
@@ -230,13 +253,25 @@ impl Files {
         entry.stage = stage;
     }
 
-    /// Takes the next file that may be checked at `now`, the fresh before the background.
+    fn queue(&mut self, priority: Priority) -> &mut VecDeque<FileId> {
+        match priority {
+            Priority::Errand => &mut self.errands,
+            Priority::Fresh => &mut self.fresh,
+            Priority::Background => &mut self.background,
+        }
+    }
+
+    /// Takes the next file that may be checked at `now`: every other one is an errand while there are any, and
+    /// the fresh come before the background.
     pub fn dequeue(&mut self, now: Duration) -> Option<FileId> {
-        let background_first = self.since_background >= BACKGROUND_SHARE;
-        let order = if background_first {
-            [Priority::Background, Priority::Fresh]
-        } else {
-            [Priority::Fresh, Priority::Background]
+        let mut order = [Priority::Fresh, Priority::Background];
+        if self.since_background >= BACKGROUND_SHARE {
+            order.reverse();
+        }
+        let [first, second] = order;
+        let order = match self.was_errand {
+            true => [first, second, Priority::Errand],
+            false => [Priority::Errand, first, second],
         };
         order
             .into_iter()
@@ -244,25 +279,23 @@ impl Files {
     }
 
     fn dequeue_from(&mut self, priority: Priority, now: Duration) -> Option<FileId> {
-        let queue = match priority {
-            Priority::Fresh => &mut self.fresh,
-            Priority::Background => &mut self.background,
-        };
-        for _ in 0..queue.len() {
-            let id = queue.pop_front()?;
+        for _ in 0..self.queue(priority).len() {
+            let id = self.queue(priority).pop_front()?;
             let Some(entry) = self.entries.get(&id) else {
                 continue;
             };
             match entry.stage {
                 Stage::Waiting(at, _) if at == priority && entry.not_before <= now => {
                     self.set_stage(id, Stage::Idle);
+                    self.was_errand = priority == Priority::Errand;
                     self.since_background = match priority {
+                        Priority::Errand => self.since_background,
                         Priority::Fresh => self.since_background.saturating_add(1),
                         Priority::Background => 0,
                     };
                     return Some(id);
                 }
-                Stage::Waiting(at, _) if at == priority => queue.push_back(id),
+                Stage::Waiting(at, _) if at == priority => self.queue(priority).push_back(id),
                 // It moved to the other queue, or was taken from it: this place is void.
                 _ => {}
             }

@@ -40,8 +40,12 @@ impl State {
             .map(|(id, _)| *id)
             .collect();
         for id in ids {
+            if self.jobs.get(&id).is_some_and(|job| job.errand.is_some()) {
+                self.pool_errand(id, actions);
+                continue;
+            }
             if self.storing >= self.settings.max_storing {
-                return;
+                continue;
             }
             let finished = self.finished(id);
             if let (Some(finished), Some(job)) = (finished, self.jobs.get_mut(&id)) {
@@ -55,7 +59,7 @@ impl State {
         }
     }
 
-    fn finished(&self, id: JobId) -> Option<FinishedJob> {
+    pub(super) fn finished(&self, id: JobId) -> Option<FinishedJob> {
         let job = self.jobs.get(&id)?;
         Some(FinishedJob {
             job: id,
@@ -206,6 +210,9 @@ impl State {
             self.let_one_in();
         }
         self.files.set_stage(job.file, Stage::Idle);
+        if let Some(errand) = &job.errand {
+            return self.errand_is_over(job.file, errand.ticket, actions);
+        }
         self.map_is_over(job.file);
         let Some(entry) = self.files.get(job.file) else {
             return;

@@ -9,6 +9,7 @@ use qcbus_document::FileKind;
 use qcbus_messages::{Catalogue, Digest, JobId};
 
 use super::action::Action;
+use super::errands::Errand;
 use super::files::{FileId, Priority, Stage};
 use super::jury::{Epoch, Mark, Seat};
 use super::notice::Notice;
@@ -38,6 +39,8 @@ pub(super) struct ActiveJob {
     pub config: Digest,
     /// By bundle name.
     pub shares: BTreeMap<String, Share>,
+    /// It is done for a client, and nothing of it is kept.
+    pub errand: Option<Errand>,
 }
 
 /// How far a job is.
@@ -165,7 +168,7 @@ impl State {
                 return;
             }
         }
-        let (path, kind) = (entry.path.clone(), entry.kind);
+        let (path, kind, errand) = (entry.path.clone(), entry.kind, entry.errand.clone());
         let waited = self.now.saturating_sub(entry.asked);
         let job = self.next_job();
         self.files.set_stage(id, Stage::Active(job));
@@ -186,6 +189,7 @@ impl State {
                 epoch: self.epoch,
                 config: self.config,
                 shares: BTreeMap::new(),
+                errand,
             },
         );
         actions.push(Action::Prepare { job, path, waited });
@@ -311,6 +315,9 @@ impl State {
         let Some(job) = self.jobs.get_mut(&id) else {
             return;
         };
+        if job.errand.is_some() {
+            return self.send_elsewhere(id, reason, actions);
+        }
         let (file, kind) = (job.file, job.kind);
         let entry = self.files.get(file).filter(|entry| !entry.doubted);
         let known = entry.and_then(|entry| entry.judged.as_ref());
@@ -365,6 +372,9 @@ impl State {
             return;
         }
         let (old, anew) = (entry.judged.clone(), entry.anew || entry.half_written);
+        if entry.errand.is_some() {
+            return self.give_out(id, actions);
+        }
         self.depend(file, &prepared.inputs, actions);
         let same = |judged: &Judged| judged.basis == prepared.basis && !anew;
         match old {

@@ -23,6 +23,9 @@ const PATIENCE: Duration = Duration::from_secs(2);
 impl State {
     /// When a job that is checked may be stored: at once, unless its map is under way.
     pub(super) fn storable_at(&self, job: &ActiveJob) -> Duration {
+        if job.errand.is_some() {
+            return Duration::ZERO;
+        }
         let is_active = |entry: &FileEntry| matches!(entry.stage(), Stage::Active(_));
         let mut maps = maps_of(job).filter_map(|map| self.entry_of(map));
         if maps.any(is_active) {
@@ -34,6 +37,10 @@ impl State {
 
     /// The maps of a job that were rejected, as the bytes that it was judged on.
     pub(super) fn rejected_maps(&self, job: &ActiveJob) -> Vec<RejectedMap> {
+        // A run of one's own knows no verdicts of others.
+        if job.errand.is_some() {
+            return Vec::new();
+        }
         let rejected = |map: &JobDocument| {
             let judged = self.entry_of(map)?.judged.as_ref()?;
             let is_it = judged.verdict == Verdict::Rejected && judged.digest == map.digest;

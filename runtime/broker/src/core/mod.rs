@@ -13,6 +13,7 @@ mod checking;
 mod children;
 mod delivering;
 mod ending;
+mod errands;
 mod event;
 mod files;
 mod finishing;
@@ -46,6 +47,7 @@ use qcbus_document::FileKind;
 use qcbus_messages::{Digest, JobId, Role};
 
 pub use action::Action;
+pub use errands::{Errand, ErrandOutcome};
 pub use event::Event;
 pub use jury::{Epoch, Juror, Jury, Mark, Member, Origin};
 pub use notice::Notice;
@@ -57,6 +59,7 @@ pub use types::*;
 use announcing::Unrest;
 use bundles::Bundle;
 use children::Child;
+use errands::Errands;
 use files::Files;
 use jobs::ActiveJob;
 use leaving::Retired;
@@ -85,6 +88,7 @@ pub struct State {
     /// What former brokers started has joined or been killed.
     former_are_gone: bool,
     waiters: Vec<Waiter>,
+    errands: Errands,
     config: Digest,
     demand: Arc<dyn Demand>,
     epoch: Epoch,
@@ -147,6 +151,7 @@ impl State {
             retired: BTreeMap::new(),
             former_are_gone: false,
             waiters: Vec::new(),
+            errands: Errands::new(),
             config,
             demand,
             epoch,
@@ -223,7 +228,10 @@ impl State {
             }
             Event::Exited { launch, end } => self.exited(launch, &end, &mut actions),
             Event::Configured { digest, demand } => self.configured(digest, demand, &mut actions),
-            Event::Children { specs } => self.set_children(specs, &mut actions),
+            Event::Children { specs } => {
+                self.set_children(specs, &mut actions);
+                self.dismiss_errands(&mut actions);
+            }
             Event::Wait {
                 ticket,
                 path,
@@ -233,7 +241,12 @@ impl State {
             } => {
                 self.wait(ticket, &path, stamp, unwatched, timeout, &mut actions);
             }
-            Event::ClientLeft { ticket } => self.waiters.retain(|it| it.ticket() != ticket),
+            Event::Check { path, errand } => self.errand(&path, errand, &mut actions),
+            Event::Pooled { job, outcome } => self.pooled(job, outcome, &mut actions),
+            Event::ClientLeft { ticket } => {
+                self.waiters.retain(|it| it.ticket() != ticket);
+                self.abandon(ticket, &mut actions);
+            }
             Event::RemoveBundle { ticket, name } => {
                 self.removal(ticket, &name, &mut actions);
             }
@@ -314,6 +327,7 @@ impl State {
         }
         self.config = digest;
         self.demand = demand;
+        self.dismiss_errands(actions);
         self.begin_epoch();
         // What is being checked is checked under the old configuration: it starts anew.
         for id in self.under_way() {

@@ -305,7 +305,7 @@ impl State {
         let Some(job) = self.jobs.get(&id) else {
             return;
         };
-        let (seats, unreadable) = (self.seats(job.kind), job.unreadable.clone());
+        let (seats, unreadable) = (self.seats_of(job), job.unreadable.clone());
         let gone: Vec<String> = job
             .shares
             .keys()
@@ -325,13 +325,14 @@ impl State {
         let Some(job) = self.jobs.get_mut(&id) else {
             return;
         };
+        let hurried = job.errand.is_some();
         job.epoch = self.epoch;
         for seat in &anew {
             let share = Share::of(seat, unreadable.as_deref());
             let queued = share.state == ShareState::Queued;
             job.shares.insert(seat.name.clone(), share);
             if let Some(bundle) = self.bundles.get_mut(&seat.name).filter(|_| queued) {
-                bundle.expect(id);
+                bundle.expect(id, hurried);
             }
         }
         if job.shares.values().any(|share| !share.is_over()) {

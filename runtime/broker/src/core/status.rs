@@ -75,7 +75,8 @@ impl State {
 
     /// The files that are there, in the order of their paths.
     pub fn present_files(&self) -> Vec<Arc<Path>> {
-        let present = self.files.iter().filter(|(_, entry)| entry.present);
+        let files = self.files.iter();
+        let present = files.filter(|(_, entry)| entry.present && entry.errand.is_none());
         let mut paths: Vec<Arc<Path>> = present.map(|(_, entry)| entry.path.clone()).collect();
         paths.sort();
         paths
@@ -93,7 +94,8 @@ impl State {
 
     fn file_counts(&self) -> FileCounts {
         let mut counts = FileCounts::default();
-        for (_, entry) in self.files.iter().filter(|(_, entry)| entry.present) {
+        let files = self.files.iter();
+        for (_, entry) in files.filter(|(_, entry)| entry.present && entry.errand.is_none()) {
             counts.total += 1;
             let idle = matches!(
                 entry.stage(),

@@ -31,6 +31,7 @@ impl Broker {
             Action::Kill { launch } => self.children.kill(launch),
             Action::KillFormer { joined } => self.kill_former(joined),
             Action::Store(job) => self.order_store(job),
+            Action::Pool(job) => self.pool_errand(job),
             Action::Withdraw { ref path, .. } => {
                 if let Some(watcher) = &self.watcher {
                     watcher.forget(path.clone());
@@ -116,6 +117,22 @@ impl Broker {
         self.untrimmed = true;
         self.writers
             .order(&path, Order::Store { job, config, root });
+    }
+
+    /// Whoever asked is not held up by what is to be written for others.
+    fn pool_errand(&mut self, mut job: Box<FinishedJob>) {
+        let root = self.intake.root(job.job);
+        let config = self.in_force.config.clone();
+        let (store, events) = (self.store.clone(), self.inbox.events_in.clone());
+        spawn_blocking(move || {
+            let outcome = store.pool_errand(&mut job, config.as_deref(), root.as_deref());
+            drop(root);
+            // After the end of the loop nobody waits for this.
+            let _ = events.send(Event::Pooled {
+                job: job.job,
+                outcome,
+            });
+        });
     }
 
     /// What concerns one peer.

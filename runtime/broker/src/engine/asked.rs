@@ -4,23 +4,27 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use qcbus_messages::control::{Request, Response, Status, Unseen};
+use qcbus_messages::control::{Request, Response, Status, Terms, Unseen};
 use tokio::sync::oneshot;
 
 use super::looks::{Look, Sighted};
 use super::{Broker, Told};
 use crate::control::Asked;
-use crate::core::{Event, Notice, Stamp, Ticket};
+use crate::core::{Errand, Event, Notice, Stamp, Ticket};
 use crate::demand::InForce;
 use crate::gate::Gate;
 use crate::reload::{Fingerprint, LoadError, differences};
+use crate::terms::{differs, terms};
 
 /// Most that is told of what could not be looked at.
 const UNSEEN_SHOWN: usize = 100;
 
 impl Broker {
     pub(super) fn asked(&mut self, asked: Asked) -> bool {
-        let only_tells = matches!(asked.request, Request::Status | Request::Wait { .. });
+        let only_tells = matches!(
+            asked.request,
+            Request::Status | Request::Wait { .. } | Request::Check { .. }
+        );
         if only_tells && asked.answer.is_closed() {
             // Nobody is there to be told.
             return true;
@@ -40,6 +44,7 @@ impl Broker {
                 };
                 self.look_at(look)
             }
+            Request::Check { file, terms } => self.check(&file, &terms, asked.answer),
             Request::Down => {
                 self.downs.push(asked.answer);
                 self.notify_stopping();
@@ -65,6 +70,22 @@ impl Broker {
                 self.handle(Event::RemoveBundle { ticket, name })
             }
         }
+    }
+
+    /// A client wants a file checked as it would do it itself.
+    fn check(&mut self, file: &Path, asked: &Terms, answer: oneshot::Sender<Response>) -> bool {
+        let ours = terms(&self.options, self.in_force.digest, &self.loaded.children);
+        if let Some(why) = differs(&ours, asked) {
+            let reason = why.to_owned();
+            let _ = answer.send(Response::Elsewhere { reason });
+            return true;
+        }
+        let ticket = self.ticket(answer);
+        let bundles = asked.bundles.keys().cloned().collect();
+        self.handle(Event::Check {
+            path: file.into(),
+            errand: Errand { ticket, bundles },
+        })
     }
 
     /// Forgets clients that have left without their answer.

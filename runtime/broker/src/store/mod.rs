@@ -1,6 +1,8 @@
 //! From outcomes to files on disk: pooling, the result, the verdict file, the gate.
 
 mod earlier;
+mod errand;
+mod given;
 mod history;
 mod leftovers;
 mod pooling;
@@ -32,6 +34,7 @@ use crate::verdict_file;
 use qcbus_disk::{FileMark, is_for_good, write_both, write_whole};
 
 pub use earlier::remove_earlier_results;
+pub use given::GivenResults;
 use history::history;
 use pooling::reasons;
 pub use reconcile::Reconciled;

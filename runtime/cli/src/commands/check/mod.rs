@@ -4,6 +4,7 @@ mod outputs;
 mod printer;
 mod tally;
 mod targets;
+mod warm;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -33,7 +34,9 @@ pub fn run(args: &CheckArgs) -> Exit {
     talk::log("warn");
     talk::set_color(args.print.color);
     match prepare(args) {
-        Ok(prepared) => check(args, prepared),
+        Ok(prepared) => {
+            warm::check(args, prepared).unwrap_or_else(|prepared| check(args, prepared))
+        }
         Err((exit, why)) => {
             talk::fail(&why);
             exit
@@ -204,7 +207,6 @@ fn wanted_bundles(
 }
 
 fn private_instance() -> Result<Instance, Refusal> {
-    qcbus_bus::sweep_private_instances();
     let random = random_bytes().map_err(|why| (Exit::Internal, why))?;
     let random = u64::from_le_bytes(random);
     let name = format!("check-{}-{random:016x}", std::process::id());
@@ -218,12 +220,19 @@ fn random_bytes() -> Result<[u8; 8], String> {
     Ok(bytes)
 }
 
-fn check(args: &CheckArgs, prepared: Prepared) -> Exit {
-    let options = &prepared.options;
+/// Where the results of a run go.
+fn places(options: &Options) -> ResultPaths {
     let here = options.here.clone().unwrap_or_default();
     let (out, roots) = (options.out.clone(), options.roots.clone());
-    let mut places = ResultPaths::of_run(out, here, roots.clone(), &options.files);
+    let mut places = ResultPaths::of_run(out, here, roots, &options.files);
     places.single.clone_from(&options.single_result);
+    places
+}
+
+fn check(args: &CheckArgs, prepared: Prepared) -> Exit {
+    qcbus_bus::sweep_private_instances();
+    let options = &prepared.options;
+    let (places, roots) = (places(options), options.roots.clone());
     let printer = Printer::new(places, roots, prepared.config, prepared.outputs, args);
     let directory = prepared.options.instance.dir().to_path_buf();
     let (sender, receiver) = channel();

@@ -1,0 +1,50 @@
+//! Whether a broker would see what its client sees.
+
+use std::fs::Metadata;
+use std::os::unix::fs::MetadataExt;
+
+use qcbus_bus::Process;
+
+/// Whether another process is this very program, run by this user, with the same files in the same places.
+/// What cannot be seen is not the same.
+pub(super) fn is_like_us(process: &Process) -> bool {
+    let of = |id: &str, what: &str| std::fs::metadata(format!("/proc/{id}/{what}")).ok();
+    let same = |what: &str, is: fn(&Metadata, &Metadata) -> bool| {
+        let id = process.id().to_string();
+        let both = of(&id, what).zip(of("self", what));
+        both.is_some_and(|(theirs, ours)| is(&theirs, &ours))
+    };
+    let same_file = |a: &Metadata, b: &Metadata| (a.dev(), a.ino()) == (b.dev(), b.ino());
+    let same_user = |a: &Metadata, b: &Metadata| a.uid() == b.uid();
+    same("", same_user)
+        && same("exe", same_file)
+        && same("ns/mnt", same_file)
+        && same("root", same_file)
+        // Its id was not given to somebody else meanwhile.
+        && process.is_alive()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn another_program_is_not_like_us() {
+        let own = Process::open(std::process::id(), None).unwrap();
+        assert!(is_like_us(&own));
+        let mut other = std::process::Command::new("sleep")
+            .arg("1000")
+            .spawn()
+            .unwrap();
+        let process = Process::open(other.id(), None).unwrap();
+        // Until it is another program it is a copy of this one.
+        let exe = || std::fs::read_link(format!("/proc/{}/exe", other.id())).unwrap();
+        while exe() == std::env::current_exe().unwrap() {
+            std::thread::yield_now();
+        }
+        assert!(!is_like_us(&process));
+        other.kill().unwrap();
+        other.wait().unwrap();
+        assert!(!is_like_us(&process));
+    }
+}

@@ -1,0 +1,41 @@
+//! A result for somebody who asked for it: pooled like any other, and written nowhere.
+
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+use qcbus_formats::config::Config;
+use qcbus_formats::pool::BundleOutcome;
+use qcbus_formats::xqar;
+use qcbus_messages::control::Checked;
+
+use super::pooling::reasons;
+use super::{Store, judged, unlooked};
+use crate::core::{ErrandOutcome, FinishedJob, ShareOutcome, file_verdict};
+
+impl Store {
+    /// Pools what was found for an errand.
+    pub fn pool_errand(
+        &self,
+        job: &mut FinishedJob,
+        config: Option<&Config>,
+        root: Option<&[u8]>,
+    ) -> ErrandOutcome {
+        match self.refresh(job) {
+            Ok(true) => {}
+            Ok(false) => return ErrandOutcome::Stale,
+            Err(error) => return ErrandOutcome::Failed(unlooked(&job.path, &error)),
+        }
+        let outcomes: Vec<BundleOutcome> = job.bundles.iter().map(ShareOutcome::said).collect();
+        let pooled = self.pool(job, outcomes, config, root);
+        let verdict = pooled.verdict();
+        let why = reasons(job, &pooled, verdict);
+        let judged = judged(job, &pooled, verdict, why, PathBuf::new());
+        if self.epoch.load(Ordering::Acquire) != job.epoch.0 {
+            return ErrandOutcome::Outdated;
+        }
+        ErrandOutcome::Pooled(Box::new(Checked {
+            verdict: file_verdict(&job.path, &judged),
+            result: xqar::write(&pooled.results, self.dialect),
+        }))
+    }
+}

@@ -1,0 +1,70 @@
+//! Results of a run of `check` that a broker has found for it.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use qcbus_disk::write_whole;
+use qcbus_messages::control::Checked;
+use qcbus_messages::{Digest, JobId, Verdict};
+
+use super::{remove_earlier_results, unwritten};
+use crate::core::{Epoch, Judged, Jury};
+use crate::directory_lock::{DirectoryLock, LockError};
+use crate::result_paths::ResultPaths;
+
+/// Where a run keeps results that others have found for it.
+#[derive(Debug)]
+pub struct GivenResults {
+    places: ResultPaths,
+    config: Digest,
+    /// No broker writes results there.
+    _results: DirectoryLock,
+}
+
+impl GivenResults {
+    /// Makes room for the results of a run, as a broker of its own would: those of earlier runs go. What of them
+    /// cannot be removed is said, for a person. `config` is the digest of the configuration that the run works under.
+    ///
+    /// # Errors
+    /// When the directory belongs to somebody else, or cannot be written to.
+    pub fn open(
+        places: ResultPaths,
+        config: Digest,
+    ) -> Result<(GivenResults, Vec<String>), LockError> {
+        let results = DirectoryLock::share(&places.out)?;
+        let left = remove_earlier_results(&places);
+        let given = GivenResults {
+            places,
+            config,
+            _results: results,
+        };
+        Ok((given, left))
+    }
+
+    /// Writes the result of a file. One that cannot be written leaves it undetermined.
+    pub fn keep(&self, file: &Path, checked: Checked) -> Arc<Judged> {
+        let told = checked.verdict;
+        let xqar = self.places.xqar(file);
+        let written = write_whole(&xqar, checked.result.as_bytes(), false);
+        let mut judged = Judged {
+            job: JobId(0),
+            verdict: told.verdict,
+            digest: told.digest.parse().unwrap_or_default(),
+            basis: Digest::default(),
+            config: self.config,
+            jury: Arc::new(Jury::default()),
+            epoch: Epoch::default(),
+            inputs: Vec::new(),
+            racy: true,
+            counts: [told.errors, told.warnings, told.information],
+            why: told.why,
+            xqar: Some(xqar.clone()),
+        };
+        if let Err(error) = written {
+            judged.verdict = Verdict::Undetermined;
+            judged.why.insert(0, unwritten(&xqar, &error).what);
+            judged.xqar = None;
+        }
+        Arc::new(judged)
+    }
+}

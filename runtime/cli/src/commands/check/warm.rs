@@ -1,0 +1,186 @@
+//! A run of `check` that asks a broker which is there already, because a start of one's own takes longer than most
+//! checks.
+//!
+//! Whatever would be found otherwise by that broker is checked here: one of another program, with another
+//! configuration or other limits, that cannot read what we can, or that is about to end.
+
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use qcbus_broker::control::Line;
+use qcbus_broker::{Announcement, GivenResults, InForce, Notice, Options, Told, terms};
+use qcbus_document::FileKind;
+use qcbus_ingest::modular::SearchPath;
+use qcbus_messages::control::{Checked, Request, Response, Terms};
+use qcbus_messages::{Digest, Exit};
+
+use super::printer::{News, Printer};
+use super::{Prepared, places};
+use crate::args::CheckArgs;
+use crate::commands::settings::instance;
+use crate::{standard, talk};
+
+/// So many files are asked for: with more of them a start of one's own is a small part of the work.
+const MOST_FILES: usize = 64;
+
+/// So many are asked for at once.
+const AT_ONCE: usize = 4;
+
+/// Asks the broker of the instance for all files. Gives back what was prepared if they are to be checked here.
+pub(super) fn check(args: &CheckArgs, prepared: Prepared) -> Result<Exit, Prepared> {
+    match ask(args, &prepared.options) {
+        Ok((given, told)) => Ok(print(args, prepared, given, told)),
+        Err(Elsewhere::Here(why)) => {
+            if args.print.verbose && !why.is_empty() {
+                talk::say(&format!(
+                    "note: checked without the broker that runs: {why}"
+                ));
+            }
+            Err(prepared)
+        }
+        Err(Elsewhere::Refused(why)) => {
+            talk::fail(&why);
+            Ok(Exit::Usage)
+        }
+    }
+}
+
+/// Why no broker was asked.
+enum Elsewhere {
+    /// The files are to be checked here: why, for a person, if that is worth a word.
+    Here(String),
+    /// They cannot be checked at all.
+    Refused(String),
+}
+
+/// Everything that was answered.
+struct Given {
+    results: GivenResults,
+    files: Vec<(PathBuf, Checked)>,
+}
+
+fn ask(args: &CheckArgs, options: &Options) -> Result<(Given, Vec<String>), Elsewhere> {
+    let here = |why: &str| Elsewhere::Here(why.to_owned());
+    let directory = instance(&args.instance).map_err(Elsewhere::Refused)?;
+    if args.cold || !may_ask(options) {
+        return Err(here(""));
+    }
+    let mut line = Line::to(directory.dir()).ok_or_else(|| here(""))?;
+    if !line.is_like_us() {
+        return Err(here(
+            "it is another program, or does not see the same files",
+        ));
+    }
+    let in_force = InForce::new(None, SearchPath::of_environment());
+    let config = in_force.map_err(|error| here(&error.to_string()))?.digest;
+    let terms_of = |file: &Path| terms_of(options, config, file);
+    // Before anything is checked, as always: what lies there was found in other bytes.
+    let opened = GivenResults::open(places(options), config);
+    let (results, left) = opened.map_err(|error| Elsewhere::Refused(error.to_string()))?;
+    let answered = match options.files.as_slice() {
+        [file] => vec![ask_for(&mut line, file, terms_of(file)).map_err(Elsewhere::Here)?],
+        files => ask_for_all(directory.dir(), files, &terms_of).map_err(Elsewhere::Here)?,
+    };
+    let files = options.files.iter().cloned().zip(answered).collect();
+    Ok((Given { results, files }, left))
+}
+
+/// Whether any broker would find the same: it knows nothing of a configuration or of bundles that are named here. Maps
+/// and the scenarios on them tell of each other when they are checked together.
+fn may_ask(options: &Options) -> bool {
+    let kinds = options.files.iter().map(|file| FileKind::of_path(file));
+    let maps = kinds.filter(|kind| *kind == Some(FileKind::Xodr)).count();
+    options.roots.is_empty()
+        && options.files.len() <= MOST_FILES
+        && options.config.is_none()
+        && options.bundles_d.is_none()
+        && options.choice.is_everything()
+        && (maps == 0 || maps == options.files.len())
+}
+
+/// The terms under which a file would be checked here.
+fn terms_of(options: &Options, config: Digest, file: &Path) -> Terms {
+    let kind = FileKind::of_path(file);
+    let takes = |name: &str| {
+        let bundle = standard::bundle(name);
+        bundle.is_some_and(|it| kind.is_some_and(|kind| it.kinds.contains(&kind)))
+    };
+    let bundles = options.standard.iter().filter(|spec| takes(&spec.name));
+    let bundles: Vec<_> = bundles.cloned().collect();
+    terms(options, config, &bundles)
+}
+
+/// Asks for one file; why it is to be checked here, if it is.
+fn ask_for(line: &mut Line, file: &Path, terms: Terms) -> Result<Checked, String> {
+    let request = Request::Check {
+        file: file.to_path_buf(),
+        terms,
+    };
+    match line.ask(&request) {
+        Ok(Response::Checked(checked)) => Ok(*checked),
+        Ok(Response::Elsewhere { reason } | Response::Failed { reason }) => Err(reason),
+        Ok(_) => Err("it answers something else".to_owned()),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+/// Asks for several files, a few at a time.
+fn ask_for_all(
+    directory: &Path,
+    files: &[PathBuf],
+    terms: &(dyn Fn(&Path) -> Terms + Sync),
+) -> Result<Vec<Checked>, String> {
+    let (next, over) = (AtomicUsize::new(0), AtomicBool::new(false));
+    let answers: Mutex<Vec<Option<Checked>>> = Mutex::new(vec![None; files.len()]);
+    let some = || -> Result<(), String> {
+        let mut line = Line::to(directory).ok_or("it has gone")?;
+        if !line.is_like_us() {
+            return Err("another one has come".to_owned());
+        }
+        while !over.load(Ordering::Relaxed) {
+            let at = next.fetch_add(1, Ordering::Relaxed);
+            let Some(file) = files.get(at) else { break };
+            let checked = ask_for(&mut line, file, terms(file))?;
+            let mut answers = answers.lock().map_err(|error| error.to_string())?;
+            if let Some(place) = answers.get_mut(at) {
+                *place = Some(checked);
+            }
+        }
+        Ok(())
+    };
+    let one = || some().inspect_err(|_| over.store(true, Ordering::Relaxed));
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..AT_ONCE.min(files.len()))
+            .map(|_| scope.spawn(one))
+            .collect();
+        let panicked = |_| "a thread has panicked".to_owned();
+        let ended = threads.into_iter().map(|it| it.join().map_err(panicked)?);
+        ended.collect::<Result<(), String>>()
+    })?;
+    let answers = answers.into_inner().map_err(|error| error.to_string())?;
+    let all: Option<Vec<Checked>> = answers.into_iter().collect();
+    all.ok_or_else(|| "it has not answered everything".to_owned())
+}
+
+/// Prints what a run of our own would print.
+fn print(args: &CheckArgs, prepared: Prepared, given: Given, left: Vec<String>) -> Exit {
+    let options = &prepared.options;
+    let (places, outputs) = (places(options), prepared.outputs);
+    let mut printer = Printer::new(places, Vec::new(), prepared.config, outputs, args);
+    for what in left {
+        printer.take(News::Told(Told::Notice(Notice::Storing(what))));
+    }
+    let files = given.files.iter().map(|(file, _)| file.as_path().into());
+    let files = files.collect();
+    printer.take(News::Told(Told::Scanned { files }));
+    for (file, checked) in given.files {
+        let judged = given.results.keep(&file, checked);
+        printer.take(News::Told(Told::Verdict(Announcement {
+            path: file.into(),
+            judged,
+            fresh: true,
+        })));
+    }
+    printer.finish()
+}
