@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use qcbus_document::FileKind;
 use qcbus_messages::Catalogue;
 use sha2::{Digest as _, Sha256};
 
@@ -29,22 +30,50 @@ impl Mark {
     /// The mark of a version with what it offers; of a child, with what its manifest starts: scripts
     /// and arguments change without a version.
     pub fn of(version: &str, catalogue: &Catalogue, started: Option<u64>) -> Mark {
-        let mut hash = Sha256::new();
-        hash.update(format!("{started:?}\0"));
-        let (alias, kinds) = (&catalogue.alias, &catalogue.kinds);
-        hash.update(format!("{version}\0{}\0", catalogue.build_date));
-        hash.update(format!("{alias}\0{kinds:?}\0"));
-        for checker in &catalogue.checkers {
-            let (id, uids, on) = (&checker.id, &checker.rule_uids, checker.default_on);
-            hash.update(format!("{id}\0{uids:?}\0{on}\0{:?}\0", checker.kinds));
+        let mut hash = Hash::default();
+        hash.list(started, |hash, it| hash.0.update(it.to_le_bytes()));
+        hash.text(version);
+        hash.text(&catalogue.build_date);
+        hash.text(&catalogue.alias);
+        hash.kinds(&catalogue.kinds);
+        hash.list(&catalogue.checkers, |hash, checker| {
+            hash.text(&checker.id);
+            hash.list(&checker.rule_uids, |hash, uid| hash.text(uid));
+            hash.0.update([u8::from(checker.default_on)]);
+            hash.kinds(&checker.kinds);
             // Another default is another result.
-            for param in &checker.params {
-                hash.update(format!("{}={}\0", param.name, param.default));
-            }
-        }
-        let digest = hash.finalize();
+            hash.list(&checker.params, |hash, param| {
+                hash.text(&param.name);
+                hash.text(&param.default);
+            });
+        });
+        let digest = hash.0.finalize();
         let first = digest.iter().take(8);
         Mark(first.fold(0, |number, byte| (number << 8) | u64::from(*byte)))
+    }
+}
+
+/// A hash over parts none of which can be taken for another: a text begins with its length, and
+/// each part of a list with a mark.
+#[derive(Default)]
+struct Hash(Sha256);
+
+impl Hash {
+    fn text(&mut self, text: &str) {
+        self.0.update((text.len() as u64).to_le_bytes());
+        self.0.update(text);
+    }
+
+    fn kinds(&mut self, kinds: &[FileKind]) {
+        self.list(kinds, |hash, kind| hash.0.update([*kind as u8]));
+    }
+
+    fn list<T>(&mut self, parts: impl IntoIterator<Item = T>, each: impl Fn(&mut Hash, T)) {
+        for part in parts {
+            self.0.update([1]);
+            each(self, part);
+        }
+        self.0.update([0]);
     }
 }
 
