@@ -15,7 +15,7 @@ use super::jury::{Epoch, Mark, Seat};
 use super::notice::Notice;
 use super::staging::Staged;
 use super::types::{Input, Judged, PrepareFailure, PreparedJob, Reading};
-use super::{Actions, State};
+use super::{Actions, ReadingEnd, State};
 
 /// Between two notices that there is no room, or that files cannot be read for now.
 const ROOM_NOTICE_PAUSE: Duration = Duration::from_secs(10);
@@ -130,7 +130,7 @@ impl State {
 
     /// Starts as many jobs as there is room for.
     pub(super) fn pump(&mut self, actions: &mut Actions) {
-        if !self.may_judge() {
+        if !self.may_judge() && !self.reads_early() {
             return;
         }
         while self.jobs.len() < self.settings.max_active
@@ -196,12 +196,7 @@ impl State {
     }
 
     /// Reading is over.
-    pub(super) fn prepared(
-        &mut self,
-        id: JobId,
-        result: Result<Box<PreparedJob>, PrepareFailure>,
-        actions: &mut Actions,
-    ) {
+    pub(super) fn prepared(&mut self, id: JobId, result: ReadingEnd, actions: &mut Actions) {
         if !matches!(self.jobs.get(&id), Some(job) if job.stage == JobStage::Preparing) {
             return;
         }

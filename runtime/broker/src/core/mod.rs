@@ -107,6 +107,8 @@ pub struct State {
     notices: VecDeque<(Notice, Duration)>,
     rate: Rate,
     judged_once: bool,
+    /// What a run has read before those were there who judge.
+    read_early: Vec<(JobId, ReadingEnd)>,
     /// Until then nobody need be told again that there is no room.
     mute_room_until: Duration,
     mute_hindered_until: Duration,
@@ -118,6 +120,9 @@ pub struct State {
     /// Since when there has been no room for anything while nothing moved.
     stuck_since: Option<Duration>,
 }
+
+/// What came of reading a file.
+type ReadingEnd = Result<Box<PreparedJob>, PrepareFailure>;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
@@ -167,6 +172,7 @@ impl State {
             notices: VecDeque::new(),
             rate: Rate::default(),
             judged_once: false,
+            read_early: Vec::new(),
             mute_room_until: Duration::ZERO,
             mute_hindered_until: Duration::ZERO,
             crowded: VecDeque::new(),
@@ -212,6 +218,9 @@ impl State {
             Event::Touched { path, stamp } => self.touched(&path, stamp, &mut actions),
             Event::Vanished { path } => self.vanished(&path, &mut actions),
             Event::Scanned => self.scanned(&mut actions),
+            Event::Prepared { job, result } if self.reads_early() => {
+                self.read_early.push((job, result));
+            }
             Event::Prepared { job, result } => self.prepared(job, result, &mut actions),
             Event::Stored { job, outcome } => self.stored(job, outcome, &mut actions),
             Event::Withdrawn { path } => self.withdrawn(&path, &mut actions),
@@ -253,6 +262,7 @@ impl State {
             Event::Drain => self.drain(),
             Event::Tick => self.tick(&mut actions),
         }
+        self.hear_what_was_read_early(&mut actions);
         self.follow_roster(&mut actions);
         self.dispatch_all(&mut actions);
         self.pump(&mut actions);
@@ -347,6 +357,21 @@ impl State {
             }
         }
         self.judged_once
+    }
+
+    /// Whether files are read already although nobody can judge them yet: a run has nothing else to do while its
+    /// bundles start. What is read is not looked at before they are there, for who they are decides what becomes of it.
+    fn reads_early(&mut self) -> bool {
+        self.settings.once && self.phase == Phase::Running && !self.may_judge()
+    }
+
+    fn hear_what_was_read_early(&mut self, actions: &mut Actions) {
+        if self.read_early.is_empty() || self.reads_early() {
+            return;
+        }
+        for (job, result) in std::mem::take(&mut self.read_early) {
+            self.prepared(job, result, actions);
+        }
     }
 
     fn tick(&mut self, actions: &mut Actions) {
