@@ -32,7 +32,7 @@ pub struct Options {
     pub here: Option<PathBuf>,
     /// One file for the one result, instead of a directory of results.
     pub single_result: Option<PathBuf>,
-    /// Directory of the journal; none: it is forgotten at the end.
+    /// Directory of the journal; none: nothing is remembered.
     pub state: Option<PathBuf>,
     /// How long the history of jobs is kept.
     pub retention: Duration,

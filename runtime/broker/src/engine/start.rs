@@ -21,7 +21,7 @@ use crate::descriptors::Descriptors;
 use crate::directory_lock::{DirectoryLock, LockError, Purpose, open_to_others};
 use crate::gate::{Gate, GateError, GateOptions};
 use crate::intake::Intake;
-use crate::journal::{Journal, JournalError, Void};
+use crate::journal::{Journal, JournalError, SharedJournal, Void};
 use crate::launches::Launches;
 use crate::options::Options;
 use crate::reload::{Loaded, Sources};
@@ -53,9 +53,10 @@ impl Broker {
         let mut host = Host::start(&options.instance, shape(&options, &loaded))?;
         options.settings.generation = host.generation();
         let journal = journal_of(&options)?;
-        options.settings.numbers = journal.numbers()?.max(host.generation());
+        let numbers = journal.as_ref().map_or(Ok(0), Journal::numbers)?;
+        options.settings.numbers = numbers.max(host.generation());
         let results = results_of(&options)?;
-        let members = journal.members()?;
+        let members = journal.as_ref().map_or(Ok(Vec::new()), Journal::members)?;
         let in_force = Arc::new(InForce::of(&sources, &loaded)?);
         host.set_config(in_force.digest, &in_force.encoded);
         let control = control_of(&options, senders.asked)?;
@@ -202,11 +203,10 @@ fn sources_of(options: &Options) -> Sources {
     }
 }
 
-fn journal_of(options: &Options) -> Result<Journal, JournalError> {
-    match &options.state {
-        Some(state) => Journal::open(state, options.instance.name()),
-        None => Journal::in_memory(),
-    }
+fn journal_of(options: &Options) -> Result<Option<Journal>, JournalError> {
+    let state = options.state.as_ref();
+    let opened = state.map(|state| Journal::open(state, options.instance.name()));
+    opened.transpose()
 }
 
 /// Nobody else may write results there meanwhile, but for other runs of `check`.
@@ -220,7 +220,7 @@ fn results_of(options: &Options) -> Result<DirectoryLock, LockError> {
 
 fn store(
     options: &Options,
-    journal: Journal,
+    journal: Option<Journal>,
     scouts: Scouts,
     notices: &mpsc::UnboundedSender<Notice>,
 ) -> Result<Store, GateError> {
@@ -244,7 +244,7 @@ fn store(
         retries: options.watch,
         gate: gate.transpose()?,
         scouts,
-        journal: journal.into(),
+        journal: journal.map(SharedJournal::from),
         epoch: AtomicU64::new(0),
     })
 }

@@ -173,10 +173,11 @@ impl Journal {
         })
     }
 
-    /// A journal that is forgotten with the process, for a single run.
+    /// A journal that is forgotten with the process, for a test.
     ///
     /// # Errors
     /// When SQLite cannot even do that.
+    #[cfg(test)]
     pub fn in_memory() -> Result<Journal, JournalError> {
         let path = PathBuf::from(":memory:");
         let connection = Connection::open_in_memory().map_err(|source| classify(&path, source))?;

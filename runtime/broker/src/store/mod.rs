@@ -60,8 +60,8 @@ pub struct Store {
     pub gate: Option<Gate>,
     /// Who looks at files.
     pub scouts: Scouts,
-    /// What is remembered.
-    pub journal: SharedJournal,
+    /// What is remembered; without it, nothing is: of a single run nobody asks later.
+    pub journal: Option<SharedJournal>,
     /// The epoch of who must judge: what was judged in an earlier one is not stored.
     pub epoch: AtomicU64,
 }
@@ -264,11 +264,14 @@ impl Store {
     /// What a person should know; the entries are not written then.
     pub fn record(&self, entries: &[Entry]) -> Result<(), String> {
         disk().map_err(|error| format!("the journal cannot be written: {error}"))?;
-        let noted = self.journal.note(entries);
+        let Some(journal) = &self.journal else {
+            return Ok(());
+        };
+        let noted = journal.note(entries);
         if let Some(path) = entries.first().and_then(Entry::path) {
             step("noted", path);
         }
-        self.journal.settle(&noted)
+        journal.settle(&noted)
     }
 
     /// Everything that is remembered of files.
@@ -276,7 +279,8 @@ impl Store {
     /// # Errors
     /// When the journal cannot be read.
     pub fn remembered(&self) -> Result<Vec<Remembered>, JournalError> {
-        self.journal.get().remembered()
+        let journal = self.journal.as_ref();
+        journal.map_or(Ok(Vec::new()), |it| it.get().remembered())
     }
 
     /// What reporters are still to take back.
@@ -284,7 +288,8 @@ impl Store {
     /// # Errors
     /// When the journal cannot be read.
     pub fn voids(&self) -> Result<Vec<Void>, JournalError> {
-        self.journal.get().voids()
+        let journal = self.journal.as_ref();
+        journal.map_or(Ok(Vec::new()), |it| it.get().voids())
     }
 
     /// Forgets the history of jobs older than `keep`.
@@ -292,7 +297,10 @@ impl Store {
     /// # Errors
     /// What a person should know.
     pub fn prune(&self, keep: std::time::Duration) -> Result<(), String> {
-        let pruned = self.journal.get().prune(keep);
+        let Some(journal) = &self.journal else {
+            return Ok(());
+        };
+        let pruned = journal.get().prune(keep);
         pruned.map(|_| ()).map_err(|error| error.to_string())
     }
 }
