@@ -173,6 +173,7 @@ async fn serve(
     mut stops: Stops,
 ) -> Ended {
     let (was_started, threads) = (hello.launch.is_some(), hello.threads);
+    let ready = Ready::new(bundle, given.as_ref());
     let mut peer = match Peer::join(stand.instance, hello, stand.options()).await {
         Ok(peer) => peer,
         Err(error @ JoinError::NoBroker { .. }) => {
@@ -186,7 +187,9 @@ async fn serve(
     };
     // Before the first thread is started: threads that there are already would stay outside.
     let heard = until_configured(&mut peer).await;
-    let fence = stand.confine(peer.memory(), || files_of(bundle, given.as_ref(), &peer));
+    let fence = stand.confine(peer.memory(), || {
+        files_of(bundle, given.as_ref(), &peer, &ready)
+    });
     let (sender, mut progress) = mpsc::unbounded_channel();
     let models = KeptModels::default();
     let threads = usize::from(threads);
@@ -200,6 +203,7 @@ async fn serve(
     let mut daemon = Daemon {
         bundle,
         given,
+        ready,
         peer,
         workers,
         models,
@@ -259,17 +263,47 @@ async fn until_configured(peer: &mut Peer) -> Vec<PeerEvent> {
 }
 
 /// Files and directories that the configuration in force names, and those of the user.
-fn files_of(bundle: &'static Bundle, given: Option<&UserFiles>, peer: &Peer) -> Vec<PathBuf> {
+fn files_of(
+    bundle: &'static Bundle,
+    given: Option<&UserFiles>,
+    peer: &Peer,
+    ready: &Ready,
+) -> Vec<PathBuf> {
     let config = peer
         .config()
         .and_then(|(_, bytes)| codec::decode(&bytes).ok());
     let config: Option<Config> = config.flatten();
-    configured(bundle, config.as_ref(), given).files()
+    match &config {
+        Some(config) => configured(bundle, Some(config), given).files(),
+        None => ready.plan.files(),
+    }
+}
+
+/// What is the same for every broker, and made before the first is there: a run of `check` waits for its bundles.
+struct Ready {
+    /// What the bundle offers.
+    catalogue: FromPeer,
+    /// What is done unless a configuration says otherwise.
+    plan: Arc<Plan>,
+}
+
+impl Ready {
+    fn new(bundle: &'static Bundle, given: Option<&UserFiles>) -> Ready {
+        let mut catalogue = bundle.catalogue();
+        if let Some(given) = given {
+            given.tell(&mut catalogue);
+        }
+        Ready {
+            catalogue: FromPeer::Catalogue(Box::new(catalogue)),
+            plan: Arc::new(configured(bundle, None, given)),
+        }
+    }
 }
 
 struct Daemon {
     bundle: &'static Bundle,
     given: Option<UserFiles>,
+    ready: Ready,
     peer: Peer,
     workers: Workers,
     models: KeptModels,
@@ -323,11 +357,7 @@ impl Daemon {
         match message {
             ToPeer::Welcome { .. } => {
                 self.forget_everything();
-                let mut catalogue = self.bundle.catalogue();
-                if let Some(given) = &self.given {
-                    given.tell(&mut catalogue);
-                }
-                self.peer.send(&FromPeer::Catalogue(Box::new(catalogue)));
+                self.peer.send(&self.ready.catalogue);
             }
             // The broker does not know yet; `Leaving` tells it that this is left undone.
             ToPeer::Job(_) if self.stopped => {}
@@ -497,11 +527,12 @@ impl Daemon {
             Some((config, _)) => config,
             None => self.read_config(digest)?,
         };
-        let plan = Arc::new(configured(
-            self.bundle,
-            config.as_ref(),
-            self.given.as_ref(),
-        ));
+        let plan = if config.is_none() && !self.ready.plan.is_outdated() {
+            self.ready.plan.clone()
+        } else {
+            let (config, given) = (config.as_ref(), self.given.as_ref());
+            Arc::new(configured(self.bundle, config, given))
+        };
         if let Some(fence) = &self.fence
             && let Some(outside) = plan.files().iter().find(|it| fence.keeps_out(it))
         {
