@@ -23,6 +23,7 @@ mod leaving;
 mod maps;
 mod notice;
 mod outcome;
+mod queue;
 mod reporters;
 mod roster;
 mod settings;
