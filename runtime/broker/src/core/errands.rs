@@ -175,13 +175,12 @@ impl State {
         }
     }
 
-    /// Configuration or bundles are others: what was asked for under what was there before is not what would be
-    /// found now.
-    pub(super) fn dismiss_errands(&mut self, actions: &mut Actions) {
+    /// Nobody who has asked can be answered any more: configuration or bundles are others, so that what would be found
+    /// now is not what was asked for, or the broker has stopped.
+    pub(super) fn dismiss_errands(&mut self, reason: &str, actions: &mut Actions) {
         let tickets: Vec<Ticket> = self.errands.keys().copied().collect();
         for ticket in tickets {
-            let reason = "its configuration or its bundles have changed".to_owned();
-            elsewhere(ticket, reason, actions);
+            elsewhere(ticket, reason.to_owned(), actions);
             self.abandon(ticket, actions);
         }
     }
