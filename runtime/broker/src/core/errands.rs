@@ -99,9 +99,6 @@ impl State {
         let Some(errand) = job.errand.clone() else {
             return;
         };
-        if !self.errands.contains_key(&errand.ticket) {
-            return self.end_job(id, actions);
-        }
         job.stage = JobStage::Storing;
         let whole = job.shares.len() == errand.bundles.len();
         let there = job.shares.values().all(|share| !share.absent);
@@ -130,20 +127,23 @@ impl State {
         let Some(errand) = job.errand.clone() else {
             return;
         };
+        let ticket = errand.ticket;
+        if !self.errands.contains_key(&ticket) {
+            return self.end_job(id, actions);
+        }
         match outcome {
             ErrandOutcome::Pooled(checked) => {
-                if self.errands.remove(&errand.ticket).is_some() {
-                    let (ticket, response) = (errand.ticket, Response::Checked(checked));
-                    actions.push(Action::Answer { ticket, response });
-                }
+                self.errands.remove(&ticket);
+                let response = Response::Checked(checked);
+                actions.push(Action::Answer { ticket, response });
                 self.end_job(id, actions);
             }
             ErrandOutcome::Stale => self.end_job(id, actions),
-            ErrandOutcome::Outdated if job.config == self.config => {
+            // The configuration is the same, or the errand would have been dismissed.
+            ErrandOutcome::Outdated => {
                 job.stage = JobStage::Checking;
                 self.reseat(id, actions);
             }
-            ErrandOutcome::Outdated => self.end_job(id, actions),
             ErrandOutcome::Failed(reason) => self.send_elsewhere(id, reason, actions),
         }
     }
