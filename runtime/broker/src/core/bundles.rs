@@ -425,6 +425,7 @@ impl State {
         self.notice(notice, actions);
         self.take_back(name, true);
         self.condemn(name, &why);
+        self.turn_away_suspects(actions);
         self.child_down(name, proved, &why, actions);
         if nobody_misses_it && !self.children.contains_key(name) {
             self.drop_bundle(name, actions);

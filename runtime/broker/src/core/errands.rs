@@ -203,6 +203,19 @@ impl State {
         }
     }
 
+    /// A bundle died that had errands. They are not tried again: a verdict would keep others from that, but of an errand
+    /// nothing is known when the next one asks, and this bundle is needed by all.
+    pub(super) fn turn_away_suspects(&mut self, actions: &mut Actions) {
+        let suspect = |job: &ActiveJob| job.shares.values().any(|share| share.suspect);
+        let jobs = self.jobs.iter();
+        let suspects = jobs.filter(|(_, job)| job.errand.is_some() && suspect(job));
+        let suspects: Vec<JobId> = suspects.map(|(id, _)| *id).collect();
+        for id in suspects {
+            let reason = "a bundle has failed while it looked at it".to_owned();
+            self.send_elsewhere(id, reason, actions);
+        }
+    }
+
     /// No new jobs are begun any more: whoever still waits for one makes it himself.
     pub(super) fn turn_away_waiting_errands(&mut self, actions: &mut Actions) {
         let waits = |file: &FileId| {

@@ -202,10 +202,22 @@ fn a_client_may_read_what_the_broker_may_not() {
 }
 
 #[test]
-fn a_bundle_that_does_not_come_back_finds_nothing_for_a_client() {
+fn a_bundle_that_dies_of_what_a_client_asks_for_dies_of_it_once() {
     let (mut world, ticket) = world_with_a_client();
+    let waits = world.ask(8);
     world.prepare(0, true);
     world.kill(1);
+    assert!(!is_checked(&world, ticket));
+    assert!(is_open(&world, waits), "the bundle did not have it");
+    world.settle();
+    assert!(is_checked(&world, waits));
+}
+
+#[test]
+fn a_bundle_that_does_not_come_back_finds_nothing_for_a_client() {
+    let (mut world, ticket) = world_with_a_client();
+    world.kill(1);
+    world.prepare(0, true);
     world.pass(Duration::from_secs(1));
     assert!(is_open(&world, ticket), "it may come back");
     world.child_ends(ChildEnd::NotStarted("no such program".to_owned()));
