@@ -12,6 +12,7 @@ use super::announcing::Announced;
 use super::jury::{Mark, Member, Origin};
 use super::leaving::LEAVE_LIMIT;
 use super::notice::Notice;
+use super::queue::Queue;
 use super::types::{Launch, SessionId};
 use super::{Actions, State};
 
@@ -43,7 +44,7 @@ pub(super) struct Bundle {
     /// The process has finished a job, so it is not broken from the start.
     pub proved: bool,
     pub active: BTreeMap<JobId, Given>,
-    pub queue: VecDeque<JobId>,
+    pub queue: Queue,
     pub suspects: VecDeque<JobId>,
     /// The highest job that this session was given.
     pub highest: Option<JobId>,
@@ -103,11 +104,8 @@ impl Bundle {
     }
 
     /// A job waits for this bundle.
-    pub fn expect(&mut self, id: JobId, hurried: bool) {
-        match hurried {
-            true => self.queue.push_front(id),
-            false => self.queue.push_back(id),
-        }
+    pub fn expect(&mut self, id: JobId, is_errand: bool) {
+        self.queue.push(id, is_errand);
     }
 
     /// Notes that the bundle has got a job.
@@ -427,6 +425,7 @@ impl State {
         self.notice(notice, actions);
         self.take_back(name, true);
         self.condemn(name, &why);
+        self.turn_away_suspects(actions);
         self.child_down(name, proved, &why, actions);
         if nobody_misses_it && !self.children.contains_key(name) {
             self.drop_bundle(name, actions);

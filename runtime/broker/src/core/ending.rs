@@ -48,6 +48,7 @@ impl State {
                 if alone || self.now.saturating_sub(since) > GOODBYE_LIMIT {
                     self.phase = Phase::Stopped;
                     self.end_waits(actions);
+                    self.dismiss_errands("the broker has stopped", actions);
                     actions.push(Action::Stop);
                 }
             }

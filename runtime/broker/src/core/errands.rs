@@ -99,9 +99,6 @@ impl State {
         let Some(errand) = job.errand.clone() else {
             return;
         };
-        if !self.errands.contains_key(&errand.ticket) {
-            return self.end_job(id, actions);
-        }
         job.stage = JobStage::Storing;
         let whole = job.shares.len() == errand.bundles.len();
         let there = job.shares.values().all(|share| !share.absent);
@@ -130,20 +127,23 @@ impl State {
         let Some(errand) = job.errand.clone() else {
             return;
         };
+        let ticket = errand.ticket;
+        if !self.errands.contains_key(&ticket) {
+            return self.end_job(id, actions);
+        }
         match outcome {
             ErrandOutcome::Pooled(checked) => {
-                if self.errands.remove(&errand.ticket).is_some() {
-                    let (ticket, response) = (errand.ticket, Response::Checked(checked));
-                    actions.push(Action::Answer { ticket, response });
-                }
+                self.errands.remove(&ticket);
+                let response = Response::Checked(checked);
+                actions.push(Action::Answer { ticket, response });
                 self.end_job(id, actions);
             }
             ErrandOutcome::Stale => self.end_job(id, actions),
-            ErrandOutcome::Outdated if job.config == self.config => {
+            // The configuration is the same, or the errand would have been dismissed.
+            ErrandOutcome::Outdated => {
                 job.stage = JobStage::Checking;
                 self.reseat(id, actions);
             }
-            ErrandOutcome::Outdated => self.end_job(id, actions),
             ErrandOutcome::Failed(reason) => self.send_elsewhere(id, reason, actions),
         }
     }
@@ -175,13 +175,12 @@ impl State {
         }
     }
 
-    /// Configuration or bundles are others: what was asked for under what was there before is not what would be
-    /// found now.
-    pub(super) fn dismiss_errands(&mut self, actions: &mut Actions) {
+    /// Nobody who has asked can be answered any more: configuration or bundles are others, so that what would be found
+    /// now is not what was asked for, or the broker has stopped.
+    pub(super) fn dismiss_errands(&mut self, reason: &str, actions: &mut Actions) {
         let tickets: Vec<Ticket> = self.errands.keys().copied().collect();
         for ticket in tickets {
-            let reason = "its configuration or its bundles have changed".to_owned();
-            elsewhere(ticket, reason, actions);
+            elsewhere(ticket, reason.to_owned(), actions);
             self.abandon(ticket, actions);
         }
     }
@@ -201,6 +200,19 @@ impl State {
                 }
             }
             _ => self.files.remove(file),
+        }
+    }
+
+    /// A bundle died that had errands. They are not tried again: a verdict would keep others from that, but of an errand
+    /// nothing is known when the next one asks, and this bundle is needed by all.
+    pub(super) fn turn_away_suspects(&mut self, actions: &mut Actions) {
+        let suspect = |job: &ActiveJob| job.shares.values().any(|share| share.suspect);
+        let jobs = self.jobs.iter();
+        let suspects = jobs.filter(|(_, job)| job.errand.is_some() && suspect(job));
+        let suspects: Vec<JobId> = suspects.map(|(id, _)| *id).collect();
+        for id in suspects {
+            let reason = "a bundle has failed while it looked at it".to_owned();
+            self.send_elsewhere(id, reason, actions);
         }
     }
 

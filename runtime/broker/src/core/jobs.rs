@@ -367,8 +367,11 @@ impl State {
             return;
         }
         let (old, anew) = (entry.judged.clone(), entry.anew || entry.half_written);
-        if entry.errand.is_some() {
-            return self.give_out(id, actions);
+        if let Some(errand) = &entry.errand {
+            return match self.errands.contains_key(&errand.ticket) {
+                true => self.give_out(id, actions),
+                false => self.end_job(id, actions),
+            };
         }
         self.depend(file, &prepared.inputs, actions);
         let same = |judged: &Judged| judged.basis == prepared.basis && !anew;

@@ -23,6 +23,7 @@ mod leaving;
 mod maps;
 mod notice;
 mod outcome;
+mod queue;
 mod reporters;
 mod roster;
 mod settings;
@@ -239,7 +240,7 @@ impl State {
             Event::Configured { digest, demand } => self.configured(digest, demand, &mut actions),
             Event::Children { specs } => {
                 self.set_children(specs, &mut actions);
-                self.dismiss_errands(&mut actions);
+                self.dismiss_errands("its bundles have changed", &mut actions);
             }
             Event::Wait {
                 ticket,
@@ -337,7 +338,7 @@ impl State {
         }
         self.config = digest;
         self.demand = demand;
-        self.dismiss_errands(actions);
+        self.dismiss_errands("its configuration has changed", actions);
         self.begin_epoch();
         // What is being checked is checked under the old configuration: it starts anew.
         for id in self.under_way() {

@@ -325,14 +325,14 @@ impl State {
         let Some(job) = self.jobs.get_mut(&id) else {
             return;
         };
-        let hurried = job.errand.is_some();
+        let is_errand = job.errand.is_some();
         job.epoch = self.epoch;
         for seat in &anew {
             let share = Share::of(seat, unreadable.as_deref());
             let queued = share.state == ShareState::Queued;
             job.shares.insert(seat.name.clone(), share);
             if let Some(bundle) = self.bundles.get_mut(&seat.name).filter(|_| queued) {
-                bundle.expect(id, hurried);
+                bundle.expect(id, is_errand);
             }
         }
         if job.shares.values().any(|share| !share.is_over()) {

@@ -158,13 +158,12 @@ impl Bundle {
     pub(super) fn next_job(&mut self, room: Room) -> Option<(JobId, bool)> {
         let Room::Full(oldest) = room else {
             let suspect = self.suspects.pop_front().map(|id| (id, true));
-            return suspect.or_else(|| self.queue.pop_front().map(|id| (id, false)));
+            return suspect.or_else(|| self.queue.pop().map(|id| (id, false)));
         };
         let oldest = oldest?;
         if let Some(at) = self.suspects.iter().position(|id| *id == oldest) {
             return self.suspects.remove(at).map(|id| (id, true));
         }
-        let at = self.queue.iter().position(|id| *id == oldest)?;
-        self.queue.remove(at).map(|id| (id, false))
+        self.queue.take(oldest).map(|id| (id, false))
     }
 }

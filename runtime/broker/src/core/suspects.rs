@@ -32,7 +32,7 @@ impl State {
             if share.suspect {
                 bundle.suspects.push_front(id);
             } else {
-                bundle.queue.push_front(id);
+                bundle.queue.put_back(id, job.errand.is_some());
             }
         }
     }

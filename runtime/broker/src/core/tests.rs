@@ -14,8 +14,10 @@ use crate::InForce;
 mod acts;
 mod behind_the_gate;
 mod children;
+mod clients;
 mod dependencies;
 mod ending;
+mod errands;
 mod exits;
 mod hands;
 mod limits;
@@ -63,13 +65,17 @@ enum Step {
     ChildEnds(u8),
     Restart,
     RestartAfter(u8, bool),
+    Errand(u8, bool),
+    ClientLeaves(u8),
+    PoolErrand(u8, bool),
+    TellPooled,
 }
 
 fn steps() -> impl Strategy<Value = Vec<Step>> {
     let step = prop_oneof![
-        4 => (0..8_u8).prop_map(Step::Write),
-        1 => (0..8_u8).prop_map(Step::Touch),
-        2 => (0..8_u8).prop_map(Step::Delete),
+        4 => (0..11_u8).prop_map(Step::Write),
+        1 => (0..11_u8).prop_map(Step::Touch),
+        2 => (0..11_u8).prop_map(Step::Delete),
         1 => (0..6_u8).prop_map(Step::Wait),
         1 => (0..6_u8).prop_map(Step::WaitBriefly),
         2 => any::<bool>().prop_map(Step::Join),
@@ -96,6 +102,10 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
         1 => (0..4_u8).prop_map(Step::ChildEnds),
         1 => Just(Step::Restart),
         1 => ((0..8_u8), any::<bool>()).prop_map(|(file, late)| Step::RestartAfter(file, late)),
+        4 => ((2..10_u8), prop::bool::weighted(0.8)).prop_map(|(file, known)| Step::Errand(file, known)),
+        1 => any::<u8>().prop_map(Step::ClientLeaves),
+        4 => (any::<u8>(), prop::bool::weighted(0.8)).prop_map(|(n, well)| Step::PoolErrand(n, well)),
+        3 => Just(Step::TellPooled),
     ];
     prop::collection::vec(step, 1..120)
 }
@@ -144,6 +154,10 @@ impl World {
             }),
             Step::Restart => self.restart(),
             Step::RestartAfter(file, unsettled) => self.restart_after(file, unsettled),
+            Step::Errand(file, known) => self.somebody_asks(file, known),
+            Step::ClientLeaves(n) => self.client_leaves(n),
+            Step::PoolErrand(n, well) => self.pool(n, well),
+            Step::TellPooled => self.tell_pooled(),
             Step::Reconfigure(n) => {
                 self.reconfigured = n;
                 let in_force = InForce::new(None, SearchPath::default()).unwrap();
@@ -193,6 +207,10 @@ proptest! {
         }
         world.all_know_the_same();
         prop_assert!(!world.waiting.values().any(there), "{:?}", world.waiting);
+        world.clients_are_content();
+        let known = world.state.status().files;
+        let counted = [known.total, known.judged];
+        prop_assert_eq!(counted, [world.judged.len() as u64; 2], "clients' files do not count");
         prop_assert_eq!(world.state.preparing, 0);
         prop_assert_eq!(world.state.storing, 0);
     }
@@ -212,6 +230,7 @@ proptest! {
         world.drain();
         prop_assert_eq!(world.stopped, 1);
         prop_assert!(world.waiting.is_empty(), "{:?}", world.waiting);
+        world.clients_are_content();
     }
 }
 

@@ -45,6 +45,7 @@ impl World {
                 self.journal.insert(file_of(&path), (*judged).clone());
             }
             Action::Store(job) => self.is_to_be_stored(*job),
+            Action::Pool(job) => self.is_to_be_pooled(*job),
             Action::Judged {
                 path,
                 judged,
@@ -131,6 +132,9 @@ impl World {
     }
 
     fn is_answered(&mut self, ticket: Ticket, response: &Response) {
+        if self.client_is_answered(ticket, response) {
+            return;
+        }
         let file = self.waiting.remove(&ticket).expect("one answer for each");
         let until = self.until.remove(&ticket);
         if *response == Response::TimedOut {

@@ -1,9 +1,9 @@
 //! The hands of a random world: files are read and results written, and a broker is killed.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use super::super::*;
+use super::clients::Clients;
 use super::things::*;
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::{DocId, DocumentRole, JobDocument, Verdict};
@@ -151,6 +151,7 @@ impl World {
         self.waiting.clear();
         self.until.clear();
         self.told.clear();
+        self.clients = Clients::default();
         self.judged.clear();
         self.gate_is_taken_over();
         let known = self.journal.keys();
@@ -169,7 +170,8 @@ impl World {
         }
         self.desk_restarts();
         self.children_are(self.manifest);
-        let there: Vec<(Arc<Path>, u64)> = self.there.clone().into_iter().collect();
+        let there = self.there.clone().into_iter();
+        let there: Vec<_> = there.filter(|(path, _)| file_of(path) < 8).collect();
         if unsettled {
             for (path, _) in there.clone() {
                 self.event(Event::Present { path });

@@ -65,9 +65,14 @@ pub fn named(jury: &Jury) -> Vec<(String, Option<Mark>)> {
     jury.0.iter().map(juror).collect()
 }
 
-/// The first six are checked, the others are only dependencies of them.
+/// The first six are checked, the next two are only dependencies of them; of what comes then nobody knows but
+/// clients that ask for it, and of the last of them it is a part.
 pub fn path_of(file: u8) -> Arc<Path> {
-    let ending = if file < 6 { "xodr" } else { "part" };
+    let ending = if matches!(file, 6 | 7 | 10) {
+        "part"
+    } else {
+        "xodr"
+    };
     Path::new(&format!("/farm/{file}.{ending}")).into()
 }
 
@@ -79,6 +84,8 @@ pub fn dependencies_of(file: u8) -> &'static [u8] {
         2 => &[6],
         3 => &[4],
         5 => &[4, 6, 7],
+        8 => &[10],
+        9 => &[0, 10],
         _ => &[],
     }
 }

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use super::super::*;
 use super::behind_the_gate::Published;
+use super::clients::Clients;
 use super::reporting::Desk;
 use super::things::*;
 use qcbus_messages::{JobId, Verdict};
@@ -57,6 +58,7 @@ pub struct World {
     pub watched: BTreeSet<u8>,
     pub gate: Published,
     pub desk: Desk,
+    pub clients: Clients,
     /// Why bundles have failed on each file, as stored.
     pub failures: BTreeMap<u8, Vec<String>>,
     /// Files with an error in them.
@@ -131,6 +133,7 @@ impl World {
             watched: BTreeSet::new(),
             gate: Published::new(),
             desk: Desk::default(),
+            clients: Clients::default(),
             failures: BTreeMap::new(),
             rejected: BTreeSet::new(),
             said_of_maps: BTreeMap::new(),
@@ -142,11 +145,14 @@ impl World {
     }
 
     pub fn event(&mut self, event: Event) {
+        self.clients_look();
+        let other_terms = self.brings_other_terms(&event);
         let mut withdrawn = Vec::new();
         for action in self.state.handle(self.now, event) {
             if let Action::Withdraw { path, .. } = &action {
                 withdrawn.push(path.clone());
             }
+            self.is_for_clients_alone(&action);
             self.desk_hears(&action);
             self.gate_follows(&action);
             self.act(action);
@@ -155,6 +161,10 @@ impl World {
             self.event(Event::Withdrawn { path });
         }
         self.gate_must_be_true();
+        self.clients_leave_no_trace();
+        if other_terms {
+            self.terms_are_others();
+        }
     }
 
     /// Who must judge, each as what it is.
@@ -185,6 +195,10 @@ impl World {
         self.contents.insert(self.stamps, content);
         self.there.insert(path_of(file), self.stamps);
         let (path, stamp) = (path_of(file), stamp(self.stamps));
+        if file >= 8 {
+            // Nobody watches it.
+            return self.clients_look();
+        }
         // As the engine does with what lies outside of the watched directories.
         self.event(if file == 7 {
             Event::Touched { path, stamp }
@@ -194,7 +208,7 @@ impl World {
     }
 
     pub fn delete(&mut self, file: u8) {
-        if self.there.remove(&path_of(file)).is_some() {
+        if self.there.remove(&path_of(file)).is_some() && file < 8 {
             self.event(Event::Vanished {
                 path: path_of(file),
             });
@@ -295,6 +309,8 @@ impl World {
             self.answer(n);
             self.store(n, true);
             self.report(true);
+            self.pool(n, true);
+            self.tell_pooled();
         }
         self.pass(Duration::from_millis(300));
     }

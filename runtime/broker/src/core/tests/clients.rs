@@ -1,0 +1,253 @@
+//! Clients of a random world that have files checked for themselves alone.
+
+use std::collections::BTreeMap;
+
+use super::super::*;
+use super::things::*;
+use super::world::World;
+use qcbus_messages::control::{Checked, FileVerdict, Response};
+use qcbus_messages::{JobId, Verdict};
+
+/// A client that has asked and has no answer.
+pub struct Client {
+    file: u8,
+    /// By whom the file is to be looked at, each as what is started under that name.
+    jury: Vec<(String, Option<Mark>)>,
+    config: Digest,
+    /// All that lay there since it asked.
+    seen: Vec<Vec<Input>>,
+}
+
+/// All clients, and what is done for them.
+#[derive(Default)]
+pub struct Clients {
+    pub open: BTreeMap<Ticket, Client>,
+    pub answers: BTreeMap<Ticket, Response>,
+    pub pooling: Vec<FinishedJob>,
+    /// What was pooled and the state machine has not heard.
+    pub pooled: Vec<(JobId, ErrandOutcome)>,
+    /// Of what each result was made.
+    found: BTreeMap<JobId, FinishedJob>,
+}
+
+impl World {
+    /// `known`: he sees that the file is there, and that the child is.
+    pub fn somebody_asks(&mut self, file: u8, known: bool) {
+        if known {
+            self.child_is_there();
+        }
+        if known && !self.there.contains_key(&path_of(file)) {
+            self.write(file);
+        }
+        self.ask(file);
+    }
+
+    pub fn child_is_there(&mut self) {
+        if self.manifest.is_none() {
+            self.manifest(Some(1));
+        }
+        self.pass(Duration::ZERO);
+        while !self.launched.is_empty() {
+            self.child_joins();
+        }
+    }
+
+    /// Somebody wants to know what the child finds in a file.
+    pub fn ask(&mut self, file: u8) -> Ticket {
+        self.ask_by(file, &[CHILD])
+    }
+
+    pub fn ask_by(&mut self, file: u8, bundles: &[&str]) -> Ticket {
+        self.tickets += 1;
+        let ticket = Ticket(self.tickets);
+        let mark = self.manifest.map(|version| {
+            let started = child(version).digest();
+            Mark::of(&version.to_string(), &catalogue(CHILD), Some(started))
+        });
+        let client = Client {
+            file,
+            jury: bundles.iter().map(|it| ((*it).to_owned(), mark)).collect(),
+            config: digest(self.reconfigured.into()),
+            seen: Vec::new(),
+        };
+        self.clients.open.insert(ticket, client);
+        let bundles = bundles.iter().map(|it| (*it).to_owned()).collect();
+        self.event(Event::Check {
+            path: path_of(file),
+            errand: Errand { ticket, bundles },
+        });
+        ticket
+    }
+
+    /// A client does not wait any longer.
+    pub fn client_leaves(&mut self, n: u8) {
+        let count = self.clients.open.len();
+        if count > 0 {
+            let ticket = self.clients.open.keys().nth(usize::from(n) % count);
+            let ticket = *ticket.unwrap();
+            self.clients.open.remove(&ticket);
+            self.event(Event::ClientLeft { ticket });
+        }
+    }
+
+    /// What is looked at for clients is what lies there while they wait.
+    pub fn clients_look(&mut self) {
+        let mut open = std::mem::take(&mut self.clients.open);
+        for client in open.values_mut() {
+            let now = self.inputs(client.file);
+            if client.seen.last() != Some(&now) {
+                client.seen.push(now);
+            }
+        }
+        self.clients.open = open;
+    }
+
+    /// Nothing that only clients have asked for is known to anybody else.
+    pub fn clients_leave_no_trace(&self) {
+        let files = self.state.present_files();
+        assert!(files.iter().all(|path| file_of(path) < 8), "{files:?}");
+        let total = self.state.status().files.total;
+        assert_eq!(total, files.len() as u64, "a file counts once");
+        let at_bundles = self.state.jobs.values().filter(|job| {
+            let at_work = job.stage.is_before_storing();
+            at_work && job.errand.is_some()
+        });
+        for errand in at_bundles.filter_map(|job| job.errand.as_ref()) {
+            let open = self.clients.open.contains_key(&errand.ticket);
+            assert!(open, "nobody is asked for a client that has gone");
+        }
+    }
+
+    /// What only clients ask for, or is looked at for them alone, is read and pooled, and that is all.
+    pub fn is_for_clients_alone(&self, action: &Action) {
+        let (paths, what): (Vec<_>, _) = match action {
+            Action::Depend { files } => (files.iter().map(|it| &it.0).collect(), "watched"),
+            Action::Undepend { paths } => (paths.iter().collect(), "watched"),
+            Action::Store(job) => {
+                let errand = &self.state.jobs[&job.job].errand;
+                assert!(errand.is_none(), "a result for a client is not stored");
+                (vec![&job.path], "stored")
+            }
+            Action::Restamp { path, .. } | Action::Withdraw { path, .. } => {
+                (vec![path], "in the journal")
+            }
+            Action::Judged { path, .. } => (vec![path], "judged"),
+            Action::OpenGate { path, .. } | Action::CloseGate { path } => {
+                (vec![path], "at the gate")
+            }
+            _ => return,
+        };
+        let theirs = paths.iter().find(|path| file_of(path) >= 8);
+        assert_eq!(theirs, None, "it is {what}");
+    }
+
+    pub fn is_to_be_pooled(&mut self, job: FinishedJob) {
+        let errand = &self.state.jobs[&job.job].errand;
+        assert!(errand.is_some(), "only for a client");
+        self.clients.pooling.push(job);
+    }
+
+    /// Something is pooled for a client, or cannot be, and nobody hears of it yet.
+    pub fn pool(&mut self, n: u8, well: bool) {
+        if self.clients.pooling.is_empty() {
+            return;
+        }
+        let at = usize::from(n) % self.clients.pooling.len();
+        let job = self.clients.pooling.remove(at);
+        let (id, prepared) = (job.job, job.prepared.as_ref().unwrap());
+        let outcome = if !well {
+            ErrandOutcome::Failed("full".to_owned())
+        } else if prepared.inputs != self.inputs(file_of(&job.path)) {
+            ErrandOutcome::Stale
+        } else if job.epoch != self.state.epoch() {
+            ErrandOutcome::Outdated
+        } else {
+            let checked = checked(&job);
+            self.clients.found.insert(id, job);
+            ErrandOutcome::Pooled(Box::new(checked))
+        };
+        self.clients.pooled.push((id, outcome));
+    }
+
+    /// The state machine hears what was pooled.
+    pub fn tell_pooled(&mut self) {
+        if !self.clients.pooled.is_empty() {
+            let (job, outcome) = self.clients.pooled.remove(0);
+            self.event(Event::Pooled { job, outcome });
+        }
+    }
+
+    /// Whether this was an answer to one of these clients.
+    pub fn client_is_answered(&mut self, ticket: Ticket, response: &Response) -> bool {
+        let once = !self.clients.answers.contains_key(&ticket);
+        assert!(once, "one answer for each");
+        let Some(client) = self.clients.open.remove(&ticket) else {
+            return false;
+        };
+        match response {
+            Response::Checked(checked) => self.must_be_true(&client, checked),
+            Response::Elsewhere { .. } => {}
+            other => panic!("no answer to a client that wants a file checked: {other:?}"),
+        }
+        self.clients.answers.insert(ticket, response.clone());
+        true
+    }
+
+    /// A client is told of what lay there since it asked, and of what those found whom it named.
+    fn must_be_true(&self, client: &Client, checked: &Checked) {
+        let job = JobId(checked.result.parse().unwrap());
+        let job = &self.clients.found[&job];
+        assert_eq!(job.path, path_of(client.file));
+        let read = &job.prepared.as_ref().unwrap().inputs;
+        assert!(client.seen.contains(read), "{read:?}: {:?}", client.seen);
+        assert_eq!(named(&job.jury), client.jury, "exactly those, and as such");
+        let names = job.bundles.iter().map(|it| &it.name);
+        assert!(names.eq(client.jury.iter().map(|it| &it.0)));
+        assert_eq!(job.config, client.config);
+    }
+
+    /// Whether files are checked otherwise from now on, or may be.
+    pub fn brings_other_terms(&self, event: &Event) -> bool {
+        match event {
+            Event::Children { .. } => true,
+            Event::Configured { digest, .. } => *digest != self.state.config,
+            _ => false,
+        }
+    }
+
+    /// Nobody is left of those who asked under what is not in force any more.
+    pub fn terms_are_others(&self) {
+        let open: Vec<&Ticket> = self.clients.open.keys().collect();
+        assert!(open.is_empty(), "{open:?} asked under other terms");
+    }
+
+    /// All clients have gone, or have their answers, and there is no trace of any.
+    pub fn clients_are_content(&self) {
+        let open: Vec<&Ticket> = self.clients.open.keys().collect();
+        assert!(open.is_empty(), "{open:?} wait for ever");
+        assert!(self.state.errands.is_empty());
+        let errands = self.state.files.iter().filter(|it| it.1.errand.is_some());
+        assert_eq!(errands.count(), 0);
+    }
+}
+
+/// A result from which it can be seen how it was found.
+fn checked(job: &FinishedJob) -> Checked {
+    let failed = job.bundles.iter().any(|it| it.failure.is_some());
+    Checked {
+        verdict: FileVerdict {
+            file: job.path.to_path_buf(),
+            verdict: match failed {
+                true => Verdict::Undetermined,
+                false => Verdict::Accepted,
+            },
+            digest: String::new(),
+            xqar: "".into(),
+            errors: 0,
+            warnings: 0,
+            information: 0,
+            why: Vec::new(),
+        },
+        result: job.job.0.to_string(),
+    }
+}
