@@ -31,7 +31,7 @@ fn store_in(dir: &Path) -> Store {
         verdict_files: true,
         retries: true,
         gate: None,
-        journal: Journal::open(&dir.join("state"), "test").unwrap().into(),
+        journal: Some(Journal::open(&dir.join("state"), "test").unwrap().into()),
         epoch: AtomicU64::new(NOW),
     }
 }

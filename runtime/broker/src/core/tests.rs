@@ -16,6 +16,7 @@ mod behind_the_gate;
 mod children;
 mod clients;
 mod dependencies;
+mod early;
 mod ending;
 mod errands;
 mod exits;

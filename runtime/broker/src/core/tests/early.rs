@@ -1,0 +1,74 @@
+//! A run reads its files while its bundles start, and nobody looks at them before all are there.
+
+use super::*;
+
+/// A run on one file, whose one bundle has been started and has not joined.
+fn run(once: bool) -> World {
+    let mut world = World::new();
+    world.state = fresh_state(1, 0);
+    world.state.settings.once = once;
+    world.manifest(Some(1));
+    world.write(0);
+    world.event(Event::Scanned);
+    world.pass(Duration::ZERO);
+    assert_eq!(world.launched.len(), 1);
+    world
+}
+
+#[test]
+fn files_are_read_before_those_are_there_who_judge() {
+    let mut world = run(true);
+    assert_eq!(world.preparing.len(), 1, "it is being read");
+    world.prepare(0, true);
+    assert!(world.storing.is_empty(), "nobody has looked at it");
+    world.child_joins();
+    let (session, job) = at_work(&world);
+    assert!(world.peers.contains_key(&session), "{job:?} is given out");
+    world.until_judged(1);
+    assert_eq!(world.names_that_judged(0), [CHILD]);
+}
+
+#[test]
+fn one_that_changes_before_anybody_looks_is_read_again() {
+    let mut world = run(true);
+    world.prepare(0, true);
+    world.write(0);
+    world.child_joins();
+    assert!(world.peers.values().all(|it| it.jobs.is_empty()));
+    assert_eq!(world.preparing.len(), 1, "the new bytes are read");
+    world.until_judged(1);
+}
+
+#[test]
+fn one_that_cannot_be_read_is_said_to_be_so_once_all_are_there() {
+    let mut world = run(true);
+    let (job, _) = world.preparing.remove(0);
+    let result = Err(PrepareFailure::Unreadable("it is a directory".to_owned()));
+    world.event(Event::Prepared { job, result });
+    assert!(world.storing.is_empty());
+    world.child_joins();
+    let said = world.storing[0].unreadable.as_deref();
+    assert_eq!(said, Some("it is a directory"));
+}
+
+#[test]
+fn a_run_that_is_to_end_before_anybody_has_joined_ends() {
+    let mut world = run(true);
+    world.prepare(0, true);
+    world.drain();
+    assert_eq!(world.stopped, 1);
+}
+
+#[test]
+fn a_broker_that_goes_on_reads_nothing_before() {
+    let world = run(false);
+    assert!(world.preparing.is_empty());
+}
+
+fn at_work(world: &World) -> (SessionId, JobId) {
+    let busy = world.peers.iter().find_map(|(session, process)| {
+        let job = process.jobs.first()?;
+        Some((*session, *job))
+    });
+    busy.expect("a bundle has a job")
+}
