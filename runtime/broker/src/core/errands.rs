@@ -57,6 +57,11 @@ impl State {
         self.files.enqueue(id, Priority::Errand, self.now);
     }
 
+    /// Whether a job is done for a client alone.
+    pub fn is_errand(&self, job: JobId) -> bool {
+        self.jobs.get(&job).is_some_and(|it| it.errand.is_some())
+    }
+
     fn takes_errand(&self, path: &Path, errand: &Errand) -> Result<FileKind, String> {
         if self.phase != Phase::Running {
             return Err("the broker is stopping".to_owned());
