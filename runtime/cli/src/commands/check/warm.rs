@@ -56,6 +56,8 @@ enum Elsewhere {
 
 /// Everything that was answered.
 struct Given {
+    /// The process that answered.
+    by: u32,
     results: GivenResults,
     files: Vec<(PathBuf, Checked)>,
 }
@@ -67,11 +69,10 @@ fn ask(args: &CheckArgs, options: &Options) -> Result<(Given, Vec<String>), Else
         return Err(here(""));
     }
     let mut line = Line::to(directory.dir()).ok_or_else(|| here(""))?;
-    if !line.is_like_us() {
-        return Err(here(
-            "it is another program, or does not see the same files",
-        ));
-    }
+    let like_us = line.process().filter(|_| line.is_like_us());
+    let by = like_us.ok_or_else(|| {
+        here("it is another program, has other rights or does not see the same files")
+    })?;
     let in_force = InForce::new(None, SearchPath::of_environment());
     let config = in_force.map_err(|error| here(&error.to_string()))?.digest;
     let terms_of = |file: &Path| terms_of(options, config, file);
@@ -83,7 +84,7 @@ fn ask(args: &CheckArgs, options: &Options) -> Result<(Given, Vec<String>), Else
         files => ask_for_all(directory.dir(), files, &terms_of).map_err(Elsewhere::Here)?,
     };
     let files = options.files.iter().cloned().zip(answered).collect();
-    Ok((Given { results, files }, left))
+    Ok((Given { by, results, files }, left))
 }
 
 /// Whether any broker would find the same: it knows nothing of a configuration or of bundles that are named here. Maps
@@ -165,6 +166,12 @@ fn ask_for_all(
 
 /// Prints what a run of our own would print.
 fn print(args: &CheckArgs, prepared: Prepared, given: Given, left: Vec<String>) -> Exit {
+    if args.print.verbose {
+        let by = given.by;
+        talk::say(&format!(
+            "note: checked by the broker that runs (process {by})"
+        ));
+    }
     let options = &prepared.options;
     let (places, outputs) = (places(options), prepared.outputs);
     let mut printer = Printer::new(places, Vec::new(), prepared.config, outputs, args);
