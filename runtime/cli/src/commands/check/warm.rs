@@ -65,7 +65,7 @@ struct Given {
 fn ask(args: &CheckArgs, options: &Options) -> Result<(Given, Vec<String>), Elsewhere> {
     let here = |why: &str| Elsewhere::Here(why.to_owned());
     let directory = instance(&args.instance).map_err(Elsewhere::Refused)?;
-    if args.cold || !may_ask(options) {
+    if args.cold || !may_ask(args, options) {
         return Err(here(""));
     }
     let mut line = Line::to(directory.dir()).ok_or_else(|| here(""))?;
@@ -87,15 +87,17 @@ fn ask(args: &CheckArgs, options: &Options) -> Result<(Given, Vec<String>), Else
     Ok((Given { by, results, files }, left))
 }
 
-/// Whether any broker would find the same: it knows nothing of a configuration or of bundles that are named here. Maps
-/// and the scenarios on them tell of each other when they are checked together.
-fn may_ask(options: &Options) -> bool {
+/// Whether any broker would find the same: it knows nothing of a configuration or of bundles that are named here, and
+/// has read schemas when it began, which may be others now. Maps and the scenarios on them tell of each other when they
+/// are checked together.
+fn may_ask(args: &CheckArgs, options: &Options) -> bool {
     let kinds = options.files.iter().map(|file| FileKind::of_path(file));
     let maps = kinds.filter(|kind| *kind == Some(FileKind::Xodr)).count();
     options.roots.is_empty()
         && options.files.len() <= MOST_FILES
         && options.config.is_none()
         && options.bundles_d.is_none()
+        && args.schema_dir.is_none()
         && options.choice.is_everything()
         && (maps == 0 || maps == options.files.len())
 }
