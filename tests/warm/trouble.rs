@@ -201,3 +201,28 @@ fn a_file_on_which_a_bundle_was_killed_each_time_is_checked_by_another() {
     });
     assert_eq!(asked.1, cold);
 }
+
+#[test]
+fn a_check_that_is_ended_by_a_signal_names_what_was_not_judged() {
+    let bench = Bench::new();
+    let _broker = bench.farm.serve_ready();
+    let files = many(&bench);
+    for (count, sent) in [(1, Signal::TERM), (3, Signal::INT)] {
+        let bundle = bench.stop_maps();
+        let words: Vec<&str> = files.iter().map(String::as_str).take(count).collect();
+        let ended = std::thread::scope(|scope| {
+            let asked = scope.spawn(|| bench.outcome(&mut bench.command(&words)));
+            bench.until_under_way();
+            let checks = bench.farm.processes().into_iter();
+            for check in checks.filter(|it| it.words.iter().any(|word| word == "check")) {
+                check.signal(sent);
+            }
+            asked.join().unwrap()
+        });
+        assert_eq!(ended.code(), Some(3), "{ended:?}");
+        assert!(ended.says("not judged: ended by a signal"), "{ended:?}");
+        assert!(ended.says("m/0.xodr"), "{ended:?}");
+        bench.until_quiet();
+        signal(&bundle, Signal::CONT);
+    }
+}
