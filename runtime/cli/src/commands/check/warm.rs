@@ -79,10 +79,11 @@ fn ask(
     run: &mut Run,
 ) -> Result<(Given, Vec<String>), Elsewhere> {
     let here = |why: &str| Elsewhere::Here(why.to_owned());
-    let directory = instance(&args.instance).map_err(Elsewhere::Refused)?;
     if args.cold || !may_ask(args, options) {
         return Err(here(""));
     }
+    // Nobody needs an instance to check files by himself.
+    let directory = instance(&args.instance).map_err(Elsewhere::Here)?;
     let mut line = Line::to(directory.dir()).ok_or_else(|| here(""))?;
     let like_us = line.process().filter(|_| line.is_like_us());
     let by = like_us.ok_or_else(|| {
