@@ -215,3 +215,21 @@ fn a_gate_that_is_watched_is_refused_whatever_the_way_to_it() {
     }
     assert!(!desk.path().join("in/accepted").exists());
 }
+
+/// A check that asks nobody is in need of no instance.
+#[test]
+fn a_check_is_made_where_no_instance_can_be() {
+    let desk = Desk::new();
+    let map = desk.write("map.xodr", Content::Good(1).bytes());
+    let map = map.to_str().unwrap();
+    let there = desk.qcbus(&["check", map, "--cold"]);
+    assert_eq!(there.code, Some(0), "{}", there.whole(&desk));
+    let instance = desk.path().join(".run/qcbus/default");
+    // An earlier command may have made it.
+    let _ = std::fs::remove_dir(&instance);
+    std::fs::write(&instance, "no directory").unwrap();
+    for more in [&[][..], &["--cold"]] {
+        let said = desk.qcbus(&[&["check", map], more].concat());
+        assert_eq!(said.whole(&desk), there.whole(&desk), "{more:?}");
+    }
+}

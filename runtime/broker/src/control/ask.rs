@@ -60,7 +60,12 @@ impl Line {
         Line { stream, process }
     }
 
-    /// Whether the broker is this very program, run by this user, and sees the files that this process sees.
+    /// Who listens there; `None` where it cannot be seen.
+    pub fn process(&self) -> Option<u32> {
+        self.process.as_ref().map(Process::id)
+    }
+
+    /// Whether the broker is this very program, with the rights of this process, and sees the files that it sees.
     pub fn is_like_us(&self) -> bool {
         self.process.as_ref().is_some_and(same::is_like_us)
     }

@@ -5,7 +5,7 @@ use std::os::unix::fs::MetadataExt;
 
 use qcbus_bus::Process;
 
-/// Whether another process is this very program, run by this user, with the same files in the same places.
+/// Whether another process is this very program, with our rights and with the same files in the same places.
 /// What cannot be seen is not the same.
 pub(super) fn is_like_us(process: &Process) -> bool {
     let of = |id: &str, what: &str| std::fs::metadata(format!("/proc/{id}/{what}")).ok();
@@ -15,13 +15,26 @@ pub(super) fn is_like_us(process: &Process) -> bool {
         both.is_some_and(|(theirs, ours)| is(&theirs, &ours))
     };
     let same_file = |a: &Metadata, b: &Metadata| (a.dev(), a.ino()) == (b.dev(), b.ino());
-    let same_user = |a: &Metadata, b: &Metadata| a.uid() == b.uid();
-    same("", same_user)
+    may_what_we_may(process)
         && same("exe", same_file)
         && same("ns/mnt", same_file)
         && same("root", same_file)
         // Its id was not given to somebody else meanwhile.
         && process.is_alive()
+}
+
+/// Whether another process has the rights that this one has: with others it reads what we cannot, or cannot what we can.
+fn may_what_we_may(process: &Process) -> bool {
+    let of = |id: &str| std::fs::read_to_string(format!("/proc/{id}/status")).ok();
+    let both = of(&process.id().to_string()).zip(of("self"));
+    both.is_some_and(|(theirs, ours)| rights(&theirs).eq(rights(&ours)))
+}
+
+/// Of what `/proc` says of a process, what it may.
+fn rights(status: &str) -> impl Iterator<Item = &str> {
+    let counts = ["Uid:", "Gid:", "Groups:", "CapEff:"];
+    let lines = status.lines();
+    lines.filter(move |line| counts.iter().any(|it| line.starts_with(it)))
 }
 
 #[cfg(test)]

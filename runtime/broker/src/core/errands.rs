@@ -14,7 +14,7 @@ use qcbus_messages::{Absence, JobId, MissingDocument};
 
 use super::action::Action;
 use super::files::{FileId, Priority, Stage};
-use super::jobs::{ActiveJob, JobStage};
+use super::jobs::{ActiveJob, JobStage, ShareState};
 use super::jury::{Origin, Seat};
 use super::types::Ticket;
 use super::{Actions, Phase, State};
@@ -55,6 +55,11 @@ impl State {
         let id = self.files.insert_errand(path, kind, errand);
         self.errands.insert(ticket, id);
         self.files.enqueue(id, Priority::Errand, self.now);
+    }
+
+    /// Whether a job is done for a client alone.
+    pub fn is_errand(&self, job: JobId) -> bool {
+        self.jobs.get(&job).is_some_and(|it| it.errand.is_some())
     }
 
     fn takes_errand(&self, path: &Path, errand: &Errand) -> Result<FileKind, String> {
@@ -101,7 +106,9 @@ impl State {
         };
         job.stage = JobStage::Storing;
         let whole = job.shares.len() == errand.bundles.len();
-        let there = job.shares.values().all(|share| !share.absent);
+        // Why a bundle has failed need not lie in the file: another process of it may find what there is.
+        let mut shares = job.shares.values();
+        let done = shares.all(|share| share.state == ShareState::Done);
         // Whoever asks may have rights that this process has not.
         let refused = |it: &MissingDocument| matches!(it.why, Absence::Unreadable { .. });
         let prepared = job.prepared.as_deref();
@@ -110,11 +117,11 @@ impl State {
             return self.send_elsewhere(id, reason, actions);
         }
         let same = errand.bundles.iter().all(|name| self.is_as_started(name));
-        if whole && there && same {
+        if whole && done && same {
             let finished = self.finished(id);
             actions.extend(finished.map(|it| Action::Pool(Box::new(it))));
         } else {
-            let reason = "a bundle that is to look at it is not there".to_owned();
+            let reason = "a bundle that is to look at it has failed or is not there".to_owned();
             self.send_elsewhere(id, reason, actions);
         }
     }

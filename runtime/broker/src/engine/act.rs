@@ -11,6 +11,7 @@ use super::{Announcement, Broker, Ready, Told};
 use crate::core::{
     Action, Delivery, Event, FinishedJob, Judged, Notice, PrepareFailure, SessionId,
 };
+use crate::intake::Within;
 use crate::journal::Entry;
 use crate::seams::{now, spawn_blocking};
 use crate::stages::reached;
@@ -211,10 +212,15 @@ impl Broker {
         let asked = begin.checked_sub(waited).unwrap_or(begin);
         let (intake, events) = (self.intake.clone(), self.inbox.events_in.clone());
         let lookout = self.looks.lookout();
+        // A run of its own watches nothing.
+        let within = match self.state.is_errand(job) {
+            true => Within::Beside,
+            false => Within::Watched,
+        };
         spawn_blocking(move || {
             reached("taken", &path);
             let attendance = lookout.attend(job.0);
-            let mut result = intake.prepare(job, &path, asked);
+            let mut result = intake.prepare(job, &path, asked, within);
             if attendance.was_given_up() {
                 // The job has ended meanwhile.
                 return intake.release(job);

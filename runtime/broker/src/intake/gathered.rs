@@ -1,6 +1,5 @@
 //! What one job depends on: the documents it brings to the bus, and every file that was looked at.
 
-use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -8,12 +7,12 @@ use std::time::Instant;
 use qcbus_bus::Held;
 use qcbus_disk::foreign;
 use qcbus_ingest::modular::ExpandedImage;
-use qcbus_ingest::{Found, Limits, Look, Prepared, Reader, Source};
+use qcbus_ingest::{Found, Limits, Look, Prepared, Source};
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Absence, Digest, DocId, DocumentRole, JobDocument, MissingDocument};
 use sha2::{Digest as _, Sha256};
 
-use super::{Intake, Published};
+use super::{Intake, Manner, Published};
 use crate::core::{Input, PrepareFailure, PreparedJob, Reading, Stamp};
 use crate::stamp::{from_content, is_racy, stamp_through_links};
 
@@ -150,7 +149,7 @@ fn basis(inputs: &[Input]) -> Digest {
 /// root's verdict that is at stake: none of them can make the root vanish or unreadable.
 pub(super) struct Links<'i> {
     pub intake: &'i Intake,
-    pub reader: RefCell<Reader>,
+    pub manner: Manner,
     /// Nothing may be older.
     pub asked: Instant,
     pub gathered: &'i mut Gathered,
@@ -165,8 +164,8 @@ impl Source for Links<'_> {
         let before = stamp_through_links(path);
         let published = match is_member(path) {
             // Read from an archive that belongs to this job alone, or was just read for it.
-            true => self.intake.publish_fresh(&self.reader, path),
-            false => self.intake.publish_shared(&self.reader, path, self.asked),
+            true => self.intake.publish_fresh(&self.manner, path),
+            false => self.intake.publish_shared(&self.manner, path, self.asked),
         };
         let absence = match published {
             Ok(published) => return Ok(Ok(published)),
@@ -183,7 +182,7 @@ impl Source for Links<'_> {
     }
 
     fn listing(&mut self, archive: &Path) -> Result<Option<Published>, PrepareFailure> {
-        match self.intake.publish_listing(&self.reader, archive) {
+        match self.intake.publish_listing(&self.manner, archive) {
             Ok(published) => Ok(published),
             // Without it the set is checked as far as it is known.
             Err(failure) => failure.of_linked(archive).map(|_| None),

@@ -46,6 +46,21 @@ impl std::fmt::Debug for Intake {
     }
 }
 
+/// What the files of a job may include.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Within {
+    /// What lies in the watched directory in which they lie; outside of all, what lies beside them.
+    Watched,
+    /// What lies beside them, as if nothing were watched.
+    Beside,
+}
+
+/// How the files of a job are read.
+struct Manner {
+    reader: RefCell<Reader>,
+    within: Within,
+}
+
 /// A published document.
 #[derive(Debug, Clone)]
 struct Published {
@@ -98,14 +113,16 @@ impl Intake {
         job: JobId,
         path: &Path,
         asked: Instant,
+        within: Within,
     ) -> Result<Box<PreparedJob>, PrepareFailure> {
         let _behalf = foreign::on_behalf_of(path);
         let reader = RefCell::new(Reader::new(self.limits));
+        let manner = Manner { reader, within };
         let root = self
-            .publish_fresh(&reader, path)
+            .publish_fresh(&manner, path)
             .map_err(|failure| explained(failure, path))?;
         let mut gathered = Gathered::new(path, &root);
-        self.gather(&root.held, reader, asked, &mut gathered)?;
+        self.gather(&root.held, manner, asked, &mut gathered)?;
         let prepared = gathered.finish();
         reached("gathered", path);
         self.hold(job, gathered.held);
@@ -174,7 +191,7 @@ impl Intake {
     fn gather(
         &self,
         root: &Held,
-        reader: RefCell<Reader>,
+        manner: Manner,
         asked: Instant,
         gathered: &mut Gathered,
     ) -> Result<(), PrepareFailure> {
@@ -183,7 +200,7 @@ impl Intake {
         };
         let mut links = Links {
             intake: self,
-            reader,
+            manner,
             asked,
             gathered,
         };
@@ -202,12 +219,13 @@ impl Intake {
     /// A map or catalog: as it is on the bus, as long as its bytes are what they were.
     fn publish_shared(
         &self,
-        reader: &RefCell<Reader>,
+        manner: &Manner,
         path: &Path,
         asked: Instant,
     ) -> Result<Published, Failure> {
-        self.shared.get(path, asked, |before| {
-            let prepared = self.read(reader, path)?;
+        let boundary = self.boundary(path, manner.within);
+        self.shared.get(path, boundary, asked, |before| {
+            let prepared = self.read(manner, path)?;
             // The digest of a new one is taken while its image is built.
             let Some(before) = before else {
                 return self.publish(path, &prepared);
@@ -224,18 +242,19 @@ impl Intake {
         })
     }
 
-    fn publish_fresh(&self, reader: &RefCell<Reader>, path: &Path) -> Result<Published, Failure> {
-        let prepared = self.read(reader, path)?;
+    fn publish_fresh(&self, manner: &Manner, path: &Path) -> Result<Published, Failure> {
+        let prepared = self.read(manner, path)?;
         self.publish(path, &prepared)
     }
 
     /// What lies in an archive of a job.
     fn publish_listing(
         &self,
-        reader: &RefCell<Reader>,
+        manner: &Manner,
         archive: &Path,
     ) -> Result<Option<Published>, Failure> {
-        let listing = reader.borrow_mut().listing(archive, &archive.join(".."))?;
+        let mut reader = manner.reader.borrow_mut();
+        let listing = reader.listing(archive, &archive.join(".."))?;
         let Some(prepared) = listing else {
             return Ok(None);
         };
@@ -252,8 +271,9 @@ impl Intake {
         self.give_out(loan, used, digest, FileKind::Xosc, Vec::new())
     }
 
-    fn read(&self, reader: &RefCell<Reader>, path: &Path) -> Result<Prepared, Failure> {
-        let prepared = reader.borrow_mut().prepare(path, self.boundary(path))?;
+    fn read(&self, manner: &Manner, path: &Path) -> Result<Prepared, Failure> {
+        let boundary = self.boundary(path, manner.within);
+        let prepared = manner.reader.borrow_mut().prepare(path, boundary)?;
         reached("read", path);
         Ok(prepared)
     }
@@ -338,8 +358,9 @@ impl Intake {
     }
 
     /// The directory that includes may not leave.
-    fn boundary<'a>(&'a self, path: &'a Path) -> &'a Path {
-        let root = self.roots.iter().filter(|root| path.starts_with(root));
+    fn boundary<'a>(&'a self, path: &'a Path, within: Within) -> &'a Path {
+        let counts = |root: &&PathBuf| within == Within::Watched && path.starts_with(root);
+        let root = self.roots.iter().filter(counts);
         root.max_by_key(|root| root.as_os_str().len())
             .map_or_else(|| path.parent().unwrap_or(path), PathBuf::as_path)
     }

@@ -25,8 +25,9 @@ const LARGE: usize = 512 << 10;
 #[derive(Debug, Default)]
 pub(super) struct Shared(Mutex<Slots>);
 
-/// A document as somebody may see it: what it includes may be open to the one and not to the other.
-type Key = (Option<foreign::Reader>, PathBuf);
+/// A document as somebody may see it: what it includes may be open to the one and not to the other, and may lie beyond
+/// the directory that includes may not leave.
+type Key = (Option<foreign::Reader>, PathBuf, PathBuf);
 
 #[derive(Debug, Default)]
 struct Slots {
@@ -65,10 +66,15 @@ impl Shared {
     pub(super) fn get<E>(
         &self,
         path: &Path,
+        boundary: &Path,
         asked: Instant,
         read: impl FnOnce(Option<&Published>) -> Result<Published, E>,
     ) -> Result<Published, E> {
-        let key = &(foreign::reader(), path.to_path_buf());
+        let key = &(
+            foreign::reader(),
+            path.to_path_buf(),
+            boundary.to_path_buf(),
+        );
         let slot = lock(&self.0).slot(key);
         let mut kept = lock(&slot);
         if let Some(kept) = kept.as_ref().filter(|kept| kept.counts(asked)) {
@@ -116,10 +122,8 @@ impl Shared {
     /// When the bytes of a document that is kept were last begun to be read.
     #[cfg(test)]
     pub(super) fn begun(&self, path: &Path) -> Option<Instant> {
-        let slot = lock(&self.0)
-            .by_path
-            .get(&(None, path.to_path_buf()))
-            .cloned()?;
+        let is_it = |(key, _): &(&Key, _)| key.1 == path;
+        let slot = lock(&self.0).by_path.iter().find(is_it)?.1.clone();
         let kept = lock(&slot);
         kept.as_ref().map(|kept| kept.begun)
     }

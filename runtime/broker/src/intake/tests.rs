@@ -54,7 +54,9 @@ impl Farm {
 
     fn prepare(&self, name: &str, asked: Instant) -> PreparedJob {
         let job = JobId(self.jobs.fetch_add(1, Ordering::Relaxed));
-        let prepared = self.intake.prepare(job, &self.path(name), asked).unwrap();
+        let path = self.path(name);
+        let prepared = self.intake.prepare(job, &path, asked, Within::Watched);
+        let prepared = prepared.unwrap();
         self.intake.release(job);
         *prepared
     }

@@ -2,6 +2,7 @@
 
 mod outputs;
 mod printer;
+mod run;
 mod tally;
 mod targets;
 mod warm;
@@ -27,20 +28,31 @@ use crate::{standard, talk};
 use outputs::Outputs;
 pub(super) use outputs::report_place;
 use printer::{News, Printer};
+use run::Run;
 use targets::{kinds, targets};
 
 /// Runs the command.
 pub fn run(args: &CheckArgs) -> Exit {
     talk::log("warn");
     talk::set_color(args.print.color);
-    match prepare(args) {
-        Ok(prepared) => {
-            warm::check(args, prepared).unwrap_or_else(|prepared| check(args, prepared))
-        }
-        Err((exit, why)) => {
+    prepare(args)
+        .and_then(|prepared| carry_out(args, prepared))
+        .unwrap_or_else(|(exit, why)| {
             talk::fail(&why);
             exit
+        })
+}
+
+fn carry_out(args: &CheckArgs, prepared: Prepared) -> Result<Exit, Refusal> {
+    let cannot = |error| (Exit::Internal, format!("cannot start: {error}"));
+    let mut run = Run::new().map_err(cannot)?;
+    match warm::check(args, prepared, &mut run) {
+        Ok(exit) => {
+            // A thread that still waits for an answer must not hold up the end.
+            run.runtime.shutdown_background();
+            Ok(exit)
         }
+        Err(prepared) => Ok(check(args, *prepared, run)),
     }
 }
 
@@ -229,7 +241,7 @@ fn places(options: &Options) -> ResultPaths {
     places
 }
 
-fn check(args: &CheckArgs, prepared: Prepared) -> Exit {
+fn check(args: &CheckArgs, prepared: Prepared, run: Run) -> Exit {
     qcbus_bus::sweep_private_instances();
     let options = &prepared.options;
     let (places, roots) = (places(options), options.roots.clone());
@@ -247,7 +259,7 @@ fn check(args: &CheckArgs, prepared: Prepared) -> Exit {
             return Exit::Internal;
         }
     };
-    let driven = drive(prepared.options, &sender);
+    let driven = drive(run, prepared.options, &sender);
     drop(sender);
     let printer = printing.join();
     // Private to this run; what is left of it is of no use to anybody.
@@ -271,22 +283,16 @@ fn print(mut printer: Printer, news: &Receiver<News>) -> Printer {
     printer
 }
 
-fn drive(options: Options, news: &Sender<News>) -> Result<(), Refusal> {
-    let internal = |why: String| (Exit::Internal, why);
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .map_err(|error| internal(format!("cannot start: {error}")))?;
-    runtime.block_on(async {
-        let stops = super::stops::listen().map_err(|error| internal(error.to_string()))?;
-        let mut stops = noted(stops, news.clone());
+fn drive(run: Run, options: Options, news: &Sender<News>) -> Result<(), Refusal> {
+    run.runtime.block_on(async {
+        let mut stops = noted(run.stops, news.clone());
         if let Some(broker) = start(options, news, &mut stops).await? {
             broker.run(stops).await;
         }
         Ok(())
     })?;
     // Threads that still read a file must not hold up the end.
-    runtime.shutdown_background();
+    run.runtime.shutdown_background();
     Ok(())
 }
 

@@ -16,6 +16,7 @@ use qcbus_messages::control::{Checked, Request, Response, Terms};
 use qcbus_messages::{Digest, Exit};
 
 use super::printer::{News, Printer};
+use super::run::Run;
 use super::{Prepared, places};
 use crate::args::CheckArgs;
 use crate::commands::settings::instance;
@@ -28,8 +29,12 @@ const MOST_FILES: usize = 64;
 const AT_ONCE: usize = 4;
 
 /// Asks the broker of the instance for all files. Gives back what was prepared if they are to be checked here.
-pub(super) fn check(args: &CheckArgs, prepared: Prepared) -> Result<Exit, Prepared> {
-    match ask(args, &prepared.options) {
+pub(super) fn check(
+    args: &CheckArgs,
+    prepared: Prepared,
+    run: &mut Run,
+) -> Result<Exit, Box<Prepared>> {
+    match ask(args, &prepared.options, run) {
         Ok((given, told)) => Ok(print(args, prepared, given, told)),
         Err(Elsewhere::Here(why)) => {
             if args.print.verbose && !why.is_empty() {
@@ -37,12 +42,13 @@ pub(super) fn check(args: &CheckArgs, prepared: Prepared) -> Result<Exit, Prepar
                     "note: checked without the broker that runs: {why}"
                 ));
             }
-            Err(prepared)
+            Err(Box::new(prepared))
         }
         Err(Elsewhere::Refused(why)) => {
             talk::fail(&why);
             Ok(Exit::Usage)
         }
+        Err(Elsewhere::Interrupted) => Ok(interrupted(args, prepared)),
     }
 }
 
@@ -52,49 +58,66 @@ enum Elsewhere {
     Here(String),
     /// They cannot be checked at all.
     Refused(String),
+    /// Somebody wanted the run to stop.
+    Interrupted,
 }
+
+/// A file, and the terms under which it is to be checked.
+type Question = (PathBuf, Terms);
 
 /// Everything that was answered.
 struct Given {
+    /// The process that answered.
+    by: u32,
     results: GivenResults,
     files: Vec<(PathBuf, Checked)>,
 }
 
-fn ask(args: &CheckArgs, options: &Options) -> Result<(Given, Vec<String>), Elsewhere> {
+fn ask(
+    args: &CheckArgs,
+    options: &Options,
+    run: &mut Run,
+) -> Result<(Given, Vec<String>), Elsewhere> {
     let here = |why: &str| Elsewhere::Here(why.to_owned());
-    let directory = instance(&args.instance).map_err(Elsewhere::Refused)?;
-    if args.cold || !may_ask(options) {
+    if args.cold || !may_ask(args, options) {
         return Err(here(""));
     }
+    // Nobody needs an instance to check files by himself.
+    let directory = instance(&args.instance).map_err(Elsewhere::Here)?;
     let mut line = Line::to(directory.dir()).ok_or_else(|| here(""))?;
-    if !line.is_like_us() {
-        return Err(here(
-            "it is another program, or does not see the same files",
-        ));
-    }
+    let like_us = line.process().filter(|_| line.is_like_us());
+    let by = like_us.ok_or_else(|| {
+        here("it is another program, has other rights or does not see the same files")
+    })?;
     let in_force = InForce::new(None, SearchPath::of_environment());
     let config = in_force.map_err(|error| here(&error.to_string()))?.digest;
-    let terms_of = |file: &Path| terms_of(options, config, file);
     // Before anything is checked, as always: what lies there was found in other bytes.
     let opened = GivenResults::open(places(options), config);
     let (results, left) = opened.map_err(|error| Elsewhere::Refused(error.to_string()))?;
-    let answered = match options.files.as_slice() {
-        [file] => vec![ask_for(&mut line, file, terms_of(file)).map_err(Elsewhere::Here)?],
-        files => ask_for_all(directory.dir(), files, &terms_of).map_err(Elsewhere::Here)?,
+    let question = |file: &PathBuf| (file.clone(), terms_of(options, config, file));
+    let questions: Vec<Question> = options.files.iter().map(question).collect();
+    let directory = directory.dir().to_path_buf();
+    let asking = move || match questions.as_slice() {
+        [one] => ask_for(&mut line, one).map(|it| vec![it]),
+        all => ask_for_all(&directory, all),
     };
+    let answered = run.unless_stopped(asking).ok_or(Elsewhere::Interrupted)?;
+    let answered = answered.map_err(Elsewhere::Here)?;
     let files = options.files.iter().cloned().zip(answered).collect();
-    Ok((Given { results, files }, left))
+    Ok((Given { by, results, files }, left))
 }
 
-/// Whether any broker would find the same: it knows nothing of a configuration or of bundles that are named here. Maps
-/// and the scenarios on them tell of each other when they are checked together.
-fn may_ask(options: &Options) -> bool {
+/// Whether any broker would find the same: it knows nothing of a configuration or of bundles that are named here, and
+/// has read schemas when it began, which may be others now. Maps and the scenarios on them tell of each other when they
+/// are checked together.
+fn may_ask(args: &CheckArgs, options: &Options) -> bool {
     let kinds = options.files.iter().map(|file| FileKind::of_path(file));
     let maps = kinds.filter(|kind| *kind == Some(FileKind::Xodr)).count();
     options.roots.is_empty()
         && options.files.len() <= MOST_FILES
         && options.config.is_none()
         && options.bundles_d.is_none()
+        && args.schema_dir.is_none()
         && options.choice.is_everything()
         && (maps == 0 || maps == options.files.len())
 }
@@ -112,10 +135,10 @@ fn terms_of(options: &Options, config: Digest, file: &Path) -> Terms {
 }
 
 /// Asks for one file; why it is to be checked here, if it is.
-fn ask_for(line: &mut Line, file: &Path, terms: Terms) -> Result<Checked, String> {
+fn ask_for(line: &mut Line, (file, terms): &Question) -> Result<Checked, String> {
     let request = Request::Check {
-        file: file.to_path_buf(),
-        terms,
+        file: file.clone(),
+        terms: terms.clone(),
     };
     match line.ask(&request) {
         Ok(Response::Checked(checked)) => Ok(*checked),
@@ -126,13 +149,9 @@ fn ask_for(line: &mut Line, file: &Path, terms: Terms) -> Result<Checked, String
 }
 
 /// Asks for several files, a few at a time.
-fn ask_for_all(
-    directory: &Path,
-    files: &[PathBuf],
-    terms: &(dyn Fn(&Path) -> Terms + Sync),
-) -> Result<Vec<Checked>, String> {
+fn ask_for_all(directory: &Path, questions: &[Question]) -> Result<Vec<Checked>, String> {
     let (next, over) = (AtomicUsize::new(0), AtomicBool::new(false));
-    let answers: Mutex<Vec<Option<Checked>>> = Mutex::new(vec![None; files.len()]);
+    let answers: Mutex<Vec<Option<Checked>>> = Mutex::new(vec![None; questions.len()]);
     let some = || -> Result<(), String> {
         let mut line = Line::to(directory).ok_or("it has gone")?;
         if !line.is_like_us() {
@@ -140,8 +159,10 @@ fn ask_for_all(
         }
         while !over.load(Ordering::Relaxed) {
             let at = next.fetch_add(1, Ordering::Relaxed);
-            let Some(file) = files.get(at) else { break };
-            let checked = ask_for(&mut line, file, terms(file))?;
+            let Some(question) = questions.get(at) else {
+                break;
+            };
+            let checked = ask_for(&mut line, question)?;
             let mut answers = answers.lock().map_err(|error| error.to_string())?;
             if let Some(place) = answers.get_mut(at) {
                 *place = Some(checked);
@@ -151,7 +172,7 @@ fn ask_for_all(
     };
     let one = || some().inspect_err(|_| over.store(true, Ordering::Relaxed));
     std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..AT_ONCE.min(files.len()))
+        let threads: Vec<_> = (0..AT_ONCE.min(questions.len()))
             .map(|_| scope.spawn(one))
             .collect();
         let panicked = |_| "a thread has panicked".to_owned();
@@ -165,15 +186,16 @@ fn ask_for_all(
 
 /// Prints what a run of our own would print.
 fn print(args: &CheckArgs, prepared: Prepared, given: Given, left: Vec<String>) -> Exit {
-    let options = &prepared.options;
-    let (places, outputs) = (places(options), prepared.outputs);
-    let mut printer = Printer::new(places, Vec::new(), prepared.config, outputs, args);
+    if args.print.verbose {
+        let by = given.by;
+        talk::say(&format!(
+            "note: checked by the broker that runs (process {by})"
+        ));
+    }
+    let mut printer = printer(args, prepared);
     for what in left {
         printer.take(News::Told(Told::Notice(Notice::Storing(what))));
     }
-    let files = given.files.iter().map(|(file, _)| file.as_path().into());
-    let files = files.collect();
-    printer.take(News::Told(Told::Scanned { files }));
     for (file, checked) in given.files {
         let judged = given.results.keep(&file, checked);
         printer.take(News::Told(Told::Verdict(Announcement {
@@ -183,4 +205,22 @@ fn print(args: &CheckArgs, prepared: Prepared, given: Given, left: Vec<String>) 
         })));
     }
     printer.finish()
+}
+
+/// Says what was not checked.
+fn interrupted(args: &CheckArgs, prepared: Prepared) -> Exit {
+    let mut printer = printer(args, prepared);
+    printer.take(News::Interrupted);
+    printer.finish()
+}
+
+/// Who knows what is to be checked, and nothing else yet.
+fn printer(args: &CheckArgs, prepared: Prepared) -> Printer {
+    let options = &prepared.options;
+    let (places, outputs) = (places(options), prepared.outputs);
+    let files = options.files.iter().map(|file| file.as_path().into());
+    let files = files.collect();
+    let mut printer = Printer::new(places, Vec::new(), prepared.config, outputs, args);
+    printer.take(News::Told(Told::Scanned { files }));
+    printer
 }

@@ -1,0 +1,206 @@
+//! A desk beside a farm: checks are typed at the one and asked of the broker of the other.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use qcbus_messages::control::PeerStatus;
+use rustix::process::Signal;
+
+use crate::support::content::{CATALOG, Content, Mark};
+use crate::support::desk::{Desk, Said, files_below};
+use crate::support::farm::{Farm, tail};
+use crate::support::processes::signal_pid;
+use crate::support::watchdog::until_or;
+
+/// What is said under `-v` of a check that a broker made.
+const WARM: &str = "note: checked by the broker that runs";
+/// What is said under `-v` of a check that a broker was to make and did not.
+const COLD: &str = "note: checked without the broker that runs";
+/// Where checks put their results, from the desk.
+const OUT: &str = "out";
+
+/// Both.
+pub struct Bench {
+    pub desk: Desk,
+    pub farm: Farm,
+}
+
+/// How a check was made, as it says itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Made {
+    Warm,
+    Cold,
+}
+
+/// All that a check leaves to a user.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Outcome {
+    code: Option<i32>,
+    stdout: String,
+    stderr: String,
+    /// Byte for byte, in letters.
+    written: BTreeMap<PathBuf, String>,
+}
+
+impl Bench {
+    /// With further arguments of `qcbus serve`.
+    pub fn with(arguments: &[&str]) -> Bench {
+        Bench {
+            desk: Desk::new(),
+            farm: Farm::with(arguments),
+        }
+    }
+
+    pub fn new() -> Bench {
+        Bench::with(&[])
+    }
+
+    /// `qcbus check`, to be typed at the desk.
+    pub fn command(&self, words: &[&str]) -> Command {
+        self.command_into(OUT, words)
+    }
+
+    /// The same, with another place for results.
+    pub fn command_into(&self, out: &str, words: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+        command.arg("check").args(words).args(["--out", out]);
+        command.arg("--instance-dir").arg(self.farm.instance());
+        command
+    }
+
+    /// Whether the broker does not check a file that it is asked for now.
+    pub fn is_asked_in_vain(&self, file: &str) -> bool {
+        let said = self.desk.run(&mut self.command_into("vain", &[file, "-v"]));
+        !said.stderr.contains(WARM)
+    }
+
+    /// Runs a check, where no other has left anything.
+    pub fn outcome(&self, command: &mut Command) -> Outcome {
+        let out = self.desk.path().join(OUT);
+        let _ = std::fs::remove_dir_all(&out);
+        let Said {
+            code,
+            stdout,
+            stderr,
+        } = self.desk.run(command);
+        let files = files_below(&out).into_iter();
+        let read = |file: &Path| std::fs::read(out.join(file)).unwrap();
+        let letters = |file: &Path| read(file).escape_ascii().to_string();
+        let written = files.map(|file| (file.clone(), letters(&file)));
+        Outcome {
+            code,
+            stdout,
+            stderr,
+            written: written.collect(),
+        }
+    }
+
+    /// What a check says without a broker.
+    pub fn cold(&self, words: &[&str]) -> Outcome {
+        let words = [words, &["--cold"]].concat();
+        self.outcome(&mut self.command(&words))
+    }
+
+    /// Holds a check that may ask against one that may not, and says how the former was made.
+    pub fn compared(&self, words: &[&str]) -> Made {
+        let (cold, warm) = (self.cold(words), self.outcome(&mut self.command(words)));
+        assert_eq!(cold, warm, "{words:?}\n{}", tail(&self.farm.log()));
+        let talkative = [words, &["-v"]].concat();
+        let (cold, warm) = (self.cold(&talkative), self.command(&talkative));
+        let (made, warm) = self.told(warm);
+        assert_eq!(cold, warm, "{talkative:?}\n{}", tail(&self.farm.log()));
+        made
+    }
+
+    /// Runs a check that says how it was made, and takes that from what it said.
+    pub fn told(&self, mut command: Command) -> (Made, Outcome) {
+        let outcome = self.outcome(&mut command);
+        told(outcome)
+    }
+
+    /// A file that the broker does not watch.
+    pub fn beside(&self, name: &str, bytes: impl AsRef<[u8]>) -> String {
+        text(&self.desk.write(name, bytes))
+    }
+
+    /// A file that the broker watches.
+    pub fn watched(&self, name: &str, bytes: impl AsRef<[u8]>) -> String {
+        let path = self.farm.root().join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(&path, bytes).unwrap();
+        text(&path)
+    }
+
+    /// A bundle of the broker, once `wanted` holds.
+    pub fn peer(&self, name: &str, wanted: impl Fn(&PeerStatus) -> bool) -> PeerStatus {
+        let found = || {
+            let peers = self.farm.status()?.peers.into_iter();
+            peers.filter(|it| it.name == name).find(&wanted)
+        };
+        let explain = || format!("{:#?}\n{}", self.farm.status(), tail(&self.farm.log()));
+        until_or(&format!("{name} gets there"), found, explain)
+    }
+
+    /// Stops the bundle that checks maps, so that whoever asks for one is in the middle of it. Says which it was.
+    pub fn stop_maps(&self) -> PeerStatus {
+        let bundle = self.peer("xodrBundle", |it| it.state == "ready");
+        signal(&bundle, Signal::STOP);
+        bundle
+    }
+
+    /// Waits until nobody waits for anything.
+    pub fn until_quiet(&self) {
+        let is_quiet = || {
+            let queue = self.farm.status()?.queue;
+            (queue.waiting + queue.background + queue.active == 0).then_some(())
+        };
+        let explain = || format!("{:#?}\n{}", self.farm.status(), tail(&self.farm.log()));
+        until_or("nothing is under way", is_quiet, explain);
+    }
+
+    /// Waits until a check that was asked for is with a bundle.
+    pub fn until_under_way(&self) {
+        self.peer("xodrBundle", |it| it.active > 0);
+    }
+}
+
+/// Says how a check was made, and takes that from what was said.
+pub fn told(mut outcome: Outcome) -> (Made, Outcome) {
+    let made = match outcome.stderr.contains(WARM) {
+        true => Made::Warm,
+        false => Made::Cold,
+    };
+    let is_of_it = |line: &&str| line.starts_with(WARM) || line.starts_with(COLD);
+    let lines = outcome.stderr.lines().filter(|line| !is_of_it(line));
+    outcome.stderr = lines.map(|line| format!("{line}\n")).collect();
+    (made, outcome)
+}
+
+impl Outcome {
+    pub fn code(&self) -> Option<i32> {
+        self.code
+    }
+
+    pub fn says(&self, words: &str) -> bool {
+        self.stdout.contains(words) || self.stderr.contains(words)
+    }
+}
+
+pub fn signal(peer: &PeerStatus, signal: Signal) {
+    signal_pid(i32::try_from(peer.pid).unwrap(), signal);
+}
+
+pub fn text(path: &Path) -> String {
+    path.to_str().unwrap().to_owned()
+}
+
+/// A scenario with its map and its catalogs.
+pub fn scenario() -> [(&'static str, Vec<u8>); 3] {
+    let scenario = Content::Scenario(1, "map.xodr".to_owned());
+    [
+        ("map.xodr", Content::Good(2).bytes()),
+        (CATALOG, Content::Catalog(3, Mark::Clean).bytes()),
+        ("scenario.xosc", scenario.bytes()),
+    ]
+}

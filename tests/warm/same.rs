@@ -1,0 +1,258 @@
+//! A warm check says what a cold one says.
+
+use std::ffi::OsStr;
+use std::os::unix::ffi::OsStrExt;
+
+use qcbus_document::FileKind;
+use qcbus_messages::Verdict;
+
+use crate::bench::{Bench, Made, scenario, text};
+use crate::support::content::{CATALOG, Content, Mark};
+use crate::support::desk::{files_below, sample_farm};
+
+/// Files of every kind of verdict, by name.
+fn files() -> Vec<(&'static str, Vec<u8>)> {
+    let torn = Content::Good(5).bytes();
+    let mut files = vec![
+        ("good.xodr", Content::Good(1).bytes()),
+        ("no_header.xodr", Content::NoHeader(2).bytes()),
+        ("no_version.xodr", Content::NoVersion(3).bytes()),
+        ("wrong_root.xodr", Content::WrongRoot(4).bytes()),
+        ("torn.xodr", torn[..torn.len() / 2].to_vec()),
+        ("empty.xodr", Vec::new()),
+        ("empty.xosc", Vec::new()),
+        ("no_xml.xodr", b"this is no XML\n".to_vec()),
+        ("no_archive.xodrz", b"this is no archive\n".to_vec()),
+        ("no_archive.mosc", b"nor is this\n".to_vec()),
+        (
+            "without_map.xosc",
+            Content::Scenario(6, "nosuch.xodr".to_owned()).bytes(),
+        ),
+        (
+            "names/with spaces & ümlauts.xodr",
+            Content::NoHeader(7).bytes(),
+        ),
+        ("names/two\nlines.xodr", Content::NoHeader(8).bytes()),
+    ];
+    files.extend(scenario());
+    files
+}
+
+#[test]
+fn every_verdict_is_the_same_beside_the_farm_and_in_it() {
+    let bench = Bench::new();
+    let _broker = bench.farm.serve_ready();
+    for (name, bytes) in files() {
+        bench.beside(name, &bytes);
+        bench.watched(name, &bytes);
+    }
+    for (name, _) in files() {
+        for at in [bench.desk.path(), &bench.farm.root()] {
+            let file = text(&at.join(name));
+            let made = bench.compared(&[&file]);
+            // What cannot be read is left to whoever asks: perhaps he can.
+            let may_be_cold = name.contains("no_archive");
+            assert!(made == Made::Warm || may_be_cold, "{file} was checked cold");
+        }
+    }
+}
+
+#[test]
+fn the_sample_farm_is_judged_the_same() {
+    let bench = Bench::new();
+    let _broker = bench.farm.serve_ready();
+    let from = sample_farm();
+    for file in files_below(&from) {
+        bench.watched(
+            file.to_str().unwrap(),
+            std::fs::read(from.join(&file)).unwrap(),
+        );
+    }
+    for file in files_below(&from) {
+        if FileKind::of_path(&file).is_some() {
+            let file = text(&bench.farm.root().join(file));
+            assert_eq!(bench.compared(&[&file]), Made::Warm, "{file}");
+        }
+    }
+}
+
+#[test]
+fn several_files_are_judged_the_same() {
+    let bench = Bench::new();
+    let _broker = bench.farm.serve_ready();
+    let mut maps = Vec::new();
+    for number in 0..9 {
+        let content = match number % 3 {
+            0 => Content::Good(number),
+            1 => Content::NoHeader(number),
+            _ => Content::WrongRoot(number),
+        };
+        maps.push(bench.beside(&format!("d/{number}.xodr"), content.bytes()));
+    }
+    let maps: Vec<&str> = maps.iter().map(String::as_str).collect();
+    assert_eq!(bench.compared(&maps), Made::Warm);
+    // The same one twice, and by another name.
+    let again = [maps[0], maps[0], "d/../d/0.xodr"];
+    assert_eq!(bench.compared(&again), Made::Warm);
+    let files: Vec<String> = scenario()
+        .iter()
+        .map(|(name, bytes)| bench.beside(name, bytes))
+        .collect();
+    let both: Vec<&str> = files.iter().map(String::as_str).collect();
+    // A map and a scenario on it, whether the map is right or not.
+    bench.compared(&both);
+    bench.beside("map.xodr", Content::NoHeader(3).bytes());
+    bench.compared(&both);
+    bench.compared(&[both[2]]);
+    // More than are asked for.
+    let many: Vec<String> = (0..65)
+        .map(|number| bench.beside(&format!("m/{number}.xodr"), Content::Good(number).bytes()))
+        .collect();
+    let many: Vec<&str> = many.iter().map(String::as_str).collect();
+    assert_eq!(bench.compared(&many), Made::Cold);
+    assert_eq!(bench.compared(&many[1..]), Made::Warm);
+    // A directory is looked through by whoever is told of it.
+    assert_eq!(bench.compared(&["d"]), Made::Cold);
+}
+
+#[test]
+fn every_way_of_printing_is_the_same() {
+    let bench = Bench::new();
+    let _broker = bench.farm.serve_ready();
+    let bad = bench.beside("bad.xodr", Content::NoHeader(1).bytes());
+    let good = bench.beside("good.xodr", Content::Good(2).bytes());
+    for format in [
+        "full",
+        "concise",
+        "json",
+        "junit",
+        "github",
+        "gitlab",
+        "sarif",
+        "html=out/page.html",
+        "json=out/all.json,junit=out/all.xml",
+    ] {
+        let made = bench.compared(&[&bad, &good, "--output-format", format]);
+        assert_eq!(made, Made::Warm, "{format}");
+    }
+    for words in [
+        &["--statistics"][..],
+        &["--fail-level", "information"],
+        &["--exit-zero"],
+        &["--color", "always"],
+    ] {
+        let words = [&[good.as_str(), &bad], words].concat();
+        assert_eq!(bench.compared(&words), Made::Warm, "{words:?}");
+    }
+    let quiet = [good.as_str(), &bad, "-q"];
+    assert_eq!(
+        bench.cold(&quiet),
+        bench.outcome(&mut bench.command(&quiet))
+    );
+}
+
+/// The broker sees its whole directory, and a check of a file what lies beside that.
+#[test]
+fn includes_are_followed_as_far_as_without_the_broker() {
+    let bench = Bench::new();
+    let _broker = bench.farm.serve_ready();
+    let including = Content::Including(1, "../part.xml".to_owned()).bytes();
+    let part = Content::Part(2, Mark::Clean).bytes();
+    bench.watched("part.xml", &part);
+    let file = bench.watched("below/map.xodr", &including);
+    assert_eq!(bench.compared(&[&file]), Made::Warm);
+    // Neither has the one changed what the other sees, in whichever order.
+    let served = |name: &str| bench.farm.verdict(name).verdict;
+    assert_eq!(served("below/map.xodr"), Verdict::Accepted);
+    assert_eq!(bench.compared(&[&file]), Made::Warm);
+    // A map on which a scenario lies is read for several.
+    let scenario = Content::Scenario(3, "map.xodr".to_owned()).bytes();
+    bench.watched(
+        "below/catalogs/vehicles.xosc",
+        Content::Catalog(4, Mark::Clean).bytes(),
+    );
+    let scenario = bench.watched("below/scenario.xosc", scenario);
+    assert_eq!(bench.compared(&[&scenario]), Made::Warm);
+    assert_eq!(served("below/scenario.xosc"), Verdict::Accepted);
+    assert_eq!(bench.compared(&[&scenario]), Made::Warm);
+    // And what lies beside is included by both.
+    let (whole, view) = Content::road_in_two_parts();
+    bench.watched("two/view.xml", view);
+    let file = bench.watched("two/map.xodr", whole);
+    assert_eq!(bench.compared(&[&file]), Made::Warm);
+}
+
+#[test]
+fn a_change_of_what_a_file_depends_on_is_seen_at_once() {
+    let bench = Bench::new();
+    let _broker = bench.farm.serve_ready();
+    let mut files = Vec::new();
+    for (name, bytes) in scenario() {
+        files.push(bench.beside(name, bytes));
+    }
+    let scenario = &files[2];
+    for number in 10..14 {
+        bench.beside("map.xodr", Content::Elsewhere(number).bytes());
+        assert_eq!(bench.compared(&[scenario]), Made::Warm);
+        bench.beside("map.xodr", Content::Good(number).bytes());
+        assert_eq!(bench.compared(&[scenario]), Made::Warm);
+        bench.beside(CATALOG, Content::OtherCatalog(number).bytes());
+        assert_eq!(bench.compared(&[scenario]), Made::Warm);
+        bench.beside(CATALOG, Content::Catalog(number, Mark::Clean).bytes());
+        std::fs::remove_file(&files[0]).unwrap();
+        assert_eq!(bench.compared(&[scenario]), Made::Warm);
+    }
+}
+
+#[test]
+fn odd_names_and_links_are_the_same() {
+    let bench = Bench::new();
+    let _broker = bench.farm.serve_ready();
+    let bytes = Content::NoHeader(1).bytes();
+    let name = OsStr::from_bytes(b"no\xfftext.xodr");
+    std::fs::write(bench.desk.path().join(name), &bytes).unwrap();
+    let link = |to: &str, name: &str| {
+        std::os::unix::fs::symlink(to, bench.desk.path().join(name)).unwrap();
+    };
+    bench.beside("plain.bin", &bytes);
+    bench.beside("map.xodr", &bytes);
+    link("plain.bin", "named.xodr");
+    link("map.xodr", "other.bin");
+    link("nosuch.xodr", "dangling.xodr");
+    link(".", "here");
+    for word in ["named.xodr", "other.bin", "here/map.xodr"] {
+        assert_eq!(bench.compared(&[word]), Made::Warm, "{word}");
+    }
+    for word in ["dangling.xodr", "nosuch.xodr", "plain.bin"] {
+        assert_eq!(bench.compared(&[word]), Made::Cold, "{word}");
+    }
+    let ask = |more: &[&str]| {
+        let mut command = bench.command(more);
+        bench.outcome(command.arg(name))
+    };
+    assert_eq!(ask(&["--cold"]), ask(&[]));
+}
+
+#[test]
+fn results_that_cannot_be_written_are_refused_alike() {
+    let bench = Bench::new();
+    let _broker = bench.farm.serve_ready();
+    let file = bench.beside("map.xodr", Content::Good(1).bytes());
+    let refused = |out: &str, more: &[&str]| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_qcbus"));
+        command.args(["check", &file, "--out", out]).args(more);
+        command.arg("--instance-dir").arg(bench.farm.instance());
+        bench.outcome(&mut command)
+    };
+    // Where the broker itself has its results, below them, and where there can be none.
+    let served = text(&bench.farm.out());
+    for out in [served.as_str(), &format!("{served}/below"), &file] {
+        let cold = refused(out, &["--cold"]);
+        assert_eq!(cold, refused(out, &[]), "{out}");
+        assert_eq!(cold.code(), Some(2), "{cold:?}");
+    }
+    // A result that is a directory already.
+    let taken = bench.desk.path().join("taken/map.xodr.xqar/x");
+    std::fs::create_dir_all(taken).unwrap();
+    assert_eq!(refused("taken", &["--cold"]), refused("taken", &[]));
+}
