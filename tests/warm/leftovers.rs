@@ -64,6 +64,25 @@ fn nothing_is_known_of_it_and_nothing_is_published() {
 }
 
 #[test]
+fn nothing_of_it_is_left_where_runs_have_their_directories() {
+    let bench = Bench::new();
+    let _broker = bench.farm.serve_ready();
+    let file = bench.beside("map.xodr", Content::Good(1).bytes());
+    let directories = || {
+        let entries = std::fs::read_dir(bench.desk.path().join(".run/qcbus"));
+        let entries = entries.into_iter().flatten().flatten();
+        let names = entries.map(|it| it.file_name());
+        names.collect::<std::collections::BTreeSet<_>>()
+    };
+    // One without a broker takes away what others have left.
+    bench.cold(&[&file]);
+    let before = directories();
+    let (made, _) = bench.told(bench.command(&[&file, "-v"]));
+    assert_eq!(made, Made::Warm);
+    assert_eq!(directories(), before);
+}
+
+#[test]
 fn a_watched_file_that_is_asked_for_keeps_its_own_verdict() {
     let bench = Bench::new();
     let _broker = bench.farm.serve_ready();

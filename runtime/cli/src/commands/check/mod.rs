@@ -52,7 +52,10 @@ fn carry_out(args: &CheckArgs, prepared: Prepared) -> Result<Exit, Refusal> {
             run.runtime.shutdown_background();
             Ok(exit)
         }
-        Err(prepared) => Ok(check(args, *prepared, run)),
+        Err(mut prepared) => {
+            prepared.options.instance = private_instance()?;
+            Ok(check(args, *prepared, run))
+        }
     }
 }
 
@@ -110,7 +113,8 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         args.limits.threads,
     );
     let options = Options {
-        instance: private_instance()?,
+        // One of its own is made when it is checked here, and not where a broker is asked.
+        instance: Instance::at(PathBuf::new()),
         roots,
         files,
         watch: false,
