@@ -219,7 +219,7 @@ impl State {
             Event::Touched { path, stamp } => self.touched(&path, stamp, &mut actions),
             Event::Vanished { path } => self.vanished(&path, &mut actions),
             Event::Scanned => self.scanned(&mut actions),
-            Event::Prepared { job, result } if self.reads_early() => {
+            Event::Prepared { job, result } if self.settings.once && !self.has_judges() => {
                 self.read_early.push((job, result));
             }
             Event::Prepared { job, result } => self.prepared(job, result, &mut actions),
@@ -360,10 +360,15 @@ impl State {
         self.judged_once
     }
 
+    /// Whether all are there, or were, who judge.
+    fn has_judges(&mut self) -> bool {
+        self.may_judge() || self.judged_once
+    }
+
     /// Whether files are read already although nobody can judge them yet: a run has nothing else to do while its
     /// bundles start. What is read is not looked at before they are there, for who they are decides what becomes of it.
     fn reads_early(&mut self) -> bool {
-        self.settings.once && self.phase == Phase::Running && !self.may_judge()
+        self.settings.once && self.phase == Phase::Running && !self.has_judges()
     }
 
     fn hear_what_was_read_early(&mut self, actions: &mut Actions) {
@@ -371,7 +376,13 @@ impl State {
             return;
         }
         for (job, result) in std::mem::take(&mut self.read_early) {
-            self.prepared(job, result, actions);
+            if self.judged_once {
+                self.prepared(job, result, actions);
+            } else {
+                // The run is to end: nobody will come any more.
+                self.preparing -= 1;
+                self.end_job(job, actions);
+            }
         }
     }
 

@@ -52,11 +52,18 @@ fn one_that_cannot_be_read_is_said_to_be_so_once_all_are_there() {
 }
 
 #[test]
-fn a_run_that_is_to_end_before_anybody_has_joined_ends() {
-    let mut world = run(true);
-    world.prepare(0, true);
-    world.drain();
-    assert_eq!(world.stopped, 1);
+fn a_run_that_is_to_end_waits_for_nobody_who_has_not_joined() {
+    for read_before in [true, false] {
+        let mut world = run(true);
+        if read_before {
+            world.prepare(0, true);
+        }
+        world.event(Event::Drain);
+        world.prepare(0, true);
+        world.pass(Duration::ZERO);
+        assert_eq!(world.stopped, 1, "{read_before}");
+        assert!(world.state.jobs.is_empty() && world.stored.is_empty());
+    }
 }
 
 #[test]
