@@ -9,13 +9,14 @@ use qcbus_document::FileKind;
 use qcbus_messages::{Catalogue, Digest, JobId};
 
 use super::action::Action;
+use super::early::ReadingEnd;
 use super::errands::Errand;
 use super::files::{FileId, Priority, Stage};
 use super::jury::{Epoch, Mark, Seat};
 use super::notice::Notice;
 use super::staging::Staged;
 use super::types::{Input, Judged, PrepareFailure, PreparedJob, Reading};
-use super::{Actions, ReadingEnd, State};
+use super::{Actions, State};
 
 /// Between two notices that there is no room, or that files cannot be read for now.
 const ROOM_NOTICE_PAUSE: Duration = Duration::from_secs(10);

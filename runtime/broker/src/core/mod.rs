@@ -12,6 +12,7 @@ mod changes;
 mod checking;
 mod children;
 mod delivering;
+mod early;
 mod ending;
 mod errands;
 mod event;
@@ -60,6 +61,7 @@ pub use types::*;
 use announcing::Unrest;
 use bundles::Bundle;
 use children::Child;
+use early::ReadingEnd;
 use errands::Errands;
 use files::Files;
 use jobs::ActiveJob;
@@ -121,9 +123,6 @@ pub struct State {
     /// Since when there has been no room for anything while nothing moved.
     stuck_since: Option<Duration>,
 }
-
-/// What came of reading a file.
-type ReadingEnd = Result<Box<PreparedJob>, PrepareFailure>;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
@@ -219,10 +218,7 @@ impl State {
             Event::Touched { path, stamp } => self.touched(&path, stamp, &mut actions),
             Event::Vanished { path } => self.vanished(&path, &mut actions),
             Event::Scanned => self.scanned(&mut actions),
-            Event::Prepared { job, result } if self.settings.once && !self.has_judges() => {
-                self.read_early.push((job, result));
-            }
-            Event::Prepared { job, result } => self.prepared(job, result, &mut actions),
+            Event::Prepared { job, result } => self.was_read(job, result, &mut actions),
             Event::Stored { job, outcome } => self.stored(job, outcome, &mut actions),
             Event::Withdrawn { path } => self.withdrawn(&path, &mut actions),
             Event::Hello { session, hello } => self.hello(session, &hello, &mut actions),
@@ -358,32 +354,6 @@ impl State {
             }
         }
         self.judged_once
-    }
-
-    /// Whether all are there, or were, who judge.
-    fn has_judges(&mut self) -> bool {
-        self.may_judge() || self.judged_once
-    }
-
-    /// Whether files are read already although nobody can judge them yet: a run has nothing else to do while its
-    /// bundles start. What is read is not looked at before they are there, for who they are decides what becomes of it.
-    fn reads_early(&mut self) -> bool {
-        self.settings.once && self.phase == Phase::Running && !self.has_judges()
-    }
-
-    fn hear_what_was_read_early(&mut self, actions: &mut Actions) {
-        if self.read_early.is_empty() || self.reads_early() {
-            return;
-        }
-        for (job, result) in std::mem::take(&mut self.read_early) {
-            if self.judged_once {
-                self.prepared(job, result, actions);
-            } else {
-                // The run is to end: nobody will come any more.
-                self.preparing -= 1;
-                self.end_job(job, actions);
-            }
-        }
     }
 
     fn tick(&mut self, actions: &mut Actions) {

@@ -53,10 +53,9 @@ impl Broker {
         let mut host = Host::start(&options.instance, shape(&options, &loaded))?;
         options.settings.generation = host.generation();
         let journal = journal_of(&options)?;
-        let numbers = journal.as_ref().map_or(Ok(0), Journal::numbers)?;
+        let (numbers, members) = remembered_by(journal.as_ref())?;
         options.settings.numbers = numbers.max(host.generation());
         let results = results_of(&options)?;
-        let members = journal.as_ref().map_or(Ok(Vec::new()), Journal::members)?;
         let in_force = Arc::new(InForce::of(&sources, &loaded)?);
         host.set_config(in_force.digest, &in_force.encoded);
         let control = control_of(&options, senders.asked)?;
@@ -207,6 +206,14 @@ fn journal_of(options: &Options) -> Result<Option<Journal>, JournalError> {
     let state = options.state.as_ref();
     let opened = state.map(|state| Journal::open(state, options.instance.name()));
     opened.transpose()
+}
+
+/// From where on numbers are new, and who must judge; nothing where there is no journal.
+fn remembered_by(journal: Option<&Journal>) -> Result<(u64, Vec<Member>), JournalError> {
+    let Some(journal) = journal else {
+        return Ok((0, Vec::new()));
+    };
+    Ok((journal.numbers()?, journal.members()?))
 }
 
 /// Nobody else may write results there meanwhile, but for other runs of `check`.
