@@ -232,4 +232,8 @@ fn a_check_is_made_where_no_instance_can_be() {
         let said = desk.qcbus(&[&["check", map], more].concat());
         assert_eq!(said.whole(&desk), there.whole(&desk), "{more:?}");
     }
+    // One that is named is not passed over.
+    let said = desk.qcbus(&["check", map, "--instance", "../other"]);
+    assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
+    assert!(said.stderr.contains("../other"), "{}", said.whole(&desk));
 }

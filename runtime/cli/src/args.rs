@@ -64,11 +64,14 @@ pub enum Command {
     Doctor(DoctorArgs),
 }
 
+/// The instance that is meant when none is named.
+pub const DEFAULT_INSTANCE: &str = "default";
+
 /// Which broker.
 #[derive(Debug, Clone, Default, ClapArgs)]
 pub struct InstanceArgs {
     /// Name of the instance
-    #[arg(long, value_name = "NAME", default_value = "default")]
+    #[arg(long, value_name = "NAME", default_value = DEFAULT_INSTANCE)]
     pub instance: String,
     /// Runtime directory of the instance, instead of a name
     #[arg(

@@ -18,7 +18,7 @@ use qcbus_messages::{Digest, Exit};
 use super::printer::{News, Printer};
 use super::run::Run;
 use super::{Prepared, places};
-use crate::args::CheckArgs;
+use crate::args::{CheckArgs, DEFAULT_INSTANCE};
 use crate::commands::settings::instance;
 use crate::{standard, talk};
 
@@ -82,8 +82,12 @@ fn ask(
     if args.cold || !may_ask(args, options) {
         return Err(here(""));
     }
-    // Nobody needs an instance to check files by himself.
-    let directory = instance(&args.instance).map_err(Elsewhere::Here)?;
+    // Nobody needs an instance to check files by himself; who names one has something in mind.
+    let unusable = match args.instance.instance.as_str() {
+        DEFAULT_INSTANCE => Elsewhere::Here,
+        _ => Elsewhere::Refused,
+    };
+    let directory = instance(&args.instance).map_err(unusable)?;
     let mut line = Line::to(directory.dir()).ok_or_else(|| here(""))?;
     let like_us = line.process().filter(|_| line.is_like_us());
     let by = like_us.ok_or_else(|| {
