@@ -43,8 +43,9 @@ fn nothing_is_known_of_it_and_nothing_is_published() {
     let bad = bench.watched("bad.xodr", Content::NoHeader(2).bytes());
     let before = bench.farm.settle(2).files;
     until_so("it is published and reported", || {
-        let reported = bench.farm.out().join("bad.xodr.json").exists();
-        gate.join("good.xodr").exists() && reported
+        let reported = |name: &str| bench.farm.out().join(name).exists();
+        let all = reported("bad.xodr.json") && reported("good.xodr.json");
+        gate.join("good.xodr").exists() && all
     });
     let trees = || [bench.farm.out(), gate.clone()].map(|it| tree(&it));
     let (kept, lines) = (trees(), history(&bench));
