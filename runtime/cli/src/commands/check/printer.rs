@@ -241,6 +241,13 @@ impl Printer {
         }
     }
 
+    /// What is still to be printed. A scenario may be judged again when its map is: it counts once.
+    fn rest(&mut self) -> Vec<(Arc<Path>, Arc<Judged>)> {
+        let printed: BTreeSet<&Arc<Path>> = self.expected.iter().take(self.printed).collect();
+        let judged = std::mem::take(&mut self.judged).into_iter();
+        judged.filter(|(path, _)| !printed.contains(path)).collect()
+    }
+
     /// The files without a verdict, apart from those that are still to be printed.
     fn unjudged(&self, rest: &[(Arc<Path>, Arc<Judged>)]) -> Vec<Arc<Path>> {
         let left = self.expected.iter().skip(self.printed);
@@ -279,7 +286,7 @@ impl Printer {
     /// All news are in: prints what is left and the summary.
     pub(super) fn finish(mut self) -> Exit {
         self.progress.clear();
-        let rest: Vec<_> = std::mem::take(&mut self.judged).into_iter().collect();
+        let rest = self.rest();
         let missing = self.unjudged(&rest);
         for (path, judged) in rest {
             self.print(&path, judged);
