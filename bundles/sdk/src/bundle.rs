@@ -136,9 +136,9 @@ impl Bundle {
             description: param.meaning(),
         });
         CheckerInfo {
-            id: checker.id.clone(),
-            description: checker.description.clone(),
-            rule_uids: facts.uids.iter().map(|&uid| uid.to_owned()).collect(),
+            id: checker.id.as_str().into(),
+            description: checker.description.as_str().into(),
+            rule_uids: facts.uids.iter().copied().collect(),
             kinds: self.kinds.to_vec(),
             default_on: facts.default_on,
             level: checker.level(),

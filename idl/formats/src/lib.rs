@@ -9,11 +9,13 @@ pub mod distance;
 pub mod location;
 pub mod manifest;
 pub mod pool;
+mod text;
 pub mod verdict;
 pub mod xqar;
 
 mod xml;
 
+pub use text::Text;
 pub use verdict::Verdict;
 
 #[doc(hidden)]

@@ -1,6 +1,8 @@
 //! How a peer introduces itself.
 
 use qcbus_document::FileKind;
+use qcbus_formats::Text;
+use qcbus_formats::pool::RuleUids;
 use qcbus_formats::xqar::Level;
 use serde::{Deserialize, Serialize};
 
@@ -56,11 +58,11 @@ pub struct Catalogue {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CheckerInfo {
     /// Identifier, unique in the bundle.
-    pub id: String,
+    pub id: Text,
     /// What it checks, in a sentence.
-    pub description: String,
+    pub description: Text,
     /// The rules that it answers for.
-    pub rule_uids: Vec<String>,
+    pub rule_uids: RuleUids,
     /// Root files that it applies to.
     pub kinds: Vec<FileKind>,
     /// Whether it runs when no configuration asks for it.

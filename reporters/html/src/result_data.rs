@@ -250,12 +250,12 @@ impl<'r> Collected<'r, '_> {
 
     /// The index of a rule, which is listed when it is met first.
     fn rule(&mut self, checker: &'r Checker, uid: &'r str) -> i64 {
-        let index = match self.known.get(&(uid, checker.id.as_str())) {
+        let index = match self.known.get(&(uid, &*checker.id)) {
             Some(index) => *index,
             None => {
                 let page = (self.pages)(uid, &checker.id).unwrap_or_default();
                 let about = match page.summary {
-                    summary if summary.is_empty() => checker.description.clone(),
+                    summary if summary.is_empty() => checker.description.to_string(),
                     summary => summary,
                 };
                 self.rules.push(RuleData {
@@ -266,7 +266,7 @@ impl<'r> Collected<'r, '_> {
                     link: page.link,
                 });
                 let index = self.rules.len() - 1;
-                self.known.insert((uid, checker.id.as_str()), index);
+                self.known.insert((uid, &*checker.id), index);
                 index
             }
         };

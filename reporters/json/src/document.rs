@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use qcbus_formats::Text;
 use qcbus_formats::xqar::{Checker, CheckerBundle, Level, Metadata, Param, Status};
 use qcbus_messages::{Digest, ResultMessage};
 use serde::Serialize;
@@ -74,7 +75,7 @@ struct CheckerJson<'r> {
     status: Option<Status>,
     parameters: Ordered<&'r Param>,
     metadata: Ordered<&'r Metadata>,
-    addressed_rule: &'r [String],
+    addressed_rule: &'r [Text],
     issues: Vec<IssueJson<'r>>,
 }
 
@@ -147,7 +148,7 @@ fn bundle<'r>(bundle: &'r CheckerBundle, result: &'r ResultMessage) -> BundleJso
         description: &bundle.description,
         parameters: params(&bundle.params),
         checkers: checkers
-            .map(|each| (each.id.clone(), checker(each, result)))
+            .map(|each| (each.id.to_string(), checker(each, result)))
             .collect(),
     }
 }
@@ -180,8 +181,8 @@ fn rules(result: &ResultMessage) -> Rules<'_> {
     };
     Rules {
         addressed: checkers(result)
-            .flat_map(|checker| &checker.addressed_rules)
-            .map(String::as_str)
+            .flat_map(|checker| checker.addressed_rules.iter())
+            .map(|uid| &**uid)
             .collect(),
         violated: levels(violated),
     }

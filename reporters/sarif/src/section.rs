@@ -69,7 +69,7 @@ fn issues(result: &ResultMessage) -> impl Iterator<Item = (&Checker, &Issue)> {
 
 fn note(result: &ResultMessage, checker: &Checker, issue: &Issue) -> RuleNote {
     let about = match result.rules.get(&issue.rule_uid) {
-        Some(about) => about,
+        Some(about) => about.as_str(),
         None => &checker.description,
     };
     RuleNote {

@@ -112,9 +112,11 @@ fn cut_to(results: &mut Results, most: usize) {
         let cut = before - checker.issues.len();
         if cut > 0 {
             let gap = if checker.summary.is_empty() { "" } else { "; " };
-            checker.summary.push_str(&format!(
-                "{gap}{cut} further findings are in the .xqar, a report has no room for them"
-            ));
+            checker.summary = format!(
+                "{}{gap}{cut} further findings are in the .xqar, a report has no room for them",
+                checker.summary
+            )
+            .into();
         }
     }
 }
@@ -126,7 +128,7 @@ pub fn broken_rules(results: &Results) -> BTreeMap<String, String> {
         checker
             .issues
             .iter()
-            .map(|issue| (issue.rule_uid.clone(), checker.description.clone()))
+            .map(|issue| (issue.rule_uid.clone(), checker.description.to_string()))
     });
     broken.collect()
 }

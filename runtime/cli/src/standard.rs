@@ -5,6 +5,7 @@ use std::path::Path;
 
 use qcbus_broker::{ChildSpec, Restart};
 use qcbus_document::FileKind;
+use qcbus_formats::Text;
 use qcbus_formats::config::{Known, KnownBundle, KnownChecker, Names};
 use qcbus_messages::Role;
 use qcbus_reporter_sdk::{Registration, RulePage, rule_name};
@@ -83,7 +84,7 @@ pub fn checkers() -> impl Iterator<Item = (&'static Bundle, Checker)> {
 /// Whether a name of `--select` and `--ignore` fits a checker.
 pub fn fits(bundle: &Bundle, checker: &Checker, pattern: &str) -> bool {
     let uids = checker.facts.uids.iter();
-    let uids: Vec<String> = uids.map(|uid| (*uid).to_owned()).collect();
+    let uids: Vec<Text> = uids.map(|uid| Text::from(*uid)).collect();
     let names = Names {
         bundle: bundle.name,
         alias: bundle.alias,

@@ -33,9 +33,9 @@ fn checker(number: u32) -> CheckerOutcome {
         0
     };
     CheckerOutcome {
-        id: format!("check_example_xodr_generated_rule_{number}"),
-        description: "What a rule wants is said in one sentence of about this length.".to_owned(),
-        rule_uids: vec![uid.clone()],
+        id: format!("check_example_xodr_generated_rule_{number}").into(),
+        description: "What a rule wants is said in one sentence of about this length.".into(),
+        rule_uids: [uid.clone()].into_iter().collect(),
         ending: Some(Ending::Completed),
         issues: (0..findings).map(|it| issue(number, it, &uid)).collect(),
         ..CheckerOutcome::default()

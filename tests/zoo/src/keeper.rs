@@ -117,9 +117,11 @@ pub const CHECKERS: u32 = 2;
 /// What it checks.
 pub fn catalogue() -> Catalogue {
     let checker = |number: u32| CheckerInfo {
-        id: format!("check_zoo_{number}"),
-        description: "looks at nothing".to_owned(),
-        rule_uids: vec![format!("example.org:xodr:1.0.0:zoo.{number}")],
+        id: format!("check_zoo_{number}").into(),
+        description: "looks at nothing".into(),
+        rule_uids: [format!("example.org:xodr:1.0.0:zoo.{number}")]
+            .into_iter()
+            .collect(),
         kinds: FileKind::ALL.to_vec(),
         default_on: true,
         level: Level::Warning,

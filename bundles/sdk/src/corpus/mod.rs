@@ -109,10 +109,10 @@ pub fn compare_real_files(
         let named = outcome
             .checkers
             .iter()
-            .filter(|ours| known.contains(&ours.id));
+            .filter(|ours| known.contains(&*ours.id));
         comparisons.extend(named.map(|ours| Comparison {
             input: input.clone(),
-            checker: ours.id.clone(),
+            checker: ours.id.to_string(),
             difference: counted(peer, ours),
         }));
     }
@@ -148,7 +148,7 @@ fn counted(peer: &Value, ours: &CheckerOutcome) -> Option<String> {
     };
     let theirs = if skipped(&ours.id) {
         "skipped"
-    } else if peer["errors"].get(&ours.id).is_some() {
+    } else if peer["errors"].get(&*ours.id).is_some() {
         "error"
     } else {
         "completed"
@@ -162,7 +162,7 @@ fn counted(peer: &Value, ours: &CheckerOutcome) -> Option<String> {
     if looked_in_vain(theirs, ours) {
         return Some(NOTHING_THERE.to_owned());
     }
-    let recorded = peer["issuesByChecker"][&ours.id].as_u64().unwrap_or(0);
+    let recorded = peer["issuesByChecker"][&*ours.id].as_u64().unwrap_or(0);
     let found = ours.issues.len() as u64;
     (theirs != status || recorded != found)
         .then(|| format!("recorded {theirs} with {recorded} issues, ours {status} with {found}"))
@@ -238,14 +238,14 @@ impl Compared<'_> {
         let known = outcome
             .checkers
             .iter()
-            .filter(|ours| observed["status"].get(&ours.id).is_some());
+            .filter(|ours| observed["status"].get(&*ours.id).is_some());
         Ok(known
-            .map(|ours| (ours.id.clone(), compared.checker(ours)))
+            .map(|ours| (ours.id.to_string(), compared.checker(ours)))
             .collect())
     }
 
     fn checker(&self, ours: &CheckerOutcome) -> Option<String> {
-        let theirs = text_of(&self.observed["status"][&ours.id]);
+        let theirs = text_of(&self.observed["status"][&*ours.id]);
         let status = status_of(ours);
         if theirs == "skipped" && status == "completed" && self.schema_silenced() {
             return None;

@@ -88,7 +88,7 @@ impl Reader<'_> {
         let mut all: Vec<Said> = issues.map(|it| self.issue(&checker.id, it)).collect();
         if checker.status() == Status::Error {
             all.push(Said {
-                checker: checker.id.clone(),
+                checker: checker.id.to_string(),
                 level: Level::Error,
                 text: format!("it failed: {}", checker.reason()),
                 rows: Vec::new(),

@@ -5,6 +5,7 @@ use std::io::{self, Write as _};
 use std::path::Path;
 use std::time::Instant;
 
+use qcbus_formats::Text;
 use qcbus_formats::pool::{
     BundleOutcome, CheckerOutcome, Ending, NoPlaces, PoolInput, Pooled, Scope, pool,
 };
@@ -113,14 +114,14 @@ pub fn findings(
 struct Judged {
     pooled: Pooled,
     /// Why checkers did not complete, by identifier.
-    reasons: BTreeMap<String, String>,
+    reasons: BTreeMap<Text, String>,
     took: Timings,
 }
 
 /// Checks a file and pools what was found, as a broker does without a configuration.
 fn judge(plan: &Plan, loaded: &Loaded, hands: &Hands) -> Result<Judged, crate::LoadError> {
     let (outcome, took) = examine_timed(plan, loaded, hands)?;
-    let mut reasons: BTreeMap<String, String> = outcome
+    let mut reasons: BTreeMap<Text, String> = outcome
         .checkers
         .iter()
         .map(|checker| (checker.id.clone(), checker.reason().to_owned()))
@@ -208,14 +209,9 @@ impl Listener for Collected<'_> {
         self.checkers.push((
             index,
             CheckerOutcome {
-                id: checker.id.clone(),
-                description: checker.description.clone(),
-                rule_uids: checker
-                    .facts
-                    .uids
-                    .iter()
-                    .map(|&uid| uid.to_owned())
-                    .collect(),
+                id: checker.id.as_str().into(),
+                description: checker.description.as_str().into(),
+                rule_uids: checker.facts.uids.iter().copied().collect(),
                 ending: Some(outcome.ending),
                 params: outcome.params,
                 issues,
@@ -261,7 +257,7 @@ fn as_json(
     path: &Path,
     bundle: &Bundle,
     pooled: &Pooled,
-    reasons: &BTreeMap<String, String>,
+    reasons: &BTreeMap<Text, String>,
 ) -> String {
     let checkers = checkers(pooled).map(|(of, checker)| {
         serde_json::json!({

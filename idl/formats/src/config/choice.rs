@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::same_bundle;
+use crate::Text;
 
 /// Checkers by name: only those selected, and of them none that is ignored.
 ///
@@ -26,7 +27,7 @@ pub struct Names<'n> {
     /// Its id.
     pub id: &'n str,
     /// The UIDs of its rules.
-    pub uids: &'n [String],
+    pub uids: &'n [Text],
 }
 
 impl Choice {
@@ -67,7 +68,7 @@ impl Names<'_> {
 
     /// Whether the pattern is the checker's whole id or one of its UIDs.
     fn are(self, pattern: &str) -> bool {
-        self.id == pattern || self.uids.iter().any(|uid| uid == pattern)
+        self.id == pattern || self.uids.iter().any(|uid| **uid == *pattern)
     }
 }
 
@@ -114,7 +115,7 @@ mod tests {
             bundle: "xodrBundle",
             alias: "xodr",
             id: ID,
-            uids: &[UID.to_owned()],
+            uids: &[UID.into()],
         };
         choice.asks(names, default_on)
     }

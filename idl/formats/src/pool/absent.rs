@@ -1,6 +1,7 @@
 //! What the configuration demands and nobody offers.
 
 use super::{BundleOutcome, CheckerOutcome, Ending};
+use crate::Text;
 use crate::config::{BundleConfig, published_name};
 use crate::distance::did_you_mean;
 
@@ -41,14 +42,14 @@ pub(super) fn demanded(why: String) -> BundleOutcome {
 
 fn whole(reason: String) -> CheckerOutcome {
     CheckerOutcome {
-        description: String::from("The bundle that must take part does."),
+        description: "The bundle that must take part does.".into(),
         ..failed(WHOLE_BUNDLE, reason)
     }
 }
 
 /// The outcome of a configured checker that its bundle does not have.
-pub(super) fn checker(id: &str, bundle: &str, there: &[String]) -> CheckerOutcome {
-    let hint = did_you_mean(id, there.iter().map(String::as_str));
+pub(super) fn checker(id: &str, bundle: &str, there: &[Text]) -> CheckerOutcome {
+    let hint = did_you_mean(id, there.iter().map(|it| &**it));
     failed(
         id,
         format!("bundle `{bundle}` has no checker of this name{hint}"),
@@ -57,8 +58,8 @@ pub(super) fn checker(id: &str, bundle: &str, there: &[String]) -> CheckerOutcom
 
 fn failed(id: &str, reason: String) -> CheckerOutcome {
     CheckerOutcome {
-        id: id.to_owned(),
-        description: String::from("Configured, and not there."),
+        id: id.into(),
+        description: "Configured, and not there.".into(),
         ending: Some(Ending::Failed { reason }),
         ..CheckerOutcome::default()
     }

@@ -11,6 +11,7 @@ use super::{
 };
 use crate::config::{BundleConfig, Config, INPUT_PARAMS, Selection, same_bundle};
 use crate::verdict;
+use crate::Text;
 use crate::xqar::{Checker, CheckerBundle, FORMAT_VERSION, Level, Param};
 
 pub(super) fn pool(input: PoolInput<'_>, resolver: &mut dyn Resolver) -> Pooled {
@@ -180,7 +181,7 @@ impl<'a> Pool<'a, '_> {
         name: &str,
         outcomes: Vec<CheckerOutcome>,
     ) -> Vec<CheckerOutcome> {
-        let there: Vec<String> = outcomes.iter().map(|outcome| outcome.id.clone()).collect();
+        let there: Vec<Text> = outcomes.iter().map(|outcome| outcome.id.clone()).collect();
         let kept = in_the_answer(&outcomes, |id| config.checker(id).is_some());
         let (mut wanted, mut others) = (Vec::new(), Vec::new());
         for (outcome, kept) in outcomes.into_iter().zip(kept) {
@@ -188,7 +189,7 @@ impl<'a> Pool<'a, '_> {
         }
         let mut ordered = Vec::with_capacity(config.checkers.len());
         for checker in &config.checkers {
-            match wanted.iter().position(|outcome| outcome.id == checker.id) {
+            match wanted.iter().position(|outcome| *outcome.id == *checker.id) {
                 Some(at) => ordered.push(wanted.remove(at)),
                 None => ordered.push(absent::checker(&checker.id, name, &there)),
             }
@@ -229,7 +230,7 @@ impl<'a> Pool<'a, '_> {
         bundle: &str,
         mut outcome: CheckerOutcome,
     ) -> Checker {
-        let ending = checker::settle(&mut outcome);
+        checker::settle(&mut outcome);
         let configured = self
             .config
             .map(|config| config.effective_params(entry, &outcome.id, &[]))
@@ -242,11 +243,12 @@ impl<'a> Pool<'a, '_> {
         for issue in &mut outcome.issues {
             self.places.complete(issue);
         }
-        if ending != Ending::Completed {
+        let ending = outcome.ending.as_ref();
+        if let Some(ending) = ending.filter(|it| **it != Ending::Completed) {
             self.pooled.unfinished.push(Unfinished {
                 bundle: bundle.to_owned(),
                 checker: outcome.id.clone(),
-                ending,
+                ending: ending.clone(),
             });
         }
         checker::finish(outcome, configured, removed)
@@ -330,12 +332,13 @@ impl<'a> Pool<'a, '_> {
 
 /// Checkers of one id become one: ids are unique in a result, and no issue is dropped for it.
 fn merged(outcomes: Vec<CheckerOutcome>) -> Vec<CheckerOutcome> {
-    let mut ids = std::collections::HashSet::with_capacity(outcomes.len());
-    if outcomes.iter().all(|it| ids.insert(it.id.as_str())) {
+    let mut ids: Vec<&str> = outcomes.iter().map(|it| &*it.id).collect();
+    ids.sort_unstable();
+    if ids.windows(2).all(|two| two[0] != two[1]) {
         return outcomes;
     }
     let mut all: Vec<CheckerOutcome> = Vec::with_capacity(outcomes.len());
-    let mut seen: std::collections::HashMap<String, usize> = std::collections::HashMap::new();
+    let mut seen: std::collections::HashMap<Text, usize> = std::collections::HashMap::new();
     for outcome in outcomes {
         match seen.get(&outcome.id) {
             None => {

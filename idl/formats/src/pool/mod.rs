@@ -12,7 +12,7 @@ mod places;
 mod remarks;
 mod uid;
 
-use crate::Verdict;
+use crate::{Text, Verdict};
 use crate::config::Config;
 use crate::xqar::{Issue, Results};
 
@@ -20,7 +20,7 @@ pub use asked::NotAsked;
 pub use outcome::{Asked, BundleOutcome, CheckerOutcome, Ending, in_the_answer};
 pub use places::{NoPlaces, Resolver, XPathPlace};
 pub use remarks::chosen;
-pub use uid::is_rule_uid;
+pub use uid::{RuleUids, is_rule_uid};
 
 /// The name of the bundle in which qcbus speaks for itself.
 pub const OWN_BUNDLE: &str = "qcbus";
@@ -122,7 +122,7 @@ pub struct Unfinished {
     /// Name of its bundle.
     pub bundle: String,
     /// Its identifier.
-    pub checker: String,
+    pub checker: Text,
     /// How it ended.
     pub ending: Ending,
 }

@@ -4,6 +4,8 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
+use super::RuleUids;
+use crate::Text;
 use crate::xqar::{Issue, Metadata, Param, Status};
 
 /// How a checker ended.
@@ -105,11 +107,11 @@ pub struct Asked {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CheckerOutcome {
     /// Its identifier.
-    pub id: String,
+    pub id: Text,
     /// What it checks.
-    pub description: String,
+    pub description: Text,
     /// The rules that it answers for.
-    pub rule_uids: Vec<String>,
+    pub rule_uids: RuleUids,
     /// How it ended; `None`: it never said, which is a failure.
     pub ending: Option<Ending>,
     /// The parameters that it used.
@@ -145,10 +147,11 @@ pub fn in_the_answer(checkers: &[CheckerOutcome], demanded: impl Fn(&str) -> boo
     let mut kept: Vec<bool> = checkers.iter().map(|it| demanded(&it.id)).collect();
     loop {
         let answers = checkers.iter().zip(&kept).filter(|(_, kept)| **kept);
-        let in_the_way: BTreeSet<&String> = answers.flat_map(|(it, _)| it.blocked_by()).collect();
+        let blocking = answers.flat_map(|(it, _)| it.blocked_by());
+        let in_the_way: BTreeSet<&str> = blocking.map(String::as_str).collect();
         let mut more = false;
         for (checker, kept) in checkers.iter().zip(&mut kept) {
-            let joins = !*kept && in_the_way.contains(&checker.id);
+            let joins = !*kept && in_the_way.contains(&*checker.id);
             *kept |= joins;
             more |= joins;
         }

@@ -135,11 +135,11 @@ fn information(rule: &str, description: String) -> Issue {
 pub(super) fn to_checkers(remarks: Vec<Remark>) -> Vec<CheckerOutcome> {
     let mut checkers: Vec<(CheckerOutcome, Vec<String>)> = Vec::new();
     for remark in remarks {
-        let known = checkers.iter().position(|(it, _)| it.id == remark.checker);
+        let known = checkers.iter().position(|(it, _)| *it.id == *remark.checker);
         let at = known.unwrap_or_else(|| {
             let checker = CheckerOutcome {
-                id: remark.checker,
-                description: remark.description,
+                id: remark.checker.into(),
+                description: remark.description.into(),
                 ..CheckerOutcome::default()
             };
             checkers.push((checker, Vec::new()));

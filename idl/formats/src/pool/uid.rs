@@ -1,4 +1,71 @@
-//! The shape of a rule UID.
+//! The shape of a rule UID, and the rules that a checker answers for.
+
+use std::ops::Deref;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use crate::Text;
+
+/// The rules that a checker answers for, as its catalogue has them. Every result names them all, so that
+/// they are shared, and looked at once.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "Arc<[Text]>", into = "Arc<[Text]>")]
+pub struct RuleUids {
+    given: Arc<[Text]>,
+    sound: bool,
+}
+
+impl RuleUids {
+    /// They can be written as they are: each is a rule UID, and none is there twice.
+    pub(super) fn can_be_written(&self) -> bool {
+        self.sound
+    }
+
+    /// They themselves, shared.
+    pub(super) fn shared(&self) -> &Arc<[Text]> {
+        &self.given
+    }
+}
+
+impl Default for RuleUids {
+    fn default() -> RuleUids {
+        RuleUids::from(Arc::default())
+    }
+}
+
+impl From<Arc<[Text]>> for RuleUids {
+    fn from(given: Arc<[Text]>) -> RuleUids {
+        let mut sorted: Vec<&str> = given.iter().map(|uid| &**uid).collect();
+        sorted.sort_unstable();
+        let no_two = sorted.windows(2).all(|two| two[0] != two[1]);
+        RuleUids {
+            sound: no_two && sorted.iter().all(|uid| is_rule_uid(uid)),
+            given,
+        }
+    }
+}
+
+impl From<RuleUids> for Arc<[Text]> {
+    fn from(uids: RuleUids) -> Arc<[Text]> {
+        uids.given
+    }
+}
+
+impl<T: Into<Text>> FromIterator<T> for RuleUids {
+    fn from_iter<I: IntoIterator<Item = T>>(uids: I) -> RuleUids {
+        let given: Arc<[Text]> = uids.into_iter().map(Into::into).collect();
+        RuleUids::from(given)
+    }
+}
+
+impl Deref for RuleUids {
+    type Target = [Text];
+
+    fn deref(&self) -> &[Text] {
+        &self.given
+    }
+}
 
 /// Whether the text is a rule UID as ASAM's readers accept it:
 /// `entity.tld:standard:1.2.3:set.of.rules.name`.

@@ -1,7 +1,10 @@
 //! The content of a result file (`.xqar`), as ASAM's quality checker framework models it.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
+use crate::Text;
 use crate::location::OtherPlace;
 
 /// How severe an issue is. The number is the one written to files; a smaller number is worse.
@@ -111,11 +114,11 @@ pub struct Param {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Checker {
     /// Identifier, such as `check_asam_xodr_xml_root_tag_is_opendrive`.
-    pub id: String,
+    pub id: Text,
     /// What it checks.
-    pub description: String,
+    pub description: Text,
     /// Why it was skipped or failed, and how many issues it found.
-    pub summary: String,
+    pub summary: Text,
     /// How it ended; files written by others may leave it out.
     pub status: Option<Status>,
     /// Effective parameters.
@@ -123,7 +126,7 @@ pub struct Checker {
     /// Its findings.
     pub issues: Vec<Issue>,
     /// The rule UIDs that it answers for.
-    pub addressed_rules: Vec<String>,
+    pub addressed_rules: Arc<[Text]>,
     /// Further facts, such as the time it took.
     pub metadata: Vec<Metadata>,
 }

@@ -77,13 +77,13 @@ impl Reader<'_> {
         let issues = named(element, "Issue").map(|issue| self.issue(issue));
         Ok(Checker {
             issues: issues.collect::<Result<_, _>>()?,
-            id: text(element, "checkerId"),
-            description: text(element, "description"),
-            summary: text(element, "summary"),
+            id: text(element, "checkerId").into(),
+            description: text(element, "description").into(),
+            summary: text(element, "summary").into(),
             status: self.status(element)?,
             params: params(element),
             addressed_rules: named(element, "AddressedRule")
-                .map(|r| text(r, "ruleUID"))
+                .map(|r| text(r, "ruleUID").into())
                 .collect(),
             metadata: named(element, "Metadata").map(metadata).collect(),
         })

@@ -104,9 +104,9 @@ impl Writer {
     }
 
     fn checker(&mut self, checker: &Checker) {
-        let id = ("checkerId", checker.id.as_str());
-        let description = ("description", checker.description.as_str());
-        let summary = ("summary", checker.summary.as_str());
+        let id = ("checkerId", &*checker.id);
+        let description = ("description", &*checker.description);
+        let summary = ("summary", &*checker.summary);
         if let (Some(status), Dialect::Current) = (checker.status, self.dialect) {
             let status = ("status", status.as_str());
             self.out
@@ -146,7 +146,8 @@ impl Writer {
         }
         let mut besides: Vec<&String> = Vec::new();
         for uid in checker.issues.iter().map(|issue| &issue.rule_uid) {
-            if !uid.is_empty() && !listed.contains(uid) && !besides.contains(&uid) {
+            let is_listed = || listed.iter().any(|it| **it == **uid);
+            if !uid.is_empty() && !is_listed() && !besides.contains(&uid) {
                 self.out.empty("AddressedRule", &[("ruleUID", uid)]);
                 besides.push(uid);
             }

@@ -199,7 +199,7 @@ impl State {
 
 /// Why a catalogue is none, if so.
 fn unsound(catalogue: &Catalogue) -> Option<String> {
-    let ids: BTreeSet<&str> = catalogue.checkers.iter().map(|it| it.id.as_str()).collect();
+    let ids: BTreeSet<&str> = catalogue.checkers.iter().map(|it| &*it.id).collect();
     if catalogue.checkers.len() > MOST_CHECKERS {
         let checkers = catalogue.checkers.len();
         return Some(format!(
@@ -225,24 +225,24 @@ fn unsound(catalogue: &Catalogue) -> Option<String> {
 }
 
 /// Whatever results and people call a thing by.
-fn names(catalogue: &Catalogue) -> impl Iterator<Item = &String> {
+fn names(catalogue: &Catalogue) -> impl Iterator<Item = &str> {
     let checkers = catalogue.checkers.iter().flat_map(|checker| {
-        let params = checker.params.iter().map(|param| &param.name);
-        std::iter::once(&checker.id)
-            .chain(&checker.rule_uids)
+        let params = checker.params.iter().map(|param| param.name.as_str());
+        std::iter::once(&*checker.id)
+            .chain(checker.rule_uids.iter().map(|uid| &**uid))
             .chain(params)
     });
-    [&catalogue.alias, &catalogue.build_date]
+    [&*catalogue.alias, &*catalogue.build_date]
         .into_iter()
         .chain(checkers)
 }
 
 /// Roughly the memory that a catalogue holds.
 fn catalogue_weight(catalogue: &Catalogue) -> usize {
-    let texts = |texts: &[&String]| texts.iter().map(|text| 24 + text.len()).sum::<usize>();
+    let texts = |texts: &[&str]| texts.iter().map(|text| 24 + text.len()).sum::<usize>();
     let kinds = |kinds: &[FileKind]| size_of_val(kinds);
     let checkers = catalogue.checkers.iter().map(|it| {
-        let uids: Vec<&String> = it.rule_uids.iter().collect();
+        let uids: Vec<&str> = it.rule_uids.iter().map(|uid| &**uid).collect();
         let params = it.params.iter();
         let params = params.map(|it| texts(&[&it.name, &it.default, &it.description]));
         64 + texts(&[&it.id, &it.description])
@@ -251,9 +251,9 @@ fn catalogue_weight(catalogue: &Catalogue) -> usize {
             + params.sum::<usize>()
     });
     let own = [
-        &catalogue.alias,
-        &catalogue.description,
-        &catalogue.build_date,
+        catalogue.alias.as_str(),
+        catalogue.description.as_str(),
+        catalogue.build_date.as_str(),
     ];
     texts(&own) + kinds(&catalogue.kinds) + checkers.sum::<usize>()
 }

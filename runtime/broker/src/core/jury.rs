@@ -38,7 +38,7 @@ impl Mark {
         hash.kinds(&catalogue.kinds);
         hash.list(&catalogue.checkers, |hash, checker| {
             hash.text(&checker.id);
-            hash.list(&checker.rule_uids, |hash, uid| hash.text(uid));
+            hash.list(checker.rule_uids.iter(), |hash, uid| hash.text(uid));
             hash.0.update([u8::from(checker.default_on)]);
             hash.kinds(&checker.kinds);
             // Another default is another result.

@@ -114,7 +114,7 @@ impl ShareOutcome {
                 continue;
             };
             if !besides.is_empty() && is_demanded(&index) {
-                asked.insert(offered.id.as_str());
+                asked.insert(&*offered.id);
             }
             checkers.push(said(offered, staged_of(index), failure));
         }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
+use qcbus_formats::Text;
 use qcbus_messages::JobId;
 use qcbus_messages::path_text::from_text;
 use rusqlite::{Connection, OpenFlags, params};
@@ -68,7 +69,7 @@ pub struct History {
     /// Bundle, checker, status, number of issues, of those that failed or have findings.
     pub checkers: Vec<(String, String, String, u64)>,
     /// By bundle the checkers that were skipped.
-    pub skipped: Vec<(String, Vec<String>)>,
+    pub skipped: Vec<(String, Vec<Text>)>,
 }
 
 /// Something to remember.

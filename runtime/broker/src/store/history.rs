@@ -25,7 +25,7 @@ pub(super) fn history(job: &FinishedJob, pooled: &Pooled) -> History {
                 Status::Completed if issues == 0 => {}
                 Status::Skipped if issues == 0 => left_out.push(checker.id.clone()),
                 status => {
-                    let (bundle, checker) = (bundle.name.clone(), checker.id.clone());
+                    let (bundle, checker) = (bundle.name.clone(), checker.id.to_string());
                     checkers.push((bundle, checker, status.as_str().to_owned(), issues));
                 }
             }

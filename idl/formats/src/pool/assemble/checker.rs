@@ -1,7 +1,12 @@
 //! What becomes of one checker.
 
+use std::borrow::Cow;
+use std::collections::HashSet;
+use std::sync::Arc;
+
 use super::super::{BLOCKED, CheckerOutcome, Counts, Ending, is_rule_uid};
 use super::summary;
+use crate::Text;
 use crate::config::Selected;
 use crate::xqar::{Checker, Issue, Metadata, Param};
 
@@ -12,7 +17,7 @@ const UNNAMED: &str = "qcbus.dev:qcbus:1.0.0:pooling.rule_named";
 const UNREADABLE: &str = "qcbus.unreadableRuleUID";
 
 /// How a checker ended. One that never said, or says what cannot be, has failed.
-pub(super) fn settle(outcome: &mut CheckerOutcome) -> Ending {
+pub(super) fn settle(outcome: &mut CheckerOutcome) {
     let wrong = match &outcome.ending {
         None => "the bundle never said how it ended",
         Some(Ending::NotApplicable { .. } | Ending::Blocked { .. })
@@ -20,15 +25,13 @@ pub(super) fn settle(outcome: &mut CheckerOutcome) -> Ending {
         {
             "the bundle said that it was skipped, and yet reported issues"
         }
-        Some(ending) => return ending.clone(),
+        Some(_) => return,
     };
     let reason = match outcome.reason() {
         "" => wrong.to_owned(),
         reason => format!("{wrong} ({reason})"),
     };
-    let ending = Ending::Failed { reason };
-    outcome.ending = Some(ending.clone());
-    ending
+    outcome.ending = Some(Ending::Failed { reason });
 }
 
 /// Gives issues their configured level and keeps those that are wanted; returns what was removed.
@@ -77,19 +80,15 @@ pub(super) fn finish(
 
 /// The rules of a checker, with those that its issues name besides. UIDs that make readers refuse
 /// the whole file are kept where they do no harm.
-fn rules(outcome: &mut CheckerOutcome) -> Vec<String> {
-    let mut rules = std::mem::take(&mut outcome.rule_uids);
-    let is_good = |at: usize| is_rule_uid(&rules[at]) && !rules[..at].contains(&rules[at]);
-    // As a catalogue has them they are good, nearly always.
-    if !(0..rules.len()).all(is_good) {
-        let given = std::mem::take(&mut rules);
-        for uid in given {
-            if !is_rule_uid(&uid) {
-                outcome.metadata.push(unreadable(uid));
-            } else if !rules.contains(&uid) {
-                rules.push(uid);
-            }
-        }
+fn rules(outcome: &mut CheckerOutcome) -> Arc<[Text]> {
+    let given = std::mem::take(&mut outcome.rule_uids);
+    let mut rules = Cow::Borrowed(&given[..]);
+    if !given.can_be_written() {
+        let (good, bad): (Vec<&Text>, _) = given.iter().partition(|uid| is_rule_uid(uid));
+        outcome.metadata.extend(bad.into_iter().map(unreadable));
+        let mut seen = HashSet::new();
+        let once = good.into_iter().filter(|uid| seen.insert(&***uid));
+        rules = once.cloned().collect();
     }
     for issue in &mut outcome.issues {
         if !is_rule_uid(&issue.rule_uid) {
@@ -98,11 +97,14 @@ fn rules(outcome: &mut CheckerOutcome) -> Vec<String> {
                 issue.description = format!("{} (rule as given: `{given}`)", issue.description);
             }
         }
-        if !rules.contains(&issue.rule_uid) {
-            rules.push(issue.rule_uid.clone());
+        if !rules.iter().any(|uid| **uid == *issue.rule_uid) {
+            rules.to_mut().push(issue.rule_uid.as_str().into());
         }
     }
-    rules
+    match rules {
+        Cow::Borrowed(_) => given.shared().clone(),
+        Cow::Owned(rules) => rules.into(),
+    }
 }
 
 /// What tells a checker that could not look from one that does not apply.
@@ -121,10 +123,10 @@ fn blocked(ending: &Ending) -> Option<Metadata> {
     })
 }
 
-fn unreadable(uid: String) -> Metadata {
+fn unreadable(uid: &Text) -> Metadata {
     Metadata {
         key: UNREADABLE.to_owned(),
-        value: uid,
+        value: String::from(&**uid),
         description: String::from("The bundle gave this rule UID, which is no rule UID."),
     }
 }
@@ -141,7 +143,8 @@ pub(super) fn merge(first: &mut CheckerOutcome, second: CheckerOutcome) {
     if worst(&second.ending) > worst(&first.ending) {
         first.ending = second.ending;
     }
-    first.rule_uids.extend(second.rule_uids);
+    let rules = [&*first.rule_uids, &*second.rule_uids].concat();
+    first.rule_uids = rules.into_iter().collect();
     first.issues.extend(second.issues);
     first.metadata.extend(second.metadata);
 }

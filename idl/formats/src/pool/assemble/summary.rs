@@ -1,8 +1,10 @@
 //! Summaries, computed from what is really in the result.
 
 use std::fmt;
+use std::sync::LazyLock;
 
 use super::super::{CheckerOutcome, Counts};
+use crate::Text;
 use crate::xqar::{Checker, Status};
 
 /// `23 checkers: 20 completed, 2 skipped, 1 error; 5 issues.`
@@ -20,11 +22,12 @@ pub(super) fn of_bundle(checkers: &[Checker]) -> String {
 }
 
 /// `Skipped: the file is OpenDRIVE 1.4. 0 issues.`
-pub(super) fn of_checker(outcome: &CheckerOutcome, removed: Counts) -> String {
+pub(super) fn of_checker(outcome: &CheckerOutcome, removed: Counts) -> Text {
     let status = outcome.status();
     // Most say this, of hundreds for every file.
     if status == Status::Completed && outcome.issues.is_empty() && removed.total() == 0 {
-        return String::from("0 issues.");
+        static NONE: LazyLock<Text> = LazyLock::new(|| Text::from("0 issues."));
+        return NONE.clone();
     }
     let word = match status {
         Status::Completed => "Completed",
@@ -51,7 +54,7 @@ pub(super) fn of_checker(outcome: &CheckerOutcome, removed: Counts) -> String {
         ));
     }
     summary.push('.');
-    summary
+    summary.into()
 }
 
 /// `1 issue`, `2 issues`.

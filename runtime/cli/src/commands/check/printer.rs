@@ -428,7 +428,7 @@ fn take_choice(message: &mut ResultMessage) -> LeftOut {
     let own = bundles.find(|(_, bundle)| bundle.name == OWN_BUNDLE);
     let checkers = own.map(|(at, bundle)| (at, &mut bundle.checkers));
     LeftOut(checkers.and_then(|(at, checkers)| {
-        let it = checkers.iter_mut().find(|it| it.id == CHOICE_CHECKER)?;
+        let it = checkers.iter_mut().find(|it| *it.id == *CHOICE_CHECKER)?;
         Some((at, std::mem::take(&mut it.issues)))
     }))
 }
@@ -438,7 +438,7 @@ impl LeftOut {
         let Some((at, issues)) = self.0 else { return };
         let bundle = message.results.bundles.get_mut(at);
         let mut checkers = bundle.into_iter().flat_map(|bundle| &mut bundle.checkers);
-        if let Some(it) = checkers.find(|it| it.id == CHOICE_CHECKER) {
+        if let Some(it) = checkers.find(|it| *it.id == *CHOICE_CHECKER) {
             it.issues = issues;
         }
     }

@@ -58,7 +58,7 @@ impl Tally {
                 let rule = self.rules.entry(key.clone()).or_insert(RuleCount {
                     findings: 0,
                     files: 0,
-                    about: checker.description.clone(),
+                    about: checker.description.to_string(),
                 });
                 rule.findings += 1;
                 rule.files += usize::from(seen.insert(key));
