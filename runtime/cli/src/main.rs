@@ -11,6 +11,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 fn main() -> ExitCode {
+    qcbus_broker::memory::join_small_pieces();
     if let Some(run) = commands::started_bundle(std::env::args_os().skip(1)) {
         return talk::exit(run()).into();
     }
