@@ -51,7 +51,7 @@ fn a_configuration_runs_what_it_names_and_nothing_else() {
     let configured: Vec<&str> = results.bundles[0]
         .checkers
         .iter()
-        .map(|it| it.id.as_str())
+        .map(|it| &*it.id)
         .collect();
     assert_eq!(
         configured,
@@ -76,7 +76,7 @@ fn a_configuration_runs_what_it_names_and_nothing_else() {
 }
 
 fn levels_kept(results: &Results) -> Vec<u8> {
-    let ours = issues(results).filter(|(checker, _)| checker.id == HEADER);
+    let ours = issues(results).filter(|(checker, _)| *checker.id == *HEADER);
     let mut levels: Vec<u8> = ours.map(|(_, issue)| issue.level as u8).collect();
     levels.sort_unstable();
     levels
@@ -89,7 +89,7 @@ fn levels_are_an_interval_in_both_orders() {
         desk.write("config.xml", config(&header_faults(), levels, ""));
         desk.qcbus(&["check", "-c", "config.xml"]);
         let results = desk.result("Result.xqar");
-        let old = checkers(&results).filter(|it| it.id != IDS && it.id != HEADER);
+        let old = checkers(&results).filter(|it| *it.id != *IDS && *it.id != *HEADER);
         let remarks = old
             .flat_map(|it| &it.issues)
             .map(|it| it.description.clone());
@@ -196,7 +196,7 @@ fn a_bundle_is_a_module_of_the_framework() {
     assert!(said.code.is_some_and(|it| it <= 1), "{}", said.whole(&desk));
     let written = std::fs::read_to_string(desk.path().join("xodr.xqar")).unwrap();
     assert_eq!(asam::complaints(&written), [""; 0]);
-    assert!(issues(&desk.result("xodr.xqar")).any(|(checker, _)| checker.id == HEADER));
+    assert!(issues(&desk.result("xodr.xqar")).any(|(checker, _)| *checker.id == *HEADER));
 }
 
 /// A Python with ASAM's library, or why there is none.

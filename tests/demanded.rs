@@ -42,7 +42,7 @@ fn what_a_demanded_checker_rests_on_counts_whoever_demanded_it() {
     let ids: Vec<&str> = results.bundles[0]
         .checkers
         .iter()
-        .map(|checker| checker.id.as_str())
+        .map(|checker| &*checker.id)
         .collect();
     assert_eq!(ids.first(), Some(&IDS), "what is configured comes first");
     assert!(
@@ -69,7 +69,7 @@ fn a_module_tells_what_kept_a_demanded_checker_from_looking() {
     let found = results.bundles[0]
         .checkers
         .iter()
-        .find(|checker| checker.id == "check_asam_xodr_xml_valid_xml_document");
+        .find(|checker| &*checker.id == "check_asam_xodr_xml_valid_xml_document");
     assert_eq!(found.map(|checker| checker.issues.len()), Some(1));
 }
 

@@ -175,7 +175,7 @@ fn only_valid_xml_is_judged_on_its_meaning() {
     assert_eq!(said.code, Some(1));
     let results = desk.result("out/faulty/not_well_formed.xodr.xqar");
     for checker in support::desk::checkers(&results) {
-        let expected = match checker.id.as_str() {
+        let expected = match &*checker.id {
             "check_asam_xodr_xml_valid_xml_document" => Status::Completed,
             _ => Status::Skipped,
         };

@@ -65,7 +65,7 @@ fn checkers_of(farm: &Farm, bundle: &str, number: u64) -> Vec<String> {
     for bundle in results.bundles.iter().filter(|it| it.name == bundle) {
         for checker in &bundle.checkers {
             assert_eq!(checker.status, Some(Status::Completed), "{}", checker.id);
-            ids.push(checker.id.clone());
+            ids.push(checker.id.to_string());
         }
     }
     ids

@@ -46,7 +46,7 @@ fn errors(farm: &Farm, name: &str, bundle: &str) -> Vec<String> {
     let failed = bundles
         .flat_map(|it| &it.checkers)
         .filter(|it| it.status == Some(Status::Error));
-    failed.map(|it| it.summary.clone()).collect()
+    failed.map(|it| it.summary.to_string()).collect()
 }
 
 fn is_complete(farm: &Farm, name: &str, bundle: &str) -> bool {

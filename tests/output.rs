@@ -178,7 +178,7 @@ fn what_is_left_out_is_said_and_the_result_says_so() {
         "{whole}"
     );
     let results = desk.result(&format!("out/{file}.xqar"));
-    let said = issues(&results).find(|(checker, _)| checker.id == "qcbus_choice");
+    let said = issues(&results).find(|(checker, _)| &*checker.id == "qcbus_choice");
     let text = &said.unwrap().1.description;
     assert!(
         text.contains("`--ignore ids.only_ref_defined_ids`"),
@@ -192,7 +192,7 @@ fn to_select_asks_nobody_else() {
     let said = desk.qcbus(&["check", "in/good.xodr", "--select", "ids"]);
     assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
     let results = desk.result("qcbus-out/in/good.xodr.xqar");
-    let asked = support::desk::checkers(&results).map(|checker| checker.id.as_str());
+    let asked = support::desk::checkers(&results).map(|checker| &*checker.id);
     let asked: Vec<&str> = asked.filter(|id| *id != "qcbus_choice").collect();
     let only = asked.iter().all(|id| id.contains("_ids_"));
     assert!(!asked.is_empty() && only, "{asked:?}");

@@ -238,7 +238,7 @@ fn desk() -> Desk {
 fn remarks(results: &Results) -> Vec<(String, (u64, u64))> {
     let own = results.bundles.iter().filter(|it| it.name == "qcbus");
     let checkers = own.flat_map(|bundle| &bundle.checkers);
-    let of_references = checkers.filter(|checker| checker.id == "qcbus_references");
+    let of_references = checkers.filter(|checker| &*checker.id == "qcbus_references");
     let issues = of_references.flat_map(|checker| &checker.issues);
     let place = |places: &[Location]| match places.first() {
         Some(Location::File { row, column, .. }) => (*row, *column),

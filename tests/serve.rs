@@ -124,7 +124,7 @@ fn every_checker_is_there(farm: &Farm, names: &[&Path]) {
         };
         let results = farm.result(&name.to_string_lossy());
         let found = results.bundles.iter().find(|it| it.name == bundle).unwrap();
-        let found: BTreeSet<String> = found.checkers.iter().map(|it| it.id.clone()).collect();
+        let found: BTreeSet<String> = found.checkers.iter().map(|it| it.id.to_string()).collect();
         assert_eq!(found, demanded[bundle], "{}", name.display());
     }
 }

@@ -211,7 +211,7 @@ fn who_writes_to_the_image_dies_alone() {
     let missing = "check_asam_xodr_xml_fileheader_is_present";
     let mut checkers = results.bundles.iter().flat_map(|it| &it.checkers);
     assert_eq!(
-        checkers.find(|it| it.id == missing).unwrap().issues.len(),
+        checkers.find(|it| *it.id == *missing).unwrap().issues.len(),
         1
     );
     assert!(broker.is_alive());

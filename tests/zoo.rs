@@ -108,7 +108,7 @@ fn reasons_of(farm: &Farm, name: &str, animal: &str) -> Vec<String> {
         .filter(|bundle| bundle.name == animal);
     let failed = bundles.flat_map(|bundle| &bundle.checkers);
     let failed = failed.filter(|checker| checker.status == Some(Status::Error));
-    failed.map(|checker| checker.summary.clone()).collect()
+    failed.map(|checker| checker.summary.to_string()).collect()
 }
 
 fn notices(farm: &Farm) -> String {

@@ -17,7 +17,7 @@ fn found(test: &str, files: &[(&str, String)], rule: &str) -> Vec<(String, usize
     let loaded = Loaded::from_path(&directory.join("main.xosc"), &directory).unwrap();
     let outcome = examine(&Plan::by_default(&qcbus_modular::BUNDLE), &loaded).unwrap();
     let id = format!("check_qcbus_mosc_{rule}");
-    let checker = outcome.checkers.iter().find(|checker| checker.id == id);
+    let checker = outcome.checkers.iter().find(|checker| *checker.id == *id);
     let issues = &checker.unwrap().issues;
     let said = issues
         .iter()

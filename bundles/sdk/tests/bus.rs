@@ -86,7 +86,7 @@ async fn talk(host: &mut Host) -> (usize, Status) {
             }
             HostEvent::Message { peer, message } => match message {
                 FromPeer::Catalogue(catalogue) => {
-                    assert_eq!(catalogue.checkers[0].id, "roads");
+                    assert_eq!(&*catalogue.checkers[0].id, "roads");
                     host.send(peer, &ToPeer::Job(on_bus::job(JOB, DOC)));
                 }
                 FromPeer::NeedDocument { doc } => {

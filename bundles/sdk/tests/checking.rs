@@ -152,7 +152,7 @@ fn of(id: &str) -> CheckerOutcome {
         |checker| checker.id == id,
         |_, name| (name == "limit").then(|| "2.5".to_owned()),
     );
-    let at = all.iter().position(|outcome| outcome.id == id).unwrap();
+    let at = all.iter().position(|outcome| *outcome.id == *id).unwrap();
     all.remove(at)
 }
 
@@ -313,7 +313,7 @@ fn rules_are_found_by_id_uid_and_their_ends() {
 #[test]
 fn what_is_in_the_way_of_a_demanded_checker_is_told() {
     let demanded = |id: &'static str| checked(move |checker| checker.id == id, |_, _| None);
-    let ids = |all: &[CheckerOutcome]| all.iter().map(|it| it.id.clone()).collect::<Vec<_>>();
+    let ids = |all: &[CheckerOutcome]| all.iter().map(|it| it.id.to_string()).collect::<Vec<_>>();
     let all = demanded("after_skipped");
     assert_eq!(ids(&all), ["finds_errors", "after_errors", "after_skipped"]);
     let by = |at: usize| match &all[at].ending {

@@ -192,13 +192,13 @@ fn checker() -> impl Strategy<Value = Checker> {
         vec(metadata, 0..2),
     )
         .prop_map(|(id, summary, status, params, issues, metadata)| Checker {
-            description: summary.clone(),
-            id,
-            summary,
+            description: summary.as_str().into(),
+            id: id.into(),
+            summary: summary.into(),
             status,
             params,
             issues,
-            addressed_rules: vec![String::from("asam.net:xodr:1.4.0:a.b")],
+            addressed_rules: ["asam.net:xodr:1.4.0:a.b".into()].into(),
             metadata,
         })
 }
@@ -273,7 +273,7 @@ proptest! {
             locations: vec![Locations { description: texts[3].clone(), ..Locations::default() }],
             domain_info: vec![info],
         };
-        let checker = Checker { id: texts[3].clone(), issues: vec![issue], ..Checker::default() };
+        let checker = Checker { id: texts[3].as_str().into(), issues: vec![issue], ..Checker::default() };
         let bundle = CheckerBundle { checkers: vec![checker], ..CheckerBundle::default() };
         let results = Results { version: texts[0].clone(), bundles: vec![bundle] };
         for dialect in [Dialect::Current, Dialect::Qc4Openx] {

@@ -167,7 +167,10 @@ fn what_readers_refuse_is_never_written() {
         checker.issues[0].description,
         "\u{FFFD}\u{FFFD}[31m\u{FFFD}\t\r\n"
     );
-    assert_eq!(checker.addressed_rules, ["asam.net:xodr:1.0.0:not.listed"]);
+    assert_eq!(
+        checker.addressed_rules[..],
+        ["asam.net:xodr:1.0.0:not.listed".into()]
+    );
     let whole_file = Location::File {
         row: 1,
         column: 1,

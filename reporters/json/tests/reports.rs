@@ -76,7 +76,7 @@ fn result(path: &str) -> ResultMessage {
         status: Some(Status::Completed),
         params: vec![param("tolerance", "0.01")],
         issues: vec![issue()],
-        addressed_rules: vec![UID.into()],
+        addressed_rules: [UID.into()].into(),
         metadata: vec![Metadata {
             key: "micros".into(),
             value: "12".into(),

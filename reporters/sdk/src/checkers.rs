@@ -75,7 +75,7 @@ mod tests {
         ] {
             let checker = Checker {
                 status: Some(Status::Error),
-                summary: summary.to_owned(),
+                summary: summary.into(),
                 ..Checker::default()
             };
             assert_eq!(reason(&checker), text);

@@ -88,7 +88,7 @@ mod tests {
 
     fn checker(id: usize, status: Option<Status>, summary: &str) -> Checker {
         Checker {
-            id: format!("c{id}"),
+            id: format!("c{id}").into(),
             status,
             summary: summary.into(),
             ..Checker::default()

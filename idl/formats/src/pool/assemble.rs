@@ -9,9 +9,9 @@ use super::{
     Asked, BundleOutcome, CheckerOutcome, Counts, Ending, OWN_BUNDLE, PoolInput, Pooled, Remark,
     Resolver, Scope, Unfinished, absent, in_the_answer,
 };
+use crate::Text;
 use crate::config::{BundleConfig, Config, INPUT_PARAMS, Selection, same_bundle};
 use crate::verdict;
-use crate::Text;
 use crate::xqar::{Checker, CheckerBundle, FORMAT_VERSION, Level, Param};
 
 pub(super) fn pool(input: PoolInput<'_>, resolver: &mut dyn Resolver) -> Pooled {

@@ -12,9 +12,9 @@ mod places;
 mod remarks;
 mod uid;
 
-use crate::{Text, Verdict};
 use crate::config::Config;
 use crate::xqar::{Issue, Results};
+use crate::{Text, Verdict};
 
 pub use asked::NotAsked;
 pub use outcome::{Asked, BundleOutcome, CheckerOutcome, Ending, in_the_answer};

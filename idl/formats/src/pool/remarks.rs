@@ -135,7 +135,9 @@ fn information(rule: &str, description: String) -> Issue {
 pub(super) fn to_checkers(remarks: Vec<Remark>) -> Vec<CheckerOutcome> {
     let mut checkers: Vec<(CheckerOutcome, Vec<String>)> = Vec::new();
     for remark in remarks {
-        let known = checkers.iter().position(|(it, _)| *it.id == *remark.checker);
+        let known = checkers
+            .iter()
+            .position(|(it, _)| *it.id == *remark.checker);
         let at = known.unwrap_or_else(|| {
             let checker = CheckerOutcome {
                 id: remark.checker.into(),

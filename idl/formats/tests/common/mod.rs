@@ -43,8 +43,8 @@ pub fn xml_place(xpath: &str) -> Locations {
 pub fn checker(id: &str, issues: Vec<Issue>) -> CheckerOutcome {
     CheckerOutcome {
         id: id.into(),
-        description: format!("Looks at {id}."),
-        rule_uids: vec![UID.into()],
+        description: format!("Looks at {id}.").into(),
+        rule_uids: [UID].into_iter().collect(),
         ending: Some(Ending::Completed),
         issues,
         ..CheckerOutcome::default()
@@ -147,7 +147,7 @@ pub fn full() -> Results {
         status: Some(Status::Completed),
         params: vec![param("tolerance", "0.01")],
         issues: vec![rich, late],
-        addressed_rules: vec![UID.into(), OTHER_UID.into()],
+        addressed_rules: [UID.into(), OTHER_UID.into()].into(),
         metadata: vec![Metadata {
             key: "micros".into(),
             value: "88".into(),
@@ -159,7 +159,7 @@ pub fn full() -> Results {
         description: "Lanes.".into(),
         summary: "Skipped: OpenDRIVE 1.4. 0 issues.".into(),
         status: Some(Status::Skipped),
-        addressed_rules: vec![UID.into()],
+        addressed_rules: [UID.into()].into(),
         ..Checker::default()
     };
     Results {

@@ -152,6 +152,7 @@ pub struct Member {
 #[cfg(test)]
 mod tests {
     use qcbus_document::FileKind;
+    use qcbus_formats::pool::RuleUids;
     use qcbus_formats::xqar::Level;
     use qcbus_messages::{CheckerInfo, ParamInfo};
 
@@ -173,9 +174,9 @@ mod tests {
     #[test]
     fn whatever_a_bundle_would_judge_otherwise_has_another_mark() {
         let checker = CheckerInfo {
-            id: "one".to_owned(),
-            description: String::new(),
-            rule_uids: vec!["uid".to_owned()],
+            id: "one".into(),
+            description: "".into(),
+            rule_uids: ["uid"].into_iter().collect(),
             kinds: vec![FileKind::Xodr],
             default_on: true,
             level: Level::Error,
@@ -196,8 +197,8 @@ mod tests {
             |it| it.alias.push('r'),
             |it| it.build_date.push('1'),
             |it| it.kinds.push(FileKind::Xosc),
-            |it| it.checkers[0].id.push('r'),
-            |it| it.checkers[0].rule_uids.clear(),
+            |it| it.checkers[0].id = "oner".into(),
+            |it| it.checkers[0].rule_uids = RuleUids::default(),
             |it| it.checkers[0].kinds.push(FileKind::Xosc),
             |it| it.checkers[0].default_on = false,
             |it| it.checkers[0].params[0].default.push('0'),

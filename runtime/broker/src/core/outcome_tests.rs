@@ -8,9 +8,11 @@ use super::*;
 
 fn offers() -> Arc<Catalogue> {
     let checker = |id: &str| CheckerInfo {
-        id: id.to_owned(),
-        description: format!("what {id} looks at"),
-        rule_uids: vec![format!("example.org:xodr:1.0.0:{id}")],
+        id: id.into(),
+        description: format!("what {id} looks at").into(),
+        rule_uids: [format!("example.org:xodr:1.0.0:{id}")]
+            .into_iter()
+            .collect(),
         kinds: vec![FileKind::Xodr],
         default_on: true,
         level: Level::Error,
@@ -57,9 +59,9 @@ fn a_result_has_what_a_checker_said_and_what_is_known_of_it() {
     };
     let outcome = outcome("Bundle", &share(BTreeMap::from([(0, staged)])));
     let expected = CheckerOutcome {
-        id: "first".to_owned(),
-        description: "what first looks at".to_owned(),
-        rule_uids: vec!["example.org:xodr:1.0.0:first".to_owned()],
+        id: "first".into(),
+        description: "what first looks at".into(),
+        rule_uids: ["example.org:xodr:1.0.0:first"].into_iter().collect(),
         ending: Some(Ending::Completed),
         params: vec![param],
         metadata: vec![fact],
@@ -108,7 +110,7 @@ fn in_the_result(ending: Ending, issues: Vec<Issue>) -> (Status, String, Vec<Str
     let checker = &pooled.results.bundles[0].checkers[0];
     let found = checker.issues.iter().map(|it| it.description.clone());
     let status = checker.status.unwrap();
-    (status, checker.summary.clone(), found.collect())
+    (status, checker.summary.to_string(), found.collect())
 }
 
 #[test]
@@ -149,7 +151,7 @@ fn a_bundle_that_takes_no_such_files_says_so_of_each_checker_asked() {
     let [only] = said.checkers.as_slice() else {
         panic!("{:?}", said.checkers);
     };
-    assert_eq!(only.id, "second");
+    assert_eq!(&*only.id, "second");
     assert_eq!(only.ending, Some(Ending::NotApplicable { reason }));
 }
 

@@ -6,7 +6,7 @@ use std::path::Path;
 use qcbus_bus::{Held, HostEvent, PeerId};
 use qcbus_document::FileKind;
 use qcbus_formats::manifest::May;
-use qcbus_formats::pool::Ending;
+use qcbus_formats::pool::{Ending, RuleUids};
 use qcbus_formats::xqar::{Issue, Level};
 use qcbus_messages::{
     Catalogue, CheckerEnd, CheckerInfo, DocId, FromPeer, Hello, Job, JobId, PROTOCOL_VERSION,
@@ -364,9 +364,9 @@ fn issue() -> Issue {
 
 fn catalogue(name: &str) -> Catalogue {
     let checker = CheckerInfo {
-        id: format!("{name}.looks"),
-        description: String::new(),
-        rule_uids: Vec::new(),
+        id: format!("{name}.looks").into(),
+        description: "".into(),
+        rule_uids: RuleUids::default(),
         kinds: vec![FileKind::Xodr, FileKind::Xosc],
         default_on: true,
         level: Level::Error,

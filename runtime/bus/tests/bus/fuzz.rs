@@ -107,8 +107,8 @@ fn issue(dice: &mut Rng) -> Issue {
 
 fn catalogue(dice: &mut Rng) -> Catalogue {
     let checkers = (0..dice.usize(..30)).map(|_| CheckerInfo {
-        id: text(dice),
-        description: text(dice),
+        id: text(dice).into(),
+        description: text(dice).into(),
         rule_uids: (0..dice.usize(..5)).map(|_| text(dice)).collect(),
         kinds: vec![FileKind::Xodr; dice.usize(..3)],
         default_on: dice.bool(),

@@ -317,14 +317,14 @@ fn a_catalogue_beyond_all_bounds_is_no_catalogue() {
             it.checkers[0].id = "a\nimportant.xodr: accepted".into();
         }),
         ("names", |it| {
-            it.checkers[0].rule_uids = vec!["\u{1b}[2K".into()];
+            it.checkers[0].rule_uids = ["\u{1b}[2K"].into_iter().collect();
         }),
         ("names", |it| it.alias = "\u{202e}".into()),
         ("names", |it| it.build_date = "x".repeat(257)),
         ("bytes", |it| it.description = "x".repeat(1 << 20)),
         ("bytes", |it| it.kinds = vec![FileKind::Xodr; (1 << 20) + 1]),
         ("bytes", |it| {
-            it.checkers[0].rule_uids = vec![String::new(); 50_000];
+            it.checkers[0].rule_uids = std::iter::repeat_n("", 50_000).collect();
         }),
         ("checkers", |it| {
             it.checkers = vec![it.checkers[0].clone(); 4097];

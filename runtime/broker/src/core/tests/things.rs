@@ -7,6 +7,7 @@ use std::time::Duration;
 use super::super::*;
 use crate::InForce;
 use qcbus_document::FileKind;
+use qcbus_formats::pool::RuleUids;
 use qcbus_formats::xqar::{Issue, Level};
 use qcbus_ingest::modular::SearchPath;
 use qcbus_messages::{Catalogue, CheckerInfo, Digest, Hello, PROTOCOL_VERSION, Role};
@@ -124,9 +125,9 @@ pub fn basis(inputs: &[Input]) -> Digest {
 
 pub fn catalogue(name: &str) -> Catalogue {
     let checker = |id: String| CheckerInfo {
-        id,
-        description: String::new(),
-        rule_uids: Vec::new(),
+        id: id.into(),
+        description: "".into(),
+        rule_uids: RuleUids::default(),
         kinds: vec![FileKind::Xodr],
         default_on: true,
         level: Level::Error,

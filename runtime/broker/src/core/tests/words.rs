@@ -93,7 +93,7 @@ fn a_process_that_says_hello_again_takes_its_own_place() {
 fn a_catalogue_that_names_a_checker_twice_is_no_catalogue() {
     let mut unsound = [catalogue("First"), catalogue("First")];
     unsound[0].checkers[1].id = unsound[0].checkers[0].id.clone();
-    unsound[1].checkers[0].id = String::new();
+    unsound[1].checkers[0].id = "".into();
     for catalogue in unsound {
         let mut world = World::new();
         world.join("First");

@@ -16,7 +16,7 @@ fn history_of(skipped: &[&str]) -> History {
         let bundle = "xodrBundle".to_owned();
         (bundle, checker.to_owned(), status.to_owned(), issues)
     };
-    let skipped: Vec<String> = skipped.iter().map(ToString::to_string).collect();
+    let skipped = skipped.iter().map(|id| Text::from(*id)).collect();
     History {
         checkers: vec![
             finding("broke", "error", 0),
