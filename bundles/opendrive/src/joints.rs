@@ -17,8 +17,8 @@ use crate::value::{ContactPoint, LayerKind, Side};
 #[derive(Debug, Default)]
 pub(crate) struct Caches<'a> {
     /// What junctions say; what lanes say is kept with their roads.
-    joints: OnceLock<Vec<LaneJoint<'a>>>,
-    pub(crate) touching: OnceLock<Vec<crate::TouchingLanes<'a>>>,
+    joints: OnceLock<Box<[LaneJoint<'a>]>>,
+    pub(crate) touching: OnceLock<Box<[crate::TouchingLanes<'a>]>>,
     /// What each road's own links say about its start and its end.
     linked: OnceLock<Vec<[Option<RoadContact<'a>>; 2]>>,
     connections: OnceLock<Vec<(usize, Connection<'a>)>>,
@@ -306,7 +306,7 @@ impl<'a> RoadMap<'a> {
                     self.collect_links(lane, end, &mut joints);
                 }
             }
-            joints
+            joints.into()
         })
     }
 
@@ -317,7 +317,7 @@ impl<'a> RoadMap<'a> {
             for (junction, connection) in self.connections() {
                 self.collect_lane_links(junction, connection, &mut joints);
             }
-            joints
+            joints.into()
         })
     }
 

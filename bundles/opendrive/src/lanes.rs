@@ -202,9 +202,9 @@ pub struct LaneSection<'a> {
     own_length: f64,
     /// Whether it covers the left and the right side.
     sides: [bool; 2],
-    lanes: Vec<Lane<'a>>,
+    lanes: Box<[Lane<'a>]>,
     /// Places in `lanes` from the center outward, left and right.
-    outward: [Vec<u32>; 2],
+    outward: [Box<[u32]>; 2],
     /// Whether the ids of a side tell the order of its lanes.
     numbered: [bool; 2],
     /// Whether a side has `<width>` records; found when first asked.
@@ -241,8 +241,8 @@ impl<'a> LaneSection<'a> {
             next: [None; 2],
             own_length: number(node, "length").unwrap_or(f64::INFINITY),
             sides,
-            lanes,
-            outward,
+            lanes: lanes.into(),
+            outward: outward.map(Vec::into_boxed_slice),
             numbered,
             widths: OnceLock::new(),
         }

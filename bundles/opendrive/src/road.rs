@@ -40,13 +40,13 @@ pub struct Road<'a> {
     plan_view: OnceLock<PlanView<'a>>,
     elevation: OnceLock<Profile<'a>>,
     lateral: OnceLock<LateralProfile<'a>>,
-    layers: OnceLock<Vec<LaneLayer<'a>>>,
+    layers: OnceLock<Box<[LaneLayer<'a>]>>,
     names: Arc<Names>,
     /// The cross sections at the start and at the end, once somebody has asked.
     end_frames: [OnceLock<Option<Frame>>; 2],
     /// What the links of its lanes say, and which lanes touch therefore, once somebody has asked.
-    pub(crate) joints: OnceLock<Vec<LaneJoint<'a>>>,
-    pub(crate) touching: OnceLock<Vec<TouchingLanes<'a>>>,
+    pub(crate) joints: OnceLock<Box<[LaneJoint<'a>]>>,
+    pub(crate) touching: OnceLock<Box<[TouchingLanes<'a>]>>,
 }
 
 /// The elements directly within a road, found in one pass; of several equals the first.

@@ -11,7 +11,7 @@ pub(crate) trait Starts {
 /// Items in document order that are looked up in order of their starts.
 #[derive(Debug, Clone)]
 pub(crate) struct Steps<T> {
-    items: Vec<T>,
+    items: Box<[T]>,
     /// Places in `items` in ascending order of start; empty when they are written so.
     order: Vec<u32>,
     /// Where the items start, but for rounding; empty when `order` is.
@@ -23,7 +23,7 @@ pub(crate) struct Steps<T> {
 impl<T> Default for Steps<T> {
     fn default() -> Steps<T> {
         Steps {
-            items: Vec::new(),
+            items: Box::default(),
             order: Vec::new(),
             starts: Vec::new(),
             unplaced: false,
@@ -58,8 +58,9 @@ impl<T: Starts> Steps<T> {
             let start = |at: &u32| starts[*at as usize];
             order.sort_by(|one, next| start(one).total_cmp(&start(next)));
         }
+        // Without spare room: a map of 100 MB has a million of them.
         Steps {
-            items,
+            items: items.into_boxed_slice(),
             order,
             starts,
             unplaced,
