@@ -185,5 +185,6 @@ impl State {
         for id in gone {
             self.vanished_file(id, actions);
         }
+        self.maps_are_known();
     }
 }

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use qcbus_document::FileKind;
 use qcbus_messages::path_text::from_text;
-use qcbus_messages::{DocumentRole, JobDocument, Verdict};
+use qcbus_messages::{DocumentRole, JobDocument, JobId, Verdict};
 
 use super::State;
 use super::files::{FileEntry, FileId, Priority, Stage};
@@ -26,12 +26,34 @@ impl State {
         if job.errand.is_some() {
             return Duration::ZERO;
         }
-        let is_active = |entry: &FileEntry| matches!(entry.stage(), Stage::Active(_));
-        let mut maps = maps_of(job).filter_map(|map| self.entry_of(map));
-        if maps.any(is_active) {
+        if maps_of(job).any(|map| self.may_come(map)) {
             self.now + PATIENCE
         } else {
             Duration::ZERO
+        }
+    }
+
+    /// Whether a verdict on this map is to be expected. A run that has an end waits for one whose turn it is not
+    /// yet, and for one that it may find yet: it tells each verdict once, and nobody reads a second.
+    fn may_come(&self, map: &JobDocument) -> bool {
+        let once = self.settings.once;
+        match self.entry_of(map).map(FileEntry::stage) {
+            Some(Stage::Active(_)) => true,
+            Some(Stage::Waiting(..)) => once,
+            Some(Stage::Idle) => false,
+            None => once && !self.scanned,
+        }
+    }
+
+    /// All files are known: who waited for a map that is none of them waits no longer.
+    pub(super) fn maps_are_known(&mut self) {
+        let waits = |job: &ActiveJob| matches!(job.stage, JobStage::Finished(at) if at > self.now);
+        let waiting = self.jobs.iter().filter(|(_, job)| waits(job));
+        let in_vain = waiting.filter(|(_, job)| !maps_of(job).any(|map| self.may_come(map)));
+        for id in in_vain.map(|(id, _)| *id).collect::<Vec<JobId>>() {
+            if let Some(job) = self.jobs.get_mut(&id) {
+                job.stage = JobStage::Finished(Duration::ZERO);
+            }
         }
     }
 

@@ -55,6 +55,19 @@ fn a_map_whose_verdict_is_the_same_has_nobody_judged_again() {
     assert_eq!(world.stored.len(), before + 2);
 }
 
+fn storing(world: &World) -> Vec<u8> {
+    let jobs = world.storing.iter();
+    jobs.map(|job| file_of(&job.path)).collect()
+}
+
+/// The bundles answer on all that they have.
+fn answer(world: &mut World) {
+    for _ in 0..8 {
+        world.answer(0);
+        world.answer(1);
+    }
+}
+
 #[test]
 fn a_scenario_waits_for_its_map_and_not_for_ever() {
     let mut world = world();
@@ -63,19 +76,52 @@ fn a_scenario_waits_for_its_map_and_not_for_ever() {
     world.write(1);
     world.prepare(1, true);
     world.prepare(0, true);
-    // The bundles have answered on both; the writer is slow with the map.
-    for _ in 0..8 {
-        world.answer(0);
-        world.answer(1);
-    }
-    let storing = |world: &World| -> Vec<u8> {
-        let jobs = world.storing.iter();
-        jobs.map(|job| file_of(&job.path)).collect()
-    };
+    // The writer is slow with the map.
+    answer(&mut world);
     assert_eq!(storing(&world), [0]);
     world.pass(Duration::from_secs(3));
     assert_eq!(storing(&world), [0, 1], "patience has an end");
     // Its result did not know the map's verdict, and another one does.
     world.settle();
     assert_eq!(world.said_of_maps[&1], [0]);
+}
+
+/// A run that has an end, whose files are still being looked for.
+fn run() -> World {
+    let mut world = World::new();
+    world.state = fresh_state(2, 0);
+    world.state.settings.once = true;
+    world.join("First");
+    world.join("Second");
+    world
+}
+
+#[test]
+fn a_run_tells_the_verdict_on_a_scenario_once_however_late_its_map_is_found() {
+    let mut world = run();
+    world.rejected.insert(0);
+    world.lay(0, 100);
+    world.write(1);
+    world.prepare(0, true);
+    answer(&mut world);
+    assert!(storing(&world).is_empty(), "the map may be found yet");
+    world.find(0);
+    world.event(Event::Scanned);
+    assert!(storing(&world).is_empty(), "and now it is its turn");
+    world.settle();
+    assert_eq!(world.said_of_maps[&1], [0]);
+    let told = world.stored.iter().filter(|it| **it == 1);
+    assert_eq!(told.count(), 1);
+}
+
+#[test]
+fn a_run_waits_for_no_map_that_is_none_of_its_files() {
+    let mut world = run();
+    world.lay(0, 100);
+    world.write(1);
+    world.prepare(0, true);
+    answer(&mut world);
+    assert!(storing(&world).is_empty());
+    world.event(Event::Scanned);
+    assert_eq!(storing(&world), [1]);
 }

@@ -191,14 +191,24 @@ impl World {
     }
 
     pub fn put(&mut self, file: u8, content: u64) {
-        self.stamps += 1;
-        self.contents.insert(self.stamps, content);
-        self.there.insert(path_of(file), self.stamps);
-        let (path, stamp) = (path_of(file), stamp(self.stamps));
+        self.lay(file, content);
         if file >= 8 {
             // Nobody watches it.
             return self.clients_look();
         }
+        self.find(file);
+    }
+
+    /// A file lies there that nobody has found yet.
+    pub fn lay(&mut self, file: u8, content: u64) {
+        self.stamps += 1;
+        self.contents.insert(self.stamps, content);
+        self.there.insert(path_of(file), self.stamps);
+    }
+
+    /// A file that lies there is found.
+    pub fn find(&mut self, file: u8) {
+        let (path, stamp) = (path_of(file), stamp(self.there[&path_of(file)]));
         // As the engine does with what lies outside of the watched directories.
         self.event(if file == 7 {
             Event::Touched { path, stamp }
