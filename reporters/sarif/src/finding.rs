@@ -16,7 +16,7 @@ const LARGEST_LINE: u64 = i32::MAX as u64;
 
 /// The id of the rule that an issue breaks.
 pub(crate) fn rule_id(checker: &Checker, issue: &Issue) -> String {
-    let named = [issue.rule_uid.as_str(), &checker.id].map(|name| text::name(name));
+    let named = [issue.rule_uid.as_str(), &checker.id].map(text::name);
     let mut named = named.into_iter().filter(|name| !name.is_empty());
     named.next().unwrap_or_else(|| "unnamed".to_owned())
 }
