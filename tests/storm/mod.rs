@@ -24,7 +24,7 @@ use crate::support::inside::is_inside;
 use crate::support::judge::{judge_with, verdicts_in_journal};
 use crate::support::processes::{peak_private_kib, private_kib};
 use crate::support::reports::{REPORTS, reported};
-use crate::support::watchdog::{until, until_or};
+use crate::support::watchdog::until_or;
 use crate::{end, report};
 
 /// Length of the storm.
@@ -180,10 +180,17 @@ fn demand(mut driver: Driver, seen: usize, start_kib: u64, end_kib: u64, seconds
     let broker = driver.broker.take().unwrap();
     let everything = is_inside();
     end(&driver.farm, broker);
+    let log_of_the_end = driver.farm.log();
     if everything {
-        until("nothing is left in /dev/shm", || {
-            shm_segments("qc").is_empty().then_some(())
-        });
+        until_or(
+            "nothing is left in /dev/shm",
+            || shm_segments("qc").is_empty().then_some(()),
+            // Its names, and what the last broker did, say who left it.
+            || {
+                let left = files_below(std::path::Path::new("/dev/shm"));
+                format!("{left:#?}\n{}", tail(&log_of_the_end))
+            },
+        );
     }
     assert!(peak < PEAK_KIB, "a broker took {peak} KiB");
     assert_eq!(
