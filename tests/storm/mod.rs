@@ -187,8 +187,9 @@ fn demand(mut driver: Driver, seen: usize, start_kib: u64, end_kib: u64, seconds
             || shm_segments("qc").is_empty().then_some(()),
             // Its names, and what the last broker did, say who left it.
             || {
-                let left = files_below(std::path::Path::new("/dev/shm"));
-                format!("{left:#?}\n{}", tail(&log_of_the_end))
+                let files = files_below(std::path::Path::new("/dev/shm"));
+                let (roots, log) = (shm_segments("qc"), tail(&log_of_the_end));
+                format!("{roots:?} {files:#?}\n{log}")
             },
         );
     }
