@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::{Deref, DerefMut};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, PoisonError, RwLock, RwLockReadGuard};
 
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::sample_mut::SampleMut;
@@ -130,8 +130,11 @@ impl Class {
     /// called with a ticket to lend; does nothing when others have one.
     ///
     /// The publisher stays the same: a confined peer could not connect to another one.
-    fn empty(&self, turns: &Turns) {
-        let _turn = turns.take();
+    fn empty(&self, shared: &Shared) {
+        let _turn = shared.turns.take();
+        let Some(_open) = shared.open() else {
+            return;
+        };
         let publisher = self
             .publisher
             .write()
@@ -187,9 +190,23 @@ struct Shared {
     /// What the bus takes for itself, in bytes.
     own: u64,
     turns: Turns,
-    stopped: AtomicBool,
+    /// Whether nothing is lent or published any more. Read by whoever may make files of the bus, for as long as that
+    /// takes: what is made after they were removed would stay.
+    stopped: RwLock<bool>,
     /// Tells the broker's loop that peers wait for a document.
     again: Notify,
+}
+
+impl Shared {
+    /// `None` when it has stopped; it does not stop as long as this is held.
+    fn open(&self) -> Option<RwLockReadGuard<'_, bool>> {
+        let stopped = self.stopped.read().unwrap_or_else(PoisonError::into_inner);
+        (!*stopped).then_some(stopped)
+    }
+}
+
+fn has_stopped() -> LoanError {
+    LoanError::Bus("the broker has stopped".to_owned())
 }
 
 /// Lends slots for document images and publishes them. Cheap to clone; meant for worker threads.
@@ -213,7 +230,7 @@ impl Documents {
             reserve,
             own,
             turns: Turns::new(),
-            stopped: AtomicBool::new(false),
+            stopped: RwLock::new(false),
             again: Notify::new(),
         };
         Ok(Documents {
@@ -244,9 +261,6 @@ impl Documents {
         if len > MAX_IMAGE {
             return Err(LoanError::TooLarge(len));
         }
-        if self.shared.stopped.load(Ordering::Acquire) {
-            return Err(LoanError::Bus("the broker has stopped".to_owned()));
-        }
         let index = usize::from(len > self.shared.classes[0].row.slot_bytes());
         let class = &self.shared.classes[index];
         let held = Ticket::take(&class.held, most_held(&class.row)).ok_or(LoanError::Busy)?;
@@ -275,6 +289,7 @@ impl Documents {
     fn take(&self, class: &Class, blocks: usize, bytes: u64) -> Result<Uninit, LoanError> {
         let _turn = self.shared.turns.take();
         self.look_for(bytes)?;
+        let open = self.shared.open().ok_or_else(has_stopped)?;
         let publisher = class
             .publisher
             .read()
@@ -292,6 +307,7 @@ impl Documents {
                 other => limited_addresses(bytes).unwrap_or(LoanError::Bus(format!("{other:?}"))),
             })?;
         drop(publisher);
+        drop(open);
         class.remember(sample.payload_mut());
         match back_with_memory(sample.payload_mut()) {
             Ok(()) => Ok(sample),
@@ -363,15 +379,16 @@ impl Documents {
         }
     }
 
-    /// From now on nothing is lent.
+    /// From now on nothing is lent or published: when this returns, nobody makes a file of the bus by it.
     pub(crate) fn stop(&self) {
-        self.shared.stopped.store(true, Ordering::Release);
+        let stopped = self.shared.stopped.write();
+        *stopped.unwrap_or_else(PoisonError::into_inner) = true;
     }
 
     fn give_back(&self, ours: usize) {
         for (index, class) in self.shared.classes.iter().enumerate() {
             let ticket = (index != ours).then(|| Ticket::take(&class.lent, class.row.loans));
-            class.empty(&self.shared.turns);
+            class.empty(&self.shared);
             drop(ticket);
         }
         self.shared.again.notify_one();
@@ -435,7 +452,11 @@ impl Loan {
             kind: kind_code(kind),
             reserved: 0,
         };
-        let class = &self.documents.shared.classes[self.class];
+        let shared = &self.documents.shared;
+        let Some(_open) = shared.open() else {
+            return Err(PublishError::Bus("the broker has stopped".to_owned()));
+        };
+        let class = &shared.classes[self.class];
         class.used.store(true, Ordering::Release);
         let own = class.own.lock().unwrap_or_else(PoisonError::into_inner);
         let refused = |why: String| PublishError::Bus(why);

@@ -6,12 +6,13 @@ use std::sync::{Mutex, PoisonError};
 
 use qcbus_messages::services::{Growth, Services, Topic};
 
+use crate::door::Door;
 use crate::entrance::introduce;
 use crate::generation::Generation;
 use crate::host::HelloHeader;
 use crate::instance::Instance;
 use crate::link::{FrameHeader, SessionKey};
-use crate::ports::{self, Access, Hub, Pub, Sub, WakeNotifier};
+use crate::ports::{self, Hub, Pub, Sub, WakeNotifier};
 
 /// What goes before a frame, to be filled with anything.
 #[derive(Debug, Clone, Copy, Default)]
@@ -45,6 +46,8 @@ pub struct Rogue {
     channels: Option<Channels>,
     hello: Pub<u8, HelloHeader>,
     wake: WakeNotifier,
+    /// Manners it needs none, but it leaves nothing in a memory that is removed: tests look.
+    door: Door,
     hub: Hub,
     instance: Instance,
     /// What says which process this is, the latest.
@@ -62,7 +65,9 @@ impl Rogue {
     pub fn new(instance: &Instance) -> Result<Rogue, String> {
         let generation = Generation::current(instance).ok_or("no broker")?;
         let services = Services::new(&generation.limits);
-        let hub = Hub::new(&generation.root, Access::Open).map_err(|error| in_words(&error))?;
+        let door = Door::of(&generation.root).map_err(|shut| shut.to_string())?;
+        let inside = door.enter().map_err(|shut| shut.to_string())?;
+        let hub = Hub::join(&inside).map_err(|error| in_words(&error))?;
         let greetings = hub
             .topic(&services.hello, "")
             .map_err(|error| in_words(&error))?;
@@ -77,6 +82,7 @@ impl Rogue {
             wake: ports::notifier(&wake).map_err(|error| in_words(&error))?,
             generation: generation.number,
             services,
+            door: door.clone(),
             hub,
             instance: instance.clone(),
             proofs: Mutex::default(),
@@ -125,6 +131,9 @@ impl Rogue {
             generation: self.generation,
             incarnation,
             attempt,
+        };
+        let Ok(_inside) = self.door.enter() else {
+            return false;
         };
         let suffix = key.suffix();
         let (to_row, from_row) = (self.services.to_peer, growing(self.services.from_peer));

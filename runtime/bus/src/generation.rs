@@ -10,12 +10,14 @@ use std::hash::BuildHasher;
 use std::io::{self, Write};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use qcbus_messages::PROTOCOL_VERSION;
 use qcbus_messages::services::Limits;
 use rustix::fs::{FlockOperation, flock};
 use serde::{Deserialize, Serialize};
 
+use crate::door;
 use crate::instance::Instance;
 use crate::memory::SHARED_MEMORY;
 use crate::ports::ICEORYX2_VERSION;
@@ -27,6 +29,8 @@ const IDENTITY: &str = "id";
 const LIFE: &str = "broker";
 /// Bytes of what is in it.
 const IDENTITY_LEN: usize = 18;
+/// A broker locks its shared memory within microseconds of making it, unless it is stopped in between.
+const UNLOCKED_FOR: Duration = Duration::from_secs(60);
 /// Names that are tried for such a directory; each is as good as new.
 const ATTEMPTS: usize = 16;
 
@@ -70,6 +74,7 @@ impl Generation {
         fs::DirBuilder::new().mode(0o700).create(&dir)?;
         let prefix = format!("{identity}{number:x}_");
         let root = root_in_memory(&prefix)?;
+        door::make(&root)?;
         Ok(Generation {
             number,
             prefix,
@@ -130,23 +135,29 @@ impl Generation {
 }
 
 /// Unlinks everything of this instance, except the generation `keep`. The caller holds the
-/// instance's lock, so whatever is found belongs to nobody alive but peers that are leaving; what
-/// they have mapped stays readable for them.
+/// instance's lock, so whatever is found belongs to nobody alive but peers that are leaving, or about
+/// to join; what they have mapped stays readable for them. What cannot be unlinked is said, and a later
+/// broker of the instance tries again.
 pub(crate) fn sweep(instance: &Instance, keep: Option<&Generation>) {
     let Ok(identity) = identity(instance) else {
         return;
     };
+    let mut all = true;
     for name in names_in(Path::new(SHARED_MEMORY)) {
         let path = Path::new(SHARED_MEMORY).join(&name);
         let kept = keep.is_some_and(|keep| keep.root == path);
         if !name.starts_with(&identity) || kept {
             continue;
         }
-        let _ = match path.is_dir() {
-            true => fs::remove_dir_all(path),
+        let removed = match path.is_dir() {
+            true => door::shut_and_remove(&path),
             // Of a version that put its segments there.
-            false => fs::remove_file(path),
+            false => fs::remove_file(&path),
         };
+        if let Err(error) = removed {
+            tracing::warn!(%error, "{} could not be removed and stays for now", path.display());
+            all = false;
+        }
     }
     for name in names_in(instance.dir()) {
         let kept = keep.is_some_and(|keep| name == format!("g{}", keep.number));
@@ -157,7 +168,7 @@ pub(crate) fn sweep(instance: &Instance, keep: Option<&Generation>) {
             let _ = fs::remove_dir_all(instance.dir().join(&name));
         }
     }
-    if keep.is_none() {
+    if keep.is_none() && all {
         let _ = fs::remove_file(instance.dir().join(IDENTITY));
     }
 }
@@ -175,13 +186,25 @@ pub(crate) fn sweep_strays() -> usize {
         .filter(is_ours)
         .map(|name| Path::new(SHARED_MEMORY).join(name));
     let strays = roots.filter(|root| is_own(root) && is_stray(root));
-    strays.filter(|it| fs::remove_dir_all(it).is_ok()).count()
+    strays
+        .filter(|it| door::shut_and_remove(it).is_ok())
+        .count()
 }
 
-/// Nobody has it who lives. A broker that has not locked its own yet has no file of that name.
+/// Nobody has it who lives. A broker that has not locked its own yet has no file of that name; nor has what somebody
+/// made too late, whom the broker had stopped waiting for.
 fn is_stray(root: &Path) -> bool {
-    let lock = File::options().write(true).open(root.join(LIFE));
-    lock.is_ok_and(|file| flock(&file, FlockOperation::NonBlockingLockExclusive).is_ok())
+    match File::options().write(true).open(root.join(LIFE)) {
+        Ok(file) => flock(&file, FlockOperation::NonBlockingLockExclusive).is_ok(),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => is_old(root),
+        Err(_) => false,
+    }
+}
+
+fn is_old(root: &Path) -> bool {
+    let changed = fs::metadata(root).and_then(|data| data.modified());
+    let age = changed.ok().and_then(|it| it.elapsed().ok());
+    age.is_some_and(|age| age >= UNLOCKED_FOR)
 }
 
 fn names_in(dir: &Path) -> Vec<String> {
@@ -266,4 +289,69 @@ pub(crate) fn close_to_others(root: &Path) -> io::Result<()> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::SystemTime;
+
+    use super::*;
+
+    fn root() -> PathBuf {
+        let prefix = format!("qc{:015x}g1_", random() >> 4);
+        let root = root_in_memory(&prefix).unwrap();
+        door::make(&root).unwrap();
+        fs::write(root.join("segment"), "of a broker").unwrap();
+        root
+    }
+
+    fn age(root: &Path, by: Duration) {
+        let then = SystemTime::now() - by;
+        File::open(root).unwrap().set_modified(then).unwrap();
+    }
+
+    #[test]
+    fn what_nobody_has_locked_is_a_stray_when_it_is_old() {
+        let root = root();
+        assert!(!is_stray(&root), "its broker may be about to lock it");
+        age(&root, UNLOCKED_FOR);
+        assert!(is_stray(&root));
+        door::shut_and_remove(&root).unwrap();
+    }
+
+    #[test]
+    fn what_a_broker_has_locked_is_none_however_old() {
+        let root = root();
+        let life = File::create(root.join(LIFE)).unwrap();
+        flock(&life, FlockOperation::NonBlockingLockExclusive).unwrap();
+        age(&root, UNLOCKED_FOR);
+        assert!(!is_stray(&root));
+        drop(life);
+        assert!(is_stray(&root), "it has died");
+        door::shut_and_remove(&root).unwrap();
+    }
+
+    #[test]
+    fn what_cannot_be_removed_is_known_to_the_next_broker() {
+        let dir = tempfile::TempDir::new().unwrap();
+        let instance = Instance::at(dir.path().to_owned());
+        let prefix = identity(&instance).unwrap();
+        // A directory that we may not empty.
+        let root = root_in_memory(&format!("{prefix}1_")).unwrap();
+        let inner = root.join("inner");
+        fs::create_dir(&inner).unwrap();
+        fs::write(inner.join("file"), "").unwrap();
+        let removable = fs::Permissions::from_mode(0o700);
+        fs::set_permissions(&inner, fs::Permissions::from_mode(0o500)).unwrap();
+        sweep(&instance, None);
+        let known = dir.path().join(IDENTITY).exists();
+        // For root nothing is forbidden.
+        let is_left = root.exists();
+        if is_left {
+            fs::set_permissions(&inner, removable).unwrap();
+            sweep(&instance, None);
+        }
+        assert_eq!((known, root.exists()), (is_left, false));
+        assert!(!dir.path().join(IDENTITY).exists());
+    }
 }

@@ -23,7 +23,7 @@ use crate::janitor::Janitor;
 use crate::link::SessionKey;
 use crate::memory::{SharedMemory, Turns, fitting_reserve, keep_room};
 use crate::options::{HostOptions, StartError};
-use crate::ports::{self, Access, Hub, PortError, Pub, Sub};
+use crate::ports::{self, Hub, PortError, Pub, Sub};
 use crate::presence::{LockSlot, Presence};
 use crate::process::Process;
 use crate::session::Session;
@@ -208,7 +208,7 @@ impl Host {
         let memory_lock = generation.lock_memory()?;
         // Somebody who takes no turns may have been faster.
         keep_room(&generation.root, room).map_err(|_| no_room(needed))?;
-        let hub = Hub::new(&generation.root, Access::Create)?;
+        let hub = Hub::create(&generation.root)?;
         let documents = Documents::new(
             &hub,
             generation.number,

@@ -11,11 +11,12 @@
 //!   constructor of services and ports;
 //! * `stream`, `link`: the streams, first as arithmetic, then on the bus;
 //! * `instance`, `generation`, `presence`, `process`, `janitor`: finding each other, noticing deaths, leaving
-//!   nothing behind; `entrance`: who is at the other end;
+//!   nothing behind; `door`: nobody makes files in memory that is removed; `entrance`: who is at the other end;
 //! * `memory`: how shared memory is had before it is written to;
 //! * `host` with `options`, `session`, `turn`, `documents`; `peer` with `membership`, `library`; `held`; `wake`.
 
 mod documents;
+mod door;
 mod enclosed;
 mod entrance;
 #[doc(hidden)]

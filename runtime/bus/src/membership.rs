@@ -9,6 +9,7 @@ use iceoryx2::prelude::*;
 use qcbus_messages::services::{HELLO_BYTES, Services};
 use qcbus_messages::{Digest, Hello, ToPeer, codec};
 
+use crate::door::{Door, IsShut};
 use crate::entrance::{Statement, introduce};
 use crate::generation::Generation;
 use crate::host::{ConfigHeader, HelloHeader};
@@ -17,7 +18,7 @@ use crate::library::Library;
 use crate::link::{FrameHeader, Link, SessionKey, Wants};
 use crate::memory::{Turns, free_shared_memory, take_room};
 use crate::peer::PeerEvent;
-use crate::ports::{self, Access, Hub, PortError, Pub, Sub, TopicService, WakeNotifier};
+use crate::ports::{self, Hub, PortError, Pub, Sub, TopicService, WakeNotifier};
 use crate::process::Process;
 use crate::wake::{TICK, Waker};
 
@@ -50,6 +51,12 @@ pub(crate) enum BeginError {
     Port(String),
 }
 
+impl From<IsShut> for BeginError {
+    fn from(error: IsShut) -> Self {
+        BeginError::Port(error.to_string())
+    }
+}
+
 impl From<PortError> for BeginError {
     fn from(error: PortError) -> Self {
         BeginError::Port(error.to_string())
@@ -76,6 +83,8 @@ pub(crate) struct Membership {
     instance: Instance,
     /// Where we have said who we are; the broker sees by them whether we live.
     said: Vec<Statement>,
+    /// Until it is welcome it makes files.
+    door: Door,
     last_tick: Instant,
     welcome: bool,
     refused: Option<String>,
@@ -109,8 +118,10 @@ impl Membership {
         let services = Services::new(&generation.limits);
         let turns = Turns::new();
         let _turn = turns.take();
+        let door = Door::of(&generation.root)?;
+        let inside = door.enter()?;
         take_part(&generation.root, services.peer_bytes())?;
-        let hub = Hub::new(&generation.root, Access::Open)?;
+        let hub = Hub::join(&inside)?;
         let config = hub.topic(&services.config, "")?;
         let greetings = hub.topic(&services.hello, "")?;
         let wake = hub.wake(&services.wake_broker, "")?;
@@ -134,6 +145,7 @@ impl Membership {
             proves,
             instance: instance.clone(),
             said: Vec::new(),
+            door,
             last_tick: Instant::now(),
             welcome: false,
             refused: None,
@@ -215,6 +227,11 @@ impl Membership {
         events: &mut VecDeque<PeerEvent>,
         config: &mut Option<(Digest, Arc<[u8]>)>,
     ) -> Standing {
+        let door = self.door.clone();
+        let _inside = match (self.welcome, door.enter()) {
+            (false, Err(shut)) => return Standing::Failed(shut.to_string()),
+            (_, entered) => entered.ok(),
+        };
         if self.channels.is_none()
             && let Err(error) = self.connect(now)
         {

@@ -14,6 +14,7 @@ use iceoryx2::prelude::*;
 use iceoryx2::service::port_factory::{event, publish_subscribe};
 use qcbus_messages::services::{Growth, Topic, Wake};
 
+use crate::door::Inside;
 pub(crate) use crate::enclosed::Enclosed as Service;
 use crate::memory::Backing;
 
@@ -86,7 +87,7 @@ impl<T, E: Debug + 'static> Explain<T> for Result<T, E> {
 
 /// Who makes a service: the broker creates, everyone else opens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Access {
+enum Access {
     Create,
     Open,
 }
@@ -125,8 +126,17 @@ pub(crate) fn generation_config(root: &Path) -> Result<Config, PortError> {
 }
 
 impl Hub {
-    /// Joins a generation.
-    pub(crate) fn new(root: &Path, access: Access) -> Result<Hub, PortError> {
+    /// The broker's, which makes all services.
+    pub(crate) fn create(root: &Path) -> Result<Hub, PortError> {
+        Hub::new(root, Access::Create)
+    }
+
+    /// Joins a generation, whose memory cannot go meanwhile.
+    pub(crate) fn join(inside: &Inside) -> Result<Hub, PortError> {
+        Hub::new(inside.root(), Access::Open)
+    }
+
+    fn new(root: &Path, access: Access) -> Result<Hub, PortError> {
         // What iceoryx2 has to say arrives as error values; it prints nothing of its own.
         set_log_level_from_env_or(LogLevel::Fatal);
         let config = generation_config(root)?;
@@ -353,7 +363,7 @@ mod tests {
         let instance = crate::Instance::at(dir.path().to_owned());
         let limits = Limits::default();
         let generation = crate::generation::Generation::begin(&instance, limits).unwrap();
-        let hub = Hub::new(&generation.root, Access::Create).unwrap();
+        let hub = Hub::create(&generation.root).unwrap();
         let services = Services::new(&limits);
         for row in services.topics() {
             if row.element == size_of::<Block>() {

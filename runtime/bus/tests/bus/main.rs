@@ -15,6 +15,7 @@ mod cleaned;
 mod deaths;
 mod delivery;
 mod documents;
+mod ending;
 mod fuzz;
 mod hostile;
 mod liars;
