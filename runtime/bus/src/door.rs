@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use rustix::fs::{FlockOperation, OFlags, flock};
+use rustix::fs::{FlockOperation, flock};
 
 /// Its name in the directory of a generation.
 const DOOR: &str = "door";
@@ -58,7 +58,7 @@ impl Door {
     /// The door of a generation that is there.
     pub(crate) fn of(root: &Path) -> Result<Door, IsShut> {
         let mut how = File::options();
-        let how = how.read(true).custom_flags(OFlags::NOFOLLOW.bits() as i32);
+        let how = how.read(true).custom_flags(libc::O_NOFOLLOW);
         let file = how.open(root.join(DOOR)).map_err(|_| IsShut)?;
         Ok(Door {
             file: Arc::new(file),
@@ -112,7 +112,7 @@ pub(crate) fn shut_and_remove(root: &Path) -> io::Result<()> {
 /// Waits until nobody is inside, but not for ever. `None`: it has no door, or none that we can shut.
 fn shut(root: &Path) -> Option<File> {
     let mut how = File::options();
-    let how = how.write(true).custom_flags(OFlags::NOFOLLOW.bits() as i32);
+    let how = how.write(true).custom_flags(libc::O_NOFOLLOW);
     let file = how.open(root.join(DOOR)).ok()?;
     // First, or those who come and go would keep it open.
     file.write_all_at(SHUT, 0).ok()?;
