@@ -228,9 +228,9 @@ impl Membership {
         config: &mut Option<(Digest, Arc<[u8]>)>,
     ) -> Standing {
         let door = self.door.clone();
-        let _inside = match (self.welcome, door.enter()) {
-            (false, Err(shut)) => return Standing::Failed(shut.to_string()),
-            (_, entered) => entered.ok(),
+        let _inside = match (!self.welcome).then(|| door.enter()).transpose() {
+            Ok(inside) => inside,
+            Err(shut) => return Standing::Failed(shut.to_string()),
         };
         if self.channels.is_none()
             && let Err(error) = self.connect(now)
