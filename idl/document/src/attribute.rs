@@ -4,6 +4,7 @@ use crate::document::Document;
 use crate::layout::{AttributeRecord, NodeRecord, Section};
 use crate::node::Node;
 use crate::source::Position;
+use crate::value::{self, ValueError};
 
 /// An attribute of an element.
 #[derive(Clone, Copy)]
@@ -105,6 +106,22 @@ impl<'a> Attribute<'a> {
                 .map_or(0, |(_, _, raw_len)| raw_len),
             _ => record.value_len.get(),
         }
+    }
+
+    /// The value as a double; see [`Node::f64`].
+    ///
+    /// # Errors
+    /// When it is no number, or is beyond what a double holds.
+    pub fn f64(&self) -> Result<f64, ValueError<'a>> {
+        value::parse_f64(*self)
+    }
+
+    /// The value as an integer; see [`Node::i64`].
+    ///
+    /// # Errors
+    /// When it is no integer, or is beyond 64 bits.
+    pub fn i64(&self) -> Result<i64, ValueError<'a>> {
+        value::parse_i64(*self)
     }
 
     /// Where its name is.

@@ -44,6 +44,58 @@ impl<'a> Document<'a> {
     /// # Errors
     /// When the expression is malformed or uses more of XPath than this.
     pub fn evaluate(&self, xpath: &str) -> Result<Vec<Node<'a>>, XPathError> {
-        Ok(evaluate::evaluate(*self, &parse::parse(xpath)?))
+        Ok(evaluate::evaluate(*self, None, &parse::parse(xpath)?))
+    }
+}
+
+impl<'a> Node<'a> {
+    /// The elements that an XPath means from here: as [`Document::evaluate`], but a step without `/` before it leads
+    /// to what lies directly within this element, and `.`, `.//` and leading `..` are understood.
+    ///
+    /// # Errors
+    /// As [`Document::evaluate`].
+    pub fn evaluate(&self, xpath: &str) -> Result<Vec<Node<'a>>, XPathError> {
+        let mut path = xpath.trim();
+        if path.is_empty() || path.starts_with('/') {
+            return self.document().evaluate(path);
+        }
+        let mut from = Some(*self);
+        while let Some((rest, is_up)) = leading_dots(path) {
+            if is_up {
+                from = from.and_then(|node| node.parent());
+            }
+            path = rest;
+        }
+        let Some(from) = from else {
+            return Ok(Vec::new());
+        };
+        if path.is_empty() {
+            return Ok(vec![from]);
+        }
+        let rooted = match path.starts_with('/') {
+            true => path.to_owned(),
+            false => format!("/{path}"),
+        };
+        let steps = parse::parse(&rooted).map_err(|error| XPathError {
+            xpath: xpath.to_owned(),
+            at: error.at.saturating_sub(usize::from(rooted != path)) + (xpath.len() - path.len()),
+            ..error
+        })?;
+        Ok(evaluate::evaluate(self.document(), Some(from), &steps))
+    }
+}
+
+/// What follows a leading `.` or `..` (then `true`), with the `/` or `//` behind it if more than one may follow.
+fn leading_dots(path: &str) -> Option<(&str, bool)> {
+    let (rest, is_up) = match path.strip_prefix("..") {
+        Some(rest) => (rest, true),
+        None => (path.strip_prefix('.')?, false),
+    };
+    match rest.strip_prefix('/') {
+        None if rest.is_empty() => Some((rest, is_up)),
+        None => None,
+        // Steps follow: `//` stays, and so do further dots.
+        Some(further) if further.starts_with('.') => Some((further, is_up)),
+        Some(_) => Some((rest, is_up)),
     }
 }

@@ -161,6 +161,75 @@ fn xpaths_of_other_tools_are_followed() {
 }
 
 #[test]
+fn an_xpath_is_followed_from_an_element() {
+    let section = |s: &str| Tree::new("laneSection").with("s", s);
+    let lanes = || {
+        let lanes = Tree::new("lanes").holding(section("0"));
+        lanes.holding(section("5").holding(Tree::new("lanes")))
+    };
+    let map = Tree::new("OpenDRIVE")
+        .holding(road("1").holding(lanes()))
+        .holding(road("2").holding(lanes()));
+    // Nodes: 0 OpenDRIVE, 1 road 1 (2 lanes, 3 and 4 sections, 5 lanes), 6 road 2 (7, 8 and 9, 10).
+    let cases: [(u32, &str, &[u32]); 18] = [
+        (1, ".", &[1]),
+        (1, "./", &[1]),
+        (1, "lanes", &[2]),
+        (1, "./lanes/laneSection[2]", &[4]),
+        (1, ".//lanes", &[2, 5]),
+        (6, ".//laneSection[@s='5']", &[9]),
+        (6, ".//laneSection[1]", &[8]),
+        (6, ".//*", &[7, 8, 9, 10]),
+        (6, "*", &[7]),
+        (6, "road", &[]),
+        (9, "..", &[7]),
+        (9, "../..", &[6]),
+        (9, "../laneSection[1]", &[8]),
+        (9, ".././../../road[1]", &[1]),
+        (9, "..//lanes", &[10]),
+        (0, "..", &[]),
+        (6, "//lanes", &[2, 5, 7, 10]),
+        (6, "/OpenDRIVE/road[1]", &[1]),
+    ];
+    with_document(&map, |document| {
+        for (from, xpath, expected) in cases {
+            let found = document.node(from).unwrap().evaluate(xpath);
+            let found = found.map(|found| found.iter().map(|node| node.index()).collect());
+            assert_eq!(
+                found.unwrap_or_else(|_| Vec::new()),
+                expected,
+                "{from} {xpath}"
+            );
+        }
+        let said = |xpath| {
+            document
+                .node(1)
+                .unwrap()
+                .evaluate(xpath)
+                .unwrap_err()
+                .to_string()
+        };
+        for (xpath, expected) in [
+            ("", "follow the XPath '': expected '/' at character 1"),
+            (
+                "../a[",
+                "follow the XPath '../a[': expected a number, 'last()', 'local-name()' or '@' at character 6",
+            ),
+            (
+                "a[",
+                "follow the XPath 'a[': expected a number, 'last()', 'local-name()' or '@' at character 3",
+            ),
+            (
+                "...",
+                "follow the XPath '...': expected the name of an element, or '*' at character 1",
+            ),
+        ] {
+            assert_eq!(said(xpath), expected);
+        }
+    });
+}
+
+#[test]
 fn what_is_not_understood_is_said_where_it_stands() {
     with_document(&Tree::new("a"), |document| {
         for (xpath, said) in [

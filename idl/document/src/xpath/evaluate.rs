@@ -7,8 +7,12 @@ use crate::node::Node;
 /// Where a step starts from: an element, or (`None`) the document that holds the root.
 type Context<'a> = Option<Node<'a>>;
 
-pub(super) fn evaluate<'a>(document: Document<'a>, steps: &[Step<'_>]) -> Vec<Node<'a>> {
-    let mut contexts: Vec<Context<'a>> = vec![None];
+pub(super) fn evaluate<'a>(
+    document: Document<'a>,
+    from: Context<'a>,
+    steps: &[Step<'_>],
+) -> Vec<Node<'a>> {
+    let mut contexts: Vec<Context<'a>> = vec![from];
     for step in steps {
         let mut found = match (step.anywhere, step.name) {
             (true, Some(name)) if !step.counts() => {
