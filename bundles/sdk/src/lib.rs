@@ -38,6 +38,8 @@ pub use qcbus_formats::xqar::{Issue, Level, Status};
 pub use qcbus_ingest::modular;
 pub use qcbus_messages::BUILD_DATE;
 pub use resource::{Resource, ResourceError, ResourceFile, ResourceValue, UserFiles};
+#[doc(hidden)]
+pub use rule::Built;
 pub use rule::{AnyRule, Backport, Each, Facts, Model, Rule, Unbuilt};
 pub use run::{Exit, Mode, Timings, examine, examine_timed, findings, main, run};
 pub use sink::{Finding, Sink};

@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
 
-use qcbus_document::{Document, FileKind, Image, ImageError, Suffix};
+use qcbus_document::{FileKind, Image, ImageError, Suffix};
 use qcbus_formats::pool::{BundleOutcome, Remark};
 use qcbus_ingest::modular::{ExpandedImage, SearchPath};
 use qcbus_ingest::{IngestError, Limits, Prepared, Reader, Source, Walking};
@@ -19,7 +19,7 @@ pub struct Loaded {
     kind: FileKind,
     path: PathBuf,
     digest: Digest,
-    root: Vec<u8>,
+    root: Image,
     links: Vec<Link>,
     linked: Vec<LinkedImage>,
     missing: Vec<MissingDocument>,
@@ -93,12 +93,11 @@ impl Loaded {
     /// # Errors
     /// [`LoadError::Image`].
     pub fn subject(&self, bundle: &Bundle) -> Result<Subject<'_>, LoadError> {
-        let root = Document::open(&self.root)?;
         // There is no next job: what is kept is for the rules of this one.
         let models = JobModels::default();
         let linked = self.linked.iter().map(|linked| linked.open(&models));
         let linked = linked.collect::<Result<_, ImageError>>()?;
-        let subject = Subject::new(root, self.kind, (bundle.version_of)(&root));
+        let subject = Subject::new(&self.root, self.kind, bundle.version_of)?;
         let subject = subject.with(linked, self.missing.clone());
         Ok(subject.with_links(self.links.clone()).read(bundle.reads))
     }
@@ -110,7 +109,7 @@ impl Loaded {
     /// [`LoadError::Image`].
     pub fn remarks(&self, bundles: &[BundleOutcome]) -> Result<Vec<Remark>, LoadError> {
         Ok(qcbus_ingest::remarks(
-            &Document::open(&self.root)?,
+            &self.root.document()?,
             &self.missing,
             bundles,
         ))
@@ -136,7 +135,7 @@ impl Loaded {
             kind,
             path: path.to_owned(),
             digest: Digest(prepared.digest()),
-            root: prepared.build(),
+            root: Image::new(prepared.build()),
             links: Vec::new(),
             linked: Vec::new(),
             missing: Vec::new(),
@@ -154,7 +153,7 @@ impl Loaded {
             boundary,
             linked: Vec::new(),
         };
-        let root = Document::open(&self.root)?;
+        let root = self.root.document()?;
         let walking = Walking {
             max_documents: MAX_DOCUMENTS,
             max_text: Limits::default().max_archive,

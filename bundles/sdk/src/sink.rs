@@ -31,6 +31,8 @@ pub struct Sink<'d> {
     /// What was found behind references: by the text and where the document's path lies in memory.
     behind: HashMap<(String, usize, u32), Behind>,
     metadata: Vec<Metadata>,
+    /// Why the rule could not look.
+    failure: Option<String>,
     /// The level of what is said once more and not kept.
     unheard: Level,
     /// Takes what is said about findings that are not kept. In a box, because most checkers keep
@@ -90,6 +92,7 @@ impl<'d> Sink<'d> {
             suppressed: None,
             behind: HashMap::new(),
             metadata: Vec::new(),
+            failure: None,
             unheard: Level::Information,
             scratch: None,
         }
@@ -215,6 +218,17 @@ impl<'d> Sink<'d> {
             value: value.into(),
             description: description.to_owned(),
         });
+    }
+
+    /// Says that the rule could not look, or came to no end: its checker has failed, whatever it found before. The
+    /// text is a sentence or several lines, such as the traceback of a language that rules are written in.
+    pub fn fail(&mut self, why: impl Into<String>) {
+        self.failure.get_or_insert_with(|| why.into());
+    }
+
+    /// Why the rule could not look, once.
+    pub(crate) fn take_failure(&mut self) -> Option<String> {
+        self.failure.take()
     }
 
     /// What is checked, with everything that the root refers to.

@@ -14,6 +14,8 @@ use crate::{LinkedModel, Reads, ResourceValue, Version};
 #[derive(Debug, Clone)]
 pub struct Subject<'d> {
     root: Document<'d>,
+    /// What `root` is read from.
+    image: &'d Image,
     written: Document<'d>,
     is_expanded: bool,
     links: Vec<Link>,
@@ -69,6 +71,11 @@ impl LinkedImage {
 }
 
 impl Linked<'_> {
+    /// The document's image, for whoever keeps what he made of it longer than he was given it.
+    pub fn image(&self) -> &Image {
+        &self.image.image
+    }
+
     /// A model of the document that is built when it is first asked for, shared by all rules, and
     /// kept for the next root that refers to the same document with the same bytes, in it and in
     /// all that it includes. `None` when nothing can be made of the document.
@@ -81,10 +88,20 @@ impl Linked<'_> {
 }
 
 impl<'d> Subject<'d> {
-    /// A root document on its own. `version` is what the document says about itself.
-    pub fn new(root: Document<'d>, kind: FileKind, version: Option<Version>) -> Subject<'d> {
-        Subject {
+    /// A root document on its own. `version_of` reads what the document says about itself.
+    ///
+    /// # Errors
+    /// As [`Document::open`].
+    pub fn new(
+        image: &'d Image,
+        kind: FileKind,
+        version_of: fn(&Document<'_>) -> Option<Version>,
+    ) -> Result<Subject<'d>, ImageError> {
+        let root = image.document()?;
+        let version = version_of(&root);
+        Ok(Subject {
             root,
+            image,
             written: root,
             is_expanded: false,
             links: Vec::new(),
@@ -94,7 +111,7 @@ impl<'d> Subject<'d> {
             missing: Vec::new(),
             resources: Vec::new(),
             paths: Arc::new(Mutex::new(XPaths::new(root))),
-        }
+        })
     }
 
     /// Adds the documents that the root refers to, and those that could not be had.
@@ -118,9 +135,10 @@ impl<'d> Subject<'d> {
     pub fn read(mut self, reads: Reads) -> Subject<'d> {
         if reads == Reads::Expanded {
             let expanded = self.with_role(DocumentRole::Expanded).next();
-            let expanded = expanded.map(|expanded| expanded.document);
-            self.is_expanded = expanded.is_some();
-            self.root = expanded.unwrap_or(self.written);
+            if let Some(expanded) = expanded {
+                (self.root, self.image) = (expanded.document, &expanded.image.image);
+                self.is_expanded = true;
+            }
             self.paths = Arc::new(Mutex::new(XPaths::new(self.root)));
         }
         self
@@ -170,6 +188,11 @@ impl<'d> Subject<'d> {
     /// The document that is checked.
     pub fn root(&self) -> Document<'d> {
         self.root
+    }
+
+    /// The image of the document that is checked, for whoever keeps what he made of it longer than he was given it.
+    pub fn image(&self) -> &'d Image {
+        self.image
     }
 
     /// What the root file's name promises.

@@ -35,6 +35,16 @@ static PANICS: Rule<Document> = Rule {
     },
     ..Rule::DEFAULTS
 };
+static GIVES_UP: Rule<Document> = Rule {
+    id: "gives_up",
+    uids: &["x:xodr:1.0.0:a.l"],
+    run: |document, found| {
+        every_road(document, found);
+        found.fail("it raised KeyError: 'id'\nin line 3");
+        found.fail("and once more");
+    },
+    ..Rule::DEFAULTS
+};
 static AFTER_ERRORS: Rule<Document> = Rule {
     id: "after_errors",
     uids: &["x:xodr:1.0.0:a.d"],
@@ -114,6 +124,7 @@ impl Model for Unavailable {
 static RULES: &[&dyn AnyRule] = &[
     &FINDS_ERRORS,
     &PANICS,
+    &GIVES_UP,
     &AFTER_ERRORS,
     &AFTER_SKIPPED,
     &NEWER,
@@ -203,6 +214,13 @@ fn a_panic_is_that_checkers_error_and_keeps_what_was_found() {
         RULES.len() + 2,
         "the others go on"
     );
+}
+
+#[test]
+fn a_rule_that_gives_up_fails_its_checker_with_its_first_reason() {
+    let outcome = of("gives_up");
+    assert_eq!((outcome.status(), outcome.issues.len()), (Status::Error, 2));
+    assert_eq!(outcome.reason(), "it raised KeyError: 'id'\nin line 3");
 }
 
 #[test]

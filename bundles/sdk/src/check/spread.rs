@@ -35,7 +35,7 @@ type Looked = (Vec<Issue>, Outcome);
 struct Had<'r> {
     sink: Sink<'r>,
     took: Duration,
-    /// Where it panicked and what that said; it is not asked again.
+    /// Where it failed and why; it is not asked again.
     failed: Option<(u32, String)>,
 }
 
@@ -182,7 +182,11 @@ impl<'r> Tasks<'_, 'r> {
             None => self.built.run(turn.rule, sink),
             Some(part) => self.built.each(part, turn.rule, sink),
         });
-        had.failed = looked.err().map(|panic| (number, panic));
+        let failure = match looked {
+            Ok(()) => had.sink.take_failure(),
+            Err(panic) => Some(format!("the rule panicked: {panic}")),
+        };
+        had.failed = failure.map(|why| (number, why));
         let now = Instant::now();
         had.took += now.duration_since(*clock);
         *clock = now;
@@ -219,9 +223,7 @@ impl<'r> Tasks<'_, 'r> {
         let (issues, metadata) = sink.finish();
         let ending = match failed {
             None => Ending::Completed,
-            Some((_, panic)) => Ending::Failed {
-                reason: format!("the rule panicked: {panic}"),
-            },
+            Some((_, reason)) => Ending::Failed { reason },
         };
         let outcome = Outcome {
             ending,

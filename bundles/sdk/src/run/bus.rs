@@ -508,7 +508,7 @@ impl Daemon {
             run: self.runs + 1,
             kind: job.kind,
             plan: plan.clone(),
-            root,
+            root: Image::new(root),
             links,
             linked,
             missing: job.missing.clone(),

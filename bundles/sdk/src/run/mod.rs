@@ -63,6 +63,17 @@ impl Mode {
     ) -> Result<Mode, UsageError> {
         args::parse(arguments.into_iter())
     }
+
+    /// The same with so many threads, whatever was asked for: where a bundle's rules cannot run side by side.
+    #[must_use]
+    pub fn with_threads(mut self, count: usize) -> Mode {
+        match &mut self {
+            Mode::Bus(options) => options.threads = count,
+            Mode::File { threads, .. } | Mode::Module { threads, .. } => *threads = count,
+            Mode::Help => {}
+        }
+        self
+    }
 }
 
 /// Runs a bundle. What was found goes to stdout, everything else to stderr as log events.
@@ -128,11 +139,16 @@ fn with_files(
 ///
 /// Log events go wherever the program has sent them with a `tracing` subscriber.
 pub fn main(bundle: &'static Bundle) -> ExitCode {
-    match Mode::parse(std::env::args_os().skip(1)) {
-        Ok(mode) => run(bundle, mode).into(),
+    run_or_explain(bundle, Mode::parse(std::env::args_os().skip(1))).into()
+}
+
+/// Runs a bundle as its arguments say; says what is wrong with them when they say nothing.
+pub fn run_or_explain(bundle: &'static Bundle, mode: Result<Mode, UsageError>) -> Exit {
+    match mode {
+        Ok(mode) => run(bundle, mode),
         Err(error) => {
             complain(&format!("{}: {error}\n\n{USAGE}", bundle.name));
-            Exit::Usage.into()
+            Exit::Usage
         }
     }
 }

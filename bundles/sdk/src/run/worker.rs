@@ -6,8 +6,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use qcbus_bus::Held;
-use qcbus_document::{Document, FileKind};
+use qcbus_document::{FileKind, Image};
 use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::Issue;
 use qcbus_messages::{Link, MissingDocument};
@@ -25,7 +24,7 @@ pub(super) struct Work {
     pub run: u64,
     pub kind: FileKind,
     pub plan: Arc<Plan>,
-    pub root: Held,
+    pub root: Image,
     pub links: Vec<Link>,
     pub linked: Vec<LinkedImage>,
     pub missing: Vec<MissingDocument>,
@@ -182,14 +181,14 @@ fn one(
     shared: &Shared,
 ) -> Result<Vec<(u32, Vec<Issue>, Outcome)>, String> {
     let unopened = |what: &str, error| format!("failed to {error} ({what})");
-    let root = Document::open(&work.root).map_err(|error| unopened("the root", error))?;
     let linked = work.linked.iter().map(|linked| {
         let opened = linked.open(models);
         opened.map_err(|error| unopened(&linked.path, error))
     });
     let linked = linked.collect::<Result<Vec<_>, String>>()?;
     let bundle = work.plan.bundle();
-    let subject = Subject::new(root, work.kind, (bundle.version_of)(&root))
+    let subject = Subject::new(&work.root, work.kind, bundle.version_of)
+        .map_err(|error| unopened("the root", error))?
         .with(linked, work.missing.clone())
         .with_links(work.links.clone())
         .read(bundle.reads);
