@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use qcbus_document::FileKind;
 use serde::{Deserialize, Serialize};
 
-use crate::{Verdict, path_text};
+use crate::{Catalogue, Verdict, path_text};
 
 /// A command's request.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -38,6 +39,16 @@ pub enum Request {
     RemoveBundle {
         /// Its name.
         name: String,
+    },
+    /// How does this bundle stand that I have added or changed?
+    Bundle {
+        /// Its name.
+        name: String,
+    },
+    /// What do the bundles offer that are there?
+    Offers {
+        /// All but these, which whoever asks knows.
+        without: Vec<String>,
     },
 }
 
@@ -85,11 +96,86 @@ pub enum Response {
         /// What that means, for a person.
         what: String,
     },
+    /// Answer to `Bundle`; nothing when there is none of this name.
+    Bundle {
+        /// How it stands.
+        bundle: Option<Box<BundleStanding>>,
+    },
+    /// Answer to `Offers`.
+    Offers {
+        /// By name.
+        offers: Vec<Offer>,
+    },
     /// The request could not be carried out, and what stays in force.
     Failed {
         /// For a person.
         reason: String,
     },
+}
+
+/// How a bundle stands, of which a manifest says what is wanted.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct BundleStanding {
+    /// Its name.
+    pub name: String,
+    /// The command of the manifest that is in force; nothing when it was started by hand or comes with the program.
+    pub command: Option<String>,
+    /// Tells the files that this command runs, and all else of the manifest, from former ones.
+    pub spec: u64,
+    /// How the process of this very command stands.
+    pub standing: Standing,
+    /// Who judges at the moment, be it an older process; nothing when nobody does.
+    pub runs: Option<Runs>,
+}
+
+/// How the process stands that is wanted of a bundle.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "standing", rename_all = "kebab-case")]
+pub enum Standing {
+    /// It has joined, has said what it checks, and is asked from now on.
+    Ready,
+    /// It is being started, and nothing has gone wrong so far.
+    Coming {
+        /// It has said hello, and not yet what it checks.
+        joined: bool,
+    },
+    /// It was started in vain; the broker tries again.
+    Failing {
+        /// Why, for a person.
+        why: String,
+    },
+}
+
+impl Default for Standing {
+    fn default() -> Standing {
+        Standing::Coming { joined: false }
+    }
+}
+
+/// A process of a bundle that judges.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Runs {
+    /// Its version.
+    pub version: String,
+    /// Its process.
+    pub pid: u32,
+    /// How many checkers it offers.
+    pub checkers: u64,
+    /// The root files that it takes.
+    pub kinds: Vec<FileKind>,
+    /// How many of its checkers are asked under the configuration in force.
+    pub demanded: u64,
+}
+
+/// What a bundle offers that is there.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Offer {
+    /// Its name.
+    pub name: String,
+    /// Its version.
+    pub version: String,
+    /// What it checks.
+    pub catalogue: Catalogue,
 }
 
 /// Under what a file is checked. A broker of the same program that works under equal terms finds the same.

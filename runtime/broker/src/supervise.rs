@@ -433,6 +433,7 @@ mod tests {
             command: command.iter().map(|it| (*it).to_owned()).collect(),
             restart: Restart::Never,
             may: Default::default(),
+            programs: Vec::new(),
         }
     }
 

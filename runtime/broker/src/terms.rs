@@ -87,6 +87,7 @@ mod tests {
             command: arguments.iter().map(|it| (*it).to_owned()).collect(),
             restart: Restart::Always,
             may: May::default(),
+            programs: Vec::new(),
         }
     }
 

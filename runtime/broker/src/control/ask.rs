@@ -163,7 +163,11 @@ fn limit_of(request: &Request) -> Option<Duration> {
         Request::Wait { timeout_ms, .. } => {
             timeout_ms.map(|limit| Duration::from_millis(limit) + GRACE)
         }
-        Request::Status | Request::Reload | Request::RemoveBundle { .. } => Some(AT_ONCE),
+        Request::Status
+        | Request::Reload
+        | Request::RemoveBundle { .. }
+        | Request::Bundle { .. }
+        | Request::Offers { .. } => Some(AT_ONCE),
         Request::Check { .. } => Some(CHECKED_WITHIN),
         Request::Down => None,
     }

@@ -109,6 +109,7 @@ impl State {
             bundle.announced = None;
             bundle.note.clear();
             bundle.believed = bundle.launch.map(Launch::started);
+            self.is_ready(name);
             self.enrol(name, actions);
         }
     }

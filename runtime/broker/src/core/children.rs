@@ -23,6 +23,8 @@ pub(super) struct Child {
     pub failures: u32,
     /// Why it does not get as far as to join; nobody waits for it meanwhile.
     stuck: Option<String>,
+    /// Why the process that is wanted was last not ready, since it was last ready or became wanted.
+    pub trouble: Option<String>,
     pub restarts: u32,
     /// A newer process that will take over once it has joined.
     pub upgrade: Option<Upgrade>,
@@ -57,21 +59,30 @@ impl Child {
             starts: VecDeque::new(),
             failures: 0,
             stuck: None,
+            trouble: None,
             restarts: 0,
             upgrade: None,
         }
     }
 
-    /// Takes a new manifest. A process that runs goes on until a newer one has joined; one that was
-    /// started and has not joined is of the manifest before, and is returned: nobody wants it.
-    fn respecify(&mut self, spec: ChildSpec, now: Duration) -> Option<Launch> {
+    /// Takes a new manifest. A process that runs goes on until a newer one has joined, and for good when it is what
+    /// the manifest wants (somebody has taken back what he had changed); one that was started and has not
+    /// joined is of the manifest before, and is returned: nobody wants it.
+    fn respecify(
+        &mut self,
+        spec: ChildSpec,
+        runs: Option<Launch>,
+        now: Duration,
+    ) -> Option<Launch> {
         let unwanted = self.starting().map(|(launch, _)| launch);
         self.spec = spec;
         self.failures = 0;
         self.stuck = None;
+        self.trouble = None;
         self.starts.clear();
+        let is_wanted = runs.is_some_and(|it| it.is_of(&self.spec));
         match self.state {
-            ChildState::Joined => self.upgrade = Some(Upgrade::Due(now)),
+            ChildState::Joined => self.upgrade = (!is_wanted).then_some(Upgrade::Due(now)),
             _ => self.state = ChildState::Due(now),
         }
         unwanted
@@ -118,10 +129,11 @@ impl State {
         }
         let due = self.now.max(self.settings.collect);
         for spec in specs {
+            let runs = self.runs_as(&spec.name);
             match self.children.get_mut(&spec.name) {
                 Some(child) if child.spec == spec => {}
                 Some(child) => {
-                    let unwanted = child.respecify(spec, self.now);
+                    let unwanted = child.respecify(spec, runs, self.now);
                     actions.extend(unwanted.map(Action::kill_unjoined));
                 }
                 None => {
@@ -132,6 +144,15 @@ impl State {
         }
         self.enrol_children(actions);
         self.watch_children(actions);
+    }
+
+    /// What the process of this name that has joined was started as.
+    fn runs_as(&self, name: &str) -> Option<Launch> {
+        let bundle = self.bundles.get(name).filter(|it| it.session.is_some());
+        let reporter = self.reporter_named(name).filter(|it| it.session.is_some());
+        bundle
+            .and_then(|it| it.launch)
+            .or_else(|| reporter.and_then(|it| it.launch))
     }
 
     /// A child is no longer wanted: what runs of it is told to go.
@@ -180,7 +201,9 @@ impl State {
         let Some(child) = self.children.get_mut(name) else {
             return;
         };
-        child.upgrade = None;
+        if child.upgrade.take().is_none() {
+            child.trouble = Some("it took its leave".to_owned());
+        }
         child.state = if child.spec.restart == Restart::Always && !draining {
             ChildState::Due(self.now + self.settings.backoff)
         } else {
@@ -202,8 +225,11 @@ impl State {
             return;
         };
         // The next start is of the newest manifest anyway.
-        if let Some(Upgrade::Starting(launch, _)) = child.upgrade.take() {
-            actions.push(Action::kill_unjoined(launch));
+        match child.upgrade.take() {
+            Some(Upgrade::Starting(launch, _)) => actions.push(Action::kill_unjoined(launch)),
+            Some(Upgrade::Due(_)) => {}
+            // It was the one that is wanted.
+            None => child.trouble = Some(why.to_owned()),
         }
         if child.spec.restart == Restart::Never || draining {
             child.state = ChildState::Ended;
@@ -291,6 +317,7 @@ impl State {
         if gives_up {
             child.stuck = Some(end.how().to_owned());
         }
+        child.trouble = Some(end.how().to_owned());
         if matches!(end, ChildEnd::Done(_)) && child.spec.restart != Restart::Always {
             child.state = ChildState::Due(now + most);
         } else {

@@ -29,6 +29,7 @@ mod reporters;
 mod roster;
 mod settings;
 mod staging;
+mod standing;
 mod status;
 mod suspects;
 mod types;

@@ -125,6 +125,7 @@ fn spec(version: u8) -> ChildSpec {
         command: vec!["text".to_owned()],
         restart: Restart::OnFailure,
         may: Default::default(),
+        programs: Vec::new(),
     }
 }
 

@@ -294,15 +294,21 @@ pub struct ChildSpec {
     pub restart: Restart,
     /// What it may do although it is confined.
     pub may: May,
+    /// The files that the command of a manifest runs, as they were when it was read. What comes with the
+    /// program has none.
+    pub programs: Vec<(PathBuf, Option<Stamp>)>,
 }
 
 impl ChildSpec {
-    /// Tells command and version from others, in as many bits as a launch has for it.
+    /// Tells command, version and programs from others, in as many bits as a launch has for it.
     pub fn digest(&self) -> u64 {
         let mut hash = Sha256::new();
         hash.update(format!("{:?}{:?}", self.version, self.command));
         if self.may != May::default() {
             hash.update(format!("{:?}", self.may));
+        }
+        if !self.programs.is_empty() {
+            hash.update(format!("{:?}", self.programs));
         }
         let digest = hash.finalize();
         let first = digest.iter().take(8);

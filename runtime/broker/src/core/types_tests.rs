@@ -9,6 +9,7 @@ fn spec(command: &str) -> ChildSpec {
         command: vec![command.to_owned()],
         restart: Restart::Always,
         may: Default::default(),
+        programs: Vec::new(),
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use qcbus_messages::control::{Request, Response, Status, Terms, Unseen};
+use qcbus_messages::control::{BundleStanding, Request, Response, Status, Terms, Unseen};
 use tokio::sync::oneshot;
 
 use super::looks::{Look, Sighted};
@@ -13,7 +13,7 @@ use crate::control::Asked;
 use crate::core::{Errand, Event, Notice, Stamp, Ticket};
 use crate::demand::InForce;
 use crate::gate::Gate;
-use crate::reload::{Fingerprint, LoadError, differences};
+use crate::reload::{Fingerprint, LoadError, command_of, differences};
 use crate::terms::{differs, terms};
 
 /// Most that is told of what could not be looked at.
@@ -23,7 +23,11 @@ impl Broker {
     pub(super) fn asked(&mut self, asked: Asked) -> bool {
         let only_tells = matches!(
             asked.request,
-            Request::Status | Request::Wait { .. } | Request::Check { .. }
+            Request::Status
+                | Request::Wait { .. }
+                | Request::Check { .. }
+                | Request::Bundle { .. }
+                | Request::Offers { .. }
         );
         if only_tells && asked.answer.is_closed() {
             // Nobody is there to be told.
@@ -69,7 +73,28 @@ impl Broker {
                 let ticket = self.ticket(asked.answer);
                 self.handle(Event::RemoveBundle { ticket, name })
             }
+            Request::Bundle { name } => {
+                let bundle = self.standing(&name).map(Box::new);
+                let _ = asked.answer.send(Response::Bundle { bundle });
+                true
+            }
+            Request::Offers { without } => {
+                let mut offers = self.state.offers();
+                offers.retain(|it| !without.contains(&it.name));
+                let _ = asked.answer.send(Response::Offers { offers });
+                true
+            }
         }
+    }
+
+    /// How a bundle stands, with what the manifest in force says of it.
+    fn standing(&self, name: &str) -> Option<BundleStanding> {
+        let mut standing = self.state.standing(name)?;
+        if let Some(spec) = self.loaded.children.iter().find(|it| it.name == name) {
+            standing.command = command_of(&spec.command).map(str::to_owned);
+            standing.spec = spec.digest();
+        }
+        Some(standing)
     }
 
     /// A client wants a file checked as it would do it itself.

@@ -22,7 +22,7 @@ use crate::stamp::stamp_through_links;
 
 pub use differences::differences;
 use modules::{add_module, read_manifest};
-pub use programs::ready;
+pub use programs::{command_of, ready};
 
 /// Largest configuration or manifest, in bytes.
 const MAX_FILE: u64 = 16 << 20;
@@ -58,7 +58,7 @@ pub struct Loaded {
     pub oddities: Vec<Oddity>,
     /// What is odd about anything, that included, for a person.
     pub notices: Vec<String>,
-    /// Every file that was read for it, with its stamp from before.
+    /// Every file that was read for it, and every program that is to run, with its stamp from before.
     pub read: Fingerprint,
     /// Which manifest brought which child.
     brought: BTreeMap<String, String>,
@@ -108,6 +108,7 @@ impl Sources {
             // Who may write to it is no file's stamp.
             note(&mut loaded, directory);
         }
+        let with_the_program = loaded.children.len();
         let manifests = self.manifests(&mut loaded.notices)?;
         loaded.manifests = self
             .directory()
@@ -118,6 +119,14 @@ impl Sources {
             for module in modules {
                 add_module(module, &mut loaded)?;
             }
+        }
+        for child in &mut loaded.children[with_the_program..] {
+            let stamped = |path: PathBuf| (path.clone(), stamp_through_links(&path));
+            child.programs = programs::files_of(&child.command)
+                .into_iter()
+                .map(stamped)
+                .collect();
+            loaded.read.extend(child.programs.iter().cloned());
         }
         if let Some((path, parsed)) = parsed {
             loaded.oddities = parsed.all_oddities(&self.known_with(&loaded.children));

@@ -95,5 +95,6 @@ fn spec_of(module: Module, role: Role) -> ChildSpec {
         role,
         restart,
         may: module.may,
+        programs: Vec::new(),
     }
 }

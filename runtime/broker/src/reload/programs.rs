@@ -1,5 +1,6 @@
 //! The programs of manifests: what a command runs must be in the broker's hands alone.
 
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::str::CharIndices;
 
@@ -25,17 +26,52 @@ pub(super) fn look_at(command: &str) -> Result<(), String> {
     resolve(command).map(drop)
 }
 
+/// What a manifest says that is run; `None` for what comes with the program.
+pub fn command_of(words: &[String]) -> Option<&str> {
+    let [_, _, line, _] = words else {
+        return None;
+    };
+    line.strip_prefix(BEFORE)?.strip_suffix(BEHIND)
+}
+
+/// The files that a child runs: the program of its manifest, there or not, and the script that it gives it.
+pub(super) fn files_of(words: &[String]) -> Vec<PathBuf> {
+    let mut words = Words {
+        rest: command_of(words).unwrap_or_default(),
+    };
+    let Some(program) = words.next_word() else {
+        return Vec::new();
+    };
+    let program = find(&program).unwrap_or_else(|| absolute(Path::new(&program)));
+    let script = first_file(&mut words).filter(|it| is_script(it));
+    std::iter::once(program).chain(script).collect()
+}
+
+/// The first word that is no option, as a path.
+fn first_file(words: &mut Words<'_>) -> Option<PathBuf> {
+    let word = std::iter::from_fn(|| words.next_word()).find(|word| !word.starts_with('-'));
+    word.map(|it| absolute(Path::new(&it)))
+}
+
+/// Whether a file is run by the program that it is given to. One that it writes to, such as its log, changes all
+/// the time, and must not make an upgrade each time.
+fn is_script(file: &Path) -> bool {
+    let begins_as_one = || {
+        let mut begin = [0; 2];
+        let opened = std::fs::File::open(file);
+        opened.is_ok_and(|mut it| it.read_exact(&mut begin).is_ok()) && begin == *b"#!"
+    };
+    let is_named_as_one = file.extension().is_some_and(|it| it == "py");
+    file.is_file() && (is_named_as_one || is_executable(file) || begins_as_one())
+}
+
 /// The words that start a child, after a last look at a manifest's program: it is named by where it was
 /// found, so that nothing is looked for between the look and the start.
 ///
 /// # Errors
 /// As [`look_at`], and when there is no such program.
 pub fn ready(words: &[String]) -> Result<Vec<String>, String> {
-    let [shell, flag, line, name] = words else {
-        return Ok(words.to_vec());
-    };
-    let inner = line.strip_prefix(BEFORE);
-    let Some(command) = inner.and_then(|it| it.strip_suffix(BEHIND)) else {
+    let ([shell, flag, _, name], Some(command)) = (words, command_of(words)) else {
         return Ok(words.to_vec());
     };
     let Some((program, rest)) = resolve(command)? else {
@@ -74,10 +110,7 @@ fn resolve(command: &str) -> Result<Option<(String, &str)>, String> {
         return Ok(None);
     };
     believe(&found)?;
-    let options = |word: &String| word.starts_with('-');
-    let script = std::iter::from_fn(|| words.next_word()).find(|word| !options(word));
-    let script = script.map(|it| absolute(Path::new(&it)));
-    if let Some(script) = script.filter(|it| it.is_file()) {
+    if let Some(script) = first_file(&mut words).filter(|it| it.is_file()) {
         believe(&script)?;
     }
     let found = found.into_os_string().into_string();
@@ -97,11 +130,13 @@ fn absolute(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf())
 }
 
+fn is_executable(path: &Path) -> bool {
+    rustix::fs::access(path, rustix::fs::Access::EXEC_OK).is_ok()
+}
+
 /// Where the shell finds a program.
 fn find(program: &str) -> Option<PathBuf> {
-    let is_program = |path: &PathBuf| {
-        path.is_file() && rustix::fs::access(path, rustix::fs::Access::EXEC_OK).is_ok()
-    };
+    let is_program = |path: &PathBuf| path.is_file() && is_executable(path);
     if program.contains('/') {
         return Some(absolute(Path::new(program))).filter(is_program);
     }
@@ -236,6 +271,26 @@ mod tests {
         assert!(unclear.contains("path of the program"), "{unclear}");
         let other = ["program".to_owned(), "x".to_owned()];
         assert_eq!(super::ready(&other).unwrap(), other);
+    }
+
+    #[test]
+    fn the_files_of_a_command_are_its_program_and_its_script() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        std::fs::write(at("rules.py"), "pass").unwrap();
+        std::fs::write(at("script"), "#!/bin/sh\n").unwrap();
+        std::fs::write(at("log"), "it grows").unwrap();
+        let shell = find("sh").unwrap();
+        let files = |line: &str| {
+            let line = line.replace("DIR", &dir.path().to_string_lossy());
+            files_of(&shell_command(&line))
+        };
+        assert_eq!(files("DIR/nothing here"), [at("nothing")]);
+        assert_eq!(files("sh -e DIR/script"), [shell.clone(), at("script")]);
+        assert_eq!(files("sh DIR/rules.py"), [shell.clone(), at("rules.py")]);
+        assert_eq!(files("sh --log DIR/log"), [shell]);
+        assert_eq!(files("$(cat x)"), [PathBuf::new(); 0]);
+        assert_eq!(files_of(&["program".to_owned()]), [PathBuf::new(); 0]);
     }
 
     #[test]

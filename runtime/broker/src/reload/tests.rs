@@ -23,6 +23,7 @@ fn child(name: &str) -> ChildSpec {
         command: vec!["program".to_owned()],
         restart: Restart::Always,
         may: Default::default(),
+        programs: Vec::new(),
     }
 }
 
@@ -114,6 +115,32 @@ fn a_manifest_that_another_lists_is_looked_at_too() {
     assert_eq!(sources.fingerprint(&old), old.read);
     std::fs::write(&listed, manifest("another", "bus")).unwrap();
     assert_ne!(sources.fingerprint(&old), old.read);
+}
+
+#[test]
+fn a_program_that_was_replaced_is_another_child() {
+    let dir = tempfile::tempdir().unwrap();
+    let sources = sources(dir.path());
+    let program = dir.path().join("mine");
+    let mine = manifest("mine", "bus").replace("/opt/mine", &program.to_string_lossy());
+    put(dir.path(), CONFIG, &[("a.json", &mine)]);
+    let missing = sources.load().unwrap();
+    std::fs::write(&program, "one").unwrap();
+    assert_ne!(sources.fingerprint(&missing), missing.read, "it has come");
+    let old = sources.load().unwrap();
+    assert_eq!(sources.fingerprint(&old), old.read);
+    let aside = dir.path().join("aside");
+    std::fs::write(&aside, "two").unwrap();
+    std::fs::rename(&aside, &program).unwrap();
+    assert_ne!(sources.fingerprint(&old), old.read);
+    let new = sources.load().unwrap();
+    assert_eq!(differences(&old, &new), ["changed mine"]);
+    let digest = |loaded: &Loaded| loaded.children.last().unwrap().digest();
+    assert_ne!(digest(&old), digest(&new));
+    assert_eq!(
+        old.children[0], new.children[0],
+        "those that come with qcbus"
+    );
 }
 
 #[test]

@@ -34,6 +34,7 @@ pub fn children() -> Vec<ChildSpec> {
         command: vec![name.to_owned()],
         restart: Restart::Always,
         may: May::default(),
+        programs: Vec::new(),
     };
     vec![child(FIRST, Role::Bundle), child(REPORTER, Role::Reporter)]
 }

@@ -40,6 +40,7 @@ pub fn reporter() -> ChildSpec {
         command: vec!["text".to_owned()],
         restart: Restart::Always,
         may: Default::default(),
+        programs: Vec::new(),
     }
 }
 

@@ -40,6 +40,7 @@ pub fn child(version: u8) -> ChildSpec {
         command: vec!["child".to_owned()],
         restart: Restart::Always,
         may: Default::default(),
+        programs: Vec::new(),
     }
 }
 
