@@ -40,7 +40,7 @@ pub enum Command {
     Wait(WaitArgs),
     /// Let a running broker read its configuration and bundle manifests again
     Reload(InstanceArgs),
-    /// List, run, add or remove checker bundles
+    /// List, run, add, upgrade or remove checker bundles
     #[command(subcommand)]
     Bundle(BundleCommand),
     /// Report on results that are there already, also ASAM's own
@@ -463,10 +463,14 @@ pub enum BundleCommand {
     List(StatusArgs),
     /// Run a bundle: on the bus, on one FILE, or as an ASAM module with -c
     Run(BundleRunArgs),
-    /// Let a running broker start one more bundle
+    /// Let a running broker start one more bundle, and say whether it is ready
     Add(BundleAddArgs),
+    /// Let a running broker go over to the newer program of a bundle that was added
+    Upgrade(BundleUpgradeArgs),
     /// Let a running broker drain a bundle that was added
     Remove(BundleRemoveArgs),
+    /// Make a directory with a bundle of one's own, which runs and has a rule, its page and a test
+    New(BundleNewArgs),
 }
 
 /// `qcbus bundle run`.
@@ -505,17 +509,63 @@ pub struct BusArgs {
 
 /// `qcbus bundle add`.
 #[derive(Debug, ClapArgs)]
-#[command(after_help = "Example:\n  \
-qcbus bundle add mine /opt/mine/bundle -- --its-own-flag")]
+#[command(
+    after_help = "A bundle that does not become ready is taken out again, for what it would judge would be \
+undetermined.\n\nExamples:\n  \
+qcbus bundle add mine /opt/mine/bundle -- --its-own-flag\n  \
+qcbus bundle add rules ./rules.py       with the python3 that is found here"
+)]
 pub struct BundleAddArgs {
     /// The bundle's name, as it says it itself
     pub name: String,
-    /// The program and its arguments; put `--` before arguments that begin with `-`
+    /// The program (or script.py) and its arguments; put `--` before arguments that begin with `-`
     #[arg(required = true)]
     pub command: Vec<String>,
+    /// Leave it in when it does not become ready
+    #[arg(long)]
+    pub keep: bool,
+    /// Wait this long until it is ready
+    #[arg(long, value_name = "TIME", default_value = "30s", value_parser = duration)]
+    pub timeout: Duration,
     /// Which broker, and which directory.
     #[command(flatten)]
     pub manifests: ManifestArgs,
+}
+
+/// `qcbus bundle upgrade`.
+#[derive(Debug, ClapArgs)]
+#[command(
+    after_help = "The process before goes on until the newer one is ready. A program that is replaced at \
+its path is noticed\nwithout this command, too; this one says what became of it."
+)]
+pub struct BundleUpgradeArgs {
+    /// The bundle's name
+    pub name: String,
+    /// Another program and its arguments; without, what lies at the path of the one before
+    pub command: Vec<String>,
+    /// Leave the other program in the manifest when it does not become ready
+    #[arg(long)]
+    pub keep: bool,
+    /// Wait this long until it is ready
+    #[arg(long, value_name = "TIME", default_value = "30s", value_parser = duration)]
+    pub timeout: Duration,
+    /// Which broker.
+    #[command(flatten)]
+    pub instance: InstanceArgs,
+}
+
+/// `qcbus bundle new`.
+#[derive(Debug, ClapArgs)]
+#[command(group = clap::ArgGroup::new("language").required(true))]
+pub struct BundleNewArgs {
+    /// The bundle's name; the directory is called so, too
+    pub name: String,
+    /// In Rust, with the SDK of a checkout of qcbus
+    #[arg(long, group = "language")]
+    pub rust: bool,
+    /// The checkout of qcbus whose SDK it is built with (default: the one that this program was built from)
+    #[arg(long, value_name = "DIR")]
+    pub sdk: Option<PathBuf>,
 }
 
 /// Where the manifest of a bundle lies.
@@ -579,11 +629,14 @@ pub struct ReportArgs {
 /// `qcbus rule`.
 #[derive(Debug, ClapArgs)]
 pub struct RuleArgs {
-    /// A checker id or a rule UID
+    /// A checker id, a rule UID, or the end of one
     pub id: Option<String>,
     /// How to print it
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
+    /// Which broker to ask about the rules of other bundles.
+    #[command(flatten)]
+    pub instance: InstanceArgs,
 }
 
 /// `qcbus expand`.

@@ -1,24 +1,29 @@
 //! `qcbus bundle add` and `qcbus bundle remove`: the manifests that a broker watches for. Success
-//! means that the broker has taken it, or, with `--offline`, is said not to mean that.
+//! means that the broker has taken it and, of what was added, that it is ready; or, with `--offline`, is said
+//! not to mean that.
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use qcbus_broker::control::{AskError, ask_broker};
 use qcbus_bus::Instance;
 use qcbus_disk::write_whole;
+use qcbus_messages::Exit;
 use qcbus_messages::control::{Request, Response};
 use qcbus_messages::path_text::to_text;
-use qcbus_messages::{Exit, shown};
-use rustix::fs::{Access, access};
+use rustix::fs::{Access, FlockOperation, access, flock};
+use rustix::io::Errno;
 
+use super::readiness;
 use super::settings::{absolute, instance, real};
 use crate::args::{BundleAddArgs, BundleRemoveArgs, ManifestArgs};
 use crate::talk;
 
 /// Why nothing was done, and what to do.
-type Refusal = (Exit, String);
+pub(super) type Refusal = (Exit, String);
 
-fn usage(why: impl Into<String>) -> Refusal {
+pub(super) fn usage(why: impl Into<String>) -> Refusal {
     (Exit::Usage, why.into())
 }
 
@@ -32,7 +37,7 @@ pub fn remove(args: &BundleRemoveArgs) -> Exit {
     said(try_remove(args))
 }
 
-fn said(done: Result<String, Refusal>) -> Exit {
+pub(super) fn said(done: Result<String, Refusal>) -> Exit {
     match done {
         Ok(text) => {
             talk::say_lines(&text);
@@ -46,42 +51,59 @@ fn said(done: Result<String, Refusal>) -> Exit {
 }
 
 fn try_add(args: &BundleAddArgs) -> Result<String, Refusal> {
-    let good = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
     let name = &args.name;
-    if name.is_empty() || name.starts_with('.') || !name.chars().all(good) {
-        return Err(usage(format!(
-            "`{name}` is no name for a bundle: use A-Z a-z 0-9 . _ -, and no dot at the start"
-        )));
-    }
-    let text = manifest(name, &args.command)?;
+    good_name(name)?;
+    let command = command_line(&args.command)?;
     let home = Home::find(&args.manifests)?;
+    // What cannot be made is said by whoever writes into it.
+    let _ = std::fs::create_dir_all(&home.directory);
+    let _alone = home.alone()?;
     let path = home.manifest(name);
     let before = std::fs::read(&path).ok();
     let shown = to_text(&path);
-    write_whole(&path, text.as_bytes(), true).map_err(|error| {
+    write_whole(&path, manifest(name, &command).as_bytes(), true).map_err(|error| {
         let why = format!("cannot write {shown}: {error}; nothing was added");
         (Exit::Internal, why)
     })?;
-    match home.reload() {
-        Ok(Some(notices)) => {
-            let about = format!("`{name}`");
-            let about = notices.iter().filter(|it| it.contains(&about));
-            let said: Vec<String> = about.map(|it| format!("\n{}", shown::line(it))).collect();
-            let said = said.concat();
-            Ok(format!(
-                "{shown} written; the broker starts the bundle{said}"
-            ))
-        }
-        Ok(None) => Ok(format!("{shown} written, but {}", home.unwatched)),
+    let notices = match home.reload() {
+        Ok(Some(notices)) => notices,
+        Ok(None) => return Ok(format!("{shown} written, but {}", home.unwatched)),
         Err((exit, why)) => {
             put_back(&path, before.as_deref());
-            Err((exit, format!("nothing was added: {why}")))
+            return Err((exit, format!("nothing was added: {why}")));
+        }
+    };
+    match readiness::wait(&home, name, &command, args.timeout) {
+        Ok(runs) => Ok(readiness::ready(name, &runs, "", &notices)),
+        Err((exit, why)) if args.keep => Err((
+            exit,
+            format!(
+                "`{name}` is not ready: {why}; {shown} stays, and what it would judge is undetermined \
+                 until it is (`qcbus bundle remove {name}` takes it out)"
+            ),
+        )),
+        Err((exit, why)) => {
+            let then = home.take_back(&path, before.as_deref());
+            let why = format!("`{name}` is not ready: {why}; {then} (--keep leaves it in)");
+            Err((exit, why))
         }
     }
 }
 
+/// A name that is that of a file, too.
+pub(super) fn good_name(name: &str) -> Result<(), Refusal> {
+    let good = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
+    if !name.is_empty() && !name.starts_with('.') && name.chars().all(good) {
+        return Ok(());
+    }
+    Err(usage(format!(
+        "`{name}` is no name for a bundle: use A-Z a-z 0-9 . _ -, and no dot at the start"
+    )))
+}
+
 fn try_remove(args: &BundleRemoveArgs) -> Result<String, Refusal> {
     let home = Home::find(&args.manifests)?;
+    let _alone = home.alone()?;
     let path = home.manifest(&args.name);
     let shown = to_text(&path);
     let before = match std::fs::read(&path) {
@@ -115,7 +137,7 @@ fn put_back(path: &Path, before: Option<&[u8]>) {
 }
 
 /// The directory of manifests, and who looks at it.
-struct Home {
+pub(super) struct Home {
     directory: PathBuf,
     /// Where the broker that watches the directory listens; `None` when none does.
     broker: Option<PathBuf>,
@@ -124,7 +146,7 @@ struct Home {
 }
 
 impl Home {
-    fn find(args: &ManifestArgs) -> Result<Home, Refusal> {
+    pub fn find(args: &ManifestArgs) -> Result<Home, Refusal> {
         let given = args.bundles_d.as_deref().map(absolute);
         let instance = instance(&args.instance).map_err(usage)?;
         let (exit, why) = match Home::watched(&instance, given.as_deref()) {
@@ -178,12 +200,54 @@ impl Home {
         })
     }
 
-    fn manifest(&self, name: &str) -> PathBuf {
+    /// Where the broker listens that watches the directory.
+    pub fn broker(&self) -> Option<&Path> {
+        self.broker.as_deref()
+    }
+
+    /// Where the manifest of a bundle lies.
+    pub fn manifest(&self, name: &str) -> PathBuf {
         self.directory.join(format!("{name}.json"))
     }
 
+    /// Keeps other commands from changing manifests here until it is dropped: none may take for its own what another
+    /// has written, or take it back.
+    pub fn alone(&self) -> Result<Option<File>, Refusal> {
+        let shown = to_text(&self.directory);
+        let Ok(directory) = File::open(&self.directory) else {
+            // It is made by whoever writes the first; then there is nothing to take for one's own.
+            return Ok(None);
+        };
+        let begin = Instant::now();
+        loop {
+            match flock(&directory, FlockOperation::NonBlockingLockExclusive) {
+                Err(Errno::WOULDBLOCK) if begin.elapsed() < OTHERS => std::thread::sleep(PAUSE),
+                Err(Errno::WOULDBLOCK) => {
+                    let why = format!(
+                        "nothing was done: another command has been changing {shown} for {} s; try \
+                         again when it is done",
+                        OTHERS.as_secs()
+                    );
+                    return Err((Exit::Undetermined, why));
+                }
+                // Where nobody can lock, nobody is kept out.
+                Ok(()) | Err(_) => return Ok(Some(directory)),
+            }
+        }
+    }
+
+    /// Puts a manifest back as it was before, and says what is in force then.
+    pub fn take_back(&self, path: &Path, before: Option<&[u8]>) -> String {
+        put_back(path, before);
+        match self.reload() {
+            Ok(_) if before.is_some() => "its manifest from before is in force again".to_owned(),
+            Ok(_) => "it was taken out again, and what was in force before is in force".to_owned(),
+            Err((_, why)) => format!("it was taken out again, but {why}"),
+        }
+    }
+
     /// Whether a broker has taken what was done, and what it has to say then.
-    fn reload(&self) -> Result<Option<Vec<String>>, Refusal> {
+    pub fn reload(&self) -> Result<Option<Vec<String>>, Refusal> {
         let Some(broker) = &self.broker else {
             return Ok(None);
         };
@@ -219,27 +283,55 @@ impl Home {
 /// Where manifests lie for a broker with the default options.
 const OFFLINE: &str = "qcbus-out/.qcbus/bundles.d";
 
-/// The text of a manifest. The program is named by its whole path: the broker may run elsewhere
-/// and search elsewhere.
-fn manifest(name: &str, command: &[String]) -> Result<String, Refusal> {
-    let Some((program, arguments)) = command.split_first() else {
-        return Err(usage("no program is named"));
-    };
-    let program = find_program(program).map_err(usage)?;
-    let Some(program) = program.to_str() else {
-        let shown = to_text(&program);
-        return Err(usage(format!("{shown}: a manifest takes UTF-8 only")));
-    };
-    let words = std::iter::once(program).chain(arguments.iter().map(String::as_str));
-    let quoted: Vec<String> = words.map(quote).collect();
+/// How long the commands of others are waited for.
+const OTHERS: Duration = Duration::from_secs(60);
+
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// The text of a manifest.
+fn manifest(name: &str, command: &str) -> String {
     let manifest = serde_json::json!({"module": [{
         "name": name,
         "exec_type": "executable",
         "module_type": "checker_bundle",
-        "exec_command": quoted.join(" "),
+        "exec_command": command,
         "mode": "bus",
     }]});
-    Ok(format!("{manifest:#}\n"))
+    format!("{manifest:#}\n")
+}
+
+/// The command of a manifest. Programs are named by their whole path: the broker may run elsewhere and
+/// search elsewhere. So is the interpreter of a script in Python, which decides what it can import.
+pub(super) fn command_line(words: &[String]) -> Result<String, Refusal> {
+    let Some((program, arguments)) = words.split_first() else {
+        return Err(usage("no program is named"));
+    };
+    let script = Path::new(program);
+    let programs = if script.extension().is_some_and(|it| it == "py") {
+        vec![find_program("python3").map_err(usage)?, script_at(script)?]
+    } else {
+        vec![find_program(program).map_err(usage)?]
+    };
+    let mut quoted = Vec::new();
+    for program in &programs {
+        let Some(program) = program.to_str() else {
+            let shown = to_text(program);
+            return Err(usage(format!("{shown}: a manifest takes UTF-8 only")));
+        };
+        quoted.push(quote(program));
+    }
+    quoted.extend(arguments.iter().map(|it| quote(it)));
+    Ok(quoted.join(" "))
+}
+
+fn script_at(script: &Path) -> Result<PathBuf, Refusal> {
+    let path = absolute(script);
+    let shown = to_text(&path);
+    match std::fs::metadata(&path) {
+        Ok(data) if data.is_file() => Ok(path),
+        Ok(_) => Err(usage(format!("cannot run {shown}: it is no file"))),
+        Err(error) => Err(usage(format!("cannot run {shown}: {error}"))),
+    }
 }
 
 /// Where a program lies that can be run.

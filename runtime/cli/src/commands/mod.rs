@@ -6,7 +6,10 @@ mod config;
 mod doctor;
 mod expand;
 mod manifests;
+mod new;
+mod offered;
 mod pack;
+mod readiness;
 mod remote;
 mod report;
 mod reporter;
@@ -16,6 +19,7 @@ mod serve;
 mod settings;
 mod status;
 mod stops;
+mod upgrade;
 
 use std::ffi::OsString;
 
@@ -54,7 +58,9 @@ pub fn run(args: Args) -> Exit {
         Command::Bundle(BundleCommand::List(args)) => bundle::list(&args),
         Command::Bundle(BundleCommand::Run(args)) => bundle::run(args),
         Command::Bundle(BundleCommand::Add(args)) => manifests::add(&args),
+        Command::Bundle(BundleCommand::Upgrade(args)) => upgrade::run(&args),
         Command::Bundle(BundleCommand::Remove(args)) => manifests::remove(&args),
+        Command::Bundle(BundleCommand::New(args)) => new::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Reporter(ReporterCommand::Run { name, bus }) => reporter::run(name, &bus),
         Command::Rule(args) => rule::run(&args),

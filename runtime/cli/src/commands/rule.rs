@@ -5,18 +5,26 @@ use std::fmt::Write;
 use qcbus_messages::Exit;
 use qcbus_sdk::{Bundle, Checker};
 
+use super::offered::{self, Offered};
 use crate::args::{Format, RuleArgs};
 use crate::{standard, talk};
 
 /// Runs the command.
 pub fn run(args: &RuleArgs) -> Exit {
+    let offered = match Offered::ask(&args.instance) {
+        Ok(offered) => offered,
+        Err(why) => {
+            talk::fail(&why);
+            return Exit::Usage;
+        }
+    };
     match &args.id {
-        None => list(args.format),
-        Some(id) => show(id, args.format),
+        None => list(&offered, args.format),
+        Some(id) => show(id, &offered, args.format),
     }
 }
 
-fn list(format: Format) -> Exit {
+fn list(offered: &Offered, format: Format) -> Exit {
     let mut text = String::new();
     let mut rows = Vec::new();
     for bundle in standard::BUNDLES {
@@ -30,6 +38,12 @@ fn list(format: Format) -> Exit {
             }
         }
     }
+    for rule in offered.rules() {
+        match format {
+            Format::Text => text.push_str(&format!("{}\n", offered::line(rule))),
+            Format::Json => rows.push(offered::describe(rule)),
+        }
+    }
     if format == Format::Json {
         text = format!("{}\n", serde_json::Value::from(rows));
     }
@@ -37,7 +51,7 @@ fn list(format: Format) -> Exit {
     Exit::Accepted
 }
 
-fn show(id: &str, format: Format) -> Exit {
+fn show(id: &str, offered: &Offered, format: Format) -> Exit {
     let mut found = Vec::new();
     for bundle in standard::BUNDLES {
         let ids: Vec<&str> = bundle.find(id).iter().map(|rule| rule.facts().id).collect();
@@ -50,7 +64,7 @@ fn show(id: &str, format: Format) -> Exit {
         );
     }
     match found.as_slice() {
-        [] => unknown(id),
+        [] => show_offered(id, offered, format),
         [(bundle, checker)] => {
             let text = match format {
                 Format::Text => page(checker),
@@ -61,6 +75,31 @@ fn show(id: &str, format: Format) -> Exit {
         }
         several => {
             list_candidates(id, several);
+            Exit::Usage
+        }
+    }
+}
+
+/// A rule of a bundle that does not come with qcbus.
+fn show_offered(id: &str, offered: &Offered, format: Format) -> Exit {
+    match *offered.find(id) {
+        [] => unknown(id, offered),
+        [rule] => {
+            talk::print(&match format {
+                Format::Text => offered::page(rule),
+                Format::Json => format!("{}\n", offered::describe(rule)),
+            });
+            Exit::Accepted
+        }
+        ref several => {
+            let count = several.len();
+            talk::fail(&format!(
+                "`{id}` is not one rule; there are {count} that it may mean:"
+            ));
+            let rows = several
+                .iter()
+                .map(|rule| format!("  {}", offered::line(*rule)));
+            talk::say_lines(&rows.collect::<Vec<_>>().join("\n"));
             Exit::Usage
         }
     }
@@ -93,14 +132,16 @@ fn family(id: &str) -> Vec<(&'static Bundle, Checker)> {
         .collect()
 }
 
-fn unknown(id: &str) -> Exit {
+fn unknown(id: &str, offered: &Offered) -> Exit {
     let family = family(id);
     if !family.is_empty() {
         list_candidates(id, &family);
         return Exit::Usage;
     }
     let hint = standard::hint(id);
-    talk::fail(&format!("there is no rule `{id}`; {hint}"));
+    let why = offered.why_not.as_deref();
+    let why = why.map(|it| format!(" ({it})")).unwrap_or_default();
+    talk::fail(&format!("there is no rule `{id}`; {hint}{why}"));
     Exit::Usage
 }
 

@@ -1,0 +1,93 @@
+//! Whether a bundle that was added or changed is ready, and why not. The broker says it of the very command that is
+//! wanted, so that no process before is taken for it.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use qcbus_broker::control::ask_broker;
+use qcbus_messages::control::{BundleStanding, Request, Response, Runs, Standing};
+use qcbus_messages::{Exit, shown};
+
+use super::manifests::{Home, Refusal};
+
+/// How often the broker is asked.
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// How a bundle stands; `None` when there is none of this name.
+pub fn standing(broker: &Path, name: &str) -> Result<Option<Box<BundleStanding>>, Refusal> {
+    let request = Request::Bundle {
+        name: name.to_owned(),
+    };
+    match ask_broker(broker, &request) {
+        Ok(Response::Bundle { bundle }) => Ok(bundle),
+        Ok(Response::Failed { reason }) => Err((Exit::Internal, reason)),
+        Ok(other) => Err((Exit::Internal, format!("unexpected answer: {other:?}"))),
+        Err(error) => Err((Exit::NoBroker, error.to_string())),
+    }
+}
+
+/// Waits until the process of this command is ready.
+///
+/// # Errors
+/// Why it is not, for a person.
+pub fn wait(home: &Home, name: &str, command: &str, limit: Duration) -> Result<Runs, Refusal> {
+    let Some(broker) = home.broker() else {
+        return Err((Exit::NoBroker, "no broker runs".to_owned()));
+    };
+    let begin = Instant::now();
+    loop {
+        let bundle = standing(broker, name)?;
+        let ours = bundle.filter(|it| it.command.as_deref() == Some(command));
+        let Some(bundle) = ours else {
+            let why = "somebody has changed its manifest meanwhile".to_owned();
+            return Err((Exit::Undetermined, why));
+        };
+        match (bundle.standing, bundle.runs) {
+            (Standing::Ready, Some(runs)) => return Ok(runs),
+            (Standing::Failing { why }, _) => {
+                let why = shown::line(&why);
+                let why = format!("{why}; what it said itself is in the broker's log");
+                return Err((Exit::Usage, why));
+            }
+            (Standing::Coming { joined }, _) if begin.elapsed() >= limit => {
+                let seconds = limit.as_secs_f64();
+                let what = if joined {
+                    "it has said hello, but not what it checks"
+                } else {
+                    "it has not said hello"
+                };
+                return Err((Exit::Undetermined, format!("{what} within {seconds} s")));
+            }
+            _ => std::thread::sleep(PAUSE),
+        }
+    }
+}
+
+/// What is said of a bundle that is ready; `was` is put behind it.
+pub fn ready(name: &str, runs: &Runs, was: &str, notices: &[String]) -> String {
+    let kinds: Vec<&str> = runs.kinds.iter().map(|it| it.as_str()).collect();
+    let mut text = format!(
+        "{name}: ready, {} ({}){was}",
+        counted(runs.checkers),
+        kinds.join(", ")
+    );
+    if runs.demanded == 0 {
+        text.push_str(
+            "; but none of them is asked: the configuration in force does not name it, or they are not on \
+             by default",
+        );
+    }
+    let text = shown::line(&text).to_string();
+    let about = format!("`{name}`");
+    let about = notices.iter().filter(|it| it.contains(&about));
+    let lines = about.map(|it| format!("\n{}", shown::line(it)));
+    std::iter::once(text).chain(lines).collect()
+}
+
+/// So many checkers.
+pub fn counted(checkers: u64) -> String {
+    match checkers {
+        1 => "1 checker".to_owned(),
+        several => format!("{several} checkers"),
+    }
+}

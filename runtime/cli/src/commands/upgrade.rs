@@ -1,0 +1,129 @@
+//! `qcbus bundle upgrade`: the newer program of a bundle that was added.
+
+use std::path::Path;
+
+use qcbus_disk::write_whole;
+use qcbus_messages::Exit;
+use qcbus_messages::control::{BundleStanding, Runs, Standing};
+use qcbus_messages::path_text::to_text;
+
+use super::manifests::{Home, Refusal, command_line, said, usage};
+use super::readiness;
+use crate::args::{BundleUpgradeArgs, ManifestArgs};
+
+/// Runs the command.
+pub fn run(args: &BundleUpgradeArgs) -> Exit {
+    said(upgrade(args))
+}
+
+fn upgrade(args: &BundleUpgradeArgs) -> Result<String, Refusal> {
+    let name = &args.name;
+    let home = Home::find(&ManifestArgs {
+        instance: args.instance.clone(),
+        bundles_d: None,
+        offline: false,
+    })?;
+    let _alone = home.alone()?;
+    let was = before(&home, name)?;
+    let path = home.manifest(name);
+    let (command, taken_from) = if args.command.is_empty() {
+        (was.command.clone().unwrap_or_default(), None)
+    } else {
+        let command = command_line(&args.command)?;
+        let bytes = change(&path, name, &command)?;
+        (command, Some(bytes))
+    };
+    let notices = match home.reload() {
+        Ok(notices) => notices.unwrap_or_default(),
+        Err((exit, why)) => {
+            let then = taken_from.map(|bytes| home.take_back(&path, Some(&bytes)));
+            let then = then.map(|it| format!("; {it}")).unwrap_or_default();
+            return Err((exit, format!("`{name}` was not upgraded: {why}{then}")));
+        }
+    };
+    match readiness::wait(&home, name, &command, args.timeout) {
+        Ok(runs) => Ok(done(&home, name, &was, &runs, &notices)),
+        Err((exit, why)) => {
+            let taken_from = taken_from.filter(|_| !args.keep);
+            let then = taken_from.map(|bytes| home.take_back(&path, Some(&bytes)));
+            let then = then.map(|it| format!("; {it}")).unwrap_or_default();
+            let goes_on = goes_on(&home, name);
+            let why = format!("`{name}` is not upgraded: {why}{then}; {goes_on}");
+            Err((exit, why))
+        }
+    }
+}
+
+/// How the bundle stands whose program is to be another.
+fn before(home: &Home, name: &str) -> Result<BundleStanding, Refusal> {
+    let Some(broker) = home.broker() else {
+        return Err((Exit::NoBroker, "no broker runs".to_owned()));
+    };
+    let standing = readiness::standing(broker, name)?;
+    let standing = standing.filter(|it| it.command.is_some()).map(|it| *it);
+    standing.ok_or_else(|| {
+        usage(format!(
+            "no manifest brings `{name}`: what comes with qcbus is upgraded with it, what was started by hand is \
+             started by hand, and `qcbus bundle add` brings what is new"
+        ))
+    })
+}
+
+/// Gives a manifest another command; returns what it was before.
+fn change(path: &Path, name: &str, command: &str) -> Result<Vec<u8>, Refusal> {
+    let shown = to_text(path);
+    let bytes = std::fs::read(path).map_err(|error| {
+        usage(format!(
+            "cannot read {shown}: {error}; change the command of `{name}` where its manifest lies"
+        ))
+    })?;
+    let parsed = serde_json::from_slice(&bytes);
+    let mut manifest: serde_json::Value =
+        parsed.map_err(|error| usage(format!("cannot read {shown}: {error}")))?;
+    let modules = manifest.get_mut("module").and_then(|it| it.as_array_mut());
+    let mut modules = modules.into_iter().flatten();
+    let module = modules.find(|it| it.get("name").is_some_and(|it| it == name));
+    let Some(module) = module.and_then(|it| it.as_object_mut()) else {
+        return Err(usage(format!("{shown} does not bring `{name}`")));
+    };
+    module.insert("exec_command".to_owned(), command.into());
+    let text = format!("{manifest:#}\n");
+    write_whole(path, text.as_bytes(), true)
+        .map_err(|error| (Exit::Internal, format!("cannot write {shown}: {error}")))?;
+    Ok(bytes)
+}
+
+fn done(home: &Home, name: &str, was: &BundleStanding, runs: &Runs, notices: &[String]) -> String {
+    let now = home
+        .broker()
+        .and_then(|it| readiness::standing(it, name).ok());
+    let spec = now.flatten().map(|it| it.spec);
+    if spec == Some(was.spec) && was.standing == Standing::Ready {
+        let nothing = "; nothing has changed: what runs is its program as it lies there (`touch` it when \
+                       something has that it loads)";
+        return readiness::ready(name, runs, nothing, notices);
+    }
+    let was = match &was.runs {
+        Some(before) => format!(
+            " (was {}, version {} -> {})",
+            before.checkers, before.version, runs.version
+        ),
+        None => " (nobody judged before)".to_owned(),
+    };
+    readiness::ready(name, runs, &was, notices)
+}
+
+/// Who judges now.
+fn goes_on(home: &Home, name: &str) -> String {
+    let broker = home.broker();
+    let standing = broker.and_then(|it| readiness::standing(it, name).ok());
+    match standing.flatten().and_then(|it| it.runs) {
+        Some(runs) => format!(
+            "the process before goes on ({}, version {}, {})",
+            runs.pid,
+            runs.version,
+            readiness::counted(runs.checkers)
+        ),
+        None => "nobody judges in its place, so what it would judge is undetermined".to_owned(),
+    }
+}
