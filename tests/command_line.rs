@@ -40,6 +40,8 @@ fn help_of_every_command() {
             "bundle --help",
             "bundle run --help",
             "bundle add --help",
+            "bundle upgrade --help",
+            "bundle new --help",
             "bundle remove --help",
             "rule --help",
             "config check --help",

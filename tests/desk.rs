@@ -15,7 +15,7 @@ use std::process::Output;
 
 use support::content::Content;
 use support::desk::{Desk, Said};
-use support::farm::Farm;
+use support::farm::{Farm, zoo};
 use support::watchdog;
 
 /// A program that can be started and joins no bus.
@@ -119,12 +119,12 @@ fn a_program_is_written_by_its_whole_path() {
 #[test]
 fn a_running_broker_takes_a_bundle_or_nothing_is_added() {
     let farm = Farm::new();
-    let program = idler(farm.base());
+    let program = zoo().display().to_string();
     let elsewhere = farm.base().join("elsewhere");
     let _broker = farm.serve_ready();
 
     let elsewhere_named = elsewhere.to_string_lossy();
-    let add = ["bundle", "add", "mine", &program];
+    let add = ["bundle", "add", "polite", &program, "polite"];
     let (code, text) = told(&farm.qcbus(&[&add[..], &["--bundles-d", &elsewhere_named]].concat()));
     assert_eq!(code, Some(2), "{text}");
     assert!(text.contains("watches"), "{text}");
@@ -132,18 +132,18 @@ fn a_running_broker_takes_a_bundle_or_nothing_is_added() {
 
     let (code, text) = told(&farm.qcbus(&add));
     assert_eq!(code, Some(0), "{text}");
-    assert!(farm.bundles_d().join("mine.json").exists());
+    assert!(farm.bundles_d().join("polite.json").exists());
     // It has been taken before the command ends.
     let is_known = || {
         let status = farm.status().unwrap();
-        status.peers.iter().any(|peer| peer.name == "mine")
+        status.peers.iter().any(|peer| peer.name == "polite")
     };
     assert!(is_known());
 
-    let (code, text) = told(&farm.qcbus(&["bundle", "remove", "mine"]));
+    let (code, text) = told(&farm.qcbus(&["bundle", "remove", "polite"]));
     assert_eq!(code, Some(0), "{text}");
     watchdog::until("the bundle has gone", || (!is_known()).then_some(()));
-    for name in ["mine", "nobody", "xodrBundle"] {
+    for name in ["polite", "nobody", "xodrBundle"] {
         let (code, text) = told(&farm.qcbus(&["bundle", "remove", name]));
         assert_eq!(code, Some(2), "{name}: {text}");
     }
@@ -156,7 +156,7 @@ fn a_running_broker_takes_a_bundle_or_nothing_is_added() {
         text.contains("nothing was added") && text.contains("broken.json"),
         "{text}"
     );
-    assert!(!farm.bundles_d().join("mine.json").exists());
+    assert!(!farm.bundles_d().join("polite.json").exists());
 }
 
 /// Everything that a configuration can name and nobody has.
