@@ -536,7 +536,7 @@ pub struct BundleAddArgs {
 #[derive(Debug, ClapArgs)]
 #[command(
     after_help = "The process before goes on until the newer one is ready. A program that is replaced at \
-its path is noticed\nwithout this command, too; this one says what became of it."
+its path is noticed without this command, too; this one says what became of it."
 )]
 pub struct BundleUpgradeArgs {
     /// The bundle's name
