@@ -35,9 +35,8 @@ impl Broker {
         }
         match asked.request {
             Request::Status => {
-                let status = self.status();
-                let _ = asked.answer.send(Response::Status(Box::new(status)));
-                true
+                let status = Box::new(self.status());
+                answer(asked.answer, Response::Status(status))
             }
             Request::Wait { file, timeout_ms } => {
                 let look = Look {
@@ -55,19 +54,8 @@ impl Broker {
                 self.handle(Event::Drain)
             }
             Request::Reload => {
-                let response = match self.reload() {
-                    Ok(changes) => Response::Reloaded {
-                        changes,
-                        notices: self.loaded.notices.clone(),
-                    },
-                    Err(error) => Response::Failed {
-                        reason: format!(
-                            "nothing was changed, what was in force stays in force: {error}"
-                        ),
-                    },
-                };
-                let _ = asked.answer.send(response);
-                true
+                let response = self.reload_for_a_client();
+                answer(asked.answer, response)
             }
             Request::RemoveBundle { name } => {
                 let ticket = self.ticket(asked.answer);
@@ -75,15 +63,25 @@ impl Broker {
             }
             Request::Bundle { name } => {
                 let bundle = self.standing(&name).map(Box::new);
-                let _ = asked.answer.send(Response::Bundle { bundle });
-                true
+                answer(asked.answer, Response::Bundle { bundle })
             }
             Request::Offers { without } => {
                 let mut offers = self.state.offers();
                 offers.retain(|it| !without.contains(&it.name));
-                let _ = asked.answer.send(Response::Offers { offers });
-                true
+                answer(asked.answer, Response::Offers { offers })
             }
+        }
+    }
+
+    fn reload_for_a_client(&mut self) -> Response {
+        match self.reload() {
+            Ok(changes) => Response::Reloaded {
+                changes,
+                notices: self.loaded.notices.clone(),
+            },
+            Err(error) => Response::Failed {
+                reason: format!("nothing was changed, what was in force stays in force: {error}"),
+            },
         }
     }
 
@@ -262,4 +260,10 @@ impl Broker {
         // Whoever asks wants to see where to look, and no answer of any length.
         self.unseen.iter().take(UNSEEN_SHOWN).map(unseen).collect()
     }
+}
+
+/// Answers at once; whoever has left needs no answer.
+fn answer(client: oneshot::Sender<Response>, response: Response) -> bool {
+    let _ = client.send(response);
+    true
 }
