@@ -289,8 +289,8 @@ mod tests {
         assert_eq!(files("sh -e DIR/script"), [shell.clone(), at("script")]);
         assert_eq!(files("sh DIR/rules.py"), [shell.clone(), at("rules.py")]);
         assert_eq!(files("sh --log DIR/log"), [shell]);
-        assert_eq!(files("$(cat x)"), [PathBuf::new(); 0]);
-        assert_eq!(files_of(&["program".to_owned()]), [PathBuf::new(); 0]);
+        assert!(files("$(cat x)").is_empty());
+        assert!(files_of(&["program".to_owned()]).is_empty());
     }
 
     #[test]
