@@ -6,7 +6,7 @@ use qcbus_formats::manifest::May;
 
 use crate::SandboxError;
 use crate::calls;
-use crate::rules::{Rules, everything, files, reading, trees};
+use crate::rules::{Rules, everything, files, listings, reading, trees};
 
 /// Programs read these by themselves: libraries for a backtrace, the time zone, the language, how many processors
 /// there are. Nothing in them is a secret.
@@ -34,6 +34,8 @@ pub struct Fenced {
     pub memory: Option<PathBuf>,
     /// Files and directories that it reads.
     pub reads: Vec<PathBuf>,
+    /// Directories below which it may see what lies there, and not read it.
+    pub lists: Vec<PathBuf>,
     /// What its manifest declares.
     pub may: May,
 }
@@ -65,6 +67,9 @@ pub fn confine(fenced: &Fenced) -> Result<(), SandboxError> {
     }
     for path in fenced.reads.iter().chain(&may.read) {
         rules = rules.allow(path, trees())?;
+    }
+    for path in &fenced.lists {
+        rules = rules.allow(path, listings())?;
     }
     for path in &may.write {
         rules = rules.allow(path, everything())?;

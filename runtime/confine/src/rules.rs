@@ -18,6 +18,11 @@ pub(crate) fn files() -> BitFlags<AccessFs> {
     AccessFs::ReadFile.into()
 }
 
+/// To see what lies below a path, not to read it.
+pub(crate) fn listings() -> BitFlags<AccessFs> {
+    AccessFs::ReadDir.into()
+}
+
 /// To read files and directories below a path.
 pub(crate) fn trees() -> BitFlags<AccessFs> {
     AccessFs::ReadFile | AccessFs::ReadDir

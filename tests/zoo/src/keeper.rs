@@ -227,7 +227,7 @@ async fn live(animal: &'static Animal, args: &Args, hello: Hello, stand: &Stand<
         let fenced = Fenced {
             memory: peer.memory().map(Path::to_path_buf),
             may: may.clone(),
-            reads: Vec::new(),
+            ..Fenced::default()
         };
         if let Err(error) = qcbus_confine::confine(&fenced) {
             complain(&format!("not wholly confined: {error}"));

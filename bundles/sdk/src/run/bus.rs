@@ -44,6 +44,17 @@ pub struct BusOptions {
     pub no_sandbox: bool,
     /// Threads that check at the same time.
     pub threads: usize,
+    /// What its own program reads while it checks.
+    pub own: OwnFiles,
+}
+
+/// What a bundle's own program reads while it checks, such as the modules of an interpreter.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct OwnFiles {
+    /// Files and directories.
+    pub reads: Vec<PathBuf>,
+    /// Directories whose entries it sees without reading them.
+    pub lists: Vec<PathBuf>,
 }
 
 impl Default for BusOptions {
@@ -56,6 +67,7 @@ impl Default for BusOptions {
             schema_dir: None,
             no_sandbox: false,
             threads: Hands::available(),
+            own: OwnFiles::default(),
         }
     }
 }
@@ -90,6 +102,7 @@ pub(super) fn run(bundle: &'static Bundle, options: BusOptions, given: Option<&U
     };
     let threads = options.threads;
     let hello = hello(bundle, options.launch, threads);
+    let own = options.own;
     sandboxed(&instance, &sessions, |stand| {
         // A bundle is confined before its first thread is started, so the runtime must not start any.
         let runtime = tokio::runtime::Builder::new_current_thread()
@@ -103,7 +116,12 @@ pub(super) fn run(bundle: &'static Bundle, options: BusOptions, given: Option<&U
         };
         runtime.block_on(async {
             let stops = Stops::listen(supervised);
-            serve((bundle, given.cloned()), &stand, hello.clone(), stops).await
+            let bundle = Checking {
+                bundle,
+                given: given.cloned(),
+                own: &own,
+            };
+            serve(bundle, &stand, hello.clone(), stops).await
         })
     })
 }
@@ -166,8 +184,15 @@ impl Stops {
     }
 }
 
+/// What a session checks with.
+struct Checking<'a> {
+    bundle: &'static Bundle,
+    given: Option<UserFiles>,
+    own: &'a OwnFiles,
+}
+
 async fn serve(
-    (bundle, given): (&'static Bundle, Option<UserFiles>),
+    Checking { bundle, given, own }: Checking<'_>,
     stand: &Stand<'_>,
     hello: Hello,
     mut stops: Stops,
@@ -187,9 +212,8 @@ async fn serve(
     };
     // Before the first thread is started: threads that there are already would stay outside.
     let heard = until_configured(&mut peer).await;
-    let fence = stand.confine(peer.memory(), || {
-        files_of(bundle, given.as_ref(), &peer, &ready)
-    });
+    let named = || files_of(bundle, given.as_ref(), &peer, &ready);
+    let fence = stand.confine(peer.memory(), named, own);
     let (sender, mut progress) = mpsc::unbounded_channel();
     let models = KeptModels::default();
     let threads = usize::from(threads);

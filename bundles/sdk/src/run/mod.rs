@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 pub use args::{USAGE, UsageError};
-pub use bus::BusOptions;
+pub use bus::{BusOptions, OwnFiles};
 pub use exit::Exit;
 pub(crate) use file::complain;
 pub use file::{Format, examine, examine_timed, findings};
@@ -71,6 +71,15 @@ impl Mode {
             Mode::Bus(options) => options.threads = count,
             Mode::File { threads, .. } | Mode::Module { threads, .. } => *threads = count,
             Mode::Help => {}
+        }
+        self
+    }
+
+    /// On the bus, what the bundle's program may read besides what every bundle may.
+    #[must_use]
+    pub fn reading(mut self, own: OwnFiles) -> Mode {
+        if let Mode::Bus(options) = &mut self {
+            options.own = own;
         }
         self
     }

@@ -7,8 +7,8 @@ use qcbus_bus::{Instance, PeerOptions};
 use qcbus_confine::{After, Fenced, Orders, keep};
 use qcbus_formats::manifest::May;
 
-use super::Exit;
 use super::file::complain;
+use super::{Exit, OwnFiles};
 
 /// What follows a session.
 pub(super) enum Ended {
@@ -46,16 +46,18 @@ impl Stand<'_> {
         }
     }
 
-    /// Confines this process, which may then read what `reads` gives. `None`: it is not to be confined.
+    /// Confines this process, which may then read what `reads` gives and what is its own. `None`: it is not to be confined.
     pub(super) fn confine(
         &self,
         memory: Option<&Path>,
         reads: impl FnOnce() -> Vec<PathBuf>,
+        own: &OwnFiles,
     ) -> Option<Fence> {
         let may = self.may?;
         let fenced = Fenced {
             memory: memory.map(Path::to_path_buf),
-            reads: reads(),
+            reads: [reads(), own.reads.clone()].concat(),
+            lists: own.lists.clone(),
             may: may.clone(),
         };
         // Before: what comes in between is taken for something else, and a fresh process reads it.
