@@ -1,0 +1,124 @@
+//! A document as long as its job lasts.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use pyo3::types::PyString;
+use qcbus_document::{Document, Image, ImageError};
+use qcbus_opendrive::OwnedMap;
+use self_cell::self_cell;
+
+self_cell!(
+    struct Opened {
+        owner: Image,
+
+        #[covariant]
+        dependent: Document,
+    }
+);
+
+pyo3::create_exception!(
+    qcbus,
+    Closed,
+    PyRuntimeError,
+    "The job that this belonged to is over, and its document is no longer there."
+);
+
+/// A document that is open for a moment.
+pub(crate) struct Held(Arc<Opened>);
+
+impl Held {
+    pub(crate) fn document(&self) -> &Document<'_> {
+        self.0.borrow_dependent()
+    }
+}
+
+/// A document that Python objects look into. When the job is over it is closed: whoever kept an element gets an
+/// error, and the shared memory is free, whatever Python still holds.
+pub(crate) struct Lease {
+    opened: Mutex<Option<Arc<Opened>>>,
+    /// The model of its roads, once somebody has asked for it.
+    map: Mutex<Option<Arc<OwnedMap>>>,
+    /// The distinct names of the document as Python texts, by their number.
+    names: Vec<Py<PyString>>,
+    path: String,
+}
+
+impl Lease {
+    pub(crate) fn open(py: Python<'_>, image: &Image) -> Result<Arc<Lease>, ImageError> {
+        let opened = Opened::try_new(image.clone(), |image| image.document())?;
+        let document = opened.borrow_dependent();
+        let intern = |name: &str| PyString::intern(py, name).unbind();
+        Ok(Arc::new(Lease {
+            names: document.names().map(intern).collect(),
+            path: document.path().to_owned(),
+            opened: Mutex::new(Some(Arc::new(opened))),
+            map: Mutex::default(),
+        }))
+    }
+
+    /// Looks into the document. Nothing that may run Python belongs in there: it would hold the document open.
+    ///
+    /// # Errors
+    /// [`Closed`].
+    pub(crate) fn read<T>(&self, look: impl FnOnce(&Document<'_>) -> T) -> PyResult<T> {
+        self.hold().map(|held| look(held.document()))
+    }
+
+    /// Holds the document open for a moment.
+    ///
+    /// # Errors
+    /// [`Closed`].
+    pub(crate) fn hold(&self) -> PyResult<Held> {
+        let slot = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
+        slot.clone().map(Held).ok_or_else(|| {
+            Closed::new_err(
+                "the job that this belonged to is over: a rule may keep texts and numbers, but no elements",
+            )
+        })
+    }
+
+    /// The model of its roads, made when it is first asked for.
+    ///
+    /// # Errors
+    /// [`Closed`].
+    pub(crate) fn map(&self) -> PyResult<Arc<OwnedMap>> {
+        let held = self.hold()?;
+        let mut map = self.map.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(map) = &*map {
+            return Ok(map.clone());
+        }
+        let image = held.0.borrow_owner().clone();
+        let made =
+            OwnedMap::of(image).map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
+        Ok(map.insert(Arc::new(made)).clone())
+    }
+
+    /// The end of the job.
+    pub(crate) fn close(&self) {
+        let opened = self
+            .opened
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take();
+        let map = self
+            .map
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take();
+        drop((map, opened));
+    }
+
+    /// A distinct name by its number, without a new text for every element that bears it.
+    pub(crate) fn name<'py>(&self, py: Python<'py>, number: u16) -> Bound<'py, PyString> {
+        match self.names.get(usize::from(number)) {
+            Some(name) => name.bind(py).clone(),
+            None => PyString::new(py, ""),
+        }
+    }
+
+    pub(crate) fn path(&self) -> &str {
+        &self.path
+    }
+}
