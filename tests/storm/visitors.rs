@@ -51,14 +51,29 @@ impl Driver {
         self.tally.note("reload", "");
     }
 
-    /// The program of the bundle of one's own: a link to the zoo's, which can be taken away.
+    /// The program of the bundle of one's own: a link to the zoo's, or to one in Python, which can be taken away.
     fn program(&self) -> PathBuf {
         self.farm.base().join("program/zoo")
+    }
+
+    /// Starts the bundle in Python, when that is to be tried.
+    fn python(&self) -> PathBuf {
+        self.farm.base().join("judge")
     }
 
     /// The bundle of one's own, in its next version.
     pub fn install(&mut self) {
         std::fs::create_dir_all(self.farm.base().join("program")).unwrap();
+        if let Some(python) = std::env::var_os(PYTHON) {
+            let python = std::path::absolute(python).unwrap();
+            let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/storm/judge.py");
+            let program = format!("#!/bin/sh\nexec {} {script} \"$@\"\n", python.display());
+            std::fs::write(self.python(), program).unwrap();
+            let may = std::os::unix::fs::PermissionsExt::from_mode(0o755);
+            std::fs::set_permissions(self.python(), may).unwrap();
+            self.tally
+                .note("the judge is one in Python", &python.to_string_lossy());
+        }
         self.bring_back();
         self.upgrade();
     }
@@ -133,7 +148,8 @@ impl Driver {
     pub fn bring_back(&mut self) {
         self.gone_until = None;
         if !self.program().exists() {
-            std::os::unix::fs::symlink(zoo(), self.program()).unwrap();
+            let python = Some(self.python()).filter(|it| it.exists());
+            std::os::unix::fs::symlink(python.unwrap_or_else(zoo), self.program()).unwrap();
             self.tally.note("program comes", JUDGE);
         }
     }
@@ -147,6 +163,9 @@ impl Driver {
         self.stops.iter().any(hand)
     }
 }
+
+/// An interpreter that has the package `qcbus`: the bundle of one's own is one in Python then.
+const PYTHON: &str = "QCBUS_STORM_PYTHON";
 
 /// A time in which a bundle could not go on.
 pub struct Stop {

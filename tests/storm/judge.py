@@ -1,0 +1,30 @@
+"""The bundle of one's own of a storm, in Python: as the zoo's `judges_strictly`, which it stands in for."""
+
+import sys
+
+import qcbus
+
+_, name, _, version, *arguments = sys.argv
+bundle = qcbus.Bundle(name, version=version, kinds=["xodr", "xosc", "mosc"])
+
+
+def looks(found, document):
+    for element in document.iter():
+        for attribute, value in element.attrib.items():
+            if "forbidden" in value:
+                found.issue(element, f"`forbidden` in {document.path}", attribute=attribute)
+
+
+@bundle.rule("example.org:xodr:1.0.0:zoo.0", id="check_zoo_0")
+def strict(doc, found):
+    """The word is nowhere."""
+    for document in (doc, *doc.linked):
+        looks(found, document)
+
+
+@bundle.rule("example.org:xodr:1.0.0:zoo.1", id="check_zoo_1")
+def nothing(doc, found):
+    """Nothing is demanded."""
+
+
+bundle.main(arguments)
