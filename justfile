@@ -34,6 +34,14 @@ browser:
     -target/debug/qcbus check tests/farm --quiet --out target/pages/out --output-format html=target/pages/farm.html
     reporters/html/browser/run target/pages
 
+# Make the wheel of the Python package, with the program `qcbus` in it; needs Python.
+wheel *ARGS:
+    bundles/python/wheel {{ARGS}}
+
+# Make it, install it into an empty environment and test it there; needs Python.
+python *ARGS:
+    bundles/python/run-tests {{ARGS}}
+
 # Times beside a rival, whose command line is in QCBUS_RIVAL: 'PROGRAM ARGS {}'.
 bench-rivals *ARGS:
     cargo build --release -p qcbus
