@@ -65,7 +65,8 @@ impl Driver {
     pub fn install(&mut self) {
         std::fs::create_dir_all(self.farm.base().join("program")).unwrap();
         if let Some(python) = std::env::var_os(PYTHON) {
-            let python = std::path::absolute(python).unwrap();
+            let python = PathBuf::from(python);
+            assert!(python.is_absolute(), "{PYTHON} is no absolute path");
             let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/storm/judge.py");
             let program = format!("#!/bin/sh\nexec {} {script} \"$@\"\n", python.display());
             std::fs::write(self.python(), program).unwrap();

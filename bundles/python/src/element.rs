@@ -343,7 +343,8 @@ impl Elements {
         }
     }
 
-    /// The elements of some of these names among some nodes, in document order; of all names when there are none.
+    /// The elements of some of these names among the nodes of a subtree, in document order; of all names when there are
+    /// none.
     pub(crate) fn within(
         lease: &Arc<Lease>,
         rest: std::ops::Range<u32>,
@@ -353,10 +354,10 @@ impl Elements {
         if let [name] = names {
             // By the index of names, which costs nothing for all others.
             let found = lease.read(|document| {
-                let all = document.elements(name).map(|node| node.index());
-                all.skip_while(|index| *index < rest.start)
-                    .take_while(|index| *index < rest.end)
-                    .collect()
+                let outer = document.node(rest.start).into_iter();
+                let own = outer.clone().filter(|node| node.is(name));
+                let inner = outer.flat_map(|node| node.descendants_named(name));
+                own.chain(inner).map(|node| node.index()).collect()
             })?;
             return Ok(Elements::of(lease, found));
         }

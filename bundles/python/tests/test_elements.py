@@ -128,4 +128,7 @@ def test_many_elements():
     ids = look(text, lambda doc: [it.get("id") for it in doc.iter("road")])
     assert ids == [str(n) for n in range(5000)]
     assert look(text, lambda doc: sum(1 for _ in doc.iter())) == 10002
+    assert look(text, lambda doc: {len(list(road.iter("a"))) for road in doc.iter("road")}) == {1}
+    assert look(text, lambda doc: [it.tag for it in doc.find("road[7]").iter("road", "a")]) == ["road", "a"]
+    assert look(text, lambda doc: [it.get("id") for it in doc.find("road[7]").iter("road")]) == ["6"]
     assert look(text, lambda doc: [it.getparent().get("id") for it in doc.iter("a")][4999]) == "4999"
