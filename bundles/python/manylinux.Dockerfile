@@ -9,10 +9,10 @@
 #   docker run --rm -v "$PWD/bundles/python/dist:/dist" python:3.11-slim-bookworm \
 #     sh -c 'pip install /dist/*abi3*.whl && qcbus --version && python -c "import qcbus"'
 FROM quay.io/pypa/manylinux_2_28_x86_64
+ENV CARGO_HOME=/opt/cargo RUSTUP_HOME=/opt/rustup CARGO_TARGET_DIR=/tmp/target PATH="/opt/cargo/bin:${PATH}"
 COPY rust-toolchain.toml /tmp/
 RUN curl --proto '=https' --tlsv1.2 -sSf https://sh.rustup.rs \
     | sh -s -- -y --profile minimal --default-toolchain "$(sed -n 's/^channel *= *"\(.*\)".*/\1/p' /tmp/rust-toolchain.toml)"
-ENV PATH="/root/.cargo/bin:${PATH}" CARGO_TARGET_DIR=/tmp/target
 WORKDIR /src
 # auditwheel is part of the image: what maturin says of the wheel's age is said once more by another.
 CMD ["sh", "-c", "bundles/python/wheel bundles/python/dist && auditwheel show bundles/python/dist/*.whl"]

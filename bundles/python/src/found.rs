@@ -11,7 +11,7 @@ use qcbus_sdk::{Level, Place, Sink};
 use crate::document;
 use crate::element::Element;
 use crate::lease::{Closed, Lease};
-use crate::roads::{Lane, Road, Section};
+use crate::roads::{PyLane, Road, Section};
 
 /// Findings that are kept with their texts; further ones are counted with their level. A result lists fewer.
 const MOST: usize = 100_000;
@@ -65,8 +65,8 @@ pub(crate) struct Found {
 }
 
 /// One finding, to be completed.
-#[pyclass(frozen, module = "qcbus")]
-pub(crate) struct Finding {
+#[pyclass(frozen, module = "qcbus", name = "Finding")]
+pub(crate) struct PyFinding {
     told: Arc<Told>,
     number: usize,
 }
@@ -121,7 +121,7 @@ fn element_of(at: &Bound<'_, PyAny>) -> PyResult<Element> {
     if let Ok(section) = at.cast::<Section>() {
         return section.get().element();
     }
-    if let Ok(lane) = at.cast::<Lane>() {
+    if let Ok(lane) = at.cast::<PyLane>() {
         return lane.get().element();
     }
     let what = at.get_type().name()?;
@@ -245,7 +245,7 @@ impl Found {
         attribute: Option<String>,
         level: Option<&str>,
         uid: Option<String>,
-    ) -> PyResult<Finding> {
+    ) -> PyResult<PyFinding> {
         let spot = self.told.spot(at, attribute)?;
         let level = level.map(level_of).transpose()?;
         if let Some(uid) = uid.as_ref().filter(|uid| !self.uids.contains(uid)) {
@@ -267,7 +267,7 @@ impl Found {
             level,
             uid,
         });
-        Ok(Finding {
+        Ok(PyFinding {
             told: self.told.clone(),
             number: collected.entries.len() - 1,
         })
@@ -310,7 +310,7 @@ impl Found {
     }
 }
 
-impl Finding {
+impl PyFinding {
     fn change(&self, change: impl FnOnce(&mut Entry)) -> PyResult<()> {
         let mut collected = self.told.open()?;
         if let Some(entry) = collected.entries.get_mut(self.number) {
@@ -325,7 +325,7 @@ impl Finding {
 }
 
 #[pymethods]
-impl Finding {
+impl PyFinding {
     /// Adds a further place and what is to be seen there.
     #[pyo3(signature = (place, description, *, attribute=None))]
     fn at<'py>(

@@ -26,9 +26,9 @@ pyo3::create_exception!(
 );
 
 /// A document that is open for a moment.
-pub(crate) struct Held(Arc<Opened>);
+pub(crate) struct Glance(Arc<Opened>);
 
-impl Held {
+impl Glance {
     pub(crate) fn document(&self) -> &Document<'_> {
         self.0.borrow_dependent()
     }
@@ -70,9 +70,9 @@ impl Lease {
     ///
     /// # Errors
     /// [`Closed`].
-    pub(crate) fn hold(&self) -> PyResult<Held> {
+    pub(crate) fn hold(&self) -> PyResult<Glance> {
         let slot = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
-        slot.clone().map(Held).ok_or_else(|| {
+        slot.clone().map(Glance).ok_or_else(|| {
             Closed::new_err(
                 "the job that this belonged to is over: a rule may keep texts and numbers, but no elements",
             )

@@ -27,10 +27,10 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<rows::Rows>()?;
     module.add_class::<roads::Road>()?;
     module.add_class::<roads::Section>()?;
-    module.add_class::<roads::Lane>()?;
+    module.add_class::<roads::PyLane>()?;
     module.add_class::<roads::Pose>()?;
     module.add_class::<found::Found>()?;
-    module.add_class::<found::Finding>()?;
+    module.add_class::<found::PyFinding>()?;
     module.add_class::<bundle::Native>()?;
     module.add("Closed", module.py().get_type::<lease::Closed>())?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;

@@ -178,8 +178,8 @@ impl Section {
         found.ok_or_else(|| PyIndexError::new_err("no such section"))
     }
 
-    fn lane_of(&self, key: LaneKey) -> Lane {
-        Lane {
+    fn lane_of(&self, key: LaneKey) -> PyLane {
+        PyLane {
             lease: self.lease.clone(),
             key,
         }
@@ -209,13 +209,13 @@ impl Section {
 
     /// Its lanes in document order, the center lane among them.
     #[getter]
-    fn lanes(&self) -> PyResult<Vec<Lane>> {
+    fn lanes(&self) -> PyResult<Vec<PyLane>> {
         let keys: Vec<LaneKey> = self.look(|it| it.lanes().map(LaneRef::key).collect())?;
         Ok(keys.into_iter().map(|key| self.lane_of(key)).collect())
     }
 
     /// The lane of an id, or `None`.
-    fn lane(&self, id: i64) -> PyResult<Option<Lane>> {
+    fn lane(&self, id: i64) -> PyResult<Option<PyLane>> {
         let key = self.look(|section| section.lane(id).map(LaneRef::key))?;
         Ok(key.map(|key| self.lane_of(key)))
     }
@@ -229,13 +229,13 @@ impl Section {
 }
 
 /// A lane of a section, valid until the rule's job is over.
-#[pyclass(frozen, module = "qcbus")]
-pub(crate) struct Lane {
+#[pyclass(frozen, module = "qcbus", name = "Lane")]
+pub(crate) struct PyLane {
     lease: Arc<Lease>,
     key: LaneKey,
 }
 
-impl Lane {
+impl PyLane {
     fn look<T>(&self, look: impl FnOnce(LaneRef<'_, '_>) -> T) -> PyResult<T> {
         let map = self.lease.map()?;
         map.with(|map| map.lane(self.key).map(look))
@@ -244,7 +244,7 @@ impl Lane {
 }
 
 #[pymethods]
-impl Lane {
+impl PyLane {
     /// Its `@id`; `None` when that is no whole number.
     #[getter]
     fn id(&self) -> PyResult<Option<i64>> {

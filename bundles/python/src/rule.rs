@@ -22,21 +22,21 @@ pub(crate) struct PyRule {
 }
 
 /// The documents of a job, as Python sees them. They end with it.
-struct Job<'d> {
+struct Shown<'d> {
     subject: &'d Subject<'d>,
     /// The root and what it refers to, in that order.
     leases: Vec<Arc<Lease>>,
     root: Py<document::Document>,
 }
 
-impl Drop for Job<'_> {
+impl Drop for Shown<'_> {
     fn drop(&mut self) {
         self.leases.iter().for_each(|lease| lease.close());
     }
 }
 
-impl<'d> Job<'d> {
-    fn open(py: Python<'_>, subject: &'d Subject<'d>) -> Result<Job<'d>, Unbuilt> {
+impl<'d> Shown<'d> {
+    fn open(py: Python<'_>, subject: &'d Subject<'d>) -> Result<Shown<'d>, Unbuilt> {
         if !subject.root().is_well_formed() {
             // A rule that looks at what there is would say that all is well.
             let why = "the file is no well-formed XML, so that only a part of it can be seen";
@@ -59,7 +59,7 @@ impl<'d> Job<'d> {
         let version = subject.version().map(numbers);
         let root = document::Document::new(leases[0].clone(), None, kind, version, linked);
         let root = Py::new(py, root).map_err(|error| failed(&error))?;
-        Ok(Job {
+        Ok(Shown {
             subject,
             leases,
             root,
@@ -97,7 +97,7 @@ impl<'d> Job<'d> {
     }
 }
 
-impl<'d> Built<'d> for Job<'d> {
+impl<'d> Built<'d> for Shown<'d> {
     fn parts(&self) -> usize {
         0
     }
@@ -138,7 +138,7 @@ impl AnyRule for PyRule {
         subject: &'d Subject<'d>,
         hand: &mut dyn FnMut(&dyn Built<'d>),
     ) -> Result<(), Unbuilt> {
-        let job = Python::attach(|py| Job::open(py, subject))?;
+        let job = Python::attach(|py| Shown::open(py, subject))?;
         hand(&job);
         Ok(())
     }
