@@ -2,10 +2,12 @@
 
 import os
 import signal
+import subprocess
+import sys
 import time
 
 import pytest
-from farm import MAP, QCBUS, TEN_LINES, serving
+from farm import MAP, QCBUS, TEN_LINES, WATCHDOG, serving
 
 pytestmark = pytest.mark.skipif(not QCBUS.exists(), reason=f"the program is not installed beside Python: {QCBUS}")
 
@@ -182,3 +184,46 @@ def test_a_scenario_sees_its_map(farm):
     [issue] = farm.result("a.xosc").iter("Issue")
     assert issue.get("description") == "road 17 of xodr"
     assert "a.xodr" in str([it.attrib for it in issue.iter()])
+
+
+def test_a_new_bundle_runs_as_its_page_says(tmp_path):
+    with serving(tmp_path) as farm:
+        farm.qcbus("bundle", "new", "my_Rules.x", "--python")
+        made = tmp_path / "my_Rules.x"
+        python = [sys.executable, "-m"]
+        for words, said in (
+            ([*python, "qcbus.test", "bundle.py"], "2 examples, 0 failed"),
+            ([*python, "pytest", "-q", "-p", "no:cacheprovider"], "3 passed"),
+        ):
+            it = subprocess.run(words, cwd=made, capture_output=True, text=True, timeout=WATCHDOG)
+            assert it.returncode == 0 and said in it.stdout, it.stdout + it.stderr
+        farm.environment["PATH"] = f"{QCBUS.parent}:{farm.environment['PATH']}"
+        ready = farm.qcbus("bundle", "add", "my_Rules.x", made / "bundle.py")
+        assert "ready" in ready and "1 checker" in ready, ready
+        narrow = MAP.replace("/>\n</Open", """><lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right>
+<lane id="-1" type="driving"><width sOffset="0" a="1" b="0" c="0" d="0"/></lane></right></laneSection></lanes></road>
+</Open""")
+        farm.wait(farm.put("a.xodr", narrow))
+        [issue] = farm.result("a.xodr", "my_Rules.x").iter("Issue")
+        assert issue.get("description") == "lane -1 of road `17` is 1 m wide; a driving lane needs 2 m"
+        said = farm.qcbus("rule", "driving_lane_width")
+        assert "wide enough for a vehicle" in said and "narrowest" in said, said
+        # Saved anew it is another bundle, without a word to the broker.
+        text = (made / "bundle.py").read_text().replace("level=\"warning\"", "level=\"error\"")
+        (made / "coming").write_text(text)
+        (made / "coming").rename(made / "bundle.py")
+        farm.until(lambda: farm.wait(farm.files / "a.xodr")["errors"] == 1 + len([
+            it for it in farm.result("a.xodr", "xodrBundle").iter("Issue") if it.get("level") == "1"
+        ]))  # fmt: skip
+
+
+def test_a_bundle_that_cannot_run_is_said_and_taken_out(farm):
+    ready = farm.script("import nothing_of_this_name\n")
+    said = subprocess.run(
+        [QCBUS, "bundle", "add", "acme", sys.executable, ready],
+        cwd=farm.place, env=farm.environment, capture_output=True, text=True, timeout=WATCHDOG,
+    )  # fmt: skip
+    assert said.returncode != 0
+    assert "ready" in said.stderr and "nothing_of_this_name" in said.stderr, said.stderr
+    assert farm.peer("acme") is None
+    assert farm.wait(farm.put("a.xodr"))["verdict"] == "undetermined", "nobody has looked"

@@ -560,11 +560,14 @@ pub struct BundleUpgradeArgs {
 pub struct BundleNewArgs {
     /// The bundle's name; the directory is called so, too
     pub name: String,
+    /// In Python, with the package `qcbus`
+    #[arg(long, group = "language")]
+    pub python: bool,
     /// In Rust, with the SDK of a checkout of qcbus
     #[arg(long, group = "language")]
     pub rust: bool,
     /// The checkout of qcbus whose SDK it is built with (default: the one that this program was built from)
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", conflicts_with = "python")]
     pub sdk: Option<PathBuf>,
 }
 

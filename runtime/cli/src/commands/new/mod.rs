@@ -1,5 +1,6 @@
 //! `qcbus bundle new`: a directory with a bundle of one's own.
 
+mod python;
 mod rust;
 
 use std::fs::OpenOptions;
@@ -16,6 +17,7 @@ use crate::args::BundleNewArgs;
 /// What a bundle is written in. A language more is a file beside `rust.rs`, with its templates below.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Language {
+    Python,
     Rust,
 }
 
@@ -35,6 +37,7 @@ pub fn run(args: &BundleNewArgs) -> Exit {
 fn new(args: &BundleNewArgs) -> Result<String, Refusal> {
     good_name(&args.name)?;
     let layout = match language(args) {
+        Language::Python => python::layout(&args.name),
         Language::Rust => rust::layout(&args.name, args.sdk.as_deref())?,
     };
     let directory = absolute(Path::new(&args.name));
@@ -58,8 +61,11 @@ fn new(args: &BundleNewArgs) -> Result<String, Refusal> {
 }
 
 /// Exactly one is given.
-fn language(_args: &BundleNewArgs) -> Language {
-    Language::Rust
+fn language(args: &BundleNewArgs) -> Language {
+    match args.python {
+        true => Language::Python,
+        false => Language::Rust,
+    }
 }
 
 fn write_new(path: &Path, text: &str) -> std::io::Result<()> {

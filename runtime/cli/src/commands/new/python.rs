@@ -1,0 +1,28 @@
+//! A bundle in Python: a script, its examples, and nothing to build.
+
+use super::Layout;
+
+/// Paths, and what they are made of.
+const TEMPLATES: [(&str, &str); 4] = [
+    ("README.md", include_str!("python/README.md.in")),
+    (".gitignore", include_str!("python/gitignore.in")),
+    ("bundle.py", include_str!("python/bundle.py.in")),
+    ("test_bundle.py", include_str!("python/test_bundle.py.in")),
+];
+
+/// What a bundle of this name consists of.
+pub(super) fn layout(name: &str) -> Layout {
+    // The domain of a UID has no capitals and no underscores.
+    let domain = name.replace(['_', '.'], "-").to_ascii_lowercase();
+    let fill = |text: &str| {
+        let text = text.replace("{{name}}", name);
+        text.replace("{{domain}}", domain.trim_matches('-'))
+    };
+    let files = TEMPLATES.iter().map(|(path, text)| (*path, fill(text)));
+    Layout {
+        files: files.collect(),
+        next: format!(
+            "  python3 -m qcbus.test bundle.py\n  python3 bundle.py FILE.xodr\n  qcbus bundle add {name} bundle.py"
+        ),
+    }
+}
