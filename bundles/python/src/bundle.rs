@@ -8,7 +8,7 @@ use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use qcbus_document::FileKind;
-use qcbus_formats::pool::Ending;
+use qcbus_formats::pool::{Ending, is_rule_uid};
 use qcbus_formats::xqar::{Issue, Location};
 use qcbus_sdk::{
     AnyRule, Backport, Bundle, Facts, Level, Loaded, Mode, Param, Plan, Reads, VersionRange,
@@ -132,6 +132,12 @@ impl Native {
             default_on,
             page: leak(page),
         };
+        if let Some(uid) = facts.uids.iter().find(|uid| !is_rule_uid(uid)) {
+            return Err(PyValueError::new_err(format!(
+                "`{uid}` is no UID: it has a domain with a dot, a standard, the version from which it holds and a name, \
+                 of letters, digits and underscores, as in `acme.example:xodr:1.0.0:road.named`"
+            )));
+        }
         if let Err(error) = facts.versions.parse::<VersionRange>() {
             let text = format!("versions is `{}`: {error}", facts.versions);
             return Err(PyValueError::new_err(text));

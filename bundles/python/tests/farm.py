@@ -48,13 +48,14 @@ class Farm:
         (place / "run").mkdir()
         self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(place / "run"), "NO_COLOR": "1"}
 
-    def qcbus(self, *arguments: object, code: int | None = 0) -> str:
+    def qcbus(self, *arguments: object, code: int | None = 0, told: bool = False) -> str:
+        """What a command prints; with ``told`` what it tells people beside."""
         it = subprocess.run(
             [QCBUS, *map(str, arguments)],
             cwd=self.place, env=self.environment, capture_output=True, text=True, timeout=WATCHDOG,
         )  # fmt: skip
         assert code is None or it.returncode == code, f"{arguments}: {it.returncode}\n{it.stdout}{it.stderr}"
-        return it.stdout
+        return it.stderr if told else it.stdout
 
     def status(self) -> dict[str, Any]:
         return json.loads(self.qcbus("status", "--json"))

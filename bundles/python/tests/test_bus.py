@@ -198,7 +198,7 @@ def test_a_new_bundle_runs_as_its_page_says(tmp_path):
             it = subprocess.run(words, cwd=made, capture_output=True, text=True, timeout=WATCHDOG)
             assert it.returncode == 0 and said in it.stdout, it.stdout + it.stderr
         farm.environment["PATH"] = f"{QCBUS.parent}:{farm.environment['PATH']}"
-        ready = farm.qcbus("bundle", "add", "my_Rules.x", made / "bundle.py")
+        ready = farm.qcbus("bundle", "add", "my_Rules.x", made / "bundle.py", told=True)
         assert "ready" in ready and "1 checker" in ready, ready
         narrow = MAP.replace("/>\n</Open", """><lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right>
 <lane id="-1" type="driving"><width sOffset="0" a="1" b="0" c="0" d="0"/></lane></right></laneSection></lanes></road>
@@ -218,12 +218,9 @@ def test_a_new_bundle_runs_as_its_page_says(tmp_path):
 
 
 def test_a_bundle_that_cannot_run_is_said_and_taken_out(farm):
-    ready = farm.script("import nothing_of_this_name\n")
-    said = subprocess.run(
-        [QCBUS, "bundle", "add", "acme", sys.executable, ready],
-        cwd=farm.place, env=farm.environment, capture_output=True, text=True, timeout=WATCHDOG,
-    )  # fmt: skip
-    assert said.returncode != 0
-    assert "ready" in said.stderr and "nothing_of_this_name" in said.stderr, said.stderr
+    script = farm.script("import nothing_of_this_name\n")
+    said = farm.qcbus("bundle", "add", "acme", sys.executable, script, code=None, told=True)
+    assert "`acme` is not ready: it ended with exit code 1" in said
+    assert "No module named 'nothing_of_this_name'" in farm.log()
     assert farm.peer("acme") is None
     assert farm.wait(farm.put("a.xodr"))["verdict"] == "undetermined", "nobody has looked"

@@ -181,8 +181,9 @@ def test_what_no_bundle_can_be():
         qcbus.Bundle("a", version="1.0", kinds=[])
     with pytest.raises(ValueError, match="needs a UID"):
         bundle.rule()(check)
-    with pytest.raises(ValueError, match="`named` is no UID"):
-        bundle.rule("named")(check)
+    for uid in ("named", "a.b:xodr:1.0.0", "a-b.c:xodr:1.0.0:d", "a.b:xodr:1.0.0:d e", "a.b:x:y:z", ""):
+        with pytest.raises(ValueError, match="is no UID: it has a domain"):
+            bundle.rule(uid)(check)
     with pytest.raises(ValueError, match="`bad` is no level"):
         bundle.rule("a.b:xodr:1.0.0:c", level="bad")(check)
     with pytest.raises(ValueError, match="does not say what it demands"):

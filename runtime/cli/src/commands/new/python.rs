@@ -12,11 +12,11 @@ const TEMPLATES: [(&str, &str); 4] = [
 
 /// What a bundle of this name consists of.
 pub(super) fn layout(name: &str) -> Layout {
-    // The domain of a UID has no capitals and no underscores.
-    let domain = name.replace(['_', '.'], "-").to_ascii_lowercase();
+    // A UID takes letters, digits and underscores between its dots.
+    let domain = name.replace(['-', '.'], "_").to_ascii_lowercase();
     let fill = |text: &str| {
         let text = text.replace("{{name}}", name);
-        text.replace("{{domain}}", domain.trim_matches('-'))
+        text.replace("{{domain}}", &domain)
     };
     let files = TEMPLATES.iter().map(|(path, text)| (*path, fill(text)));
     Layout {
