@@ -15,14 +15,14 @@ def looks(found, document):
                 found.issue(element, f"`forbidden` in {document.path}", attribute=attribute)
 
 
-@bundle.rule("example.org:xodr:1.0.0:zoo.0", id="check_zoo_0")
+@bundle.rule("example.org:xodr:1.0.0:zoo.strict", id="check_zoo_0")
 def strict(doc, found):
     """The word is nowhere."""
     for document in (doc, *doc.linked):
         looks(found, document)
 
 
-@bundle.rule("example.org:xodr:1.0.0:zoo.1", id="check_zoo_1")
+@bundle.rule("example.org:xodr:1.0.0:zoo.nothing", id="check_zoo_1")
 def nothing(doc, found):
     """Nothing is demanded."""
 
