@@ -267,7 +267,11 @@ fn param(
     }
 }
 
-fn level_of(name: &str) -> PyResult<Level> {
+/// The level of a name, as rules and findings give it.
+///
+/// # Errors
+/// `ValueError`, when there is no such level.
+pub(crate) fn level_of(name: &str) -> PyResult<Level> {
     match name {
         "error" => Ok(Level::Error),
         "warning" => Ok(Level::Warning),

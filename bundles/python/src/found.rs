@@ -8,6 +8,7 @@ use pyo3::types::PyDict;
 use qcbus_document::{Document, Node};
 use qcbus_sdk::{Level, Place, Sink};
 
+use crate::bundle::level_of;
 use crate::document;
 use crate::element::Element;
 use crate::lease::{Closed, Lease};
@@ -128,17 +129,6 @@ fn element_of(at: &Bound<'_, PyAny>) -> PyResult<Element> {
     Err(PyTypeError::new_err(format!(
         "a finding points at an element, a road, a lane section, a lane or a document of its job, not at {what}"
     )))
-}
-
-fn level_of(name: &str) -> PyResult<Level> {
-    match name {
-        "error" => Ok(Level::Error),
-        "warning" => Ok(Level::Warning),
-        "information" | "info" => Ok(Level::Information),
-        _ => Err(PyValueError::new_err(format!(
-            "`{name}` is no level: error, warning or information"
-        ))),
-    }
 }
 
 impl Found {
