@@ -24,6 +24,8 @@ pub struct Module {
     pub mode: Mode,
     /// What it may do besides checking.
     pub may: May,
+    /// It looks and has no weight in any verdict: `"shadow": true`.
+    pub shadow: bool,
     /// Keys that begin with `qcbus`, for whoever knows them; texts, numbers and truth values as
     /// text, in the order of their names.
     pub extra: Vec<(String, String)>,
@@ -301,6 +303,7 @@ fn module(path: &Path, index: usize, value: &Value) -> Result<Module, ManifestEr
         exec_command: keys.text("exec_command")?,
         mode,
         may: keys.may()?,
+        shadow: keys.shadow(module_type, mode)?,
         extra: extra(object),
         manifest: path.to_owned(),
     })
@@ -362,6 +365,18 @@ impl Keys<'_> {
         Ok(may)
     }
 
+    fn shadow(&self, module_type: ModuleType, mode: Mode) -> Result<bool, ManifestError> {
+        let shadow = match self.object.get("shadow") {
+            Some(value) => self.truth("shadow", value)?,
+            None => false,
+        };
+        if shadow && (module_type, mode) != (ModuleType::CheckerBundle, Mode::Bus) {
+            let reason = "is for checker bundles that speak on the bus";
+            return Err(self.wrong("shadow", reason));
+        }
+        Ok(shadow)
+    }
+
     fn paths(&self, name: &str, value: &Value) -> Result<Vec<PathBuf>, ManifestError> {
         let Value::Array(list) = value else {
             return Err(self.wrong(name, "is not a list of paths"));
@@ -394,13 +409,14 @@ fn misspelt<'k>(name: &str, written: impl Iterator<Item = &'k str>) -> String {
 /// Keys of ours beside `mode`, handed on as they are.
 const OWN_KEYS: [&str; 2] = ["version", "restart"];
 
-const MODULE_KEYS: [&str; 6] = [
+const MODULE_KEYS: [&str; 7] = [
     "name",
     "exec_type",
     "module_type",
     "exec_command",
     "mode",
     "may",
+    "shadow",
 ];
 
 /// What stands in `may`.

@@ -37,6 +37,29 @@ impl Verdict {
         }
     }
 
+    /// What one bundle adds to the verdict of others: rejected by an error, undetermined by a checker that should have
+    /// answered and did not. One that has nothing to say, be it that it did not look, adds nothing: accepted.
+    pub fn added_by(bundle: &CheckerBundle) -> Verdict {
+        let mut issues = bundle.checkers.iter().flat_map(|checker| &checker.issues);
+        if issues.any(|issue| issue.level == Level::Error) {
+            Verdict::Rejected
+        } else if bundle.checkers.iter().any(is_open) {
+            Verdict::Undetermined
+        } else {
+            Verdict::Accepted
+        }
+    }
+
+    /// The verdict when this is said as well.
+    #[must_use]
+    pub fn and(self, other: Verdict) -> Verdict {
+        match (self, other) {
+            (Verdict::Rejected, _) | (_, Verdict::Rejected) => Verdict::Rejected,
+            (Verdict::Undetermined, _) | (_, Verdict::Undetermined) => Verdict::Undetermined,
+            (Verdict::Accepted, Verdict::Accepted) => Verdict::Accepted,
+        }
+    }
+
     /// The word written to reports and verdict files.
     pub fn as_str(self) -> &'static str {
         match self {
@@ -112,6 +135,32 @@ mod tests {
             of(Some(Status::Error), Some(Level::Error)),
             Verdict::Rejected
         );
+    }
+
+    #[test]
+    fn a_bundle_adds_what_it_found_or_failed_at_and_nothing_else() {
+        let adds = |status, level, blocked| {
+            let results = results(status, level, blocked);
+            Verdict::added_by(&results.bundles[0])
+        };
+        let done = Some(Status::Completed);
+        assert_eq!(adds(done, Some(Level::Error), false), Verdict::Rejected);
+        assert_eq!(adds(done, Some(Level::Warning), false), Verdict::Accepted);
+        assert_eq!(
+            adds(Some(Status::Error), None, false),
+            Verdict::Undetermined
+        );
+        assert_eq!(
+            adds(Some(Status::Skipped), None, true),
+            Verdict::Undetermined
+        );
+        assert_eq!(adds(Some(Status::Skipped), None, false), Verdict::Accepted);
+        let all = [Verdict::Accepted, Verdict::Undetermined, Verdict::Rejected];
+        for (at, one) in all.into_iter().enumerate() {
+            for (other_at, other) in all.into_iter().enumerate() {
+                assert_eq!(one.and(other), all[at.max(other_at)]);
+            }
+        }
     }
 
     #[test]

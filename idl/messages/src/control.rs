@@ -45,6 +45,11 @@ pub enum Request {
         /// Its name.
         name: String,
     },
+    /// What has this shadow found?
+    Trials {
+        /// Its name.
+        name: String,
+    },
     /// What do the bundles offer that are there?
     Offers {
         /// All but these, which whoever asks knows.
@@ -100,6 +105,13 @@ pub enum Response {
     Bundle {
         /// How it stands.
         bundle: Option<Box<BundleStanding>>,
+    },
+    /// Answer to `Trials`.
+    Trials {
+        /// How many there are of each kind; nothing when there is no such shadow.
+        counts: Option<TrialCounts>,
+        /// Those that would change a verdict, failed, or found anything: at most a thousand, what changes most first.
+        trials: Vec<Trial>,
     },
     /// Answer to `Offers`.
     Offers {
@@ -165,6 +177,51 @@ pub struct Runs {
     pub kinds: Vec<FileKind>,
     /// How many of its checkers are asked under the configuration in force.
     pub demanded: u64,
+    /// It has no weight in any verdict.
+    #[serde(default)]
+    pub shadow: bool,
+}
+
+/// How far a shadow is with its trials, and what they come to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct TrialCounts {
+    /// Files that it has been asked about.
+    pub tried: u64,
+    /// Files that wait for it.
+    pub waiting: u64,
+    /// Files that are not rejected, and would be.
+    pub would_reject: u64,
+    /// Files that are accepted, and would be undetermined.
+    pub would_leave_open: u64,
+    /// Files that are undetermined because nobody judges them, and would be accepted.
+    pub would_accept: u64,
+    /// Files about which it could not say anything.
+    pub failed: u64,
+}
+
+/// What a shadow said of a file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Trial {
+    /// Absolute path.
+    #[serde(with = "path_text::one")]
+    pub file: PathBuf,
+    /// The verdict on it.
+    pub verdict: Verdict,
+    /// The verdict that it would have if the shadow judged, too.
+    pub would: Verdict,
+    /// Issues of level error.
+    pub errors: u64,
+    /// Issues of level warning.
+    pub warnings: u64,
+    /// Issues of level information.
+    pub information: u64,
+    /// Its checkers that did not end well and why.
+    pub why: Vec<String>,
+    /// Why it said nothing, if it did not.
+    pub failure: Option<String>,
+    /// Where its result lies; empty when there is none.
+    #[serde(with = "path_text::one")]
+    pub result: PathBuf,
 }
 
 /// What a bundle offers that is there.
@@ -385,6 +442,9 @@ pub struct PeerStatus {
     /// How far it is confined; nothing where nobody can tell, and for reporters.
     #[serde(default)]
     pub sandbox: Option<SandboxStatus>,
+    /// Of a shadow, how its trials stand.
+    #[serde(default)]
+    pub trials: Option<TrialCounts>,
 }
 
 /// How far a bundle is confined, as the broker sees it.

@@ -5,13 +5,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use qcbus_document::FileKind;
-use qcbus_formats::config::{Choice, Config, Names};
+use qcbus_formats::config::{BundleConfig, Choice, Config, Names, same_bundle};
 use qcbus_ingest::modular::SearchPath;
 use qcbus_messages::codec;
 use qcbus_messages::{Catalogue, Digest};
 use sha2::{Digest as _, Sha256};
 
-use crate::core::Demand;
+use crate::core::{ChildSpec, Demand};
 use crate::reload::{LoadError, Loaded, Sources};
 
 /// A configuration in force: parsed, encoded for the bus, and with its digest.
@@ -19,6 +19,8 @@ use crate::reload::{LoadError, Loaded, Sources};
 pub struct InForce {
     /// The configuration; `None` when there is none and everything runs that is on by default.
     pub config: Option<Arc<Config>>,
+    /// The same without the shadows that it names: what results are pooled by, for nobody misses those.
+    pub judging: Option<Arc<Config>>,
     /// As it travels on the bus.
     pub encoded: Vec<u8>,
     /// SHA-256 of the encoded form and of the search path.
@@ -43,8 +45,10 @@ impl InForce {
             hash.update(directory.as_os_str().as_encoded_bytes());
         }
         let digest = Digest(hash.finalize().into());
+        let config = config.map(Arc::new);
         Ok(InForce {
-            config: config.map(Arc::new),
+            judging: config.clone(),
+            config,
             encoded,
             digest,
             search: Arc::new(search),
@@ -69,8 +73,25 @@ impl InForce {
             None => of_environment,
         };
         InForce::new(loaded.config.clone(), search)
+            .map(|in_force| in_force.beside(&loaded.children))
             .map(|in_force| in_force.narrowed(sources.choice.clone()))
             .map_err(|error| LoadError::Config(error.to_string()))
+    }
+
+    /// The same beside these children, some of which may be shadows.
+    fn beside(mut self, children: &[ChildSpec]) -> InForce {
+        let names_shadow = |it: &BundleConfig| {
+            let mut shadows = children.iter().filter(|child| child.shadow);
+            shadows.any(|child| same_bundle(&it.application, &child.name, ""))
+        };
+        if let Some(judging) = &mut self.judging
+            && judging.bundles.iter().any(names_shadow)
+        {
+            Arc::make_mut(judging)
+                .bundles
+                .retain(|it| !names_shadow(it));
+        }
+        self
     }
 
     /// The same, but only what `choice` asks for.
@@ -154,7 +175,7 @@ impl Demand for Configured {
     }
 
     fn means(&self, named: &str, name: &str, alias: &str) -> bool {
-        qcbus_formats::config::same_bundle(named, name, alias)
+        same_bundle(named, name, alias)
     }
 }
 

@@ -434,6 +434,7 @@ mod tests {
             restart: Restart::Never,
             may: Default::default(),
             programs: Vec::new(),
+            shadow: false,
         }
     }
 

@@ -1,8 +1,8 @@
 //! Under what a broker checks files, so that a run of `check` knows whether one that is there would find what it would
 //! find itself.
 
+use qcbus_messages::Digest;
 use qcbus_messages::control::Terms;
-use qcbus_messages::{Digest, Role};
 use sha2::{Digest as _, Sha256};
 
 use crate::core::{ChildSpec, Settings};
@@ -22,7 +22,7 @@ pub fn terms(options: &Options, config: Digest, children: &[ChildSpec]) -> Terms
         options.limits,
         of_settings(&options.settings)
     );
-    let bundles = children.iter().filter(|it| it.role == Role::Bundle);
+    let bundles = children.iter().filter(|it| it.judges());
     Terms {
         general: digest(&general),
         bundles: bundles
@@ -75,6 +75,7 @@ fn digest(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use qcbus_formats::manifest::May;
+    use qcbus_messages::Role;
 
     use super::*;
     use crate::core::Restart;
@@ -88,6 +89,7 @@ mod tests {
             restart: Restart::Always,
             may: May::default(),
             programs: Vec::new(),
+            shadow: false,
         }
     }
 

@@ -31,6 +31,7 @@ fn store_in(dir: &Path) -> Store {
         verdict_files: true,
         retries: true,
         gate: None,
+        trials: None,
         journal: Some(Journal::open(&dir.join("state"), "test").unwrap().into()),
         epoch: AtomicU64::new(NOW),
     }

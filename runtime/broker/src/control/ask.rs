@@ -167,6 +167,7 @@ fn limit_of(request: &Request) -> Option<Duration> {
         | Request::Reload
         | Request::RemoveBundle { .. }
         | Request::Bundle { .. }
+        | Request::Trials { .. }
         | Request::Offers { .. } => Some(AT_ONCE),
         Request::Check { .. } => Some(CHECKED_WITHIN),
         Request::Down => None,

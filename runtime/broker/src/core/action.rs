@@ -175,6 +175,13 @@ pub enum Action {
         /// `false` when the verdict stood already.
         fresh: bool,
     },
+    /// What a shadow has found, in one file or in all, is to be forgotten.
+    ForgetTrials {
+        /// The shadow.
+        shadow: String,
+        /// The file; `None` for all.
+        file: Option<Arc<Path>>,
+    },
     /// Something that a person should read.
     Notice(Notice),
     /// Everything is drained: leave the loop.

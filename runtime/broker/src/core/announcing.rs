@@ -74,7 +74,8 @@ impl State {
         let catalogue = Arc::new(catalogue);
         let waits_until = bundle.announced.as_ref().map(|it| it.at);
         let mark = self.mark_of(name, bundle, &catalogue);
-        let changes = bundle.mark != Some(mark) || bundle.origin.is_none();
+        let is_new = bundle.origin.is_none() && !self.is_shadow(name);
+        let changes = bundle.mark != Some(mark) || is_new;
         let at = waits_until.or_else(|| changes.then(|| self.believed_from(name, bundle)));
         match at.filter(|at| *at > self.now) {
             Some(at) => self.disbelieve(name, Announced { catalogue, at }, actions),
@@ -100,7 +101,7 @@ impl State {
             return;
         };
         let changes = bundle.mark != Some(self.mark_of(name, bundle, &catalogue));
-        if changes || bundle.origin.is_none() {
+        if changes || (bundle.origin.is_none() && !self.is_shadow(name)) {
             self.note_change(name);
         }
         if let Some(bundle) = self.bundles.get_mut(name) {

@@ -151,6 +151,7 @@ impl State {
             return;
         }
         let path = entry.path.clone();
+        self.forget_trials(&path, actions);
         let reporters = self.void_reports(id);
         self.files.remove(id);
         self.forget_dependencies(actions);

@@ -398,7 +398,7 @@ impl State {
     /// Whether every bundle that was to be started has joined, or has had its chance.
     pub(super) fn children_settled(&self) -> bool {
         let children = self.children.iter();
-        let mut bundles = children.filter(|(_, child)| child.spec.role == Role::Bundle);
+        let mut bundles = children.filter(|(_, child)| child.spec.judges());
         bundles.all(|(name, _)| {
             let ready = self.bundles.get(name).is_some_and(|it| it.ready);
             ready || self.hopeless(name).is_some()

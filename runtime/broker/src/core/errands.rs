@@ -16,6 +16,7 @@ use super::action::Action;
 use super::files::{FileId, Priority, Stage};
 use super::jobs::{ActiveJob, JobStage, ShareState};
 use super::jury::{Origin, Seat};
+use super::trials::TrialEnd;
 use super::types::Ticket;
 use super::{Actions, Phase, State};
 
@@ -26,6 +27,19 @@ pub struct Errand {
     pub ticket: Ticket,
     /// The bundles that are to look at the file, and nobody else.
     pub bundles: Arc<[String]>,
+    /// Nobody waits for it: it is the trial of a shadow.
+    pub is_trial: bool,
+}
+
+impl Errand {
+    /// What a client asks for.
+    pub fn of_client(ticket: Ticket, bundles: Arc<[String]>) -> Errand {
+        Errand {
+            ticket,
+            bundles,
+            is_trial: false,
+        }
+    }
 }
 
 /// What became of an errand whose file was checked.
@@ -33,6 +47,8 @@ pub struct Errand {
 pub enum ErrandOutcome {
     /// Here is what was found.
     Pooled(Box<Checked>),
+    /// This is what a shadow found.
+    Tried(TrialEnd),
     /// The file has changed since it was read.
     Stale,
     /// Others must judge by now, or otherwise.
@@ -89,6 +105,7 @@ impl State {
         let seats = self.seats(job.kind);
         match &job.errand {
             None => seats,
+            Some(errand) if errand.is_trial => self.seats_of_trial(&errand.bundles, job.kind),
             Some(errand) => {
                 let asked = |seat: &&Seat| errand.bundles.contains(&seat.name);
                 seats.iter().filter(asked).cloned().collect()
@@ -105,6 +122,9 @@ impl State {
             return;
         };
         job.stage = JobStage::Storing;
+        if errand.is_trial {
+            return self.pool_trial(id, actions);
+        }
         let whole = job.shares.len() == errand.bundles.len();
         // Why a bundle has failed need not lie in the file: another process of it may find what there is.
         let mut shares = job.shares.values();
@@ -145,6 +165,11 @@ impl State {
                 actions.push(Action::Answer { ticket, response });
                 self.end_job(id, actions);
             }
+            ErrandOutcome::Tried(found) => {
+                self.errands.remove(&ticket);
+                self.trial_ended(ticket, Ok(found));
+                self.end_job(id, actions);
+            }
             ErrandOutcome::Stale => self.end_job(id, actions),
             // The configuration is the same, or the errand would have been dismissed.
             ErrandOutcome::Outdated => {
@@ -161,7 +186,11 @@ impl State {
         if let Some(ticket) = errand.map(|it| it.ticket)
             && self.errands.remove(&ticket).is_some()
         {
-            elsewhere(ticket, reason, actions);
+            if self.is_trial(ticket) {
+                self.trial_ended(ticket, Err(reason));
+            } else {
+                elsewhere(ticket, reason, actions);
+            }
         }
         self.end_job(id, actions);
     }
@@ -173,6 +202,10 @@ impl State {
         };
         if !self.errands.contains_key(&ticket) {
             self.files.remove(file);
+        } else if self.is_trial(ticket) {
+            self.errands.remove(&ticket);
+            self.files.remove(file);
+            self.put_trial_back(ticket);
         } else if entry.present {
             self.files.enqueue(file, Priority::Errand, self.now);
         } else {
@@ -187,7 +220,11 @@ impl State {
     pub(super) fn dismiss_errands(&mut self, reason: &str, actions: &mut Actions) {
         let tickets: Vec<Ticket> = self.errands.keys().copied().collect();
         for ticket in tickets {
-            elsewhere(ticket, reason.to_owned(), actions);
+            if self.is_trial(ticket) {
+                self.put_trial_back(ticket);
+            } else {
+                elsewhere(ticket, reason.to_owned(), actions);
+            }
             self.abandon(ticket, actions);
         }
     }
@@ -218,6 +255,9 @@ impl State {
         let suspects = jobs.filter(|(_, job)| job.errand.is_some() && suspect(job));
         let suspects: Vec<JobId> = suspects.map(|(id, _)| *id).collect();
         for id in suspects {
+            if self.try_again(id, actions) {
+                continue;
+            }
             let reason = "a bundle has failed while it looked at it".to_owned();
             self.send_elsewhere(id, reason, actions);
         }

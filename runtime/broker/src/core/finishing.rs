@@ -3,7 +3,6 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use qcbus_document::FileKind;
 use qcbus_messages::{JobId, Verdict};
 
 use super::action::Action;
@@ -72,7 +71,7 @@ impl State {
                 .shares
                 .iter()
                 .map(|(name, share)| outcome(name, share))
-                .chain(self.inapplicable(job.kind))
+                .chain(self.inapplicable(job))
                 .collect(),
             rejected_maps: self.rejected_maps(job),
             jury: State::jury(&job.shares),
@@ -83,9 +82,14 @@ impl State {
 
     /// Configured bundles that do not take files of this kind: their checkers are listed as
     /// skipped, so that nobody takes them for lost.
-    fn inapplicable(&self, kind: FileKind) -> Vec<ShareOutcome> {
+    fn inapplicable(&self, job: &ActiveJob) -> Vec<ShareOutcome> {
         let mut outcomes = Vec::new();
-        let named = self.demand.named();
+        let kind = job.kind;
+        // What others would say of this kind is nothing that a shadow says.
+        let named = match job.is_trial() {
+            true => Vec::new(),
+            false => self.demand.named(),
+        };
         for (name, bundle) in &self.bundles {
             let Some(catalogue) = &bundle.catalogue else {
                 continue;
@@ -93,7 +97,7 @@ impl State {
             let wanted = named
                 .iter()
                 .any(|it| self.demand.means(it, name, &catalogue.alias));
-            if !wanted || catalogue.kinds.contains(&kind) {
+            if !wanted || catalogue.kinds.contains(&kind) || self.is_shadow(name) {
                 continue;
             }
             let checkers = self.demand.checkers(name, catalogue, kind);
@@ -184,6 +188,7 @@ impl State {
             self.map_is_judged(file, before.as_deref(), &now);
         }
         self.deliver_to_all(file, actions);
+        self.let_shadows_try(file);
     }
 
     /// The job counts for nothing, and its file is read again.

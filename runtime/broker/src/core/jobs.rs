@@ -44,6 +44,13 @@ pub(super) struct ActiveJob {
     pub errand: Option<Errand>,
 }
 
+impl ActiveJob {
+    /// Whether it is the trial of a shadow.
+    pub fn is_trial(&self) -> bool {
+        self.errand.as_ref().is_some_and(|it| it.is_trial)
+    }
+}
+
 /// How far a job is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum JobStage {
@@ -134,7 +141,7 @@ impl State {
         if !self.may_judge() && !self.reads_early() {
             return;
         }
-        while self.jobs.len() < self.settings.max_active
+        while self.jobs.len() < self.settings.max_active + self.trials.under_way()
             && self.preparing < self.settings.max_preparing
             && self.documents_active() < self.settings.max_documents
         {
@@ -155,7 +162,7 @@ impl State {
     }
 
     /// Begins with one file, unless its verdict still stands.
-    fn take(&mut self, id: FileId, actions: &mut Actions) {
+    pub(super) fn take(&mut self, id: FileId, actions: &mut Actions) {
         let Some(entry) = self.files.get(id).filter(|it| it.present) else {
             return;
         };
@@ -217,6 +224,7 @@ impl State {
                 self.end_job(id, actions);
             }
             Err(PrepareFailure::NoRoom(why)) => {
+                self.trials_give_way(id, actions);
                 // Every file in the queue would say the same and push out all other notices.
                 if self.now >= self.mute_room_until {
                     self.mute_room_until = self.now + ROOM_NOTICE_PAUSE;
@@ -225,6 +233,7 @@ impl State {
                 self.wait_for_room(id, &why, self.settings.retry_after, actions);
             }
             Err(PrepareFailure::Busy) => {
+                self.trials_give_way(id, actions);
                 let why = "as many documents as the bus carries at once are in use";
                 let pause = self.settings.busy_pause * self.stand_in_line(id);
                 self.wait_for_room(id, why, pause, actions);

@@ -32,6 +32,7 @@ mod staging;
 mod standing;
 mod status;
 mod suspects;
+mod trials;
 mod types;
 mod upgrades;
 mod waits;
@@ -57,6 +58,7 @@ pub use notice::Notice;
 pub use outcome::ShareOutcome;
 pub(crate) use outcome::{facts_weight, weight};
 pub use settings::Settings;
+pub use trials::TrialEnd;
 pub use types::*;
 
 use announcing::Unrest;
@@ -70,6 +72,7 @@ use leaving::Retired;
 use reporters::Reporter;
 use roster::Seats;
 use status::Rate;
+use trials::Trials;
 use waits::Waiter;
 
 /// What one event makes necessary.
@@ -93,6 +96,7 @@ pub struct State {
     former_are_gone: bool,
     waiters: Vec<Waiter>,
     errands: Errands,
+    trials: Trials,
     config: Digest,
     demand: Arc<dyn Demand>,
     epoch: Epoch,
@@ -158,6 +162,7 @@ impl State {
             former_are_gone: false,
             waiters: Vec::new(),
             errands: Errands::new(),
+            trials: Trials::default(),
             config,
             demand,
             epoch,
@@ -264,6 +269,7 @@ impl State {
         self.follow_roster(&mut actions);
         self.dispatch_all(&mut actions);
         self.pump(&mut actions);
+        self.pump_trials(&mut actions);
         self.store_finished(&mut actions);
         self.wind_down(&mut actions);
         actions

@@ -126,6 +126,7 @@ fn spec(version: u8) -> ChildSpec {
         restart: Restart::OnFailure,
         may: Default::default(),
         programs: Vec::new(),
+        shadow: false,
     }
 }
 

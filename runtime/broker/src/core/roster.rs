@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use qcbus_document::FileKind;
-use qcbus_messages::{JobId, Role};
+use qcbus_messages::JobId;
 
 use super::action::Action;
 use super::bundles::Bundle;
@@ -48,9 +48,10 @@ impl State {
     pub(super) fn enrol_children(&mut self, actions: &mut Actions) {
         let children = self.children.iter();
         let wanted: BTreeSet<String> = children
-            .filter(|(_, child)| child.spec.role == Role::Bundle)
+            .filter(|(_, child)| child.spec.judges())
             .map(|(name, _)| name.clone())
             .collect();
+        self.follow_shadows(actions);
         let struck: Vec<String> = self
             .bundles
             .iter()
@@ -107,9 +108,14 @@ impl State {
             return;
         };
         let mark = self.mark_of(name, bundle, catalogue);
+        let is_shadow = self.is_shadow(name);
         let Some(bundle) = self.bundles.get_mut(name) else {
             return;
         };
+        if is_shadow {
+            bundle.mark = Some(mark);
+            return self.shadow_is_ready(name, mark, actions);
+        }
         let origin = if supervised {
             Origin::Supervised
         } else {
@@ -200,8 +206,13 @@ impl State {
     }
 
     fn seat_of(&self, name: &str, bundle: &Bundle, kind: FileKind) -> Option<Seat> {
-        // Whoever leaves is off the roster.
+        // Whoever leaves is off the roster, and no shadow is on it.
         bundle.origin?;
+        self.place_of(name, bundle, kind)
+    }
+
+    /// What a bundle would have to look at in files of a kind.
+    pub(super) fn place_of(&self, name: &str, bundle: &Bundle, kind: FileKind) -> Option<Seat> {
         let alias = bundle.catalogue.as_ref().map_or("", |it| it.alias.as_str());
         if !self.demand.wants_bundle(name, alias) {
             return None;
@@ -222,16 +233,26 @@ impl State {
         })
     }
 
-    /// Bundles that the configuration names and nobody has seen.
+    /// Bundles that the configuration names and nobody has seen. A shadow that is named by its name need not judge.
     fn absent_by_name(&self) -> Vec<String> {
-        let seen = |named: &String| {
-            self.bundles.iter().any(|(name, bundle)| {
+        let means = |named: &str, name: &str, alias: &str| self.demand.means(named, name, alias);
+        let is_shadow = |named: &str| {
+            let mut children = self.children.iter();
+            children.any(|(name, it)| it.spec.shadow && means(named, name, ""))
+        };
+        let seen = |named: &str| {
+            let mut bundles = self.bundles.iter();
+            bundles.any(|(name, bundle)| {
                 let alias = bundle.catalogue.as_ref().map_or("", |it| it.alias.as_str());
-                bundle.catalogue.is_some() && self.demand.means(named, name, alias)
+                // Who leaves, or looks without weight, does not judge.
+                let judges = bundle.catalogue.is_some() && bundle.origin.is_some();
+                judges && means(named, name, alias)
             })
         };
         let named = self.demand.named().into_iter();
-        named.filter(|named| !seen(named)).collect()
+        named
+            .filter(|named| !is_shadow(named) && !seen(named))
+            .collect()
     }
 
     pub(super) fn seats(&self, kind: FileKind) -> Arc<[Seat]> {

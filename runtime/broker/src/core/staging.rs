@@ -8,7 +8,7 @@ use qcbus_messages::{CheckerEnd, JobId};
 
 use super::State;
 use super::bundles::Bundle;
-use super::jobs::{JobStage, Share, ShareState};
+use super::jobs::{ActiveJob, JobStage, Share, ShareState};
 use super::outcome::{clip, clip_text, facts_weight, weight};
 
 /// More checkers need not be named as those in the way of one.
@@ -42,7 +42,10 @@ pub(super) enum Room {
 impl State {
     /// While findings take up all the room that they may have, younger jobs stay queued.
     pub(super) fn room_for_findings(&self) -> Room {
-        let staged = self.jobs.values().flat_map(|job| job.shares.values());
+        // A trial is kept to what one bundle may say of one file, and holds up nobody.
+        let counts = |job: &&ActiveJob| !job.is_trial();
+        let jobs = self.jobs.values().filter(counts);
+        let staged = jobs.flat_map(|job| job.shares.values());
         let bytes: usize = staged.map(|share| share.staged_bytes).sum();
         if bytes < self.settings.max_findings_bytes {
             return Room::Free;
@@ -50,7 +53,7 @@ impl State {
         let mut under_way = self
             .jobs
             .iter()
-            .filter(|(_, job)| job.stage != JobStage::Preparing);
+            .filter(|(_, job)| job.stage != JobStage::Preparing && counts(job));
         Room::Full(under_way.next().map(|(id, _)| *id))
     }
 

@@ -73,6 +73,7 @@ impl State {
             checkers: catalogue.checkers.len() as u64,
             kinds: catalogue.kinds.clone(),
             demanded: demanded.len() as u64,
+            shadow: self.is_shadow(name),
         })
     }
 }
@@ -86,7 +87,7 @@ impl Child {
 
 impl Bundle {
     /// Whether it is there, has said what it checks, and stays.
-    fn is_heard(&self) -> bool {
+    pub fn is_heard(&self) -> bool {
         self.session.is_some() && self.ready && !self.leaving
     }
 }

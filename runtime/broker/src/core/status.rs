@@ -117,7 +117,8 @@ impl State {
     fn queue_status(&self) -> QueueStatus {
         let counts = self.files.counts();
         let rate = self.rate.per_second(self.now);
-        let left = (counts.fresh + counts.background + counts.active) as f64;
+        let active = counts.active.saturating_sub(self.trials.under_way() as u64);
+        let left = (counts.fresh + counts.background + active) as f64;
         let estimated = if left == 0.0 {
             Some(0.0)
         } else {
@@ -126,7 +127,7 @@ impl State {
         QueueStatus {
             waiting: counts.fresh,
             background: counts.background,
-            active: counts.active,
+            active,
             oldest_waiting_s: self.files.oldest_wait(self.now).as_secs_f64(),
             rate,
             estimated_s: estimated,
@@ -164,7 +165,7 @@ impl State {
             } else {
                 it.note.clone()
             },
-            sandbox: None,
+            ..PeerStatus::default()
         });
         let starting = self.children.iter().filter(|(name, _)| {
             let reporter = self.reporter_named(name).is_some();
@@ -225,6 +226,7 @@ impl State {
             restarts: self.restarts(name),
             note,
             sandbox: None,
+            trials: self.trial_counts(name),
         }
     }
 

@@ -29,6 +29,7 @@ mod processes;
 mod reporting;
 mod restless;
 mod things;
+mod trials;
 mod words;
 mod world;
 
@@ -61,6 +62,7 @@ enum Step {
     Leave(u8),
     Remove(u8),
     Manifest(u8),
+    Shadow(u8),
     ChildJoins,
     ChildJoinsTooLate(bool),
     ChildEnds(u8),
@@ -98,6 +100,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
         1 => any::<u8>().prop_map(Step::Leave),
         1 => (0..3_u8).prop_map(Step::Remove),
         2 => (0..3_u8).prop_map(Step::Manifest),
+        1 => (0..3_u8).prop_map(Step::Shadow),
         2 => Just(Step::ChildJoins),
         1 => any::<bool>().prop_map(Step::ChildJoinsTooLate),
         1 => (0..4_u8).prop_map(Step::ChildEnds),
@@ -146,6 +149,7 @@ impl World {
             Step::Remove(n) => self.remove(["First", "Second", CHILD][usize::from(n)]),
             // Absent, or one of two versions.
             Step::Manifest(n) => self.manifest((n > 0).then_some(n)),
+            Step::Shadow(n) => self.shadow_is((n > 0).then_some(n)),
             Step::ChildJoins => self.child_joins(),
             Step::ChildJoinsTooLate(known) => self.child_joins_too_late(known),
             Step::ChildEnds(n) => self.child_ends(match n {
@@ -207,6 +211,7 @@ proptest! {
             prop_assert!(why.iter().all(|it| it.contains("alone in a fresh process")), "{:?}", why);
         }
         world.all_know_the_same();
+        world.all_is_tried();
         prop_assert!(!world.waiting.values().any(there), "{:?}", world.waiting);
         world.clients_are_content();
         let known = world.state.status().files;

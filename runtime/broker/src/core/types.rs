@@ -297,13 +297,23 @@ pub struct ChildSpec {
     /// The files that the command of a manifest runs, as they were when it was read. What comes with the
     /// program has none.
     pub programs: Vec<(PathBuf, Option<Stamp>)>,
+    /// It is a bundle that looks at files and has no weight in any verdict.
+    pub shadow: bool,
 }
 
 impl ChildSpec {
+    /// Whether it is a bundle that must judge.
+    pub fn judges(&self) -> bool {
+        self.role == Role::Bundle && !self.shadow
+    }
+
     /// Tells command, version and programs from others, in as many bits as a launch has for it.
     pub fn digest(&self) -> u64 {
         let mut hash = Sha256::new();
         hash.update(format!("{:?}{:?}", self.version, self.command));
+        if self.shadow {
+            hash.update("shadow");
+        }
         if self.may != May::default() {
             hash.update(format!("{:?}", self.may));
         }

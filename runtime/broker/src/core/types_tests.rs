@@ -10,6 +10,7 @@ fn spec(command: &str) -> ChildSpec {
         restart: Restart::Always,
         may: Default::default(),
         programs: Vec::new(),
+        shadow: false,
     }
 }
 

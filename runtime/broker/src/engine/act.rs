@@ -73,6 +73,7 @@ impl Broker {
                 judged,
                 fresh,
             } => self.announce(path, judged, fresh),
+            Action::ForgetTrials { shadow, file } => self.forget_trials(shadow, file),
             Action::Notice(notice) => (self.tell)(Told::Notice(notice)),
         }
         true
@@ -112,7 +113,7 @@ impl Broker {
 
     fn order_store(&mut self, job: Box<FinishedJob>) {
         let root = self.intake.root(job.job);
-        let config = self.in_force.config.clone();
+        let config = self.in_force.judging.clone();
         let path = job.path.clone();
         reached("checked", &path);
         self.untrimmed = true;
@@ -125,14 +126,28 @@ impl Broker {
         let root = self.intake.root(job.job);
         let config = self.in_force.config.clone();
         let (store, events) = (self.store.clone(), self.inbox.events_in.clone());
+        let shadow = self.state.tried_out(job.job).map(str::to_owned);
         spawn_blocking(move || {
-            let outcome = store.pool_errand(&mut job, config.as_deref(), root.as_deref());
+            let (config, document) = (config.as_deref(), root.as_deref());
+            let outcome = match shadow {
+                Some(shadow) => store.pool_trial(&shadow, &mut job, config, document),
+                None => store.pool_errand(&mut job, config, document),
+            };
             drop(root);
             // After the end of the loop nobody waits for this.
             let _ = events.send(Event::Pooled {
                 job: job.job,
                 outcome,
             });
+        });
+    }
+
+    fn forget_trials(&self, shadow: String, file: Option<Arc<Path>>) {
+        let store = self.store.clone();
+        spawn_blocking(move || {
+            if let Some(results) = &store.trials {
+                results.forget(&shadow, file.as_deref());
+            }
         });
     }
 

@@ -27,6 +27,7 @@ impl Broker {
                 | Request::Wait { .. }
                 | Request::Check { .. }
                 | Request::Bundle { .. }
+                | Request::Trials { .. }
                 | Request::Offers { .. }
         );
         if only_tells && asked.answer.is_closed() {
@@ -64,6 +65,11 @@ impl Broker {
             Request::Bundle { name } => {
                 let bundle = self.standing(&name).map(Box::new);
                 answer(asked.answer, Response::Bundle { bundle })
+            }
+            Request::Trials { name } => {
+                let (counts, trials) = self.state.trials(&name).unzip();
+                let trials = trials.unwrap_or_default();
+                answer(asked.answer, Response::Trials { counts, trials })
             }
             Request::Offers { without } => {
                 let mut offers = self.state.offers();
@@ -107,7 +113,7 @@ impl Broker {
         let bundles = asked.bundles.keys().cloned().collect();
         self.handle(Event::Check {
             path: file.into(),
-            errand: Errand { ticket, bundles },
+            errand: Errand::of_client(ticket, bundles),
         })
     }
 
@@ -198,6 +204,9 @@ impl Broker {
                 digest: in_force.digest,
                 demand: in_force.demand(),
             });
+        } else {
+            // Other shadows may be left out when results are pooled.
+            self.in_force = in_force;
         }
         if let Some(specs) = children {
             self.handle(Event::Children { specs });

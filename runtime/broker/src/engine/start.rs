@@ -29,7 +29,7 @@ use crate::result_paths::ResultPaths;
 use crate::scouts::Scouts;
 use crate::seams::{Children, ControlSocket, Host, now, spawn_blocking};
 use crate::stamp::stamp_of;
-use crate::store::{Reconciled, Store, remove_earlier_results};
+use crate::store::{Reconciled, Store, TrialResults, remove_earlier_results};
 use crate::supervise::Surroundings;
 use crate::watch::{Seen, is_looked_at, scan_directory};
 use crate::writers::{Order, Writers};
@@ -251,6 +251,7 @@ fn store(
         retries: options.watch,
         gate: gate.transpose()?,
         scouts,
+        trials: options.state.as_deref().map(TrialResults::anew),
         journal: journal.map(SharedJournal::from),
         epoch: AtomicU64::new(0),
     })

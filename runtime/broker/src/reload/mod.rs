@@ -14,6 +14,7 @@ use qcbus_disk::trust::{self, TrustError};
 use qcbus_formats::config::{
     Choice, Config, Known, KnownBundle, Oddity, Parsed, same_bundle, same_reporter,
 };
+use qcbus_formats::manifest::Module;
 use qcbus_messages::Role;
 use qcbus_messages::path_text::to_text;
 
@@ -117,6 +118,10 @@ impl Sources {
             let read = RefCell::new(&mut loaded);
             let modules = read_manifest(&path, &|path| note(&mut read.borrow_mut(), path))?;
             for module in modules {
+                if module.shadow && !self.lasting {
+                    loaded.notices.push(no_shadow_in_a_run(&module));
+                    continue;
+                }
                 add_module(module, &mut loaded)?;
             }
         }
@@ -134,6 +139,8 @@ impl Sources {
             loaded.notices.splice(0..0, lines);
             let unasked = unasked(path, &parsed.config, &loaded);
             loaded.notices.extend(unasked);
+            let named_shadows = named_shadows(path, &parsed.config, &loaded);
+            loaded.notices.extend(named_shadows);
             loaded.config = Some(parsed.config);
         }
         Ok(loaded)
@@ -261,6 +268,34 @@ impl Sources {
              demanded until it is back (to do without them, start the broker anew)"
         )))
     }
+}
+
+/// Nothing that a run of `check` prints or writes is of a shadow.
+fn no_shadow_in_a_run(module: &Module) -> String {
+    format!(
+        "{}: `{}` is a shadow: it takes no part in a run, only where a broker stays (`qcbus serve`)",
+        to_text(&module.manifest),
+        module.name
+    )
+}
+
+/// Bundles that the configuration names, and that have no weight all the same.
+fn named_shadows(path: &Path, config: &Config, loaded: &Loaded) -> Vec<String> {
+    let named = |name: &str| {
+        let mut bundles = config.bundles.iter();
+        bundles.any(|it| same_bundle(&it.application, name, ""))
+    };
+    let shadows = loaded
+        .children
+        .iter()
+        .filter(|it| it.shadow && named(&it.name));
+    let shown = to_text(path);
+    shadows
+        .map(|it| {
+            let name = &it.name;
+            format!("{shown} names `{name}`, which is a shadow: it is tried as it is configured, and nobody misses it")
+        })
+        .collect()
 }
 
 /// Bundles that somebody has brought, and of which the configuration asks nothing.

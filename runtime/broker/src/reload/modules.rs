@@ -96,5 +96,6 @@ fn spec_of(module: Module, role: Role) -> ChildSpec {
         restart,
         may: module.may,
         programs: Vec::new(),
+        shadow: module.shadow,
     }
 }

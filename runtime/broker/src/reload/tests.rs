@@ -24,6 +24,7 @@ fn child(name: &str) -> ChildSpec {
         restart: Restart::Always,
         may: Default::default(),
         programs: Vec::new(),
+        shadow: false,
     }
 }
 

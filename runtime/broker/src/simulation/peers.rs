@@ -35,6 +35,7 @@ pub fn children() -> Vec<ChildSpec> {
         restart: Restart::Always,
         may: May::default(),
         programs: Vec::new(),
+        shadow: false,
     };
     vec![child(FIRST, Role::Bundle), child(REPORTER, Role::Reporter)]
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 use qcbus_formats::config::Config;
-use qcbus_formats::pool::BundleOutcome;
+use qcbus_formats::pool::{BundleOutcome, Scope};
 use qcbus_formats::xqar;
 use qcbus_messages::control::Checked;
 
@@ -26,7 +26,7 @@ impl Store {
             Err(error) => return ErrandOutcome::Failed(unlooked(&job.path, &error)),
         }
         let outcomes: Vec<BundleOutcome> = job.bundles.iter().map(ShareOutcome::said).collect();
-        let pooled = self.pool(job, outcomes, config, root);
+        let pooled = self.pool(job, outcomes, (config, Scope::Whole), root);
         let verdict = pooled.verdict();
         let why = reasons(job, &pooled, verdict);
         let judged = judged(job, &pooled, verdict, why, PathBuf::new());

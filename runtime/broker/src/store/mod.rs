@@ -8,6 +8,7 @@ mod leftovers;
 mod pooling;
 mod reconcile;
 mod refresh;
+mod trial;
 mod withdraw;
 
 use std::cell::Cell;
@@ -17,7 +18,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use qcbus_formats::config::{Choice, Config};
-use qcbus_formats::pool::{BundleOutcome, Pooled};
+use qcbus_formats::pool::{BundleOutcome, Pooled, Scope};
 use qcbus_formats::xqar::{self, Dialect};
 use qcbus_messages::Verdict;
 use qcbus_messages::path_text::to_text;
@@ -40,6 +41,7 @@ use pooling::reasons;
 pub use reconcile::Reconciled;
 pub use refresh::digest_of;
 use refresh::refreshed;
+pub use trial::TrialResults;
 
 /// Writes results. Shared by the threads that do so.
 #[derive(Debug)]
@@ -60,6 +62,8 @@ pub struct Store {
     pub gate: Option<Gate>,
     /// Who looks at files.
     pub scouts: Scouts,
+    /// Where results of trials are kept, if anything is.
+    pub trials: Option<TrialResults>,
     /// What is remembered; without it, nothing is: of a single run nobody asks later.
     pub journal: Option<SharedJournal>,
     /// The epoch of who must judge: what was judged in an earlier one is not stored.
@@ -81,7 +85,7 @@ impl Store {
             Err(error) => return StoreOutcome::Failed(unlooked(&job.path, &error)),
         }
         let outcomes: Vec<BundleOutcome> = job.bundles.iter().map(ShareOutcome::said).collect();
-        let pooled = self.pool(job, outcomes, config, root);
+        let pooled = self.pool(job, outcomes, (config, Scope::Whole), root);
         reached("pooled", &job.path);
         let verdict = pooled.verdict();
         let why = reasons(job, &pooled, verdict);

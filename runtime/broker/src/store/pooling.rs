@@ -16,7 +16,7 @@ impl Store {
         &self,
         job: &FinishedJob,
         bundles: Vec<BundleOutcome>,
-        config: Option<&Config>,
+        (config, scope): (Option<&Config>, Scope),
         root: Option<&[u8]>,
     ) -> Pooled {
         let document = root.and_then(|bytes| Document::open(bytes).ok());
@@ -37,7 +37,7 @@ impl Store {
             config,
             bundles,
             remarks,
-            scope: Scope::Whole,
+            scope,
             version: env!("CARGO_PKG_VERSION"),
             build_date: BUILD_DATE,
         };

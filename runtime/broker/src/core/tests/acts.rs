@@ -8,7 +8,7 @@ use super::reporting::REPORTER;
 use super::things::*;
 use super::world::*;
 use qcbus_messages::control::Response;
-use qcbus_messages::{Role, ToPeer, Verdict};
+use qcbus_messages::{ToPeer, Verdict};
 
 impl World {
     pub fn act(&mut self, action: Action) {
@@ -22,10 +22,10 @@ impl World {
                 self.peers.remove(&session);
             }
             Action::Spawn { launch, spec } => {
-                let bundle = spec.role == Role::Bundle;
+                let names = [CHILD, SHADOW, REPORTER];
                 self.launched.push(Launched {
                     launch,
-                    name: if bundle { CHILD } else { REPORTER },
+                    name: names.into_iter().find(|it| *it == spec.name).unwrap(),
                     version: spec.version.and_then(|it| it.parse().ok()).unwrap_or(1),
                 });
             }
@@ -33,7 +33,7 @@ impl World {
                 self.killed.push(launch);
                 let killed = self.launched.iter().position(|it| it.launch == launch);
                 let killed = killed.map(|at| self.launched.remove(at));
-                self.dying.extend(killed.filter(|it| it.name == CHILD));
+                self.dying.extend(killed.filter(|it| it.name != REPORTER));
             }
             Action::Enrol(member) => {
                 self.members.insert(member.name.clone(), member);
@@ -99,6 +99,10 @@ impl World {
 
     fn is_to_be_stored(&mut self, job: FinishedJob) {
         let names: BTreeSet<_> = job.bundles.iter().map(|it| it.name.clone()).collect();
+        assert!(
+            !names.contains(SHADOW),
+            "nothing of a shadow is in a result"
+        );
         assert_eq!(
             names.len(),
             job.bundles.len(),

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::super::*;
 use super::things::*;
+use super::trials::found_in;
 use super::world::World;
 use qcbus_messages::control::{Checked, FileVerdict, Response};
 use qcbus_messages::{JobId, Verdict};
@@ -74,7 +75,7 @@ impl World {
         let bundles = bundles.iter().map(|it| (*it).to_owned()).collect();
         self.event(Event::Check {
             path: path_of(file),
-            errand: Errand { ticket, bundles },
+            errand: Errand::of_client(ticket, bundles),
         });
         ticket
     }
@@ -110,7 +111,7 @@ impl World {
         assert_eq!(total, files.len() as u64, "a file counts once");
         let at_bundles = self.state.jobs.values().filter(|job| {
             let at_work = job.stage.is_before_storing();
-            at_work && job.errand.is_some()
+            at_work && job.errand.is_some() && !job.is_trial()
         });
         for errand in at_bundles.filter_map(|job| job.errand.as_ref()) {
             let open = self.clients.open.contains_key(&errand.ticket);
@@ -155,10 +156,13 @@ impl World {
         let at = usize::from(n) % self.clients.pooling.len();
         let job = self.clients.pooling.remove(at);
         let (id, prepared) = (job.job, job.prepared.as_ref().unwrap());
+        let is_trial = self.state.jobs.get(&id).is_some_and(|it| it.is_trial());
         let outcome = if !well {
             ErrandOutcome::Failed("full".to_owned())
         } else if prepared.inputs != self.inputs(file_of(&job.path)) {
             ErrandOutcome::Stale
+        } else if is_trial {
+            ErrandOutcome::Tried(found_in(&job))
         } else if job.epoch != self.state.epoch() {
             ErrandOutcome::Outdated
         } else {

@@ -81,6 +81,7 @@ impl World {
             return session;
         }
         let wanted = launch.is_none() || self.manifest.is_some();
+        let wanted = wanted && name != SHADOW;
         if wanted {
             self.demanded.insert(name.to_owned(), Some(version));
         }
@@ -137,7 +138,9 @@ impl World {
 
     pub fn children_are(&mut self, version: Option<u8>) {
         let reporter = self.desk.open.then(reporter);
-        let specs = version.map(child).into_iter().chain(reporter).collect();
+        let children = version.map(child).into_iter();
+        let children = children.chain(self.shadow.map(shadow));
+        let specs = children.chain(reporter).collect();
         self.event(Event::Children { specs });
     }
 
@@ -196,6 +199,17 @@ impl World {
                 }],
             },
         );
+    }
+
+    /// A bundle ends the job that it has with so many findings of each checker.
+    pub fn answers_with(&mut self, n: u8, findings: usize) {
+        let session = self.nth_peer(n).unwrap();
+        let process = self.peers.get_mut(&session).unwrap();
+        let job = process.jobs.pop_first().unwrap();
+        for checker in 0..2 {
+            self.says_on(session, job, checker, findings);
+        }
+        self.say(session, FromPeer::JobDone { job, micros: 1 });
     }
 
     pub fn answer(&mut self, n: u8) {

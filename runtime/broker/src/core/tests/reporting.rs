@@ -41,6 +41,7 @@ pub fn reporter() -> ChildSpec {
         restart: Restart::Always,
         may: Default::default(),
         programs: Vec::new(),
+        shadow: false,
     }
 }
 

@@ -41,6 +41,18 @@ pub fn child(version: u8) -> ChildSpec {
         restart: Restart::Always,
         may: Default::default(),
         programs: Vec::new(),
+        shadow: false,
+    }
+}
+
+/// What its manifest brings looks and has no weight.
+pub const SHADOW: &str = "Shadow";
+
+pub fn shadow(version: u8) -> ChildSpec {
+    ChildSpec {
+        name: SHADOW.to_owned(),
+        shadow: true,
+        ..child(version)
     }
 }
 

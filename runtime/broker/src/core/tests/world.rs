@@ -43,6 +43,8 @@ pub struct World {
     pub killed: Vec<Launch>,
     /// Which version the manifest of the child brings, if it is there.
     pub manifest: Option<u8>,
+    /// The same of the shadow.
+    pub shadow: Option<u8>,
     /// What the journal has been told.
     pub members: BTreeMap<String, Member>,
     pub journal: BTreeMap<u8, Judged>,
@@ -122,6 +124,7 @@ impl World {
             dying: Vec::new(),
             killed: Vec::new(),
             manifest: None,
+            shadow: None,
             members: BTreeMap::new(),
             journal: BTreeMap::new(),
             generation: 1,
@@ -348,6 +351,7 @@ impl World {
                     .manifest
                     .is_none_or(|it| self.demanded[CHILD] == Some(it));
             let all = all && self.state.files.is_quiet() && self.state.jobs.is_empty();
+            let all = all && self.shadow_rests();
             if all && self.reporter_rests() {
                 return;
             }

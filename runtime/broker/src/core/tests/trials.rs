@@ -1,0 +1,308 @@
+//! Shadows: they look at everything, and nothing comes of it.
+
+use qcbus_messages::control::{Trial, TrialCounts};
+
+use super::super::*;
+use super::things::*;
+use super::world::World;
+use qcbus_messages::Verdict;
+use std::time::Duration;
+
+impl World {
+    /// The manifest of the shadow comes, changes or goes.
+    pub fn shadow_is(&mut self, version: Option<u8>) {
+        self.shadow = version;
+        self.children_are(self.manifest);
+    }
+
+    /// Whether a shadow that is wanted has nothing left to try.
+    pub fn shadow_rests(&self) -> bool {
+        let counts = self.state.trial_counts(SHADOW);
+        let rests = counts.is_some_and(|it| it.waiting == 0) && self.is_there(SHADOW);
+        self.shadow.is_none() || rests
+    }
+
+    /// A shadow has been asked about every file, once the world has calmed down, or was killed by it.
+    pub fn all_is_tried(&self) {
+        let counts = self.state.trial_counts(SHADOW);
+        assert_eq!(counts.is_some(), self.shadow.is_some());
+        let Some(counts) = counts else {
+            return;
+        };
+        assert_eq!(counts.tried, self.judged.len() as u64);
+        assert_eq!(self.state.trials.under_way(), 0);
+    }
+
+    fn trials(&self) -> (TrialCounts, Vec<Trial>) {
+        self.state.trials(SHADOW).unwrap()
+    }
+
+    fn peer(&self, name: &str) -> u8 {
+        let at = self.peers.values().position(|it| it.name == name);
+        u8::try_from(at.unwrap()).unwrap()
+    }
+
+    fn jobs_at(&self, name: &str) -> usize {
+        let peers = self.peers.values().filter(|it| it.name == name);
+        peers.map(|it| it.jobs.len()).sum()
+    }
+
+    /// Until the shadow has the trial of a file.
+    fn until_tried(&mut self) {
+        for _ in 0..200 {
+            if self.jobs_at(SHADOW) > 0 {
+                return;
+            }
+            self.prepare(0, true);
+            self.pass(Duration::from_millis(100));
+        }
+        panic!("it is asked nothing: {:#?}", self.state.jobs);
+    }
+}
+
+impl World {
+    /// Those who are there do all that there is to do; nobody else comes but a shadow that was started again.
+    fn comes_to_rest(&mut self) {
+        for _ in 0..500 {
+            for n in 0..4 {
+                self.prepare(n, true);
+                self.answer(n);
+                self.store(n, true);
+                self.pool(n, true);
+                self.tell_pooled();
+            }
+            self.child_joins();
+            self.pass(Duration::from_millis(100));
+            if self.state.jobs.is_empty() && self.state.files.is_quiet() && self.shadow_rests() {
+                return;
+            }
+        }
+        panic!("it does not come to rest: {:#?}", self.state.jobs);
+    }
+}
+
+/// What a shadow finds as the store would tell it: an error where it has anything to say.
+pub fn found_in(job: &FinishedJob) -> TrialEnd {
+    let said: Vec<_> = job.bundles.iter().map(ShareOutcome::said).collect();
+    let names: Vec<&str> = said.iter().map(|it| &*it.name).collect();
+    assert_eq!(names, [SHADOW], "nobody else is asked");
+    let mut checkers = said.iter().flat_map(|it| &it.checkers);
+    let errors = checkers.any(|it| !it.issues.is_empty());
+    let adds = match errors {
+        true => Verdict::Rejected,
+        false => Verdict::Accepted,
+    };
+    TrialEnd {
+        adds,
+        alone: adds,
+        counts: [u64::from(errors), 0, 0],
+        why: Vec::new(),
+        result: None,
+    }
+}
+
+/// A world with a bundle that judges, and a shadow that is there.
+fn world_with_a_shadow() -> World {
+    let mut world = World::new();
+    world.join("First");
+    world.shadow_is(Some(1));
+    world.pass(Duration::ZERO);
+    world.child_joins();
+    assert!(world.is_there(SHADOW));
+    world
+}
+
+#[test]
+fn a_shadow_looks_at_what_is_there_and_at_what_comes_and_no_verdict_waits_for_it() {
+    let mut world = World::new();
+    world.join("First");
+    world.write(0);
+    world.until_judged(1);
+    world.shadow_is(Some(1));
+    world.pass(Duration::ZERO);
+    world.child_joins();
+    world.write(2);
+    // The shadow does not answer.
+    for _ in 0..50 {
+        world.prepare(0, true);
+        world.answer(world.peer("First"));
+        world.store(0, true);
+    }
+    assert_eq!(world.judged.len(), 2);
+    assert_eq!(world.names_that_judged(2), ["First"]);
+    assert_eq!(
+        world.stored.len(),
+        2,
+        "nothing is judged again because of it"
+    );
+    assert!(world.members.contains_key("First") && !world.members.contains_key(SHADOW));
+    world.comes_to_rest();
+    world.all_is_tried();
+    assert_eq!(world.stored.len(), 2);
+}
+
+#[test]
+fn it_is_asked_about_one_file_at_a_time_and_after_its_verdict() {
+    let mut world = world_with_a_shadow();
+    for file in 0..6 {
+        world.write(file);
+    }
+    for _ in 0..20 {
+        world.prepare(0, true);
+        assert!(world.jobs_at(SHADOW) <= 1);
+        assert!(world.jobs_at(SHADOW) == 0 || !world.stored.is_empty());
+        world.answer(world.peer("First"));
+        world.store(0, true);
+        world.pass(Duration::from_millis(50));
+    }
+    assert_eq!(world.judged.len(), 6);
+    world.comes_to_rest();
+    world.all_is_tried();
+}
+
+#[test]
+fn a_shadow_that_hangs_holds_up_neither_verdicts_nor_the_end() {
+    let mut world = world_with_a_shadow();
+    world.write(0);
+    world.until_judged(1);
+    world.until_tried();
+    for file in 1..6 {
+        world.write(file);
+    }
+    for _ in 0..50 {
+        world.prepare(0, true);
+        world.answer(world.peer("First"));
+        world.store(0, true);
+    }
+    assert_eq!(world.judged.len(), 6);
+    assert_eq!(world.jobs_at(SHADOW), 1);
+    world.drain();
+}
+
+#[test]
+fn one_that_dies_with_a_file_is_asked_once_more_and_then_not_again() {
+    let mut world = world_with_a_shadow();
+    world.write(0);
+    world.until_judged(1);
+    for _ in 0..2 {
+        world.until_tried();
+        world.kill(world.peer(SHADOW));
+        while world.launched.is_empty() {
+            world.pass(Duration::from_millis(100));
+        }
+        world.child_joins();
+    }
+    world.comes_to_rest();
+    let (counts, trials) = world.trials();
+    assert_eq!((counts.tried, counts.failed), (1, 1));
+    assert!(
+        trials[0].failure.as_ref().unwrap().contains("failed"),
+        "{trials:?}"
+    );
+    assert_eq!(
+        world.judged[&0].1,
+        Verdict::Accepted,
+        "that is no matter of the verdict"
+    );
+    assert_eq!(world.stored.len(), 1);
+}
+
+#[test]
+fn what_it_would_change_is_told_and_follows_the_files() {
+    let mut world = world_with_a_shadow();
+    for file in [0, 2] {
+        world.write(file);
+    }
+    world.until_judged(2);
+    world.until_tried();
+    let process = world.peer(SHADOW);
+    // Of the first it finds nothing, of the second an error.
+    world.answers_with(process, 0);
+    world.pool(0, true);
+    world.tell_pooled();
+    world.until_tried();
+    world.answers_with(world.peer(SHADOW), 1);
+    world.pool(0, true);
+    world.tell_pooled();
+    let (counts, trials) = world.trials();
+    assert_eq!(
+        (counts.tried, counts.would_reject, counts.waiting),
+        (2, 1, 0)
+    );
+    assert_eq!(trials.len(), 1);
+    assert_eq!(
+        (trials[0].verdict, trials[0].would),
+        (Verdict::Accepted, Verdict::Rejected)
+    );
+    assert_eq!(world.state.status().files.rejected, 0);
+    let rejected = trials[0].file.clone();
+    world.delete(file_of(&rejected));
+    let (counts, trials) = world.trials();
+    assert_eq!((counts.tried, counts.would_reject), (1, 0));
+    assert!(trials.is_empty());
+}
+
+#[test]
+fn a_newer_shadow_tries_everything_again_and_the_same_one_nothing() {
+    let mut world = world_with_a_shadow();
+    world.write(0);
+    world.comes_to_rest();
+    let done = |world: &World| world.state.bundles[SHADOW].done;
+    assert_eq!(done(&world), 1);
+    world.kill(world.peer(SHADOW));
+    world.comes_to_rest();
+    assert_eq!(world.trials().0.tried, 1);
+    let before = done(&world);
+    world.shadow_is(Some(2));
+    world.comes_to_rest();
+    assert_eq!(world.trials().0.tried, 1);
+    assert_eq!(done(&world), before + 1);
+}
+
+#[test]
+fn who_becomes_a_shadow_need_not_judge_and_who_is_none_any_more_must() {
+    let mut world = world_with_a_shadow();
+    world.write(0);
+    world.comes_to_rest();
+    let judge = ChildSpec {
+        shadow: false,
+        ..shadow(1)
+    };
+    // From now on it must judge, also while its next process is not there.
+    world.event(Event::Children {
+        specs: vec![judge.clone()],
+    });
+    let id = world.state.files.id(&path_of(0)).unwrap();
+    let stands = |world: &World| {
+        let entry = world.state.files.get(id).unwrap();
+        world
+            .state
+            .stands(entry.kind, entry.judged.as_ref().unwrap())
+    };
+    assert!(!stands(&world), "a verdict without it stands no more");
+    assert!(world.members.contains_key(SHADOW), "and the journal knows");
+    assert_eq!(world.state.trials(SHADOW), None);
+    world.event(Event::Children {
+        specs: vec![shadow(1)],
+    });
+    assert!(stands(&world));
+    assert!(!world.members.contains_key(SHADOW));
+    assert!(world.state.trials(SHADOW).is_some());
+}
+
+#[test]
+fn a_shadow_is_restless_to_nobody() {
+    let mut world = world_with_a_shadow();
+    world.state.settings.changes_forgiven = 2;
+    world.write(0);
+    world.comes_to_rest();
+    for _ in 0..8 {
+        world.kill(world.peer(SHADOW));
+        while world.launched.is_empty() {
+            world.pass(Duration::from_millis(100));
+        }
+        world.child_joins();
+        assert!(world.state.bundles[SHADOW].ready, "it is believed at once");
+    }
+    assert_eq!(world.stored.len(), 1);
+}

@@ -1,0 +1,81 @@
+//! What is told of trials: which verdicts would be others if a shadow judged as well.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use qcbus_messages::Verdict;
+use qcbus_messages::control::{Trial, TrialCounts};
+
+use super::TrialEnd;
+use crate::core::State;
+
+/// Trials that are told one by one.
+const TOLD: usize = 1000;
+
+impl State {
+    /// How the trials of a bundle stand; `None` when it is no shadow.
+    pub(in crate::core) fn trial_counts(&self, name: &str) -> Option<TrialCounts> {
+        let shadow = self.trials.shadows.get(name)?;
+        let mut counts = TrialCounts {
+            tried: shadow.tried.len() as u64,
+            waiting: (shadow.waiting.len() + usize::from(shadow.under_way.is_some())) as u64,
+            ..TrialCounts::default()
+        };
+        for trial in shadow.tried.iter().filter_map(|it| self.told(it)) {
+            match (&trial.failure, trial.would) {
+                (Some(_), _) => counts.failed += 1,
+                (None, would) if would == trial.verdict => {}
+                (None, Verdict::Rejected) => counts.would_reject += 1,
+                (None, Verdict::Undetermined) => counts.would_leave_open += 1,
+                (None, Verdict::Accepted) => counts.would_accept += 1,
+            }
+        }
+        Some(counts)
+    }
+
+    /// The trials of a shadow that change something, or failed, or found anything; `None` when there is no such shadow.
+    pub fn trials(&self, name: &str) -> Option<(TrialCounts, Vec<Trial>)> {
+        let counts = self.trial_counts(name)?;
+        let tried = self.trials.shadows.get(name)?.tried.iter();
+        let told = tried.filter_map(|it| self.told(it));
+        let of_interest = |it: &Trial| {
+            it.failure.is_some()
+                || it.would != it.verdict
+                || it.errors + it.warnings + it.information > 0
+        };
+        let mut told: Vec<Trial> = told.filter(of_interest).collect();
+        // What would change first; of each, in the order of the paths.
+        told.sort_by_key(|it| (it.failure.is_none(), it.would == it.verdict));
+        told.truncate(TOLD);
+        Some((counts, told))
+    }
+
+    fn told(&self, (path, end): (&Arc<Path>, &Result<TrialEnd, String>)) -> Option<Trial> {
+        let entry = self.files.get(self.files.id(path)?)?;
+        let verdict = entry.judged.as_ref()?.verdict;
+        let mut trial = Trial {
+            file: path.to_path_buf(),
+            verdict,
+            would: verdict,
+            errors: 0,
+            warnings: 0,
+            information: 0,
+            why: Vec::new(),
+            failure: None,
+            result: PathBuf::new(),
+        };
+        match end {
+            Ok(found) => {
+                [trial.errors, trial.warnings, trial.information] = found.counts;
+                trial.why.clone_from(&found.why);
+                trial.result = found.result.clone().unwrap_or_default();
+                trial.would = match self.seats(entry.kind).is_empty() {
+                    true => found.alone,
+                    false => verdict.and(found.adds),
+                };
+            }
+            Err(why) => trial.failure = Some(why.clone()),
+        }
+        Some(trial)
+    }
+}

@@ -1,0 +1,124 @@
+//! What a shadow found in a file, by itself: pooled like any other result, and kept beside the journal.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use qcbus_disk::write_whole;
+use qcbus_formats::config::Config;
+use qcbus_formats::pool::{BundleOutcome, Scope};
+use qcbus_formats::xqar::{self, CheckerBundle, Level};
+use qcbus_messages::Verdict;
+use qcbus_messages::path_text::to_text;
+use sha2::{Digest as _, Sha256};
+
+use super::{Store, unlooked};
+use crate::core::{ErrandOutcome, FinishedJob, ShareOutcome, TrialEnd};
+
+/// Below the directory of state.
+const DIRECTORY: &str = "shadow";
+
+/// Reasons that are kept of one trial.
+const REASONS: usize = 3;
+
+/// Bytes of a file's name in that of its result.
+const MOST_OF_A_NAME: usize = 128;
+
+/// Where the results of trials lie.
+#[derive(Debug, Clone)]
+pub struct TrialResults(PathBuf);
+
+impl TrialResults {
+    /// Those of a broker with this directory of state. Nothing of an earlier broker stays: all is tried anew.
+    pub fn anew(state: &Path) -> TrialResults {
+        let directory = state.join(DIRECTORY);
+        // What cannot be removed is written over, or nobody names it.
+        let _ = std::fs::remove_dir_all(&directory);
+        TrialResults(directory)
+    }
+
+    /// The result of one file. Names say which file it is, and differ where only directories do.
+    fn of(&self, shadow: &str, file: &Path) -> PathBuf {
+        let digest = Sha256::digest(file.as_os_str().as_encoded_bytes());
+        let number = digest.iter().take(4).map(|byte| format!("{byte:02x}"));
+        let number: String = number.collect();
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        let mut end = name.len().min(MOST_OF_A_NAME);
+        while !name.is_char_boundary(end) {
+            end -= 1;
+        }
+        let name = format!("{}-{number}.xqar", &name[..end]);
+        self.0.join(shadow).join(name)
+    }
+
+    /// Forgets what a shadow found in a file, or in all.
+    pub fn forget(&self, shadow: &str, file: Option<&Path>) {
+        // One that was never written need not be removed, and what cannot be is written over.
+        let _ = match file {
+            Some(file) => std::fs::remove_file(self.of(shadow, file)),
+            None => std::fs::remove_dir_all(self.0.join(shadow)),
+        };
+    }
+}
+
+impl Store {
+    /// Pools what a shadow found, and keeps its result if it found anything.
+    pub fn pool_trial(
+        &self,
+        shadow: &str,
+        job: &mut FinishedJob,
+        config: Option<&Config>,
+        root: Option<&[u8]>,
+    ) -> ErrandOutcome {
+        match self.refresh(job) {
+            Ok(true) => {}
+            Ok(false) => return ErrandOutcome::Stale,
+            Err(error) => return ErrandOutcome::Failed(unlooked(&job.path, &error)),
+        }
+        let outcomes: Vec<BundleOutcome> = job.bundles.iter().map(ShareOutcome::said).collect();
+        let pooled = self.pool(job, outcomes, (config, Scope::Alone), root);
+        let mut bundles = pooled.results.bundles.iter();
+        let its_own = bundles.find(|it| it.name == shadow);
+        let adds = its_own.map_or(Verdict::Accepted, Verdict::added_by);
+        let open = pooled.open().filter(|it| it.bundle == shadow);
+        let mut found = TrialEnd {
+            adds,
+            alone: pooled.verdict(),
+            counts: its_own.map(counts).unwrap_or_default(),
+            why: open.take(REASONS).map(ToString::to_string).collect(),
+            result: None,
+        };
+        let is_silent = adds == Verdict::Accepted && found.counts == [0; 3];
+        let (Some(results), false) = (&self.trials, is_silent) else {
+            if let Some(results) = &self.trials {
+                results.forget(shadow, Some(&job.path));
+            }
+            return ErrandOutcome::Tried(found);
+        };
+        let path = results.of(shadow, &job.path);
+        let text = xqar::write(&pooled.results, self.dialect);
+        match write_whole(&path, text.as_bytes(), false) {
+            Ok(()) => found.result = Some(path),
+            Err(error) => return ErrandOutcome::Failed(unkept(&path, &error)),
+        }
+        ErrandOutcome::Tried(found)
+    }
+}
+
+/// Its issues: errors, warnings, information.
+fn counts(bundle: &CheckerBundle) -> [u64; 3] {
+    let issues = bundle.checkers.iter().flat_map(|it| &it.issues);
+    let mut counts = [0; 3];
+    for issue in issues {
+        let at = match issue.level {
+            Level::Error => 0,
+            Level::Warning => 1,
+            Level::Information => 2,
+        };
+        counts[at] += 1;
+    }
+    counts
+}
+
+fn unkept(path: &Path, error: &io::Error) -> String {
+    format!("cannot write {}: {error}", to_text(path))
+}
