@@ -207,6 +207,7 @@ fn spec(program: &Path, command: &str, alias: &str, name: &str, role: Role) -> C
         restart: Restart::Always,
         may: Default::default(),
         programs: Vec::new(),
+        shadow: false,
     }
 }
 

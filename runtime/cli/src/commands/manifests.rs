@@ -61,7 +61,7 @@ fn try_add(args: &BundleAddArgs) -> Result<String, Refusal> {
     let path = home.manifest(name);
     let before = std::fs::read(&path).ok();
     let shown = to_text(&path);
-    write_whole(&path, manifest(name, &command).as_bytes(), true).map_err(|error| {
+    write_whole(&path, manifest(args, &command).as_bytes(), true).map_err(|error| {
         let why = format!("cannot write {shown}: {error}; nothing was added");
         (Exit::Internal, why)
     })?;
@@ -289,14 +289,18 @@ const OTHERS: Duration = Duration::from_secs(60);
 const PAUSE: Duration = Duration::from_millis(50);
 
 /// The text of a manifest.
-fn manifest(name: &str, command: &str) -> String {
-    let manifest = serde_json::json!({"module": [{
-        "name": name,
+fn manifest(args: &BundleAddArgs, command: &str) -> String {
+    let mut module = serde_json::json!({
+        "name": args.name,
         "exec_type": "executable",
         "module_type": "checker_bundle",
         "exec_command": command,
         "mode": "bus",
-    }]});
+    });
+    if args.shadow {
+        module["shadow"] = true.into();
+    }
+    let manifest = serde_json::json!({"module": [module]});
     format!("{manifest:#}\n")
 }
 

@@ -19,6 +19,7 @@ mod serve;
 mod settings;
 mod status;
 mod stops;
+mod trials;
 mod upgrade;
 
 use std::ffi::OsString;
@@ -60,6 +61,7 @@ pub fn run(args: Args) -> Exit {
         Command::Bundle(BundleCommand::Add(args)) => manifests::add(&args),
         Command::Bundle(BundleCommand::Upgrade(args)) => upgrade::run(&args),
         Command::Bundle(BundleCommand::Remove(args)) => manifests::remove(&args),
+        Command::Bundle(BundleCommand::Trials(args)) => trials::run(&args),
         Command::Bundle(BundleCommand::New(args)) => new::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Reporter(ReporterCommand::Run { name, bus }) => reporter::run(name, &bus),

@@ -71,6 +71,11 @@ pub fn ready(name: &str, runs: &Runs, was: &str, notices: &[String]) -> String {
         counted(runs.checkers),
         kinds.join(", ")
     );
+    if runs.shadow {
+        text.push_str("; a shadow: without weight in any verdict (`qcbus bundle trials ");
+        text.push_str(name);
+        text.push_str("` shows what it would change)");
+    }
     if runs.demanded == 0 {
         text.push_str(
             "; but none of them is asked: the configuration in force does not name it, or they are not on \
@@ -89,5 +94,13 @@ pub fn counted(checkers: u64) -> String {
     match checkers {
         1 => "1 checker".to_owned(),
         several => format!("{several} checkers"),
+    }
+}
+
+/// So many files.
+pub fn files(number: u64) -> String {
+    match number {
+        1 => "1 file".to_owned(),
+        several => format!("{several} files"),
     }
 }

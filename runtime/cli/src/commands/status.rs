@@ -127,7 +127,12 @@ fn queue_line(queue: &qcbus_messages::control::QueueStatus) -> String {
 }
 
 fn peer_line(peer: &PeerStatus) -> String {
-    let mut line = format!("{} {}: {}", peer.name, peer.version, peer.state);
+    let what = if peer.trials.is_some() {
+        "a shadow, "
+    } else {
+        ""
+    };
+    let mut line = format!("{} {}: {what}{}", peer.name, peer.version, peer.state);
     if peer.checkers > 0 {
         let _ = write!(line, ", {} checkers", peer.checkers);
     }
@@ -136,6 +141,9 @@ fn peer_line(peer: &PeerStatus) -> String {
         let _ = write!(line, ", {} thread{plural}", peer.threads);
     }
     let _ = write!(line, ", {} done", peer.done);
+    if let Some(trials) = &peer.trials {
+        let _ = write!(line, ", {}", super::trials::counted(trials));
+    }
     if peer.restarts > 0 {
         let _ = write!(line, ", started again {} times", peer.restarts);
     }
@@ -208,6 +216,7 @@ mod tests {
                     state: "partly".into(),
                     why: "this kernel has no Landlock".into(),
                 }),
+                trials: None,
             }],
             epoch: (3 << 32) + 2,
             notices: vec![NoticeStatus {

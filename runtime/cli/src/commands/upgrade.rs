@@ -26,12 +26,18 @@ fn upgrade(args: &BundleUpgradeArgs) -> Result<String, Refusal> {
     let _alone = home.alone()?;
     let was = before(&home, name)?;
     let path = home.manifest(name);
-    let (command, taken_from) = if args.command.is_empty() {
-        (was.command.clone().unwrap_or_default(), None)
-    } else {
-        let command = command_line(&args.command)?;
-        let bytes = change(&path, name, &command)?;
-        (command, Some(bytes))
+    let wanted = match (args.shadow, args.no_shadow) {
+        (true, _) => Some(true),
+        (_, true) => Some(false),
+        _ => None,
+    };
+    let command = match args.command.is_empty() {
+        true => was.command.clone().unwrap_or_default(),
+        false => command_line(&args.command)?,
+    };
+    let taken_from = match args.command.is_empty() && wanted.is_none() {
+        true => None,
+        false => Some(change(&path, name, &command, wanted)?),
     };
     let notices = match home.reload() {
         Ok(notices) => notices.unwrap_or_default(),
@@ -69,8 +75,13 @@ fn before(home: &Home, name: &str) -> Result<BundleStanding, Refusal> {
     })
 }
 
-/// Gives a manifest another command; returns what it was before.
-fn change(path: &Path, name: &str, command: &str) -> Result<Vec<u8>, Refusal> {
+/// Gives a manifest another command, and says whether it is of a shadow; returns what it was before.
+fn change(
+    path: &Path,
+    name: &str,
+    command: &str,
+    shadow: Option<bool>,
+) -> Result<Vec<u8>, Refusal> {
     let shown = to_text(path);
     let bytes = std::fs::read(path).map_err(|error| {
         usage(format!(
@@ -87,6 +98,11 @@ fn change(path: &Path, name: &str, command: &str) -> Result<Vec<u8>, Refusal> {
         return Err(usage(format!("{shown} does not bring `{name}`")));
     };
     module.insert("exec_command".to_owned(), command.into());
+    match shadow {
+        Some(true) => drop(module.insert("shadow".to_owned(), true.into())),
+        Some(false) => drop(module.remove("shadow")),
+        None => {}
+    }
     let text = format!("{manifest:#}\n");
     write_whole(path, text.as_bytes(), true)
         .map_err(|error| (Exit::Internal, format!("cannot write {shown}: {error}")))?;
