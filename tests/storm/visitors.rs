@@ -22,9 +22,15 @@ impl Driver {
             && !self.animals.contains(&animal)
         {
             let arguments = if animal == "slow" { "--millis 5" } else { "" };
-            self.farm.let_in(animal, arguments);
+            // What has no weight must change nothing, whatever it does.
+            if !animal.starts_with("reporter") && self.dice.below(3) == 0 {
+                self.farm.let_in_as_shadow(animal, arguments);
+                self.tally.note("shadow comes", animal);
+            } else {
+                self.farm.let_in(animal, arguments);
+                self.tally.note("animal comes", animal);
+            }
             self.animals.push(animal);
-            self.tally.note("animal comes", animal);
         }
     }
 

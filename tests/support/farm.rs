@@ -214,20 +214,33 @@ impl Farm {
         self.let_in_by(&zoo(), animal, arguments);
     }
 
+    /// Lets an animal in that has no weight in any verdict.
+    pub fn let_in_as_shadow(&self, animal: &str, arguments: &str) {
+        self.let_in_with(&zoo(), animal, arguments, true);
+    }
+
     /// Lets an animal in whose program lies elsewhere.
     pub fn let_in_by(&self, program: &Path, animal: &str, arguments: &str) {
+        self.let_in_with(program, animal, arguments, false);
+    }
+
+    fn let_in_with(&self, program: &Path, animal: &str, arguments: &str, shadow: bool) {
         let module_type = if animal.starts_with("reporter") {
             "report_module"
         } else {
             "checker_bundle"
         };
-        let manifest = serde_json::json!({ "module": [{
+        let mut module = serde_json::json!({
             "name": animal,
             "exec_type": "executable",
             "module_type": module_type,
             "exec_command": format!("{} {animal} {arguments}", program.display()),
             "mode": "bus",
-        }]});
+        });
+        if shadow {
+            module["shadow"] = true.into();
+        }
+        let manifest = serde_json::json!({ "module": [module] });
         let path = self.bundles_d().join(format!("{animal}.json"));
         // Renamed into place: a manifest that is half there is refused, with a notice.
         let unfinished = self.bundles_d().join(format!(".{animal}"));
