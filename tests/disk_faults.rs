@@ -16,7 +16,7 @@ use nix::errno::Errno;
 use qcbus_messages::Verdict;
 use qcbus_messages::control::{Request, Response};
 use support::content::{CATALOG, Content, Mark};
-use support::farm::{Farm, tail};
+use support::farm::{Farm, copy_program, tail, zoo};
 use support::inside::skip;
 use support::judge::{Files, judge};
 use support::tracer::{Answer, Kind, Traced, Trouble, no_other_answers};
@@ -278,6 +278,67 @@ fn a_file_that_never_answers_is_named_and_holds_up_nobody() {
         let unseen = victim.farm.status().unwrap().unseen;
         assert!(unseen.is_empty(), "{unseen:?}");
     }
+}
+
+/// The program of a manifest lies on a server that is gone: the process that runs goes on, and so does everybody.
+#[test]
+fn a_program_that_never_answers_holds_up_nobody() {
+    let test = "a_program_that_never_answers_holds_up_nobody";
+    let Some(mut victim) = Victim::new(test) else {
+        return;
+    };
+    let program = victim.farm.base().join("remote/polite");
+    std::fs::create_dir(program.parent().unwrap()).unwrap();
+    copy_program(&zoo(), &program);
+    victim.farm.let_in_by(&program, "polite", "");
+    let peer = |victim: &Victim| {
+        let peers = victim.farm.status()?.peers;
+        peers
+            .into_iter()
+            .find(|it| it.name == "polite" && it.state == "ready")
+    };
+    let pid = until_or("it judges", || peer(&victim), || victim.explain()).pid;
+    victim.broker.trouble(Some(Trouble {
+        below: program.clone(),
+        kinds: &[Kind::Look],
+        answer: Answer::Never,
+        one_in: 1,
+    }));
+    let named = || {
+        let status = victim.farm.status()?;
+        status
+            .unseen
+            .iter()
+            .any(|it| it.path == program)
+            .then_some(())
+    };
+    until_or("it is named", named, || victim.explain());
+    for number in 0..20 {
+        let name = format!("honest-{number}.xodr");
+        victim.put(&name, Content::Good(3000 + number));
+        assert_eq!(victim.farm.verdict(&name).verdict, Verdict::Accepted);
+        let results = victim.farm.result(&name);
+        assert!(
+            results.bundles.iter().any(|it| it.name == "polite"),
+            "{name}"
+        );
+    }
+    victim.broker.trouble(None);
+    until_or(
+        "it answers again",
+        || victim.farm.status()?.unseen.is_empty().then_some(()),
+        || victim.explain(),
+    );
+    // A change is seen then.
+    victim.farm.send_away("polite");
+    until_or(
+        "it has gone",
+        || {
+            let peers = victim.farm.status()?.peers;
+            peers.iter().all(|it| it.pid != pid).then_some(())
+        },
+        || victim.explain(),
+    );
 }
 
 #[test]

@@ -7,7 +7,7 @@ use std::time::Duration;
 use qcbus_messages::control::{BundleStanding, Request, Response, Status, Terms, Unseen};
 use tokio::sync::oneshot;
 
-use super::looks::{Look, Sighted};
+use super::looks::{Look, Seen, Sighted};
 use super::{Broker, Told};
 use crate::control::Asked;
 use crate::core::{Errand, Event, Notice, Stamp, Ticket};
@@ -222,12 +222,26 @@ impl Broker {
         }
     }
 
-    pub(super) fn reload_if_changed(&mut self, fingerprint: &mut Fingerprint) {
-        let now = self.sources.fingerprint(&self.loaded);
-        if now == *fingerprint {
+    /// Sends a scout to configuration, manifests and programs, unless one is on his way: they may lie on a disk that
+    /// does not answer, for which the loop must not wait.
+    pub(super) fn look_for_changes(&mut self) {
+        if self.looks.changes.is_some() {
             return;
         }
-        *fingerprint = now;
+        let (sources, read) = (self.sources.clone(), self.loaded.read.clone());
+        // Where no thread can be started now, one may in a second.
+        self.looks.changes = self
+            .scout(move || Seen::Sources(sources.fingerprint(&read)))
+            .ok();
+    }
+
+    /// A scout has come back with the stamps of all that was read for what is in force.
+    pub(super) fn reload_if_changed(&mut self, now: Fingerprint) {
+        self.looks.changes = None;
+        if now == self.fingerprint {
+            return;
+        }
+        self.fingerprint = now;
         match self.reload() {
             Ok(changes) if changes.is_empty() => {}
             Ok(changes) => {

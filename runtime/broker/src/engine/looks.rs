@@ -13,6 +13,7 @@ use tokio::sync::oneshot;
 
 use super::Broker;
 use crate::core::{Event, Input, PrepareFailure, Stamp};
+use crate::reload::Fingerprint;
 use crate::result_paths::ResultPaths;
 use crate::scouts::{PATIENCE, Scouts};
 use crate::stamp::{stamp_of, stamp_through_links};
@@ -29,6 +30,8 @@ pub(super) struct Looks {
     pending: HashMap<u64, Look>,
     /// Files that have gone while somebody waits for them, which are looked at once more.
     missed: HashMap<u64, Arc<Path>>,
+    /// The scout who looks whether configuration, manifests and programs are what they were.
+    pub(super) changes: Option<u64>,
 }
 
 impl Default for Looks {
@@ -40,6 +43,7 @@ impl Default for Looks {
             hanging: BTreeSet::new(),
             pending: HashMap::new(),
             missed: HashMap::new(),
+            changes: None,
         }
     }
 }
@@ -90,7 +94,9 @@ pub(super) struct Looked {
     seen: Seen,
 }
 
-enum Seen {
+pub(super) enum Seen {
+    /// What configuration, manifests and programs are now.
+    Sources(Fingerprint),
     /// The path means another file.
     Elsewhere(PathBuf),
     Sighted(Sighted),
@@ -162,7 +168,7 @@ impl Broker {
     }
 
     /// Sends a scout, who tells the loop what he sees; gives his number.
-    fn scout(&self, see: impl FnOnce() -> Seen + Send + 'static) -> io::Result<u64> {
+    pub(super) fn scout(&self, see: impl FnOnce() -> Seen + Send + 'static) -> io::Result<u64> {
         let (tell, told) = std::sync::mpsc::channel();
         let inbox = self.inbox.looked_in.clone();
         let sent = self.looks.scouts.send(move || {
@@ -191,26 +197,33 @@ impl Broker {
     }
 
     pub(super) fn looked(&mut self, looked: Looked) -> bool {
-        if let Seen::Again { stamp, inputs } = looked.seen {
-            let path = self.looks.missed.remove(&looked.scout);
-            self.take_in(inputs);
-            return path.is_none_or(|path| self.missed(path, stamp));
-        }
-        // Given up, and answered, if it is not there.
-        let Some(look) = self.looks.pending.remove(&looked.scout) else {
-            return true;
-        };
-        match looked.seen {
-            Seen::Elsewhere(file) => {
-                let is_led = true;
-                self.look_at(Look {
-                    file,
-                    is_led,
-                    ..look
-                })
+        let Looked { scout, seen } = looked;
+        match seen {
+            Seen::Sources(now) => {
+                self.reload_if_changed(now);
+                true
             }
-            Seen::Sighted(seen) => self.wait(look, seen),
-            Seen::Again { .. } => true,
+            Seen::Again { stamp, inputs } => {
+                let path = self.looks.missed.remove(&scout);
+                self.take_in(inputs);
+                path.is_none_or(|path| self.missed(path, stamp))
+            }
+            // A look that is not there any more was given up, and answered.
+            Seen::Elsewhere(file) => match self.looks.pending.remove(&scout) {
+                Some(look) => {
+                    let is_led = true;
+                    self.look_at(Look {
+                        file,
+                        is_led,
+                        ..look
+                    })
+                }
+                None => true,
+            },
+            Seen::Sighted(seen) => match self.looks.pending.remove(&scout) {
+                Some(look) => self.wait(look, seen),
+                None => true,
+            },
         }
     }
 
@@ -241,7 +254,8 @@ impl Broker {
     fn give_up(&mut self, overdue: &Overdue) {
         // Without an owner: the only look that there is, which nobody can take over.
         let Some(owner) = overdue.owner else { return };
-        if self.is_watcher(owner) {
+        // What changed there is seen when it answers.
+        if self.is_watcher(owner) || self.looks.changes == Some(owner) {
             return;
         }
         let (path, seconds) = (to_text(&overdue.path), overdue.waited.as_secs());

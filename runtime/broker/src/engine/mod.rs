@@ -34,7 +34,7 @@ use crate::gate::GateError;
 use crate::intake::Intake;
 use crate::journal::JournalError;
 use crate::options::Options;
-use crate::reload::{LoadError, Loaded, Sources};
+use crate::reload::{Fingerprint, LoadError, Loaded, Sources};
 use crate::seams::{Children, ControlSocket, Host, now, spawn_blocking};
 use crate::stages::reached;
 use crate::store::Store;
@@ -117,6 +117,8 @@ pub struct Broker {
     sources: Sources,
     loaded: Loaded,
     in_force: Arc<InForce>,
+    /// Of all that was last looked at for what is in force.
+    fingerprint: Fingerprint,
     watcher: Option<Watcher>,
     watching: Option<Watching>,
     watch_mode: String,
@@ -242,8 +244,6 @@ impl Broker {
         }
         let mut tick = tokio::time::interval(TICK);
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
-        // From before it was read: what has changed since is not in force.
-        let mut fingerprint = self.loaded.read.clone();
         let mut next_reload = now() + RELOAD_INTERVAL;
         // What is remembered for one run has no history.
         let lasts = self.options.state.is_some();
@@ -270,7 +270,7 @@ impl Broker {
             }
             if now() >= next_reload {
                 next_reload = now() + RELOAD_INTERVAL;
-                self.reload_if_changed(&mut fingerprint);
+                self.look_for_changes();
                 self.forget_clients();
                 self.notify_watchdog();
                 self.children.look_for_orphans();

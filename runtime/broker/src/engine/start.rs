@@ -75,6 +75,8 @@ impl Broker {
             writers,
             children,
             sources,
+            // From before it was read: what has changed since is not in force.
+            fingerprint: loaded.read.clone(),
             loaded,
             in_force,
             watcher: None,

@@ -234,12 +234,12 @@ impl Sources {
         Some((data.dev(), data.ino()))
     }
 
-    /// All files that count, as they are now: `loaded` knows those that manifests list.
-    pub fn fingerprint(&self, loaded: &Loaded) -> Fingerprint {
+    /// All files that count, as they are now: `read` has those that manifests list, among others.
+    pub fn fingerprint(&self, read: &Fingerprint) -> Fingerprint {
         let manifests = self.manifests(&mut Vec::new()).unwrap_or_default();
         let paths = self.config.iter().cloned().chain(manifests);
         paths
-            .chain(loaded.read.keys().cloned())
+            .chain(read.keys().cloned())
             .map(|path| (path.clone(), stamp_through_links(&path)))
             .collect()
     }

@@ -87,11 +87,11 @@ fn what_has_changed_is_told_line_by_line() {
     let (mine, yours) = (manifest("mine", "bus"), manifest("yours", "bus"));
     put(dir.path(), CONFIG, &[("a.json", &mine)]);
     let old = sources.load().unwrap();
-    assert_eq!(sources.fingerprint(&old), old.read);
+    assert_eq!(sources.fingerprint(&old.read), old.read);
     assert_eq!(differences(&old, &old), Vec::<String>::new());
     let config = CONFIG.replace("xodrBundle", "xoscBundle");
     put(dir.path(), &config, &[("b.json", &yours)]);
-    assert_ne!(sources.fingerprint(&old), old.read);
+    assert_ne!(sources.fingerprint(&old.read), old.read);
     let mut lines = differences(&old, &sources.load().unwrap());
     lines.sort();
     let expected = [
@@ -113,9 +113,9 @@ fn a_manifest_that_another_lists_is_looked_at_too() {
     put(dir.path(), CONFIG, &[("all.json", &list)]);
     let old = sources.load().unwrap();
     assert!(old.children.iter().any(|it| it.name == "mine"));
-    assert_eq!(sources.fingerprint(&old), old.read);
+    assert_eq!(sources.fingerprint(&old.read), old.read);
     std::fs::write(&listed, manifest("another", "bus")).unwrap();
-    assert_ne!(sources.fingerprint(&old), old.read);
+    assert_ne!(sources.fingerprint(&old.read), old.read);
 }
 
 #[test]
@@ -127,13 +127,17 @@ fn a_program_that_was_replaced_is_another_child() {
     put(dir.path(), CONFIG, &[("a.json", &mine)]);
     let missing = sources.load().unwrap();
     std::fs::write(&program, "one").unwrap();
-    assert_ne!(sources.fingerprint(&missing), missing.read, "it has come");
+    assert_ne!(
+        sources.fingerprint(&missing.read),
+        missing.read,
+        "it has come"
+    );
     let old = sources.load().unwrap();
-    assert_eq!(sources.fingerprint(&old), old.read);
+    assert_eq!(sources.fingerprint(&old.read), old.read);
     let aside = dir.path().join("aside");
     std::fs::write(&aside, "two").unwrap();
     std::fs::rename(&aside, &program).unwrap();
-    assert_ne!(sources.fingerprint(&old), old.read);
+    assert_ne!(sources.fingerprint(&old.read), old.read);
     let new = sources.load().unwrap();
     assert_eq!(differences(&old, &new), ["changed mine"]);
     let digest = |loaded: &Loaded| loaded.children.last().unwrap().digest();
