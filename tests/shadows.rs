@@ -111,6 +111,7 @@ fn what_it_would_change_is_told_and_nothing_is_changed_until_it_judges() {
 
     let (code, text) = bundle(&farm, &["upgrade", STRICT, "--no-shadow"]);
     assert_eq!(code, Some(0), "{text}");
+    assert!(text.contains("it judges from now on"), "{text}");
     assert_eq!(verdict("before.xodr"), Verdict::Rejected);
     assert_eq!(verdict("clean.xodr"), Verdict::Accepted);
     let (code, text) = bundle(&farm, &["trials", STRICT]);

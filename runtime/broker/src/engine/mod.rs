@@ -117,7 +117,8 @@ pub struct Broker {
     sources: Sources,
     loaded: Loaded,
     in_force: Arc<InForce>,
-    /// Of all that was last looked at for what is in force.
+    /// Of all that was last looked at for what is in force: at first from before it was read, because what has
+    /// changed since is not.
     fingerprint: Fingerprint,
     watcher: Option<Watcher>,
     watching: Option<Watching>,

@@ -64,7 +64,6 @@ impl Broker {
         let reconciled = reconcile(&options, &loaded, &store)?;
         let writers = writers(&options, &store, &inbox, &senders.notices)?;
         let intake = intake(&options, &host, &in_force);
-        let children = early_or_now(early, &options, descriptors, &inbox)?;
         let mut broker = Broker {
             started: now(),
             clock: AttendedTime::new(),
@@ -73,9 +72,8 @@ impl Broker {
             intake,
             store,
             writers,
-            children,
+            children: early_or_now(early, &options, descriptors, &inbox)?,
             sources,
-            // From before it was read: what has changed since is not in force.
             fingerprint: loaded.read.clone(),
             loaded,
             in_force,

@@ -121,7 +121,7 @@ pub struct BundleUpgradeArgs {
 #[command(
     after_help = "A shadow is a bundle that was added with --shadow. `qcbus bundle upgrade NAME --no-shadow` lets it \
 judge.\n\nExit codes: 0 nothing would be rejected or undetermined because of it, 1 something would be rejected, 3 something \
-would be undetermined, or it has not tried everything yet"
+would be undetermined, it has not tried everything yet, or nothing at all"
 )]
 pub struct BundleTrialsArgs {
     /// The shadow's name

@@ -44,7 +44,10 @@ pub fn list(args: &StatusArgs) -> Exit {
                 peer.name.clone(),
                 peer.version.clone(),
                 peer.checkers.to_string(),
-                peer.state.clone(),
+                match peer.trials {
+                    Some(_) => format!("{}, a shadow", peer.state),
+                    None => peer.state.clone(),
+                },
                 peer.note.clone(),
             ]);
         }

@@ -42,7 +42,7 @@ pub fn run(args: &BundleTrialsArgs) -> Exit {
 fn exit(counts: &TrialCounts) -> Exit {
     if counts.would_reject > 0 {
         Exit::Rejected
-    } else if counts.would_leave_open + counts.failed + counts.waiting > 0 {
+    } else if counts.tried == 0 || counts.would_leave_open + counts.failed + counts.waiting > 0 {
         Exit::Undetermined
     } else {
         Exit::Accepted
@@ -78,10 +78,10 @@ fn render(name: &str, counts: &TrialCounts, trials: &[Trial]) -> String {
         }
     }
     let nothing = counts.would_reject + counts.would_leave_open + counts.would_accept == 0;
-    let nothing = if nothing {
-        "; it would change no verdict"
-    } else {
-        ""
+    let nothing = match (nothing, counts.tried) {
+        (true, 0) => "; what it would change is not known yet",
+        (true, _) => "; it would change none of their verdicts",
+        (false, _) => "",
     };
     let summary = format!("{name}: {}{nothing}", counted(counts));
     let _ = writeln!(text, "{}", shown::line(&summary));
@@ -182,6 +182,7 @@ mod tests {
             ..TrialCounts::default()
         };
         assert_eq!(of(tried), Exit::Accepted);
+        assert_eq!(of(TrialCounts::default()), Exit::Undetermined);
         assert_eq!(
             of(TrialCounts {
                 waiting: 1,

@@ -120,10 +120,17 @@ fn done(home: &Home, name: &str, was: &BundleStanding, runs: &Runs, notices: &[S
         return readiness::ready(name, runs, nothing, notices);
     }
     let was = match &was.runs {
-        Some(before) => format!(
-            " (was {}, version {} -> {})",
-            before.checkers, before.version, runs.version
-        ),
+        Some(before) => {
+            let judges = match (before.shadow, runs.shadow) {
+                (true, false) => "; it judges from now on",
+                (false, true) => "; it judges no more",
+                _ => "",
+            };
+            format!(
+                " (was {}, version {} -> {}){judges}",
+                before.checkers, before.version, runs.version
+            )
+        }
         None => " (nobody judged before)".to_owned(),
     };
     readiness::ready(name, runs, &was, notices)
