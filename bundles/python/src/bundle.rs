@@ -164,9 +164,13 @@ impl Native {
     ) -> u8 {
         let bundle = self.bundle();
         log();
+        let own = OwnFiles {
+            reads,
+            lists,
+            modest: false,
+        };
         // One thread at a time may run Python: more of them would only wait for each other.
-        let mode = Mode::parse(arguments)
-            .map(|mode| mode.with_threads(1).reading(OwnFiles { reads, lists }));
+        let mode = Mode::parse(arguments).map(|mode| mode.with_threads(1).reading(own));
         py.detach(|| run_or_explain(bundle, mode).code())
     }
 

@@ -1,7 +1,9 @@
 //! Which checkers run, and with which parameters.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use qcbus_formats::config::Config;
 use qcbus_formats::pool::Asked;
 
 use crate::bundle::groups;
@@ -23,6 +25,8 @@ pub struct Plan {
     pub(crate) resources: Vec<ResourceValue>,
     /// What the files looked like that parameters name.
     seen: Vec<Seen>,
+    /// The configuration that it follows.
+    pub(crate) config: Option<Arc<Config>>,
 }
 
 /// How one checker takes part.
@@ -64,7 +68,15 @@ impl Plan {
             entries,
             resources: Vec::new(),
             seen: Vec::new(),
+            config: None,
         }
+    }
+
+    /// Says which configuration it follows, for rules that hand it on ([`crate::Subject::config`]).
+    #[must_use]
+    pub(crate) fn following(mut self, config: &Config) -> Plan {
+        self.config = Some(Arc::new(config.clone()));
+        self
     }
 
     /// Every checker that is on by default, with the default parameters.

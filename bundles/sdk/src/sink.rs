@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use qcbus_document::Node;
+use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::{DomainInfo, InfoElement, Issue, Level, Location, Metadata};
 
 use crate::param::MAX_ISSUES;
@@ -31,8 +32,8 @@ pub struct Sink<'d> {
     /// What was found behind references: by the text and where the document's path lies in memory.
     behind: HashMap<(String, usize, u32), Behind>,
     metadata: Vec<Metadata>,
-    /// Why the rule could not look.
-    failure: Option<String>,
+    /// How the rule has ended, when it has said so itself.
+    ending: Option<Ending>,
     /// The level of what is said once more and not kept.
     unheard: Level,
     /// Takes what is said about findings that are not kept. In a box, because most checkers keep
@@ -92,7 +93,7 @@ impl<'d> Sink<'d> {
             suppressed: None,
             behind: HashMap::new(),
             metadata: Vec::new(),
-            failure: None,
+            ending: None,
             unheard: Level::Information,
             scratch: None,
         }
@@ -223,12 +224,31 @@ impl<'d> Sink<'d> {
     /// Says that the rule could not look, or came to no end: its checker has failed, whatever it found before. The
     /// text is a sentence or several lines, such as the traceback of a language that rules are written in.
     pub fn fail(&mut self, why: impl Into<String>) {
-        self.failure.get_or_insert_with(|| why.into());
+        self.end(Ending::Failed { reason: why.into() });
     }
 
-    /// Why the rule could not look, once.
-    pub(crate) fn take_failure(&mut self) -> Option<String> {
-        self.failure.take()
+    /// Says how the rule has ended, for one that asks somebody else. The first that is said counts.
+    pub fn end(&mut self, ending: Ending) {
+        if ending != Ending::Completed {
+            self.ending.get_or_insert(ending);
+        }
+    }
+
+    /// How the rule has ended, when it has said so, once.
+    pub(crate) fn take_ending(&mut self) -> Option<Ending> {
+        self.ending.take()
+    }
+
+    /// Passes on an issue as another program has said it, with its places, which are not looked at. Such issues are
+    /// listed in the order in which they are passed on.
+    pub fn retell(&mut self, issue: Issue) {
+        if self.kept.len() >= self.limit() {
+            let level = issue.level;
+            return self.suppress(&Place::Text(self.subject.written(), 0), level);
+        }
+        let part = self.part;
+        let order = (0, u32::try_from(self.kept.len()).unwrap_or(u32::MAX));
+        self.kept.push(Kept { part, order, issue });
     }
 
     /// What is checked, with everything that the root refers to.

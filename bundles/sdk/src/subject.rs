@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use qcbus_document::{Document, FileKind, Image, ImageError, Node, XPaths};
+use qcbus_formats::config::Config;
 use qcbus_ingest::Limits;
 use qcbus_ingest::modular::{Expansion, Piece};
 use qcbus_messages::{DocumentRole, Link, MissingDocument};
@@ -24,6 +25,7 @@ pub struct Subject<'d> {
     linked: Vec<Linked<'d>>,
     missing: Vec<MissingDocument>,
     resources: Vec<ResourceValue>,
+    config: Option<Arc<Config>>,
     paths: Arc<Mutex<XPaths>>,
 }
 
@@ -110,6 +112,7 @@ impl<'d> Subject<'d> {
             linked: Vec::new(),
             missing: Vec::new(),
             resources: Vec::new(),
+            config: None,
             paths: Arc::new(Mutex::new(XPaths::new(root))),
         })
     }
@@ -149,6 +152,19 @@ impl<'d> Subject<'d> {
     pub fn with_resources(mut self, resources: Vec<ResourceValue>) -> Subject<'d> {
         self.resources = resources;
         self
+    }
+
+    /// The same subject under the configuration in force.
+    #[must_use]
+    pub(crate) fn under(mut self, config: Option<Arc<Config>>) -> Subject<'d> {
+        self.config = config;
+        self
+    }
+
+    /// The configuration in force, for whoever hands it on to another program; rules have their parameters from their
+    /// [`crate::Sink`].
+    pub fn config(&self) -> Option<&Config> {
+        self.config.as_deref()
     }
 
     /// What was made of the user's files, if the user gave any to this bundle.

@@ -66,7 +66,8 @@ pub fn check_with(
     hands: &Hands,
     listener: &mut dyn Listener,
 ) -> bool {
-    let subject = &subject.clone().with_resources(plan.resources.clone());
+    let subject = subject.clone().with_resources(plan.resources.clone());
+    let subject = &subject.under(plan.config.clone());
     let mut run = Run {
         plan,
         standings: vec![None; plan.checkers.len()],

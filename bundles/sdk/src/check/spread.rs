@@ -35,8 +35,8 @@ type Looked = (Vec<Issue>, Outcome);
 struct Had<'r> {
     sink: Sink<'r>,
     took: Duration,
-    /// Where it failed and why; it is not asked again.
-    failed: Option<(u32, String)>,
+    /// Where it failed or said that it has ended, and how; it is not asked again.
+    ended: Option<(u32, Ending)>,
 }
 
 /// The tasks, and which of them is next.
@@ -171,7 +171,7 @@ impl<'r> Tasks<'_, 'r> {
     /// Has a checker look at a part, or at the whole (`None`). `clock` is when that began, and then when it
     /// ended.
     fn look(&self, turn: &Turn<'r>, had: &mut Had<'r>, part: Option<usize>, clock: &mut Instant) {
-        if had.failed.is_some() {
+        if had.ended.is_some() {
             return;
         }
         self.work.listener.begins(turn.index);
@@ -182,11 +182,13 @@ impl<'r> Tasks<'_, 'r> {
             None => self.built.run(turn.rule, sink),
             Some(part) => self.built.each(part, turn.rule, sink),
         });
-        let failure = match looked {
-            Ok(()) => had.sink.take_failure(),
-            Err(panic) => Some(format!("the rule panicked: {panic}")),
+        let ending = match looked {
+            Ok(()) => had.sink.take_ending(),
+            Err(panic) => Some(Ending::Failed {
+                reason: format!("the rule panicked: {panic}"),
+            }),
         };
-        had.failed = failure.map(|why| (number, why));
+        had.ended = ending.map(|ending| (number, ending));
         let now = Instant::now();
         had.took += now.duration_since(*clock);
         *clock = now;
@@ -200,7 +202,7 @@ impl<'r> Tasks<'_, 'r> {
         Had {
             sink: Sink::new(self.work.subject, turn.facts, values, not_normative.clone()),
             took: Duration::ZERO,
-            failed: None,
+            ended: None,
         }
     }
 
@@ -216,15 +218,12 @@ impl<'r> Tasks<'_, 'r> {
         }
         let Had {
             mut sink,
-            failed,
+            ended,
             took,
         } = had;
         // What was found before a panic is still true.
         let (issues, metadata) = sink.finish();
-        let ending = match failed {
-            None => Ending::Completed,
-            Some((_, reason)) => Ending::Failed { reason },
-        };
+        let ending = ended.map_or(Ending::Completed, |(_, ending)| ending);
         let outcome = Outcome {
             ending,
             params: turn.pass.values.listed(),
@@ -247,16 +246,16 @@ impl<'r> Tasks<'_, 'r> {
 
 /// What several threads have, as one, as one thread would have it. `None`: that cannot be told.
 fn merged(mut found: Vec<Had<'_>>) -> Option<Had<'_>> {
-    let failed = found.iter_mut().filter_map(|had| had.failed.take());
+    let ended = found.iter_mut().filter_map(|had| had.ended.take());
     // One thread would have come no further than the first panic.
-    let failed = failed.min_by_key(|(part, _)| *part);
-    let last = failed.as_ref().map_or(WHOLE, |(part, _)| *part);
+    let ended = ended.min_by_key(|(part, _)| *part);
+    let last = ended.as_ref().map_or(WHOLE, |(part, _)| *part);
     let took = found.iter().map(|had| had.took).sum();
     let mut found = found.into_iter();
     let mut first = found.next()?;
     let rest = found.map(|had| had.sink).collect();
     first.sink.take_in(rest, last).then_some(())?;
-    (first.failed, first.took) = (failed, took);
+    (first.ended, first.took) = (ended, took);
     Some(first)
 }
 

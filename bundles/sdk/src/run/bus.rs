@@ -55,6 +55,9 @@ pub struct OwnFiles {
     pub reads: Vec<PathBuf>,
     /// Directories whose entries it sees without reading them.
     pub lists: Vec<PathBuf>,
+    /// What its manifest declares is for processes that it has started before it joined: it does without all of
+    /// that itself.
+    pub modest: bool,
 }
 
 impl Default for BusOptions {

@@ -141,7 +141,7 @@ pub(super) fn configured(
             .map(|p| p.value)
             .filter(|v| !v.is_empty())
     });
-    plan.with_files(given)
+    plan.following(config).with_files(given)
 }
 
 /// As ASAM's bundles: the bundle's Param, relative to the current directory; else the bundle's name.

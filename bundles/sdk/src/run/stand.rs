@@ -58,7 +58,11 @@ impl Stand<'_> {
             memory: memory.map(Path::to_path_buf),
             reads: [reads(), own.reads.clone()].concat(),
             lists: own.lists.clone(),
-            may: may.clone(),
+            may: if own.modest {
+                May::default()
+            } else {
+                may.clone()
+            },
         };
         // Before: what comes in between is taken for something else, and a fresh process reads it.
         let fence = Fence::around(&fenced.reads);
