@@ -42,6 +42,11 @@ const MAY_KNOW: &[(&str, Option<&[&str]>)] = &[
     ("qcbus-xodr", Some(BUNDLE)),
     ("qcbus-xosc", Some(BUNDLE)),
     ("qcbus-modular", Some(BUNDLE)),
+    // A bundle that has others run: it makes their files and confines them.
+    (
+        "qcbus-asam-adapter",
+        Some(&["qcbus-sdk", "qcbus-disk", "qcbus-confine"]),
+    ),
     ("qcbus-reporter-sdk", Some(PROCESS)),
     // What a report draws of a road network.
     ("qcbus-plan", Some(&["qcbus-opendrive"])),

@@ -26,6 +26,8 @@ pub struct Module {
     pub may: May,
     /// It looks and has no weight in any verdict: `"shadow": true`.
     pub shadow: bool,
+    /// How one that is started for every file is run.
+    pub once: Once,
     /// Keys that begin with `qcbus`, for whoever knows them; texts, numbers and truth values as
     /// text, in the order of their names.
     pub extra: Vec<(String, String)>,
@@ -65,6 +67,21 @@ pub struct May {
     pub network: bool,
     /// Whether it starts programs.
     pub programs: bool,
+}
+
+/// How a module is run that is started once for a file, beyond its command.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
+pub struct Once {
+    /// The name by which it looks for its section of a configuration, where that is another than its own.
+    pub application: Option<String>,
+    /// Where it runs, when that is not its private directory.
+    pub working_directory: Option<PathBuf>,
+    /// Variables of its environment besides those that there are, by name.
+    pub environment: Vec<(String, String)>,
+    /// The kinds of files that it takes (`xodr`), when they are not to be learned from it.
+    pub kinds: Vec<String>,
+    /// What a run may use up, by name: whole numbers above zero.
+    pub limits: Vec<(String, u64)>,
 }
 
 /// A manifest that cannot be used. The text names the file and the key.
@@ -303,7 +320,8 @@ fn module(path: &Path, index: usize, value: &Value) -> Result<Module, ManifestEr
         exec_command: keys.text("exec_command")?,
         mode,
         may: keys.may()?,
-        shadow: keys.shadow(module_type, mode)?,
+        shadow: keys.shadow(module_type)?,
+        once: keys.once()?,
         extra: extra(object),
         manifest: path.to_owned(),
     })
@@ -365,16 +383,82 @@ impl Keys<'_> {
         Ok(may)
     }
 
-    fn shadow(&self, module_type: ModuleType, mode: Mode) -> Result<bool, ManifestError> {
+    fn shadow(&self, module_type: ModuleType) -> Result<bool, ManifestError> {
         let shadow = match self.object.get("shadow") {
             Some(value) => self.truth("shadow", value)?,
             None => false,
         };
-        if shadow && (module_type, mode) != (ModuleType::CheckerBundle, Mode::Bus) {
-            let reason = "is for checker bundles that speak on the bus";
-            return Err(self.wrong("shadow", reason));
+        if shadow && module_type != ModuleType::CheckerBundle {
+            return Err(self.wrong("shadow", "is for checker bundles"));
         }
         Ok(shadow)
+    }
+
+    /// As in [`Keys::may`], what is not understood is said.
+    fn once(&self) -> Result<Once, ManifestError> {
+        let mut once = Once::default();
+        if self.object.contains_key("application") {
+            once.application = Some(self.text("application")?);
+        }
+        if self.object.contains_key("working_directory") {
+            let path = PathBuf::from(self.text("working_directory")?);
+            if !path.is_absolute() {
+                return Err(self.wrong("working_directory", "is not an absolute path"));
+            }
+            once.working_directory = Some(path);
+        }
+        for (name, value) in self.inner("environment")? {
+            let text = value
+                .as_str()
+                .filter(|_| !name.is_empty() && !name.contains('='));
+            let Some(text) = text else {
+                return Err(self.wrong(
+                    &format!("environment.{name}"),
+                    "is not a variable with a text",
+                ));
+            };
+            once.environment.push((name.clone(), text.to_owned()));
+        }
+        for (name, value) in self.inner("limits")? {
+            let key = format!("limits.{name}");
+            if !LIMIT_KEYS.contains(&name.as_str()) {
+                let hint = did_you_mean(name, LIMIT_KEYS.iter().copied());
+                return Err(
+                    self.wrong(&key, &format!("is none of {}{hint}", LIMIT_KEYS.join(", ")))
+                );
+            }
+            match value.as_u64().filter(|it| *it > 0) {
+                Some(number) => once.limits.push((name.clone(), number)),
+                None => return Err(self.wrong(&key, "is not a whole number above zero")),
+            }
+        }
+        match self.object.get("kinds") {
+            None => {}
+            Some(Value::Array(kinds)) => {
+                let text = |it: &Value| {
+                    it.as_str()
+                        .filter(|it| KINDS.contains(it))
+                        .map(str::to_owned)
+                };
+                let kinds: Option<Vec<String>> = kinds.iter().map(text).collect();
+                let kinds = kinds.filter(|it| !it.is_empty());
+                let known = KINDS.join(", ");
+                once.kinds = kinds.ok_or_else(|| {
+                    self.wrong("kinds", &format!("is not a list of some of {known}"))
+                })?;
+            }
+            Some(_) => return Err(self.wrong("kinds", "is not a list")),
+        }
+        Ok(once)
+    }
+
+    /// The keys of an object that may be there.
+    fn inner(&self, name: &str) -> Result<impl Iterator<Item = (&String, &Value)>, ManifestError> {
+        match self.object.get(name) {
+            None => Ok(None.into_iter().flatten()),
+            Some(Value::Object(object)) => Ok(Some(object).into_iter().flatten()),
+            Some(_) => Err(self.wrong(name, "is not an object")),
+        }
     }
 
     fn paths(&self, name: &str, value: &Value) -> Result<Vec<PathBuf>, ManifestError> {
@@ -409,7 +493,7 @@ fn misspelt<'k>(name: &str, written: impl Iterator<Item = &'k str>) -> String {
 /// Keys of ours beside `mode`, handed on as they are.
 const OWN_KEYS: [&str; 2] = ["version", "restart"];
 
-const MODULE_KEYS: [&str; 7] = [
+const MODULE_KEYS: [&str; 12] = [
     "name",
     "exec_type",
     "module_type",
@@ -417,7 +501,18 @@ const MODULE_KEYS: [&str; 7] = [
     "mode",
     "may",
     "shadow",
+    "application",
+    "working_directory",
+    "environment",
+    "kinds",
+    "limits",
 ];
+
+/// What stands in `limits`.
+const LIMIT_KEYS: [&str; 3] = ["seconds", "memory_mb", "output_mb"];
+
+/// What stands in `kinds`: what a module can be asked about.
+const KINDS: [&str; 2] = ["xodr", "xosc"];
 
 /// What stands in `may`.
 const MAY_KEYS: [&str; 4] = ["read", "write", "network", "programs"];

@@ -125,26 +125,24 @@ fn a_byte_order_mark_does_no_harm() {
 }
 
 #[test]
-fn only_a_bundle_on_the_bus_can_be_a_shadow() {
-    let of = |module_type: &str, mode: &str, shadow: &str| {
+fn only_a_bundle_can_be_a_shadow() {
+    let of = |module_type: &str, shadow: &str| {
         let text = format!(
             r#"{{"module": [{{"name": "a", "exec_type": "executable", "module_type": "{module_type}",
-                "exec_command": "x", "mode": "{mode}"{shadow}}}]}}"#
+                "exec_command": "x"{shadow}}}]}}"#
         );
         let loaded = load_from(&[("m.json", &text)], "m.json");
         loaded.map(|mut modules| modules.remove(0).shadow)
     };
     let shadow = r#", "shadow": true"#;
-    assert_eq!(of("checker_bundle", "bus", ""), Ok(false));
-    assert_eq!(of("checker_bundle", "bus", shadow), Ok(true));
-    for (module_type, mode) in [("report_module", "bus"), ("checker_bundle", "once")] {
-        let error = of(module_type, mode, shadow).unwrap_err();
-        assert!(
-            error.contains("`module[0].shadow` is for checker bundles"),
-            "{error}"
-        );
-    }
-    let error = of("checker_bundle", "bus", r#", "shadow": "yes""#).unwrap_err();
+    assert_eq!(of("checker_bundle", ""), Ok(false));
+    assert_eq!(of("checker_bundle", shadow), Ok(true));
+    let error = of("report_module", shadow).unwrap_err();
+    assert!(
+        error.contains("`module[0].shadow` is for checker bundles"),
+        "{error}"
+    );
+    let error = of("checker_bundle", r#", "shadow": "yes""#).unwrap_err();
     assert!(error.contains("is neither true nor false"), "{error}");
 }
 

@@ -10,6 +10,7 @@ use qcbus_ingest::Limits;
 
 use crate::core::{ChildSpec, Settings};
 use crate::gate::Outside;
+use crate::reload::Adapter;
 
 /// Everything that a broker is told at its start.
 #[derive(Debug, Clone)]
@@ -59,6 +60,8 @@ pub struct Options {
     /// What can be said beforehand of the bundles that come with the program, for looking at the
     /// configuration.
     pub known: Known,
+    /// Who has one-shot modules of ASAM's framework take part as bundles.
+    pub adapter: Adapter,
     /// Whether children die with the broker at once.
     pub die_with_broker: bool,
     /// Whether bundles are confined.

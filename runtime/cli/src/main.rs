@@ -15,6 +15,9 @@ fn main() -> ExitCode {
     if let Some(run) = commands::started_bundle(std::env::args_os().skip(1)) {
         return talk::exit(run()).into();
     }
+    if let Some(run) = commands::adapter(std::env::args_os().skip(1)) {
+        return talk::exit(run()).into();
+    }
     let args = match args::Args::try_parse() {
         Ok(args) => args,
         Err(error) => {

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use qcbus_broker::reload::Adapter;
 use qcbus_broker::{ChildSpec, Restart};
 use qcbus_document::FileKind;
 use qcbus_formats::Text;
@@ -210,6 +211,23 @@ fn spec(program: &Path, command: &str, alias: &str, name: &str, role: Role) -> C
         shadow: false,
     }
 }
+
+/// Who has one-shot modules of ASAM's framework take part as bundles. `are_there`: the standard bundles keep their
+/// names.
+pub fn adapter(program: &Path, are_there: bool) -> Adapter {
+    let bundles = BUNDLES.iter().filter(|_| are_there);
+    Adapter {
+        command: vec![
+            program.to_string_lossy().into_owned(),
+            ASAM_ADAPTER.to_owned(),
+        ],
+        reserved: bundles.map(|bundle| bundle.name.to_owned()).collect(),
+        scratch: qcbus_asam_adapter::usual_scratch(),
+    }
+}
+
+/// The command that hosts a module.
+pub const ASAM_ADAPTER: &str = "asam-adapter";
 
 /// What a configuration can name: the standard bundles with their checkers and parameters, and the
 /// standard reporters.

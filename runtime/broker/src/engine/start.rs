@@ -199,6 +199,7 @@ fn sources_of(options: &Options) -> Sources {
         standard: options.standard.clone(),
         reporters: options.reporters.clone(),
         known: options.known.clone(),
+        adapter: options.adapter.clone(),
     }
 }
 

@@ -2,6 +2,7 @@
 //! broker is its first reload; a mistake never takes down what is in force.
 
 mod differences;
+mod hosted;
 mod modules;
 mod programs;
 
@@ -22,6 +23,7 @@ use crate::core::{ChildSpec, Stamp};
 use crate::stamp::stamp_through_links;
 
 pub use differences::differences;
+pub use hosted::Adapter;
 use modules::{add_module, read_manifest};
 pub use programs::{command_of, ready};
 
@@ -46,6 +48,8 @@ pub struct Sources {
     pub reporters: Vec<ChildSpec>,
     /// What can be said beforehand of the bundles that come with the program.
     pub known: Known,
+    /// Who has one-shot modules of ASAM's framework take part as bundles.
+    pub adapter: Adapter,
 }
 
 /// What was read, valid as a whole.
@@ -79,6 +83,14 @@ pub enum LoadError {
     /// A manifest cannot be used.
     #[error("{0}")]
     Manifest(String),
+}
+
+impl Loaded {
+    /// Whether a child has this name that no manifest has brought: it comes with the program.
+    fn comes_with_the_program(&self, name: &str) -> bool {
+        let mut children = self.children.iter();
+        children.any(|it| it.name == name) && !self.brought.contains_key(name)
+    }
 }
 
 impl Sources {
@@ -122,8 +134,13 @@ impl Sources {
                     loaded.notices.push(no_shadow_in_a_run(&module));
                     continue;
                 }
-                add_module(module, &mut loaded)?;
+                add_module(module, &self.adapter, &mut loaded)?;
             }
+        }
+        if let Some((_, parsed)) = &parsed {
+            let known = self.known.bundles.iter().map(|it| it.name.as_str());
+            let known: Vec<&str> = known.collect();
+            self.adapter.add_named(&parsed.config, &known, &mut loaded);
         }
         for child in &mut loaded.children[with_the_program..] {
             let stamped = |path: PathBuf| (path.clone(), stamp_through_links(&path));

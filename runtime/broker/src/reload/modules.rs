@@ -8,7 +8,7 @@ use qcbus_formats::pool::OWN_BUNDLE;
 use qcbus_messages::Role;
 use qcbus_messages::path_text::to_text;
 
-use super::{LoadError, Loaded, MAX_FILE, programs};
+use super::{Adapter, LoadError, Loaded, MAX_FILE, programs};
 use crate::core::{ChildSpec, Restart};
 
 /// The modules of a manifest; every file that is read for it is told to `note` first.
@@ -27,7 +27,11 @@ pub(super) fn read_manifest(path: &Path, note: &dyn Fn(&Path)) -> Result<Vec<Mod
 ///
 /// # Errors
 /// [`LoadError::Manifest`] when its name is taken, or it would have to judge and cannot be asked.
-pub(super) fn add_module(module: Module, loaded: &mut Loaded) -> Result<(), LoadError> {
+pub(super) fn add_module(
+    module: Module,
+    adapter: &Adapter,
+    loaded: &mut Loaded,
+) -> Result<(), LoadError> {
     let manifest = to_text(&module.manifest);
     let role = match module.module_type {
         ModuleType::CheckerBundle => Role::Bundle,
@@ -39,10 +43,14 @@ pub(super) fn add_module(module: Module, loaded: &mut Loaded) -> Result<(), Load
             return Ok(());
         }
     };
-    if module.mode != Mode::Bus {
+    let is_hosted = module.mode != Mode::Bus && role == Role::Bundle && adapter.is_there();
+    if module.mode != Mode::Bus && !is_hosted {
         return not_on_the_bus(&module, role, loaded);
     }
-    let name = module.name.clone();
+    let name = match is_hosted {
+        true => adapter.name_of(&module, loaded),
+        false => module.name.clone(),
+    };
     if let Some(other) = loaded.brought.get(&name) {
         return Err(LoadError::Manifest(format!(
             "{manifest}: `{name}` is the name of a module in {other}, too: one of them would not run; give \
@@ -58,8 +66,14 @@ pub(super) fn add_module(module: Module, loaded: &mut Loaded) -> Result<(), Load
     programs::look_at(&module.exec_command).map_err(|why| {
         LoadError::Manifest(format!("{manifest}: `{name}` is not started: {why}"))
     })?;
+    let mut spec = spec_of(&module, role);
+    if is_hosted {
+        spec.command = adapter.words(&name, &module);
+        spec.may = adapter.may(&module.may);
+        spec.name.clone_from(&name);
+    }
     loaded.brought.insert(name, manifest);
-    loaded.children.push(spec_of(module, role));
+    loaded.children.push(spec);
     Ok(())
 }
 
@@ -78,7 +92,7 @@ fn not_on_the_bus(module: &Module, role: Role, loaded: &mut Loaded) -> Result<()
     Ok(())
 }
 
-fn spec_of(module: Module, role: Role) -> ChildSpec {
+fn spec_of(module: &Module, role: Role) -> ChildSpec {
     let extra = |key: &str| {
         let mut found = module.extra.iter().filter(|(name, _)| name == key);
         found.next().map(|(_, value)| value.as_str())
@@ -91,10 +105,10 @@ fn spec_of(module: Module, role: Role) -> ChildSpec {
     ChildSpec {
         version: extra("version").map(str::to_owned),
         command: programs::shell_command(&module.exec_command),
-        name: module.name,
+        name: module.name.clone(),
         role,
         restart,
-        may: module.may,
+        may: module.may.clone(),
         programs: Vec::new(),
         shadow: module.shadow,
     }

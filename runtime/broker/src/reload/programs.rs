@@ -6,6 +6,8 @@ use std::str::CharIndices;
 
 use qcbus_disk::trust::{self, TrustError};
 
+use super::hosted;
+
 /// What a command of a manifest becomes, so that it is the shell's to take apart, as in ASAM's framework.
 const BEFORE: &str = "exec ";
 const BEHIND: &str = " \"$@\"";
@@ -28,6 +30,9 @@ pub(super) fn look_at(command: &str) -> Result<(), String> {
 
 /// What a manifest says that is run; `None` for what comes with the program.
 pub fn command_of(words: &[String]) -> Option<&str> {
+    if let Some(command) = hosted::command_of(words) {
+        return Some(command);
+    }
     let [_, _, line, _] = words else {
         return None;
     };
@@ -71,6 +76,7 @@ fn is_script(file: &Path) -> bool {
 /// # Errors
 /// As [`look_at`], and when there is no such program.
 pub fn ready(words: &[String]) -> Result<Vec<String>, String> {
+    hosted::ready(words)?;
     let ([shell, flag, _, name], Some(command)) = (words, command_of(words)) else {
         return Ok(words.to_vec());
     };
@@ -135,7 +141,7 @@ fn is_executable(path: &Path) -> bool {
 }
 
 /// Where the shell finds a program.
-fn find(program: &str) -> Option<PathBuf> {
+pub(super) fn find(program: &str) -> Option<PathBuf> {
     let is_program = |path: &PathBuf| path.is_file() && is_executable(path);
     if program.contains('/') {
         return Some(absolute(Path::new(program))).filter(is_program);

@@ -12,6 +12,7 @@ fn sources(directory: &Path) -> Sources {
         standard: vec![child("xodrBundle")],
         reporters: vec![child("qc-report-text")],
         known: Known::default(),
+        adapter: Adapter::default(),
     }
 }
 

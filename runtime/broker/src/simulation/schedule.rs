@@ -119,6 +119,7 @@ fn options(dir: &Path) -> Options {
         standard: children(),
         reporters: Vec::new(),
         known: qcbus_formats::config::Known::default(),
+        adapter: crate::reload::Adapter::default(),
         die_with_broker: false,
         memory_limit: None,
         limits: qcbus_ingest::Limits::default(),

@@ -72,8 +72,12 @@ pub struct BundleAddArgs {
     /// The bundle's name, as it says it itself
     pub name: String,
     /// The program (or script.py) and its arguments; put `--` before arguments that begin with `-`
-    #[arg(required = true)]
+    #[arg(required_unless_present = "asam")]
     pub command: Vec<String>,
+    /// Instead: the command of a one-shot module of ASAM's framework, for a shell, such as
+    /// 'qc_opendrive -c $ASAM_QC_FRAMEWORK_CONFIG_FILE'
+    #[arg(long, value_name = "COMMAND", conflicts_with = "command")]
+    pub asam: Option<String>,
     /// Let it look at every file without weight in any verdict; `qcbus bundle trials` shows what it would change
     #[arg(long)]
     pub shadow: bool,

@@ -32,6 +32,7 @@ fn load(file: &Path, bundles_d: Option<&Path>) -> Result<Loaded, String> {
         standard: Vec::new(),
         reporters: Vec::new(),
         known: standard::known(),
+        adapter: standard::adapter(Path::new("qcbus"), true),
     };
     sources.load().map_err(|error| error.to_string())
 }

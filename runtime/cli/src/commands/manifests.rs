@@ -18,7 +18,7 @@ use rustix::io::Errno;
 use super::readiness;
 use super::settings::{absolute, instance, real};
 use crate::args::{BundleAddArgs, BundleRemoveArgs, ManifestArgs};
-use crate::talk;
+use crate::{standard, talk};
 
 /// Why nothing was done, and what to do.
 pub(super) type Refusal = (Exit, String);
@@ -51,9 +51,11 @@ pub(super) fn said(done: Result<String, Refusal>) -> Exit {
 }
 
 fn try_add(args: &BundleAddArgs) -> Result<String, Refusal> {
-    let name = &args.name;
-    good_name(name)?;
-    let command = command_line(&args.command)?;
+    good_name(&args.name)?;
+    let (name, command) = match &args.asam {
+        Some(command) => (&joined_as(&args.name), one_shot(command)?),
+        None => (&args.name, command_line(&args.command)?),
+    };
     let home = Home::find(&args.manifests)?;
     // What cannot be made is said by whoever writes into it.
     let _ = std::fs::create_dir_all(&home.directory);
@@ -61,7 +63,11 @@ fn try_add(args: &BundleAddArgs) -> Result<String, Refusal> {
     let path = home.manifest(name);
     let before = std::fs::read(&path).ok();
     let shown = to_text(&path);
-    write_whole(&path, manifest(args, &command).as_bytes(), true).map_err(|error| {
+    let text = match &args.asam {
+        Some(_) => one_shot_manifest(name, args, &command),
+        None => manifest(args, &command),
+    };
+    write_whole(&path, text.as_bytes(), true).map_err(|error| {
         let why = format!("cannot write {shown}: {error}; nothing was added");
         (Exit::Internal, why)
     })?;
@@ -302,6 +308,46 @@ fn manifest(args: &BundleAddArgs, command: &str) -> String {
     }
     let manifest = serde_json::json!({"module": [module]});
     format!("{manifest:#}\n")
+}
+
+/// The name under which a one-shot module joins: its own, unless a bundle that comes with qcbus has it.
+fn joined_as(name: &str) -> String {
+    match standard::bundle(name) {
+        Some(_) => format!("asam.{name}"),
+        None => name.to_owned(),
+    }
+}
+
+/// The text of the manifest of a one-shot module, which looks for its section of a configuration by the name that it was
+/// given.
+fn one_shot_manifest(name: &str, args: &BundleAddArgs, command: &str) -> String {
+    let mut module = serde_json::json!({
+        "name": name,
+        "exec_type": "executable",
+        "module_type": "checker_bundle",
+        "exec_command": command,
+    });
+    if name != args.name {
+        module["application"] = args.name.as_str().into();
+    }
+    if args.shadow {
+        module["shadow"] = true.into();
+    }
+    format!("{:#}\n", serde_json::json!({"module": [module]}))
+}
+
+/// The command of a one-shot module with the whole path of its program, as in [`command_line`]. The rest is the
+/// shell's.
+fn one_shot(command: &str) -> Result<String, Refusal> {
+    let command = command.trim();
+    let end = command.find(char::is_whitespace).unwrap_or(command.len());
+    let (program, rest) = command.split_at(end);
+    let found = find_program(program).map_err(usage)?;
+    let Some(path) = found.to_str() else {
+        let shown = to_text(&found);
+        return Err(usage(format!("{shown}: a manifest takes UTF-8 only")));
+    };
+    Ok(format!("{}{rest}", quote(path)))
 }
 
 /// The command of a manifest. Programs are named by their whole path: the broker may run elsewhere and

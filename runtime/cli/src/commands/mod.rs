@@ -29,7 +29,7 @@ use qcbus_messages::Exit;
 use crate::args::{
     Args, BundleCommand, BundleRunArgs, Command, ConfigCommand, ReporterCommand, SchemaCommand,
 };
-use crate::standard;
+use crate::{standard, talk};
 
 /// What a broker starts a standard bundle with, `bundle run NAME … --launch N`: read by hand, for the tree of all
 /// commands takes as long to build as such a bundle may take to start. Everything else is for the parser.
@@ -45,6 +45,16 @@ pub fn started_bundle(arguments: impl Iterator<Item = OsString>) -> Option<impl 
     let is_started = arguments.iter().any(|it| it == "--launch");
     let run = BundleRunArgs { name, arguments };
     (is_standard && is_started).then_some(move || bundle::run(run))
+}
+
+/// What a broker starts for a one-shot module of ASAM's framework, `asam-adapter …`: read by hand as well.
+pub fn adapter(arguments: impl Iterator<Item = OsString>) -> Option<impl FnOnce() -> Exit> {
+    let mut words = arguments;
+    let is_it = words.next().is_some_and(|it| it == standard::ASAM_ADAPTER);
+    is_it.then_some(move || {
+        talk::log("warn");
+        qcbus_asam_adapter::run(&[standard::ASAM_ADAPTER], words, talk::say_lines)
+    })
 }
 
 /// Does what the command line says.

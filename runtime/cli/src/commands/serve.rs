@@ -229,6 +229,7 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         standard: children,
         reporters,
         known: standard::known(),
+        adapter: standard::adapter(&program, !args.no_standard_bundles),
         die_with_broker: false,
         sandbox: !args.no_sandbox,
         memory_limit: memory_limit(&args.limits),

@@ -140,6 +140,7 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
             true => standard::known(),
             false => Known::default(),
         },
+        adapter: standard::adapter(&program, true),
         die_with_broker: true,
         sandbox: !args.no_sandbox,
         memory_limit: memory_limit(&args.limits),

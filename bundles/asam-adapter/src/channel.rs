@@ -1,0 +1,247 @@
+//! What the bus process and an office say to each other: packets on a pair of sockets.
+//!
+//! A message is a number, a head in JSON and a body of bytes, cut into packets that arrive whole or not at all. A
+//! bus process that is killed in the middle of a message is followed by another one on the same sockets: whoever
+//! reads drops what was begun when a packet of another message comes.
+
+use std::io::{self, ErrorKind};
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+
+use rustix::net::{AddressFamily, SocketFlags, SocketType, socketpair};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+/// Bytes of a packet, its own head of [`HEAD`] bytes included.
+const PACKET: usize = 64 << 10;
+/// Number of the message, bytes of its head, bytes of its body, bytes that came before.
+const HEAD: usize = 32;
+
+/// One end.
+#[derive(Debug)]
+pub(crate) struct Channel {
+    socket: OwnedFd,
+}
+
+/// A whole message.
+#[derive(Debug)]
+pub(crate) struct Message {
+    /// Which one, for the answer to name.
+    pub number: u64,
+    head: Vec<u8>,
+    /// What goes along with the head.
+    pub body: Vec<u8>,
+}
+
+impl Message {
+    /// The head.
+    ///
+    /// # Errors
+    /// When it is not what was expected.
+    pub fn head<T: DeserializeOwned>(&self) -> io::Result<T> {
+        serde_json::from_slice(&self.head)
+            .map_err(|error| io::Error::new(ErrorKind::InvalidData, error))
+    }
+}
+
+impl Channel {
+    /// Both ends. They do not outlive a process that becomes another program.
+    ///
+    /// # Errors
+    /// The system's.
+    pub fn pair() -> io::Result<(Channel, Channel)> {
+        let (one, other) = socketpair(
+            AddressFamily::UNIX,
+            SocketType::SEQPACKET,
+            SocketFlags::CLOEXEC,
+            None,
+        )?;
+        Ok((Channel { socket: one }, Channel { socket: other }))
+    }
+
+    /// An end that somebody has handed over.
+    pub fn from_socket(socket: OwnedFd) -> Channel {
+        Channel { socket }
+    }
+
+    /// The socket, to hand it over.
+    pub fn into_socket(self) -> OwnedFd {
+        self.socket
+    }
+
+    /// Sends a message, whose body is these pieces in a row.
+    ///
+    /// # Errors
+    /// The system's; [`ErrorKind::BrokenPipe`] when nobody is at the other end.
+    pub fn send(&self, number: u64, head: &impl Serialize, body: &[&[u8]]) -> io::Result<()> {
+        let head = serde_json::to_vec(head)?;
+        let length: usize = body.iter().map(|it| it.len()).sum();
+        let lengths = [head.len() as u64, length as u64];
+        let mut pieces = std::iter::once(&head[..]).chain(body.iter().copied());
+        let mut piece = pieces.next().unwrap_or_default();
+        let mut before = 0_u64;
+        let mut packet = Vec::with_capacity(PACKET);
+        loop {
+            packet.clear();
+            for word in [number, lengths[0], lengths[1], before] {
+                packet.extend_from_slice(&word.to_le_bytes());
+            }
+            while packet.len() < PACKET {
+                if piece.is_empty() {
+                    match pieces.next() {
+                        Some(next) => piece = next,
+                        None => break,
+                    }
+                    continue;
+                }
+                let (now, later) = piece.split_at(piece.len().min(PACKET - packet.len()));
+                packet.extend_from_slice(now);
+                piece = later;
+            }
+            before += (packet.len() - HEAD) as u64;
+            self.write(&packet)?;
+            if before == lengths[0] + lengths[1] {
+                return Ok(());
+            }
+        }
+    }
+
+    fn write(&self, packet: &[u8]) -> io::Result<()> {
+        // Not by `send`: a signal for a closed pipe is ignored in Rust's programs.
+        loop {
+            match rustix::io::write(&self.socket, packet) {
+                Ok(_) => return Ok(()),
+                Err(rustix::io::Errno::INTR) => {}
+                Err(error) => return Err(error.into()),
+            }
+        }
+    }
+
+    /// Waits for a message. `None`: nobody is at the other end any more.
+    ///
+    /// # Errors
+    /// The system's, and [`ErrorKind::InvalidData`] for what is no packet, or longer than `most`.
+    pub fn receive(&self, most: u64) -> io::Result<Option<Message>> {
+        let mut packet = vec![0; PACKET];
+        let mut begun: Option<(Message, u64, usize)> = None;
+        loop {
+            let length = match rustix::io::read(&self.socket, &mut packet[..]) {
+                Ok(0) | Err(rustix::io::Errno::CONNRESET) => return Ok(None),
+                Ok(length) => length,
+                Err(rustix::io::Errno::INTR) => continue,
+                Err(error) => return Err(error.into()),
+            };
+            let Some(Packet {
+                number,
+                head,
+                body,
+                before,
+                content,
+            }) = Packet::of(&packet[..length])
+            else {
+                return Err(io::Error::new(ErrorKind::InvalidData, "this is no packet"));
+            };
+            if head.saturating_add(body) > most {
+                return Err(io::Error::new(
+                    ErrorKind::InvalidData,
+                    "a message is too long",
+                ));
+            }
+            if before == 0 {
+                let message = Message {
+                    number,
+                    head: Vec::with_capacity(head as usize),
+                    body: Vec::with_capacity(body as usize),
+                };
+                begun = Some((message, 0, head as usize));
+            }
+            // The rest of a message whose begin went to somebody else means nothing.
+            let Some((message, there, head)) = begun.as_mut() else {
+                continue;
+            };
+            if message.number != number || *there != before {
+                continue;
+            }
+            let of_head = content.len().min(*head - message.head.len());
+            message.head.extend_from_slice(&content[..of_head]);
+            message.body.extend_from_slice(&content[of_head..]);
+            *there += content.len() as u64;
+            let is_whole = *there == *head as u64 + body;
+            if is_whole && let Some((message, ..)) = begun.take() {
+                return Ok(Some(message));
+            }
+        }
+    }
+}
+
+impl AsFd for Channel {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.socket.as_fd()
+    }
+}
+
+struct Packet<'p> {
+    number: u64,
+    head: u64,
+    body: u64,
+    before: u64,
+    content: &'p [u8],
+}
+
+impl Packet<'_> {
+    fn of(bytes: &[u8]) -> Option<Packet<'_>> {
+        let (words, content) = bytes.split_first_chunk::<HEAD>()?;
+        let word = |at: usize| {
+            let bytes = words.get(8 * at..8 * at + 8)?;
+            Some(u64::from_le_bytes(bytes.try_into().ok()?))
+        };
+        Some(Packet {
+            number: word(0)?,
+            head: word(1)?,
+            body: word(2)?,
+            before: word(3)?,
+            content,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_of_all_sizes_arrive() {
+        let (one, other) = Channel::pair().unwrap();
+        let large = vec![7; 3 * PACKET + 5];
+        let sender = std::thread::spawn(move || {
+            one.send(1, &"head", &[b"ab", b"", b"cd"]).unwrap();
+            one.send(2, &"", &[]).unwrap();
+            one.send(3, &"x".repeat(PACKET), &[&large, b"end"]).unwrap();
+        });
+        let next = || other.receive(1 << 20).unwrap().unwrap();
+        let first = next();
+        assert_eq!((first.number, &first.body[..]), (1, &b"abcd"[..]));
+        assert_eq!(first.head::<String>().unwrap(), "head");
+        assert_eq!(next().number, 2);
+        let third = next();
+        assert_eq!(third.head::<String>().unwrap().len(), PACKET);
+        assert_eq!(third.body.len(), 3 * PACKET + 8);
+        sender.join().unwrap();
+        assert!(other.receive(1).unwrap().is_none());
+    }
+
+    #[test]
+    fn what_was_begun_by_one_who_was_killed_is_dropped() {
+        let (one, other) = Channel::pair().unwrap();
+        let mut packet = Vec::new();
+        for word in [1_u64, 2, 100, 0] {
+            packet.extend_from_slice(&word.to_le_bytes());
+        }
+        packet.extend_from_slice(b"\"\"half");
+        one.write(&packet).unwrap();
+        one.send(2, &"whole", &[b"body"]).unwrap();
+        let message = other.receive(1 << 20).unwrap().unwrap();
+        assert_eq!((message.number, &message.body[..]), (2, &b"body"[..]));
+        assert!(one.send(3, &"", &[&[0; 100]]).is_ok());
+        assert!(other.receive(50).is_err(), "longer than is taken");
+    }
+}

@@ -1,0 +1,133 @@
+//! The configuration that a module reads: that in force, with its own files in it.
+
+use std::fmt::Write as _;
+
+use qcbus_formats::config::{BundleConfig, Config, ConfigParam, INPUT_PARAMS};
+
+/// The bundle's parameters that name its result, the framework's first.
+const RESULT_PARAMS: [&str; 2] = ["resultFile", "strResultFile"];
+
+/// Everything that goes into it.
+pub(crate) struct Configuration<'c> {
+    /// The name under which the module is hosted.
+    pub name: &'c str,
+    /// The file to check.
+    pub input: &'c str,
+    /// The configuration in force.
+    pub config: Option<&'c Config>,
+    /// The names by which the module may look for its section, each with the file for its result.
+    pub sections: &'c [(String, String)],
+}
+
+impl Configuration<'_> {
+    /// Its text.
+    pub fn text(&self) -> String {
+        let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<Config>\n");
+        param(&mut text, 1, INPUT_PARAMS[0], self.input);
+        let global = self.config.map_or(&[][..], |it| &it.params);
+        params(&mut text, 1, global);
+        let own = self.config.and_then(|it| it.bundle(self.name, self.name));
+        for (application, result) in self.sections {
+            let application = escaped(application);
+            let _ = writeln!(text, "  <CheckerBundle application=\"{application}\">");
+            param(&mut text, 2, RESULT_PARAMS[0], result);
+            if let Some(own) = own {
+                section(&mut text, own);
+            }
+            text.push_str("  </CheckerBundle>\n");
+        }
+        text.push_str("</Config>\n");
+        text
+    }
+}
+
+fn section(text: &mut String, own: &BundleConfig) {
+    params(text, 2, &own.params);
+    for checker in &own.checkers {
+        // As ASAM writes it: the larger number is the milder level.
+        let (mildest, worst) = (checker.levels.mildest() as u8, checker.levels.worst() as u8);
+        let id = escaped(&checker.id);
+        let _ = writeln!(
+            text,
+            "    <Checker checkerId=\"{id}\" maxLevel=\"{worst}\" minLevel=\"{mildest}\">"
+        );
+        params(text, 3, &checker.params);
+        text.push_str("    </Checker>\n");
+    }
+}
+
+/// Parameters, without those that name files of the run: these are ours to say.
+fn params(text: &mut String, depth: usize, all: &[ConfigParam]) {
+    let is_ours = |name: &str| INPUT_PARAMS.contains(&name) || RESULT_PARAMS.contains(&name);
+    for it in all.iter().filter(|it| !is_ours(&it.name)) {
+        param(text, depth, &it.name, &it.value);
+    }
+}
+
+fn param(text: &mut String, depth: usize, name: &str, value: &str) {
+    let (indent, name, value) = ("  ".repeat(depth), escaped(name), escaped(value));
+    let _ = writeln!(text, "{indent}<Param name=\"{name}\" value=\"{value}\"/>");
+}
+
+/// A text as the value of an attribute. What XML cannot say is left out, and is in no configuration either.
+fn escaped(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            '\t' | '\n' | '\r' => {
+                let _ = write!(escaped, "&#{};", u32::from(c));
+            }
+            c if c < ' ' || matches!(c, '\u{fffe}' | '\u{ffff}') => {}
+            c => escaped.push(c),
+        }
+    }
+    escaped
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_in_force_is_handed_on_but_for_the_files() {
+        let given = br#"<Config><Param name="InputFile" value="other"/><Param name="g" value="1"/>
+            <CheckerBundle application="mine"><Param name="resultFile" value="there"/>
+              <Param name="p" value="a &quot;b&quot; &lt;c&gt;&#10;"/>
+              <Checker checkerId="one" maxLevel="1" minLevel="2"><Param name="q" value="3"/></Checker>
+            </CheckerBundle>
+            <CheckerBundle application="other"><Param name="z" value="0"/></CheckerBundle></Config>"#;
+        let given = Config::parse(given).unwrap().config;
+        let text = Configuration {
+            name: "mine",
+            input: "/in/a & b.xodr",
+            config: Some(&given),
+            sections: &[("xodrBundle".to_owned(), "r.xqar".to_owned())],
+        }
+        .text();
+        let read = Config::parse(text.as_bytes()).unwrap().config;
+        assert_eq!(read.input_file(), Some("/in/a & b.xodr"));
+        let names = |params: &[ConfigParam]| -> Vec<(String, String)> {
+            let all = params.iter();
+            all.map(|it| (it.name.clone(), it.value.clone())).collect()
+        };
+        let pair = |a: &str, b: &str| (a.to_owned(), b.to_owned());
+        assert_eq!(
+            names(&read.params),
+            [pair("InputFile", "/in/a & b.xodr"), pair("g", "1")]
+        );
+        assert_eq!(read.bundles.len(), 1);
+        let bundle = &read.bundles[0];
+        assert_eq!(bundle.application, "xodrBundle");
+        assert_eq!(
+            names(&bundle.params),
+            [pair("resultFile", "r.xqar"), pair("p", "a \"b\" <c>\n")]
+        );
+        let checker = &bundle.checkers[0];
+        assert_eq!(checker.levels, given.bundles[0].checkers[0].levels);
+        assert_eq!(names(&checker.params), [pair("q", "3")]);
+    }
+}

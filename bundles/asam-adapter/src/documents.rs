@@ -1,0 +1,96 @@
+//! The files of a job, byte by byte as they are on disk.
+
+use std::collections::BTreeSet;
+use std::path::{Component, Path, PathBuf};
+
+use qcbus_document::{FaultCode, Suffix};
+use qcbus_messages::DocumentRole;
+use qcbus_messages::path_text::{from_text, split_archive};
+use qcbus_sdk::Subject;
+use sha2::{Digest as _, Sha256};
+
+use crate::messages::{Bytes, Document};
+
+/// What is handed to an office: the files, and pieces of images that are the bytes of those that are here.
+pub(crate) type Files<'d> = (Vec<Document>, Vec<&'d [u8]>);
+
+/// The documents of a job: the one that is checked first, then those that it refers to, each once. Members of
+/// archives are none: no module of ASAM's knows archives.
+///
+/// # Errors
+/// When a file's bytes cannot be had, for a person.
+pub(crate) fn of<'d>(subject: &Subject<'d>) -> Result<Files<'d>, String> {
+    let is_file = |role: DocumentRole| {
+        matches!(
+            role,
+            DocumentRole::Root | DocumentRole::Map | DocumentRole::Catalog | DocumentRole::Scenario
+        )
+    };
+    let linked = subject.linked().iter().filter(|it| is_file(it.role));
+    let documents = std::iter::once(subject.written()).chain(linked.map(|it| it.document));
+    let mut known = BTreeSet::new();
+    let (mut files, mut pieces) = (Vec::new(), Vec::new());
+    for document in documents {
+        for (number, source) in document.sources().enumerate() {
+            if split_archive(source.path).is_some() {
+                continue;
+            }
+            let path = plain(&from_text(source.path));
+            if !path.is_absolute() {
+                return Err(format!("`{}` is no absolute path", source.path));
+            }
+            if !known.insert(path.clone()) {
+                continue;
+            }
+            let text = document.source_bytes(&source);
+            let digest = (number == 0).then(|| document.content_hash());
+            let transcoded = document
+                .faults()
+                .any(|fault| fault.code == FaultCode::EncodingTranscoded);
+            let bytes = bytes_of(&path, text, digest, transcoded)?;
+            if let Bytes::Here(_) = bytes {
+                pieces.push(text);
+            }
+            files.push(Document { path, bytes });
+        }
+    }
+    if files.is_empty() {
+        return Err("the file lies in an archive".to_owned());
+    }
+    Ok((files, pieces))
+}
+
+fn bytes_of(
+    path: &Path,
+    text: &[u8],
+    digest: Option<[u8; 32]>,
+    transcoded: bool,
+) -> Result<Bytes, String> {
+    let is_packed = Suffix::of_path(path).is_some_and(|it| it.packed);
+    match digest {
+        Some(digest) if <[u8; 32]>::from(Sha256::digest(text)) == digest => {
+            Ok(Bytes::Here(text.len() as u64))
+        }
+        Some(digest) => Ok(Bytes::OnDisk(digest)),
+        None if transcoded || is_packed => Err(format!(
+            "the bytes of {} cannot be proven: it is included, and not in UTF-8",
+            path.display()
+        )),
+        None => Ok(Bytes::Here(text.len() as u64)),
+    }
+}
+
+/// The same path without `.` and `..`.
+fn plain(path: &Path) -> PathBuf {
+    let mut plain = PathBuf::new();
+    for component in path.components() {
+        match component {
+            Component::CurDir => {}
+            Component::ParentDir => {
+                plain.pop();
+            }
+            other => plain.push(other),
+        }
+    }
+    plain
+}

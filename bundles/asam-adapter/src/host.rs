@@ -1,0 +1,74 @@
+//! The bus process: learns what a module is, and is its bundle from then on.
+
+use std::ffi::OsString;
+
+use qcbus_messages::Exit;
+use qcbus_sdk::Mode;
+use qcbus_sdk::run::OwnFiles;
+
+use crate::bundle::bundle;
+use crate::hosted::{Asked, Hosted, parse};
+use crate::learn::learn;
+use crate::office;
+use crate::offices::Offices;
+
+/// Runs the adapter. `program` are the words behind the name of the program that lead here, such as `asam-adapter`;
+/// `arguments` what follows them. What there is to say goes to the log, and where that ends by itself to `complain`.
+pub fn run(
+    program: &[&str],
+    arguments: impl IntoIterator<Item = OsString>,
+    complain: impl Fn(&str),
+) -> Exit {
+    let Asked {
+        hosted,
+        is_office,
+        rest,
+    } = match parse(arguments) {
+        Ok(asked) => asked,
+        Err(error) => {
+            complain(&format!("asam-adapter: {error}"));
+            return Exit::Usage;
+        }
+    };
+    if is_office {
+        return office::serve(&hosted);
+    }
+    match Mode::parse(rest) {
+        Ok(Mode::Bus(options)) => {
+            let threads = options.threads;
+            match begin(hosted, threads, program) {
+                Ok(bundle) => qcbus_sdk::run::run(bundle, Mode::Bus(options).reading(own())),
+                Err(why) => {
+                    complain(&why);
+                    Exit::Internal
+                }
+            }
+        }
+        Ok(_) => Exit::Usage,
+        Err(error) => {
+            complain(&format!("asam-adapter: {error}"));
+            Exit::Usage
+        }
+    }
+}
+
+fn begin(
+    hosted: Hosted,
+    threads: usize,
+    program: &[&str],
+) -> Result<&'static qcbus_sdk::Bundle, String> {
+    let name = hosted.name.clone();
+    let offices = Offices::start(threads, &hosted, program)
+        .map_err(|error| format!("`{name}` cannot be run: {error}"))?;
+    let learned = learn(&hosted, &offices)
+        .map_err(|why| format!("`{name}` is of no use as a bundle: {why}"))?;
+    Ok(bundle(hosted, learned, offices))
+}
+
+/// It reads nothing of its own, and what its manifest declares is for what the offices run.
+fn own() -> OwnFiles {
+    OwnFiles {
+        modest: true,
+        ..OwnFiles::default()
+    }
+}

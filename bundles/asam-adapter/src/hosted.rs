@@ -1,0 +1,208 @@
+//! What is hosted: the module, and what it may use up.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use lexopt::ValueExt as _;
+use qcbus_document::FileKind;
+use qcbus_sdk::run::UsageError;
+
+/// A one-shot module of ASAM's framework that takes part as a bundle.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Hosted {
+    /// The name under which it joins, which is that of the bundle in results and configurations.
+    pub name: String,
+    /// The command, for a shell: `qc_opendrive -c $ASAM_QC_FRAMEWORK_CONFIG_FILE`.
+    pub command: String,
+    /// The `application` by which the module finds its section of a configuration, where that is known. Otherwise
+    /// it is learned: modules have one written in their code, which need not be the name of their manifest.
+    pub application: Option<String>,
+    /// Where it runs, when that is not the private directory of the job.
+    pub directory: Option<PathBuf>,
+    /// Variables of its environment besides those that there are.
+    pub environment: Vec<(String, String)>,
+    /// The kinds of files that it takes, when they are not to be learned.
+    pub kinds: Option<Vec<FileKind>>,
+    /// What a run may use up.
+    pub limits: Limits,
+    /// Where private directories are made.
+    pub scratch: PathBuf,
+}
+
+/// What a run may use up. What goes beyond is killed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// Time by the clock on the wall.
+    pub time: Duration,
+    /// Memory of all its processes together, and private memory of each, in bytes.
+    pub memory: u64,
+    /// What it prints, and the largest file that it writes, in bytes.
+    pub output: u64,
+    /// Processes at the same time.
+    pub processes: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Limits {
+        Limits {
+            time: Duration::from_secs(300),
+            memory: 4096 << 20,
+            output: 256 << 20,
+            processes: 256,
+        }
+    }
+}
+
+/// The directory for private directories of this user, unless another is given.
+pub fn usual_scratch() -> PathBuf {
+    let user = rustix::process::geteuid().as_raw();
+    std::env::temp_dir().join(format!("qcbus-asam-{user}"))
+}
+
+/// What a command line says: what is hosted, and the arguments that are the SDK's.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Asked {
+    pub hosted: Hosted,
+    /// This is the process that runs modules.
+    pub is_office: bool,
+    pub rest: Vec<OsString>,
+}
+
+/// Reads the arguments of the adapter.
+///
+/// # Errors
+/// [`UsageError`] says what does not fit.
+pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Asked, UsageError> {
+    use lexopt::Arg::{Long, Short, Value};
+    let mut parser = lexopt::Parser::from_args(arguments);
+    let (mut name, mut command) = (None, None);
+    let mut asked = Asked {
+        hosted: Hosted {
+            name: String::new(),
+            command: String::new(),
+            application: None,
+            directory: None,
+            environment: Vec::new(),
+            kinds: None,
+            limits: Limits::default(),
+            scratch: usual_scratch(),
+        },
+        is_office: false,
+        rest: Vec::new(),
+    };
+    let hosted = &mut asked.hosted;
+    let limits = &mut hosted.limits;
+    while let Some(argument) = parser.next()? {
+        match argument {
+            Long("name") => name = Some(parser.value()?.string()?),
+            Long("exec") => command = Some(parser.value()?.string()?),
+            Long("application") => hosted.application = Some(parser.value()?.string()?),
+            Long("directory") => hosted.directory = Some(parser.value()?.into()),
+            Long("scratch") => hosted.scratch = parser.value()?.into(),
+            Long("env") => hosted
+                .environment
+                .push(variable(&parser.value()?.string()?)?),
+            Long("kind") => {
+                let kind = kind(&parser.value()?.string()?)?;
+                hosted.kinds.get_or_insert_default().push(kind);
+            }
+            Long("seconds") => limits.time = Duration::from_secs(positive(&mut parser)?),
+            Long("memory-mb") => limits.memory = positive(&mut parser)?.saturating_mul(1 << 20),
+            Long("output-mb") => limits.output = positive(&mut parser)?.saturating_mul(1 << 20),
+            Long("office") => asked.is_office = true,
+            Long(option @ ("instance" | "instance-dir" | "launch" | "threads")) => {
+                asked.rest.push(format!("--{option}").into());
+                asked.rest.push(parser.value()?);
+            }
+            Long(option @ ("die-with-parent" | "no-sandbox")) => {
+                asked.rest.push(format!("--{option}").into());
+            }
+            Short(_) | Long(_) | Value(_) => return Err(argument.unexpected().into()),
+        }
+    }
+    hosted.name = name.ok_or(UsageError::Lacks("asam-adapter", "--name"))?;
+    hosted.command = command.ok_or(UsageError::Lacks("asam-adapter", "--exec"))?;
+    Ok(asked)
+}
+
+impl Hosted {
+    /// The arguments from which [`parse`] reads this again.
+    pub(crate) fn arguments(&self) -> Vec<OsString> {
+        let mut words: Vec<OsString> = Vec::new();
+        let mut add = |option: &str, value: OsString| words.extend([option.into(), value]);
+        add("--name", self.name.clone().into());
+        add("--exec", self.command.clone().into());
+        add("--scratch", self.scratch.clone().into());
+        if let Some(application) = &self.application {
+            add("--application", application.into());
+        }
+        if let Some(directory) = &self.directory {
+            add("--directory", directory.into());
+        }
+        for (name, value) in &self.environment {
+            add("--env", format!("{name}={value}").into());
+        }
+        for kind in self.kinds.iter().flatten() {
+            add("--kind", kind.as_str().into());
+        }
+        let limits = &self.limits;
+        add("--seconds", limits.time.as_secs().to_string().into());
+        add("--memory-mb", (limits.memory >> 20).to_string().into());
+        add("--output-mb", (limits.output >> 20).to_string().into());
+        words
+    }
+}
+
+fn variable(text: &str) -> Result<(String, String), UsageError> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.is_empty() => Ok((name.to_owned(), value.to_owned())),
+        _ => Err(UsageError::Argument(format!(
+            "--env: `{text}` is no NAME=VALUE"
+        ))),
+    }
+}
+
+fn kind(text: &str) -> Result<FileKind, UsageError> {
+    let known = FileKind::ALL.into_iter().find(|it| it.as_str() == text);
+    known
+        .ok_or_else(|| UsageError::Argument(format!("--kind: there are no files of kind `{text}`")))
+}
+
+fn positive(parser: &mut lexopt::Parser) -> Result<u64, UsageError> {
+    let number = |text: &str| text.parse().ok().filter(|it| *it > 0);
+    let read = |text: &str| number(text).ok_or("it is no number above zero");
+    Ok(parser.value()?.parse_with(read)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_hosted_reads_back_what_it_says() {
+        let line = "--name a --exec x --application b --directory /d --env K=V=W --kind xodr --seconds 7 \
+                    --memory-mb 8 --output-mb 9 --scratch /s --launch 3 --die-with-parent";
+        let asked = parse(line.split_whitespace().map(OsString::from)).unwrap();
+        assert_eq!(asked.rest, ["--launch", "3", "--die-with-parent"]);
+        assert_eq!(asked.hosted.environment, [("K".into(), "V=W".into())]);
+        let again = parse(asked.hosted.arguments()).unwrap();
+        assert_eq!(again.hosted, asked.hosted);
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        for wrong in [
+            "",
+            "--name a",
+            "--exec x",
+            "--name a --exec x --kind pdf",
+            "--name a --exec x --env =v",
+            "--name a --exec x --seconds 0",
+            "--name a --exec x file",
+        ] {
+            let words = wrong.split_whitespace().map(OsString::from);
+            assert!(parse(words).is_err(), "{wrong}");
+        }
+    }
+}

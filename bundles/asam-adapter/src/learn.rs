@@ -1,0 +1,210 @@
+//! Which checkers a module has, and which files it takes: learned from runs over small valid files.
+
+use std::path::Path;
+
+use qcbus_document::FileKind;
+use qcbus_formats::pool::Ending;
+use qcbus_formats::xqar::Level;
+
+use crate::back::{Report, Told, read};
+use crate::hosted::Hosted;
+use crate::messages::{Bytes, Document, Request};
+use crate::offices::Offices;
+use crate::samples::{SAMPLES, Sample};
+
+/// What was learned of a module.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Learned {
+    /// The name by which it finds its section of a configuration.
+    pub application: String,
+    pub version: String,
+    pub description: String,
+    pub kinds: Vec<FileKind>,
+    pub checkers: Vec<Known>,
+}
+
+/// A checker of a module.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Known {
+    pub id: String,
+    pub description: String,
+    pub uids: Vec<String>,
+    /// The kinds of files over which it was heard of.
+    pub kinds: Vec<FileKind>,
+}
+
+/// Names in the code of the modules that ASAM publishes.
+const PUBLISHED: [&str; 3] = ["xodrBundle", "xoscBundle", "otxBundle"];
+
+/// What a name is preceded by when it would be that of a bundle of ours.
+pub(crate) const PREFIX: &str = "asam.";
+
+/// Where samples are said to lie.
+const NOWHERE: &str = "/sample of qcbus";
+
+/// Learns what the module is.
+///
+/// # Errors
+/// Why it is of no use, for a person.
+pub(crate) fn learn(hosted: &Hosted, offices: &Offices) -> Result<Learned, String> {
+    let wanted = |it: &&Sample| {
+        hosted
+            .kinds
+            .as_ref()
+            .is_none_or(|kinds| kinds.contains(&it.kind))
+    };
+    let samples: Vec<&Sample> = SAMPLES.iter().filter(wanted).collect();
+    let requests: Vec<(Request, Vec<u8>)> = samples
+        .iter()
+        .map(|it| (request(it, hosted), it.text.as_bytes().to_vec()))
+        .collect();
+    let answers = offices
+        .ask_all(&requests)
+        .map_err(|error| format!("nothing can be run: {error}"))?;
+    let mut learned: Option<Learned> = None;
+    let mut failures = Vec::new();
+    for (sample, answered) in samples.into_iter().zip(answers) {
+        let kind = sample.kind.as_str();
+        let looked = answered.and_then(|(ran, result)| {
+            let report = read(&hosted.name, &ran, &result)?;
+            Ok((ran.application.unwrap_or_default(), report))
+        });
+        match looked {
+            Err(why) => failures.push(format!("over a small {kind} file: {why}")),
+            Ok((_, report)) if hosted.kinds.is_none() && !takes(&report) => failures.push(format!(
+                "over a small {kind} file: the module `{}` has not looked, so it is not asked about such files \
+                 (`kinds` in its manifest says otherwise)",
+                hosted.name
+            )),
+            Ok((application, report)) => add(&mut learned, sample.kind, application, report),
+        }
+    }
+    match learned {
+        Some(learned) if !learned.checkers.is_empty() => {
+            for why in failures {
+                tracing::info!(module = hosted.name, why, "a kind of files is not taken");
+            }
+            Ok(learned)
+        }
+        _ => Err(failures.join("\n")),
+    }
+}
+
+fn request(sample: &Sample, hosted: &Hosted) -> Request {
+    Request {
+        files: vec![Document {
+            path: Path::new(NOWHERE).join(sample.name),
+            bytes: Bytes::Here(sample.text.len() as u64),
+        }],
+        config: None,
+        applications: applications(hosted),
+    }
+}
+
+/// The names by which a module may look for its section: one is in its code, and nobody else knows it.
+fn applications(hosted: &Hosted) -> Vec<String> {
+    if let Some(application) = &hosted.application {
+        return vec![application.clone()];
+    }
+    let name = hosted.name.as_str();
+    let names = [name, name.strip_prefix(PREFIX).unwrap_or(name)];
+    let mut all: Vec<String> = Vec::new();
+    for name in names.into_iter().chain(PUBLISHED) {
+        if !all.iter().any(|it| it == name) {
+            all.push(name.to_owned());
+        }
+    }
+    all
+}
+
+/// Whether a module has looked at a file of its own kind: over a valid one it finds no error, or most of its checkers
+/// come to an end. One that is given another standard's file says that the root is wrong, and skips the rest.
+fn takes(report: &Report) -> bool {
+    let completed = |it: &&Told| it.ending == Ending::Completed;
+    let count = report.checkers.iter().filter(completed).count();
+    let mut issues = report.checkers.iter().flat_map(|it| &it.issues);
+    let finds_errors = issues.any(|it| it.level == Level::Error);
+    count > 0 && (!finds_errors || 2 * count > report.checkers.len())
+}
+
+fn add(learned: &mut Option<Learned>, kind: FileKind, application: String, report: Report) {
+    let learned = learned.get_or_insert_with(|| Learned {
+        application,
+        version: report.version,
+        description: report.description,
+        kinds: Vec::new(),
+        checkers: Vec::new(),
+    });
+    learned.kinds.push(kind);
+    for told in report.checkers {
+        match learned.checkers.iter_mut().find(|it| it.id == told.id) {
+            Some(known) => {
+                known.kinds.push(kind);
+                for uid in told.uids {
+                    if !known.uids.contains(&uid) {
+                        known.uids.push(uid);
+                    }
+                }
+            }
+            None => learned.checkers.push(Known {
+                id: told.id,
+                description: told.description,
+                uids: told.uids,
+                kinds: vec![kind],
+            }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use qcbus_formats::xqar::Issue;
+
+    use super::*;
+
+    fn told(ending: Ending, level: Option<Level>) -> Told {
+        let issue = |level| Issue {
+            id: 0,
+            description: String::new(),
+            level,
+            rule_uid: String::new(),
+            locations: Vec::new(),
+            domain_info: Vec::new(),
+        };
+        Told {
+            id: String::new(),
+            description: String::new(),
+            uids: Vec::new(),
+            issues: level.map(issue).into_iter().collect(),
+            ending,
+            metadata: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_file_of_another_standard_is_not_looked_at() {
+        let skipped = || {
+            let reason = String::new();
+            told(Ending::NotApplicable { reason }, None)
+        };
+        let done = |level| told(Ending::Completed, level);
+        let takes = |checkers| {
+            takes(&Report {
+                version: String::new(),
+                description: String::new(),
+                checkers,
+            })
+        };
+        assert!(
+            takes(vec![done(None), skipped(), skipped()]),
+            "nothing is wrong with it"
+        );
+        assert!(
+            takes(vec![done(Some(Level::Error)), done(None), skipped()]),
+            "strict"
+        );
+        assert!(!takes(vec![done(Some(Level::Error)), skipped(), skipped()]));
+        assert!(!takes(vec![skipped()]));
+        assert!(!takes(Vec::new()));
+    }
+}

@@ -1,0 +1,179 @@
+//! Private directories: one for each office, in it one for each run.
+//!
+//! An office holds a lock on its own as long as it lives. What nobody holds was left by one that was killed, and
+//! goes when the next one begins.
+
+use std::fs::File;
+use std::io;
+use std::os::unix::fs::{DirBuilderExt as _, PermissionsExt as _};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use qcbus_disk::trust;
+use rustix::fs::{FlockOperation, flock};
+
+/// The directory of one office.
+#[derive(Debug)]
+pub(crate) struct Scratch {
+    path: PathBuf,
+    /// Held as long as it is in use.
+    _lock: File,
+    runs: u64,
+}
+
+impl Scratch {
+    /// Makes a directory below `root`, and removes what dead offices have left there.
+    ///
+    /// # Errors
+    /// The system's, and when the root is not in our hands alone.
+    pub fn make(root: &Path) -> io::Result<Scratch> {
+        trust::make_private_directory(root).map_err(io::Error::other)?;
+        // Modules may write paths as the kernel knows them, and those are to be found again.
+        let root = root.canonicalize()?;
+        let door = File::open(&root)?;
+        // Shut: no directory is new and not yet locked while others are swept.
+        flock(&door, FlockOperation::LockExclusive)?;
+        sweep(&root);
+        let number =
+            std::hash::BuildHasher::hash_one(&std::hash::RandomState::new(), std::process::id());
+        let path = root.join(format!("{}-{number:016x}", std::process::id()));
+        private(&path)?;
+        let lock = File::open(&path)?;
+        flock(&lock, FlockOperation::NonBlockingLockExclusive)?;
+        Ok(Scratch {
+            path,
+            _lock: lock,
+            runs: 0,
+        })
+    }
+
+    /// A directory for one run. It goes with the value.
+    ///
+    /// # Errors
+    /// The system's.
+    pub fn for_a_run(&mut self) -> io::Result<Room> {
+        self.runs += 1;
+        // A module may have taken more than its own.
+        if !self.path.exists() {
+            private(&self.path)?;
+        }
+        let path = self.path.join(self.runs.to_string());
+        private(&path)?;
+        Ok(Room { path })
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        remove(&self.path);
+    }
+}
+
+/// The private directory of one run.
+#[derive(Debug)]
+pub(crate) struct Room {
+    path: PathBuf,
+}
+
+impl Room {
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// A directory in it.
+    ///
+    /// # Errors
+    /// The system's.
+    pub fn directory(&self, name: &str) -> io::Result<PathBuf> {
+        let path = self.path.join(name);
+        private(&path)?;
+        Ok(path)
+    }
+}
+
+impl Drop for Room {
+    fn drop(&mut self) {
+        remove(&self.path);
+    }
+}
+
+fn private(path: &Path) -> io::Result<()> {
+    std::fs::DirBuilder::new().mode(0o700).create(path)
+}
+
+/// Removes directories that nobody holds.
+fn sweep(root: &Path) {
+    let entries = std::fs::read_dir(root).into_iter().flatten().flatten();
+    for entry in entries {
+        let path = entry.path();
+        let is_left = File::open(&path).map_or(true, |it| {
+            flock(&it, FlockOperation::NonBlockingLockExclusive).is_ok()
+        });
+        if is_left {
+            remove(&path);
+        }
+    }
+}
+
+/// Removes whatever lies there, however its owner has left it.
+fn remove(path: &Path) {
+    let gone = |it: &io::Result<()>| match it {
+        Ok(()) => true,
+        Err(error) => error.kind() == io::ErrorKind::NotFound,
+    };
+    if gone(&std::fs::remove_dir_all(path)) {
+        return;
+    }
+    // What may not be looked into is made so that it may; what is too deep for open directories is not for `rm`.
+    open_up(path, 64);
+    if gone(&std::fs::remove_dir_all(path)) {
+        return;
+    }
+    let removed = Command::new("rm")
+        .args(["-rf", "--"])
+        .arg(path)
+        .stdin(Stdio::null())
+        .stderr(Stdio::null())
+        .status();
+    if path.symlink_metadata().is_ok() {
+        tracing::warn!(path = %path.display(), ?removed, "a private directory cannot be removed");
+    }
+}
+
+fn open_up(path: &Path, depth: usize) {
+    let Ok(found) = path.symlink_metadata() else {
+        return;
+    };
+    if !found.is_dir() || depth == 0 {
+        return;
+    }
+    let _ = std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o700));
+    let entries = std::fs::read_dir(path).into_iter().flatten().flatten();
+    for entry in entries {
+        open_up(&entry.path(), depth - 1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_dead_offices_have_left_goes_and_what_the_living_have_stays() {
+        let base = tempfile::tempdir().unwrap();
+        let root = base.path().join("scratch");
+        let mut living = Scratch::make(&root).unwrap();
+        let room = living.for_a_run().unwrap();
+        let left = root.join("1-left");
+        let deep = left.join("shut");
+        std::fs::create_dir_all(deep.join("more")).unwrap();
+        std::fs::set_permissions(&deep, std::fs::Permissions::from_mode(0o000)).unwrap();
+        let other = Scratch::make(&root).unwrap();
+        assert!(!left.exists());
+        assert!(room.path().exists());
+        assert_eq!(std::fs::read_dir(&root).unwrap().count(), 2);
+        drop((room, living, other));
+        assert_eq!(std::fs::read_dir(&root).unwrap().count(), 0);
+    }
+}

@@ -1,0 +1,181 @@
+//! One-shot modules of ASAM's framework, which the adapter has take part as bundles.
+
+use std::path::{Path, PathBuf};
+
+use qcbus_disk::trust;
+use qcbus_formats::config::{Config, same_bundle};
+use qcbus_formats::manifest::{May, Module};
+use qcbus_messages::Role;
+use qcbus_messages::path_text::to_text;
+
+use super::{Loaded, programs};
+use crate::core::{ChildSpec, Restart};
+
+/// Who has one-shot modules take part as bundles.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Adapter {
+    /// The words that start it; none: nobody does.
+    pub command: Vec<String>,
+    /// Names that are those of bundles which come with the program, whether they run or not.
+    pub reserved: Vec<String>,
+    /// Where modules have their private directories.
+    pub scratch: PathBuf,
+}
+
+/// What a name is preceded by that is taken.
+const PREFIX: &str = "asam.";
+/// Before the command of a module, and before the directory of its private ones.
+const EXEC: &str = "--exec";
+const SCRATCH: &str = "--scratch";
+/// The word behind the name of the program.
+const ADAPTER: &str = "asam-adapter";
+
+impl Adapter {
+    /// Whether there is one.
+    pub(super) fn is_there(&self) -> bool {
+        !self.command.is_empty()
+    }
+
+    /// The name under which a module joins: its own, unless a bundle that comes with the program has it.
+    pub(super) fn name_of(&self, module: &Module, loaded: &mut Loaded) -> String {
+        let name = &module.name;
+        let is_taken = self.reserved.iter().any(|it| same_bundle(name, it, ""))
+            || loaded.comes_with_the_program(name);
+        if !is_taken {
+            return name.clone();
+        }
+        let joined = format!("{PREFIX}{name}");
+        loaded.notices.push(format!(
+            "{}: `{name}` comes with qcbus, so this module of ASAM's framework joins as `{joined}`; that is its \
+             name in configurations, too",
+            to_text(&module.manifest)
+        ));
+        joined
+    }
+
+    /// How the adapter is started for a module.
+    pub(super) fn words(&self, name: &str, module: &Module) -> Vec<String> {
+        let mut words = self.command.clone();
+        let mut add =
+            |option: &str, value: &str| words.extend([option.to_owned(), value.to_owned()]);
+        add("--name", name);
+        add(EXEC, &module.exec_command);
+        add(SCRATCH, &self.scratch.to_string_lossy());
+        let once = &module.once;
+        if let Some(application) = &once.application {
+            add("--application", application);
+        }
+        if let Some(directory) = &once.working_directory {
+            add("--directory", &directory.to_string_lossy());
+        }
+        for (variable, value) in &once.environment {
+            add("--env", &format!("{variable}={value}"));
+        }
+        for kind in &once.kinds {
+            add("--kind", kind);
+        }
+        for (limit, number) in &once.limits {
+            add(
+                &format!("--{}", limit.replace('_', "-")),
+                &number.to_string(),
+            );
+        }
+        words
+    }
+
+    /// What the adapter may do although it is confined: what its module may, and its private directories.
+    pub(super) fn may(&self, module: &May) -> May {
+        let mut may = module.clone();
+        may.write.push(self.scratch.clone());
+        may
+    }
+
+    /// Adds the modules that a configuration names and nothing else brings, when a program of that name is found:
+    /// so ASAM's framework is configured that has no manifests.
+    pub(super) fn add_named(&self, config: &Config, known: &[&str], loaded: &mut Loaded) {
+        for bundle in &config.bundles {
+            let name = bundle.application.as_str();
+            let mut children = loaded.children.iter().map(|it| it.name.as_str());
+            let is_brought = children.any(|it| same_bundle(name, it, ""))
+                || known.iter().any(|it| same_bundle(name, it, ""));
+            if !self.is_there() || is_brought || !looks_like_a_module(name) {
+                continue;
+            }
+            let Some(program) = programs::find(name) else {
+                continue;
+            };
+            let shown = to_text(&program);
+            if let Err(why) = programs::look_at(name) {
+                loaded
+                    .notices
+                    .push(format!("`{name}` is not started as {shown}: {why}"));
+                continue;
+            }
+            loaded.notices.push(format!(
+                "no manifest brings `{name}`, which the configuration names: {shown} is run as a one-shot module of \
+                 ASAM's framework"
+            ));
+            let module = named_module(name);
+            let command = self.words(name, &module);
+            loaded.children.push(ChildSpec {
+                name: name.to_owned(),
+                role: Role::Bundle,
+                version: None,
+                command,
+                restart: Restart::Always,
+                may: self.may(&module.may),
+                programs: Vec::new(),
+                shadow: false,
+            });
+        }
+    }
+}
+
+/// A configuration is no place to name any program whatever: only such names as those of modules are looked for.
+fn looks_like_a_module(name: &str) -> bool {
+    let good = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
+    let is_one = name.starts_with("qc_") || name.starts_with("qc-") || name.ends_with("Bundle");
+    is_one && name.len() <= 64 && name.chars().all(good)
+}
+
+fn named_module(name: &str) -> Module {
+    Module {
+        name: name.to_owned(),
+        module_type: qcbus_formats::manifest::ModuleType::CheckerBundle,
+        exec_command: format!("{name} -c \"$ASAM_QC_FRAMEWORK_CONFIG_FILE\""),
+        mode: qcbus_formats::manifest::Mode::Once,
+        may: May::default(),
+        once: qcbus_formats::manifest::Once::default(),
+        shadow: false,
+        extra: Vec::new(),
+        manifest: PathBuf::new(),
+    }
+}
+
+/// The command of a module that the adapter runs; `None` for other children.
+pub(super) fn command_of(words: &[String]) -> Option<&str> {
+    value_of(words, EXEC)
+}
+
+/// Looks once more at what the adapter is to run, and makes the place for it.
+///
+/// # Errors
+/// What somebody else decides, and when there is no such program.
+pub(super) fn ready(words: &[String]) -> Result<(), String> {
+    if let Some(command) = command_of(words) {
+        programs::look_at(command)?;
+    }
+    if let Some(scratch) = value_of(words, SCRATCH) {
+        // There before the process is confined, which may write to it.
+        trust::make_private_directory(Path::new(scratch)).map_err(|error| error.to_string())?;
+    }
+    Ok(())
+}
+
+fn value_of<'w>(words: &'w [String], option: &str) -> Option<&'w str> {
+    if words.get(1).is_none_or(|it| it != ADAPTER) {
+        return None;
+    }
+    let at = words.iter().position(|it| it == option)?;
+    words.get(at + 1).map(String::as_str)
+}
