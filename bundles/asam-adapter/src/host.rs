@@ -33,32 +33,34 @@ pub fn run(
     if is_office {
         return office::serve(&hosted);
     }
-    match Mode::parse(rest) {
-        Ok(Mode::Bus(options)) => {
-            let threads = options.threads;
-            match begin(hosted, threads, program) {
-                Ok(bundle) => qcbus_sdk::run::run(bundle, Mode::Bus(options).reading(own())),
-                Err(why) => {
-                    complain(&why);
-                    Exit::Internal
-                }
-            }
-        }
-        Ok(_) => Exit::Usage,
+    let mode = match Mode::parse(rest) {
+        Ok(mode) => mode,
         Err(error) => {
             complain(&format!("asam-adapter: {error}"));
-            Exit::Usage
+            return Exit::Usage;
+        }
+    };
+    // Beside a broker several jobs are under way at the same time; a file is one.
+    let count = match &mode {
+        Mode::Bus(options) => options.threads,
+        _ => 1,
+    };
+    match begin(hosted, count, program) {
+        Ok(bundle) => qcbus_sdk::run::run(bundle, mode.reading(own())),
+        Err(why) => {
+            complain(&why);
+            Exit::Internal
         }
     }
 }
 
 fn begin(
     hosted: Hosted,
-    threads: usize,
+    count: usize,
     program: &[&str],
 ) -> Result<&'static qcbus_sdk::Bundle, String> {
     let name = hosted.name.clone();
-    let offices = Offices::start(threads, &hosted, program)
+    let offices = Offices::start(count, &hosted, program)
         .map_err(|error| format!("`{name}` cannot be run: {error}"))?;
     let learned = learn(&hosted, &offices)
         .map_err(|why| format!("`{name}` is of no use as a bundle: {why}"))?;

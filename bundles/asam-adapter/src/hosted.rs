@@ -111,14 +111,16 @@ pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Ask
             Long("memory-mb") => limits.memory = positive(&mut parser)?.saturating_mul(1 << 20),
             Long("output-mb") => limits.output = positive(&mut parser)?.saturating_mul(1 << 20),
             Long("office") => asked.is_office = true,
-            Long(option @ ("instance" | "instance-dir" | "launch" | "threads")) => {
+            Long(option @ ("instance" | "instance-dir" | "launch" | "threads" | "format")) => {
                 asked.rest.push(format!("--{option}").into());
                 asked.rest.push(parser.value()?);
             }
-            Long(option @ ("die-with-parent" | "no-sandbox")) => {
+            Long(option @ ("die-with-parent" | "no-sandbox" | "timings")) => {
                 asked.rest.push(format!("--{option}").into());
             }
-            Short(_) | Long(_) | Value(_) => return Err(argument.unexpected().into()),
+            Short('c') => asked.rest.extend(["-c".into(), parser.value()?]),
+            Value(file) => asked.rest.push(file),
+            Short(_) | Long(_) => return Err(argument.unexpected().into()),
         }
     }
     hosted.name = name.ok_or(UsageError::Lacks("asam-adapter", "--name"))?;
@@ -199,7 +201,7 @@ mod tests {
             "--name a --exec x --kind pdf",
             "--name a --exec x --env =v",
             "--name a --exec x --seconds 0",
-            "--name a --exec x file",
+            "--name a --exec x --bad",
         ] {
             let words = wrong.split_whitespace().map(OsString::from);
             assert!(parse(words).is_err(), "{wrong}");

@@ -40,7 +40,7 @@ fn office(hosted: &Hosted) -> io::Result<()> {
     };
     let mut office = Office {
         hosted,
-        scratch: Scratch::make(&hosted.scratch)?,
+        scratch: Scratch::open(&hosted.scratch)?,
         channel: Channel::from_socket(socket),
         may,
     };

@@ -1,7 +1,7 @@
-//! Private directories: one for each office, in it one for each run.
+//! Private directories, one for each run.
 //!
-//! An office holds a lock on its own as long as it lives. What nobody holds was left by one that was killed, and
-//! goes when the next one begins.
+//! Its office holds a lock on it as long as it lasts. What nobody holds was left by an office that was killed, and goes
+//! when the next one begins.
 
 use std::fs::File;
 use std::io;
@@ -12,60 +12,47 @@ use std::process::{Command, Stdio};
 use qcbus_disk::trust;
 use rustix::fs::{FlockOperation, flock};
 
-/// The directory of one office.
+/// Where private directories are made.
 #[derive(Debug)]
 pub(crate) struct Scratch {
-    path: PathBuf,
-    /// Held as long as it is in use.
-    _lock: File,
-    runs: u64,
+    root: PathBuf,
 }
 
 impl Scratch {
-    /// Makes a directory below `root`, and removes what dead offices have left there.
+    /// Makes `root`, and removes what dead offices have left there.
     ///
     /// # Errors
     /// The system's, and when the root is not in our hands alone.
-    pub fn make(root: &Path) -> io::Result<Scratch> {
+    pub fn open(root: &Path) -> io::Result<Scratch> {
         trust::make_private_directory(root).map_err(io::Error::other)?;
         // Modules may write paths as the kernel knows them, and those are to be found again.
         let root = root.canonicalize()?;
-        let door = File::open(&root)?;
-        // Shut: no directory is new and not yet locked while others are swept.
-        flock(&door, FlockOperation::LockExclusive)?;
-        sweep(&root);
-        let number =
-            std::hash::BuildHasher::hash_one(&std::hash::RandomState::new(), std::process::id());
-        let path = root.join(format!("{}-{number:016x}", std::process::id()));
-        private(&path)?;
-        let lock = File::open(&path)?;
-        flock(&lock, FlockOperation::NonBlockingLockExclusive)?;
-        Ok(Scratch {
-            path,
-            _lock: lock,
-            runs: 0,
-        })
+        let scratch = Scratch { root };
+        let _door = scratch.shut()?;
+        sweep(&scratch.root);
+        Ok(scratch)
     }
 
     /// A directory for one run. It goes with the value.
     ///
     /// # Errors
     /// The system's.
-    pub fn for_a_run(&mut self) -> io::Result<Room> {
-        self.runs += 1;
-        // A module may have taken more than its own.
-        if !self.path.exists() {
-            private(&self.path)?;
-        }
-        let path = self.path.join(self.runs.to_string());
+    pub fn for_a_run(&self) -> io::Result<Room> {
+        let _door = self.shut()?;
+        let own = std::process::id();
+        let number = std::hash::BuildHasher::hash_one(&std::hash::RandomState::new(), own);
+        let path = self.root.join(format!("{own}-{number:016x}"));
         private(&path)?;
-        Ok(Room { path })
+        let lock = File::open(&path)?;
+        flock(&lock, FlockOperation::NonBlockingLockExclusive)?;
+        Ok(Room { path, _lock: lock })
     }
-}
 
-impl Drop for Scratch {
-    fn drop(&mut self) {
-        remove(&self.path);
+    /// While it is shut no directory is new and not yet locked, and none is swept.
+    fn shut(&self) -> io::Result<File> {
+        let door = File::open(&self.root)?;
+        flock(&door, FlockOperation::LockExclusive)?;
+        Ok(door)
     }
 }
 
@@ -73,6 +60,8 @@ impl Drop for Scratch {
 #[derive(Debug)]
 pub(crate) struct Room {
     path: PathBuf,
+    /// Held as long as it is in use.
+    _lock: File,
 }
 
 impl Room {
@@ -163,17 +152,16 @@ mod tests {
     fn what_dead_offices_have_left_goes_and_what_the_living_have_stays() {
         let base = tempfile::tempdir().unwrap();
         let root = base.path().join("scratch");
-        let mut living = Scratch::make(&root).unwrap();
+        let living = Scratch::open(&root).unwrap();
         let room = living.for_a_run().unwrap();
         let left = root.join("1-left");
         let deep = left.join("shut");
         std::fs::create_dir_all(deep.join("more")).unwrap();
         std::fs::set_permissions(&deep, std::fs::Permissions::from_mode(0o000)).unwrap();
-        let other = Scratch::make(&root).unwrap();
+        Scratch::open(&root).unwrap();
         assert!(!left.exists());
         assert!(room.path().exists());
-        assert_eq!(std::fs::read_dir(&root).unwrap().count(), 2);
-        drop((room, living, other));
+        drop(room);
         assert_eq!(std::fs::read_dir(&root).unwrap().count(), 0);
     }
 }

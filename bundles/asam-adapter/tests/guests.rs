@@ -1,0 +1,439 @@
+//! Modules that misbehave on purpose. Whatever they do, nobody takes it for a look at the file: every checker of theirs
+//! is open, says why, and nothing of theirs is left, neither a process nor a directory.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+use std::os::unix::fs::PermissionsExt as _;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// Long enough for the slowest machine, so that a test that hangs ends.
+const WATCHDOG: Duration = Duration::from_secs(240);
+
+/// What every guest begins with: where its input is, and how a result is written.
+const MANNERS: &str = r#"
+config="$ASAM_QC_FRAMEWORK_CONFIG_FILE"
+value() { sed -n "s/.*name=\"$1\" value=\"\([^\"]*\)\".*/\1/p" "$config" | head -n 1; }
+input="$(value InputFile)"
+result="$(value resultFile)"
+checker() { echo "<Checker checkerId=\"$1\" status=\"$2\" description=\"what $1 checks\" summary=\"\">$3</Checker>"; }
+issue() { echo "<Issue issueId=\"0\" level=\"$1\" ruleUID=\"guest.example:xodr:1.0.0:rule\" description=\"$2\">
+<Locations description=\"here\"><XMLLocation xpath=\"/OpenDRIVE\"/></Locations></Issue>"; }
+begin() { echo "<CheckerResults version=\"1.0.0\"><CheckerBundle name=\"guest\" version=\"7.1\" build_date=\"\" description=\"a guest\" summary=\"\"><Param name=\"InputFile\" value=\"${1:-$input}\"/>"; }
+end() { echo "</CheckerBundle></CheckerResults>"; }
+polite() { { begin; checker one completed; checker two completed; end; } > "$result"; }
+case "$input" in */sample.xodr) polite; exit 0;; esac
+"#;
+
+/// A guest and what it has been given.
+struct Guest {
+    dir: tempfile::TempDir,
+    /// In the command line of everything that it starts and leaves.
+    mark: String,
+}
+
+impl Guest {
+    /// One that is polite while it is asked what it has, and does this over a real file.
+    fn doing(script: &str) -> Guest {
+        let dir = tempfile::tempdir().unwrap();
+        let mark = format!("{}.{}", 86_400 + std::process::id(), unique());
+        let text = format!("#!/bin/sh\nMARK={mark}\n{MANNERS}\n{script}\n");
+        let program = dir.path().join("guest");
+        std::fs::write(&program, text).unwrap();
+        std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+        std::fs::write(
+            dir.path().join("real.xodr"),
+            include_str!("../src/samples/sample.xodr"),
+        )
+        .unwrap();
+        Guest { dir, mark }
+    }
+
+    fn at(&self, name: &str) -> PathBuf {
+        self.dir.path().join(name)
+    }
+
+    fn command(&self, limits: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus-asam-adapter"));
+        command
+            .args(["--name", "guest", "--kind", "xodr", "--exec"])
+            .arg(self.at("guest"))
+            .arg("--scratch")
+            .arg(self.at("scratch"))
+            .args(limits)
+            .arg(self.at("real.xodr"))
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        command
+    }
+
+    /// Has it judge the file. Gives the exit code and all that is said.
+    fn judge(&self, limits: &[&str]) -> (Option<i32>, String) {
+        let output = within(self.command(limits).spawn().unwrap());
+        let said = [output.stdout, output.stderr].concat();
+        let said = String::from_utf8_lossy(&said).into_owned();
+        self.is_gone(&said);
+        (output.status.code(), said)
+    }
+
+    /// Nothing is left of it.
+    fn is_gone(&self, said: &str) {
+        let begin = Instant::now();
+        while !processes_with(&self.mark).is_empty() {
+            assert!(begin.elapsed() < WATCHDOG, "it has left processes; {said}");
+            std::thread::yield_now();
+        }
+        assert_eq!(self.rooms(), Vec::<PathBuf>::new(), "{said}");
+    }
+
+    fn rooms(&self) -> Vec<PathBuf> {
+        let entries = std::fs::read_dir(self.at("scratch")).into_iter().flatten();
+        entries.map(|it| it.unwrap().path()).collect()
+    }
+
+    /// Both its checkers are open, and say this.
+    fn is_open(&self, limits: &[&str], why: &[&str]) {
+        let (code, said) = self.judge(limits);
+        assert_eq!(code, Some(3), "{said}");
+        for checker in ["one", "two"] {
+            let line = said
+                .lines()
+                .find(|it| it.contains(&format!(": {checker} failed: ")));
+            let line = line.unwrap_or_else(|| panic!("{checker} is not open: {said}"));
+            for why in why {
+                assert!(line.contains(why), "{why}: {said}");
+            }
+        }
+    }
+}
+
+fn unique() -> u32 {
+    use std::sync::atomic::{AtomicU32, Ordering};
+    static NEXT: AtomicU32 = AtomicU32::new(1);
+    NEXT.fetch_add(1, Ordering::Relaxed)
+}
+
+fn within(mut child: Child) -> Output {
+    let id = child.id();
+    let (done, is_done) = std::sync::mpsc::channel::<()>();
+    let watchdog = std::thread::spawn(move || {
+        if is_done.recv_timeout(WATCHDOG).is_err() {
+            let pid = rustix::process::Pid::from_raw(id.cast_signed()).unwrap();
+            let _ = rustix::process::kill_process(pid, rustix::process::Signal::KILL);
+        }
+    });
+    let stderr = child.stderr.take();
+    let errors = std::thread::spawn(move || {
+        let mut text = Vec::new();
+        if let Some(mut stderr) = stderr {
+            std::io::Read::read_to_end(&mut stderr, &mut text).unwrap();
+        }
+        text
+    });
+    let mut output = child.wait_with_output().unwrap();
+    output.stderr = errors.join().unwrap();
+    drop(done);
+    watchdog.join().unwrap();
+    output
+}
+
+/// Living processes that have this in their command line.
+fn processes_with(mark: &str) -> Vec<i32> {
+    let entries = std::fs::read_dir("/proc").unwrap().flatten();
+    let pids = entries.filter_map(|it| it.file_name().to_str()?.parse::<i32>().ok());
+    let has = |pid: &i32| {
+        let read = |name: &str| std::fs::read(format!("/proc/{pid}/{name}")).unwrap_or_default();
+        let line = String::from_utf8_lossy(&read("cmdline")).into_owned();
+        let stat = String::from_utf8_lossy(&read("stat")).into_owned();
+        line.contains(mark) && !stat.contains(") Z ")
+    };
+    pids.filter(has).collect()
+}
+
+#[test]
+fn a_polite_guest_is_believed() {
+    let guest = Guest::doing("polite");
+    assert_eq!(guest.judge(&[]), (Some(0), String::new()));
+    let guest = Guest::doing(
+        r#"{ begin; checker one completed "$(issue 1 "wrong in $input")"; checker two completed; end; } > "$result""#,
+    );
+    let (code, said) = guest.judge(&[]);
+    assert_eq!(code, Some(1), "{said}");
+    let real = guest.at("real.xodr");
+    let text = format!(
+        "error: wrong in {} [guest.example:xodr:1.0.0:rule]",
+        real.display()
+    );
+    assert!(said.contains(&text), "{said}");
+}
+
+#[test]
+fn it_sees_the_very_bytes_and_its_own_places_alone() {
+    let guest = Guest::doing(
+        r#"cmp "$input" "REAL" || exit 4
+        [ "$PWD" = "$ASAM_QC_FRAMEWORK_WORKING_DIR" ] || exit 5
+        case "$input" in "${PWD%/work}"/input/*) ;; *) exit 6;; esac
+        [ -z "$QCBUS_LAUNCH$QCBUS_SANDBOX" ] || exit 7
+        [ "$MINE" = "a b" ] || exit 8
+        [ -w "$TMPDIR" ] || exit 9
+        polite"#,
+    );
+    let real = guest.at("real.xodr");
+    let script = std::fs::read_to_string(guest.at("guest")).unwrap();
+    std::fs::write(
+        guest.at("guest"),
+        script.replace("REAL", real.to_str().unwrap()),
+    )
+    .unwrap();
+    assert_eq!(
+        guest.judge(&["--env", "MINE=a b"]),
+        (Some(0), String::new())
+    );
+}
+
+#[test]
+fn exit_code_0_without_a_result_is_no_look() {
+    Guest::doing("echo I am done; exit 0").is_open(&[], &["no result", "I am done"]);
+}
+
+#[test]
+fn half_a_result_is_none() {
+    let half = r#"polite; head -c 250 "$result" > half; mv half "$result""#;
+    Guest::doing(half).is_open(&[], &["cannot be read"]);
+    Guest::doing(": > \"$result\"").is_open(&[], &["cannot be read"]);
+}
+
+#[test]
+fn a_result_about_another_file_is_none() {
+    let other = r#"{ begin /somewhere/else.xodr; checker one completed; checker two completed; end; } > "$result""#;
+    Guest::doing(other).is_open(&[], &["about another file", "/somewhere/else.xodr"]);
+}
+
+#[test]
+fn a_result_from_before_is_none() {
+    Guest::doing("polite; touch -d 2001-01-01 \"$result\"").is_open(&[], &["older than its run"]);
+}
+
+#[test]
+fn what_is_no_file_is_no_result() {
+    Guest::doing("mkfifo \"$result\"").is_open(&[], &["no file"]);
+    Guest::doing("polite; mv \"$result\" x; ln -s x \"$result\"").is_open(&[], &["no file"]);
+    Guest::doing("mkdir \"$result\"").is_open(&[], &["no file"]);
+}
+
+#[test]
+fn a_crash_is_told_with_what_it_printed_last() {
+    Guest::doing("polite; exit 7").is_open(&[], &["exit code 7", "printed nothing"]);
+    Guest::doing("polite; echo oh no >&2; kill -SEGV $$").is_open(&[], &["signal 11", "oh no"]);
+    let many = "i=0; while [ $i -lt 2000 ]; do echo line $i; i=$((i+1)); done; exit 1";
+    Guest::doing(many).is_open(&[], &["exit code 1", "line 1999"]);
+}
+
+#[test]
+fn who_never_ends_is_ended() {
+    Guest::doing("polite; while :; do :; done")
+        .is_open(&["--seconds", "1"], &["not done after 1 s"]);
+    Guest::doing("polite; kill -STOP $$").is_open(&["--seconds", "1"], &["not done after 1 s"]);
+    let deaf = "polite; trap '' TERM INT HUP; while :; do sleep 1; done";
+    Guest::doing(deaf).is_open(&["--seconds", "1"], &["not done after 1 s"]);
+}
+
+#[test]
+fn who_floods_is_ended() {
+    Guest::doing("polite; yes").is_open(&["--output-mb", "1"], &["printed more than 1 MB"]);
+    Guest::doing("polite; yes >&2").is_open(&["--output-mb", "1"], &["printed more than 1 MB"]);
+    let file = "polite; exec yes > \"$result\"";
+    Guest::doing(file).is_open(&["--output-mb", "1"], &["file of more than 1 MB"]);
+}
+
+#[test]
+fn who_takes_all_memory_is_ended() {
+    // Doubles a text until it does not fit.
+    let leak = "polite; x=xxxxxxxxxxxxxxxx; while :; do x=$x$x; done";
+    Guest::doing(leak).is_open(
+        &["--memory-mb", "64", "--seconds", "60"],
+        &["the module `guest`"],
+    );
+}
+
+#[test]
+fn what_it_has_started_ends_with_it() {
+    let children = r#"polite
+        i=0; while [ $i -lt 20 ]; do setsid sh -c "sleep $MARK & sleep $MARK" </dev/null & i=$((i+1)); done
+        setsid sh -c "trap '' TERM; (sleep $MARK &) ; sleep $MARK" & exit 0"#;
+    let guest = Guest::doing(children);
+    assert_eq!(
+        guest.judge(&[]),
+        (Some(0), String::new()),
+        "its result counts"
+    );
+    let crashed = children.replace("exit 0", "exit 9");
+    Guest::doing(&crashed).is_open(&[], &["exit code 9"]);
+}
+
+#[test]
+fn who_has_hundreds_of_processes_is_ended() {
+    let many =
+        r#"polite; i=0; while [ $i -lt 400 ]; do setsid sleep $MARK & i=$((i+1)); done; wait"#;
+    Guest::doing(many).is_open(&["--seconds", "60"], &["more than 256 processes"]);
+}
+
+#[test]
+fn what_changes_its_document_has_judged_something_else() {
+    let change = r#"polite; chmod u+w "$input"; echo "<!-- -->" >> "$input""#;
+    Guest::doing(change).is_open(&[], &["changed its copy of", "real.xodr"]);
+    Guest::doing("polite; rm \"$input\"").is_open(&[], &["changed its copy of"]);
+}
+
+#[test]
+fn who_takes_its_directory_away_has_no_result() {
+    Guest::doing("polite; cd /; rm -rf \"${ASAM_QC_FRAMEWORK_WORKING_DIR%/work}\"; exit 0")
+        .is_open(&[], &["the module `guest`"]);
+}
+
+#[test]
+fn what_it_leaves_goes_however_it_is_left() {
+    let shut = "polite; mkdir -p a/b/c; echo x > a/b/c/d; chmod 0 a/b/c a/b a; exit 0";
+    assert_eq!(Guest::doing(shut).judge(&[]), (Some(0), String::new()));
+}
+
+#[test]
+fn a_checker_that_is_missing_is_open_and_the_other_is_not() {
+    let guest = Guest::doing(r#"{ begin; checker two completed; end; } > "$result""#);
+    let (code, said) = guest.judge(&[]);
+    assert_eq!(code, Some(3), "{said}");
+    assert!(
+        said.contains("one failed: the module's result does not mention this checker"),
+        "{said}"
+    );
+    assert!(!said.contains("two failed"), "{said}");
+}
+
+#[test]
+fn what_nobody_knew_of_is_not_lost() {
+    let guest = Guest::doing(
+        r#"{ begin; checker one completed; checker two completed; checker three completed "$(issue 1 "new and wrong")"; end; } > "$result""#,
+    );
+    let (code, said) = guest.judge(&[]);
+    assert!(said.contains("new and wrong"), "{said}");
+    assert!(
+        said.contains("did not have when it was started: `three`"),
+        "{said}"
+    );
+    assert_eq!(code, Some(1), "an error is an error: {said}");
+    let quiet = Guest::doing(
+        r#"{ begin; checker one completed; checker two completed; checker three completed; end; } > "$result""#,
+    );
+    assert_eq!(quiet.judge(&[]).0, Some(3), "it was not asked before");
+}
+
+#[test]
+fn statuses_are_what_they_say() {
+    let guest =
+        Guest::doing(r#"{ begin; checker one error; checker two skipped; end; } > "$result""#);
+    let (code, said) = guest.judge(&[]);
+    assert_eq!(code, Some(3), "{said}");
+    assert!(
+        said.contains("one failed: the module says that it failed"),
+        "{said}"
+    );
+    assert!(!said.contains("two"), "skipped is an answer: {said}");
+}
+
+#[test]
+fn a_module_that_tells_nothing_of_itself_is_of_no_use() {
+    let guest = Guest::doing("polite");
+    for script in ["exit 0", "exit 3", "kill -9 $$"] {
+        std::fs::write(
+            guest.at("guest"),
+            format!("#!/bin/sh\necho because\n{script}\n"),
+        )
+        .unwrap();
+        let (code, said) = guest.judge(&[]);
+        assert_eq!(code, Some(5), "{said}");
+        assert!(
+            said.contains("of no use as a bundle") && said.contains("because"),
+            "{said}"
+        );
+    }
+}
+
+/// The id of a process that this one has started whose command line has a word.
+fn child_of(parent: u32, word: &str) -> Option<i32> {
+    let children =
+        std::fs::read_to_string(format!("/proc/{parent}/task/{parent}/children")).ok()?;
+    let pids = children.split_whitespace().filter_map(|it| it.parse().ok());
+    let mut pids = pids.filter(|pid: &i32| {
+        let line = std::fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
+        line.split(|it| *it == 0).any(|it| it == word.as_bytes())
+    });
+    pids.next()
+}
+
+fn until<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
+    let begin = Instant::now();
+    loop {
+        if let Some(found) = look() {
+            return found;
+        }
+        assert!(begin.elapsed() < WATCHDOG, "{what}");
+        std::thread::yield_now();
+    }
+}
+
+fn kill(pid: i32) {
+    let pid = rustix::process::Pid::from_raw(pid).unwrap();
+    rustix::process::kill_process(pid, rustix::process::Signal::KILL).unwrap();
+}
+
+#[test]
+fn who_is_killed_leaves_no_process_and_the_next_no_directory() {
+    if !Path::new("/proc/thread-self/children").exists() {
+        eprintln!("skipped: this kernel does not list the children of a process");
+        return;
+    }
+    // Whatever is left of it in its own directory, and without a word of its command line.
+    let script = "sleep $MARK & sleep $MARK";
+    for victim in ["the bus process", "the office"] {
+        let guest = Guest::doing(script);
+        let child = guest.command(&[]).spawn().unwrap();
+        until("it runs", || {
+            (processes_with(&guest.mark).len() >= 2).then_some(())
+        });
+        let office = until("the office", || child_of(child.id(), "--office"));
+        match victim {
+            "the office" => kill(office),
+            _ => kill(child.id().cast_signed()),
+        }
+        let output = within(child);
+        assert!(!output.status.success(), "{victim}");
+        let is_module = |pid: &i32| processes_with(&guest.mark).contains(pid);
+        if victim == "the bus process" {
+            until("no process is left", || {
+                processes_with(&guest.mark).is_empty().then_some(())
+            });
+            until("no directory is left", || {
+                guest.rooms().is_empty().then_some(())
+            });
+            continue;
+        }
+        // What the shell of the module has started itself has nobody who ends it but a broker, whose orphan it is.
+        processes_with(&guest.mark)
+            .into_iter()
+            .filter(is_module)
+            .for_each(kill);
+        assert_eq!(guest.rooms().len(), 1, "{victim}");
+        std::fs::write(guest.at("guest"), format!("#!/bin/sh\n{MANNERS}\npolite")).unwrap();
+        assert_eq!(
+            guest.judge(&[]).0,
+            Some(0),
+            "the next begins with an empty place"
+        );
+    }
+}
