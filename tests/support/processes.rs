@@ -68,6 +68,15 @@ pub fn of_directory(directory: &Path) -> Vec<Process> {
     found
 }
 
+/// All processes in whose command line a text stands.
+pub fn all_with(text: &str) -> Vec<Process> {
+    let own = std::process::id().cast_signed();
+    let others = all().filter(|process| process.pid != own);
+    others
+        .filter(|process| process.words.iter().any(|word| word.contains(text)))
+        .collect()
+}
+
 fn all() -> impl Iterator<Item = Process> {
     std::fs::read_dir("/proc")
         .unwrap()

@@ -1,0 +1,431 @@
+//! One-shot modules of ASAM's framework on the bus: brought by a manifest, by a command, or by a configuration alone.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::ffi::OsString;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use qcbus_formats::xqar::{CheckerBundle, Results, Status};
+use qcbus_messages::Verdict;
+use support::broker::Broker;
+use support::content::Content;
+use support::desk::Desk;
+use support::farm::Farm;
+use support::watchdog::{until, until_or};
+
+const MANNERS: &str = include_str!("../bundles/asam-adapter/tests/guests/manners.sh");
+
+/// Finds something in every file.
+const FINDS: &str = r#"{ begin; checker one completed "$(issue 1 "wrong in $input")"; checker two completed; end; } > "$result""#;
+
+/// A module that is polite over small files and does this over real ones.
+fn install(path: &Path, script: &str) {
+    let aside = path.with_extension("new");
+    std::fs::write(&aside, format!("#!/bin/sh\n{MANNERS}\n{script}\n")).unwrap();
+    std::fs::set_permissions(&aside, std::fs::Permissions::from_mode(0o755)).unwrap();
+    std::fs::rename(&aside, path).unwrap();
+}
+
+fn manifest(name: &str, command: &str, more: &serde_json::Value) -> String {
+    let mut module = serde_json::json!({
+        "name": name,
+        "exec_type": "executable",
+        "module_type": "checker_bundle",
+        "exec_command": command,
+        "kinds": ["xodr"],
+    });
+    for (key, value) in more.as_object().into_iter().flatten() {
+        module[key] = value.clone();
+    }
+    serde_json::json!({ "module": [module] }).to_string()
+}
+
+fn bundle<'r>(results: &'r Results, name: &str) -> &'r CheckerBundle {
+    let found = results.bundles.iter().find(|it| it.name == name);
+    found.unwrap_or_else(|| panic!("no bundle {name}"))
+}
+
+/// How its checkers ended, each with the number of its issues.
+fn endings(bundle: &CheckerBundle) -> Vec<(String, Option<Status>, usize)> {
+    let checkers = bundle.checkers.iter();
+    checkers
+        .map(|it| (it.id.to_string(), it.status, it.issues.len()))
+        .collect()
+}
+
+const OWN: &str = "check_qcbus_asam_module_is_known";
+
+/// What a guest that has found one thing has said.
+fn found_one() -> Vec<(String, Option<Status>, usize)> {
+    let done = |id: &str, issues| (id.to_owned(), Some(Status::Completed), issues);
+    vec![done("one", 1), done("two", 0), done(OWN, 0)]
+}
+
+/// A desk with a guest and its manifest.
+struct Table {
+    desk: Desk,
+    program: PathBuf,
+}
+
+impl Table {
+    fn with(script: &str, name: &str, more: &serde_json::Value) -> Table {
+        let desk = Desk::new();
+        let program = desk.path().join("qc_guest");
+        install(&program, script);
+        let text = manifest(name, &program.to_string_lossy(), more);
+        desk.write("bundles.d/guest.json", text);
+        desk.write("a.xodr", Content::Good(1).bytes());
+        desk.write("tmp/x", "");
+        Table { desk, program }
+    }
+
+    fn check(&self, arguments: &[&str]) -> support::desk::Said {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+        command.arg("check").args(arguments).args(["--out", "out"]);
+        let path = std::env::var_os("PATH").unwrap_or_default();
+        let own = std::iter::once(self.desk.path().to_path_buf());
+        let path: OsString = std::env::join_paths(own.chain(std::env::split_paths(&path))).unwrap();
+        command.env("PATH", path);
+        command.env("TMPDIR", self.desk.path().join("tmp"));
+        self.desk.run(&mut command)
+    }
+}
+
+#[test]
+fn a_manifest_of_asams_framework_is_all_that_is_needed() {
+    let table = Table::with(FINDS, "guest", &serde_json::Value::Null);
+    let said = table.check(&["a.xodr", "--bundles-d", "bundles.d"]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&table.desk));
+    let results = table.desk.result("out/a.xodr.xqar");
+    let guest = bundle(&results, "guest");
+    assert_eq!(endings(guest), found_one());
+    assert_eq!(
+        (guest.version.as_str(), guest.description.as_str()),
+        ("7.1", "a guest")
+    );
+    let issue = &guest.checkers[0].issues[0];
+    let real = table.desk.path().join("a.xodr");
+    assert_eq!(issue.description, format!("wrong in {}", real.display()));
+    assert_eq!(issue.rule_uid, "guest.example:xodr:1.0.0:rule");
+    assert_eq!(*guest.checkers[0].description, *"what one checks");
+    assert!(said.stdout.contains("wrong in"), "{}", said.stdout);
+    // Nothing of it is left.
+    let scratch = std::fs::read_dir(table.desk.path().join("tmp")).unwrap();
+    let below = scratch.flatten().filter(|it| it.path().is_dir());
+    for directory in below {
+        assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 0);
+    }
+}
+
+#[test]
+fn one_with_the_name_of_a_bundle_of_ours_joins_beside_it() {
+    let table = Table::with(FINDS, "xodrBundle", &serde_json::Value::Null);
+    let said = table.check(&["a.xodr", "--bundles-d", "bundles.d"]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&table.desk));
+    assert!(
+        said.stderr.contains("joins as `asam.xodrBundle`"),
+        "{}",
+        said.stderr
+    );
+    let results = table.desk.result("out/a.xodr.xqar");
+    assert_eq!(endings(bundle(&results, "asam.xodrBundle")), found_one());
+    assert!(bundle(&results, "xodrBundle").checkers.len() > 100);
+}
+
+#[test]
+fn a_configuration_names_it_and_its_parameters_reach_it() {
+    let script = r#"[ "$(value limit)" = "a & b" ] || exit 4
+        grep -q 'checkerId="one"' "$config" || exit 5
+        polite"#
+        .replace("\"a & b\"", "\"a &amp; b\"");
+    let table = Table::with(&script, "mine", &serde_json::Value::Null);
+    table.desk.write(
+        "config.xml",
+        r#"<Config><CheckerBundle application="mine"><Param name="limit" value="a &amp; b"/>
+           <Checker checkerId="one" maxLevel="1" minLevel="3"/></CheckerBundle></Config>"#,
+    );
+    let said = table.check(&["a.xodr", "-c", "config.xml", "--bundles-d", "bundles.d"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&table.desk));
+    let results = table.desk.result("out/Result.xqar");
+    let one = ("one".to_owned(), Some(Status::Completed), 0);
+    assert_eq!(endings(bundle(&results, "mine")), [one]);
+}
+
+#[test]
+fn a_configuration_alone_brings_what_is_on_the_path() {
+    let script = r#"[ "$1 $2" = "-c $config" ] || exit 4
+        polite"#;
+    let table = Table::with(script, "unused", &serde_json::Value::Null);
+    let named = |name: &str| {
+        let text = format!("<Config><CheckerBundle application=\"{name}\"/></Config>");
+        table.desk.write("config.xml", text);
+        table.check(&["a.xodr", "-c", "config.xml"])
+    };
+    let said = named("qc_guest");
+    assert_eq!(said.code, Some(0), "{}", said.whole(&table.desk));
+    let results = table.desk.result("out/Result.xqar");
+    assert!(endings(bundle(&results, "qc_guest")).len() == 3);
+    // What does not look like a module is not run, whatever a configuration says.
+    std::fs::rename(&table.program, table.desk.path().join("guest")).unwrap();
+    let said = named("guest");
+    assert_eq!(said.code, Some(3), "{}", said.whole(&table.desk));
+}
+
+#[test]
+fn a_module_that_fails_leaves_the_file_undetermined_and_says_why() {
+    let table = Table::with(
+        "echo what a pity >&2; exit 9",
+        "guest",
+        &serde_json::Value::Null,
+    );
+    let said = table.check(&["a.xodr", "--bundles-d", "bundles.d"]);
+    assert_eq!(said.code, Some(3), "{}", said.whole(&table.desk));
+    let results = table.desk.result("out/a.xodr.xqar");
+    for checker in &bundle(&results, "guest").checkers {
+        assert_eq!(checker.status, Some(Status::Error), "{}", checker.id);
+        let summary = &*checker.summary;
+        assert!(
+            summary.contains("exit code 9") && summary.contains("what a pity"),
+            "{summary}"
+        );
+    }
+}
+
+#[test]
+fn it_writes_nowhere_else_and_reaches_nobody() {
+    if qcbus_confine::kernel_level() == 0 {
+        support::inside::skip("it_writes_nowhere_else", "this kernel has no Landlock");
+        return;
+    }
+    let script = r#"( echo x > "OUTSIDE" ) 2>/dev/null && exit 4
+        ( echo x > "$ASAM_QC_FRAMEWORK_WORKING_DIR/inside" ) || exit 5
+        ( echo x > "${ASAM_QC_FRAMEWORK_WORKING_DIR%/*/work}/other" ) 2>/dev/null && exit 6
+        ( kill -0 $OUTER ) 2>/dev/null && exit 7
+        polite"#;
+    let table = Table::with(script, "guest", &serde_json::Value::Null);
+    let outside = table.desk.path().join("outside");
+    let own = std::process::id().to_string();
+    let script = script.replace("OUTSIDE", &outside.to_string_lossy());
+    install(&table.program, &script.replace("$OUTER", &own));
+    let said = table.check(&["a.xodr", "--bundles-d", "bundles.d"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&table.desk));
+    assert!(!outside.exists());
+}
+
+#[test]
+fn what_a_manifest_says_of_its_run_counts() {
+    let script = r#"[ "$MINE" = "a b" ] || exit 4
+        [ "$PWD" = "/" ] || exit 5
+        grep -q 'application="inner"' "$config" || exit 6
+        polite"#;
+    let more = serde_json::json!({
+        "environment": {"MINE": "a b"},
+        "working_directory": "/",
+        "application": "inner",
+        "limits": {"seconds": 60, "memory_mb": 512, "output_mb": 8},
+    });
+    let table = Table::with(script, "guest", &more);
+    let said = table.check(&["a.xodr", "--bundles-d", "bundles.d"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&table.desk));
+    let wrong = [
+        (
+            serde_json::json!({"limits": {"secnds": 1}}),
+            "limits.secnds",
+        ),
+        (
+            serde_json::json!({"limits": {"seconds": 0}}),
+            "limits.seconds",
+        ),
+        (serde_json::json!({"kinds": ["pdf"]}), "kinds"),
+        (
+            serde_json::json!({"environment": {"A": 1}}),
+            "environment.A",
+        ),
+        (
+            serde_json::json!({"working_directory": "here"}),
+            "working_directory",
+        ),
+    ];
+    for (more, key) in wrong {
+        let table = Table::with("polite", "guest", &more);
+        let said = table.check(&["a.xodr", "--bundles-d", "bundles.d"]);
+        assert_eq!(said.code, Some(2), "{key}");
+        assert!(said.stderr.contains(key), "{key}: {}", said.stderr);
+    }
+}
+
+/// A farm with a guest beside it, whose private directories lie there, too.
+fn farm_with(script: &str) -> (Farm, PathBuf, Broker) {
+    let farm = Farm::new();
+    let program = farm.base().join("guest");
+    install(&program, script);
+    std::fs::create_dir(farm.base().join("tmp")).unwrap();
+    let mut command = farm.serve_command();
+    command.env("TMPDIR", farm.base().join("tmp"));
+    let broker = Broker::start(&mut command, &farm.log_path());
+    until_or("it answers", || farm.status().map(drop), || farm.log());
+    (farm, program, broker)
+}
+
+fn told(said: &Output) -> (Option<i32>, String) {
+    let text = [&*said.stdout, &*said.stderr].concat();
+    (said.status.code(), String::from_utf8(text).unwrap())
+}
+
+fn add(farm: &Farm, name: &str, program: &Path) -> (Option<i32>, String) {
+    let command = format!("{} -c $ASAM_QC_FRAMEWORK_CONFIG_FILE", program.display());
+    told(&farm.qcbus(&["bundle", "add", name, "--asam", &command]))
+}
+
+#[test]
+fn it_is_added_looked_at_upgraded_and_removed_as_any_bundle() {
+    let (farm, program, _broker) = farm_with(FINDS);
+    let (code, text) = add(&farm, "guest", &program);
+    assert_eq!(code, Some(0), "{text}");
+    assert!(
+        text.contains("guest: ready, 3 checkers (xodr, xosc)"),
+        "{text}"
+    );
+    farm.write("a.xodr", &Content::Good(1).bytes());
+    assert_eq!(
+        farm.verdict("a.xodr").verdict,
+        Verdict::Rejected,
+        "{}",
+        farm.log()
+    );
+    assert_eq!(
+        endings(bundle(&farm.result("a.xodr"), "guest")),
+        found_one()
+    );
+    let (_, status) = told(&farm.qcbus(&["status"]));
+    assert!(status.contains("guest"), "{status}");
+    let (code, rules) = told(&farm.qcbus(&["rule", "two"]));
+    assert_eq!(code, Some(0), "{rules}");
+    assert!(rules.contains("what two checks"), "{rules}");
+
+    // A program that is replaced judges again.
+    install(&program, "polite");
+    until_or(
+        "the newer program has judged it again",
+        || (farm.verdict("a.xodr").verdict == Verdict::Accepted).then_some(()),
+        || farm.log(),
+    );
+    let (code, text) = told(&farm.qcbus(&["bundle", "remove", "guest"]));
+    assert_eq!(code, Some(0), "{text}");
+    farm.write("b.xodr", &Content::Good(2).bytes());
+    assert_eq!(farm.verdict("b.xodr").verdict, Verdict::Accepted);
+    assert!(
+        farm.result("b.xodr")
+            .bundles
+            .iter()
+            .all(|it| it.name != "guest")
+    );
+}
+
+#[test]
+fn what_is_of_no_use_is_taken_out_again() {
+    let (farm, program, _broker) = farm_with("polite");
+    std::fs::write(&program, "#!/bin/sh\nexit 0\n").unwrap();
+    let (code, text) = add(&farm, "guest", &program);
+    assert_eq!(code, Some(2), "{text}");
+    assert!(text.contains("it was taken out again"), "{text}");
+    until_or(
+        "the log says why",
+        || farm.log().contains("no result").then_some(()),
+        || farm.log(),
+    );
+}
+
+/// Private directories that there are.
+fn rooms(farm: &Farm) -> Vec<PathBuf> {
+    let roots = std::fs::read_dir(farm.base().join("tmp")).unwrap();
+    let entries = roots
+        .flatten()
+        .filter_map(|it| std::fs::read_dir(it.path()).ok());
+    entries.flatten().flatten().map(|it| it.path()).collect()
+}
+
+#[test]
+fn whoever_is_killed_the_file_is_judged_and_nothing_is_left() {
+    // Until it is told to go on a run takes for ever, with children that have gone their own way.
+    let script = r#"[ -e "GO" ] || { setsid sh -c "sleep 86399.MARK & sleep 86399.MARK" & sleep 86399.MARK; }
+        polite"#;
+    for victim in ["--office", "asam-adapter"] {
+        let (farm, program, _broker) = farm_with("polite");
+        let (go, mark) = (farm.base().join("go"), std::process::id().to_string());
+        let script = script.replace("GO", &go.to_string_lossy());
+        install(&program, &script.replace("MARK", &mark));
+        assert_eq!(add(&farm, "guest", &program).0, Some(0));
+        farm.write("a.xodr", &Content::Good(1).bytes());
+        let sleeper = format!("86399.{mark}");
+        let sleepers = || support::processes::all_with(&sleeper);
+        until_or(
+            "it runs",
+            || (sleepers().len() >= 3).then_some(()),
+            || farm.log(),
+        );
+        std::fs::write(&go, "").unwrap();
+        let base = farm.base().to_string_lossy().into_owned();
+        for process in support::processes::all_with(&base) {
+            if process.words.iter().any(|word| word == victim) {
+                process.signal(rustix::process::Signal::KILL);
+            }
+        }
+        until_or(
+            "it is judged",
+            || (farm.verdict("a.xodr").verdict == Verdict::Accepted).then_some(()),
+            || farm.log(),
+        );
+        until("nothing of the first run is left", || {
+            sleepers().is_empty().then_some(())
+        });
+        until_or(
+            "no directory is left",
+            || rooms(&farm).is_empty().then_some(()),
+            || format!("{victim}: {:?}\n{}", rooms(&farm), farm.log()),
+        );
+    }
+}
+
+#[test]
+fn a_scenario_comes_with_what_it_refers_to() {
+    let script = r#"case "$input" in */scenarios/deep/a.xosc) ;; *) exit 4;; esac
+        cmp "${input%/*}/../../maps/m.xodr" "REAL/maps/m.xodr" || exit 5
+        polite"#;
+    let more = serde_json::json!({"kinds": ["xosc"]});
+    let table = Table::with(script, "guest", &more);
+    let real = table.desk.path();
+    install(
+        &table.program,
+        &script.replace("REAL", &real.to_string_lossy()),
+    );
+    table.desk.write("maps/m.xodr", Content::Good(1).bytes());
+    let scenario = include_str!("../bundles/asam-adapter/src/samples/sample.xosc").replace(
+        "<RoadNetwork/>",
+        "<RoadNetwork><LogicFile filepath=\"../../maps/m.xodr\"/></RoadNetwork>",
+    );
+    table.desk.write("scenarios/deep/a.xosc", scenario);
+    table.check(&["scenarios/deep/a.xosc", "--bundles-d", "bundles.d"]);
+    let out = real.join("out");
+    let found = support::desk::files_below(&out);
+    let result = found.iter().find(|it| it.ends_with("a.xosc.xqar"));
+    let result = result.unwrap_or_else(|| panic!("{found:?}"));
+    let results = support::desk::read_result(&out.join(result));
+    let guest = bundle(&results, "guest");
+    for checker in &guest.checkers {
+        assert_eq!(
+            checker.status,
+            Some(Status::Completed),
+            "{}",
+            checker.summary
+        );
+    }
+}
