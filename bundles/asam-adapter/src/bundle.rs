@@ -29,7 +29,7 @@ struct Host {
 }
 
 /// What a rule stands for.
-enum Part {
+enum Voice {
     /// A checker of the module.
     Checker(&'static Known),
     /// Whatever no rule stands for.
@@ -38,7 +38,7 @@ enum Part {
 
 struct HostedRule {
     facts: Facts,
-    part: Part,
+    voice: Voice,
     host: &'static Host,
 }
 
@@ -66,11 +66,11 @@ pub(crate) fn bundle(hosted: Hosted, learned: Learned, offices: Offices) -> &'st
     });
     let learned = &host.learned;
     let known = learned.checkers.iter();
-    let rules = known.map(|it| (facts_of(it), Part::Checker(it)));
-    let rules = rules.chain([(module_facts(), Part::Rest)]);
+    let rules = known.map(|it| (facts_of(it), Voice::Checker(it)));
+    let rules = rules.chain([(module_facts(), Voice::Rest)]);
     let rules: Vec<&'static dyn AnyRule> = rules
-        .map(|(facts, part)| {
-            let rule = leak(HostedRule { facts, part, host });
+        .map(|(facts, voice)| {
+            let rule = leak(HostedRule { facts, voice, host });
             rule as &'static dyn AnyRule
         })
         .collect();
@@ -215,9 +215,9 @@ impl<'d> Built<'d> for Run<'d> {
         let Some(rule) = rule.as_any().downcast_ref::<HostedRule>() else {
             return;
         };
-        match rule.part {
-            Part::Checker(known) => self.told(known, found),
-            Part::Rest => self.told_besides(rule.host, found),
+        match rule.voice {
+            Voice::Checker(known) => self.told(known, found),
+            Voice::Rest => self.told_besides(rule.host, found),
         }
     }
 }

@@ -83,8 +83,8 @@ struct Office<'h> {
     may: Option<May>,
 }
 
-/// The places of one run.
-struct Places {
+/// What a run is prepared with.
+struct Prepared {
     room: Room,
     directory: PathBuf,
     config: PathBuf,
@@ -96,14 +96,14 @@ struct Places {
 impl Office<'_> {
     fn answer(&mut self, message: &Message) -> Result<(Ran, Vec<u8>), NotRun> {
         let request: Request = message.head()?;
-        let places = self.prepare(&request, &message.body)?;
-        let environment = self.environment(&places);
+        let prepared = self.prepare(&request, &message.body)?;
+        let environment = self.environment(&prepared);
         let run = Run {
             command: &self.hosted.command,
             environment: &environment,
-            directory: &places.directory,
+            directory: &prepared.directory,
             limits: self.hosted.limits,
-            may: self.may_in(&places.room),
+            may: self.may_in(&prepared.room),
         };
         let ended = match process::run(&run, self.channel.as_fd()) {
             Ok(ended) => ended,
@@ -116,16 +116,16 @@ impl Office<'_> {
             fault: ended.fault,
             said: ended.said,
             application: None,
-            input: text(places.staged.input()),
-            staged: text(&places.staged.directory),
-            real: text(&places.staged.real),
-            room: text(places.room.path()),
+            input: text(prepared.staged.input()),
+            staged: text(&prepared.staged.directory),
+            real: text(&prepared.staged.real),
+            room: text(prepared.room.path()),
         };
-        let result = self.collect(&places, &mut ran);
+        let result = self.collect(&prepared, &mut ran);
         Ok((ran, result))
     }
 
-    fn prepare(&mut self, request: &Request, body: &[u8]) -> Result<Places, NotRun> {
+    fn prepare(&mut self, request: &Request, body: &[u8]) -> Result<Prepared, NotRun> {
         let room = self.scratch.for_a_run()?;
         let staged = Staged::write(&request.files, body, &room.directory("input")?)?;
         let own = room.directory("work")?;
@@ -156,7 +156,7 @@ impl Office<'_> {
         }
         .text();
         std::fs::write(&config, text)?;
-        Ok(Places {
+        Ok(Prepared {
             room,
             directory,
             config,
@@ -165,15 +165,15 @@ impl Office<'_> {
         })
     }
 
-    fn environment(&self, places: &Places) -> Vec<(OsString, OsString)> {
+    fn environment(&self, prepared: &Prepared) -> Vec<(OsString, OsString)> {
         let own = self.hosted.environment.iter();
         let mut all: Vec<(OsString, OsString)> = own
             .map(|(name, value)| (name.into(), value.into()))
             .collect();
         let mut add = |name: &str, path: &Path| all.push((name.into(), path.into()));
-        add("ASAM_QC_FRAMEWORK_CONFIG_FILE", &places.config);
-        add("ASAM_QC_FRAMEWORK_WORKING_DIR", &places.directory);
-        add("TMPDIR", &places.room.path().join("tmp"));
+        add("ASAM_QC_FRAMEWORK_CONFIG_FILE", &prepared.config);
+        add("ASAM_QC_FRAMEWORK_WORKING_DIR", &prepared.directory);
+        add("TMPDIR", &prepared.room.path().join("tmp"));
         all
     }
 
@@ -187,20 +187,20 @@ impl Office<'_> {
     }
 
     /// The result file, once nobody can write to it any more; what is wrong with it is the run's fault.
-    fn collect(&self, places: &Places, ran: &mut Ran) -> Vec<u8> {
+    fn collect(&self, prepared: &Prepared, ran: &mut Ran) -> Vec<u8> {
         if ran.fault.is_some() {
             return Vec::new();
         }
-        if let Some(changed) = places.staged.changed() {
+        if let Some(changed) = prepared.staged.changed() {
             let changed = changed.display();
             ran.fault = Some(format!(
                 "has changed its copy of {changed}, and judged something else"
             ));
             return Vec::new();
         }
-        for (application, result) in &places.sections {
-            let path = places.directory.join(result);
-            match self.read(&path, &places.config) {
+        for (application, result) in &prepared.sections {
+            let path = prepared.directory.join(result);
+            match self.read(&path, &prepared.config) {
                 Ok(None) => {}
                 Ok(Some(bytes)) => {
                     ran.application = Some(application.clone());

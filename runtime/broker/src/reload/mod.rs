@@ -134,7 +134,7 @@ impl Sources {
                     loaded.notices.push(no_shadow_in_a_run(&module));
                     continue;
                 }
-                add_module(module, &self.adapter, &mut loaded)?;
+                add_module(&module, &self.adapter, &mut loaded)?;
             }
         }
         if let Some((_, parsed)) = &parsed {

@@ -28,7 +28,7 @@ pub(super) fn read_manifest(path: &Path, note: &dyn Fn(&Path)) -> Result<Vec<Mod
 /// # Errors
 /// [`LoadError::Manifest`] when its name is taken, or it would have to judge and cannot be asked.
 pub(super) fn add_module(
-    module: Module,
+    module: &Module,
     adapter: &Adapter,
     loaded: &mut Loaded,
 ) -> Result<(), LoadError> {
@@ -45,10 +45,10 @@ pub(super) fn add_module(
     };
     let is_hosted = module.mode != Mode::Bus && role == Role::Bundle && adapter.is_there();
     if module.mode != Mode::Bus && !is_hosted {
-        return not_on_the_bus(&module, role, loaded);
+        return not_on_the_bus(module, role, loaded);
     }
     let name = match is_hosted {
-        true => adapter.name_of(&module, loaded),
+        true => adapter.name_of(module, loaded),
         false => module.name.clone(),
     };
     if let Some(other) = loaded.brought.get(&name) {
@@ -66,9 +66,9 @@ pub(super) fn add_module(
     programs::look_at(&module.exec_command).map_err(|why| {
         LoadError::Manifest(format!("{manifest}: `{name}` is not started: {why}"))
     })?;
-    let mut spec = spec_of(&module, role);
+    let mut spec = spec_of(module, role);
     if is_hosted {
-        spec.command = adapter.words(&name, &module);
+        spec.command = adapter.words(&name, module);
         spec.may = adapter.may(&module.may);
         spec.name.clone_from(&name);
     }
