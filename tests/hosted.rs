@@ -425,3 +425,35 @@ fn a_scenario_comes_with_what_it_refers_to() {
         );
     }
 }
+
+#[test]
+fn a_one_shot_module_can_be_a_shadow() {
+    let farm = Farm::new();
+    let _broker = farm.serve_ready();
+    let program = farm.base().join("qc_guest");
+    install(&program, FINDS);
+    let command = program.to_string_lossy().into_owned();
+    let said = farm.qcbus(&["bundle", "add", "--shadow", "guest", "--asam", &command]);
+    let text = String::from_utf8([said.stdout, said.stderr].concat()).unwrap();
+    assert!(
+        text.contains("a shadow: without weight in any verdict"),
+        "{text}"
+    );
+    farm.write("a.xodr", &Content::Good(1).bytes());
+    assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Accepted);
+    assert!(
+        farm.result("a.xodr")
+            .bundles
+            .iter()
+            .all(|it| it.name != "guest")
+    );
+    until_or(
+        "it is tried",
+        || {
+            let said = farm.qcbus(&["bundle", "trials", "guest"]);
+            let text = String::from_utf8(said.stdout).unwrap();
+            text.contains("1 of 1 file tried").then_some(())
+        },
+        || farm.log(),
+    );
+}

@@ -151,16 +151,21 @@ impl Sources {
             loaded.read.extend(child.programs.iter().cloned());
         }
         if let Some((path, parsed)) = parsed {
-            loaded.oddities = parsed.all_oddities(&self.known_with(&loaded.children));
-            let lines = loaded.oddities.iter().map(|oddity| oddity.line(path));
-            loaded.notices.splice(0..0, lines);
-            let unasked = unasked(path, &parsed.config, &loaded);
-            loaded.notices.extend(unasked);
-            let named_shadows = named_shadows(path, &parsed.config, &loaded);
-            loaded.notices.extend(named_shadows);
+            self.compare(path, &parsed, &mut loaded);
             loaded.config = Some(parsed.config);
         }
         Ok(loaded)
+    }
+
+    /// Says what is odd about a configuration beside what is there to run.
+    fn compare(&self, path: &Path, parsed: &Parsed, loaded: &mut Loaded) {
+        loaded.oddities = parsed.all_oddities(&self.known_with(&loaded.children));
+        let lines = loaded.oddities.iter().map(|oddity| oddity.line(path));
+        loaded.notices.splice(0..0, lines);
+        let unasked = unasked(path, &parsed.config, loaded);
+        loaded.notices.extend(unasked);
+        let named_shadows = named_shadows(path, &parsed.config, loaded);
+        loaded.notices.extend(named_shadows);
     }
 
     fn read_config(&self, path: &Path) -> Result<Parsed, LoadError> {
