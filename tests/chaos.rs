@@ -158,6 +158,13 @@ fn end(farm: &Farm, mut broker: support::broker::Broker) {
         || farm.processes().is_empty().then_some(()),
         || format!("{:#?}\n{}", farm.processes(), tail(&farm.log())),
     );
+    let guests = farm.base().join("guests");
+    let of_modules = || support::processes::all_with(&guests.to_string_lossy());
+    until_or(
+        "all that modules have started has ended",
+        || of_modules().is_empty().then_some(()),
+        || format!("{:#?}\n{}", of_modules(), tail(&farm.log())),
+    );
     until_so("no shared memory is left", || {
         shm_segments(&prefix).is_empty()
     });

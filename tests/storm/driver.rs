@@ -8,7 +8,7 @@ use rustix::process::Signal;
 
 use super::ledger::Ledger;
 use super::tally::Tally;
-use super::trouble::{self, ANIMALS, Trouble};
+use super::trouble::{self, ANIMALS, GUESTS, Trouble};
 use super::verdicts::JUDGE;
 use super::visitors::Stop;
 use crate::support::broker::Broker;
@@ -16,7 +16,7 @@ use crate::support::dice::Dice;
 use crate::support::farm::Farm;
 use crate::support::inside::is_inside;
 use crate::support::judge::Files;
-use crate::support::processes::{Process, ProcessKind, signal_pid};
+use crate::support::processes::{Process, ProcessKind, all_with, signal_pid};
 use crate::support::watchdog::{pause, until_or};
 
 /// Longest pause between two deeds, in milliseconds.
@@ -228,7 +228,8 @@ impl Driver {
 
     fn is_calm(&self) -> Option<()> {
         let status = self.farm.status()?;
-        let animal = |name: &str| ANIMALS.contains(&name);
+        let guest = |name: &str| GUESTS.iter().any(|(guest, _)| *guest == name);
+        let animal = |name: &str| ANIMALS.contains(&name) || guest(name);
         let there = status
             .peers
             .iter()
@@ -296,7 +297,10 @@ impl Driver {
     }
 
     pub(super) fn any_process(&mut self, wanted: impl Fn(&Process) -> bool) -> Option<Process> {
-        let all: Vec<Process> = self.farm.processes().into_iter().filter(wanted).collect();
+        // What modules have started has not been told of the instance.
+        let guests = all_with(&self.guests().to_string_lossy());
+        let all = self.farm.processes().into_iter().chain(guests);
+        let all: Vec<Process> = all.filter(wanted).collect();
         self.dice.pick(&all).cloned()
     }
 

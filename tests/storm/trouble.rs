@@ -15,6 +15,7 @@ pub const WILD: &str = "<Config>\n  <CheckerBundle application=\"xodrBundle\"/>\
     <CheckerBundle application=\"sends_garbage\"/>\n  \
     <CheckerBundle application=\"lies_about_job_id\"/>\n  \
     <CheckerBundle application=\"slow\"/>\n  \
+    <CheckerBundle application=\"qc_polite\"/>\n  \
     <CheckerBundle application=\"floods_issues\"/>\n</Config>\n";
 
 /// What cannot be used and must change nothing.
@@ -35,6 +36,23 @@ pub const ANIMALS: &[&str] = &[
     "hangs_in_a_job",
     "reporter_never_acknowledges",
 ];
+
+/// One-shot modules of ASAM's framework that come and go like animals: what each does after it has written a polite
+/// result. What they leave behind has their own name in its command line.
+pub const GUESTS: &[(&str, &str)] = &[
+    ("qc_polite", ""),
+    ("qc_crashes", "kill -SEGV $$"),
+    ("qc_stops", "kill -STOP $$"),
+    ("qc_floods", "yes"),
+    ("qc_leaks", "x=xxxxxxxxxxxxxxxx; while :; do x=$x$x; done"),
+    (
+        "qc_forks",
+        "i=0; while [ $i -lt 10 ]; do setsid sh -c 'sleep 600 & sleep 600' \"$0\" & i=$((i+1)); done",
+    ),
+];
+
+/// What modules that misbehave may take.
+pub const GUEST_LIMITS: (u64, u64, u64) = (2, 128, 4);
 
 /// Something to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -7,9 +7,12 @@ use qcbus_broker::control::ask_broker;
 use qcbus_messages::control::Request;
 
 use super::driver::Driver;
-use super::trouble::{self, ANIMALS};
+use super::trouble::{self, ANIMALS, GUEST_LIMITS, GUESTS};
 use super::verdicts::JUDGE;
 use crate::support::farm::zoo;
+
+/// How modules behave towards who starts them.
+const MANNERS: &str = include_str!("../../bundles/asam-adapter/tests/guests/manners.sh");
 
 impl Driver {
     pub fn animal(&mut self) {
@@ -18,6 +21,8 @@ impl Driver {
             let animal = self.animals.swap_remove(at);
             self.farm.send_away(animal);
             self.tally.note("animal goes", animal);
+        } else if self.dice.below(4) == 0 {
+            self.guest();
         } else if let Some(animal) = self.dice.pick(ANIMALS).copied()
             && !self.animals.contains(&animal)
         {
@@ -31,6 +36,46 @@ impl Driver {
                 self.tally.note("animal comes", animal);
             }
             self.animals.push(animal);
+        }
+    }
+
+    /// A one-shot module comes, with weight or without.
+    fn guest(&mut self) {
+        let Some((name, _)) = self.dice.pick(GUESTS).copied() else {
+            return;
+        };
+        if self.animals.contains(&name) {
+            return;
+        }
+        let (seconds, memory, output) = GUEST_LIMITS;
+        let is_shadow = self.dice.below(3) == 0;
+        let module = serde_json::json!({
+            "name": name,
+            "exec_type": "executable",
+            "module_type": "checker_bundle",
+            "exec_command": self.guests().join(name),
+            "kinds": ["xodr"],
+            "limits": {"seconds": seconds, "memory_mb": memory, "output_mb": output},
+            "shadow": is_shadow,
+        });
+        self.farm.let_in_module(name, module);
+        self.animals.push(name);
+        self.tally.note("module comes", name);
+    }
+
+    /// Where the programs of modules lie.
+    pub fn guests(&self) -> PathBuf {
+        self.farm.base().join("guests")
+    }
+
+    fn install_guests(&self) {
+        std::fs::create_dir_all(self.guests()).unwrap();
+        for (name, does) in GUESTS {
+            let path = self.guests().join(name);
+            let program = format!("#!/bin/sh\n{MANNERS}\npolite\n{does}\n");
+            std::fs::write(&path, program).unwrap();
+            let may = std::os::unix::fs::PermissionsExt::from_mode(0o755);
+            std::fs::set_permissions(&path, may).unwrap();
         }
     }
 
@@ -69,6 +114,7 @@ impl Driver {
 
     /// The bundle of one's own, in its next version.
     pub fn install(&mut self) {
+        self.install_guests();
         std::fs::create_dir_all(self.farm.base().join("program")).unwrap();
         if let Some(python) = std::env::var_os(PYTHON) {
             let python = PathBuf::from(python);

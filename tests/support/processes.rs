@@ -20,7 +20,7 @@ pub enum ProcessKind {
     Bundle,
     /// A standard reporter.
     Reporter,
-    /// An animal.
+    /// An animal; or a one-shot module, its adapter, or what it has started.
     Animal,
     /// A command such as `qcbus wait`.
     Other,
@@ -31,7 +31,8 @@ impl Process {
     pub fn kind(&self) -> ProcessKind {
         let said = |word: &str| self.words.iter().skip(1).any(|it| it == word);
         let program = self.words.first().map_or("", String::as_str);
-        if program.ends_with("/zoo") {
+        let is_of_a_module = self.words.iter().any(|it| it.contains("/guests/qc_"));
+        if program.ends_with("/zoo") || is_of_a_module {
             ProcessKind::Animal
         } else if said("serve") {
             ProcessKind::Broker

@@ -176,7 +176,13 @@ fn a_shadow_that_hangs_holds_up_neither_verdicts_nor_the_end() {
     }
     assert_eq!(world.judged.len(), 6);
     assert_eq!(world.jobs_at(SHADOW), 1);
+    let told = world.now;
     world.drain();
+    let waited = world.now.saturating_sub(told);
+    assert!(
+        waited < world.state.settings.drain_limit / 2,
+        "it is not waited for: {waited:?}"
+    );
 }
 
 #[test]
