@@ -58,7 +58,7 @@ impl Driver {
             "limits": {"seconds": seconds, "memory_mb": memory, "output_mb": output},
             "shadow": is_shadow,
         });
-        self.farm.let_in_module(name, module);
+        self.farm.let_in_module(name, &module);
         self.animals.push(name);
         self.tally.note("module comes", name);
     }

@@ -240,11 +240,11 @@ impl Farm {
         if shadow {
             module["shadow"] = true.into();
         }
-        self.let_in_module(animal, module);
+        self.let_in_module(animal, &module);
     }
 
     /// Lets in what a manifest brings that has this module, under a name.
-    pub fn let_in_module(&self, animal: &str, module: serde_json::Value) {
+    pub fn let_in_module(&self, animal: &str, module: &serde_json::Value) {
         let manifest = serde_json::json!({ "module": [module] });
         let path = self.bundles_d().join(format!("{animal}.json"));
         // Renamed into place: a manifest that is half there is refused, with a notice.
