@@ -4,6 +4,7 @@
 #![allow(dead_code, reason = "every test target uses another part of this")]
 
 pub mod asam;
+pub mod asam_venv;
 pub mod broker;
 pub mod content;
 pub mod desk;
