@@ -28,6 +28,8 @@ pub struct Hosted {
     pub limits: Limits,
     /// Where private directories are made.
     pub scratch: PathBuf,
+    /// Every run begins from nothing: no interpreter is kept that has loaded the module already.
+    pub is_cold: bool,
 }
 
 /// What a run may use up. What goes beyond is killed.
@@ -87,6 +89,7 @@ pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Ask
             kinds: None,
             limits: Limits::default(),
             scratch: usual_scratch(),
+            is_cold: false,
         },
         is_office: false,
         rest: Vec::new(),
@@ -110,6 +113,7 @@ pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Ask
             Long("seconds") => limits.time = Duration::from_secs(positive(&mut parser)?),
             Long("memory-mb") => limits.memory = positive(&mut parser)?.saturating_mul(1 << 20),
             Long("output-mb") => limits.output = positive(&mut parser)?.saturating_mul(1 << 20),
+            Long("cold") => hosted.is_cold = true,
             Long("office") => asked.is_office = true,
             Long(option @ ("instance" | "instance-dir" | "launch" | "threads" | "format")) => {
                 asked.rest.push(format!("--{option}").into());
@@ -152,6 +156,9 @@ impl Hosted {
         add("--seconds", limits.time.as_secs().to_string().into());
         add("--memory-mb", (limits.memory >> 20).to_string().into());
         add("--output-mb", (limits.output >> 20).to_string().into());
+        if self.is_cold {
+            words.push("--cold".into());
+        }
         words
     }
 }
@@ -184,7 +191,7 @@ mod tests {
     #[test]
     fn what_is_hosted_reads_back_what_it_says() {
         let line = "--name a --exec x --application b --directory /d --env K=V=W --kind xodr --seconds 7 \
-                    --memory-mb 8 --output-mb 9 --scratch /s --launch 3 --die-with-parent";
+                    --memory-mb 8 --output-mb 9 --scratch /s --cold --launch 3 --die-with-parent";
         let asked = parse(line.split_whitespace().map(OsString::from)).unwrap();
         assert_eq!(asked.rest, ["--launch", "3", "--die-with-parent"]);
         assert_eq!(asked.hosted.environment, [("K".into(), "V=W".into())]);

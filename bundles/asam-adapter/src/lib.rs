@@ -16,6 +16,7 @@ mod documents;
 mod family;
 mod host;
 mod hosted;
+mod keeper;
 mod learn;
 mod messages;
 mod office;
@@ -24,6 +25,7 @@ mod process;
 mod samples;
 mod scratch;
 mod staging;
+pub mod warm;
 
 pub use host::run;
 pub use hosted::{Hosted, Limits, usual_scratch};

@@ -13,6 +13,7 @@ use crate::channel::{Channel, Message};
 use crate::configuration::Configuration;
 use crate::family;
 use crate::hosted::Hosted;
+use crate::keeper::Keeper;
 use crate::messages::{Answer, MOST, Ran, Request};
 use crate::process::{self, Broken, Run};
 use crate::scratch::{Room, Scratch};
@@ -43,11 +44,12 @@ fn office(hosted: &Hosted) -> io::Result<()> {
         scratch: Scratch::open(&hosted.scratch)?,
         channel: Channel::from_socket(socket),
         may,
+        keeper: Keeper::new(hosted.is_cold),
     };
     while let Some(message) = office.channel.receive(MOST)? {
         let (answer, result) = match office.answer(&message) {
             Ok((ran, result)) => (Answer::Ran(ran), result),
-            Err(NotRun::Why(why)) => (Answer::Not(why), Vec::new()),
+            Err(NotRun::Why(why) | NotRun::Unkept(why)) => (Answer::Not(why), Vec::new()),
             Err(NotRun::Over) => return Ok(()),
             Err(NotRun::Lost(error)) => return Err(io::Error::other(error)),
         };
@@ -63,6 +65,8 @@ fn office(hosted: &Hosted) -> io::Result<()> {
 enum NotRun {
     /// For a person.
     Why(String),
+    /// Its interpreter has gone.
+    Unkept(String),
     /// Nobody waits for it any more.
     Over,
     /// Nothing can be run here any more.
@@ -81,6 +85,7 @@ struct Office<'h> {
     channel: Channel,
     /// What runs may do. `None`: they are not confined.
     may: Option<May>,
+    keeper: Keeper,
 }
 
 /// What a run is prepared with.
@@ -95,6 +100,21 @@ struct Prepared {
 
 impl Office<'_> {
     fn answer(&mut self, message: &Message) -> Result<(Ran, Vec<u8>), NotRun> {
+        match self.run(message, false) {
+            // It may have been the run that has ended its interpreter: plainly there is none.
+            Err(NotRun::Unkept(why)) => {
+                tracing::warn!(
+                    module = self.hosted.name,
+                    why,
+                    "it is run plainly once more"
+                );
+                self.run(message, true)
+            }
+            answer => answer,
+        }
+    }
+
+    fn run(&mut self, message: &Message, plainly: bool) -> Result<(Ran, Vec<u8>), NotRun> {
         let request: Request = message.head()?;
         let prepared = self.prepare(&request, &message.body)?;
         let environment = self.environment(&prepared);
@@ -105,9 +125,10 @@ impl Office<'_> {
             limits: self.hosted.limits,
             may: self.may_in(&prepared.room),
         };
-        let ended = match process::run(&run, self.channel.as_fd()) {
+        let ended = match process::run(&run, self.channel.as_fd(), &mut self.keeper, plainly) {
             Ok(ended) => ended,
             Err(Broken::Unwanted) => return Err(NotRun::Over),
+            Err(Broken::Unkept(error)) => return Err(NotRun::Unkept(error.to_string())),
             Err(error @ Broken::Start(_)) => return Err(NotRun::Why(error.to_string())),
             Err(error @ Broken::Lasts(_)) => return Err(NotRun::Lost(error)),
         };

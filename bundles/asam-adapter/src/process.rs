@@ -3,18 +3,18 @@
 use std::ffi::OsString;
 use std::io::{self, PipeReader, Read as _};
 use std::os::fd::{AsFd as _, BorrowedFd, OwnedFd};
-use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
+use std::os::unix::process::ExitStatusExt as _;
 use std::path::Path;
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::ExitStatus;
 use std::time::{Duration, Instant};
 
-use qcbus_confine::Outer;
 use qcbus_formats::manifest::May;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::process::{Pid, PidfdFlags, Resource, Rlimit, getrlimit, pidfd_open, setrlimit};
+use rustix::process::{Pid, PidfdFlags, pidfd_open};
 
 use crate::family;
 use crate::hosted::Limits;
+use crate::keeper::{Keeper, Started};
 
 /// How often a run is looked at while nothing is heard of it.
 const TICK: Duration = Duration::from_millis(100);
@@ -52,6 +52,9 @@ pub(crate) enum Broken {
     /// It was not started.
     #[error("it cannot be started: {0}")]
     Start(io::Error),
+    /// The interpreter that keeps it warm has gone, and nobody can tell how it ended.
+    #[error("{0}")]
+    Unkept(io::Error),
     /// What it has started cannot be ended, so that nothing else can be run here.
     #[error("{0} of its processes cannot be killed")]
     Lasts(usize),
@@ -61,23 +64,36 @@ pub(crate) enum Broken {
 ///
 /// # Errors
 /// [`Broken`].
-pub(crate) fn run(run: &Run<'_>, caller: BorrowedFd<'_>) -> Result<Ended, Broken> {
+pub(crate) fn run(
+    run: &Run<'_>,
+    caller: BorrowedFd<'_>,
+    keeper: &mut Keeper,
+    plainly: bool,
+) -> Result<Ended, Broken> {
     let (reader, writer) = io::pipe().map_err(Broken::Start)?;
     rustix::fs::fcntl_setfl(&reader, rustix::fs::OFlags::NONBLOCK)
         .map_err(|error| Broken::Start(error.into()))?;
-    let child = start(run, writer).map_err(Broken::Start)?;
+    let started = keeper.start(run, writer, plainly).map_err(Broken::Start)?;
+    let handle = match &started {
+        Started::Cold(child) => Pid::from_raw(child.id().cast_signed())
+            .and_then(|pid| pidfd_open(pid, PidfdFlags::empty()).ok()),
+        Started::Warm(_) => None,
+    };
     let mut watched = Watched {
         limits: run.limits,
         begin: Instant::now(),
-        handle: Pid::from_raw(child.id().cast_signed())
-            .and_then(|pid| pidfd_open(pid, PidfdFlags::empty()).ok()),
-        child,
+        keeper,
+        handle,
+        started,
         reader,
         heard: Heard::default(),
     };
     let end = watched.end(caller);
+    if let Err(Broken::Unkept(_)) = end {
+        watched.keeper.let_go();
+    }
     // Before anything is looked at: nothing is written any more by then.
-    family::end(&[]).map_err(Broken::Lasts)?;
+    family::end(&watched.keeper.spared()).map_err(Broken::Lasts)?;
     watched.hear();
     let fault = end?;
     Ok(Ended {
@@ -86,84 +102,29 @@ pub(crate) fn run(run: &Run<'_>, caller: BorrowedFd<'_>) -> Result<Ended, Broken
     })
 }
 
-#[expect(
-    unsafe_code,
-    reason = "only the new process itself can leave its session and set its limits, between fork and exec"
-)]
-fn start(run: &Run<'_>, writer: io::PipeWriter) -> io::Result<Child> {
-    let mut command = Command::new("sh");
-    command
-        .arg("-c")
-        .arg(run.command)
-        .current_dir(run.directory)
-        .stdin(Stdio::null())
-        .stdout(writer.try_clone()?)
-        .stderr(writer)
-        // Whoever has these is believed to be a bundle of ours.
-        .env_remove("QCBUS_LAUNCH")
-        .env_remove("QCBUS_SANDBOX")
-        .envs(run.environment.iter().map(|(name, value)| (name, value)));
-    let limits = run.limits;
-    let office = std::process::id();
-    // SAFETY: between fork and exec only system calls are made; nothing is allocated and no lock is taken.
-    unsafe {
-        command.pre_exec(move || {
-            rustix::process::setsid()?;
-            restrict(&limits)?;
-            // It may be gone already, and then nobody would end this.
-            let failed = libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) != 0;
-            let parent = rustix::process::getppid().map(|it| it.as_raw_nonzero().get());
-            if failed || parent != Some(office.cast_signed()) {
-                return Err(io::Error::from_raw_os_error(libc::ESRCH));
-            }
-            Ok(())
-        });
-    }
-    if let Some(may) = &run.may {
-        Outer::new(may)
-            .map_err(io::Error::other)?
-            .surround(&mut command);
-    }
-    command.spawn()
-}
-
-fn restrict(limits: &Limits) -> io::Result<()> {
-    let most = |resource: Resource, bytes: u64| {
-        // What this process may not have itself it cannot give.
-        let bytes = getrlimit(resource)
-            .maximum
-            .map_or(bytes, |it| it.min(bytes));
-        let limit = Rlimit {
-            current: Some(bytes),
-            maximum: Some(bytes),
-        };
-        setrlimit(resource, limit)
-    };
-    most(Resource::Core, 0)?;
-    most(Resource::Fsize, limits.output)?;
-    most(Resource::Data, limits.memory)?;
-    Ok(())
-}
-
-struct Watched {
+struct Watched<'k> {
     limits: Limits,
     begin: Instant,
+    keeper: &'k mut Keeper,
     /// Can be waited for together with other things; older kernels have none.
     handle: Option<OwnedFd>,
-    child: Child,
+    started: Started,
     reader: PipeReader,
     heard: Heard,
 }
 
-impl Watched {
+impl Watched<'_> {
     /// Waits until it has ended, or must. Gives why nothing of it counts.
     fn end(&mut self, caller: BorrowedFd<'_>) -> Result<Option<String>, Broken> {
         let mut looked = Instant::now();
         loop {
             self.hear();
-            match self.child.try_wait() {
+            match self.keeper.ended(&mut self.started) {
                 Ok(None) => {}
                 Ok(Some(status)) => return Ok(self.fault_of(status)),
+                Err(error) if matches!(self.started, Started::Warm(_)) => {
+                    return Err(Broken::Unkept(error));
+                }
                 Err(error) => return Ok(Some(format!("cannot be waited for: {error}"))),
             }
             if let Some(fault) = self.is_over() {
@@ -187,8 +148,12 @@ impl Watched {
         if !self.heard.closed {
             fds.push(PollFd::new(&self.reader, PollFlags::IN));
         }
-        if let Some(handle) = &self.handle {
-            fds.push(PollFd::from_borrowed_fd(handle.as_fd(), PollFlags::IN));
+        let ends = match self.started {
+            Started::Cold(_) => self.handle.as_ref().map(|it| it.as_fd()),
+            Started::Warm(_) => self.keeper.heard(),
+        };
+        if let Some(ends) = ends {
+            fds.push(PollFd::from_borrowed_fd(ends, PollFlags::IN));
         }
         let tick = Timespec {
             tv_sec: 0,
@@ -220,7 +185,7 @@ impl Watched {
     }
 
     fn takes_too_much(&self) -> Option<String> {
-        let family = family::living(&[]);
+        let family = family::living(&self.keeper.spared());
         let limits = &self.limits;
         if family.len() > limits.processes {
             let most = limits.processes;
