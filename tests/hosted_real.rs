@@ -2,13 +2,13 @@
 
 #![expect(
     clippy::unwrap_used,
+    clippy::panic,
     reason = "a test that cannot go on fails where it stands"
 )]
 
 mod support;
 
 use std::collections::BTreeSet;
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -20,11 +20,57 @@ use support::inside::skip;
 /// Of all cases so many are tried, evenly spread, unless `QCBUS_ALL_CASES` is set.
 const SOME: usize = 13;
 
-/// A module of ASAM's: program, name in its code, kind of files.
-const MODULES: [(&str, &str, &str); 2] = [
-    ("qc_opendrive", "xodrBundle", "xodr"),
-    ("qc_openscenario", "xoscBundle", "xosc"),
-];
+/// A module: its program, the name of its section in its code, its kind of files.
+struct Module {
+    program: PathBuf,
+    name: String,
+    kind: String,
+}
+
+impl Module {
+    fn new(program: PathBuf, name: &str, kind: &str) -> Module {
+        Module {
+            program,
+            name: name.to_owned(),
+            kind: kind.to_owned(),
+        }
+    }
+
+    fn takes(&self, file: &Path) -> bool {
+        file.extension().is_some_and(|it| *it == *self.kind)
+    }
+
+    /// The name under which it joins.
+    fn joined_as(&self) -> String {
+        match self.name.as_str() {
+            "xodrBundle" | "xoscBundle" => format!("asam.{}", self.name),
+            _ => self.name.clone(),
+        }
+    }
+}
+
+/// One module more, where one is at hand: program, name of its section and kind of files, separated by spaces.
+const ANOTHER: &str = "QCBUS_ANOTHER_MODULE";
+
+fn modules(programs: &Path) -> Vec<Module> {
+    let mut modules = vec![
+        Module::new(programs.join("qc_opendrive"), "xodrBundle", "xodr"),
+        Module::new(programs.join("qc_openscenario"), "xoscBundle", "xosc"),
+    ];
+    let Ok(another) = std::env::var(ANOTHER) else {
+        skip("another module", &format!("{ANOTHER} is not set"));
+        return modules;
+    };
+    let words: Vec<&str> = another.split(' ').collect();
+    let [program, name, kind] = words[..] else {
+        panic!("{ANOTHER} is no program, name and kind: {another}");
+    };
+    modules.push(Module::new(program.into(), name, kind));
+    modules
+}
+
+/// Files in one run: as many as a slow machine does before the watchdog bites.
+const IN_ONE_RUN: usize = 20;
 
 /// What a checker says: its status and what it found.
 type Said = BTreeSet<(String, String, String)>;
@@ -60,32 +106,53 @@ fn place(locations: &Locations) -> String {
     format!("{} {}", locations.description, places.join(" "))
 }
 
-/// What a module says of a file when it is run by hand.
-fn alone(
-    desk: &Desk,
-    programs: &Path,
-    (program, name, _): (&str, &str, &str),
-    file: &Path,
-) -> Said {
+/// What a module says of a file when it is run by hand; `None` when it fails.
+fn alone(desk: &Desk, module: &Module, file: &Path) -> Option<Said> {
     let directory = desk.path().join("alone");
     std::fs::create_dir_all(&directory).unwrap();
     let config = directory.join("config.xml");
     let text = format!(
-        "<Config><Param name=\"InputFile\" value=\"{}\"/><CheckerBundle application=\"{name}\">\
+        "<Config><Param name=\"InputFile\" value=\"{}\"/><CheckerBundle application=\"{}\">\
          <Param name=\"resultFile\" value=\"own.xqar\"/></CheckerBundle></Config>",
-        file.display()
+        file.display(),
+        module.name
     );
     std::fs::write(&config, text).unwrap();
     let result = directory.join("own.xqar");
     let _ = std::fs::remove_file(&result);
-    let output = Command::new(programs.join(program))
-        .arg("-c")
-        .arg(&config)
-        .current_dir(&directory)
-        .output()
-        .unwrap();
-    assert!(output.status.success(), "{}: {output:?}", file.display());
-    said(&read_result(&result).bundles[0])
+    let mut command = Command::new(&module.program);
+    command.arg("-c").arg(&config).current_dir(&directory);
+    let output = command.output().unwrap();
+    let succeeded = output.status.success();
+    succeeded.then(|| said(&read_result(&result).bundles[0]))
+}
+
+/// What a module said hosted, without the checker that is ours.
+fn hosted(desk: &Desk, module: &Module, input: &Path) -> Said {
+    let result = desk.path().join("out");
+    let results = read_result(&result.join(format!("{}.xqar", input.display())));
+    let name = module.joined_as();
+    let bundle = results.bundles.iter().find(|it| it.name == name);
+    let mut said = said(bundle.unwrap_or_else(|| panic!("{name} has not judged {input:?}")));
+    said.retain(|(id, ..)| id != "check_qcbus_asam_module_is_known");
+    said
+}
+
+/// In what a module is different hosted.
+fn differences(desk: &Desk, module: &Module, input: &Path) -> Vec<String> {
+    let hosted = hosted(desk, module, input);
+    let Some(alone) = alone(desk, module, &desk.path().join(input)) else {
+        // What gives no result alone must not have one here.
+        let silent = hosted.iter().all(|(_, what, _)| what == "Some(Error)");
+        let differs = (!silent).then(|| format!("{}: it fails alone: {hosted:?}", input.display()));
+        return differs.into_iter().collect();
+    };
+    let mut found = Vec::new();
+    for (one, other, what) in [(&hosted, &alone, "hosted"), (&alone, &hosted, "alone")] {
+        let only = one.difference(other);
+        found.extend(only.map(|it| format!("{}: only {what}: {it:?}", input.display())));
+    }
+    found
 }
 
 #[test]
@@ -99,64 +166,44 @@ fn hosted_modules_say_what_they_say_by_themselves() {
         Ok(programs) => programs,
         Err(why) => return skip(test, &format!("ASAM's modules cannot be installed: {why}")),
     };
+    let modules = modules(&programs);
     let desk = Desk::new();
     for file in files_below(&cases) {
         let bytes = std::fs::read(cases.join(&file)).unwrap();
         desk.write(&format!("cases/{}", file.display()), bytes);
     }
-    let modules = MODULES.map(|(program, name, _)| {
+    let manifests = modules.iter().map(|module| {
+        let command = module.program.display();
         serde_json::json!({
-            "name": name,
+            "name": module.name,
             "exec_type": "executable",
             "module_type": "checker_bundle",
-            "exec_command": format!("{program} -c $ASAM_QC_FRAMEWORK_CONFIG_FILE"),
+            "exec_command": format!("{command} -c $ASAM_QC_FRAMEWORK_CONFIG_FILE"),
         })
     });
+    let manifests: Vec<serde_json::Value> = manifests.collect();
     desk.write(
         "bundles.d/asam.json",
-        serde_json::json!({ "module": modules }).to_string(),
+        serde_json::json!({ "module": manifests }).to_string(),
     );
     let inputs = inputs(&desk);
-    let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    let path: OsString =
-        std::env::join_paths(std::iter::once(programs.clone()).chain(std::env::split_paths(&path)))
-            .unwrap();
-    command.env("PATH", path);
-    command
-        .args(["check", "--bundles-d", "bundles.d", "--out", "out"])
-        .args(&inputs);
-    let whole = desk.run(&mut command);
-    let mut differences = Vec::new();
-    for input in &inputs {
-        let ending = input.extension().unwrap().to_string_lossy().into_owned();
-        let module = MODULES
-            .into_iter()
-            .find(|(.., kind)| *kind == ending)
-            .unwrap();
-        let result = desk
-            .path()
-            .join("out")
-            .join(format!("{}.xqar", input.display()));
-        let results = read_result(&result);
-        let name = format!("asam.{}", module.1);
-        let hosted = results.bundles.iter().find(|it| it.name == name);
-        let mut hosted = said(hosted.unwrap_or_else(|| panic!("{}", whole.whole(&desk))));
-        // The checker of ours is none of the module's.
-        hosted.retain(|(id, ..)| id != "check_qcbus_asam_module_is_known");
-        let alone = alone(&desk, &programs, module, &desk.path().join(input));
-        for (one, other, what) in [(&hosted, &alone, "hosted"), (&alone, &hosted, "alone")] {
-            for it in one.difference(other) {
-                differences.push(format!("{}: only {what}: {it:?}", input.display()));
-            }
+    let mut found = Vec::new();
+    for some in inputs.chunks(IN_ONE_RUN) {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+        command
+            .args(["check", "--bundles-d", "bundles.d", "--out", "out"])
+            .args(some);
+        desk.run(&mut command);
+        for input in some {
+            let theirs = modules.iter().filter(|it| it.takes(input));
+            found.extend(theirs.flat_map(|it| differences(&desk, it, input)));
         }
     }
+    let (count, inputs) = (found.len(), inputs.len());
     assert!(
-        differences.is_empty(),
-        "{} of {} inputs:\n{}",
-        differences.len(),
-        inputs.len(),
-        differences.join("\n")
+        found.is_empty(),
+        "{count} of {inputs} inputs:\n{}",
+        found.join("\n")
     );
 }
 
@@ -167,9 +214,8 @@ fn inputs(desk: &Desk) -> Vec<PathBuf> {
         .into_iter()
         .map(|it| Path::new("cases").join(it))
         .filter(|it| {
-            MODULES
-                .iter()
-                .any(|(.., kind)| it.extension().is_some_and(|e| e == *kind))
+            it.extension()
+                .is_some_and(|it| it == "xodr" || it == "xosc")
         })
         .collect();
     all.sort();

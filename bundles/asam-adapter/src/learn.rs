@@ -86,8 +86,38 @@ pub(crate) fn learn(hosted: &Hosted, offices: &Offices) -> Result<Learned, Strin
             }
             Ok(learned)
         }
-        _ => Err(failures.join("\n")),
+        _ => Err(of_no_use(&failures, hosted)),
     }
+}
+
+/// Lines that are told of what a module printed when nothing could be learned of it.
+const LINES: usize = 6;
+
+fn of_no_use(failures: &[String], hosted: &Hosted) -> String {
+    let mut text: Vec<String> = failures.iter().map(|it| shortened(it)).collect();
+    if hosted.application.is_none() {
+        let tried = applications(hosted).join("`, `");
+        text.push(format!(
+            "if its section of a configuration has another name in its code than `{tried}`, say so in its manifest: \
+             \"application\": \"NAME\""
+        ));
+    }
+    text.join("\n")
+}
+
+/// The first line, and the last ones: what a program printed before it failed is at the end.
+fn shortened(text: &str) -> String {
+    let lines: Vec<&str> = text.lines().collect();
+    let [first, rest @ ..] = &lines[..] else {
+        return String::new();
+    };
+    let left_out = rest.len().saturating_sub(LINES);
+    let mut told = vec![*first];
+    if left_out > 0 {
+        told.push("[...]");
+    }
+    told.extend(&rest[left_out..]);
+    told.join("\n")
 }
 
 fn request(sample: &Sample, hosted: &Hosted) -> Request {
@@ -179,6 +209,16 @@ mod tests {
             ending,
             metadata: Vec::new(),
         }
+    }
+
+    #[test]
+    fn of_much_that_was_printed_the_end_is_told() {
+        assert_eq!(shortened("why\none"), "why\none");
+        let many: Vec<String> = (0..40).map(|it| it.to_string()).collect();
+        assert_eq!(
+            shortened(&many.join("\n")),
+            "0\n[...]\n34\n35\n36\n37\n38\n39"
+        );
     }
 
     #[test]

@@ -349,6 +349,10 @@ fn a_module_that_tells_nothing_of_itself_is_of_no_use() {
             said.contains("of no use as a bundle") && said.contains("because"),
             "{said}"
         );
+        assert!(
+            said.contains("`guest`, `xodrBundle`") && said.contains("\"application\""),
+            "its section may have another name: {said}"
+        );
     }
 }
 
