@@ -344,7 +344,11 @@ fn what_is_of_no_use_is_taken_out_again() {
 fn rooms(tmp: &Path) -> Vec<PathBuf> {
     let roots = std::fs::read_dir(tmp).unwrap().flatten();
     let own = roots.filter(|it| it.file_name().to_string_lossy().starts_with("qcbus-asam-"));
-    let entries = own.filter_map(|it| std::fs::read_dir(it.path()).ok());
+    let modules = own
+        .filter_map(|it| std::fs::read_dir(it.path()).ok())
+        .flatten()
+        .flatten();
+    let entries = modules.filter_map(|it| std::fs::read_dir(it.path()).ok());
     entries.flatten().flatten().map(|it| it.path()).collect()
 }
 

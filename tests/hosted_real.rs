@@ -103,7 +103,18 @@ fn place(locations: &Locations) -> String {
         .filter(is_added)
         .map(|it| format!("{it:?}"))
         .collect();
-    format!("{} {}", locations.description, places.join(" "))
+    let description = without_addresses(&locations.description);
+    format!("{description} {}", places.join(" "))
+}
+
+/// Python shows where an object lies in memory, which is elsewhere each time.
+fn without_addresses(text: &str) -> String {
+    let mut pieces = text.split(" at 0x");
+    let mut whole = pieces.next().unwrap_or_default().to_owned();
+    for piece in pieces {
+        whole.push_str(piece.trim_start_matches(|c: char| c.is_ascii_hexdigit()));
+    }
+    whole
 }
 
 /// What a module says of a file when it is run by hand; `None` when it fails.

@@ -80,6 +80,8 @@ pub struct Once {
     pub environment: Vec<(String, String)>,
     /// The kinds of files that it takes (`xodr`), when they are not to be learned from it.
     pub kinds: Vec<String>,
+    /// Every run begins from nothing, whatever could be kept for it: `"warm": false`.
+    pub cold: bool,
     /// What a run may use up, by name: whole numbers above zero.
     pub limits: Vec<(String, u64)>,
 }
@@ -432,6 +434,9 @@ impl Keys<'_> {
                 None => return Err(self.wrong(&key, "is not a whole number above zero")),
             }
         }
+        if let Some(warm) = self.object.get("warm") {
+            once.cold = !self.truth("warm", warm)?;
+        }
         match self.object.get("kinds") {
             None => {}
             Some(Value::Array(kinds)) => {
@@ -506,6 +511,7 @@ const MODULE_KEYS: [&str; 12] = [
     "environment",
     "kinds",
     "limits",
+    "warm",
 ];
 
 /// What stands in `limits`.

@@ -60,7 +60,7 @@ impl Adapter {
             |option: &str, value: &str| words.extend([option.to_owned(), value.to_owned()]);
         add("--name", name);
         add(EXEC, &module.exec_command);
-        add(SCRATCH, &self.scratch.to_string_lossy());
+        add(SCRATCH, &self.scratch_of(name).to_string_lossy());
         let once = &module.once;
         if let Some(application) = &once.application {
             add("--application", application);
@@ -74,6 +74,11 @@ impl Adapter {
         for kind in &once.kinds {
             add("--kind", kind);
         }
+        if once.cold {
+            words.push("--cold".to_owned());
+        }
+        let mut add =
+            |option: &str, value: &str| words.extend([option.to_owned(), value.to_owned()]);
         for (limit, number) in &once.limits {
             add(
                 &format!("--{}", limit.replace('_', "-")),
@@ -84,10 +89,15 @@ impl Adapter {
     }
 
     /// What the adapter may do although it is confined: what its module may, and its private directories.
-    pub(super) fn may(&self, module: &May) -> May {
+    pub(super) fn may(&self, name: &str, module: &May) -> May {
         let mut may = module.clone();
-        may.write.push(self.scratch.clone());
+        may.write.push(self.scratch_of(name));
         may
+    }
+
+    /// Where the private directories of one module are: those of others are none of its business.
+    fn scratch_of(&self, name: &str) -> PathBuf {
+        self.scratch.join(format!("of-{name}"))
     }
 
     /// Adds the modules that a configuration names and nothing else brings, when a program of that name is found:
@@ -123,7 +133,7 @@ impl Adapter {
                 version: None,
                 command,
                 restart: Restart::Always,
-                may: self.may(&module.may),
+                may: self.may(name, &module.may),
                 programs: Vec::new(),
                 shadow: false,
             });

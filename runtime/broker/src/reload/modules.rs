@@ -69,7 +69,7 @@ pub(super) fn add_module(
     let mut spec = spec_of(module, role);
     if is_hosted {
         spec.command = adapter.words(&name, module);
-        spec.may = adapter.may(&module.may);
+        spec.may = adapter.may(&name, &module.may);
         spec.name.clone_from(&name);
     }
     loaded.brought.insert(name, manifest);
