@@ -498,7 +498,7 @@ fn misspelt<'k>(name: &str, written: impl Iterator<Item = &'k str>) -> String {
 /// Keys of ours beside `mode`, handed on as they are.
 const OWN_KEYS: [&str; 2] = ["version", "restart"];
 
-const MODULE_KEYS: [&str; 12] = [
+const MODULE_KEYS: [&str; 13] = [
     "name",
     "exec_type",
     "module_type",
