@@ -108,7 +108,8 @@ impl Keeper {
                 memory: Some(at_most(Resource::Data, run.limits.memory)),
                 ..warm::Limits::default()
             };
-            let started = recognise(run.command, &path, Path::new("/"))
+            let command = without_going_where_it_is(run.command, run.directory);
+            let started = recognise(command, &path, Path::new("/"))
                 .and_then(|entry| Server::start(&entry, environment, &limits, PATIENCE));
             // It would be the same for every job, and cost the time of an import each time.
             let started = started.inspect_err(|_| self.is_cold = true)?;
@@ -228,4 +229,62 @@ fn at_most(resource: Resource, bytes: u64) -> u64 {
     getrlimit(resource)
         .maximum
         .map_or(bytes, |it| it.min(bytes))
+}
+
+/// The command without what the manifests of ASAM's own modules begin with, `cd $ASAM_QC_FRAMEWORK_WORKING_DIR &&`: a
+/// run is in that directory already, and no shell is needed to go there.
+fn without_going_where_it_is<'c>(command: &'c str, directory: &Path) -> &'c str {
+    const QUOTED: [&str; 2] = [
+        "\"$ASAM_QC_FRAMEWORK_WORKING_DIR\"",
+        "\"${ASAM_QC_FRAMEWORK_WORKING_DIR}\"",
+    ];
+    const BARE: [&str; 2] = [
+        "$ASAM_QC_FRAMEWORK_WORKING_DIR",
+        "${ASAM_QC_FRAMEWORK_WORKING_DIR}",
+    ];
+    let behind = |names: &[&str]| {
+        let rest = command.trim_start().strip_prefix("cd ")?.trim_start();
+        let mut rest = names.iter().filter_map(|it| rest.strip_prefix(it));
+        let rest = rest.find_map(|it| it.trim_start().strip_prefix("&&"))?;
+        Some(rest.trim_start())
+    };
+    // Without quotes a shell takes other paths apart.
+    let plain = |it: u8| it.is_ascii_alphanumeric() || b"/._-".contains(&it);
+    let is_one_word = directory
+        .as_os_str()
+        .as_encoded_bytes()
+        .iter()
+        .all(|it| plain(*it));
+    let bare = behind(&BARE).filter(|_| is_one_word);
+    behind(&QUOTED).or(bare).unwrap_or(command)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_leads_to_where_it_is_already_is_left_out() {
+        let directory = Path::new("/var/a-b_1.c");
+        let of = |command: &str| without_going_where_it_is(command, directory).to_owned();
+        let rest = "qc_x -c $ASAM_QC_FRAMEWORK_CONFIG_FILE";
+        for begin in [
+            "cd $ASAM_QC_FRAMEWORK_WORKING_DIR && ",
+            "cd ${ASAM_QC_FRAMEWORK_WORKING_DIR}&&",
+            " cd  \"$ASAM_QC_FRAMEWORK_WORKING_DIR\"  &&  ",
+        ] {
+            assert_eq!(of(&format!("{begin}{rest}")), rest, "{begin}");
+        }
+        for whole in [
+            "cd $ASAM_QC_FRAMEWORK_WORKING_DIR/x && qc_x",
+            "cd $ASAM_QC_FRAMEWORK_WORKING_DIR; qc_x",
+            "cd /tmp && qc_x",
+            "cd '$ASAM_QC_FRAMEWORK_WORKING_DIR' && qc_x",
+            rest,
+        ] {
+            assert_eq!(of(whole), whole);
+        }
+        let bare = "cd $ASAM_QC_FRAMEWORK_WORKING_DIR && qc_x";
+        assert_eq!(without_going_where_it_is(bare, Path::new("/a b")), bare);
+    }
 }
