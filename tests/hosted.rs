@@ -461,3 +461,25 @@ fn a_one_shot_module_can_be_a_shadow() {
         || farm.log(),
     );
 }
+
+/// A module that reads plain files only must not reject a good one because it is packed.
+#[test]
+fn a_packed_map_is_handed_over_unpacked_and_its_findings_name_it() {
+    let script = r#"grep -q "<OpenDRIVE" "$input" || exit 3
+        { begin; checker one completed "$(issue 2 "odd in $input")"; checker two completed; end; } > "$result""#;
+    let table = Table::with(script, "guest", &serde_json::Value::Null);
+    for name in ["b.xodrz", "c.xodr.gz"] {
+        let path = table.desk.path().join(name);
+        let mut gzip = Command::new("gzip");
+        gzip.arg("-c").arg(table.desk.path().join("a.xodr"));
+        let packed = gzip.output().unwrap();
+        assert!(packed.status.success(), "{packed:?}");
+        std::fs::write(&path, packed.stdout).unwrap();
+        table.check(&[name, "--bundles-d", "bundles.d"]);
+        let results = table.desk.result(&format!("out/{name}.xqar"));
+        let guest = bundle(&results, "guest");
+        assert_eq!(endings(guest), found_one(), "{name}");
+        let issue = &guest.checkers[0].issues[0];
+        assert_eq!(issue.description, format!("odd in {}", path.display()));
+    }
+}

@@ -167,6 +167,8 @@ impl Paths {
             real => real,
         };
         let pair = |from: String, to: &str| (from, to.to_owned());
+        let packed = ran.packed.as_ref();
+        let packed = packed.map(|packed| pair(ran.input.clone(), packed));
         let pairs = [
             pair(format!("{}/", ran.staged), &format!("{real}/")),
             pair(ran.staged.clone(), &ran.real),
@@ -175,8 +177,9 @@ impl Paths {
         ];
         Paths {
             // An answer without paths leads nowhere.
-            pairs: pairs
+            pairs: packed
                 .into_iter()
+                .chain(pairs)
                 .filter(|(from, _)| from.len() > 6)
                 .collect(),
         }

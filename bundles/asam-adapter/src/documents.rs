@@ -47,17 +47,44 @@ pub(crate) fn of<'d>(subject: &Subject<'d>) -> Result<Files<'d>, String> {
             let transcoded = document
                 .faults()
                 .any(|fault| fault.code == FaultCode::EncodingTranscoded);
-            let bytes = bytes_of(&path, text, digest, transcoded)?;
+            let is_root = files.is_empty();
+            let unpacked = unpacked(&path).filter(|_| is_root && !transcoded);
+            let (path, bytes, packed) = match unpacked {
+                Some(unpacked) => (unpacked, Bytes::Here(text.len() as u64), Some(path)),
+                None => {
+                    let bytes = bytes_of(&path, text, digest, transcoded)?;
+                    (path, bytes, None)
+                }
+            };
             if let Bytes::Here(_) = bytes {
                 pieces.push(text);
             }
-            files.push(Document { path, bytes });
+            files.push(Document {
+                path,
+                bytes,
+                packed,
+            });
         }
     }
     if files.is_empty() {
         return Err("the file lies in an archive".to_owned());
     }
     Ok((files, pieces))
+}
+
+/// Where a packed file would lie if it were not packed. No module of ASAM's can read those, and would say of a good one
+/// that it is no XML.
+fn unpacked(path: &Path) -> Option<PathBuf> {
+    let is_packed = Suffix::of_path(path).is_some_and(|it| it.packed);
+    let name = path.file_name()?.to_str().filter(|_| is_packed)?;
+    let stem = name.split_at_checked(name.len().checked_sub(".xodrz".len())?);
+    let by_letter = stem.filter(|(_, end)| end.eq_ignore_ascii_case(".xodrz"));
+    let name = match by_letter {
+        Some((stem, _)) => format!("{stem}.xodr"),
+        // `.xodr.gz`
+        None => name.rsplit_once('.')?.0.to_owned(),
+    };
+    Some(path.with_file_name(name))
 }
 
 fn bytes_of(
@@ -93,4 +120,19 @@ fn plain(path: &Path) -> PathBuf {
         }
     }
     plain
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_packed_file_is_handed_over_under_the_name_of_what_is_in_it() {
+        let of = |path: &str| unpacked(Path::new(path));
+        assert_eq!(of("/a/b.xodrz"), Some("/a/b.xodr".into()));
+        assert_eq!(of("/a/B.XODRZ"), Some("/a/B.xodr".into()));
+        assert_eq!(of("/a/b.xodr.gz"), Some("/a/b.xodr".into()));
+        assert_eq!(of("/a/b.xodr"), None);
+        assert_eq!(of("/a/b.xosc"), None);
+    }
 }

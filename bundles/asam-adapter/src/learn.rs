@@ -125,6 +125,7 @@ fn request(sample: &Sample, hosted: &Hosted) -> Request {
         files: vec![Document {
             path: Path::new(NOWHERE).join(sample.name),
             bytes: Bytes::Here(sample.text.len() as u64),
+            packed: None,
         }],
         config: None,
         applications: applications(hosted),

@@ -27,6 +27,8 @@ pub(crate) struct Document {
     #[serde(with = "path_text::one")]
     pub path: PathBuf,
     pub bytes: Bytes,
+    /// Where it really is packed, when `path` is only where it would be if it were not.
+    pub packed: Option<PathBuf>,
 }
 
 /// Where the bytes of a file are.
@@ -58,6 +60,8 @@ pub(crate) struct Ran {
     pub application: Option<String>,
     /// The file that it was given.
     pub input: String,
+    /// Where that one is packed, if it is.
+    pub packed: Option<String>,
     /// The directory that stands for `real`.
     pub staged: String,
     /// The directory in which all documents lie, in truth.

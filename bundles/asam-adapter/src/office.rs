@@ -138,6 +138,10 @@ impl Office<'_> {
             said: ended.said,
             application: None,
             input: text(prepared.staged.input()),
+            packed: request
+                .files
+                .first()
+                .and_then(|it| it.packed.as_deref().map(text)),
             staged: text(&prepared.staged.directory),
             real: text(&prepared.staged.real),
             room: text(prepared.room.path()),

@@ -137,6 +137,7 @@ mod tests {
         Document {
             path: path.into(),
             bytes: Bytes::Here(length),
+            packed: None,
         }
     }
 
@@ -165,6 +166,7 @@ mod tests {
         let seen = |text: &str| Document {
             path: path.clone(),
             bytes: Bytes::OnDisk(Sha256::digest(text).into()),
+            packed: None,
         };
         let place = |name: &str| {
             let place = dir.path().join(name);
