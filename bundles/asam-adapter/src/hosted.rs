@@ -48,7 +48,8 @@ pub struct Limits {
 impl Default for Limits {
     fn default() -> Limits {
         Limits {
-            time: Duration::from_secs(300),
+            // Before the broker loses patience (`--job-deadline`) and ends the whole bundle, without saying which limit.
+            time: Duration::from_secs(50),
             memory: 4096 << 20,
             output: 256 << 20,
             processes: 256,
