@@ -231,32 +231,32 @@ fn at_most(resource: Resource, bytes: u64) -> u64 {
         .map_or(bytes, |it| it.min(bytes))
 }
 
-/// The command without what the manifests of ASAM's own modules begin with, `cd $ASAM_QC_FRAMEWORK_WORKING_DIR &&`: a
-/// run is in that directory already, and no shell is needed to go there.
+/// The command without [`goes_where_it_is`]'s beginning, if no shell would make something else of it.
 fn without_going_where_it_is<'c>(command: &'c str, directory: &Path) -> &'c str {
-    const QUOTED: [&str; 2] = [
-        "\"$ASAM_QC_FRAMEWORK_WORKING_DIR\"",
-        "\"${ASAM_QC_FRAMEWORK_WORKING_DIR}\"",
-    ];
-    const BARE: [&str; 2] = [
-        "$ASAM_QC_FRAMEWORK_WORKING_DIR",
-        "${ASAM_QC_FRAMEWORK_WORKING_DIR}",
-    ];
-    let behind = |names: &[&str]| {
-        let rest = command.trim_start().strip_prefix("cd ")?.trim_start();
-        let mut rest = names.iter().filter_map(|it| rest.strip_prefix(it));
-        let rest = rest.find_map(|it| it.trim_start().strip_prefix("&&"))?;
-        Some(rest.trim_start())
-    };
     // Without quotes a shell takes other paths apart.
-    let plain = |it: u8| it.is_ascii_alphanumeric() || b"/._-".contains(&it);
-    let is_one_word = directory
-        .as_os_str()
-        .as_encoded_bytes()
-        .iter()
-        .all(|it| plain(*it));
-    let bare = behind(&BARE).filter(|_| is_one_word);
-    behind(&QUOTED).or(bare).unwrap_or(command)
+    let plain = |it: &u8| it.is_ascii_alphanumeric() || b"/._-".contains(it);
+    let is_one_word = directory.as_os_str().as_encoded_bytes().iter().all(plain);
+    match goes_where_it_is(command) {
+        Some((rest, quoted)) if quoted || is_one_word => rest,
+        _ => command,
+    }
+}
+
+/// What follows in a command that begins as those in the manifests of ASAM's own modules do, with
+/// `cd $ASAM_QC_FRAMEWORK_WORKING_DIR &&`, and whether that is in quotes. A run is in that directory already, and needs
+/// no shell to go there.
+pub fn goes_where_it_is(command: &str) -> Option<(&str, bool)> {
+    const NAMES: [(&str, bool); 4] = [
+        ("\"$ASAM_QC_FRAMEWORK_WORKING_DIR\"", true),
+        ("\"${ASAM_QC_FRAMEWORK_WORKING_DIR}\"", true),
+        ("$ASAM_QC_FRAMEWORK_WORKING_DIR", false),
+        ("${ASAM_QC_FRAMEWORK_WORKING_DIR}", false),
+    ];
+    let behind = command.trim_start().strip_prefix("cd ")?.trim_start();
+    NAMES.into_iter().find_map(|(name, quoted)| {
+        let rest = behind.strip_prefix(name)?.trim_start();
+        Some((rest.strip_prefix("&&")?.trim_start(), quoted))
+    })
 }
 
 #[cfg(test)]

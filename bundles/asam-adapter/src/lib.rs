@@ -29,3 +29,4 @@ pub mod warm;
 
 pub use host::run;
 pub use hosted::{Hosted, Limits, usual_scratch};
+pub use keeper::goes_where_it_is;

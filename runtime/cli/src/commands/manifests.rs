@@ -339,6 +339,7 @@ fn one_shot_manifest(name: &str, args: &BundleAddArgs, command: &str) -> String 
 /// The command of a one-shot module with the whole path of its program, as in [`command_line`]. The rest is the
 /// shell's.
 fn one_shot(command: &str) -> Result<String, Refusal> {
+    let command = qcbus_asam_adapter::goes_where_it_is(command).map_or(command, |(rest, _)| rest);
     let command = command.trim();
     let end = command.find(char::is_whitespace).unwrap_or(command.len());
     let (program, rest) = command.split_at(end);
