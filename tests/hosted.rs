@@ -484,3 +484,89 @@ fn a_packed_map_is_handed_over_unpacked_and_its_findings_name_it() {
         assert_eq!(issue.description, format!("odd in {}", path.display()));
     }
 }
+
+/// Counts the issues of a result, and writes down one of its parameters.
+const REPORTS: &str = r#"config="$ASAM_QC_FRAMEWORK_CONFIG_FILE"
+value() { sed -n "s/.*name=\"$1\" value=\"\([^\"]*\)\".*/\1/p" "$config" | head -n 1; }
+grep -c "<Issue " "$(value strInputFile)" > "$(value strReportFile)"
+mkdir more; echo "$(value lines)" > more/x.txt
+"#;
+
+#[test]
+fn a_report_module_is_run_after_every_result_and_takes_back_what_it_said() {
+    let mut farm = Farm::new();
+    let config = farm.base().join("config.xml");
+    let text = "<Config><CheckerBundle application=\"xodrBundle\"/><ReportModule application=\"guestReport\">\
+                <Param name=\"lines\" value=\"many\"/></ReportModule></Config>";
+    std::fs::write(&config, text).unwrap();
+    farm.arguments
+        .extend(["-c".to_owned(), config.display().to_string()]);
+    let program = farm.base().join("report");
+    install_report(&program, REPORTS);
+    let module = serde_json::json!({
+        "name": "guestReport",
+        "exec_type": "executable",
+        "module_type": "report_module",
+        "exec_command": program,
+    });
+    farm.let_in_module("guestReport", &module);
+    let _broker = farm.serve_ready();
+    farm.write("a.xodr", &Content::NoHeader(1).bytes());
+    assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Rejected);
+    let place = farm.out().join("a.xodr.guestReport");
+    let read = |name: &str| std::fs::read_to_string(place.join(name)).ok();
+    let issues = until_or("it has reported", || read("Report.txt"), || farm.log());
+    assert_eq!(issues, "1\n");
+    until_or(
+        "all of it",
+        || read("more/x.txt").filter(|it| it == "many\n"),
+        || farm.log(),
+    );
+    std::fs::write(farm.root().join("a.xodr"), Content::Good(2).bytes()).unwrap();
+    until_or(
+        "the newer result has its report",
+        || read("Report.txt").filter(|it| it == "0\n"),
+        || farm.log(),
+    );
+    std::fs::remove_file(farm.root().join("a.xodr")).unwrap();
+    until_or(
+        "it is taken back",
+        || (!place.exists()).then_some(()),
+        || farm.log(),
+    );
+    let peers = farm.status().unwrap().peers;
+    let peer = peers.iter().find(|it| it.name == "guestReport").unwrap();
+    assert_eq!(peer.role, "reporter");
+}
+
+#[test]
+fn a_report_module_that_fails_is_told_and_holds_up_nobody() {
+    let farm = Farm::new();
+    let program = farm.base().join("report");
+    install_report(&program, "echo oh no >&2; exit 7");
+    let module = serde_json::json!({
+        "name": "guestReport",
+        "exec_type": "executable",
+        "module_type": "report_module",
+        "exec_command": program,
+    });
+    farm.let_in_module("guestReport", &module);
+    let _broker = farm.serve_ready();
+    farm.write("a.xodr", &Content::Good(1).bytes());
+    assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Accepted);
+    until_or(
+        "it is told",
+        || {
+            let peers = farm.status()?.peers;
+            let peer = peers.into_iter().find(|it| it.name == "guestReport")?;
+            (peer.note.contains("exit code 7") && peer.note.contains("oh no")).then_some(())
+        },
+        || farm.log(),
+    );
+    assert!(!farm.out().join("a.xodr.guestReport").exists());
+}
+
+fn install_report(path: &Path, script: &str) {
+    std::fs::write(path, format!("#!/bin/sh\n{script}\n")).unwrap();
+    std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o755)).unwrap();
+}

@@ -134,6 +134,7 @@ impl Host {
             files,
             config: subject.config().cloned(),
             applications: vec![self.learned.application.clone()],
+            report: None,
         };
         let name = &self.hosted.name;
         let answered = match self.offices.ask(&request, &pieces) {

@@ -1,11 +1,17 @@
 //! The configuration that a module reads: that in force, with its own files in it.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use qcbus_formats::config::{BundleConfig, Config, ConfigParam, INPUT_PARAMS};
 
 /// The bundle's parameters that name its result, the framework's first.
 const RESULT_PARAMS: [&str; 2] = ["resultFile", "strResultFile"];
+
+/// A report module's parameters that name the result.
+const RESULT_INPUTS: [&str; 2] = ["InputFile", "strInputFile"];
+/// Those that say where it writes.
+const OUTPUT_PARAMS: [&str; 2] = ["OutputFile", "strReportFile"];
 
 /// Everything that goes into it.
 pub(crate) struct Configuration<'c> {
@@ -39,6 +45,39 @@ impl Configuration<'_> {
         text.push_str("</Config>\n");
         text
     }
+}
+
+/// The configuration of a report module: the result, where to write, and its own parameters. ASAM's modules and others
+/// call the two differently.
+pub(crate) fn of_report(applications: &[String], result: &str, own: &[(String, String)]) -> String {
+    let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<Config>\n");
+    param(&mut text, 1, INPUT_PARAMS[0], result);
+    let named = own
+        .iter()
+        .rev()
+        .find(|(name, _)| OUTPUT_PARAMS.contains(&name.as_str()));
+    // It writes to its own directory, whatever the path was.
+    let named = named.and_then(|(_, value)| Path::new(value).file_name()?.to_str());
+    let report = named
+        .filter(|it| !it.starts_with("__"))
+        .unwrap_or("Report.txt");
+    for application in applications {
+        let application = escaped(application);
+        let _ = writeln!(text, "  <ReportModule application=\"{application}\">");
+        for name in RESULT_INPUTS {
+            param(&mut text, 2, name, result);
+        }
+        for name in OUTPUT_PARAMS {
+            param(&mut text, 2, name, report);
+        }
+        let is_ours = |name: &str| RESULT_INPUTS.contains(&name) || OUTPUT_PARAMS.contains(&name);
+        for (name, value) in own.iter().filter(|(name, _)| !is_ours(name)) {
+            param(&mut text, 2, name, value);
+        }
+        text.push_str("  </ReportModule>\n");
+    }
+    text.push_str("</Config>\n");
+    text
 }
 
 fn section(text: &mut String, own: &BundleConfig) {
@@ -91,6 +130,34 @@ fn escaped(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_report_module_gets_the_result_and_a_place_of_its_own() {
+        let own = [
+            ("strReportFile".to_owned(), "/somewhere/mine.txt".to_owned()),
+            ("strInputFile".to_owned(), "other.xqar".to_owned()),
+            ("p".to_owned(), "1".to_owned()),
+        ];
+        let names = ["mine".to_owned(), "TextReport".to_owned()];
+        let text = of_report(&names, "/in/r.xqar", &own);
+        let read = Config::parse(text.as_bytes()).unwrap().config;
+        assert_eq!(read.reports.len(), 2);
+        let params: Vec<(&str, &str)> = read.reports[1]
+            .params
+            .iter()
+            .map(|it| (&*it.name, &*it.value))
+            .collect();
+        let expected = [
+            ("InputFile", "/in/r.xqar"),
+            ("strInputFile", "/in/r.xqar"),
+            ("OutputFile", "mine.txt"),
+            ("strReportFile", "mine.txt"),
+            ("p", "1"),
+        ];
+        assert_eq!(params, expected);
+        let stream = [("OutputFile".to_owned(), "__stdout__".to_owned())];
+        assert!(of_report(&names, "/r", &stream).contains("\"Report.txt\""));
+    }
 
     #[test]
     fn what_is_in_force_is_handed_on_but_for_the_files() {

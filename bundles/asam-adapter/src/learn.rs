@@ -129,6 +129,7 @@ fn request(sample: &Sample, hosted: &Hosted) -> Request {
         }],
         config: None,
         applications: applications(hosted),
+        report: None,
     }
 }
 

@@ -22,11 +22,14 @@ mod messages;
 mod office;
 mod offices;
 mod process;
+mod report;
 mod samples;
 mod scratch;
 mod staging;
 pub mod warm;
+mod written;
 
 pub use host::run;
 pub use hosted::{Hosted, Limits, usual_scratch};
 pub use keeper::goes_where_it_is;
+pub use report::{ReportFile, ReportModule};

@@ -18,6 +18,8 @@ pub(crate) struct Request {
     pub config: Option<Config>,
     /// The names by which the module may look for its section of a configuration.
     pub applications: Vec<String>,
+    /// It is a report module, with these parameters: its one file is a result.
+    pub report: Option<Vec<(String, String)>>,
 }
 
 /// A file of a job.
@@ -41,7 +43,7 @@ pub(crate) enum Bytes {
     OnDisk([u8; 32]),
 }
 
-/// What came of it. The body of the message is the result file.
+/// What came of it. The body of the message is the result file, or what a report module has written.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) enum Answer {
     Ran(Ran),
@@ -68,4 +70,6 @@ pub(crate) struct Ran {
     pub real: String,
     /// The private directory, in which everything else is.
     pub room: String,
+    /// The files that a report module has written, each with its length, in the order of the body.
+    pub reports: Vec<(String, u64)>,
 }

@@ -10,7 +10,7 @@ use qcbus_formats::manifest::May;
 use qcbus_messages::Exit;
 
 use crate::channel::{Channel, Message};
-use crate::configuration::Configuration;
+use crate::configuration::{Configuration, of_report};
 use crate::family;
 use crate::hosted::Hosted;
 use crate::keeper::Keeper;
@@ -18,6 +18,7 @@ use crate::messages::{Answer, MOST, Ran, Request};
 use crate::process::{self, Broken, Run};
 use crate::scratch::{Room, Scratch};
 use crate::staging::Staged;
+use crate::written;
 
 /// Serves until nobody is at the other end of the socket, which stands where a program's input does.
 pub(crate) fn serve(hosted: &Hosted) -> Exit {
@@ -92,6 +93,8 @@ struct Office<'h> {
 struct Prepared {
     room: Room,
     directory: PathBuf,
+    /// Its own directory, in which it runs unless its manifest says otherwise.
+    work: PathBuf,
     config: PathBuf,
     staged: Staged,
     /// The names of sections, each with the file for its result.
@@ -145,8 +148,18 @@ impl Office<'_> {
             staged: text(&prepared.staged.directory),
             real: text(&prepared.staged.real),
             room: text(prepared.room.path()),
+            reports: Vec::new(),
         };
-        let result = self.collect(&prepared, &mut ran);
+        let result = match &request.report {
+            Some(_) if ran.fault.is_none() => {
+                let written = written::in_directory(&prepared.work, self.hosted.limits.output);
+                let (reports, body) = written.map_err(NotRun::Why)?;
+                ran.reports = reports;
+                body
+            }
+            Some(_) => Vec::new(),
+            None => self.collect(&prepared, &mut ran),
+        };
         Ok((ran, result))
     }
 
@@ -173,17 +186,21 @@ impl Office<'_> {
             });
         let sections: Vec<(String, String)> = sections.collect();
         let config = room.path().join("config.xml");
-        let text = Configuration {
-            name: &self.hosted.name,
-            input,
-            config: request.config.as_ref(),
-            sections: &sections,
-        }
-        .text();
+        let text = match &request.report {
+            Some(params) => of_report(&request.applications, input, params),
+            None => Configuration {
+                name: &self.hosted.name,
+                input,
+                config: request.config.as_ref(),
+                sections: &sections,
+            }
+            .text(),
+        };
         std::fs::write(&config, text)?;
         Ok(Prepared {
             room,
             directory,
+            work: own,
             config,
             staged,
             sections,

@@ -18,6 +18,9 @@ fn main() -> ExitCode {
     if let Some(run) = commands::adapter(std::env::args_os().skip(1)) {
         return talk::exit(run()).into();
     }
+    if let Some(run) = commands::asam_reporter(std::env::args_os().skip(1)) {
+        return talk::exit(run()).into();
+    }
     let args = match args::Args::try_parse() {
         Ok(args) => args,
         Err(error) => {

@@ -228,6 +228,8 @@ pub fn adapter(program: &Path, are_there: bool) -> Adapter {
 
 /// The command that hosts a module.
 pub const ASAM_ADAPTER: &str = "asam-adapter";
+/// The command that hosts a report module.
+pub const ASAM_REPORTER: &str = "asam-reporter";
 
 /// What a configuration can name: the standard bundles with their checkers and parameters, and the
 /// standard reporters.

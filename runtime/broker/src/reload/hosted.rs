@@ -27,8 +27,9 @@ const PREFIX: &str = "asam.";
 /// Before the command of a module, and before the directory of its private ones.
 const EXEC: &str = "--exec";
 const SCRATCH: &str = "--scratch";
-/// The word behind the name of the program.
+/// The word behind the name of the program, for a checker bundle and for a report module.
 const ADAPTER: &str = "asam-adapter";
+const REPORTER: &str = "asam-reporter";
 
 impl Adapter {
     /// Whether there is one.
@@ -54,8 +55,13 @@ impl Adapter {
     }
 
     /// How the adapter is started for a module.
-    pub(super) fn words(&self, name: &str, module: &Module) -> Vec<String> {
+    pub(super) fn words(&self, name: &str, module: &Module, role: Role) -> Vec<String> {
         let mut words = self.command.clone();
+        if role == Role::Reporter
+            && let Some(word) = words.last_mut()
+        {
+            REPORTER.clone_into(word);
+        }
         let mut add =
             |option: &str, value: &str| words.extend([option.to_owned(), value.to_owned()]);
         add("--name", name);
@@ -126,7 +132,7 @@ impl Adapter {
                  ASAM's framework"
             ));
             let module = named_module(name);
-            let command = self.words(name, &module);
+            let command = self.words(name, &module, Role::Bundle);
             loaded.children.push(ChildSpec {
                 name: name.to_owned(),
                 role: Role::Bundle,
@@ -183,7 +189,10 @@ pub(super) fn ready(words: &[String]) -> Result<(), String> {
 }
 
 fn value_of<'w>(words: &'w [String], option: &str) -> Option<&'w str> {
-    if words.get(1).is_none_or(|it| it != ADAPTER) {
+    if words
+        .get(1)
+        .is_none_or(|it| it != ADAPTER && it != REPORTER)
+    {
         return None;
     }
     let at = words.iter().position(|it| it == option)?;

@@ -43,11 +43,11 @@ pub(super) fn add_module(
             return Ok(());
         }
     };
-    let is_hosted = module.mode != Mode::Bus && role == Role::Bundle && adapter.is_there();
+    let is_hosted = module.mode != Mode::Bus && adapter.is_there();
     if module.mode != Mode::Bus && !is_hosted {
         return not_on_the_bus(module, role, loaded);
     }
-    let name = match is_hosted {
+    let name = match is_hosted && role == Role::Bundle {
         true => adapter.name_of(module, loaded),
         false => module.name.clone(),
     };
@@ -68,7 +68,7 @@ pub(super) fn add_module(
     })?;
     let mut spec = spec_of(module, role);
     if is_hosted {
-        spec.command = adapter.words(&name, module);
+        spec.command = adapter.words(&name, module, role);
         spec.may = adapter.may(&name, &module.may);
         spec.name.clone_from(&name);
     }

@@ -1,5 +1,6 @@
 //! One command, one file.
 
+mod asam_report;
 mod bundle;
 mod check;
 mod config;
@@ -55,6 +56,13 @@ pub fn adapter(arguments: impl Iterator<Item = OsString>) -> Option<impl FnOnce(
         talk::log("warn");
         qcbus_asam_adapter::run(&[standard::ASAM_ADAPTER], words, talk::say_lines)
     })
+}
+
+/// What a broker starts for a one-shot report module of ASAM's framework, `asam-reporter …`.
+pub fn asam_reporter(arguments: impl Iterator<Item = OsString>) -> Option<impl FnOnce() -> Exit> {
+    let mut words = arguments;
+    let is_it = words.next().is_some_and(|it| it == standard::ASAM_REPORTER);
+    is_it.then_some(move || asam_report::run(words))
 }
 
 /// Does what the command line says.

@@ -1,7 +1,8 @@
 //! `qcbus reporter run`: a reporter daemon.
 
+use qcbus_bus::Instance;
 use qcbus_messages::Exit;
-use qcbus_reporter_sdk::{Identity, Registration, RunError, Setting};
+use qcbus_reporter_sdk::{Identity, Registration, Reporter, RunError, Setting};
 
 use super::settings::instance;
 use crate::args::BusArgs;
@@ -29,6 +30,11 @@ pub fn run(which: &Registration, bus: &BusArgs) -> Exit {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         launch: bus.launch,
     };
+    serve(&instance, &identity, reporter.as_mut())
+}
+
+/// Reports on the bus of an instance until somebody wants it to go.
+pub fn serve(instance: &Instance, identity: &Identity, reporter: &mut dyn Reporter) -> Exit {
     let runtime = match tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()
@@ -39,11 +45,7 @@ pub fn run(which: &Registration, bus: &BusArgs) -> Exit {
             return Exit::Internal;
         }
     };
-    match runtime.block_on(qcbus_reporter_sdk::run(
-        &instance,
-        &identity,
-        reporter.as_mut(),
-    )) {
+    match runtime.block_on(qcbus_reporter_sdk::run(instance, identity, reporter)) {
         Ok(()) => Exit::Accepted,
         Err(error) => {
             talk::fail(&format!("failed to {error}"));

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use qcbus_messages::control::{Request, Response, Trial, TrialCounts};
 use qcbus_messages::path_text::to_text;
-use qcbus_messages::{Exit, shown};
+use qcbus_messages::{Exit, Verdict, shown};
 
 use super::readiness::files;
 use super::remote::ask;
@@ -70,7 +70,12 @@ fn render(name: &str, counts: &TrialCounts, trials: &[Trial]) -> String {
     let mut text = String::new();
     for trial in trials {
         let _ = writeln!(text, "{}", shown::line(&line(trial)));
-        for why in &trial.why {
+        // Beside an error it goes without saying that others could not look.
+        let why = trial
+            .why
+            .iter()
+            .filter(|_| trial.would == Verdict::Undetermined);
+        for why in why {
             let _ = writeln!(text, "    {}", shown::line(why));
         }
         if !trial.result.as_os_str().is_empty() {
@@ -122,8 +127,6 @@ fn line(trial: &Trial) -> String {
 
 #[cfg(test)]
 mod tests {
-    use qcbus_messages::Verdict;
-
     use super::*;
 
     fn trial(file: &str, would: Verdict) -> Trial {

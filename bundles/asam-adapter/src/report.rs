@@ -1,0 +1,90 @@
+//! A report module of ASAM's framework: given a result, it writes whatever it writes.
+
+use std::ffi::OsString;
+use std::path::Path;
+
+use qcbus_formats::xqar::Param;
+use qcbus_messages::Exit;
+
+use crate::back::Paths;
+use crate::hosted::{Hosted, parse};
+use crate::messages::{Bytes, Document, Request};
+use crate::offices::Offices;
+
+/// A report module that is run for every result.
+#[derive(Debug)]
+pub struct ReportModule {
+    hosted: Hosted,
+    offices: Offices,
+}
+
+/// A file that it has written: its name, below its own directory, and what is in it.
+pub type ReportFile = (String, Vec<u8>);
+
+impl ReportModule {
+    /// Starts what runs the module. `program` are the words behind the name of the program that lead to the adapter;
+    /// what `arguments` there are for somebody else is returned.
+    ///
+    /// # Errors
+    /// The exit code, with why for a person.
+    pub fn start(
+        program: &[&str],
+        arguments: impl IntoIterator<Item = OsString>,
+    ) -> Result<(ReportModule, Vec<OsString>), (Exit, String)> {
+        let asked = parse(arguments).map_err(|error| (Exit::Usage, error.to_string()))?;
+        let hosted = asked.hosted;
+        let name = &hosted.name;
+        let offices = Offices::start(1, &hosted, program)
+            .map_err(|error| (Exit::Internal, format!("`{name}` cannot be run: {error}")))?;
+        Ok((ReportModule { hosted, offices }, asked.rest))
+    }
+
+    /// The name under which it joins.
+    pub fn name(&self) -> &str {
+        &self.hosted.name
+    }
+
+    /// Has it report on a result, with the parameters of a configuration.
+    ///
+    /// # Errors
+    /// Why there is no report, for a person.
+    pub fn report(&self, result: &Path, params: &[Param]) -> Result<Vec<ReportFile>, String> {
+        let bytes = std::fs::read(result)
+            .map_err(|error| format!("cannot read {}: {error}", result.display()))?;
+        let name = &self.hosted.name;
+        let mut applications = vec![name.clone()];
+        applications.extend(self.hosted.application.clone());
+        let params = params.iter().map(|it| (it.name.clone(), it.value.clone()));
+        let request = Request {
+            files: vec![Document {
+                path: result.to_path_buf(),
+                bytes: Bytes::Here(bytes.len() as u64),
+                packed: None,
+            }],
+            config: None,
+            applications,
+            report: Some(params.collect()),
+        };
+        let answered = self.offices.ask(&request, &[&bytes]);
+        // Whoever started this process starts a new one.
+        let answered = answered.unwrap_or_else(|error| {
+            tracing::error!(module = name, %error, "the office is gone");
+            std::process::exit(i32::from(Exit::Internal.code()))
+        });
+        let (ran, body) =
+            answered.map_err(|why| format!("the report module `{name}` did not run: {why}"))?;
+        if let Some(fault) = &ran.fault {
+            return Err(Paths::of(&ran).sentence(name, fault, &ran.said));
+        }
+        let mut rest = &body[..];
+        let files = ran.reports.into_iter().map(|(file, length)| {
+            let length = usize::try_from(length)
+                .unwrap_or(usize::MAX)
+                .min(rest.len());
+            let (own, others) = rest.split_at(length);
+            rest = others;
+            (file, own.to_vec())
+        });
+        Ok(files.collect())
+    }
+}
