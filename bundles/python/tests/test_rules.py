@@ -272,6 +272,8 @@ def test_examples_are_tried(tmp_path):
     (tmp_path / "none.py").write_text("x = 1")
     assert ran(tmp_path, "-m", "qcbus.test", "none.py").returncode == 2
     assert ran(tmp_path, "-m", "qcbus.test").returncode == 2
+    missing = ran(tmp_path, "-m", "qcbus.test", "nowhere.py")
+    assert (missing.returncode, missing.stderr) == (2, "nowhere.py: there is no such script\n")
 
 
 def test_examples_are_tests_of_pytest(tmp_path):

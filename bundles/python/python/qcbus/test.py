@@ -81,6 +81,9 @@ def main(arguments: list[str]) -> int:
         return 2
     tried = failed = 0
     for path in map(Path, arguments):
+        if not path.is_file():
+            print(f"{path}: there is no such script", file=sys.stderr)
+            return 2
         bundles = load(path)
         if not bundles:
             print(f"{path}: makes no qcbus.Bundle", file=sys.stderr)
