@@ -96,10 +96,13 @@ fn sweep(root: &Path) {
     let entries = std::fs::read_dir(root).into_iter().flatten().flatten();
     for entry in entries {
         let path = entry.path();
-        let is_left = File::open(&path).map_or(true, |it| {
-            flock(&it, FlockOperation::NonBlockingLockExclusive).is_ok()
+        // A module may have shut its own; one that cannot be asked for its lock may be in use.
+        let opened = File::open(&path).or_else(|_| {
+            std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o700))?;
+            File::open(&path)
         });
-        if is_left {
+        let lock = |it: File| flock(&it, FlockOperation::NonBlockingLockExclusive).is_ok();
+        if opened.is_ok_and(lock) {
             remove(&path);
         }
     }

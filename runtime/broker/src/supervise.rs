@@ -435,6 +435,7 @@ mod tests {
             may: Default::default(),
             programs: Vec::new(),
             shadow: false,
+            slow_start: false,
         }
     }
 

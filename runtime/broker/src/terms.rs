@@ -90,6 +90,7 @@ mod tests {
             may: May::default(),
             programs: Vec::new(),
             shadow: false,
+            slow_start: false,
         }
     }
 

@@ -209,6 +209,7 @@ fn spec(program: &Path, command: &str, alias: &str, name: &str, role: Role) -> C
         may: Default::default(),
         programs: Vec::new(),
         shadow: false,
+        slow_start: false,
     }
 }
 

@@ -46,7 +46,9 @@ pub(super) enum ChildState {
 }
 
 /// How long a child may take until it says hello.
-pub(super) const START_LIMIT: Duration = Duration::from_secs(15);
+const START_LIMIT: Duration = Duration::from_secs(15);
+/// The same of one that runs programs first, which may have to come from a slow disk.
+const SLOW_START_LIMIT: Duration = Duration::from_secs(120);
 
 /// Failures in a row, without ever having joined, after which nobody waits for a child.
 const STUCK_AFTER: u32 = 3;
@@ -86,6 +88,14 @@ impl Child {
             _ => self.state = ChildState::Due(now),
         }
         unwanted
+    }
+
+    /// How long it may take until it says hello.
+    pub fn start_limit(&self) -> Duration {
+        match self.spec.slow_start {
+            true => SLOW_START_LIMIT,
+            false => START_LIMIT,
+        }
     }
 
     /// The process that was started and has not joined, and since when.
@@ -347,7 +357,9 @@ impl State {
                     let spec = child.spec.clone();
                     actions.push(Action::Spawn { launch, spec });
                 }
-                ChildState::Starting(launch, since) if now.saturating_sub(since) > START_LIMIT => {
+                ChildState::Starting(launch, since)
+                    if now.saturating_sub(since) > child.start_limit() =>
+                {
                     late.push((name.clone(), launch));
                 }
                 _ => {}

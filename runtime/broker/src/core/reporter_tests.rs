@@ -127,6 +127,7 @@ fn spec(version: u8) -> ChildSpec {
         may: Default::default(),
         programs: Vec::new(),
         shadow: false,
+        slow_start: false,
     }
 }
 

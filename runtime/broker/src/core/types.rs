@@ -299,6 +299,8 @@ pub struct ChildSpec {
     pub programs: Vec<(PathBuf, Option<Stamp>)>,
     /// It is a bundle that looks at files and has no weight in any verdict.
     pub shadow: bool,
+    /// It may take long until it says hello: it runs programs before that.
+    pub slow_start: bool,
 }
 
 impl ChildSpec {
@@ -311,9 +313,7 @@ impl ChildSpec {
     pub fn digest(&self) -> u64 {
         let mut hash = Sha256::new();
         hash.update(format!("{:?}{:?}", self.version, self.command));
-        if self.shadow {
-            hash.update("shadow");
-        }
+        hash.update(if self.shadow { "shadow" } else { "" });
         if self.may != May::default() {
             hash.update(format!("{:?}", self.may));
         }

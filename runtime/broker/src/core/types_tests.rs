@@ -11,6 +11,7 @@ fn spec(command: &str) -> ChildSpec {
         may: Default::default(),
         programs: Vec::new(),
         shadow: false,
+        slow_start: false,
     }
 }
 

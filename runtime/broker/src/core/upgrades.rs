@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::action::Action;
-use super::children::{Child, START_LIMIT};
+use super::children::Child;
 use super::notice::Notice;
 use super::types::{Launch, Restart};
 use super::{Actions, State};
@@ -38,7 +38,7 @@ impl Child {
                 actions.push(Action::Spawn { launch, spec });
                 None
             }
-            Upgrade::Starting(launch, since) if now.saturating_sub(since) > START_LIMIT => {
+            Upgrade::Starting(launch, since) if now.saturating_sub(since) > self.start_limit() => {
                 Some(launch)
             }
             _ => None,

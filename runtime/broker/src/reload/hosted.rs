@@ -142,6 +142,7 @@ impl Adapter {
                 may: self.may(name, &module.may),
                 programs: Vec::new(),
                 shadow: false,
+                slow_start: true,
             });
         }
     }

@@ -69,6 +69,7 @@ pub(super) fn add_module(
     let mut spec = spec_of(module, role);
     if is_hosted {
         spec.command = adapter.words(&name, module, role);
+        spec.slow_start = true;
         spec.may = adapter.may(&name, &module.may);
         spec.name.clone_from(&name);
     }
@@ -111,5 +112,6 @@ fn spec_of(module: &Module, role: Role) -> ChildSpec {
         may: module.may.clone(),
         programs: Vec::new(),
         shadow: module.shadow,
+        slow_start: false,
     }
 }

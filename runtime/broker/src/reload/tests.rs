@@ -26,6 +26,7 @@ fn child(name: &str) -> ChildSpec {
         may: Default::default(),
         programs: Vec::new(),
         shadow: false,
+        slow_start: false,
     }
 }
 

@@ -36,6 +36,7 @@ pub fn children() -> Vec<ChildSpec> {
         may: May::default(),
         programs: Vec::new(),
         shadow: false,
+        slow_start: false,
     };
     vec![child(FIRST, Role::Bundle), child(REPORTER, Role::Reporter)]
 }

@@ -71,6 +71,24 @@ fn a_bundle_that_another_command_starts_judges_anew() {
 }
 
 #[test]
+fn one_that_runs_programs_before_it_joins_may_take_longer() {
+    for (slow_start, patient) in [(false, false), (true, true)] {
+        let mut world = World::new();
+        let spec = ChildSpec {
+            slow_start,
+            ..child(1)
+        };
+        world.event(Event::Children { specs: vec![spec] });
+        world.pass(Duration::ZERO);
+        let launch = world.launched[0].launch;
+        world.pass(Duration::from_secs(16));
+        assert_eq!(!world.killed.contains(&launch), patient);
+        world.pass(Duration::from_secs(110));
+        assert!(world.killed.contains(&launch), "not for ever");
+    }
+}
+
+#[test]
 fn a_process_that_a_newer_manifest_overtakes_before_it_joins_is_killed() {
     let first_start = || {
         let mut world = World::new();

@@ -42,6 +42,7 @@ pub fn child(version: u8) -> ChildSpec {
         may: Default::default(),
         programs: Vec::new(),
         shadow: false,
+        slow_start: false,
     }
 }
 
