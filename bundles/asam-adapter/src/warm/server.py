@@ -341,12 +341,16 @@ class Ending:
     def __init__(self):
         self.whole = atexit._ncallbacks() > 0
         self.code = None
-        self.standard = set()
-        for text in (sys.__stdin__, sys.__stdout__, sys.__stderr__):
-            self.standard |= {id(text), id(text.buffer), id(getattr(text.buffer, "raw", None))}
+        self.know_streams()
         self.exit = c_function("exit")
         # Registered first, it is called last.
         atexit.register(self.last)
+
+    def know_streams(self):
+        """Which objects the standard streams are made of: they want to be told of the end, and are flushed instead."""
+        self.standard = set()
+        for text in (sys.__stdin__, sys.__stdout__, sys.__stderr__):
+            self.standard |= {id(text), id(text.buffer), id(getattr(text.buffer, "raw", None))}
 
     def see_loaded(self):
         self.whole = self.whole or self.exit is None or self.wanted()
@@ -558,6 +562,8 @@ def start():
         os._exit(0)
     line.send("ready", *files())
     server.serve()
+    # They are renewed in each.
+    ending.know_streams()
     return run, ending
 
 
