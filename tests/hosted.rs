@@ -501,15 +501,7 @@ fn a_report_module_is_run_after_every_result_and_takes_back_what_it_said() {
     std::fs::write(&config, text).unwrap();
     farm.arguments
         .extend(["-c".to_owned(), config.display().to_string()]);
-    let program = farm.base().join("report");
-    install_report(&program, REPORTS);
-    let module = serde_json::json!({
-        "name": "guestReport",
-        "exec_type": "executable",
-        "module_type": "report_module",
-        "exec_command": program,
-    });
-    farm.let_in_module("guestReport", &module);
+    let_report_in(&farm, REPORTS);
     let _broker = farm.serve_ready();
     farm.write("a.xodr", &Content::NoHeader(1).bytes());
     assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Rejected);
@@ -542,15 +534,7 @@ fn a_report_module_is_run_after_every_result_and_takes_back_what_it_said() {
 #[test]
 fn a_report_module_that_fails_is_told_and_holds_up_nobody() {
     let farm = Farm::new();
-    let program = farm.base().join("report");
-    install_report(&program, "echo oh no >&2; exit 7");
-    let module = serde_json::json!({
-        "name": "guestReport",
-        "exec_type": "executable",
-        "module_type": "report_module",
-        "exec_command": program,
-    });
-    farm.let_in_module("guestReport", &module);
+    let_report_in(&farm, "echo oh no >&2; exit 7");
     let _broker = farm.serve_ready();
     farm.write("a.xodr", &Content::Good(1).bytes());
     assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Accepted);
@@ -566,7 +550,16 @@ fn a_report_module_that_fails_is_told_and_holds_up_nobody() {
     assert!(!farm.out().join("a.xodr.guestReport").exists());
 }
 
-fn install_report(path: &Path, script: &str) {
-    std::fs::write(path, format!("#!/bin/sh\n{script}\n")).unwrap();
-    std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o755)).unwrap();
+/// Lets a report module in that does this.
+fn let_report_in(farm: &Farm, script: &str) {
+    let program = farm.base().join("report");
+    std::fs::write(&program, format!("#!/bin/sh\n{script}\n")).unwrap();
+    std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let module = serde_json::json!({
+        "name": "guestReport",
+        "exec_type": "executable",
+        "module_type": "report_module",
+        "exec_command": program,
+    });
+    farm.let_in_module("guestReport", &module);
 }

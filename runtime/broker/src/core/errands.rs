@@ -27,19 +27,6 @@ pub struct Errand {
     pub ticket: Ticket,
     /// The bundles that are to look at the file, and nobody else.
     pub bundles: Arc<[String]>,
-    /// Nobody waits for it: it is the trial of a shadow.
-    pub is_trial: bool,
-}
-
-impl Errand {
-    /// What a client asks for.
-    pub fn of_client(ticket: Ticket, bundles: Arc<[String]>) -> Errand {
-        Errand {
-            ticket,
-            bundles,
-            is_trial: false,
-        }
-    }
 }
 
 /// What became of an errand whose file was checked.
@@ -105,7 +92,9 @@ impl State {
         let seats = self.seats(job.kind);
         match &job.errand {
             None => seats,
-            Some(errand) if errand.is_trial => self.seats_of_trial(&errand.bundles, job.kind),
+            Some(errand) if errand.ticket.is_trial() => {
+                self.seats_of_trial(&errand.bundles, job.kind)
+            }
             Some(errand) => {
                 let asked = |seat: &&Seat| errand.bundles.contains(&seat.name);
                 seats.iter().filter(asked).cloned().collect()
@@ -122,7 +111,7 @@ impl State {
             return;
         };
         job.stage = JobStage::Storing;
-        if errand.is_trial {
+        if errand.ticket.is_trial() {
             return self.pool_trial(id, actions);
         }
         let whole = job.shares.len() == errand.bundles.len();
@@ -186,7 +175,7 @@ impl State {
         if let Some(ticket) = errand.map(|it| it.ticket)
             && self.errands.remove(&ticket).is_some()
         {
-            if self.is_trial(ticket) {
+            if ticket.is_trial() {
                 self.trial_ended(ticket, Err(reason));
             } else {
                 elsewhere(ticket, reason, actions);
@@ -202,7 +191,7 @@ impl State {
         };
         if !self.errands.contains_key(&ticket) {
             self.files.remove(file);
-        } else if self.is_trial(ticket) {
+        } else if ticket.is_trial() {
             self.errands.remove(&ticket);
             self.files.remove(file);
             self.put_trial_back(ticket);
@@ -220,7 +209,7 @@ impl State {
     pub(super) fn dismiss_errands(&mut self, reason: &str, actions: &mut Actions) {
         let tickets: Vec<Ticket> = self.errands.keys().copied().collect();
         for ticket in tickets {
-            if self.is_trial(ticket) {
+            if ticket.is_trial() {
                 self.put_trial_back(ticket);
             } else {
                 elsewhere(ticket, reason.to_owned(), actions);

@@ -47,7 +47,7 @@ pub(super) struct ActiveJob {
 impl ActiveJob {
     /// Whether it is the trial of a shadow.
     pub fn is_trial(&self) -> bool {
-        self.errand.as_ref().is_some_and(|it| it.is_trial)
+        self.errand.as_ref().is_some_and(|it| it.ticket.is_trial())
     }
 }
 

@@ -113,7 +113,7 @@ impl Broker {
         let bundles = asked.bundles.keys().cloned().collect();
         self.handle(Event::Check {
             path: file.into(),
-            errand: Errand::of_client(ticket, bundles),
+            errand: Errand { ticket, bundles },
         })
     }
 

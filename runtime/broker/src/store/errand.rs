@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 use qcbus_formats::config::Config;
-use qcbus_formats::pool::{BundleOutcome, Scope};
+use qcbus_formats::pool::{BundleOutcome, Pooled, Scope};
 use qcbus_formats::xqar;
 use qcbus_messages::control::Checked;
 
@@ -20,13 +20,10 @@ impl Store {
         config: Option<&Config>,
         root: Option<&[u8]>,
     ) -> ErrandOutcome {
-        match self.refresh(job) {
-            Ok(true) => {}
-            Ok(false) => return ErrandOutcome::Stale,
-            Err(error) => return ErrandOutcome::Failed(unlooked(&job.path, &error)),
-        }
-        let outcomes: Vec<BundleOutcome> = job.bundles.iter().map(ShareOutcome::said).collect();
-        let pooled = self.pool(job, outcomes, (config, Scope::Whole), root);
+        let pooled = match self.pool_as_it_is(job, (config, Scope::Whole), root) {
+            Ok(pooled) => pooled,
+            Err(outcome) => return outcome,
+        };
         let verdict = pooled.verdict();
         let why = reasons(job, &pooled, verdict);
         let judged = judged(job, &pooled, verdict, why, PathBuf::new());
@@ -37,5 +34,20 @@ impl Store {
             verdict: file_verdict(&job.path, &judged),
             result: xqar::write(&pooled.results, self.dialect),
         }))
+    }
+    /// Pools what was found, unless something that it rests on is not any more what was read.
+    pub(super) fn pool_as_it_is(
+        &self,
+        job: &mut FinishedJob,
+        config: (Option<&Config>, Scope),
+        root: Option<&[u8]>,
+    ) -> Result<Pooled, ErrandOutcome> {
+        match self.refresh(job) {
+            Ok(true) => {}
+            Ok(false) => return Err(ErrandOutcome::Stale),
+            Err(error) => return Err(ErrandOutcome::Failed(unlooked(&job.path, &error))),
+        }
+        let outcomes: Vec<BundleOutcome> = job.bundles.iter().map(ShareOutcome::said).collect();
+        Ok(self.pool(job, outcomes, config, root))
     }
 }

@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 
 use qcbus_disk::write_whole;
 use qcbus_formats::config::Config;
-use qcbus_formats::pool::{BundleOutcome, Scope};
+use qcbus_formats::pool::Scope;
 use qcbus_formats::xqar::{self, CheckerBundle, Level};
 use qcbus_messages::Verdict;
 use qcbus_messages::path_text::to_text;
 use sha2::{Digest as _, Sha256};
 
-use super::{Store, unlooked};
-use crate::core::{ErrandOutcome, FinishedJob, ShareOutcome, TrialEnd};
+use super::Store;
+use crate::core::{ErrandOutcome, FinishedJob, TrialEnd};
 
 /// Below the directory of state.
 const DIRECTORY: &str = "shadow";
@@ -69,13 +69,10 @@ impl Store {
         config: Option<&Config>,
         root: Option<&[u8]>,
     ) -> ErrandOutcome {
-        match self.refresh(job) {
-            Ok(true) => {}
-            Ok(false) => return ErrandOutcome::Stale,
-            Err(error) => return ErrandOutcome::Failed(unlooked(&job.path, &error)),
-        }
-        let outcomes: Vec<BundleOutcome> = job.bundles.iter().map(ShareOutcome::said).collect();
-        let pooled = self.pool(job, outcomes, (config, Scope::Alone), root);
+        let pooled = match self.pool_as_it_is(job, (config, Scope::Alone), root) {
+            Ok(pooled) => pooled,
+            Err(outcome) => return outcome,
+        };
         let mut bundles = pooled.results.bundles.iter();
         let its_own = bundles.find(|it| it.name == shadow);
         let adds = its_own.map_or(Verdict::Accepted, Verdict::added_by);

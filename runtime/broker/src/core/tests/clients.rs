@@ -75,7 +75,7 @@ impl World {
         let bundles = bundles.iter().map(|it| (*it).to_owned()).collect();
         self.event(Event::Check {
             path: path_of(file),
-            errand: Errand::of_client(ticket, bundles),
+            errand: Errand { ticket, bundles },
         });
         ticket
     }

@@ -262,6 +262,20 @@ fn a_newer_shadow_tries_everything_again_and_the_same_one_nothing() {
 }
 
 #[test]
+fn a_shadow_that_comes_has_no_other_try_anything_again() {
+    let mut world = world_with_a_shadow();
+    world.write(0);
+    world.comes_to_rest();
+    let before = world.trials().0;
+    let mut actions = Vec::new();
+    world
+        .state
+        .shadow_is_ready("Another", Mark(1), &mut actions);
+    let waiting = |name: &str| world.state.trial_counts(name).unwrap().waiting;
+    assert_eq!((waiting("Another"), world.trials().0), (1, before));
+}
+
+#[test]
 fn who_becomes_a_shadow_need_not_judge_and_who_is_none_any_more_must() {
     let mut world = world_with_a_shadow();
     world.write(0);

@@ -53,6 +53,13 @@ pub struct TrialEnd {
     pub result: Option<PathBuf>,
 }
 
+impl Ticket {
+    /// Whether it is of no client, but of a trial of the broker's own.
+    pub(super) fn is_trial(self) -> bool {
+        self.0 >= FIRST_TICKET
+    }
+}
+
 /// The shadows that are wanted, by name.
 #[derive(Debug, Default)]
 pub(super) struct Trials {
@@ -130,12 +137,8 @@ impl State {
     /// The shadow that a job is a trial of, if it is one.
     pub fn tried_out(&self, job: JobId) -> Option<&str> {
         let errand = self.jobs.get(&job)?.errand.as_ref()?;
-        let name = errand.bundles.first().filter(|_| errand.is_trial);
+        let name = errand.bundles.first().filter(|_| errand.ticket.is_trial());
         name.map(String::as_str)
-    }
-
-    pub(super) fn is_trial(&self, ticket: Ticket) -> bool {
-        ticket.0 >= FIRST_TICKET
     }
 
     /// The children are others: who is a shadow by now need not judge, and who no longer is one is forgotten as such.
@@ -170,23 +173,18 @@ impl State {
             return;
         }
         self.end_trial_of(name, actions);
-        self.trials.shadows.insert(
-            name.to_owned(),
-            Shadow {
-                mark: Some(mark),
-                ..Shadow::default()
-            },
-        );
+        let mut shadow = Shadow {
+            mark: Some(mark),
+            ..Shadow::default()
+        };
+        let files = self.files.iter().map(|(_, it)| it);
+        let judged = files.filter(|it| it.present && it.errand.is_none() && it.judged.is_some());
+        judged.for_each(|it| shadow.wait(&it.path));
+        self.trials.shadows.insert(name.to_owned(), shadow);
         actions.push(Action::ForgetTrials {
             shadow: name.to_owned(),
             file: None,
         });
-        let files = self.files.iter();
-        let judged =
-            files.filter(|(_, it)| it.present && it.errand.is_none() && it.judged.is_some());
-        for id in judged.map(|(id, _)| id).collect::<Vec<FileId>>() {
-            self.let_shadows_try(id);
-        }
     }
 
     /// A file has a verdict: the shadows are to look at it. Whether they take such files is asked when it is their turn,
@@ -278,7 +276,6 @@ impl State {
             let errand = Errand {
                 ticket,
                 bundles: Arc::new([name.to_owned()]),
-                is_trial: true,
             };
             let id = self.files.insert_errand(&path, kind, errand);
             if let Some(entry) = self.files.get_mut(id) {
@@ -347,7 +344,7 @@ impl State {
     /// A shadow has died with the file of a trial. Whether it is tried again.
     pub(super) fn try_again(&mut self, id: JobId, actions: &mut Actions) -> bool {
         let errand = self.jobs.get(&id).and_then(|job| job.errand.as_ref());
-        let Some(ticket) = errand.filter(|it| it.is_trial).map(|it| it.ticket) else {
+        let Some(ticket) = errand.map(|it| it.ticket).filter(|it| it.is_trial()) else {
             return false;
         };
         let Some(shadow) = self.trials.of(ticket) else {
