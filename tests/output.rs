@@ -405,3 +405,42 @@ fn rules_are_found_by_what_people_remember_of_them() {
         page.stdout
     );
 }
+
+/// As a hook and an editor call it.
+fn hook(desk: &Desk, further: &[&str]) -> Said {
+    let call = ["check", "--force-exclude", "--output-format", "concise"];
+    desk.qcbus(&[&call, further].concat())
+}
+
+#[test]
+fn excluded_file_is_passed_over_when_a_hook_names_it() {
+    let desk = desk();
+    desk.write(".qcignore", "vendor/\n");
+    desk.write("vendor/bad.xodr", Content::NoHeader(2).bytes());
+    let named = desk.qcbus(&["check", "vendor/bad.xodr"]);
+    assert_eq!(named.code, Some(1), "without the flag: {named:?}");
+    let alone = hook(&desk, &["--", "vendor/bad.xodr"]);
+    assert_eq!(alone.code, Some(0), "{alone:?}");
+    assert_eq!(alone.stdout, "");
+    assert!(alone.stderr.contains("nothing to check"), "{alone:?}");
+    let quiet = hook(&desk, &["--quiet", "--", "vendor/bad.xodr"]);
+    assert_eq!((quiet.code, &*quiet.stderr), (Some(0), ""), "{quiet:?}");
+    let both = hook(&desk, &["-v", "--", "vendor/bad.xodr", "in/bad.xodr"]);
+    assert_eq!(both.code, Some(1), "{both:?}");
+    assert!(!both.stdout.contains("vendor"), "{both:?}");
+    let passed_over = "note: vendor/bad.xodr is excluded by a .qcignore\n";
+    assert!(both.stderr.contains(passed_over), "{both:?}");
+}
+
+#[test]
+fn missing_report_is_said_when_every_named_file_is_excluded() {
+    let desk = desk();
+    desk.write("in/.qcignore", "*\n");
+    let said = hook(
+        &desk,
+        &["--output-format", "sarif=all.sarif", "in/bad.xodr"],
+    );
+    assert_eq!(said.code, Some(0), "{said:?}");
+    assert!(said.stderr.contains("not written: sarif ("), "{said:?}");
+    assert!(!desk.path().join("all.sarif").exists());
+}

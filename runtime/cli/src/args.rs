@@ -162,6 +162,9 @@ pub struct CheckArgs {
     /// ASAM configuration: run what it demands, as it demands it
     #[arg(short, long, value_name = "FILE")]
     pub config: Option<PathBuf>,
+    /// Pass over files that a .qcignore excludes, also those that are named: for hooks and editors
+    #[arg(long)]
+    pub force_exclude: bool,
     /// How results are written.
     #[command(flatten)]
     pub output: OutputArgs,

@@ -55,10 +55,13 @@ impl IgnoreRules {
         } else {
             path.file_name().is_some_and(is_ignored_file)
         };
-        if by_name || below.ancestors().skip(1).any(is_ignored_directory) {
-            return true;
-        }
-        // The nearest rule file that says anything decides.
+        by_name
+            || below.ancestors().skip(1).any(is_ignored_directory)
+            || self.excludes(path, is_dir)
+    }
+
+    /// Whether a rule file says so: the nearest that says anything decides.
+    fn excludes(&mut self, path: &Path, is_dir: bool) -> bool {
         let mut directory = path.parent();
         while let Some(at) = directory.filter(|at| at.starts_with(&self.root)) {
             if !self.by_directory.contains_key(at) {
@@ -77,6 +80,11 @@ impl IgnoreRules {
         }
         false
     }
+}
+
+/// Whether a `.qcignore` beside a file or in any directory above it excludes the file. The path is absolute.
+pub fn is_excluded(file: &Path) -> bool {
+    IgnoreRules::new(Path::new("/")).excludes(file, false)
 }
 
 /// Whether a file's name alone is reason enough: dotfiles and unfinished copies.
@@ -154,6 +162,19 @@ mod tests {
         assert!(!rules.ignores(&root.join("maps/keep_draft.xodr"), false));
         assert!(!rules.ignores(&root.join("maps/a.xodr"), false));
         assert!(rules.ignores(Path::new("/elsewhere/a.xodr"), false));
+    }
+
+    #[test]
+    fn file_is_excluded_by_rules_of_any_directory_above_and_not_by_its_name() {
+        let dir = tempfile::tempdir().unwrap();
+        let root = dir.path();
+        let deep = root.join("vendor/.hidden");
+        std::fs::create_dir_all(&deep).unwrap();
+        std::fs::write(root.join(IGNORE_FILE), "/vendor/\n").unwrap();
+        assert!(is_excluded(&deep.join("a.xodr")));
+        assert!(!is_excluded(&root.join("other/.a.xodr")));
+        std::fs::write(deep.join(IGNORE_FILE), "!a.xodr\n").unwrap();
+        assert!(!is_excluded(&deep.join("a.xodr")));
     }
 
     #[test]

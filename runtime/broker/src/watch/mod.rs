@@ -35,6 +35,7 @@ use self::scan::scan;
 use crate::core::Stamp;
 use crate::seams::{Bell, Sender, channel, thread};
 
+pub use self::ignore::is_excluded;
 pub use self::scan::Scan;
 pub use self::sight::{NoFile, Sight, is_behind_a_link, look_at};
 

@@ -21,7 +21,7 @@ use qcbus_messages::path_text::to_text;
 use tokio::sync::mpsc;
 
 use super::settings::{
-    absolute, dialect, limits, manifest_directory, memory_limit, program, settings,
+    absolute, dialect, limits, manifest_directory, memory_limit, program, relative, settings,
 };
 use crate::args::CheckArgs;
 use crate::{standard, talk};
@@ -29,7 +29,7 @@ use outputs::Outputs;
 pub(super) use outputs::report_place;
 use printer::{News, Printer};
 use run::Run;
-use targets::{kinds, targets};
+use targets::{Targets, kinds, targets};
 
 /// Runs the command.
 pub fn run(args: &CheckArgs) -> Exit {
@@ -44,6 +44,10 @@ pub fn run(args: &CheckArgs) -> Exit {
 }
 
 fn carry_out(args: &CheckArgs, prepared: Prepared) -> Result<Exit, Refusal> {
+    say_excluded(args, &prepared.excluded);
+    if prepared.options.roots.is_empty() && prepared.options.files.is_empty() {
+        return Ok(nothing_left(args, prepared.outputs));
+    }
     let cannot = |error| (Exit::Internal, format!("cannot start: {error}"));
     let mut run = Run::new().map_err(cannot)?;
     match warm::check(args, prepared, &mut run) {
@@ -59,6 +63,29 @@ fn carry_out(args: &CheckArgs, prepared: Prepared) -> Result<Exit, Refusal> {
     }
 }
 
+/// Names the files that are passed over, for whoever wants to know everything.
+fn say_excluded(args: &CheckArgs, excluded: &[PathBuf]) {
+    for file in excluded.iter().filter(|_| args.print.verbose) {
+        let shown = to_text(relative(file));
+        talk::say(&format!("note: {shown} is excluded by a .qcignore"));
+    }
+}
+
+/// Every named file is excluded, as whoever excluded them wants. There is nothing to report on.
+fn nothing_left(args: &CheckArgs, mut outputs: Outputs) -> Exit {
+    if args.print.quiet {
+        return Exit::Accepted;
+    }
+    let unwritten = match outputs.give_up() {
+        names if names.is_empty() => String::new(),
+        names => format!("; not written: {}", names.join(", ")),
+    };
+    talk::say(&format!(
+        "note: nothing to check: every named file is excluded by a .qcignore{unwritten}"
+    ));
+    Exit::Accepted
+}
+
 type Refusal = (Exit, String);
 
 fn usage(why: impl Into<String>) -> Refusal {
@@ -70,6 +97,7 @@ struct Prepared {
     options: Options,
     config: Option<Arc<Config>>,
     outputs: Outputs,
+    excluded: Vec<PathBuf>,
 }
 
 fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
@@ -84,7 +112,11 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
     };
     let bundles_d = args.bundles_d.as_deref().map(manifest_directory);
     let bundles_d = bundles_d.transpose().map_err(usage)?;
-    let (roots, files) = targets(args, config.as_deref(), parsed.as_ref())?;
+    let Targets {
+        roots,
+        files,
+        excluded,
+    } = targets(args, config.as_deref(), parsed.as_ref())?;
     // A directory may have any number of them.
     let several = if roots.is_empty() {
         files.len()
@@ -152,6 +184,7 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         options,
         config: parsed.map(Arc::new),
         outputs,
+        excluded,
     })
 }
 

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use qcbus_broker::watch::is_excluded;
 use qcbus_document::{FileKind, Suffix};
 use qcbus_formats::config::Config;
 use qcbus_messages::path_text::{from_text, to_text};
@@ -11,12 +12,20 @@ use super::{Refusal, usage};
 use crate::args::CheckArgs;
 use crate::commands::settings::named;
 
+/// What is to be checked.
+pub(super) struct Targets {
+    pub roots: Vec<PathBuf>,
+    pub files: Vec<PathBuf>,
+    /// Files that are named and that a `.qcignore` excludes.
+    pub excluded: Vec<PathBuf>,
+}
+
 /// Directories and files, from the command line or from the configuration.
 pub(super) fn targets(
     args: &CheckArgs,
     config_path: Option<&Path>,
     config: Option<&Config>,
-) -> Result<(Vec<PathBuf>, Vec<PathBuf>), Refusal> {
+) -> Result<Targets, Refusal> {
     let mut paths = args.paths.clone();
     if paths.is_empty() {
         let Some(config) = config else {
@@ -56,6 +65,15 @@ pub(super) fn targets(
             )));
         }
     }
+    let mut excluded = BTreeSet::new();
+    if args.force_exclude {
+        excluded = files
+            .iter()
+            .filter(|file| is_excluded(file))
+            .cloned()
+            .collect();
+        files.retain(|file| !excluded.contains(file));
+    }
     files.retain(|file| !roots.iter().any(|root| file.starts_with(root)));
     let nested: Vec<PathBuf> = roots
         .iter()
@@ -63,7 +81,11 @@ pub(super) fn targets(
         .cloned()
         .collect();
     roots.retain(|root| !nested.contains(root));
-    Ok((roots.into_iter().collect(), files.into_iter().collect()))
+    Ok(Targets {
+        roots: roots.into_iter().collect(),
+        files: files.into_iter().collect(),
+        excluded: excluded.into_iter().collect(),
+    })
 }
 
 /// A relative InputFile is meant from here, as ASAM's bundles take it, else from beside the
