@@ -205,6 +205,7 @@ fn a_check_that_is_ended_by_a_signal_says_what_it_did_not_look_at() {
                 for (signal, name) in [
                     ("INT", rustix::process::Signal::INT),
                     ("TERM", rustix::process::Signal::TERM),
+                    ("HUP", rustix::process::Signal::HUP),
                 ] {
                     let mut check = place.command(&["check", "large.xodr", "--out", "out"]);
                     let mut check = check

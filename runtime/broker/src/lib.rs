@@ -41,7 +41,7 @@ mod writers;
 pub use core::{ChildSpec, Delivery, Judged, Notice, Restart, Settings};
 pub use demand::InForce;
 pub use directory_lock::LockError;
-pub use engine::{Announcement, Broker, StartError, Stop, Told};
+pub use engine::{Announcement, Broker, OperatorSignal, StartError, Told};
 pub use gate::{GateError, Outside};
 pub use options::Options;
 pub use result_paths::ResultPaths;

@@ -11,7 +11,8 @@ use super::{Actions, Phase, State};
 const GOODBYE_LIMIT: Duration = Duration::from_secs(3);
 
 impl State {
-    pub(super) fn draining(&self) -> bool {
+    /// Whether somebody has told the broker to stop.
+    pub fn draining(&self) -> bool {
         self.phase != Phase::Running
     }
 

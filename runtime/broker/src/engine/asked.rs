@@ -242,6 +242,19 @@ impl Broker {
             return;
         }
         self.fingerprint = now;
+        self.reload_and_say();
+    }
+
+    /// Reads configuration and manifests again for a service manager. One that stops needs no others.
+    pub(super) fn reload_on_signal(&mut self) {
+        if !self.state.draining() {
+            tracing::info!("SIGHUP: configuration and manifests are read again");
+            self.reload_and_say();
+        }
+    }
+
+    /// Nobody waits for an answer: it is said in the log and in the status.
+    fn reload_and_say(&mut self) {
         match self.reload() {
             Ok(changes) if changes.is_empty() => {}
             Ok(changes) => {

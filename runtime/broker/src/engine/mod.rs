@@ -71,11 +71,13 @@ pub enum StartError {
 
 /// What a person at the keyboard or a service manager wants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stop {
-    /// Finish what is there.
+pub enum OperatorSignal {
+    /// Finish what is there, and stop.
     Drain,
-    /// At once.
+    /// Stop at once.
     Quit,
+    /// Read configuration and manifests again, and go on.
+    Reload,
 }
 
 /// A verdict as the loop's owner is told.
@@ -237,7 +239,7 @@ const TRIM_INTERVAL: Duration = Duration::from_secs(10);
 
 impl Broker {
     /// Runs until everything is done (`once`) or somebody wants it to stop.
-    pub async fn run(mut self, mut stops: mpsc::Receiver<Stop>) {
+    pub async fn run(mut self, mut signals: mpsc::Receiver<OperatorSignal>) {
         let children = self.loaded.children.clone();
         self.handle(Event::Children { specs: children });
         for notice in self.loaded.notices.clone() {
@@ -259,9 +261,10 @@ impl Broker {
                 Some(asked) = self.inbox.asked.recv() => self.asked(asked),
                 Some(notice) = self.inbox.notices.recv() => { self.say(notice); true }
                 Some(ready) = self.inbox.deliveries.recv() => self.delivery(ready),
-                Some(stop) = stops.recv() => match stop {
-                    Stop::Drain => { self.notify_stopping(); self.handle(Event::Drain) }
-                    Stop::Quit => { quit = true; false }
+                Some(signal) = signals.recv() => match signal {
+                    OperatorSignal::Drain => { self.notify_stopping(); self.handle(Event::Drain) }
+                    OperatorSignal::Quit => { quit = true; false }
+                    OperatorSignal::Reload => { self.reload_on_signal(); true }
                 },
                 Some(looked) = self.inbox.looked.recv() => self.looked(looked),
                 _ = tick.tick() => { self.look_around(); self.handle(Event::Tick) }

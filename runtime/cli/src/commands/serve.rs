@@ -11,6 +11,7 @@ use qcbus_messages::path_text::to_text;
 use super::settings::{
     absolute, dialect, instance, limits, manifest_directory, memory_limit, program, real, settings,
 };
+use super::stops::Hangup;
 use crate::args::{OutsideArg, ServeArgs};
 use crate::{standard, talk};
 
@@ -18,6 +19,21 @@ use crate::{standard, talk};
 pub fn run(args: &ServeArgs) -> Exit {
     qcbus_broker::memory::share_heaps();
     talk::log("info");
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build();
+    // Before anything that takes time: a terminal that closes during the start must not end it.
+    let prepared = runtime.and_then(|runtime| {
+        let hangup = runtime.block_on(async { Hangup::reloads() })?;
+        Ok((runtime, hangup))
+    });
+    let (runtime, hangup) = match prepared {
+        Ok(prepared) => prepared,
+        Err(error) => {
+            talk::fail(&format!("cannot start: {error}"));
+            return Exit::Internal;
+        }
+    };
     let options = match options(args) {
         Ok(options) => options,
         Err(why) => {
@@ -27,22 +43,12 @@ pub fn run(args: &ServeArgs) -> Exit {
     };
     // What killed checks hold of the shared memory may be what is missing.
     qcbus_bus::sweep_private_instances();
-    let runtime = match tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-    {
-        Ok(runtime) => runtime,
-        Err(error) => {
-            talk::fail(&format!("cannot start: {error}"));
-            return Exit::Internal;
-        }
-    };
-    let exit = runtime.block_on(serve(options));
+    let exit = runtime.block_on(serve(options, hangup));
     runtime.shutdown_background();
     exit
 }
 
-async fn serve(options: Options) -> Exit {
+async fn serve(options: Options, hangup: Hangup) -> Exit {
     let banner = banner(&options);
     let broker = match Broker::start(options, tell) {
         Ok(broker) => broker,
@@ -60,15 +66,15 @@ async fn serve(options: Options) -> Exit {
             };
         }
     };
-    let stops = match super::stops::listen() {
-        Ok(stops) => stops,
+    let signals = match super::stops::listen(hangup) {
+        Ok(signals) => signals,
         Err(error) => {
             talk::fail(&error.to_string());
             return Exit::Internal;
         }
     };
     talk::say(&banner);
-    broker.run(stops).await;
+    broker.run(signals).await;
     talk::say("stopped");
     Exit::Accepted
 }

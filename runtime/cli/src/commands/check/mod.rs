@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
-use qcbus_broker::{Broker, Options, Outside, ResultPaths, Settings, StartError, Stop};
+use qcbus_broker::{Broker, OperatorSignal, Options, Outside, ResultPaths, Settings, StartError};
 use qcbus_bus::{HostOptions, Instance, SharedMemory, StartError as BusError};
 use qcbus_document::FileKind;
 use qcbus_formats::config::{Choice, Config, Known};
@@ -335,7 +335,10 @@ fn drive(run: Run, options: Options, news: &Sender<News>) -> Result<(), Refusal>
 }
 
 /// Passes wishes to stop on, and tells the printer that there was one.
-fn noted(mut stops: mpsc::Receiver<Stop>, news: Sender<News>) -> mpsc::Receiver<Stop> {
+fn noted(
+    mut stops: mpsc::Receiver<OperatorSignal>,
+    news: Sender<News>,
+) -> mpsc::Receiver<OperatorSignal> {
     let (sender, receiver) = mpsc::channel(4);
     tokio::spawn(async move {
         while let Some(stop) = stops.recv().await {
@@ -356,7 +359,7 @@ const START_AGAIN: Duration = Duration::from_millis(50);
 async fn start(
     options: Options,
     news: &Sender<News>,
-    stops: &mut mpsc::Receiver<Stop>,
+    stops: &mut mpsc::Receiver<OperatorSignal>,
 ) -> Result<Option<Broker>, Refusal> {
     let (mut moved, mut most_free) = (Instant::now(), 0);
     let limit = options.settings.room_limit;

@@ -2,7 +2,7 @@
 
 use std::io;
 
-use qcbus_broker::Stop;
+use qcbus_broker::OperatorSignal;
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::mpsc::Receiver;
 
@@ -12,13 +12,13 @@ use crate::commands::stops;
 pub(super) struct Run {
     pub runtime: Runtime,
     /// Listened to from the beginning: no signal is lost between asking a broker and being one.
-    pub stops: Receiver<Stop>,
+    pub stops: Receiver<OperatorSignal>,
 }
 
 impl Run {
     pub fn new() -> io::Result<Run> {
         let runtime = Builder::new_current_thread().enable_all().build()?;
-        let stops = runtime.block_on(async { stops::listen() })?;
+        let stops = runtime.block_on(async { stops::listen(stops::Hangup::stops()?) })?;
         Ok(Run { runtime, stops })
     }
 

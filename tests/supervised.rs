@@ -1,0 +1,103 @@
+//! A broker under the eyes of a service manager, a terminal and other users.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::os::unix::net::UnixStream;
+use std::os::unix::process::CommandExt;
+use std::process::Stdio;
+
+use qcbus_messages::Verdict;
+use rustix::process::{Pid, Signal, kill_process_group};
+use support::broker::Broker;
+use support::content::Content;
+use support::farm::{Farm, tail};
+use support::processes::ProcessKind;
+use support::watchdog::{until_or, until_so};
+
+/// Starts a broker in a process group of its own, as a shell does.
+fn serve_as_a_job(farm: &Farm) -> Broker {
+    let mut command = farm.serve_command();
+    Broker::start(command.process_group(0), &farm.log_path())
+}
+
+/// As a terminal does that closes: whoever is in the group of the broker gets it.
+fn hang_up(broker: &Broker) {
+    let group = Pid::from_raw(broker.pid().cast_signed()).unwrap();
+    kill_process_group(group, Signal::HUP).unwrap();
+}
+
+fn until_it_answers(farm: &Farm) {
+    let answers = || farm.status().map(drop);
+    until_or("the broker answers", answers, || tail(&farm.log()));
+}
+
+fn until_reloaded(farm: &Farm, times: usize) {
+    let reloaded = || farm.log().matches("SIGHUP: ").count();
+    let is_enough = || (reloaded() >= times).then_some(());
+    until_or("it reloads", is_enough, || tail(&farm.log()));
+}
+
+fn bundles(farm: &Farm) -> Vec<i32> {
+    let all = farm.processes().into_iter();
+    let bundles = all.filter(|it| it.kind() == ProcessKind::Bundle);
+    bundles.map(|it| it.pid).collect()
+}
+
+#[test]
+fn hangup_reloads_and_broker_and_bundles_go_on() {
+    let farm = Farm::new();
+    let mut broker = serve_as_a_job(&farm);
+    until_it_answers(&farm);
+    farm.write("first.xodr", &Content::Good(1).bytes());
+    assert_eq!(farm.verdict("first.xodr").verdict, Verdict::Accepted);
+    let before = bundles(&farm);
+    hang_up(&broker);
+    until_reloaded(&farm, 1);
+    farm.write("second.xodr", &Content::Good(2).bytes());
+    assert_eq!(farm.verdict("second.xodr").verdict, Verdict::Accepted);
+    assert_eq!(bundles(&farm), before);
+    broker.signal(Signal::TERM);
+    assert_eq!(broker.wait().code(), Some(0), "{}", tail(&farm.log()));
+}
+
+/// Whether a process has a handler for SIGHUP.
+fn catches_hangup(pid: u32) -> bool {
+    let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
+    let mut lines = status.lines();
+    let mask = lines.find_map(|line| line.strip_prefix("SigCgt:"));
+    mask.is_some_and(|it| u64::from_str_radix(it.trim(), 16).unwrap() & 1 == 1)
+}
+
+#[test]
+fn hangup_during_the_start_does_not_end_it() {
+    let farm = Farm::new();
+    let mut broker = serve_as_a_job(&farm);
+    until_so("it listens to SIGHUP", || catches_hangup(broker.pid()));
+    hang_up(&broker);
+    until_it_answers(&farm);
+    until_reloaded(&farm, 1);
+    assert!(broker.is_alive());
+}
+
+#[test]
+fn closed_log_does_not_end_the_broker() {
+    let farm = Farm::new();
+    let (log, reader) = UnixStream::pair().unwrap();
+    drop(reader);
+    let mut command = farm.serve_command();
+    command.stdin(Stdio::null()).stdout(Stdio::null());
+    let log = Stdio::from(std::os::fd::OwnedFd::from(log));
+    let mut broker = command.stderr(log).spawn().unwrap();
+    until_it_answers(&farm);
+    farm.write("bad.xodr", &Content::NoHeader(1).bytes());
+    assert_eq!(farm.verdict("bad.xodr").verdict, Verdict::Rejected);
+    assert!(broker.try_wait().unwrap().is_none());
+    broker.kill().unwrap();
+    broker.wait().unwrap();
+}
