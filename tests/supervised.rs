@@ -8,15 +8,20 @@
 
 mod support;
 
+use std::fs::Permissions;
+use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
 use std::os::unix::process::CommandExt;
-use std::process::Stdio;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
 
+use qcbus_broker::control::ask_broker;
 use qcbus_messages::Verdict;
+use qcbus_messages::control::Request;
 use rustix::process::{Pid, Signal, kill_process_group};
 use support::broker::Broker;
 use support::content::Content;
-use support::farm::{Farm, tail};
+use support::farm::{Farm, copy_program, tail};
 use support::processes::ProcessKind;
 use support::watchdog::{until_or, until_so};
 
@@ -100,4 +105,80 @@ fn closed_log_does_not_end_the_broker() {
     assert!(broker.try_wait().unwrap().is_none());
     broker.kill().unwrap();
     broker.wait().unwrap();
+}
+
+/// Whoever owns nothing.
+const NOBODY: u32 = 65534;
+
+/// A command as another user; nothing where this test may not be one.
+fn as_nobody(program: &Path, arguments: &[&str]) -> Option<Output> {
+    if !rustix::process::geteuid().is_root() {
+        eprintln!("SKIPPED: only root can be another user");
+        return None;
+    }
+    let mut command = Command::new(program);
+    command.args(arguments).uid(NOBODY).gid(NOBODY);
+    command.env_remove("XDG_RUNTIME_DIR");
+    Some(command.output().unwrap())
+}
+
+fn status_for_nobody(program: &Path, instance: &Path) -> Option<Output> {
+    let instance = instance.to_str().unwrap();
+    as_nobody(program, &["status", "--instance-dir", instance])
+}
+
+/// A farm that others can look into, with a copy of the program that they can run.
+fn open_farm() -> (Farm, PathBuf) {
+    let farm = Farm::new();
+    std::fs::set_permissions(farm.base(), Permissions::from_mode(0o755)).unwrap();
+    let program = farm.base().join("qcbus");
+    copy_program(Path::new(env!("CARGO_BIN_EXE_qcbus")), &program);
+    (farm, program)
+}
+
+#[test]
+fn another_user_is_told_whose_broker_it_is() {
+    let (farm, program) = open_farm();
+    let _broker = farm.serve();
+    until_it_answers(&farm);
+    let directory = farm.instance();
+    let Some(said) = status_for_nobody(&program, &directory) else {
+        return;
+    };
+    let why = String::from_utf8(said.stderr).unwrap();
+    assert_eq!(said.status.code(), Some(4), "{why}");
+    assert!(why.contains("it belongs to user `root` (uid 0)"), "{why}");
+    assert!(!why.contains("no broker"), "{why}");
+    let missing = farm.base().join("nothing");
+    let said = status_for_nobody(&program, &missing).unwrap();
+    let why = String::from_utf8(said.stderr).unwrap();
+    assert_eq!(said.status.code(), Some(4), "{why}");
+    assert!(why.contains("no broker runs as this instance"), "{why}");
+}
+
+#[test]
+fn user_without_a_broker_is_told_of_one_of_another_user() {
+    let (farm, program) = open_farm();
+    // The name tells this broker from those of other tests.
+    let name = format!("test-{}", std::process::id());
+    let directory = farm.base().join(&name);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+    command
+        .arg("serve")
+        .arg(farm.root())
+        .arg("--out")
+        .arg(farm.out());
+    command.arg("--instance-dir").arg(&directory);
+    let mut broker = Broker::start(&mut command, &farm.log_path());
+    until_so("the broker answers", || {
+        ask_broker(&directory, &Request::Status).is_ok()
+    });
+    let said = as_nobody(&program, &["status", "--instance", &name]);
+    let of_root = format!("process {} of user `root` (uid 0)", broker.pid());
+    broker.signal(Signal::TERM);
+    broker.wait();
+    let Some(said) = said else { return };
+    let why = String::from_utf8(said.stderr).unwrap();
+    assert_eq!(said.status.code(), Some(4), "{why}");
+    assert!(why.contains(&of_root), "{why}");
 }

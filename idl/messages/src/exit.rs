@@ -15,7 +15,7 @@ pub enum Exit {
     /// No file is rejected and at least one is undetermined, something could not be looked at, or the
     /// time is over.
     Undetermined = 3,
-    /// No broker runs as the instance that was asked for.
+    /// No broker runs as the instance that was asked for, or it is one of another user.
     NoBroker = 4,
     /// Something went wrong inside qcbus or the system.
     Internal = 5,

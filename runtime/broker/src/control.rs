@@ -10,6 +10,7 @@ use tokio::task::AbortHandle;
 
 mod ask;
 mod clients;
+mod others;
 mod place;
 mod same;
 

@@ -5,21 +5,39 @@ use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use qcbus_bus::Process;
+use qcbus_bus::{Instance, Process};
 use qcbus_messages::control::{Request, Response};
 
-use super::{SOCKET, place, same};
+use super::{SOCKET, others, place, same};
 
 /// Why a broker could not be asked.
 #[derive(Debug, thiserror::Error)]
 pub enum AskError {
     /// Nobody listens.
-    #[error(
-        "no broker runs as this instance ({path}); start one with `qcbus serve`, or name another with --instance"
-    )]
+    #[error("no broker {}", nobody(path, others))]
     NoBroker {
         /// The socket looked for.
         path: PathBuf,
+        /// Brokers of other users that serve an instance of this name, each in words.
+        others: Vec<String>,
+    },
+    /// The instance is another user's.
+    #[error(
+        "this user may not ask the broker of this instance ({path}): it belongs to {owner}; ask as that user"
+    )]
+    Forbidden {
+        /// The socket.
+        path: PathBuf,
+        /// Whose it is, for a person.
+        owner: String,
+    },
+    /// The socket cannot be reached, whoever listens.
+    #[error("cannot ask the broker of this instance ({path}): {why}")]
+    Unreachable {
+        /// The socket.
+        path: PathBuf,
+        /// What the system says.
+        why: String,
     },
     /// The broker went away before it answered.
     #[error("the broker left before it answered ({0}); see its log, and ask again when it runs")]
@@ -42,9 +60,43 @@ pub struct Line {
 /// # Errors
 /// See [`AskError`].
 pub fn ask_broker(directory: &Path, request: &Request) -> Result<Response, AskError> {
-    let path = directory.join(SOCKET);
-    let stream = place::connect(directory).map_err(|_| AskError::NoBroker { path })?;
+    let stream = place::connect(directory).map_err(|error| refused(directory, &error))?;
     Line::on(stream).ask(request)
+}
+
+/// Why there is no connection.
+fn refused(directory: &Path, error: &io::Error) -> AskError {
+    use io::ErrorKind::{ConnectionRefused, NotADirectory, NotFound, PermissionDenied};
+    let path = directory.join(SOCKET);
+    match error.kind() {
+        NotFound | NotADirectory | ConnectionRefused => {
+            let name = Instance::at(directory.to_owned());
+            let others = others::brokers(name.name());
+            AskError::NoBroker { path, others }
+        }
+        PermissionDenied => {
+            let owner = others::owner_of(directory);
+            let owner = owner.map_or("another user".to_owned(), others::user);
+            AskError::Forbidden { path, owner }
+        }
+        _ => {
+            let why = error.to_string();
+            AskError::Unreachable { path, why }
+        }
+    }
+}
+
+fn nobody(path: &Path, others: &[String]) -> String {
+    let path = path.display();
+    if others.is_empty() {
+        return format!(
+            "runs as this instance ({path}); start one with `qcbus serve`, or name another with --instance"
+        );
+    }
+    format!(
+        "of this user runs as this instance ({path}), but {}; ask as that user, with its XDG_RUNTIME_DIR or with --instance-dir",
+        others.join(" and ")
+    )
 }
 
 impl Line {

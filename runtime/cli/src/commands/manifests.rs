@@ -16,6 +16,7 @@ use rustix::fs::{Access, FlockOperation, access, flock};
 use rustix::io::Errno;
 
 use super::readiness;
+use super::remote::exit_of;
 use super::settings::{absolute, instance, real};
 use crate::args::{BundleAddArgs, BundleRemoveArgs, ManifestArgs};
 use crate::{standard, talk};
@@ -183,6 +184,9 @@ impl Home {
             Ok(Response::Status(status)) => status,
             Ok(other) => return Err((Exit::Internal, format!("unexpected answer: {other:?}"))),
             Err(AskError::NoAnswer(why)) => return Err((Exit::Internal, why)),
+            Err(error @ (AskError::Forbidden { .. } | AskError::Unreachable { .. })) => {
+                return Err((exit_of(&error), error.to_string()));
+            }
             Err(AskError::NoBroker { .. } | AskError::Left(_)) => {
                 let why = format!("no broker runs as instance `{name}`");
                 return Err((Exit::NoBroker, why));

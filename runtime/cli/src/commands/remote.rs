@@ -18,11 +18,18 @@ pub fn ask(args: &InstanceArgs, request: &Request) -> Result<Response, Exit> {
     })?;
     ask_broker(instance.dir(), request).map_err(|error| {
         talk::fail(&error.to_string());
-        match error {
-            AskError::NoBroker { .. } | AskError::Left(_) => Exit::NoBroker,
-            AskError::NoAnswer(_) => Exit::Internal,
-        }
+        exit_of(&error)
     })
+}
+
+/// With what a command ends that has no answer.
+pub fn exit_of(error: &AskError) -> Exit {
+    match error {
+        AskError::NoBroker { .. } | AskError::Forbidden { .. } | AskError::Left(_) => {
+            Exit::NoBroker
+        }
+        AskError::Unreachable { .. } | AskError::NoAnswer(_) => Exit::Internal,
+    }
 }
 
 /// `qcbus down`.
