@@ -22,6 +22,15 @@ pub enum Request {
         /// Give up after this many milliseconds; never, when absent.
         timeout_ms: Option<u64>,
     },
+    /// Answer when the file's present bytes have a verdict, and every reporter has said that its report of it is
+    /// written. A request of its own: a broker that does not know it must not answer without the reports.
+    WaitReported {
+        /// Absolute path of the file.
+        #[serde(with = "path_text::one")]
+        file: PathBuf,
+        /// Give up after this many milliseconds; never, when absent.
+        timeout_ms: Option<u64>,
+    },
     /// Check a file for me, watched or not, and give me the result; nothing of it is kept.
     Check {
         /// Absolute path of the file.
@@ -63,10 +72,17 @@ pub enum Request {
 pub enum Response {
     /// Answer to `Status`.
     Status(Box<Status>),
-    /// Answer to `Wait`.
+    /// Answer to `Wait` and `WaitReported`.
     Verdict(FileVerdict),
-    /// Answer to `Wait`: the time is over.
+    /// Answer to `Wait` and `WaitReported`: the time is over.
     TimedOut,
+    /// Answer to `WaitReported`: the time is over, there is a verdict, and reports are missing.
+    Unreported {
+        /// The verdict.
+        verdict: FileVerdict,
+        /// The reporters that have not written theirs, each with why, for a person.
+        reporters: Vec<String>,
+    },
     /// Answer to `Wait`: the file cannot be looked at, or one that it refers to; it lies on a disk that does not answer,
     /// for instance.
     Unanswered {

@@ -452,6 +452,9 @@ pub struct StatusArgs {
 pub struct WaitArgs {
     /// The file
     pub file: PathBuf,
+    /// Wait for the reports on it, too: every reporter that the broker runs has written its own
+    #[arg(long)]
+    pub reports: bool,
     /// Give up after this time (30s, 5m); without it, wait for ever
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub timeout: Option<Duration>,

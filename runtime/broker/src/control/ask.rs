@@ -162,7 +162,7 @@ fn answer(
             return Err(lost(error));
         }
         let is_over = limit.is_some_and(|limit| begin.elapsed() >= limit);
-        if is_over && matches!(request, Request::Wait { .. }) {
+        if is_over && has_own_limit(request) {
             // The broker stands still: whoever asked for a limit gets it all the same.
             return Ok(Response::TimedOut);
         }
@@ -205,6 +205,9 @@ fn has_own_limit(request: &Request) -> bool {
         Request::Wait {
             timeout_ms: Some(_),
             ..
+        } | Request::WaitReported {
+            timeout_ms: Some(_),
+            ..
         }
     )
 }
@@ -212,7 +215,7 @@ fn has_own_limit(request: &Request) -> bool {
 /// How long to wait for an answer; `None`: as long as it takes.
 fn limit_of(request: &Request) -> Option<Duration> {
     match request {
-        Request::Wait { timeout_ms, .. } => {
+        Request::Wait { timeout_ms, .. } | Request::WaitReported { timeout_ms, .. } => {
             timeout_ms.map(|limit| Duration::from_millis(limit) + GRACE)
         }
         Request::Status

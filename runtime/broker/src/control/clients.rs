@@ -280,7 +280,7 @@ async fn answer(visit: &Visit, line: &[u8], stream: &UnixStream) -> Option<Respo
     };
     let takes_long = matches!(
         request,
-        Request::Wait { .. } | Request::Check { .. } | Request::Down
+        Request::Wait { .. } | Request::WaitReported { .. } | Request::Check { .. } | Request::Down
     );
     if takes_long && !visit.may_wait() {
         let waiting = visit.clients.bounds.waiting;
@@ -289,7 +289,9 @@ async fn answer(visit: &Visit, line: &[u8], stream: &UnixStream) -> Option<Respo
              some have theirs, or start the broker with a higher limit of open files (`ulimit -n`)"
         );
         match request {
-            Request::Wait { .. } => return Some(Response::Failed { reason }),
+            Request::Wait { .. } | Request::WaitReported { .. } => {
+                return Some(Response::Failed { reason });
+            }
             Request::Check { .. } => return Some(Response::Elsewhere { reason }),
             _ => {}
         }

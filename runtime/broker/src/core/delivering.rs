@@ -73,6 +73,7 @@ impl State {
             };
             // One that is away gets everything that it lacks when it joins.
             if reporter.session.is_some() {
+                reporter.retries.forget(file);
                 reporter.queue.push_back(file);
                 self.deliver(u32::try_from(index).unwrap_or(u32::MAX), actions);
             }
@@ -147,42 +148,76 @@ impl State {
         report: PeerReport,
         actions: &mut Actions,
     ) {
-        let (now, max_text) = (self.now, self.settings.max_text);
         let Some(reporter) = self.reporters.get_mut(index as usize) else {
             return;
         };
         let Some(sent) = reporter.active.remove(&job) else {
             return;
         };
-        let file = sent.file;
-        reporter.moved = now;
+        reporter.moved = self.now;
         reporter.done += 1;
-        let name = reporter.name.clone();
-        let is_written = report == PeerReport::Written;
-        if let PeerReport::Failed(mut why) = report {
-            clip_text(&mut why, max_text);
-            reporter.failed += 1;
-            reporter.note.clone_from(&why);
-            let why = format!("could not report: {why}");
-            self.notice(Notice::not_reported(&name, why), actions);
-        }
-        if let Some(entry) = self.files.get_mut(file) {
-            entry.delivered.retain(|(other, _)| *other != index);
-            entry.delivered.push((index, Reported::Of(job)));
-            // What failed is not tried again by this broker, and is by the next one: the journal
-            // does not have it.
-            if is_written {
-                let path = entry.path.clone();
-                actions.push(Action::Delivered {
-                    reporter: name,
-                    path,
-                    job,
-                });
-            }
+        match report {
+            PeerReport::Written => self.is_reported(index, sent.file, job, actions),
+            PeerReport::Failed(why) => self.is_not_reported(index, sent.file, why, actions),
         }
         self.deliver(index, actions);
         if sent.is_large() {
             self.deliver_what_waited(actions);
+        }
+    }
+
+    fn is_reported(&mut self, index: u32, file: FileId, job: JobId, actions: &mut Actions) {
+        let Some(reporter) = self.reporters.get_mut(index as usize) else {
+            return;
+        };
+        let had_failed = reporter.retries.len() > 0;
+        reporter.queue.extend(reporter.retries.written(file));
+        let name = reporter.name.clone();
+        if had_failed && reporter.retries.len() == 0 && reporter.not_withdrawn == 0 {
+            reporter.note.clear();
+            self.is_over(|it| matches!(it, Notice::NotReported { name: of, .. } if *of == name));
+        }
+        if let Some(entry) = self.files.get_mut(file) {
+            entry.delivered.retain(|(other, _)| *other != index);
+            entry.delivered.push((index, Reported::Of(job)));
+            let path = entry.path.clone();
+            actions.push(Action::Delivered {
+                reporter: name,
+                path,
+                job,
+            });
+        }
+        self.settle_waits(file, actions);
+    }
+
+    /// It is tried again after a pause, and the journal does not have it: the next broker tries it, too.
+    fn is_not_reported(&mut self, index: u32, file: FileId, why: String, actions: &mut Actions) {
+        let (now, pause) = (self.now, self.settings.retry_after);
+        let mut why = why;
+        clip_text(&mut why, self.settings.max_text);
+        let Some(reporter) = self.reporters.get_mut(index as usize) else {
+            return;
+        };
+        let is_new = reporter.retries.failed(file, now, pause);
+        if is_new || reporter.note != why {
+            reporter.note.clone_from(&why);
+            let why = format!("could not report, and tries again: {why}");
+            let notice = Notice::not_reported(&reporter.name, why);
+            self.notice(notice, actions);
+        }
+    }
+
+    /// Tries reports again that failed, when their pause is over.
+    pub(super) fn report_again(&mut self, actions: &mut Actions) {
+        for index in 0..self.reporters.len() {
+            let Some(reporter) = self.reporters.get_mut(index) else {
+                continue;
+            };
+            let probes = reporter.retries.probes(self.now);
+            if !probes.is_empty() {
+                reporter.queue.extend(probes);
+                self.deliver(u32::try_from(index).unwrap_or(u32::MAX), actions);
+            }
         }
     }
 
@@ -206,7 +241,7 @@ impl State {
         let name = reporter.name.clone();
         if let PeerReport::Failed(mut why) = report {
             clip_text(&mut why, max_text);
-            reporter.failed += 1;
+            reporter.not_withdrawn += 1;
             reporter.note.clone_from(&why);
             let why = format!("could not withdraw: {why}");
             self.notice(Notice::not_reported(&name, why), actions);
@@ -232,8 +267,13 @@ impl State {
         let index = self.reporter_index(&name);
         if let Some(reporter) = self.reporters.get_mut(index as usize)
             && let Some(Sent { file, .. }) = reporter.active.remove(&job)
-            && self.files.get(file).is_some_and(|it| it.present)
+            && let Some(entry) = self.files.get(file).filter(|it| it.present)
         {
+            if entry.judged.as_ref().is_some_and(|it| it.is_written()) {
+                let pause = self.settings.retry_after;
+                reporter.retries.failed(file, self.now, pause);
+                reporter.note.clone_from(&why);
+            }
             self.notice(Notice::NotDelivered(why), actions);
         }
         self.deliver(index, actions);

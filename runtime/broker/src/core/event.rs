@@ -2,7 +2,6 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Duration;
 
 use qcbus_messages::{Digest, FromPeer, Hello, JobId};
 
@@ -11,6 +10,7 @@ use super::types::{
     ChildEnd, ChildSpec, Demand, Launch, PrepareFailure, PreparedJob, SessionId, Stamp,
     StoreOutcome, Ticket,
 };
+use super::waits::Until;
 
 /// Everything that can happen to the broker.
 #[derive(Debug)]
@@ -125,8 +125,8 @@ pub enum Event {
         stamp: Option<Stamp>,
         /// Why nobody will ever check it, if so.
         unwatched: Option<String>,
-        /// When to give up.
-        timeout: Option<Duration>,
+        /// What for, and when to give up.
+        until: Until,
     },
     /// A client wants a file checked for itself alone.
     Check {

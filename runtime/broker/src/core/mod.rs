@@ -25,7 +25,9 @@ mod maps;
 mod notice;
 mod outcome;
 mod queue;
+mod reported;
 mod reporters;
+mod retries;
 mod roster;
 mod settings;
 mod staging;
@@ -60,6 +62,7 @@ pub(crate) use outcome::{facts_weight, weight};
 pub use settings::Settings;
 pub use trials::TrialEnd;
 pub use types::*;
+pub use waits::Until;
 
 use announcing::Unrest;
 use bundles::Bundle;
@@ -249,9 +252,9 @@ impl State {
                 path,
                 stamp,
                 unwatched,
-                timeout,
+                until,
             } => {
-                self.wait(ticket, &path, stamp, unwatched, timeout, &mut actions);
+                self.wait(ticket, &path, stamp, unwatched, until, &mut actions);
             }
             Event::Check { path, errand } => self.errand(&path, errand, &mut actions),
             Event::Pooled { job, outcome } => self.pooled(job, outcome, &mut actions),
@@ -371,6 +374,7 @@ impl State {
         self.watch_reporters(actions);
         self.fail_absent();
         self.read_again_what_was_unreadable();
+        self.settle_reported(actions);
         self.expire_waits(actions);
     }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use qcbus_ingest::modular::SearchPath;
+use qcbus_messages::control::Response;
 use qcbus_messages::{
     Digest, FromPeer, Hello, JobId, PROTOCOL_VERSION, PeerReport, Role, ToPeer, Verdict,
 };
@@ -78,6 +79,17 @@ impl Desk {
 
     fn judges_nothing(&mut self) {
         self.state.settings.collect = Duration::MAX;
+    }
+
+    /// The verdict is one of those who must judge now: nobody. It is about the bytes that are there.
+    fn makes_it_stand(&mut self) {
+        let config = self.state.config;
+        let path = self.path.clone();
+        let content = Reading::Read(Stamp::default(), Digest::default());
+        let entry = self.state.files.get_mut(0).unwrap();
+        let judged = Arc::make_mut(entry.judged.as_mut().unwrap());
+        judged.config = config;
+        judged.inputs = vec![Input { path, content }];
     }
 
     fn vanish(&mut self) -> Vec<Action> {
@@ -468,7 +480,7 @@ fn what_a_reporter_did_and_could_not_do_is_in_its_status() {
     let status = desk.state.status();
     let peer = status.peers.iter().find(|it| it.name == TEXT).unwrap();
     assert_eq!(peer.done, 3);
-    assert_eq!(peer.note, "2 not reported: no rights");
+    assert_eq!(peer.note, "2 not reported: no rights; tried again in 1 s");
 }
 
 #[test]
@@ -611,4 +623,128 @@ fn a_reporter_whose_process_has_ended_is_away_at_once() {
     let said =
         |it: &Action| matches!(it, Action::Notice(Notice::Ended { name, .. }) if name == TEXT);
     assert!(actions.iter().any(said), "{actions:?}");
+}
+
+#[test]
+fn failed_report_is_tried_again_after_a_pause_and_then_the_rest() {
+    let mut desk = Desk::new(true);
+    more(&mut desk, &[1; 20]);
+    let (session, _) = desk.join();
+    let mut given: Vec<u64> = (8..12).collect();
+    while let Some(job) = given.pop() {
+        given.extend(sent(&desk.say(session, not(written(job), "no room"))));
+    }
+    let remark = |desk: &Desk| desk.state.status().peers[0].note.clone();
+    assert_eq!(
+        remark(&desk),
+        "20 not reported: no room; tried again in 1 s"
+    );
+    let after = Duration::from_secs(1) + desk.state.settings.retry_after;
+    let early = desk
+        .state
+        .handle(after - Duration::from_millis(1), Event::Tick);
+    assert!(sent(&early).is_empty(), "{early:?}");
+    let mut given = sent(&desk.state.handle(after, Event::Tick));
+    assert_eq!(given.len(), 4, "as many as it takes at once");
+    let mut all = 0;
+    while let Some(job) = given.pop() {
+        all += 1;
+        given.extend(sent(&desk.say(session, written(job))));
+    }
+    assert_eq!((all, remark(&desk)), (20, String::new()));
+    assert!(desk.state.status().notices.is_empty());
+}
+
+#[test]
+fn result_that_cannot_be_read_back_is_delivered_later() {
+    let mut desk = Desk::new(false);
+    let path = desk.path.clone();
+    desk.event(Event::Present { path });
+    let (session, _) = desk.join();
+    let (job, why) = (JobId(7), "the disk is in trouble".to_owned());
+    desk.event(Event::Undeliverable { session, job, why });
+    let after = Duration::from_secs(1) + desk.state.settings.retry_after;
+    assert_eq!(sent(&desk.state.handle(after, Event::Tick)), [7]);
+}
+
+/// A client waits for the verdict and the reports; what it is answered.
+fn waits(desk: &mut Desk, timeout: Option<Duration>) -> Vec<Action> {
+    let path = desk.path.clone();
+    let reports = true;
+    desk.event(Event::Wait {
+        ticket: Ticket(1),
+        path,
+        stamp: Some(Stamp::default()),
+        unwatched: None,
+        until: Until { timeout, reports },
+    })
+}
+
+fn answer(actions: &[Action]) -> Option<&Response> {
+    actions.iter().find_map(|it| match it {
+        Action::Answer { response, .. } => Some(response),
+        _ => None,
+    })
+}
+
+#[test]
+fn client_that_waits_for_reports_is_answered_when_every_one_is_written() {
+    let mut desk = Desk::new(false);
+    desk.makes_it_stand();
+    let launch = desk.wants(1);
+    let actions = waits(&mut desk, None);
+    assert_eq!(answer(&actions), None, "the reporter is still to come");
+    let (session, _) = desk.join_as(Some(launch.0));
+    let failed = desk.say(session, not(written(7), "no room"));
+    assert_eq!(answer(&failed), None, "it is tried again");
+    let after = Duration::from_secs(1) + desk.state.settings.retry_after;
+    assert_eq!(sent(&desk.state.handle(after, Event::Tick)), [7]);
+    let done = desk.say(session, written(7));
+    assert!(
+        matches!(answer(&done), Some(Response::Verdict(_))),
+        "{done:?}"
+    );
+}
+
+#[test]
+fn client_is_told_at_its_timeout_which_report_is_missing_and_why() {
+    let mut desk = Desk::new(false);
+    desk.makes_it_stand();
+    let launch = desk.wants(1);
+    let (session, _) = desk.join_as(Some(launch.0));
+    let timeout = Duration::from_millis(500);
+    waits(&mut desk, Some(timeout));
+    desk.say(session, not(written(7), "no room"));
+    let over = Duration::from_secs(1) + timeout;
+    let actions = desk.state.handle(over, Event::Tick);
+    let Some(Response::Unreported { reporters, .. }) = answer(&actions) else {
+        panic!("{actions:?}");
+    };
+    let why = "text: 1 not reported: no room; tried again in 1 s";
+    assert_eq!(reporters, &[why]);
+}
+
+#[test]
+fn client_that_waits_for_reports_does_not_wait_where_there_is_no_reporter() {
+    let mut desk = Desk::new(false);
+    desk.makes_it_stand();
+    let actions = waits(&mut desk, None);
+    assert!(
+        matches!(answer(&actions), Some(Response::Verdict(_))),
+        "{actions:?}"
+    );
+}
+
+#[test]
+fn client_is_answered_when_the_reporter_that_owes_is_removed() {
+    let mut desk = Desk::new(false);
+    desk.makes_it_stand();
+    desk.wants(1);
+    assert_eq!(answer(&waits(&mut desk, None)), None);
+    desk.event(Event::Children { specs: Vec::new() });
+    let actions = desk.event(Event::Tick);
+    assert!(
+        matches!(answer(&actions), Some(Response::Verdict(_))),
+        "{actions:?}"
+    );
 }

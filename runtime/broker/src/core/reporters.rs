@@ -12,6 +12,7 @@ use super::action::Action;
 use super::delivering::Sent;
 use super::files::{FileId, Files};
 use super::notice::Notice;
+use super::retries::Retries;
 use super::types::{Launch, Reported, SessionId};
 use super::{Actions, State};
 
@@ -38,7 +39,10 @@ pub(super) struct Reporter {
     pub heard: Duration,
     pub moved: Duration,
     pub done: u64,
-    pub failed: u64,
+    /// Reports that failed.
+    pub retries: Retries,
+    /// Reports that it could not take back.
+    pub not_withdrawn: u64,
     pub note: String,
 }
 
@@ -63,10 +67,24 @@ impl Reporter {
         self.queue.remove(at)
     }
 
+    /// What a person should know of it: reports that are missing and why, or why it is down.
+    pub fn remark(&self, now: Duration) -> String {
+        let missing = self.retries.len() as u64 + self.not_withdrawn;
+        if missing == 0 {
+            return self.note.clone();
+        }
+        let again = self.retries.due().map_or(String::new(), |due| {
+            let seconds = due.saturating_sub(now).as_secs_f64().ceil();
+            format!("; tried again in {seconds} s")
+        });
+        format!("{missing} not reported: {}{again}", self.note)
+    }
+
     /// A session is over: what was said in it counts no more.
     fn forget_session(&mut self) {
         self.active.clear();
         self.queue.clear();
+        self.retries = Retries::default();
         self.void.append(&mut self.voiding);
     }
 }
@@ -192,6 +210,7 @@ impl State {
             let has = |it: &(u32, Reported)| usize::try_from(it.0) == Ok(index);
             let under_way = reporter.active.values().any(|sent| sent.file == id);
             reporter.active.retain(|_, sent| sent.file != id);
+            reporter.retries.forget(id);
             let pending =
                 reporter.void.contains(&entry.path) || reporter.voiding.contains(&entry.path);
             // A former broker may have sent it and died before it heard of the report.
@@ -262,6 +281,7 @@ impl State {
     pub(super) fn watch_reporters(&mut self, actions: &mut Actions) {
         // One that had a large result may have gone.
         self.deliver_what_waited(actions);
+        self.report_again(actions);
         let limit = self.settings.job_deadline;
         let silence = self.settings.silence_limit;
         let mut failing = Vec::new();

@@ -160,11 +160,7 @@ impl State {
             threads: 0,
             done: it.done,
             restarts: self.restarts(&it.name),
-            note: if it.failed > 0 {
-                format!("{} not reported: {}", it.failed, it.note)
-            } else {
-                it.note.clone()
-            },
+            note: it.remark(self.now),
             ..PeerStatus::default()
         });
         let starting = self.children.iter().filter(|(name, _)| {

@@ -1,5 +1,6 @@
 //! Clients that wait for the verdict on a file's present bytes.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -13,12 +14,23 @@ use super::files::{FileEntry, FileId, Priority, Stage};
 use super::types::{Judged, Stamp, Ticket, file_verdict};
 use super::{Actions, State};
 
+/// For what a client of the control socket waits, and when it gives up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Until {
+    /// When to give up; never, when absent.
+    pub timeout: Option<Duration>,
+    /// Also for every reporter to have its report written.
+    pub reports: bool,
+}
+
 /// One client.
 #[derive(Debug)]
 pub(super) struct Waiter {
     ticket: Ticket,
     path: Arc<Path>,
     until: Option<Duration>,
+    /// It waits for the reports, too.
+    reports: bool,
     /// Whether the file has been seen to be there since it was asked for. A verdict is kept while a
     /// watched directory is away, and nobody may be told that what is not there was accepted.
     seen: bool,
@@ -39,7 +51,7 @@ impl State {
         path: &Arc<Path>,
         stamp: Option<Stamp>,
         unwatched: Option<String>,
-        timeout: Option<Duration>,
+        until: Until,
         actions: &mut Actions,
     ) {
         if let Some(reason) = unwatched {
@@ -49,11 +61,11 @@ impl State {
             });
             return;
         }
-        let until = timeout.map(|timeout| self.now + timeout);
         self.waiters.push(Waiter {
             ticket,
             path: path.clone(),
-            until,
+            until: until.timeout.map(|timeout| self.now + timeout),
+            reports: until.reports,
             seen: false,
         });
         if let Some(stamp) = stamp
@@ -99,9 +111,21 @@ impl State {
 
     /// Answers everybody who waits for this file, if there is nothing more to wait for.
     pub(super) fn settle_waits(&mut self, id: FileId, actions: &mut Actions) {
-        let Some(entry) = self.files.get(id) else {
+        let Some((path, judged)) = self.standing_verdict(id) else {
             return;
         };
+        let for_reports = |it: &Waiter| it.reports && it.path == path;
+        let waits = self.waiters.iter().any(for_reports);
+        let is_reported = !waits || self.unreported(id).is_empty();
+        let told = |it: &Waiter| it.seen && it.path == path && (!it.reports || is_reported);
+        self.answer(actions, told, || {
+            Response::Verdict(file_verdict(&path, &judged))
+        });
+    }
+
+    /// The verdict on a file, if there is nothing more to wait for.
+    fn standing_verdict(&self, id: FileId) -> Option<(Arc<Path>, Arc<Judged>)> {
+        let entry = self.files.get(id)?;
         // One that waits in the background may have a verdict that stands nevertheless.
         let settled = matches!(
             entry.stage(),
@@ -110,14 +134,17 @@ impl State {
         let stands = |judged: &Arc<Judged>| {
             settled && entry.present && !entry.doubted && self.stands(entry.kind, judged)
         };
-        let Some(judged) = entry.judged.clone().filter(stands) else {
-            return;
-        };
-        let path = entry.path.clone();
-        let told = |waiter: &Waiter| waiter.seen && waiter.path == path;
-        self.answer(actions, told, || {
-            Response::Verdict(file_verdict(&path, &judged))
-        });
+        let judged = entry.judged.clone().filter(stands)?;
+        Some((entry.path.clone(), judged))
+    }
+
+    /// Answers clients that wait for reports of which nobody is in debt any more: a reporter may have been removed.
+    pub(super) fn settle_reported(&mut self, actions: &mut Actions) {
+        let waiting = self.waiters.iter().filter(|it| it.reports && it.seen);
+        let files: BTreeSet<FileId> = waiting.filter_map(|it| self.files.id(&it.path)).collect();
+        for id in files {
+            self.settle_waits(id, actions);
+        }
     }
 
     /// A person wants a bundle off the roster.
@@ -156,16 +183,30 @@ impl State {
 
     pub(super) fn expire_waits(&mut self, actions: &mut Actions) {
         let now = self.now;
-        self.waiters.retain(|waiter| {
-            let over = waiter.until.is_some_and(|until| until <= now);
-            if over {
-                actions.push(Action::Answer {
-                    ticket: waiter.ticket,
-                    response: Response::TimedOut,
-                });
-            }
-            !over
-        });
+        let is_over = |it: &Waiter| it.until.is_some_and(|until| until <= now);
+        let waiters = std::mem::take(&mut self.waiters);
+        let (over, rest): (Vec<Waiter>, _) = waiters.into_iter().partition(is_over);
+        self.waiters = rest;
+        for waiter in over {
+            actions.push(Action::Answer {
+                ticket: waiter.ticket,
+                response: self.in_vain(&waiter),
+            });
+        }
+    }
+
+    /// The answer to a client whose time is over.
+    fn in_vain(&self, waiter: &Waiter) -> Response {
+        let id = self.files.id(&waiter.path);
+        let id = id.filter(|_| waiter.reports && waiter.seen);
+        let standing = id.and_then(|id| Some((id, self.standing_verdict(id)?)));
+        let Some((id, (path, judged))) = standing else {
+            return Response::TimedOut;
+        };
+        Response::Unreported {
+            verdict: file_verdict(&path, &judged),
+            reporters: self.unreported(id),
+        }
     }
 
     /// The broker stops: nobody is left without an answer.

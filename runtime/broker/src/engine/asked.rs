@@ -10,7 +10,7 @@ use tokio::sync::oneshot;
 use super::looks::{Look, Seen, Sighted};
 use super::{Broker, Told};
 use crate::control::Asked;
-use crate::core::{Errand, Event, Notice, Stamp, Ticket};
+use crate::core::{Errand, Event, Notice, Stamp, Ticket, Until};
 use crate::demand::InForce;
 use crate::gate::Gate;
 use crate::reload::{Fingerprint, LoadError, command_of, differences};
@@ -25,6 +25,7 @@ impl Broker {
             asked.request,
             Request::Status
                 | Request::Wait { .. }
+                | Request::WaitReported { .. }
                 | Request::Check { .. }
                 | Request::Bundle { .. }
                 | Request::Trials { .. }
@@ -40,13 +41,10 @@ impl Broker {
                 answer(asked.answer, Response::Status(status))
             }
             Request::Wait { file, timeout_ms } => {
-                let look = Look {
-                    file,
-                    timeout_ms,
-                    answer: asked.answer,
-                    is_led: false,
-                };
-                self.look_at(look)
+                self.wait_for(file, timeout_ms, false, asked.answer)
+            }
+            Request::WaitReported { file, timeout_ms } => {
+                self.wait_for(file, timeout_ms, true, asked.answer)
             }
             Request::Check { file, terms } => self.check(&file, &terms, asked.answer),
             Request::Down => {
@@ -77,6 +75,22 @@ impl Broker {
                 answer(asked.answer, Response::Offers { offers })
             }
         }
+    }
+
+    fn wait_for(
+        &mut self,
+        file: PathBuf,
+        timeout_ms: Option<u64>,
+        reports: bool,
+        answer: oneshot::Sender<Response>,
+    ) -> bool {
+        let timeout = timeout_ms.map(Duration::from_millis);
+        self.look_at(Look {
+            file,
+            until: Until { timeout, reports },
+            answer,
+            is_led: false,
+        })
     }
 
     fn reload_for_a_client(&mut self) -> Response {
@@ -151,7 +165,7 @@ impl Broker {
             let _ = look.answer.send(Response::Unanswered { reason });
             return true;
         }
-        let (file, timeout_ms) = (&*file, look.timeout_ms);
+        let (file, until) = (&*file, look.until);
         let ticket = self.ticket(look.answer);
         if let (None, Some(watcher)) = (&unwatched, &self.watcher) {
             match stamp {
@@ -161,13 +175,12 @@ impl Broker {
                 None => watcher.look(file.into()),
             }
         }
-        let timeout = timeout_ms.map(Duration::from_millis);
         self.handle(Event::Wait {
             ticket,
             path: file.into(),
             stamp,
             unwatched,
-            timeout,
+            until,
         })
     }
 

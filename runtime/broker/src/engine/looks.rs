@@ -12,7 +12,7 @@ use qcbus_messages::path_text::to_text;
 use tokio::sync::oneshot;
 
 use super::Broker;
-use crate::core::{Event, Input, PrepareFailure, Stamp};
+use crate::core::{Event, Input, PrepareFailure, Stamp, Until};
 use crate::reload::Fingerprint;
 use crate::result_paths::ResultPaths;
 use crate::scouts::{PATIENCE, Scouts};
@@ -66,7 +66,7 @@ impl Looks {
 /// A client that waits for the verdict on a file, which is being looked at for it.
 pub(super) struct Look {
     pub file: PathBuf,
-    pub timeout_ms: Option<u64>,
+    pub until: Until,
     pub answer: oneshot::Sender<Response>,
     /// The path that was given led to this file.
     pub is_led: bool,

@@ -71,7 +71,11 @@ pub fn wait(args: &WaitArgs) -> Exit {
     let timeout_ms = args
         .timeout
         .map(|it| u64::try_from(it.as_millis()).unwrap_or(u64::MAX));
-    match ask(&args.instance, &Request::Wait { file, timeout_ms }) {
+    let request = match args.reports {
+        true => Request::WaitReported { file, timeout_ms },
+        false => Request::Wait { file, timeout_ms },
+    };
+    match ask(&args.instance, &request) {
         Ok(Response::Verdict(verdict)) => tell(args, &verdict),
         Ok(Response::TimedOut) => {
             talk::fail(&format!(
@@ -79,6 +83,12 @@ pub fn wait(args: &WaitArgs) -> Exit {
                 to_text(&args.file),
                 why_no_verdict(args)
             ));
+            Exit::Undetermined
+        }
+        Ok(Response::Unreported { verdict, reporters }) => {
+            tell(args, &verdict);
+            let (file, why) = (to_text(&args.file), reporters.join("; "));
+            talk::fail(&format!("not all reports on {file} in time: {why}"));
             Exit::Undetermined
         }
         Ok(Response::Unanswered { reason }) => {

@@ -62,7 +62,7 @@ fn a_bundle_that_another_command_starts_judges_anew() {
         path: path_of(0),
         stamp: Some(stamp(world.there[&path_of(0)])),
         unwatched: None,
-        timeout: None,
+        until: Until::default(),
     };
     let answered = |it: &Action| matches!(it, Action::Answer { .. });
     assert!(!world.state.handle(world.now, waits).iter().any(answered));

@@ -350,7 +350,7 @@ fn waits(file: u8, unwatched: Option<String>, stamp: Option<Stamp>) -> Event {
         path: path_of(file),
         stamp,
         unwatched,
-        timeout: None,
+        until: Until::default(),
     }
 }
 
@@ -478,7 +478,7 @@ fn who_waits_for_what_is_not_there_is_not_told_what_was() {
             path: path_of(1),
             stamp: None,
             unwatched: None,
-            timeout: None,
+            until: Until::default(),
         });
         world.pass(Duration::from_secs(30));
         assert!(world.waiting.contains_key(&ticket));
@@ -578,7 +578,7 @@ fn a_verdict_that_stands_after_all_is_not_told_of_what_is_not_there() {
         path: path_of(1),
         stamp: None,
         unwatched: None,
-        timeout: None,
+        until: Until::default(),
     };
     let answered = |it: &Action| matches!(it, Action::Answer { .. });
     assert!(!comes_of(&mut world, waits).iter().any(answered));

@@ -249,7 +249,10 @@ impl World {
             stamp: self.there.get(&path).map(|number| stamp(*number)),
             path,
             unwatched: None,
-            timeout,
+            until: Until {
+                timeout,
+                reports: false,
+            },
         });
     }
 
