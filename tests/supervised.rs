@@ -183,3 +183,85 @@ fn user_without_a_broker_is_told_of_one_of_another_user() {
     assert_eq!(said.status.code(), Some(4), "{why}");
     assert!(why.contains(&of_root), "{why}");
 }
+
+/// What `status --health` says, and with what it ends.
+fn health(farm: &Farm) -> (Option<i32>, String) {
+    let said = farm.qcbus(&["status", "--health"]);
+    (said.status.code(), String::from_utf8(said.stdout).unwrap())
+}
+
+fn until_health(farm: &Farm, wanted: i32, reason: &str) {
+    let is_so = || {
+        let (code, text) = health(farm);
+        (code == Some(wanted) && text.contains(reason)).then_some(())
+    };
+    let explain = || format!("{:?}\n{}", health(farm), tail(&farm.log()));
+    until_or(reason, is_so, explain);
+}
+
+#[test]
+fn health_is_an_exit_code_with_reasons() {
+    let farm = Farm::with(&["--max-restarts", "1"]);
+    assert_eq!(health(&farm), (Some(4), String::new()));
+    let _broker = farm.serve_ready();
+    until_health(&farm, 0, "healthy\n");
+    farm.let_in("dies_on_every_job", "");
+    farm.write("a.xodr", &Content::Good(1).bytes());
+    until_health(&farm, 1, "\nbundle dies_on_every_job ");
+    let plain = farm.qcbus(&["status"]);
+    assert_eq!(plain.status.code(), Some(0));
+    farm.send_away("dies_on_every_job");
+    until_health(&farm, 0, "healthy\n");
+}
+
+#[test]
+fn watched_directory_that_is_away_is_no_health() {
+    let farm = Farm::new();
+    let _broker = farm.serve_ready();
+    let aside = farm.base().join("aside");
+    std::fs::rename(farm.root(), &aside).unwrap();
+    until_health(&farm, 1, "farm: is gone\n");
+    std::fs::rename(&aside, farm.root()).unwrap();
+    until_health(&farm, 0, "healthy\n");
+}
+
+#[test]
+fn missing_report_is_no_health() {
+    let farm = Farm::with(&["--report", "text"]);
+    let _broker = farm.serve_ready();
+    let obstacle = farm.out().join("a.xodr.txt/obstacle");
+    std::fs::create_dir_all(&obstacle).unwrap();
+    farm.write("a.xodr", &Content::Good(1).bytes());
+    until_health(&farm, 1, " cannot report: 1 not reported: ");
+    std::fs::remove_dir_all(obstacle.parent().unwrap()).unwrap();
+    until_health(&farm, 0, "healthy\n");
+}
+
+#[test]
+fn doctor_looks_at_the_running_broker() {
+    let mut farm = Farm::new();
+    let state = farm.base().join("state");
+    let gate = farm.gate();
+    for (option, path) in [("--state", &state), ("--gate", &gate)] {
+        let path = path.to_str().unwrap().to_owned();
+        farm.arguments.extend([option.to_owned(), path]);
+    }
+    let told = |farm: &Farm| String::from_utf8(farm.qcbus(&["doctor"]).stdout).unwrap();
+    let journal = format!("{}/journal.sqlite", state.display());
+    let without = told(&farm);
+    assert!(without.contains("none runs as this instance"), "{without}");
+    assert!(
+        without.contains("/qcbus-out/.qcbus/journal.sqlite"),
+        "{without}"
+    );
+    let _broker = farm.serve_ready();
+    let with = told(&farm);
+    for wanted in [
+        &journal,
+        gate.to_str().unwrap(),
+        farm.out().to_str().unwrap(),
+    ] {
+        assert!(with.contains(wanted), "{wanted}\n{with}");
+    }
+    assert!(!with.contains("qcbus-out"), "{with}");
+}

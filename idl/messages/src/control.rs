@@ -313,6 +313,9 @@ pub struct Status {
     /// Where results go.
     #[serde(with = "path_text::one")]
     pub out: PathBuf,
+    /// Where it keeps what must survive a restart.
+    #[serde(default)]
+    pub state: Option<PathBuf>,
     /// The directory of bundle manifests that it watches.
     #[serde(default)]
     pub bundles_d: Option<PathBuf>,
@@ -332,6 +335,9 @@ pub struct Status {
     /// What lies in the watched directories and cannot be looked at now; the first hundred.
     #[serde(default)]
     pub unseen: Vec<Unseen>,
+    /// What keeps the broker from its work at this moment, for a person.
+    #[serde(default)]
+    pub troubles: Vec<String>,
     /// Things a person should look at, newest last.
     pub notices: Vec<NoticeStatus>,
 }
@@ -453,6 +459,9 @@ pub struct PeerStatus {
     pub done: u64,
     /// Times that it was started again.
     pub restarts: u64,
+    /// Of a reporter, reports that are not written or not taken back.
+    #[serde(default)]
+    pub unreported: u64,
     /// Remarks: why it is down, that it is slow.
     pub note: String,
     /// How far it is confined; nothing where nobody can tell, and for reporters.

@@ -8,12 +8,12 @@ use crate::Verdict;
 pub enum Exit {
     /// Everything that was checked is accepted, or the command did what it was asked to.
     Accepted = 0,
-    /// At least one file is rejected.
+    /// At least one file is rejected; of `doctor` and `status --health`: something needs a look.
     Rejected = 1,
     /// Wrong usage or configuration, nothing to check, or a file that nobody watches.
     Usage = 2,
     /// No file is rejected and at least one is undetermined, something could not be looked at, or the
-    /// time is over.
+    /// time is over, also for the reports that `wait --reports` waits for.
     Undetermined = 3,
     /// No broker runs as the instance that was asked for, or it is one of another user.
     NoBroker = 4,

@@ -1,11 +1,11 @@
 //! The threads that write. What concerns one path is done by one thread, in order, so that a
 //! result can never be withdrawn by an order that is older than the result.
 
-use std::collections::{HashSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, HashSet, VecDeque};
 use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::mpsc::RecvTimeoutError;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use qcbus_bus::Held;
@@ -69,6 +69,7 @@ pub enum Order {
 #[derive(Debug)]
 pub struct Writers {
     writers: Vec<Sender<Order>>,
+    troubles: Troubles,
     threads: Vec<thread::JoinHandle<()>>,
 }
 
@@ -86,11 +87,14 @@ impl Writers {
     ) -> std::io::Result<Writers> {
         let mut writers = Writers {
             writers: Vec::new(),
+            troubles: Troubles::default(),
             threads: Vec::new(),
         };
         for number in 0..count.max(1) {
             let (sender, receiver) = channel();
             let mut writer = Writer {
+                number,
+                troubles: writers.troubles.clone(),
                 store: store.clone(),
                 events: events.clone(),
                 notices: notices.clone(),
@@ -106,6 +110,12 @@ impl Writers {
             writers.writers.push(sender);
         }
         Ok(writers)
+    }
+
+    /// What cannot be written at this moment, each thing once.
+    pub fn troubles(&self) -> BTreeSet<String> {
+        let troubles = self.troubles.lock().unwrap_or_else(PoisonError::into_inner);
+        troubles.values().cloned().collect()
     }
 
     /// Gives an order that concerns `path`.
@@ -156,7 +166,12 @@ impl Order {
     }
 }
 
+/// What each writer cannot write, by its number.
+type Troubles = Arc<Mutex<BTreeMap<usize, String>>>;
+
 struct Writer {
+    number: usize,
+    troubles: Troubles,
     store: Arc<Store>,
     events: UnboundedSender<Event>,
     notices: UnboundedSender<Notice>,
@@ -197,7 +212,9 @@ impl Writer {
                 retry_at = None;
             }
             if self.waiting.is_empty() {
-                retry_at = None;
+                if retry_at.take().is_some() {
+                    self.is_in_trouble(None);
+                }
             } else {
                 retry_at = retry_at.or_else(|| Some(now() + RETRY));
             }
@@ -230,7 +247,16 @@ impl Writer {
         }
     }
 
+    fn is_in_trouble(&self, what: Option<String>) {
+        let mut troubles = self.troubles.lock().unwrap_or_else(PoisonError::into_inner);
+        match what {
+            Some(what) => troubles.insert(self.number, what),
+            None => troubles.remove(&self.number),
+        };
+    }
+
     fn hold_up(&mut self, trouble: &Trouble) {
+        self.is_in_trouble(Some(trouble.what.clone()));
         self.stopped |= trouble.concerns_all;
         if !self.told {
             self.told = true;

@@ -445,6 +445,9 @@ pub struct StatusArgs {
     /// For programs
     #[arg(long)]
     pub json: bool,
+    /// Say only whether it needs a look, and why: ends with 0 when it is healthy, 1 when not, 4 without a broker
+    #[arg(long, conflicts_with = "json")]
+    pub health: bool,
 }
 
 /// `qcbus wait`.
@@ -582,9 +585,12 @@ pub struct DoctorArgs {
     /// Which broker.
     #[command(flatten)]
     pub instance: InstanceArgs,
-    /// State directory to look into
-    #[arg(long, value_name = "DIR", default_value = "qcbus-out/.qcbus")]
-    pub state: PathBuf,
+    /// Directory of results to look into (default: that of the running broker, else qcbus-out)
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// State directory to look into (default: that of the running broker, else OUT/.qcbus)
+    #[arg(long, value_name = "DIR")]
+    pub state: Option<PathBuf>,
 }
 
 /// Takes a standard reporter by its short name.

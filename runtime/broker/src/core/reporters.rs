@@ -67,9 +67,14 @@ impl Reporter {
         self.queue.remove(at)
     }
 
+    /// Reports that are not written or not taken back.
+    pub fn unreported(&self) -> u64 {
+        self.retries.len() as u64 + self.not_withdrawn
+    }
+
     /// What a person should know of it: reports that are missing and why, or why it is down.
     pub fn remark(&self, now: Duration) -> String {
-        let missing = self.retries.len() as u64 + self.not_withdrawn;
+        let missing = self.unreported();
         if missing == 0 {
             return self.note.clone();
         }

@@ -161,6 +161,7 @@ impl State {
             done: it.done,
             restarts: self.restarts(&it.name),
             note: it.remark(self.now),
+            unreported: it.unreported(),
             ..PeerStatus::default()
         });
         let starting = self.children.iter().filter(|(name, _)| {
@@ -221,6 +222,7 @@ impl State {
             done: bundle.done,
             restarts: self.restarts(name),
             note,
+            unreported: 0,
             sandbox: None,
             trials: self.trial_counts(name),
         }

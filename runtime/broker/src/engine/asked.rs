@@ -296,11 +296,23 @@ impl Broker {
             watch_mode: self.watch_mode.clone(),
             out: self.options.out.clone(),
             unseen: self.all_unseen(),
+            state: self.options.state.clone(),
             bundles_d: self.options.bundles_d.clone(),
+            troubles: self.troubles(),
             gate: self.store.gate.as_ref().map(Gate::status),
             ..status
         }
     }
+
+    /// What keeps the broker from its work at this moment.
+    fn troubles(&self) -> Vec<String> {
+        let mut troubles: Vec<String> = self.writers.troubles().into_iter().collect();
+        if self.watching.as_ref().is_some_and(|it| it.is_alone()) {
+            troubles.push("nobody watches for changes".to_owned());
+        }
+        troubles
+    }
+
     fn all_unseen(&self) -> Vec<Unseen> {
         let unseen = |(path, why): (&PathBuf, &String)| Unseen {
             path: path.clone(),

@@ -450,6 +450,10 @@ impl Broker {
                 self.unseen(unseen);
                 true
             }
+            Seen::Away(unseen) => {
+                self.unseen.insert(unseen.path, unseen.why);
+                true
+            }
             Seen::SeenAgain(path) => {
                 self.unseen.remove(&path);
                 true

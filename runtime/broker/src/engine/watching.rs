@@ -34,6 +34,11 @@ impl Watching {
         }
     }
 
+    /// Whether nobody watches for changes now.
+    pub(super) fn is_alone(&self) -> bool {
+        self.is_alone
+    }
+
     fn number(&self) -> u64 {
         self.current.load(Ordering::Acquire)
     }

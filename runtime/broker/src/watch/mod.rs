@@ -76,6 +76,8 @@ pub enum Seen {
     Vanished(Arc<Path>),
     /// Something cannot be looked at; said once, until it can.
     Unseen(Unseen),
+    /// A watched directory is away, which is said by a notice.
+    Away(Unseen),
     /// What could not be looked at can be, or has gone.
     SeenAgain(PathBuf),
     /// The first scan of everything is complete.

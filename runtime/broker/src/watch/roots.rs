@@ -6,6 +6,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use qcbus_disk::foreign;
+use qcbus_messages::control::Unseen;
 use qcbus_messages::path_text::to_text;
 
 use super::Seen;
@@ -51,6 +52,9 @@ impl Looker {
             );
         }
         let was_lost = self.roots.lost.remove(root);
+        if was_lost {
+            (self.tell)(Seen::SeenAgain(root.to_path_buf()));
+        }
         // One that was made anew may have the number of the former.
         let is_watched = self.tree.contains(root) || self.due.covers(root);
         let what = match before {
@@ -82,6 +86,8 @@ impl Looker {
         if self.roots.lost.insert(root.to_path_buf()) {
             self.tree.remove_below(root);
             self.dependencies.poll_all();
+            let (path, why) = (root.to_path_buf(), how.to_owned());
+            (self.tell)(Seen::Away(Unseen { path, why }));
             self.say_of_root(
                 root,
                 &format!("{how}; its results are kept, and it is watched again when it comes back"),

@@ -39,7 +39,7 @@ fn words(root: &Path, told: &Receiver<Seen>) -> Vec<String> {
         Seen::Settled(path, _) => format!("settled {}", name(&path)),
         Seen::Present(path) => format!("present {}", name(&path)),
         Seen::Vanished(path) => format!("vanished {}", name(&path)),
-        Seen::Unseen(it) => format!("unseen {}", name(&it.path)),
+        Seen::Unseen(it) | Seen::Away(it) => format!("unseen {}", name(&it.path)),
         Seen::SeenAgain(path) => format!("seen again {}", name(&path)),
         other => format!("{other:?}"),
     };

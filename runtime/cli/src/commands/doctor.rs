@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
-use qcbus_broker::control::ask_broker;
+use qcbus_broker::control::{AskError, ask_broker};
 use qcbus_broker::journal::Journal;
 use qcbus_bus::{HostOptions, SharedMemory};
-use qcbus_messages::control::{Request, Response};
+use qcbus_messages::control::{Request, Response, Status};
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Exit, PROTOCOL_VERSION, shown};
 
+use super::health;
 use super::settings::{absolute, instance};
 use crate::args::DoctorArgs;
 use crate::{standard, talk};
@@ -38,11 +39,15 @@ pub fn run(args: &DoctorArgs) -> Exit {
             "set XDG_RUNTIME_DIR to a directory of your own",
         ),
     });
-    if let Ok(instance) = instance(&args.instance) {
-        remarks.push(broker(instance.dir()));
-    }
+    let asked = instance(&args.instance).ok();
+    let asked = asked.map(|it| ask_broker(it.dir(), &Request::Status));
+    remarks.extend(asked.as_ref().map(broker));
     remarks.push(stale_instances());
-    remarks.push(journal(&absolute(&args.state)));
+    let status = match asked {
+        Some(Ok(Response::Status(status))) => Some(*status),
+        _ => None,
+    };
+    remarks.extend(directories(args, status.as_ref()));
     for remark in &remarks {
         let mark = if remark.ok { "ok  " } else { "FIX " };
         let text = shown::line(&remark.text);
@@ -195,31 +200,65 @@ fn runtime_directory(directory: &Path) -> Remark {
     }
 }
 
-fn broker(directory: &Path) -> Remark {
+fn broker(asked: &Result<Response, AskError>) -> Remark {
     let what = "broker";
-    match ask_broker(directory, &Request::Status) {
-        Ok(Response::Status(status)) => {
-            let troubled: Vec<_> = status
-                .peers
-                .iter()
-                .filter(|peer| ["down", "gave up", "silent"].contains(&peer.state.as_str()))
-                .map(|peer| format!("{} is {}", peer.name, peer.state))
-                .collect();
-            let text = format!(
-                "process {} runs, {} files known",
-                status.pid, status.files.total
+    let status = match asked {
+        Ok(Response::Status(status)) => status,
+        Ok(other) => {
+            return bad(
+                what,
+                format!("it answers something else: {other:?}"),
+                UPGRADE,
             );
-            if troubled.is_empty() {
-                good(what, text)
-            } else {
-                bad(
-                    what,
-                    format!("{text}; {}", troubled.join(", ")),
-                    "`qcbus status` says why; the log of the broker says more",
-                )
-            }
         }
-        Ok(_) | Err(_) => good(what, "none runs as this instance".to_owned()),
+        Err(AskError::NoBroker { others, .. }) if others.is_empty() => {
+            return good(what, "none runs as this instance".to_owned());
+        }
+        Err(error) => return bad(what, error.to_string(), "ask the broker that you mean"),
+    };
+    let text = format!(
+        "process {} runs, {} files known",
+        status.pid, status.files.total
+    );
+    match health::reasons(status) {
+        reasons if reasons.is_empty() => good(what, text),
+        reasons => bad(
+            what,
+            format!("{text}; {}", reasons.join("; ")),
+            "`qcbus status` says more, and the log of the broker",
+        ),
+    }
+}
+
+const UPGRADE: &str = "use the program that the broker was started from";
+
+/// The directories of the running broker, else those that it would have here; what is named comes first.
+fn directories(args: &DoctorArgs, status: Option<&Status>) -> Vec<Remark> {
+    let out = args.out.as_deref().map(absolute);
+    let running = status.filter(|_| out.is_none());
+    let out = out
+        .or_else(|| running.map(|it| it.out.clone()))
+        .unwrap_or_else(|| absolute(Path::new("qcbus-out")));
+    let state = args.state.as_deref().map(absolute);
+    let state = state
+        .or_else(|| running.and_then(|it| it.state.clone()))
+        .unwrap_or_else(|| out.join(".qcbus"));
+    let mut remarks = vec![directory("results", &out), journal(&state)];
+    let gate = running.and_then(|it| it.gate.as_ref());
+    remarks.extend(gate.map(|it| directory("gate", &it.directory)));
+    remarks
+}
+
+fn directory(what: &'static str, path: &Path) -> Remark {
+    use rustix::fs::{Access, access};
+    let shown = to_text(path);
+    match access(path, Access::WRITE_OK | Access::EXEC_OK) {
+        Err(rustix::io::Errno::NOENT) => {
+            good(what, format!("{shown} does not exist; `serve` makes it"))
+        }
+        Ok(()) if path.is_dir() => good(what, shown),
+        Ok(()) => bad(what, format!("{shown} is no directory"), "name another one"),
+        Err(error) => bad(what, format!("{shown}: {error}"), "make it writable"),
     }
 }
 
@@ -235,14 +274,14 @@ fn stale_instances() -> Remark {
 
 fn journal(state: &Path) -> Remark {
     let what = "journal";
+    let journal = state.join("journal.sqlite");
+    let shown = to_text(&journal);
     match Journal::examine(state) {
-        None => good(
+        None if !journal.exists() => good(
             what,
-            format!(
-                "{} is sound or not there",
-                state.join("journal.sqlite").display()
-            ),
+            format!("{shown} does not exist; name the directory of a broker with --out or --state"),
         ),
+        None => good(what, format!("{shown} is sound")),
         Some(wrong) => bad(
             what,
             wrong,

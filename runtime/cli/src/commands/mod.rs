@@ -6,6 +6,7 @@ mod check;
 mod config;
 mod doctor;
 mod expand;
+mod health;
 mod manifests;
 mod new;
 mod offered;

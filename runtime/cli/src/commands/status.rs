@@ -7,7 +7,7 @@ use qcbus_messages::control::{GateStatus, PeerStatus, Request, Response, Status}
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::shown;
 
-use super::remote::ask;
+use super::{health, remote::ask};
 use crate::args::StatusArgs;
 use crate::talk;
 
@@ -21,6 +21,11 @@ pub fn run(args: &StatusArgs) -> Exit {
         }
         Err(exit) => return exit,
     };
+    if args.health {
+        let reasons = health::reasons(&status);
+        talk::print(&health::render(&reasons));
+        return health::exit(&reasons);
+    }
     if args.json {
         match serde_json::to_string_pretty(&status) {
             Ok(text) => talk::print(&format!("{text}\n")),
@@ -216,7 +221,7 @@ mod tests {
                     state: "partly".into(),
                     why: "this kernel has no Landlock".into(),
                 }),
-                trials: None,
+                ..PeerStatus::default()
             }],
             epoch: (3 << 32) + 2,
             notices: vec![NoticeStatus {

@@ -57,7 +57,7 @@ impl Watched {
             Seen::Present(path) => format!("present {}", name(path)),
             Seen::Touched(path, _) => format!("touched {}", name(path)),
             Seen::Vanished(path) => format!("vanished {}", name(path)),
-            Seen::Unseen(it) => format!("unseen {}", name(&it.path)),
+            Seen::Unseen(it) | Seen::Away(it) => format!("unseen {}", name(&it.path)),
             Seen::SeenAgain(path) => format!("seen again {}", name(path)),
             Seen::Scanned => "Scanned".to_owned(),
             Seen::Mode(mode) => format!("mode {mode}"),

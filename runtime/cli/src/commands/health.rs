@@ -1,0 +1,163 @@
+//! `qcbus status --health`: whether a broker needs a look, for scripts and service managers.
+
+use qcbus_messages::control::{NoticeStatus, PeerStatus, Status};
+use qcbus_messages::{Exit, shown};
+
+/// What happened within this time may still be so. What lasts is told again more often.
+const RECENT_S: u64 = 60;
+
+/// Of things that cannot be looked at, so many are named.
+const NAMED: usize = 5;
+
+/// One line that says whether the broker is healthy, then a line for each reason why not.
+pub fn render(reasons: &[String]) -> String {
+    if reasons.is_empty() {
+        return "healthy\n".to_owned();
+    }
+    let lines = reasons.iter().map(|it| format!("{}\n", shown::line(it)));
+    std::iter::once("not healthy\n".to_owned())
+        .chain(lines)
+        .collect()
+}
+
+/// With what the command ends.
+pub fn exit(reasons: &[String]) -> Exit {
+    match reasons {
+        [] => Exit::Accepted,
+        _ => Exit::Rejected,
+    }
+}
+
+/// Why a broker needs a look; nothing when it does not.
+pub fn reasons(status: &Status) -> Vec<String> {
+    let mut reasons = status.troubles.clone();
+    reasons.extend(status.peers.iter().filter_map(of_peer));
+    let unseen = status.unseen.iter().take(NAMED).map(|it| it.to_string());
+    reasons.extend(unseen);
+    if let Some(more) = status.unseen.len().checked_sub(NAMED).filter(|it| *it > 0) {
+        reasons.push(format!("{more} more cannot be looked at"));
+    }
+    let told = status.notices.iter().filter(|it| is_trouble(it));
+    reasons.extend(told.map(|it| format!("{} ({} s ago)", it.text, it.ago_s)));
+    if status.watching.is_empty() {
+        reasons.push("no directory is watched".to_owned());
+    }
+    reasons
+}
+
+/// A bundle that does not judge keeps files from being accepted, and a reporter that is not there keeps reports.
+fn of_peer(peer: &PeerStatus) -> Option<String> {
+    let PeerStatus {
+        role, name, note, ..
+    } = peer;
+    let what = match peer.state.as_str() {
+        "down" => "is down",
+        "gave up" => "failed too often and is left alone for a while",
+        "silent" => "has work and says nothing",
+        "starting" => "is starting",
+        _ if peer.unreported > 0 => "cannot report",
+        _ => return None,
+    };
+    let why = match note.is_empty() {
+        true => String::new(),
+        false => format!(": {note}"),
+    };
+    Some(format!("{role} {name} {what}{why}"))
+}
+
+/// Whether a notice says that something cannot be read, written or given room. Of other trouble the status itself
+/// tells how it is now.
+fn is_trouble(notice: &NoticeStatus) -> bool {
+    match notice.kind.as_str() {
+        // Until the broker is started again.
+        "lost" => true,
+        "no-room" | "not-read" | "not-written" | "not-delivered" => notice.ago_s <= RECENT_S,
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use qcbus_messages::control::Unseen;
+
+    fn status() -> Status {
+        Status {
+            watching: vec!["/farm/in".into()],
+            ..Status::default()
+        }
+    }
+
+    fn peer(state: &str, unreported: u64) -> PeerStatus {
+        PeerStatus {
+            name: "acme".into(),
+            role: "bundle".into(),
+            state: state.into(),
+            note: "killed by signal 9".into(),
+            unreported,
+            ..PeerStatus::default()
+        }
+    }
+
+    fn of_one(peer: PeerStatus) -> Vec<String> {
+        reasons(&Status {
+            peers: vec![peer],
+            ..status()
+        })
+    }
+
+    #[test]
+    fn broker_is_healthy_while_its_bundles_work() {
+        for state in ["ready", "busy", "draining"] {
+            assert!(of_one(peer(state, 0)).is_empty(), "{state}");
+        }
+        assert_eq!(render(&[]), "healthy\n");
+        assert_eq!(exit(&[]), Exit::Accepted);
+    }
+
+    #[test]
+    fn each_reason_is_a_line() {
+        for state in ["down", "gave up", "silent", "starting"] {
+            assert_eq!(of_one(peer(state, 0)).len(), 1, "{state}");
+        }
+        let found = of_one(peer("ready", 2));
+        assert_eq!(found, ["bundle acme cannot report: killed by signal 9"]);
+        assert_eq!(exit(&found), Exit::Rejected);
+        let text = render(&found);
+        assert_eq!(text.lines().next(), Some("not healthy"));
+        assert_eq!(text.lines().count(), 2);
+    }
+
+    #[test]
+    fn only_recent_notices_of_trouble_count() {
+        let notice = |kind: &str, ago_s| NoticeStatus {
+            kind: kind.into(),
+            text: "no space left".into(),
+            ago_s,
+            about: None,
+        };
+        let told = |notice| {
+            reasons(&Status {
+                notices: vec![notice],
+                ..status()
+            })
+        };
+        assert_eq!(told(notice("not-written", 3)), ["no space left (3 s ago)"]);
+        assert!(told(notice("not-written", 3600)).is_empty());
+        assert!(told(notice("held-back", 3)).is_empty());
+    }
+
+    #[test]
+    fn many_unseen_things_are_few_lines() {
+        let one = |number: u32| Unseen {
+            path: format!("/farm/in/{number}").into(),
+            why: "Permission denied".into(),
+        };
+        let found = reasons(&Status {
+            unseen: (0..20).map(one).collect(),
+            ..status()
+        });
+        assert_eq!(found.len(), NAMED + 1);
+        assert_eq!(found[NAMED], "15 more cannot be looked at");
+    }
+}
