@@ -29,6 +29,7 @@ mod seams;
 mod simulation;
 mod stages;
 mod stamp;
+mod state_identity;
 mod store;
 mod supervise;
 mod terms;

@@ -77,6 +77,16 @@ impl ResultPaths {
         self.files.contains(path) || self.roots.iter().any(|root| path.starts_with(root))
     }
 
+    /// Whether a result lies where this broker writes, so that it may remove it. No part of the path leads
+    /// upwards: results are named by what is below the directory.
+    pub fn owns(&self, xqar: &Path) -> bool {
+        let below = xqar.strip_prefix(&self.out).ok();
+        below.is_some_and(|it| {
+            it.components()
+                .all(|part| matches!(part, Component::Normal(_)))
+        })
+    }
+
     /// The path for people of the file whose result lies there; `None` when it lies elsewhere.
     pub fn shown_at(&self, xqar: &Path) -> Option<PathBuf> {
         let shown = xqar.strip_prefix(&self.out).ok()?;
@@ -162,6 +172,20 @@ mod tests {
         let shown = places.shown_at(Path::new("/out/maps/a.xodr.xqar"));
         assert_eq!(shown.as_deref(), Some(Path::new("maps/a.xodr")));
         assert_eq!(places.shown_at(Path::new("/elsewhere/a.xodr.xqar")), None);
+    }
+
+    #[test]
+    fn only_results_below_the_own_directory_are_owned() {
+        let places = ResultPaths::of_watched("/live/out".into(), paths(&["/farm"]));
+        for (path, owned) in [
+            ("/live/out/a.xodr.xqar", true),
+            ("/live/out/maps/a.xodr.xqar", true),
+            ("/live/out-2/a.xodr.xqar", false),
+            ("/live/out/../other/a.xodr.xqar", false),
+            ("/copy/out/a.xodr.xqar", false),
+        ] {
+            assert_eq!(places.owns(Path::new(path)), owned, "{path}");
+        }
     }
 
     #[test]

@@ -8,6 +8,7 @@ use std::sync::atomic::AtomicU64;
 use qcbus_bus::HostOptions;
 use qcbus_messages::Role;
 use qcbus_messages::control::Unseen;
+use qcbus_messages::path_text::to_text;
 use tokio::sync::mpsc;
 
 use super::early::{early_children, early_or_now};
@@ -29,6 +30,7 @@ use crate::result_paths::ResultPaths;
 use crate::scouts::Scouts;
 use crate::seams::{Children, ControlSocket, Host, now, spawn_blocking};
 use crate::stamp::stamp_of;
+use crate::state_identity::identify;
 use crate::store::{Reconciled, Store, TrialResults, remove_earlier_results};
 use crate::supervise::Surroundings;
 use crate::watch::{Seen, is_looked_at, scan_directory};
@@ -56,6 +58,7 @@ impl Broker {
         let (numbers, members) = remembered_by(journal.as_ref())?;
         options.settings.numbers = numbers.max(host.generation());
         let results = results_of(&options)?;
+        let identity = identity_of(&options);
         let in_force = Arc::new(InForce::of(&sources, &loaded)?);
         host.set_config(in_force.digest, &in_force.encoded);
         let control = control_of(&options, senders.asked)?;
@@ -96,7 +99,9 @@ impl Broker {
             options,
         };
         broker.take_up(members, broker.store.voids()?);
-        tell_at_the_start(&reconciled, &broker.options, limited, &senders.notices);
+        let limited = limited.map(Notice::Limited);
+        let first = limited.into_iter().chain(identity.map(Notice::Storing));
+        tell_at_the_start(&reconciled, &broker.options, first, &senders.notices);
         let dependencies = broker.remember(reconciled);
         broker.look(dependencies, senders.seen)?;
         Ok(broker)
@@ -173,18 +178,13 @@ fn control_of(
 fn tell_at_the_start(
     reconciled: &Reconciled,
     options: &Options,
-    limited: Option<String>,
+    first: impl Iterator<Item = Notice>,
     notices: &mpsc::UnboundedSender<Notice>,
 ) {
     let right = reconciled.said.iter().cloned().map(Notice::Storing);
     let lasting = [Some(&*options.out), options.gate.as_deref()].into_iter();
     let open = open_to_others(lasting.flatten().filter(|_| options.watch)).map(Notice::Storing);
-    for notice in limited
-        .map(Notice::Limited)
-        .into_iter()
-        .chain(open)
-        .chain(right)
-    {
+    for notice in first.chain(open).chain(right) {
         // The loop that listens has not ended before it began.
         let _ = notices.send(notice);
     }
@@ -207,6 +207,16 @@ fn journal_of(options: &Options) -> Result<Option<Journal>, JournalError> {
     let state = options.state.as_ref();
     let opened = state.map(|state| Journal::open(state, options.instance.name()));
     opened.transpose()
+}
+
+/// Whether the state directory is the one that it was, for a person; nothing where there is none.
+fn identity_of(options: &Options) -> Option<String> {
+    let state = options.state.as_deref()?;
+    let identified = identify(state, &options.out, options.durable);
+    identified.unwrap_or_else(|error| {
+        let state = to_text(state);
+        Some(format!("cannot tell whether {state} was copied: {error}"))
+    })
 }
 
 /// From where on numbers are new, and who must judge; nothing where there is no journal.

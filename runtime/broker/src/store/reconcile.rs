@@ -100,7 +100,10 @@ impl Store {
         (!same || !xqar.exists()).then_some(Fall::Incomplete)
     }
 
-    /// Removes results, and records that they are gone and who is to take back reports.
+    /// Removes results, and records that they are gone and who is to take back reports. A result outside of our
+    /// directory of results stays, with the reports beside it: only the broker that holds the lock of a
+    /// directory removes anything in it. The journal may name such a result because the state was copied from
+    /// another broker, or because results went elsewhere before.
     fn let_fall(
         &self,
         fallen: Vec<(Remembered, Fall)>,
@@ -110,9 +113,18 @@ impl Store {
     ) {
         let mut entries = Vec::new();
         let mut by_reason: BTreeMap<Fall, Vec<Arc<Path>>> = BTreeMap::new();
+        let mut foreign_results = BTreeSet::new();
         for (row, fall) in fallen {
-            // By now the result of another file may lie there.
             let xqar = row.judged.xqar.as_ref();
+            if let Some(foreign) = xqar.filter(|xqar| !self.places.owns(xqar)) {
+                foreign_results.insert(directory_of(foreign));
+                entries.push(Entry::Withdrawn {
+                    path: row.path,
+                    reporters: Vec::new(),
+                });
+                continue;
+            }
+            // By now the result of another file may lie there.
             let xqar = xqar.filter(|xqar| !owned.contains(*xqar));
             let mine = xqar.is_some();
             if let Some(error) = xqar.and_then(|xqar| remove_result(xqar).err()) {
@@ -134,6 +146,11 @@ impl Store {
         self.recorded(&entries, found);
         for (fall, paths) in by_reason {
             found.said.push(said(fall, &paths));
+        }
+        if !foreign_results.is_empty() {
+            found
+                .said
+                .push(left_alone(&foreign_results, &self.places.out));
         }
     }
 
@@ -249,6 +266,21 @@ fn said(fall: Fall, paths: &[Arc<Path>]) -> String {
         Fall::Incomplete => "they were not complete, and their files are judged anew",
     };
     format!("results withdrawn: {}: {why}", some_of(paths))
+}
+
+fn directory_of(xqar: &Path) -> PathBuf {
+    xqar.parent().unwrap_or(xqar).to_path_buf()
+}
+
+/// What is said of results that the journal names and that lie outside of our directory of results.
+fn left_alone(directories: &BTreeSet<PathBuf>, out: &Path) -> String {
+    let directories: Vec<Arc<Path>> = directories.iter().map(|it| it.as_path().into()).collect();
+    format!(
+        "results in {} are left alone: the journal names them, but this broker writes to {} only. The state was \
+         copied from another broker, or --out was another directory before; remove them if nobody needs them",
+        some_of(&directories),
+        to_text(out)
+    )
 }
 
 /// The first of many.

@@ -1,0 +1,148 @@
+//! Which directory a state belongs to, so that a copied or moved one says so.
+//!
+//! A state directory is copied for a backup or a staging farm. What its journal names are the results of the
+//! farm it was copied from; this broker leaves them alone, and tells the operator why it judges everything anew.
+
+use std::io;
+use std::os::unix::fs::MetadataExt;
+use std::path::Path;
+
+use qcbus_disk::{foreign, write_whole};
+use qcbus_messages::path_text::{from_text, to_text};
+use serde::{Deserialize, Serialize};
+
+/// Name of the file in the state directory.
+const FILE: &str = "belongs-to.json";
+
+/// Most bytes of that file: two paths and two numbers.
+const MOST: u64 = 64 << 10;
+
+/// What a state directory belongs to.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+struct Identity {
+    /// Absolute path of the state directory.
+    state: String,
+    /// Device number of the state directory.
+    device: u64,
+    /// Inode number of the state directory.
+    inode: u64,
+    /// Absolute path of the directory of results.
+    out: String,
+}
+
+/// Compares a state directory with what it was when a broker last used it, and writes what it is now. Returns
+/// what a person should know: that it was copied or moved, or that results go elsewhere than before.
+///
+/// # Errors
+/// When the directory cannot be looked at or written to.
+pub fn identify(state: &Path, out: &Path, durable: bool) -> io::Result<Option<String>> {
+    let data = std::fs::metadata(state)?;
+    let now = Identity {
+        state: to_text(state),
+        device: data.dev(),
+        inode: data.ino(),
+        out: to_text(out),
+    };
+    let file = state.join(FILE);
+    let before = foreign::read(&file, MOST).ok();
+    let before: Option<Identity> = before.and_then(|text| serde_json::from_slice(&text).ok());
+    if before.as_ref() == Some(&now) {
+        return Ok(None);
+    }
+    let mut text = serde_json::to_vec_pretty(&now).map_err(io::Error::other)?;
+    text.push(b'\n');
+    write_whole(&file, &text, durable)?;
+    Ok(before.and_then(|before| difference(&before, &now)))
+}
+
+fn difference(before: &Identity, now: &Identity) -> Option<String> {
+    let (is, was) = (&now.state, &before.state);
+    let same_directory = (before.device, before.inode) == (now.device, now.inode);
+    if !same_directory && was != is && from_text(was).exists() {
+        return Some(format!(
+            "the state directory {is} is a copy of {was}: results that it names outside of {} belong to that \
+             farm and are left alone; what is missing here is judged anew",
+            now.out
+        ));
+    }
+    if was != is {
+        return Some(format!(
+            "the state directory {is} was moved or copied from {was}: results that it names outside of {} are \
+             left alone; what is missing here is judged anew",
+            now.out
+        ));
+    }
+    if !same_directory {
+        return Some(format!(
+            "the state directory {is} was replaced, by a backup for instance: what does not agree with the \
+             results in {} is judged anew",
+            now.out
+        ));
+    }
+    (before.out != now.out).then(|| {
+        format!(
+            "results go to {} now and went to {} before: those are left alone",
+            now.out, before.out
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(state: &Path, out: &str) -> Option<String> {
+        identify(state, Path::new(out), false).unwrap()
+    }
+
+    #[test]
+    fn unchanged_state_says_nothing() {
+        let dir = tempfile::tempdir().unwrap();
+        assert_eq!(said(dir.path(), "/out"), None, "it is new");
+        assert_eq!(said(dir.path(), "/out"), None);
+    }
+
+    #[test]
+    fn copied_state_names_the_original() {
+        let dir = tempfile::tempdir().unwrap();
+        let (live, copy) = (dir.path().join("live"), dir.path().join("copy"));
+        std::fs::create_dir(&live).unwrap();
+        std::fs::create_dir(&copy).unwrap();
+        said(&live, "/live/out");
+        std::fs::copy(live.join(FILE), copy.join(FILE)).unwrap();
+        let told = said(&copy, "/copy/out").unwrap();
+        assert!(
+            told.contains(&format!("a copy of {}", live.display())),
+            "{told}"
+        );
+        assert_eq!(said(&copy, "/copy/out"), None, "it is said once");
+        assert_eq!(said(&live, "/live/out"), None, "the original is untouched");
+    }
+
+    #[test]
+    fn moved_state_names_its_former_place() {
+        let dir = tempfile::tempdir().unwrap();
+        let (before, after) = (dir.path().join("before"), dir.path().join("after"));
+        std::fs::create_dir(&before).unwrap();
+        said(&before, "/out");
+        std::fs::rename(&before, &after).unwrap();
+        let told = said(&after, "/out").unwrap();
+        assert!(told.contains("was moved or copied from"), "{told}");
+    }
+
+    #[test]
+    fn another_directory_of_results_is_said() {
+        let dir = tempfile::tempdir().unwrap();
+        said(dir.path(), "/one");
+        let told = said(dir.path(), "/two").unwrap();
+        assert!(told.contains("/one") && told.contains("/two"), "{told}");
+    }
+
+    #[test]
+    fn broken_identity_is_replaced() {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join(FILE), "{").unwrap();
+        assert_eq!(said(dir.path(), "/out"), None);
+        assert_eq!(said(dir.path(), "/out"), None);
+    }
+}

@@ -1,0 +1,161 @@
+//! State directories that are copied, moved or pointed elsewhere: a broker takes nothing from a directory
+//! that is not its own.
+
+#![expect(
+    clippy::unwrap_used,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use support::broker::Broker;
+use support::content::Content;
+use support::farm::Farm;
+use support::watchdog::until_or;
+
+/// A farm with a gate and reports beside its results.
+fn farm_with_everything() -> Farm {
+    let mut farm = Farm::new();
+    let gate = farm.base().join("gate").to_string_lossy().into_owned();
+    let arguments = ["--gate", &gate, "--report", "text"];
+    farm.arguments.extend(arguments.map(str::to_owned));
+    farm
+}
+
+/// Serves a good and a bad file until their reports are there.
+fn serve_both(farm: &Farm) -> Broker {
+    farm.write("good.xodr", &Content::Good(1).bytes());
+    farm.write("bad.xodr", &Content::NoHeader(1).bytes());
+    let broker = farm.serve_ready();
+    farm.verdict("good.xodr");
+    farm.verdict("bad.xodr");
+    let reports = ["good.xodr.txt", "bad.xodr.txt"].map(|name| farm.out().join(name));
+    let written = || reports.iter().all(|it| it.exists()).then_some(());
+    until_or("the reports are there", written, || farm.log());
+    broker
+}
+
+/// Everything that a farm has written for others to read.
+fn written(farm: &Farm) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    let mut open = vec![farm.out(), farm.base().join("gate")];
+    while let Some(directory) = open.pop() {
+        for entry in std::fs::read_dir(directory).unwrap() {
+            let entry = entry.unwrap();
+            if entry.file_name() == ".qcbus" {
+                continue;
+            }
+            match entry.file_type().unwrap().is_dir() {
+                true => open.push(entry.path()),
+                false => files.push(entry.path()),
+            }
+        }
+    }
+    files.sort();
+    files
+}
+
+fn copy_tree(from: &Path, to: &Path) {
+    let copied = Command::new("cp").arg("-a").arg(from).arg(to).status();
+    assert!(copied.unwrap().success());
+}
+
+#[test]
+fn copied_farm_takes_nothing_from_the_original() {
+    let live = farm_with_everything();
+    let mut broker = serve_both(&live);
+    let before = written(&live);
+    assert_eq!(
+        before.len(),
+        8,
+        "results, verdicts, reports, a published file: {before:?}"
+    );
+
+    let copy = farm_with_everything();
+    for name in ["farm", "out"] {
+        let place = copy.base().join(name);
+        if place.exists() {
+            std::fs::remove_dir_all(&place).unwrap();
+        }
+    }
+    copy_tree(&live.root(), &copy.root());
+    copy_tree(&live.out(), &copy.out());
+    let mut second = copy.serve_ready();
+    copy.verdict("good.xodr");
+    copy.verdict("bad.xodr");
+    copy.settle(2);
+    let said = format!("is a copy of {}", live.out().join(".qcbus").display());
+    until_or(
+        "the copy says what it is",
+        || copy.log().contains(&said).then_some(()),
+        || copy.log(),
+    );
+    assert_eq!(copy.qcbus(&["down"]).status.code(), Some(0));
+    assert!(second.wait().success());
+    assert_eq!(written(&live), before, "{}", copy.log());
+    assert_eq!(live.qcbus(&["down"]).status.code(), Some(0));
+    assert!(broker.wait().success());
+}
+
+#[test]
+fn results_in_a_former_directory_belong_to_whoever_writes_there_now() {
+    let first = farm_with_everything();
+    let mut broker = serve_both(&first);
+    assert_eq!(first.qcbus(&["down"]).status.code(), Some(0));
+    assert!(broker.wait().success());
+    let state = first.base().join("state");
+    copy_tree(&first.out().join(".qcbus"), &state);
+
+    // Somebody else writes results of files of the same names there.
+    std::fs::remove_dir_all(first.out()).unwrap();
+    let inbox = first.base().join("other");
+    std::fs::create_dir(&inbox).unwrap();
+    std::fs::write(inbox.join("good.xodr"), Content::Good(2).bytes()).unwrap();
+    let serve = |directory: &Path, instance: &str, more: &[(&str, &Path)]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
+        command.arg("serve").arg(directory).env("NO_COLOR", "1");
+        command
+            .arg("--instance-dir")
+            .arg(first.base().join(instance));
+        for (option, place) in more {
+            command.arg(option).arg(place);
+        }
+        command
+    };
+    let out = first.out();
+    let mut other = Broker::start(
+        &mut serve(&inbox, "other-instance", &[("--out", &out)]),
+        &first.log_path(),
+    );
+    let theirs = out.join("good.xodr.xqar");
+    until_or(
+        "the other has a result",
+        || theirs.exists().then_some(()),
+        || first.log(),
+    );
+
+    let elsewhere = first.base().join("elsewhere");
+    let moved = [("--out", &*elsewhere), ("--state", &*state)];
+    let mut broker = Broker::start(
+        &mut serve(&first.root(), "instance", &moved),
+        &first.log_path(),
+    );
+    let ours = elsewhere.join("good.xodr.xqar");
+    until_or(
+        "the first has a result",
+        || ours.exists().then_some(()),
+        || first.log(),
+    );
+    let said = format!("results in {} are left alone", out.display());
+    until_or(
+        "it says so",
+        || first.log().contains(&said).then_some(()),
+        || first.log(),
+    );
+    assert!(theirs.exists(), "{}", first.log());
+    broker.kill();
+    other.kill();
+}
