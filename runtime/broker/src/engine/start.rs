@@ -58,7 +58,6 @@ impl Broker {
         let (numbers, members) = remembered_by(journal.as_ref())?;
         options.settings.numbers = numbers.max(host.generation());
         let results = results_of(&options)?;
-        let identity = identity_of(&options);
         let in_force = Arc::new(InForce::of(&sources, &loaded)?);
         host.set_config(in_force.digest, &in_force.encoded);
         let control = control_of(&options, senders.asked)?;
@@ -99,9 +98,7 @@ impl Broker {
             options,
         };
         broker.take_up(members, broker.store.voids()?);
-        let limited = limited.map(Notice::Limited);
-        let first = limited.into_iter().chain(identity.map(Notice::Storing));
-        tell_at_the_start(&reconciled, &broker.options, first, &senders.notices);
+        tell_at_the_start(&reconciled, &broker.options, limited, &senders.notices);
         let dependencies = broker.remember(reconciled);
         broker.look(dependencies, senders.seen)?;
         Ok(broker)
@@ -178,13 +175,15 @@ fn control_of(
 fn tell_at_the_start(
     reconciled: &Reconciled,
     options: &Options,
-    first: impl Iterator<Item = Notice>,
+    limited: Option<String>,
     notices: &mpsc::UnboundedSender<Notice>,
 ) {
     let right = reconciled.said.iter().cloned().map(Notice::Storing);
     let lasting = [Some(&*options.out), options.gate.as_deref()].into_iter();
     let open = open_to_others(lasting.flatten().filter(|_| options.watch)).map(Notice::Storing);
-    for notice in first.chain(open).chain(right) {
+    let first = limited.map(Notice::Limited).into_iter();
+    let identity = identity_of(options).map(Notice::Storing);
+    for notice in first.chain(identity).chain(open).chain(right) {
         // The loop that listens has not ended before it began.
         let _ = notices.send(notice);
     }
