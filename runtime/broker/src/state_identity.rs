@@ -11,6 +11,8 @@ use qcbus_disk::{foreign, write_whole};
 use qcbus_messages::path_text::{from_text, to_text};
 use serde::{Deserialize, Serialize};
 
+use crate::options::Options;
+
 /// Name of the file in the state directory.
 const FILE: &str = "belongs-to.json";
 
@@ -30,12 +32,21 @@ struct Identity {
     out: String,
 }
 
-/// Compares a state directory with what it was when a broker last used it, and writes what it is now. Returns
-/// what a person should know: that it was copied or moved, or that results go elsewhere than before.
+/// Returns what a person should know of the state directory: that it was copied or moved, or that results go
+/// elsewhere than before. `None` where there is no state, or nothing has changed.
+pub fn difference_of(options: &Options) -> Option<String> {
+    let state = options.state.as_deref()?;
+    identify(state, &options.out, options.durable).unwrap_or_else(|error| {
+        let state = to_text(state);
+        Some(format!("cannot tell whether {state} was copied: {error}"))
+    })
+}
+
+/// Compares a state directory with what it was when a broker last used it, and writes what it is now.
 ///
 /// # Errors
 /// When the directory cannot be looked at or written to.
-pub fn identify(state: &Path, out: &Path, durable: bool) -> io::Result<Option<String>> {
+fn identify(state: &Path, out: &Path, durable: bool) -> io::Result<Option<String>> {
     let data = std::fs::metadata(state)?;
     let now = Identity {
         state: to_text(state),

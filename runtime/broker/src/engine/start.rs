@@ -8,7 +8,6 @@ use std::sync::atomic::AtomicU64;
 use qcbus_bus::HostOptions;
 use qcbus_messages::Role;
 use qcbus_messages::control::Unseen;
-use qcbus_messages::path_text::to_text;
 use tokio::sync::mpsc;
 
 use super::early::{early_children, early_or_now};
@@ -30,7 +29,7 @@ use crate::result_paths::ResultPaths;
 use crate::scouts::Scouts;
 use crate::seams::{Children, ControlSocket, Host, now, spawn_blocking};
 use crate::stamp::stamp_of;
-use crate::state_identity::identify;
+use crate::state_identity::difference_of;
 use crate::store::{Reconciled, Store, TrialResults, remove_earlier_results};
 use crate::supervise::Surroundings;
 use crate::watch::{Seen, is_looked_at, scan_directory};
@@ -182,7 +181,7 @@ fn tell_at_the_start(
     let lasting = [Some(&*options.out), options.gate.as_deref()].into_iter();
     let open = open_to_others(lasting.flatten().filter(|_| options.watch)).map(Notice::Storing);
     let first = limited.map(Notice::Limited).into_iter();
-    let identity = identity_of(options).map(Notice::Storing);
+    let identity = difference_of(options).map(Notice::Storing);
     for notice in first.chain(identity).chain(open).chain(right) {
         // The loop that listens has not ended before it began.
         let _ = notices.send(notice);
@@ -206,16 +205,6 @@ fn journal_of(options: &Options) -> Result<Option<Journal>, JournalError> {
     let state = options.state.as_ref();
     let opened = state.map(|state| Journal::open(state, options.instance.name()));
     opened.transpose()
-}
-
-/// Whether the state directory is the one that it was, for a person; nothing where there is none.
-fn identity_of(options: &Options) -> Option<String> {
-    let state = options.state.as_deref()?;
-    let identified = identify(state, &options.out, options.durable);
-    identified.unwrap_or_else(|error| {
-        let state = to_text(state);
-        Some(format!("cannot tell whether {state} was copied: {error}"))
-    })
 }
 
 /// From where on numbers are new, and who must judge; nothing where there is no journal.

@@ -25,7 +25,7 @@ use qcbus_messages::path_text::to_text;
 
 use crate::core::{FinishedJob, Judged, ShareOutcome, StoreOutcome};
 use crate::gate::Gate;
-use crate::journal::{Entry, JournalError, Remembered, SharedJournal, Void};
+use crate::journal::{Entry, JournalError, Remembered, SharedJournal};
 use crate::result_paths::ResultPaths;
 use crate::scouts::Scouts;
 use crate::seams::{disk, step};
@@ -285,35 +285,6 @@ impl Store {
     pub fn remembered(&self) -> Result<Vec<Remembered>, JournalError> {
         let journal = self.journal.as_ref();
         journal.map_or(Ok(Vec::new()), |it| it.get().remembered())
-    }
-
-    /// What reporters are still to take back. Reports beside results outside of our directory belong to
-    /// another broker: nobody takes them back, and they are forgotten.
-    ///
-    /// # Errors
-    /// When the journal cannot be read.
-    pub fn voids(&self) -> Result<Vec<Void>, JournalError> {
-        let Some(journal) = &self.journal else {
-            return Ok(Vec::new());
-        };
-        let voids = journal.get().voids()?;
-        let is_ours = |void: &Void| {
-            let xqar = void.xqar.as_ref();
-            xqar.is_none_or(|xqar| self.places.owns(xqar))
-        };
-        let (ours, others): (Vec<Void>, Vec<Void>) = voids.into_iter().partition(is_ours);
-        let forgotten = others.into_iter().map(|void| Entry::Voided {
-            path: void.path,
-            reporter: void.reporter,
-        });
-        let forgotten: Vec<Entry> = forgotten.collect();
-        if !forgotten.is_empty()
-            && let Err(why) = self.record(&forgotten)
-        {
-            // The next start finds the same and tries again.
-            tracing::warn!("{why}");
-        }
-        Ok(ours)
     }
 
     /// Forgets the history of jobs older than `keep`.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use qcbus_messages::path_text::to_text;
 
 use super::{Store, Trouble};
-use crate::journal::Entry;
+use crate::journal::{Entry, JournalError, Void};
 use crate::seams::{disk, step};
 use qcbus_disk::remove;
 
@@ -41,5 +41,34 @@ impl Store {
         step("half withdrawn", path);
         disk()?;
         remove(&self.places.verdict(path))
+    }
+
+    /// What reporters are still to take back. Reports beside results outside of our directory belong to
+    /// another broker: nobody takes them back, and they are forgotten.
+    ///
+    /// # Errors
+    /// When the journal cannot be read.
+    pub fn voids(&self) -> Result<Vec<Void>, JournalError> {
+        let Some(journal) = &self.journal else {
+            return Ok(Vec::new());
+        };
+        let voids = journal.get().voids()?;
+        let is_ours = |void: &Void| {
+            let xqar = void.xqar.as_ref();
+            xqar.is_none_or(|xqar| self.places.owns(xqar))
+        };
+        let (ours, others): (Vec<Void>, Vec<Void>) = voids.into_iter().partition(is_ours);
+        let forgotten = others.into_iter().map(|void| Entry::Voided {
+            path: void.path,
+            reporter: void.reporter,
+        });
+        let forgotten: Vec<Entry> = forgotten.collect();
+        if !forgotten.is_empty()
+            && let Err(why) = self.record(&forgotten)
+        {
+            // The next start finds the same and tries again.
+            tracing::warn!("{why}");
+        }
+        Ok(ours)
     }
 }
