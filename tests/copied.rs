@@ -1,5 +1,5 @@
-//! State directories that are copied, moved or pointed elsewhere: a broker takes nothing from a directory
-//! that is not its own.
+//! What a broker removes: nothing from a directory that is not its own, as when a state is copied, moved or
+//! pointed elsewhere; and of its own, the directories that are empty.
 
 #![expect(
     clippy::unwrap_used,
@@ -98,6 +98,37 @@ fn copied_farm_takes_nothing_from_the_original() {
     assert!(second.wait().success());
     assert_eq!(written(&live), before, "{}", copy.log());
     assert_eq!(live.qcbus(&["down"]).status.code(), Some(0));
+    assert!(broker.wait().success());
+}
+
+#[test]
+fn removed_directory_takes_its_directories_of_results_with_it() {
+    let farm = farm_with_everything();
+    let mut broker = farm.serve_ready();
+    for day in ["2026-11-20/a", "2026-11-21", "kept"] {
+        std::fs::create_dir_all(farm.root().join(day)).unwrap();
+    }
+    for day in ["2026-11-20/a", "2026-11-21"] {
+        farm.write(&format!("{day}/good.xodr"), &Content::Good(1).bytes());
+        farm.verdict(&format!("{day}/good.xodr"));
+    }
+    farm.write("kept/good.xodr", &Content::Good(2).bytes());
+    farm.verdict("kept/good.xodr");
+    let below = |day: &str| [farm.out().join(day), farm.base().join("gate").join(day)];
+    let report = farm.out().join("kept/good.xodr.txt");
+    let published = farm.base().join("gate/kept/good.xodr");
+    let there = || (report.exists() && published.exists()).then_some(());
+    until_or("everything is written", there, || farm.log());
+    for day in ["2026-11-20", "2026-11-21"] {
+        std::fs::remove_dir_all(farm.root().join(day)).unwrap();
+    }
+    let gone = || {
+        let mut left = ["2026-11-20", "2026-11-21"].into_iter().flat_map(below);
+        (!left.any(|it| it.exists())).then_some(())
+    };
+    until_or("their directories go", gone, || farm.log());
+    assert!(below("kept").iter().all(|it| it.exists()));
+    assert_eq!(farm.qcbus(&["down"]).status.code(), Some(0));
     assert!(broker.wait().success());
 }
 

@@ -309,6 +309,10 @@ impl Writer {
             Order::Record(entry) => {
                 let recorded = self.store.record(std::slice::from_ref(entry));
                 recorded.map_err(Trouble::of_all)?;
+                if let Entry::Voided { path, .. } = entry {
+                    // The report was the last that lay there.
+                    self.store.tidy_above(path);
+                }
             }
         }
         Ok(None)

@@ -144,19 +144,31 @@ fn write_aside(path: &Path, content: &[u8]) -> io::Result<NamedTempFile> {
         _ => Path::new("."),
     };
     sweep_once(directory);
-    let made = make_temporary(directory);
-    let mut file = match made {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            make_directory(directory)?;
-            make_temporary(directory)
-        }
-        made => made,
-    }
-    .map_err(without_path)?;
+    let mut file = make_temporary_in(directory).map_err(without_path)?;
     // Some file systems have no locks; there the name has to do.
     let _ = flock(file.as_file(), FlockOperation::NonBlockingLockExclusive);
     file.as_file_mut().write_all(content)?;
     Ok(file)
+}
+
+/// How often a directory is made again that goes as soon as it is there.
+const TRIES: usize = 16;
+
+/// Makes a temporary file, and its directory if that is missing. Another thread may remove the directory
+/// while it is still empty ([`remove_empty_above`]), so that it is made again.
+fn make_temporary_in(directory: &Path) -> io::Result<NamedTempFile> {
+    for _ in 0..TRIES {
+        match make_temporary(directory) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            made => return made,
+        }
+        match make_directory(directory) {
+            // A directory above it went while it was made.
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+            _ => {}
+        }
+    }
+    make_temporary(directory)
 }
 
 fn make_temporary(directory: &Path) -> io::Result<NamedTempFile> {
@@ -220,6 +232,17 @@ pub fn remove(path: &Path) -> io::Result<()> {
     match std::fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound && !is_for_good(&error) => Err(error),
         _ => Ok(()),
+    }
+}
+
+/// Removes the directories above `path` that are empty, up to `top`, which stays. A directory that holds
+/// anything, or cannot be removed, ends it.
+pub fn remove_empty_above(path: &Path, top: &Path) {
+    let above = path.ancestors().skip(1);
+    for directory in above.take_while(|it| *it != top && it.starts_with(top)) {
+        if std::fs::remove_dir(directory).is_err() {
+            return;
+        }
     }
 }
 
@@ -392,6 +415,41 @@ mod tests {
         write_whole(&dir.path().join("a"), b"whole", false).unwrap();
         sweep_dead(dir.path());
         assert!(ahead.exists(), "it is this process', and not renamed yet");
+    }
+
+    #[test]
+    fn empty_directories_go_and_the_top_stays() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        std::fs::create_dir_all(at("top/a/b")).unwrap();
+        std::fs::create_dir_all(at("top/c/d")).unwrap();
+        std::fs::write(at("top/c/kept"), "").unwrap();
+        remove_empty_above(&at("top/a/b/gone"), &at("top"));
+        remove_empty_above(&at("top/c/d/gone"), &at("top"));
+        assert!(at("top").exists() && !at("top/a").exists());
+        assert!(at("top/c/kept").exists() && !at("top/c/d").exists());
+        remove_empty_above(&at("top/gone"), &at("elsewhere"));
+        assert!(at("top").exists(), "it does not lie below that top");
+    }
+
+    #[test]
+    fn files_are_written_while_their_empty_directory_is_removed() {
+        let dir = tempfile::tempdir().unwrap();
+        let top = dir.path().to_path_buf();
+        let place = top.join("a/b/file");
+        let done = std::sync::atomic::AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while !done.load(std::sync::atomic::Ordering::Relaxed) {
+                    remove_empty_above(&place, &top);
+                }
+            });
+            for _ in 0..500 {
+                write_whole(&place, b"whole", false).unwrap();
+                remove(&place).unwrap();
+            }
+            done.store(true, std::sync::atomic::Ordering::Relaxed);
+        });
     }
 
     #[test]

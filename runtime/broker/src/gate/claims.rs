@@ -11,7 +11,7 @@ use qcbus_messages::path_text::to_text;
 use tempfile::TempPath;
 
 use crate::result_paths::ResultPaths;
-use qcbus_disk::remove;
+use qcbus_disk::{remove, remove_empty_above};
 
 /// A file that an acceptance rests on, besides the accepted one.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -349,7 +349,9 @@ impl Claims {
             if !self.is_published(&root) {
                 continue;
             }
-            remove(&self.place(&root))?;
+            let place = self.place(&root);
+            remove(&place)?;
+            remove_empty_above(&place, &self.directory);
             self.lying.remove(&root);
             if let Some(claim) = self.get_mut(&root) {
                 claim.published = false;
@@ -398,6 +400,7 @@ impl Claims {
     fn tidy(&mut self) -> io::Result<()> {
         while let Some(litter) = self.litter.first().cloned() {
             remove(&litter)?;
+            remove_empty_above(&litter, &self.directory);
             self.litter.remove(&litter);
         }
         Ok(())

@@ -18,7 +18,7 @@ use crate::gate::GateError;
 use crate::journal::{Entry, Remembered};
 use crate::result_paths::verdict_beside;
 use crate::stamp::{stamp_of, stamp_through_links};
-use qcbus_disk::{FileMark, remove};
+use qcbus_disk::{FileMark, remove, remove_empty_above};
 
 /// What stands after all was looked through.
 #[derive(Debug, Default)]
@@ -127,7 +127,7 @@ impl Store {
             // By now the result of another file may lie there.
             let xqar = xqar.filter(|xqar| !owned.contains(*xqar));
             let mine = xqar.is_some();
-            if let Some(error) = xqar.and_then(|xqar| remove_result(xqar).err()) {
+            if let Some(error) = xqar.and_then(|xqar| self.remove_result(xqar).err()) {
                 found.cannot_withdraw(&row.path, &error);
                 continue;
             }
@@ -166,7 +166,7 @@ impl Store {
         let mut removed: Vec<Arc<Path>> = Vec::new();
         let mut failed = Vec::new();
         for Leftover { path, xqar } in leftovers(&self.places.out, owned) {
-            if let Err(error) = remove_result(&xqar) {
+            if let Err(error) = self.remove_result(&xqar) {
                 failed.push((path, error));
                 continue;
             }
@@ -191,6 +191,14 @@ impl Store {
                 .said
                 .push(format!("results withdrawn: {results}: {why}"));
         }
+    }
+
+    /// Removes a result, and last the verdict file, which tells that there was one.
+    fn remove_result(&self, xqar: &Path) -> io::Result<()> {
+        remove(xqar)?;
+        verdict_beside(xqar).map_or(Ok(()), |verdict| remove(&verdict))?;
+        remove_empty_above(xqar, &self.places.out);
+        Ok(())
     }
 
     fn recorded(&self, entries: &[Entry], found: &mut Reconciled) {
@@ -251,12 +259,6 @@ impl Reconciled {
             "cannot withdraw the result of {path}: {error}; it is tried again when qcbus is started anew"
         ));
     }
-}
-
-/// Removes a result, and last the verdict file, which tells that there was one.
-fn remove_result(xqar: &Path) -> io::Result<()> {
-    remove(xqar)?;
-    verdict_beside(xqar).map_or(Ok(()), |verdict| remove(&verdict))
 }
 
 fn said(fall: Fall, paths: &[Arc<Path>]) -> String {

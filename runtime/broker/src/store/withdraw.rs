@@ -9,7 +9,7 @@ use qcbus_messages::path_text::to_text;
 use super::{Store, Trouble};
 use crate::journal::{Entry, JournalError, Void};
 use crate::seams::{disk, step};
-use qcbus_disk::remove;
+use qcbus_disk::{remove, remove_empty_above};
 
 impl Store {
     /// Removes what was written for a file that has gone, and remembers who is to take back a
@@ -40,7 +40,14 @@ impl Store {
         remove(&self.places.xqar(path))?;
         step("half withdrawn", path);
         disk()?;
-        remove(&self.places.verdict(path))
+        remove(&self.places.verdict(path))?;
+        self.tidy_above(path);
+        Ok(())
+    }
+
+    /// Removes the directories of results that are empty now that a result, or a report beside it, has gone.
+    pub fn tidy_above(&self, path: &Path) {
+        remove_empty_above(&self.places.xqar(path), &self.places.out);
     }
 
     /// What reporters are still to take back. Reports beside results outside of our directory belong to
