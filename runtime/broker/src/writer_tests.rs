@@ -127,15 +127,21 @@ fn what_must_not_lie_behind_the_gate_waits_for_no_journal() {
     let name = "Nobody".to_owned();
     writers.order(&path, Order::Record(Entry::Struck { name }));
     writers.order(&path, Order::CloseGate { path: path.clone() });
-    let begun = Instant::now();
-    while published.exists() {
-        assert!(begun.elapsed() < Duration::from_secs(60), "the watchdog");
-        std::thread::sleep(Duration::from_millis(10));
-    }
+    until(|| !published.exists());
+    assert_eq!(writers.troubles().len(), 1);
     let said = format!("{:?}", told.try_recv());
     assert!(said.contains("it is tried again"), "{said}");
     journal.execute_batch("ROLLBACK").unwrap();
+    until(|| writers.troubles().is_empty());
     assert!(writers.finish(Duration::from_secs(60)).is_empty());
+}
+
+fn until(is_so: impl Fn() -> bool) {
+    let begun = Instant::now();
+    while !is_so() {
+        assert!(begun.elapsed() < Duration::from_secs(60), "the watchdog");
+        std::thread::sleep(Duration::from_millis(10));
+    }
 }
 
 fn accepted(job: &FinishedJob) -> Judged {

@@ -102,6 +102,7 @@ impl Writers {
                 held_up: HashSet::new(),
                 stopped: false,
                 told: false,
+                troubled: false,
             };
             let thread = thread::Builder::new().name(format!("write-{number}"));
             writers
@@ -184,6 +185,8 @@ struct Writer {
     stopped: bool,
     /// Since the last try a failure was told; there may be thousands of the kind.
     told: bool,
+    /// What it cannot write is in `troubles`.
+    troubled: bool,
 }
 
 /// Pause before a failed order is tried again.
@@ -212,7 +215,8 @@ impl Writer {
                 retry_at = None;
             }
             if self.waiting.is_empty() {
-                if retry_at.take().is_some() {
+                retry_at = None;
+                if std::mem::take(&mut self.troubled) {
                     self.is_in_trouble(None);
                 }
             } else {
@@ -256,6 +260,7 @@ impl Writer {
     }
 
     fn hold_up(&mut self, trouble: &Trouble) {
+        self.troubled = true;
         self.is_in_trouble(Some(trouble.what.clone()));
         self.stopped |= trouble.concerns_all;
         if !self.told {
