@@ -13,8 +13,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::options::Options;
 
-/// Name of the file in the state directory.
-const FILE: &str = "belongs-to.json";
+/// Name of the file in the state directory. It has no suffix: whoever looks for reports below the directory of
+/// results must not take it for one.
+const FILE: &str = "belongs-to";
 
 /// Most bytes of that file: two paths and two numbers.
 const MOST: u64 = 64 << 10;
