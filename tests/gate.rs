@@ -125,18 +125,22 @@ fn a_scenario_goes_with_its_map_and_comes_back_with_it() {
     let _broker = farm.serve_ready();
     publishes(&farm, &[CATALOG, MAP, SCENARIO]);
     is_sound(&farm);
-    // The map is rejected: the scenario is accepted, and nobody gets it.
+    // The map is rejected, and so is the scenario, whoever is asked.
     put(&farm, MAP, &Content::NoHeader(1).bytes());
+    assert_eq!(farm.verdict(SCENARIO).verdict, Verdict::Rejected);
     assert_eq!(farm.verdict(MAP).verdict, Verdict::Rejected);
     publishes(&farm, &[CATALOG]);
-    until_so("it is said why", || {
-        let status = farm.status().unwrap();
-        let why = |text: &str| text.contains(MAP) && text.contains("not accepted");
-        let mut said = status.notices.iter();
-        said.any(|it| it.kind == "held-back" && why(&it.text))
-    });
-    let held = farm.status().unwrap().gate.unwrap();
-    assert_eq!(held.held_back, held.examples.len() as u64, "{held:?}");
+    let scenario = farm.root().join(SCENARIO).to_string_lossy().into_owned();
+    assert_eq!(farm.qcbus(&["wait", &scenario]).status.code(), Some(1));
+    let told = farm.verdict_file(SCENARIO);
+    assert_eq!(told["own"], "accepted", "{told:#}");
+    let at = farm.root().join(MAP).to_string_lossy().into_owned();
+    let mut under = told["rests_on"].as_array().unwrap().iter();
+    let map = under.find(|it| it["path"] == *at).unwrap();
+    assert_eq!(
+        (&map["verdict"], &map["errors"]),
+        (&"rejected".into(), &1.into())
+    );
     // Another map that is accepted.
     put(&farm, MAP, &Content::Good(2).bytes());
     publishes(&farm, &[CATALOG, MAP, SCENARIO]);
@@ -149,6 +153,25 @@ fn a_scenario_goes_with_its_map_and_comes_back_with_it() {
     publishes(&farm, &[CATALOG, MAP, SCENARIO]);
     std::fs::write(farm.root().join(CATALOG), "<no catalog").unwrap();
     publishes(&farm, &[MAP]);
+}
+
+#[test]
+fn scenario_that_is_judged_by_itself_is_held_back_with_its_map() {
+    let farm = farm_of(&[MAP, SCENARIO, CATALOG], &["--own-verdict"]);
+    let _broker = farm.serve_ready();
+    publishes(&farm, &[CATALOG, MAP, SCENARIO]);
+    put(&farm, MAP, &Content::NoHeader(1).bytes());
+    assert_eq!(farm.verdict(MAP).verdict, Verdict::Rejected);
+    assert_eq!(farm.verdict(SCENARIO).verdict, Verdict::Accepted);
+    publishes(&farm, &[CATALOG]);
+    until_so("it is said why", || {
+        let status = farm.status().unwrap();
+        let why = |text: &str| text.contains(MAP) && text.contains("not accepted");
+        let mut said = status.notices.iter();
+        said.any(|it| it.kind == "held-back" && why(&it.text))
+    });
+    let held = farm.status().unwrap().gate.unwrap();
+    assert_eq!(held.held_back, held.examples.len() as u64, "{held:?}");
 }
 
 #[test]

@@ -14,7 +14,7 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 use std::process::Command;
 
 use qcbus_formats::xqar::{Location, Results};
-use support::desk::{Desk, sample_farm};
+use support::desk::{Desk, Said, issues, places, sample_farm};
 
 const MAP: &str = "../maps/quay_straight.xodr";
 const CATALOGS: &str = "../catalogs";
@@ -344,37 +344,78 @@ fn rejected_map() -> String {
     farm.replacen("<geometry ", "<geometry paved=\"yes\" ", 1)
 }
 
+/// A run over a scenario before its map, the map, and a scenario behind it.
+fn checked(desk: &Desk, out: &str, more: &[&str]) -> Said {
+    let files = ["a/on_it.xosc", "maps/quay_straight.xodr", "z/on_it.xosc"];
+    let mut arguments = vec!["check", "-v", "--out", out];
+    arguments.extend(files.iter().chain(more));
+    desk.qcbus(&arguments)
+}
+
 #[test]
-fn a_scenario_on_a_rejected_map_says_so_and_is_not_rejected_for_it() {
+fn scenario_on_a_rejected_map_is_rejected_until_the_map_is_fixed() {
     let desk = desk();
+    let good = std::fs::read(desk.path().join("maps/quay_straight.xodr")).unwrap();
     desk.write("maps/quay_straight.xodr", rejected_map());
     desk.write("a/on_it.xosc", scenario());
     desk.write("z/on_it.xosc", scenario());
-    let said = desk.qcbus(&[
-        "check",
-        "a/on_it.xosc",
-        "maps/quay_straight.xodr",
-        "z/on_it.xosc",
-        "-v",
-        "--out",
-        "out",
-    ]);
+    let said = checked(&desk, "out", &[]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    for name in ["a", "z"] {
+        let line = format!("rejected: {name}/on_it.xosc: ");
+        assert!(said.stdout.contains(&line), "{line}\n{}", said.whole(&desk));
+        let results = desk.result(&format!("out/{name}/on_it.xosc.xqar"));
+        let (text, place) = one_about_the_map(&results);
+        assert!(
+            text.contains("maps/quay_straight.xodr is rejected: it has 1 error"),
+            "{text}"
+        );
+        assert_eq!(place, [AT_MAP]);
+    }
+    // Each by itself: the map is rejected, and the scenarios only say so.
+    let said = checked(&desk, "own", &["--own-verdict"]);
     assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
     for name in ["a", "z"] {
         let line = format!("accepted: {name}/on_it.xosc: ");
         assert!(said.stdout.contains(&line), "{line}\n{}", said.whole(&desk));
-        let results = desk.result(&format!("out/{name}/on_it.xosc.xqar"));
-        let remarks = remarks(&results);
-        let [(text, _)] = &*remarks else {
-            panic!("one remark: {remarks:?}");
-        };
-        assert!(
-            text.contains("maps/quay_straight.xodr is rejected itself"),
-            "{text}"
-        );
+        one_about_the_map(&desk.result(&format!("own/{name}/on_it.xosc.xqar")));
     }
     // Alone, nobody has judged the map.
     let said = desk.qcbus(&["check", "a/on_it.xosc", "--out", "alone"]);
     assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
-    assert_eq!(remarks(&desk.result("alone/a/on_it.xosc.xqar")), []);
+    desk.write("maps/quay_straight.xodr", good);
+    let said = checked(&desk, "out", &[]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+}
+
+/// The text and the places of the one issue about a file that the checked one rests on.
+fn one_about_the_map(results: &Results) -> (String, Vec<(u64, u64)>) {
+    let all = issues(results).filter(|(checker, _)| &*checker.id == "qcbus_rests_on");
+    let all: Vec<_> = all.collect();
+    let [(_, issue)] = &*all else {
+        panic!("one issue: {all:?}");
+    };
+    (issue.description.clone(), places(issue))
+}
+
+#[test]
+fn only_catalogs_that_entries_are_taken_from_count() {
+    let desk = desk();
+    let catalog = std::fs::read_to_string(desk.path().join("catalogs/vehicles.xosc")).unwrap();
+    let broken = catalog.replacen("<Vehicle ", "<Vehicle paved=\"yes\" ", 1);
+    desk.write("scenarios/on_it.xosc", scenario());
+    // A scenario and another catalog in the catalog directory, both rejected, are nobody's business.
+    let scenario_with_fault = scenario().replacen("<Vehicle ", "<Vehicle paved=\"yes\" ", 1);
+    desk.write("catalogs/beside.xosc", scenario_with_fault);
+    desk.write(
+        "catalogs/unused.xosc",
+        broken.replace("harbour_vehicles", "others"),
+    );
+    let said = desk.qcbus(&["check", "-v", "."]);
+    let line = "accepted: scenarios/on_it.xosc: ";
+    assert!(said.stdout.contains(line), "{}", said.whole(&desk));
+    desk.write("catalogs/vehicles.xosc", broken);
+    let said = desk.qcbus(&["check", "-v", "."]);
+    let line = "rejected: scenarios/on_it.xosc: ";
+    assert!(said.stdout.contains(line), "{}", said.whole(&desk));
 }

@@ -174,6 +174,14 @@ impl Content {
         }
     }
 
+    /// The files that it rests on, by name: their verdicts are part of its own.
+    pub fn rests_on(&self) -> Vec<String> {
+        match self {
+            Content::Scenario(..) => self.parts(),
+            _ => Vec::new(),
+        }
+    }
+
     /// The standard bundle that must judge a file of this name.
     pub fn bundle(name: &str) -> &'static str {
         if name.ends_with(".xosc") {

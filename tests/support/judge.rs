@@ -46,10 +46,21 @@ pub fn judge_with(farm: &Farm, files: &Files, parts: &Files, strangers: &[&str])
             Some(part) => part.spoils(),
             None => Some(STRICT),
         });
-        judgement.file(farm, name, content, spoilt, strangers);
+        let under = content.rests_on().into_iter();
+        let under = under.filter(|it| files.contains_key(it)).collect();
+        let parts = Parts { spoilt, under };
+        judgement.file(farm, name, content, &parts, strangers);
     }
     judgement.nothing_else(farm, files);
     judgement
+}
+
+/// What the parts of a file make of it.
+struct Parts {
+    /// The checker that finds a fault in the file because of a part.
+    spoilt: Option<&'static str>,
+    /// The files that it rests on and that have verdicts of their own.
+    under: Vec<String>,
 }
 
 /// All that a file depends on, by name, the parts of its parts as well: a scenario on a map that
@@ -85,7 +96,7 @@ impl Judgement {
         farm: &Farm,
         name: &str,
         content: &Content,
-        by_parts: Option<&'static str>,
+        parts: &Parts,
         strangers: &[&str],
     ) {
         let bytes = content.bytes();
@@ -105,7 +116,7 @@ impl Judgement {
             );
         }
         let (complete, foreign) = self.is_complete(farm, name, strangers);
-        let checker = content.checker().or(by_parts);
+        let checker = content.checker().or(parts.spoilt);
         if complete && !expected_rule_fired(farm, name, checker) {
             self.complain(name, format!("the fault was not found: {content:?}"));
         }
@@ -114,7 +125,12 @@ impl Judgement {
             None => Verdict::Accepted,
             Some(_) => Verdict::Rejected,
         };
+        let under = parts.under.iter().map(|it| farm.verdict_file(it));
+        let under: Vec<serde_json::Value> = under.map(|it| it["verdict"].clone()).collect();
+        let has = |verdict: Verdict| under.iter().any(|it| *it == verdict.as_str());
         let allowed = match expected {
+            _ if has(Verdict::Rejected) => verdict == Verdict::Rejected.as_str(),
+            _ if has(Verdict::Undetermined) => verdict != Verdict::Accepted.as_str(),
             _ if !complete => verdict != Verdict::Accepted.as_str(),
             Verdict::Accepted if foreign => verdict == Verdict::Undetermined.as_str(),
             expected => verdict == expected.as_str(),
@@ -139,7 +155,8 @@ impl Judgement {
                 if matches!(checker.status, Some(Status::Completed | Status::Skipped)) {
                     continue;
                 }
-                if stranger {
+                // That a verdict which it rests on is undetermined is looked at there.
+                if stranger || &*checker.id == "qcbus_rests_on" {
                     foreign = true;
                 } else if checker.summary.contains(CONDEMNED) {
                     complete = false;

@@ -26,7 +26,17 @@ impl Verdict {
     /// should have answered and did not, and when nobody looked; else accepted. A checker without
     /// status, as other tools write it, is taken at its issues.
     pub fn of(results: &Results) -> Verdict {
-        let mut checkers = results.bundles.iter().flat_map(|bundle| &bundle.checkers);
+        Verdict::of_those(results, |_| true)
+    }
+
+    /// The verdict that a result would stand for without one of its checkers.
+    pub fn without(results: &Results, checker: &str) -> Verdict {
+        Verdict::of_those(results, |it| &*it.id != checker)
+    }
+
+    fn of_those(results: &Results, counts: impl Fn(&Checker) -> bool) -> Verdict {
+        let checkers = results.bundles.iter().flat_map(|bundle| &bundle.checkers);
+        let mut checkers = checkers.filter(|it| counts(it));
         let mut issues = checkers.clone().flat_map(|checker| &checker.issues);
         if issues.any(|issue| issue.level == Level::Error) {
             Verdict::Rejected

@@ -75,6 +75,7 @@ impl InForce {
         InForce::new(loaded.config.clone(), search)
             .map(|in_force| in_force.beside(&loaded.children))
             .map(|in_force| in_force.narrowed(sources.choice.clone()))
+            .map(|in_force| in_force.with_own_verdicts(sources.own_verdicts))
             .map_err(|error| LoadError::Config(error.to_string()))
     }
 
@@ -103,6 +104,18 @@ impl InForce {
             self.digest = Digest(hash.finalize().into());
         }
         self.choice = choice;
+        self
+    }
+
+    /// The same, with or without verdicts that count in those on the files that a file rests on. Verdicts of the
+    /// other kind do not stand.
+    #[must_use]
+    fn with_own_verdicts(mut self, own_verdicts: bool) -> InForce {
+        if own_verdicts {
+            let mut hash = Sha256::new_with_prefix(self.digest.0);
+            hash.update("own verdicts");
+            self.digest = Digest(hash.finalize().into());
+        }
         self
     }
 

@@ -9,7 +9,7 @@ use qcbus_messages::Verdict;
 use qcbus_messages::path_text::to_text;
 use serde::Serialize;
 
-use crate::core::{FinishedJob, Input, Judged, Juror, Jury};
+use crate::core::{FinishedJob, Input, Judged, Juror, Jury, RestsOn};
 
 /// Version of the form.
 pub const FORMAT: u32 = 1;
@@ -19,8 +19,12 @@ pub const FORMAT: u32 = 1;
 pub struct VerdictFile<'a> {
     format: u32,
     verdict: Verdict,
+    /// The verdict without the files that it rests on.
+    own: Verdict,
     input_file: String,
     sha256: String,
+    /// The files with verdicts of their own that it rests on.
+    rests_on: Vec<RestsOnLine>,
     depends_on: Vec<Dependency>,
     configuration_sha256: String,
     qcbus_version: &'a str,
@@ -46,6 +50,16 @@ pub struct VerdictFile<'a> {
     /// lie outside of the watched directories; absent when there is no gate.
     #[serde(skip_serializing_if = "Option::is_none")]
     outside_gate: Option<Vec<String>>,
+}
+
+#[derive(Debug, Serialize)]
+struct RestsOnLine {
+    path: String,
+    sha256: String,
+    /// `null` while there was none on these bytes.
+    verdict: Option<Verdict>,
+    /// Errors of its own.
+    errors: u64,
 }
 
 #[derive(Debug, Serialize)]
@@ -94,6 +108,13 @@ pub fn render(
     let file = VerdictFile {
         format: FORMAT,
         verdict: judged.verdict,
+        own: judged.own,
+        rests_on: judged
+            .rests_on
+            .iter()
+            .flatten()
+            .map(rests_on_line)
+            .collect(),
         input_file: to_text(&job.path),
         sha256: inputs.first().and_then(sha256).unwrap_or_default(),
         depends_on: depends_on.collect(),
@@ -125,6 +146,15 @@ pub fn render(
     let _ = serde_json::to_writer_pretty(&mut text, &file);
     text.push(b'\n');
     text
+}
+
+fn rests_on_line(it: &RestsOn) -> RestsOnLine {
+    RestsOnLine {
+        path: to_text(&it.path),
+        sha256: it.digest.to_string(),
+        verdict: it.verdict,
+        errors: it.errors,
+    }
 }
 
 fn names(jury: &Jury, wanted: impl Fn(&Juror) -> bool) -> Vec<&str> {

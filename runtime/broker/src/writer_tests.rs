@@ -29,6 +29,7 @@ fn store_in(dir: &Path) -> Store {
         dialect: Dialect::default(),
         durable: false,
         verdict_files: true,
+        own_verdicts: false,
         retries: true,
         gate: None,
         trials: None,
@@ -53,6 +54,7 @@ fn finished(dir: &Path, epoch: u64) -> FinishedJob {
         racy: false,
         documents: Vec::new(),
         missing: Vec::new(),
+        rests_on: Vec::new(),
         bytes: bytes.len() as u64,
     };
     FinishedJob {
@@ -63,7 +65,7 @@ fn finished(dir: &Path, epoch: u64) -> FinishedJob {
         prepared: Some(Arc::new(prepared)),
         unreadable: None,
         bundles: Vec::new(),
-        rejected_maps: Vec::new(),
+        rests_on: Vec::new(),
         jury: Arc::new(Jury::default()),
         epoch: Epoch(epoch),
         elapsed: Duration::ZERO,
@@ -149,6 +151,9 @@ fn accepted(job: &FinishedJob) -> Judged {
     Judged {
         job: job.job,
         verdict: Verdict::Accepted,
+        own: Verdict::Accepted,
+        own_errors: 0,
+        rests_on: Some(Vec::new()),
         digest: inputs[0].digest().unwrap(),
         basis: Digest::default(),
         config: Digest::default(),

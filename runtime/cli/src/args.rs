@@ -174,6 +174,9 @@ pub struct CheckArgs {
     /// Do not ask these checkers; results and verdicts say what was left out
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub ignore: Vec<String>,
+    /// Judge each file by itself: a rejected map does not reject the scenarios on it
+    #[arg(long)]
+    pub own_verdict: bool,
     /// What is printed, and what ends how.
     #[command(flatten)]
     pub print: PrintArgs,
@@ -398,6 +401,9 @@ pub struct ServeArgs {
     /// Publish accepted files here, and only those
     #[arg(long, value_name = "DIR")]
     pub gate: Option<PathBuf>,
+    /// Judge each file by itself: a rejected map does not reject the scenarios on it
+    #[arg(long)]
+    pub own_verdict: bool,
     /// What becomes behind the gate of a file that depends on others outside of DIR
     #[arg(long, value_name = "WHAT", value_enum, default_value_t = OutsideArg::Name, hide_short_help = true)]
     pub gate_outside: OutsideArg,

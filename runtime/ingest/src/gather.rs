@@ -12,6 +12,7 @@ use qcbus_messages::{Absence, DocumentRole, Link, MissingDocument, Within};
 use crate::archive::MAIN_MEMBER;
 use crate::modular::{ExpandedImage, MAX_DEPTH, Piece, SearchPath, expand, libraries};
 use crate::references::{Parameters, Reference, references};
+use crate::rests_on::{Member, rests_on};
 
 /// Where documents come from and go to.
 pub trait Source {
@@ -87,6 +88,9 @@ pub struct Found {
     pub missing: Vec<MissingDocument>,
     /// Of each document, the root first: where its references to maps and scenarios lead.
     pub links: Vec<Vec<Link>>,
+    /// Of each document, the root first: whether the root rests on it, so that a fault of it is a fault of
+    /// whatever runs the root.
+    pub rests_on: Vec<bool>,
 }
 
 /// Follows the references of a root and fetches what they lead to; those of scenarios that a modular
@@ -105,7 +109,7 @@ pub fn gather<S: Source>(
         source,
         walking,
         had: HashMap::from([(own, 0)]),
-        documents: vec![Had::default()],
+        documents: vec![Had::of_root(DocumentRole::Root)],
         catalogs: BTreeSet::new(),
         is_expanded: false,
         listed: BTreeSet::new(),
@@ -130,9 +134,11 @@ pub fn gather<S: Source>(
         walk.expand()?;
     }
     let links = walk.documents.iter().map(|had| had.links.clone()).collect();
+    let rests_on = rests_on(&walk.set());
     Ok(Found {
         missing: walk.weighed(),
         links,
+        rests_on,
     })
 }
 
@@ -157,14 +163,27 @@ struct Walk<'w, S> {
 type Obstacle = (String, u32);
 
 /// A document that was fetched.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Had {
+    role: DocumentRole,
     links: Vec<Link>,
     is_library: bool,
     /// How many references lead from the root to it, at least.
     depth: u32,
     /// The element of the root that leads to it.
     referred_at: u32,
+}
+
+impl Had {
+    fn of_root(role: DocumentRole) -> Had {
+        Had {
+            role,
+            links: Vec::new(),
+            is_library: false,
+            depth: 0,
+            referred_at: 0,
+        }
+    }
 }
 
 impl<S: Source> Walk<'_, S> {
@@ -261,6 +280,7 @@ impl<S: Source> Walk<'_, S> {
             _ => self.documents[from].referred_at,
         };
         self.documents.push(Had {
+            role: reference.role,
             links: Vec::new(),
             is_library: reference.is_library,
             depth,
@@ -289,7 +309,7 @@ impl<S: Source> Walk<'_, S> {
             && let Some(listing) = self.source.listing(&path)?
         {
             let referred_at = self.documents.last().map_or(0, |had| had.referred_at);
-            self.documents.push(Had::default());
+            self.documents.push(Had::of_root(DocumentRole::Listing));
             self.source
                 .keep(&path, DocumentRole::Listing, referred_at, listing);
         }
@@ -301,7 +321,7 @@ impl<S: Source> Walk<'_, S> {
         match self.expanded()? {
             Ok(document) => {
                 let path = from_text(self.root.path());
-                self.documents.push(Had::default());
+                self.documents.push(Had::of_root(DocumentRole::Expanded));
                 self.source.keep(&path, DocumentRole::Expanded, 0, document);
                 self.is_expanded = true;
             }
@@ -345,6 +365,18 @@ impl<S: Source> Walk<'_, S> {
                 Ok(Err((why.to_owned(), 0)))
             }
         }
+    }
+
+    /// The documents with their roles.
+    fn set(&self) -> Vec<Member<'_>> {
+        let image = |index: usize| match index {
+            0 => Some(*self.root),
+            _ => Document::open(self.source.kept(index - 1)).ok(),
+        };
+        let documents = self.documents.iter().enumerate();
+        documents
+            .map(|(index, had)| (had.role, image(index)))
+            .collect()
     }
 
     /// The documents with their links. One that cannot be opened was said to be missing: the root stands

@@ -221,6 +221,11 @@ fn listing(entries: &[Entry]) -> String {
 }
 
 /// Parts `archive.mosc!member!member` into the file on disk and the members.
+/// Returns the file on the disk that a path means: for a member of an archive, the archive.
+pub fn outer_file(path: &Path) -> PathBuf {
+    split_members(path).0
+}
+
 pub(crate) fn split_members(path: &Path) -> (PathBuf, Vec<String>) {
     // The file's name may be no UTF-8; its members have names in the archive, which is.
     let bytes = path.as_os_str().as_bytes();

@@ -1,6 +1,7 @@
 //! What qcbus itself finds in a set of documents: faults and missing references, whoever demanded what.
 
 use qcbus_document::{Attribute, Document, FaultCode, FaultGroup, Node};
+use qcbus_formats::Verdict;
 use qcbus_formats::location::OtherPlace;
 use qcbus_formats::pool::{BundleOutcome, Remark};
 use qcbus_formats::xqar::{Issue, Level, Location, Locations};
@@ -8,6 +9,8 @@ use qcbus_messages::{Absence, DocumentRole, MissingDocument, Within};
 
 /// Rule: what the file refers to is there and can be read.
 const REFERENCES: &str = "qcbus.dev:qcbus:1.0.0:file.references_resolved";
+/// Rule: what the file rests on is accepted itself.
+const RESTS_ON: &str = "qcbus.dev:qcbus:1.0.0:file.rests_on_accepted";
 /// Rule: the file is whole and well-formed.
 const WELL_FORMED: &str = "qcbus.dev:qcbus:1.0.0:file.well_formed";
 
@@ -124,25 +127,92 @@ fn missing_reference(root: &Document<'_>, missing: &MissingDocument) -> Remark {
     reference_remark(text, open, missing.level, vec![place])
 }
 
-/// That the map of a scenario is rejected itself: whoever runs the scenario should know, and its own
-/// verdict does not depend on it.
-pub fn rejected_map(root: &Document<'_>, referred_at: u32, path: &str, errors: u64) -> Remark {
-    let count = match errors {
-        1 => "it has one error".to_owned(),
-        _ => format!("it has {errors} errors"),
+/// Checker of the bundle `qcbus` that says what a file rests on and that is not accepted itself.
+pub const RESTS_ON_CHECKER: &str = "qcbus_rests_on";
+
+/// A file that the root rests on, and the verdict on it.
+#[derive(Debug, Clone, Copy)]
+pub struct Resting<'a> {
+    /// What it is to the root.
+    pub role: DocumentRole,
+    /// Byte offset of the element of the root that refers to it.
+    pub referred_at: u32,
+    /// Its absolute path.
+    pub path: &'a str,
+    /// The verdict on it; `None` while there is none on these bytes.
+    pub verdict: Option<Verdict>,
+    /// Errors found in it, without those of the files that it rests on.
+    pub errors: u64,
+}
+
+/// Says that a file which the root rests on is not accepted itself; `None` if it is accepted. With
+/// `binding`, the verdict on the root depends on it; otherwise it is only told.
+pub fn resting(root: &Document<'_>, it: &Resting<'_>, binding: bool) -> Option<Remark> {
+    if it.verdict == Some(Verdict::Accepted) {
+        return None;
+    }
+    let fact = format!("{} {} {}", name_of_role(it.role), it.path, standing_of(it));
+    let (text, level) = match (binding, it.verdict) {
+        (false, _) => (
+            format!("{fact}; the verdict on this file is its own (--own-verdict)"),
+            Level::Information,
+        ),
+        (true, Some(Verdict::Rejected)) => (
+            format!("{fact}; this file is judged again when that one is fixed"),
+            Level::Error,
+        ),
+        (true, _) => (fact.clone(), Level::Warning),
     };
-    let text = format!(
-        "the map {path} is rejected itself: {count}; the scenario was checked on it as far as it can be read"
-    );
+    let remark = Remark {
+        checker: RESTS_ON_CHECKER.to_owned(),
+        description: "What the file rests on is accepted itself.".to_owned(),
+        open: (level == Level::Warning).then_some(fact),
+        issue: Some(Issue {
+            id: 0,
+            description: text,
+            level,
+            rule_uid: RESTS_ON.to_owned(),
+            locations: vec![referring_place(root, it.referred_at)],
+            domain_info: Vec::new(),
+        }),
+    };
+    Some(remark)
+}
+
+fn name_of_role(role: DocumentRole) -> &'static str {
+    match role {
+        DocumentRole::Map => "the map",
+        DocumentRole::Catalog => "the catalog",
+        _ => "the scenario",
+    }
+}
+
+fn standing_of(it: &Resting<'_>) -> String {
+    match (it.verdict, it.errors) {
+        (Some(Verdict::Rejected), 0) => {
+            "is rejected, because it rests on a rejected file".to_owned()
+        }
+        (Some(Verdict::Rejected), 1) => "is rejected: it has 1 error".to_owned(),
+        (Some(Verdict::Rejected), errors) => format!("is rejected: it has {errors} errors"),
+        (Some(Verdict::Undetermined), _) => "is undetermined: see its own result".to_owned(),
+        (None, _) => "has no verdict yet".to_owned(),
+        (Some(Verdict::Accepted), _) => "is accepted".to_owned(),
+    }
+}
+
+/// The attribute that holds a path, else the element that refers.
+fn referring_place(root: &Document<'_>, referred_at: u32) -> Locations {
     let mut nodes = root.root().into_iter().flat_map(|node| node.descendants());
-    let place = match nodes.find(|node| node.offset() == referred_at) {
-        Some(node) => match node.attribute("filepath") {
-            Some(path) => attribute_place(root, node, path),
-            None => place_at(root, referred_at, Some((node, "")), "the reference"),
-        },
-        None => place_at(root, referred_at, None, "here"),
+    let Some(node) = nodes.find(|node| node.offset() == referred_at) else {
+        return place_at(root, referred_at, None, "here");
     };
-    reference_remark(text, String::new(), Level::Information, vec![place])
+    let attribute = ["filepath", "path"]
+        .into_iter()
+        .find_map(|name| node.attribute(name));
+    match attribute {
+        Some(attribute) => attribute_place(root, node, attribute),
+        None => place_at(root, referred_at, Some((node, "")), "the reference"),
+    }
 }
 
 fn reference_remark(text: String, open: String, level: Level, locations: Vec<Locations>) -> Remark {

@@ -99,6 +99,11 @@ impl Pooled {
         Verdict::of(&self.results)
     }
 
+    /// The verdict without what one checker says.
+    pub fn verdict_without(&self, checker: &str) -> Verdict {
+        Verdict::without(&self.results, checker)
+    }
+
     /// What keeps the file from being accepted though no error was found.
     pub fn open(&self) -> impl Iterator<Item = &Unfinished> {
         self.unfinished.iter().filter(|it| it.ending.is_open())

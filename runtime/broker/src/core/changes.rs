@@ -8,9 +8,22 @@ use qcbus_document::FileKind;
 use qcbus_messages::Verdict;
 
 use super::action::Action;
-use super::files::{FileId, Priority, Stage};
+use super::files::{FileEntry, FileId, Priority, Stage};
 use super::types::{Judged, Stamp};
 use super::{Actions, State};
+
+/// How a verdict depends on a file.
+enum Dependence {
+    /// The file was read, or looked for.
+    Read {
+        /// What it was then; `None` if it was not there.
+        stamp: Option<Stamp>,
+        /// The stamp proves nothing.
+        racy: bool,
+    },
+    /// The file has the verdict, and a link to it was read.
+    ByLink,
+}
 
 impl State {
     /// A file is there and may still be written to.
@@ -24,17 +37,44 @@ impl State {
     /// A file is there and quiet: whose verdict depends on it?
     pub(super) fn touched(&mut self, path: &Arc<Path>, stamp: Stamp, actions: &mut Actions) {
         for dependent in self.files.dependents(path) {
-            let judged = self.files.get(dependent).and_then(|it| it.judged.clone());
-            let read = judged.as_ref().and_then(|judged| {
-                let input = judged.inputs.iter().find(|input| input.path == *path);
-                input.and_then(|it| it.content.stamp())
-            });
-            if read != Some(stamp) {
-                self.doubt(dependent, actions);
-            } else if judged.is_some_and(|it| it.racy) {
-                self.look_again(dependent);
+            match self.reading_of(dependent, path) {
+                // It rests on the file and has read it by a link, which is watched, too.
+                Some(Dependence::ByLink) => {}
+                Some(Dependence::Read { stamp: read, racy }) if read == Some(stamp) => {
+                    if racy {
+                        self.look_again(dependent);
+                    }
+                }
+                Some(Dependence::Read { .. }) | None => self.doubt(dependent, actions),
             }
         }
+    }
+
+    /// How a file was read for the verdict on another one: for the one that is on its way, else for the last.
+    fn reading_of(&self, dependent: FileId, path: &Path) -> Option<Dependence> {
+        let entry = self.files.get(dependent)?;
+        let job = match entry.stage() {
+            Stage::Active(job) => self.jobs.get(job).and_then(|job| job.prepared.as_ref()),
+            _ => None,
+        };
+        let judged = entry.judged.as_ref();
+        let (inputs, racy) = match (job, judged) {
+            (Some(prepared), _) => (&prepared.inputs, prepared.racy),
+            (None, Some(judged)) => (&judged.inputs, judged.racy),
+            (None, None) => return None,
+        };
+        if let Some(input) = inputs.iter().find(|input| *input.path == *path) {
+            let stamp = input.content.stamp();
+            return Some(Dependence::Read { stamp, racy });
+        }
+        let by_link = match (job, judged) {
+            (Some(prepared), _) => prepared.rests_on.iter().any(|it| *it.path == *path),
+            (None, judged) => {
+                let under = judged.and_then(|it| it.rests_on.as_ref());
+                under.is_some_and(|all| all.iter().any(|it| *it.path == *path))
+            }
+        };
+        by_link.then_some(Dependence::ByLink)
     }
 
     /// An event tells that a file is there and quiet.
@@ -77,6 +117,9 @@ impl State {
         if !same || racy {
             self.changed(id);
         }
+        if !same {
+            self.wait_no_longer(id, actions);
+        }
         self.seen(id, actions);
     }
 
@@ -85,6 +128,7 @@ impl State {
     fn doubt(&mut self, id: FileId, actions: &mut Actions) {
         self.shut(id, actions);
         self.look_again(id);
+        self.wait_no_longer(id, actions);
     }
 
     /// Everything that a verdict depends on is to be read again, whatever the file's stamp says.
@@ -93,6 +137,16 @@ impl State {
             entry.doubted = true;
         }
         self.changed(id);
+    }
+
+    /// A job that waits for other verdicts begins anew when something that it has read is another by now.
+    fn wait_no_longer(&mut self, id: FileId, actions: &mut Actions) {
+        if let Some(Stage::Active(job)) = self.files.get(id).map(FileEntry::stage) {
+            let job = *job;
+            if self.is_held_up(job) {
+                self.begin_anew(job, actions);
+            }
+        }
     }
 
     /// What was accepted goes from behind the gate at once, before there is a new verdict.
@@ -186,6 +240,7 @@ impl State {
         for id in gone {
             self.vanished_file(id, actions);
         }
-        self.maps_are_known();
+        self.all_are_known();
+        self.count_again();
     }
 }

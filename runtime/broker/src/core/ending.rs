@@ -36,6 +36,7 @@ impl State {
         match self.phase {
             Phase::Draining(since) => {
                 self.turn_away_waiting_errands(actions);
+                self.end_held_up(actions);
                 self.end_trials(actions);
                 let overdue = self.now.saturating_sub(since) > self.settings.drain_limit;
                 if quiet || overdue {

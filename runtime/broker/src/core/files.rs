@@ -242,6 +242,18 @@ impl Files {
         }
     }
 
+    /// Moves a file that waits to the front: others wait for the verdict on it.
+    pub fn hurry(&mut self, id: FileId, now: Duration) {
+        if matches!(
+            self.entries.get(&id).map(FileEntry::stage),
+            Some(Stage::Waiting(..))
+        ) {
+            self.set_stage(id, Stage::Waiting(Priority::Fresh, now));
+            // Its other place in a queue is void.
+            self.fresh.push_front(id);
+        }
+    }
+
     /// Moves a file to another stage; the queues themselves are the business of
     /// [`Files::enqueue`] and [`Files::dequeue`].
     pub fn set_stage(&mut self, id: FileId, stage: Stage) {

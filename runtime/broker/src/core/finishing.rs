@@ -22,7 +22,7 @@ impl State {
         if job.stage != JobStage::Checking || !job.shares.values().all(Share::is_over) {
             return;
         }
-        let at = self.storable_at(job);
+        let at = self.storable_at(id);
         if let Some(job) = self.jobs.get_mut(&id) {
             job.stage = JobStage::Finished(at);
         }
@@ -73,7 +73,7 @@ impl State {
                 .map(|(name, share)| outcome(name, share))
                 .chain(self.inapplicable(job))
                 .collect(),
-            rejected_maps: self.rejected_maps(job),
+            rests_on: self.verdicts_under(job),
             jury: State::jury(&job.shares),
             epoch: job.epoch,
             elapsed: self.now.saturating_sub(job.since),
@@ -170,7 +170,7 @@ impl State {
     fn is_judged(&mut self, file: FileId, judged: Arc<Judged>, actions: &mut Actions) {
         self.rate.note(self.now);
         if let Some(entry) = self.files.get_mut(file) {
-            let before = entry.judged.replace(judged.clone());
+            entry.judged = Some(judged.clone());
             (entry.shut, entry.half_written) = (false, false);
             let (path, fresh) = (entry.path.clone(), true);
             let doubted = entry.doubted && judged.verdict == Verdict::Accepted;
@@ -185,7 +185,7 @@ impl State {
                 entry.shut = true;
                 actions.push(Action::CloseGate { path: gated });
             }
-            self.map_is_judged(file, before.as_deref(), &now);
+            self.counts_for_others(file, &now);
         }
         self.deliver_to_all(file, actions);
         self.let_shadows_try(file);
@@ -218,20 +218,26 @@ impl State {
         if let Some(errand) = &job.errand {
             return self.errand_is_over(job.file, errand.ticket, actions);
         }
-        self.map_is_over(job.file);
-        let Some(entry) = self.files.get(job.file) else {
+        self.what_follows(job.file, actions);
+        // It waits again by now, if it does.
+        self.verdict_has_come(job.file, actions);
+    }
+
+    /// A file whose job is over waits again, is withdrawn, or has a verdict that stands.
+    fn what_follows(&mut self, file: FileId, actions: &mut Actions) {
+        let Some(entry) = self.files.get(file) else {
             return;
         };
         let stands = |judged: &Arc<Judged>| self.stands(entry.kind, judged);
         if !entry.present {
-            self.vanished_file(job.file, actions);
+            self.vanished_file(file, actions);
         } else if entry.doubted || entry.judged.is_none() {
-            self.files.enqueue(job.file, Priority::Fresh, self.now);
+            self.files.enqueue(file, Priority::Fresh, self.now);
         } else if entry.judged.as_ref().is_some_and(stands) {
-            self.settle_waits(job.file, actions);
+            self.settle_waits(file, actions);
         } else {
             let priority = self.priority_of(&entry.path);
-            self.files.enqueue(job.file, priority, self.now);
+            self.files.enqueue(file, priority, self.now);
         }
     }
 

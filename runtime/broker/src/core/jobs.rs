@@ -141,7 +141,7 @@ impl State {
         if !self.may_judge() && !self.reads_early() {
             return;
         }
-        while self.jobs.len() < self.settings.max_active + self.trials.under_way()
+        while self.jobs.len() < self.settings.max_active + self.trials.under_way() + self.held_up()
             && self.preparing < self.settings.max_preparing
             && self.documents_active() < self.settings.max_documents
         {
@@ -150,6 +150,12 @@ impl State {
             };
             self.take(id, actions);
         }
+    }
+
+    /// Jobs that wait for the verdicts that their own rest on, which need places to come.
+    fn held_up(&self) -> usize {
+        let held_up = self.jobs.keys().filter(|id| self.is_held_up(**id));
+        held_up.count().min(self.settings.max_active)
     }
 
     fn documents_active(&self) -> usize {
@@ -172,6 +178,7 @@ impl State {
             if same_bytes && !entry.half_written && self.stands(entry.kind, judged) {
                 let judged = judged.clone();
                 self.confirm(id, &judged, actions);
+                self.verdict_has_come(id, actions);
                 self.settle_waits(id, actions);
                 return;
             }
@@ -383,7 +390,7 @@ impl State {
                 false => self.end_job(id, actions),
             };
         }
-        self.depend(file, &prepared.inputs, actions);
+        self.depend(file, prepared, actions);
         let same = |judged: &Judged| judged.basis == prepared.basis && !anew;
         match old {
             Some(judged) if same(&judged) && self.stands(kind, &judged) => {
@@ -432,12 +439,17 @@ impl State {
             judged: judged.clone(),
             fresh: false,
         });
+        self.counts_for_others(file, judged);
     }
 
-    fn depend(&mut self, file: FileId, inputs: &[Input], actions: &mut Actions) {
+    fn depend(&mut self, file: FileId, prepared: &PreparedJob, actions: &mut Actions) {
+        let inputs = &prepared.inputs;
         let others = inputs.iter().skip(1);
         let new: Vec<Arc<Path>> = others.map(|input| input.path.clone()).collect();
-        self.files.set_dependencies(file, new.clone());
+        // A link to a file is read, and the file itself has the verdict.
+        let under = prepared.rests_on.iter().map(|it| it.path.clone());
+        self.files
+            .set_dependencies(file, new.iter().cloned().chain(under).collect());
         self.forget_dependencies(actions);
         if !new.is_empty() {
             let stamps = inputs.iter().skip(1);

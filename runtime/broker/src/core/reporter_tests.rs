@@ -31,6 +31,9 @@ impl Desk {
         let judged = Judged {
             job: JobId(7),
             verdict: Verdict::Accepted,
+            own: Verdict::Accepted,
+            own_errors: 0,
+            rests_on: Some(Vec::new()),
             digest: Digest::default(),
             basis: Digest::default(),
             config: Digest::default(),

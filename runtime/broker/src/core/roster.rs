@@ -266,6 +266,7 @@ impl State {
             seat.name == juror.name && self.is_served_by(seat, juror.mark)
         };
         judged.config == self.config
+            && judged.rests_on.is_some()
             && seats.len() == judged.jury.0.len()
             && seats.iter().zip(&judged.jury.0).all(same)
     }

@@ -72,6 +72,8 @@ pub struct Settings {
     pub read_again_after: Duration,
     /// Drain limit after which unfinished work is given up.
     pub drain_limit: Duration,
+    /// The verdict on a file is its own, whatever the verdicts on the files are that it rests on.
+    pub own_verdicts: bool,
     /// Stop by itself once the scan is complete and everything has a verdict.
     pub once: bool,
 }
@@ -110,6 +112,7 @@ impl Default for Settings {
             moment_pause_max: Duration::from_secs(4),
             read_again_after: Duration::from_secs(60),
             drain_limit: Duration::from_secs(30),
+            own_verdicts: false,
             once: false,
         }
     }

@@ -39,6 +39,7 @@ use world::*;
 #[derive(Debug, Clone)]
 enum Step {
     Write(u8),
+    Spoil(u8),
     Touch(u8),
     Delete(u8),
     Wait(u8),
@@ -77,6 +78,7 @@ enum Step {
 fn steps() -> impl Strategy<Value = Vec<Step>> {
     let step = prop_oneof![
         4 => (0..11_u8).prop_map(Step::Write),
+        2 => (0..6_u8).prop_map(Step::Spoil),
         1 => (0..11_u8).prop_map(Step::Touch),
         2 => (0..11_u8).prop_map(Step::Delete),
         1 => (0..6_u8).prop_map(Step::Wait),
@@ -118,6 +120,7 @@ impl World {
     fn step(&mut self, step: &Step) {
         match *step {
             Step::Write(file) => self.write(file),
+            Step::Spoil(file) => self.put(file, BAD + self.stamps + 1),
             Step::Touch(file) => self.touch(file),
             Step::Delete(file) => self.delete(file),
             Step::Wait(file) => self.wait(file),
@@ -206,6 +209,7 @@ proptest! {
             let judged = world.state.files.get(id).unwrap().judged.clone().unwrap();
             prop_assert_eq!(named(&judged.jury), world.expected_jury());
             prop_assert_eq!(&world.journal[file], &*judged, "the journal knows the same");
+            prop_assert_eq!(judged.verdict, world.verdict_with_all(*file, judged.own));
             // Once all are there, only a file that kills bundles keeps them from a judgement.
             let why = &world.failures[file];
             prop_assert!(why.iter().all(|it| it.contains("alone in a fresh process")), "{:?}", why);

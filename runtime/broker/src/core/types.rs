@@ -7,7 +7,9 @@ use std::time::Duration;
 use qcbus_document::FileKind;
 use qcbus_formats::manifest::May;
 use qcbus_messages::control::FileVerdict;
-use qcbus_messages::{Catalogue, Digest, Job, JobDocument, JobId, MissingDocument, Role, Verdict};
+use qcbus_messages::{
+    Catalogue, Digest, DocumentRole, Job, JobDocument, JobId, MissingDocument, Role, Verdict,
+};
 
 use sha2::{Digest as _, Sha256};
 
@@ -140,8 +142,37 @@ pub struct PreparedJob {
     pub documents: Vec<JobDocument>,
     /// What could not be had.
     pub missing: Vec<MissingDocument>,
+    /// Those of the documents that the root rests on and that get verdicts of their own.
+    pub rests_on: Vec<Referenced>,
     /// Source bytes in total.
     pub bytes: u64,
+}
+
+/// A file with a verdict of its own that another file rests on: its map, a catalog that it takes entries from,
+/// a scenario that it is made of.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Referenced {
+    /// Absolute path, under which it is judged.
+    pub path: Arc<Path>,
+    /// Digest of the bytes that were read.
+    pub digest: Digest,
+    /// What it is to the file that rests on it.
+    pub role: DocumentRole,
+    /// Byte offset of the referring element in the image of that file.
+    pub referred_at: u32,
+}
+
+/// A file that a verdict rests on, with the verdict on it that was counted in.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RestsOn {
+    /// Absolute path, under which it is judged.
+    pub path: Arc<Path>,
+    /// Digest of the bytes that were read.
+    pub digest: Digest,
+    /// The verdict on these bytes; `None` while there was none.
+    pub verdict: Option<Verdict>,
+    /// Errors found in it, without those of the files that it rests on.
+    pub errors: u64,
 }
 
 impl PreparedJob {
@@ -172,8 +203,14 @@ pub enum PrepareFailure {
 pub struct Judged {
     /// The job that gave it.
     pub job: JobId,
-    /// The verdict.
+    /// The verdict: the worst of its own and of the files that it rests on.
     pub verdict: Verdict,
+    /// The verdict without the files that it rests on.
+    pub own: Verdict,
+    /// Errors without the findings about files that it rests on.
+    pub own_errors: u64,
+    /// The files that it rests on; `None` in a journal from before this was recorded.
+    pub rests_on: Option<Vec<RestsOn>>,
     /// Digest of the root's bytes.
     pub digest: Digest,
     /// Digest over all inputs.
@@ -234,25 +271,14 @@ pub struct FinishedJob {
     pub unreadable: Option<String>,
     /// By bundle.
     pub bundles: Vec<ShareOutcome>,
-    /// Maps that it refers to and that are rejected themselves.
-    pub rejected_maps: Vec<RejectedMap>,
+    /// The files that it rests on, each with the verdict on it.
+    pub rests_on: Vec<(Referenced, RestsOn)>,
     /// Those who had to judge, and did.
     pub jury: Arc<Jury>,
     /// The epoch in which they were called: in a later one the job is not to be stored.
     pub epoch: Epoch,
     /// Time since the job was taken from the queue.
     pub elapsed: Duration,
-}
-
-/// A map that was rejected itself.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct RejectedMap {
-    /// Its path, as the job's documents have it.
-    pub path: String,
-    /// Byte offset of the referring element in the root's image.
-    pub referred_at: u32,
-    /// How many errors it has.
-    pub errors: u64,
 }
 
 /// What storing a result gave.

@@ -107,6 +107,7 @@ impl State {
         if self.files.get(id).is_some_and(there) {
             self.files.enqueue(id, Priority::Fresh, self.now);
         }
+        self.hurry_under(id);
     }
 
     /// Answers everybody who waits for this file, if there is nothing more to wait for.
@@ -132,7 +133,11 @@ impl State {
             Stage::Idle | Stage::Waiting(Priority::Background, _)
         );
         let stands = |judged: &Arc<Judged>| {
-            settled && entry.present && !entry.doubted && self.stands(entry.kind, judged)
+            settled
+                && entry.present
+                && !entry.doubted
+                && self.stands(entry.kind, judged)
+                && self.rests_firmly(judged)
         };
         let judged = entry.judged.clone().filter(stands)?;
         Some((entry.path.clone(), judged))

@@ -20,7 +20,7 @@ use crate::demand::InForce;
 use crate::descriptors::Descriptors;
 use crate::directory_lock::{DirectoryLock, LockError, Purpose, open_to_others};
 use crate::gate::{Gate, GateError, GateOptions};
-use crate::intake::Intake;
+use crate::intake::{Intake, JudgedAs};
 use crate::journal::{Journal, JournalError, SharedJournal, Void};
 use crate::launches::Launches;
 use crate::options::Options;
@@ -34,7 +34,7 @@ use crate::store::{Reconciled, Store, TrialResults, remove_earlier_results};
 use crate::supervise::Surroundings;
 use crate::watch::{Seen, is_looked_at, scan_directory};
 use crate::writers::{Order, Writers};
-use qcbus_disk::sweep;
+use qcbus_disk::{foreign, sweep};
 
 impl Broker {
     /// Takes the instance, opens the journal, reads the configuration. Must be called within a
@@ -194,6 +194,7 @@ fn sources_of(options: &Options) -> Sources {
         lasting: options.watch,
         bundles_d: options.bundles_d.clone(),
         choice: options.choice.clone(),
+        own_verdicts: options.settings.own_verdicts,
         standard: options.standard.clone(),
         reporters: options.reporters.clone(),
         known: options.known.clone(),
@@ -248,6 +249,7 @@ fn store(
         durable: options.durable,
         verdict_files: options.verdict_files,
         retries: options.watch,
+        own_verdicts: options.settings.own_verdicts,
         gate: gate.transpose()?,
         scouts,
         trials: options.state.as_deref().map(TrialResults::anew),
@@ -332,9 +334,26 @@ fn intake(options: &Options, host: &Host, in_force: &InForce) -> Arc<Intake> {
         options.limits,
         roots,
         options.settings.max_documents,
+        judged_as(options),
     );
     intake.search_in(in_force.search.clone());
     Arc::new(intake)
+}
+
+/// A file that a link leads to is judged under its own path.
+fn judged_as(options: &Options) -> JudgedAs {
+    let (roots, files) = (options.roots.clone(), options.files.clone());
+    Box::new(move |path| {
+        let is_judged = |path: &Path| {
+            let mut files = files.iter();
+            files.any(|it| it == path) || is_looked_at(&roots, path)
+        };
+        if is_judged(path) {
+            return Some(path.into());
+        }
+        let real = foreign::canonicalize(path).ok();
+        real.filter(|it| is_judged(it)).map(Into::into)
+    })
 }
 
 pub(super) fn children(

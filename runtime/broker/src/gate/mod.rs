@@ -21,7 +21,7 @@ use qcbus_messages::Digest;
 use qcbus_messages::control::{GateStatus, HeldBack};
 use qcbus_messages::path_text::to_text;
 
-use crate::core::{Input, Judged, Reading};
+use crate::core::{Input, Judged, Reading, RestsOn};
 use crate::directory_lock::{DirectoryLock, Purpose};
 use crate::journal::Remembered;
 use crate::result_paths::ResultPaths;
@@ -361,6 +361,12 @@ impl Gate {
                 judged: (self.options.is_judged)(&input.path),
             })
         };
+        // A file that was only looked at, such as a scenario in a catalog directory, is needed by nobody.
+        let rests_on = judged.rests_on.as_ref();
+        let is_needed = |need: &Need| {
+            let named = |all: &Vec<RestsOn>| all.iter().any(|it| it.path == need.path);
+            !need.judged || rests_on.is_none_or(named)
+        };
         Claim {
             digest: judged.digest,
             size: size_of_root(judged),
@@ -368,6 +374,7 @@ impl Gate {
                 .filter(|input| is_file(input))
                 .filter(inside)
                 .filter_map(need)
+                .filter(is_needed)
                 .collect(),
             refused: self.refusal(judged),
             published: false,

@@ -8,18 +8,20 @@ use qcbus_bus::Held;
 use qcbus_disk::foreign;
 use qcbus_ingest::modular::ExpandedImage;
 use qcbus_ingest::{Found, Limits, Look, Prepared, Source};
-use qcbus_messages::path_text::to_text;
+use qcbus_messages::path_text::{from_text, to_text};
 use qcbus_messages::{Absence, Digest, DocId, DocumentRole, JobDocument, MissingDocument};
 use sha2::{Digest as _, Sha256};
 
-use super::{Intake, Manner, Published};
-use crate::core::{Input, PrepareFailure, PreparedJob, Reading, Stamp};
+use super::{Intake, JudgedAs, Manner, Published};
+use crate::core::{Input, PrepareFailure, PreparedJob, Reading, Referenced, Stamp};
 use crate::stamp::{from_content, is_racy, stamp_through_links};
 
 /// What has been found for one job so far.
 pub(super) struct Gathered {
     documents: Vec<JobDocument>,
     missing: Vec<MissingDocument>,
+    /// Of each document: whether the root rests on it.
+    rests_on: Vec<bool>,
     inputs: BTreeMap<PathBuf, Input>,
     root: Vec<Input>,
     pub held: Vec<(DocId, Held)>,
@@ -33,6 +35,7 @@ impl Gathered {
         let mut gathered = Gathered {
             documents: Vec::new(),
             missing: Vec::new(),
+            rests_on: Vec::new(),
             inputs: BTreeMap::new(),
             root: root.inputs.iter().take(1).cloned().collect(),
             held: Vec::new(),
@@ -63,6 +66,7 @@ impl Gathered {
     /// What the walk came to.
     pub fn found(&mut self, found: Found) {
         self.missing = found.missing;
+        self.rests_on = found.rests_on;
         for (document, links) in self.documents.iter_mut().zip(found.links) {
             document.links = links;
         }
@@ -107,7 +111,32 @@ impl Gathered {
         );
     }
 
-    pub fn finish(&self) -> PreparedJob {
+    /// The documents that the root rests on and that are judged by themselves. `judged_as` gives the path
+    /// under which a file is. A member of an archive is judged with its archive.
+    pub fn rests_on(&self, judged_as: &JudgedAs) -> Vec<Referenced> {
+        let root = self.root.first().map(|input| &*input.path);
+        let documents = self.documents.iter().zip(&self.rests_on);
+        let mut found: Vec<Referenced> = Vec::new();
+        for (document, _) in documents.filter(|(_, rests)| **rests) {
+            let file = qcbus_ingest::outer_file(&from_text(&document.path));
+            let digest = self.inputs.get(&file).and_then(Input::digest);
+            let Some((path, digest)) = judged_as(&file).zip(digest) else {
+                continue;
+            };
+            let is_new = Some(&*path) != root && found.iter().all(|it| it.path != path);
+            if is_new {
+                found.push(Referenced {
+                    path,
+                    digest,
+                    role: document.role,
+                    referred_at: document.referred_at,
+                });
+            }
+        }
+        found
+    }
+
+    pub fn finish(&self, judged_as: Option<&JudgedAs>) -> PreparedJob {
         let root = self.root.first().map(|input| input.path.clone());
         let others = self
             .inputs
@@ -120,6 +149,7 @@ impl Gathered {
             inputs,
             documents: self.documents.clone(),
             missing: self.missing.clone(),
+            rests_on: judged_as.map_or_else(Vec::new, |it| self.rests_on(it)),
             bytes: self.bytes,
         }
     }

@@ -32,6 +32,7 @@ pub struct Intake {
     roots: Vec<PathBuf>,
     max_documents: usize,
     search: Mutex<Arc<SearchPath>>,
+    judged_as: JudgedAs,
     next_doc: AtomicU64,
     shared: Shared,
     held: Mutex<HashMap<JobId, Vec<(DocId, Held)>>>,
@@ -45,6 +46,9 @@ impl std::fmt::Debug for Intake {
             .finish_non_exhaustive()
     }
 }
+
+/// The path under which a file gets a verdict of its own, if it does.
+pub type JudgedAs = Box<dyn Fn(&Path) -> Option<Arc<Path>> + Send + Sync>;
 
 /// What the files of a job may include.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,6 +88,7 @@ impl Intake {
         limits: Limits,
         roots: Vec<PathBuf>,
         max_documents: usize,
+        judged_as: JudgedAs,
     ) -> Intake {
         Intake {
             documents,
@@ -91,6 +96,7 @@ impl Intake {
             roots,
             max_documents,
             search: Mutex::default(),
+            judged_as,
             next_doc: AtomicU64::new(1),
             shared: Shared::default(),
             held: Mutex::default(),
@@ -123,7 +129,8 @@ impl Intake {
             .map_err(|failure| explained(failure, path))?;
         let mut gathered = Gathered::new(path, &root);
         self.gather(&root.held, manner, asked, &mut gathered)?;
-        let prepared = gathered.finish();
+        let judged_as = (within == Within::Watched).then_some(&self.judged_as);
+        let prepared = gathered.finish(judged_as);
         reached("gathered", path);
         self.hold(job, gathered.held);
         Ok(Box::new(prepared))

@@ -30,7 +30,13 @@ impl Farm {
         let host = Host::start(&Instance::at(dir.path().join("instance")), options).unwrap();
         let roots = vec![dir.path().to_path_buf()];
         Farm {
-            intake: Intake::new(host.documents(), Limits::default(), roots, 64),
+            intake: Intake::new(
+                host.documents(),
+                Limits::default(),
+                roots,
+                64,
+                Box::new(|_| None),
+            ),
             jobs: AtomicU64::new(0),
             _host: Mutex::new(host),
             dir,

@@ -20,7 +20,10 @@ CREATE TABLE IF NOT EXISTS files (
     racy     INTEGER NOT NULL,      -- 1: read so soon after a write that the stamps prove nothing
     at       INTEGER NOT NULL,
     epoch    INTEGER NOT NULL DEFAULT 0, -- of who had to judge
-    written  TEXT NOT NULL DEFAULT ''    -- size, mtime_ns, inode of the verdict file as it was written
+    written  TEXT NOT NULL DEFAULT '',   -- size, mtime_ns, inode of the verdict file as it was written
+    own      TEXT NOT NULL DEFAULT '',   -- the verdict without the files that it rests on
+    own_errors INTEGER NOT NULL DEFAULT 0, -- errors without the findings about those files
+    rests_on TEXT NOT NULL DEFAULT ''    -- JSON list of [path, digest, verdict or null, errors]; empty: not known
 ) WITHOUT ROWID;
 
 -- The roster: the bundles that must judge until somebody removes them, whether they are there or not.

@@ -31,7 +31,7 @@ use schema::prepare;
 use write::{Change, changes};
 
 /// Version of the schema, kept in SQLite's `user_version`.
-pub const SCHEMA_VERSION: i64 = 4;
+pub const SCHEMA_VERSION: i64 = 5;
 
 /// A file with its verdict, as the journal remembers it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -246,7 +246,7 @@ impl Journal {
         }
         let mut query = self.connection.prepare(
             "SELECT path, job, verdict, digest, basis, config, jury, errors, warnings, \
-             information, why, xqar, inputs, racy, epoch, written FROM files ORDER BY path",
+             information, why, xqar, inputs, racy, epoch, written, own, own_errors, rests_on FROM files ORDER BY path",
         )?;
         let mut rows = query.query([])?;
         let mut all = Vec::new();

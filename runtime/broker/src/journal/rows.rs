@@ -6,7 +6,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use qcbus_messages::path_text::{from_text, to_text as text};
 use qcbus_messages::{Digest, JobId, Verdict};
 
-use crate::core::{Epoch, Input, Judged, Juror, Jury, Mark, Reading, Stamp};
+use crate::core::{Epoch, Input, Judged, Juror, Jury, Mark, Reading, RestsOn, Stamp};
 
 pub(super) fn jury_to_text(jury: &Jury) -> String {
     let row = |juror: &Juror| {
@@ -102,15 +102,49 @@ fn rows_of_schema_1(text: &str) -> Option<Vec<InputRow>> {
     Some(rows.into_iter().map(row).collect())
 }
 
+fn verdict_of(text: &str) -> Option<Verdict> {
+    let all = [Verdict::Accepted, Verdict::Rejected, Verdict::Undetermined];
+    all.into_iter().find(|it| it.as_str() == text)
+}
+
+/// Path, digest, verdict if there was one, errors.
+type RestsOnRow = (String, String, Option<String>, u64);
+
+pub(super) fn rests_on_to_text(rests_on: Option<&[RestsOn]>) -> String {
+    let Some(rests_on) = rests_on else {
+        return String::new();
+    };
+    let row = |it: &RestsOn| -> RestsOnRow {
+        let verdict = it.verdict.map(|verdict| verdict.as_str().to_owned());
+        (text(&it.path), it.digest.to_string(), verdict, it.errors)
+    };
+    let rows: Vec<RestsOnRow> = rests_on.iter().map(row).collect();
+    serde_json::to_string(&rows).unwrap_or_default()
+}
+
+/// Nothing where it is not known, or makes no sense: the verdict is given anew then.
+fn rests_on_from_text(text: &str) -> Option<Vec<RestsOn>> {
+    let rows: Vec<RestsOnRow> = serde_json::from_str(text).ok()?;
+    let read = |(path, digest, verdict, errors): RestsOnRow| {
+        Some(RestsOn {
+            path: from_text(&path).into(),
+            digest: digest.parse().ok()?,
+            verdict: match verdict {
+                Some(verdict) => Some(verdict_of(&verdict)?),
+                None => None,
+            },
+            errors,
+        })
+    };
+    rows.into_iter().map(read).collect()
+}
+
 pub(super) fn judged_of(row: &rusqlite::Row<'_>) -> rusqlite::Result<Option<Judged>> {
     let digest = |index| -> rusqlite::Result<Option<Digest>> {
         Ok(row.get::<_, String>(index)?.parse().ok())
     };
-    let verdict = match row.get::<_, String>(2)?.as_str() {
-        "accepted" => Verdict::Accepted,
-        "rejected" => Verdict::Rejected,
-        "undetermined" => Verdict::Undetermined,
-        _ => return Ok(None),
+    let Some(verdict) = verdict_of(&row.get::<_, String>(2)?) else {
+        return Ok(None);
     };
     let (own, basis, config) = (digest(3)?, digest(4)?, digest(5)?);
     let inputs = inputs_from_text(&row.get::<_, String>(12)?);
@@ -118,7 +152,11 @@ pub(super) fn judged_of(row: &rusqlite::Row<'_>) -> rusqlite::Result<Option<Judg
     else {
         return Ok(None);
     };
+    let rests_on = rests_on_from_text(&row.get::<_, String>(18)?);
     Ok(Some(Judged {
+        own: verdict_of(&row.get::<_, String>(16)?).unwrap_or(verdict),
+        own_errors: number(row.get(17)?),
+        rests_on,
         job: JobId(number(row.get(1)?)),
         verdict,
         digest,

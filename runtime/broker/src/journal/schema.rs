@@ -43,6 +43,14 @@ pub(super) fn prepare(connection: &Connection, path: &Path) -> Result<(), Journa
             .execute_batch("BEGIN; ALTER TABLE job_checkers RENAME TO job_findings; PRAGMA user_version = 4; COMMIT;")
             .map_err(fail)?;
     }
+    if (1..=4).contains(&found) {
+        // What verdicts rest on is not known of older ones: they are given anew.
+        let newer = "BEGIN; ALTER TABLE files ADD COLUMN own TEXT NOT NULL DEFAULT ''; \
+                     ALTER TABLE files ADD COLUMN own_errors INTEGER NOT NULL DEFAULT 0; \
+                     ALTER TABLE files ADD COLUMN rests_on TEXT NOT NULL DEFAULT ''; \
+                     PRAGMA user_version = 5; COMMIT;";
+        connection.execute_batch(newer).map_err(fail)?;
+    }
     connection.set_prepared_statement_cache_capacity(STATEMENTS);
     // WAL with synchronous=NORMAL survives a killed process; after a power cut the last verdicts
     // may be missing, and their files are judged anew.

@@ -13,6 +13,9 @@ fn judged(job: u64) -> Judged {
     Judged {
         job: JobId(job),
         verdict: Verdict::Undetermined,
+        own: Verdict::Undetermined,
+        own_errors: 0,
+        rests_on: Some(Vec::new()),
         digest: Digest([1; 32]),
         basis: Digest([2; 32]),
         config: Digest([3; 32]),
@@ -140,6 +143,8 @@ fn a_journal_of_schema_1_opens_and_its_stamps_fit_nothing() {
              ALTER TABLE job_findings RENAME TO job_checkers; \
              ALTER TABLE files RENAME COLUMN jury TO bundles; \
              ALTER TABLE files DROP COLUMN epoch; ALTER TABLE files DROP COLUMN written; \
+             ALTER TABLE files DROP COLUMN own; ALTER TABLE files DROP COLUMN own_errors; \
+             ALTER TABLE files DROP COLUMN rests_on; \
              UPDATE files SET bundles = 'ffffffffffffffff'; \
              INSERT INTO deliveries VALUES ('/a.xosc', 'json', 5), ('/a.xosc', 'text', 0); \
              PRAGMA user_version = 1",

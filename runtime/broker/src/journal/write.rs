@@ -7,7 +7,7 @@ use qcbus_messages::path_text::to_text as text;
 use rusqlite::types::Value;
 use rusqlite::{Transaction, params_from_iter};
 
-use super::rows::{inputs_to_text, jury_to_text, millis, signed};
+use super::rows::{inputs_to_text, jury_to_text, millis, rests_on_to_text, signed};
 use super::{Entry, History};
 use crate::core::{Judged, Member, Reported};
 use crate::store::digest_of;
@@ -133,9 +133,9 @@ fn delivery(path: &str, reporter: &str, reported: Reported) -> Change {
 fn file(path: &Path, judged: &Judged, written: Option<&FileMark>) -> Change {
     // Whoever writes no verdict file leaves the mark of the one that is there.
     let sql = "INSERT OR REPLACE INTO files (path, job, verdict, digest, basis, config, jury, errors, \
-         warnings, information, why, xqar, inputs, racy, at, epoch, written) \
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, \
-         coalesce(?17, (SELECT written FROM files WHERE path = ?1), ''))";
+         warnings, information, why, xqar, inputs, racy, at, epoch, own, own_errors, rests_on, written) \
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, \
+         coalesce(?20, (SELECT written FROM files WHERE path = ?1), ''))";
     let values = [
         Value::Text(text(path)),
         count(judged.job.0),
@@ -153,6 +153,9 @@ fn file(path: &Path, judged: &Judged, written: Option<&FileMark>) -> Change {
         Value::Integer(judged.racy.into()),
         Value::Integer(millis()),
         count(judged.epoch.0),
+        word(judged.own.as_str()),
+        count(judged.own_errors),
+        Value::Text(rests_on_to_text(judged.rests_on.as_deref())),
         written.map_or(Value::Null, |it| word(&it.0)),
     ];
     Change::new(sql, values)

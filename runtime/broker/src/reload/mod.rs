@@ -42,6 +42,8 @@ pub struct Sources {
     pub bundles_d: Option<PathBuf>,
     /// What of all that would be demanded is asked for.
     pub choice: Choice,
+    /// Whether the verdict on a file is its own, whatever the verdicts on the files are that it rests on.
+    pub own_verdicts: bool,
     /// The children that come with the program.
     pub standard: Vec<ChildSpec>,
     /// Reporters that run when the configuration names them.

@@ -8,6 +8,7 @@ fn sources(directory: &Path) -> Sources {
         config: Some(directory.join("config.xml")),
         lasting: true,
         bundles_d: Some(directory.join("bundles.d")),
+        own_verdicts: false,
         choice: Default::default(),
         standard: vec![child("xodrBundle")],
         reporters: vec![child("qc-report-text")],

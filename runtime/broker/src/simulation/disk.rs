@@ -126,11 +126,8 @@ impl Disk {
         let sound = |it: Meant| it.whole && it.mark != Mark::Bad;
         let part = self.meant_at(lying, PART);
         let own = |it: Meant| sound(it) && (!it.includes || part.is_some_and(sound));
-        let map = |it: Meant| {
-            it.whole
-                && (it.mark != Mark::Unfit || !maps)
-                && (!it.includes || part.is_some_and(|it| it.whole))
-        };
+        // A scenario is as good as its map.
+        let map = |it: Meant| own(it) && (it.mark != Mark::Unfit || !maps);
         self.meant_at(lying, file).is_some_and(own)
             && map_of(file).is_none_or(|it| self.meant_at(lying, it).is_some_and(map))
     }

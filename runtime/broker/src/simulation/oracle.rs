@@ -287,10 +287,10 @@ impl World {
         {
             return Err("the journal knows another verdict file".to_owned());
         }
-        let given_up = judged
-            .why
-            .iter()
-            .any(|it| it.contains("alone in a fresh process"));
+        // The file itself, or the map that it rests on.
+        let given_up = judged.why.iter().any(|it| {
+            it.contains("alone in a fresh process") || it.contains("is undetermined: see")
+        });
         if given_up && self.peers.deaths >= 2 {
             return Ok(false);
         }

@@ -49,6 +49,9 @@ impl GivenResults {
         let mut judged = Judged {
             job: JobId(0),
             verdict: told.verdict,
+            own: told.verdict,
+            own_errors: told.errors,
+            rests_on: Some(Vec::new()),
             digest: told.digest.parse().unwrap_or_default(),
             basis: Digest::default(),
             config: self.config,

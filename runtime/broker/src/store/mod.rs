@@ -19,7 +19,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use qcbus_formats::config::{Choice, Config};
 use qcbus_formats::pool::{BundleOutcome, Pooled, Scope};
-use qcbus_formats::xqar::{self, Dialect};
+use qcbus_formats::xqar::{self, Dialect, Level};
+use qcbus_ingest::RESTS_ON_CHECKER;
 use qcbus_messages::Verdict;
 use qcbus_messages::path_text::to_text;
 
@@ -58,6 +59,8 @@ pub struct Store {
     pub verdict_files: bool,
     /// Whether what cannot be written now is tried again.
     pub retries: bool,
+    /// Whether the verdict on a file is its own, whatever it rests on.
+    pub own_verdicts: bool,
     /// Where accepted files are published.
     pub gate: Option<Gate>,
     /// Who looks at files.
@@ -367,9 +370,18 @@ fn judged(
 ) -> Judged {
     let prepared = job.prepared.as_deref();
     let root = prepared.and_then(crate::core::PreparedJob::root);
+    // What is said of the files that it rests on is no fault of its own.
+    let of_others = pooled.results.bundles.iter().flat_map(|it| &it.checkers);
+    let of_others = of_others.filter(|it| &*it.id == RESTS_ON_CHECKER);
+    let of_others = of_others.flat_map(|it| &it.issues);
+    let of_others = of_others.filter(|it| it.level == Level::Error).count() as u64;
+    let rests_on = job.rests_on.iter().map(|(_, it)| it.clone());
     Judged {
         job: job.job,
         verdict,
+        own: pooled.verdict_without(RESTS_ON_CHECKER),
+        own_errors: pooled.counts.errors.saturating_sub(of_others),
+        rests_on: Some(rests_on.collect()),
         digest: root.map(|(_, digest)| digest).unwrap_or_default(),
         basis: prepared.map(|it| it.basis).unwrap_or_default(),
         config: job.config,

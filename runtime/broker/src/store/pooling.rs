@@ -5,11 +5,13 @@ use qcbus_formats::config::Config;
 use qcbus_formats::pool::{
     self, BundleOutcome, Ending, NoPlaces, PoolInput, Pooled, Remark, Resolver, Scope, Unfinished,
 };
+use qcbus_formats::xqar::Level;
+use qcbus_ingest::Resting;
 use qcbus_messages::path_text::to_text;
-use qcbus_messages::{BUILD_DATE, Verdict};
+use qcbus_messages::{BUILD_DATE, MissingDocument, Verdict};
 
 use super::Store;
-use crate::core::{FinishedJob, ShareOutcome};
+use crate::core::{FinishedJob, Referenced, RestsOn, ShareOutcome};
 
 impl Store {
     pub(super) fn pool(
@@ -25,9 +27,7 @@ impl Store {
         match (&document, &job.prepared) {
             (Some(document), Some(prepared)) => {
                 remarks.extend(qcbus_ingest::remarks(document, &prepared.missing, &bundles));
-                remarks.extend(job.rejected_maps.iter().map(|map| {
-                    qcbus_ingest::rejected_map(document, map.referred_at, &map.path, map.errors)
-                }));
+                remarks.extend(self.resting(job, document, &prepared.missing));
             }
             (None, Some(_)) => remarks.push(unseen_root()),
             (_, None) => {}
@@ -45,6 +45,35 @@ impl Store {
             Some(document) => pool::pool(input, &mut InDocument { document }),
             None => pool::pool(input, &mut NoPlaces),
         }
+    }
+}
+
+impl Store {
+    /// What the file rests on and is not accepted itself. A file that is broken is said to be so at the same
+    /// reference already.
+    fn resting(
+        &self,
+        job: &FinishedJob,
+        root: &Document<'_>,
+        missing: &[MissingDocument],
+    ) -> Vec<Remark> {
+        let is_said = |path: &str| {
+            let mut missing = missing.iter();
+            missing.any(|it| it.path == path && it.level == Level::Error)
+        };
+        let remark = |(file, verdict): &(Referenced, RestsOn)| {
+            let path = to_text(&file.path);
+            let resting = Resting {
+                role: file.role,
+                referred_at: file.referred_at,
+                path: &path,
+                verdict: verdict.verdict,
+                errors: verdict.errors,
+            };
+            let remark = qcbus_ingest::resting(root, &resting, !self.own_verdicts);
+            remark.filter(|_| !is_said(&path))
+        };
+        job.rests_on.iter().filter_map(remark).collect()
     }
 }
 

@@ -28,6 +28,7 @@ fn load(file: &Path, bundles_d: Option<&Path>) -> Result<Loaded, String> {
         config: Some(file.to_path_buf()),
         lasting: false,
         bundles_d: bundles_d.map(manifest_directory).transpose()?,
+        own_verdicts: false,
         choice: Default::default(),
         standard: Vec::new(),
         reporters: Vec::new(),

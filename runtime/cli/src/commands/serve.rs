@@ -243,6 +243,7 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         host: HostOptions::default(),
         settings: qcbus_broker::Settings {
             drain_limit: args.drain_limit,
+            own_verdicts: args.own_verdict,
             ..settings(&args.limits)
         },
     })

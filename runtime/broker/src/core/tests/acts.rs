@@ -149,7 +149,22 @@ impl World {
             self.must_be_earned(&judged);
             let told = self.state.inputs_of(&path_of(file));
             assert_eq!(told, self.inputs(file), "the answer is true at that moment");
+            let with_all = self.verdict_with_all(file, judged.own);
+            assert_eq!(
+                judged.verdict, with_all,
+                "so are the verdicts that it rests on"
+            );
         }
+    }
+
+    /// The verdict on a file with those on the files that it rests on, as the journal has them.
+    pub fn verdict_with_all(&self, file: u8, own: Verdict) -> Verdict {
+        let under = dependencies_of(file).iter().filter(|it| **it < 6);
+        let there = under.filter(|it| self.there.contains_key(&path_of(**it)));
+        there.fold(own, |verdict, it| {
+            let known = self.journal.get(it);
+            verdict.and(known.map_or(Verdict::Undetermined, |judged| judged.verdict))
+        })
     }
 
     fn verdict_on(&self, file: u8) -> Arc<Judged> {

@@ -225,6 +225,9 @@ fn unread() -> Judged {
     Judged {
         job: JobId(0),
         verdict: Verdict::Undetermined,
+        own: Verdict::Undetermined,
+        own_errors: 0,
+        rests_on: Some(Vec::new()),
         digest: Digest::default(),
         basis: Digest::default(),
         config: Digest::default(),

@@ -193,6 +193,7 @@ fn a_client_may_read_what_the_broker_may_not() {
             referred_at: 0,
             within: None,
         }],
+        rests_on: Vec::new(),
         bytes: 1,
     }));
     world.event(Event::Prepared { job, result });

@@ -40,12 +40,23 @@ impl World {
                     Some(document(DocumentRole::Map, input, digest))
                 });
                 let documents = std::iter::once(root).chain(maps).collect();
+                let rests_on = inputs[1..].iter().filter_map(|input| {
+                    let digest = input.digest().filter(|_| file_of(&input.path) < 6)?;
+                    Some(Referenced {
+                        path: input.path.clone(),
+                        digest,
+                        role: DocumentRole::Map,
+                        referred_at: 0,
+                    })
+                });
+                let rests_on = rests_on.collect();
                 Ok(Box::new(PreparedJob {
                     basis: basis(&inputs),
                     inputs,
                     racy: self.young,
                     documents,
                     missing: Vec::new(),
+                    rests_on,
                     bytes: 1,
                 }))
             }
@@ -83,45 +94,67 @@ impl World {
         } else if !room {
             // The journal comes last: by then an acceptance lies behind the gate.
             let failed = job.bundles.iter().any(|it| it.failure.is_some());
-            if !failed && !self.rejected.contains(&file) {
+            let bad = self.rejected.contains(&file) || is_bad(prepared.root().unwrap().1);
+            let under = job.rests_on.iter();
+            let firm = under
+                .clone()
+                .all(|(_, it)| it.verdict == Some(Verdict::Accepted));
+            if !failed && !bad && firm {
                 self.gate.insert(file, prepared.inputs.clone());
             }
             StoreOutcome::Failed("full".to_owned())
         } else {
             self.stored.push(file);
-            let maps = job.rejected_maps.iter();
-            let maps = maps.map(|map| file_of(Path::new(&map.path))).collect();
-            self.said_of_maps.insert(file, maps);
-            let names = job.bundles.iter().map(|it| it.name.clone());
-            self.judges.insert(file, names.collect());
-            let why = job.bundles.iter().filter_map(|it| it.failure.clone());
-            let why: Vec<String> = why.collect();
-            let failed = !why.is_empty();
-            self.failures.insert(file, why);
-            let judged = Judged {
-                job: job.job,
-                verdict: match self.rejected.contains(&file) {
-                    _ if failed => Verdict::Undetermined,
-                    true => Verdict::Rejected,
-                    false => Verdict::Accepted,
-                },
-                digest: prepared.root().unwrap().1,
-                basis: prepared.basis,
-                config: job.config,
-                jury: job.jury.clone(),
-                epoch: job.epoch,
-                inputs: prepared.inputs.clone(),
-                racy: false,
-                counts: [0; 3],
-                why: Vec::new(),
-                xqar: Some("/out".into()),
-            };
+            let judged = self.judged(file, &job);
             self.must_be_earned(&judged);
             self.journal.insert(file, judged.clone());
             self.publish(file, &judged);
             StoreOutcome::Stored(Box::new(judged))
         };
         self.told.push(((file, job.job), outcome));
+    }
+
+    /// What a writer makes of a job: the worst of the file's own verdict and of those that it rests on.
+    fn judged(&mut self, file: u8, job: &FinishedJob) -> Judged {
+        let (inputs, digest) = {
+            let prepared = job.prepared.as_ref().unwrap();
+            (prepared.inputs.clone(), prepared.root().unwrap().1)
+        };
+        let under = job.rests_on.iter();
+        let rejected = under.filter(|(_, it)| it.verdict == Some(Verdict::Rejected));
+        let maps = rejected.map(|(it, _)| file_of(&it.path)).collect();
+        self.said_of_maps.insert(file, maps);
+        let under = job.rests_on.iter().map(|(_, it)| it.verdict);
+        let under = under.map(|it| it.unwrap_or(Verdict::Undetermined));
+        let under = under.fold(Verdict::Accepted, Verdict::and);
+        let names = job.bundles.iter().map(|it| it.name.clone());
+        self.judges.insert(file, names.collect());
+        let why = job.bundles.iter().filter_map(|it| it.failure.clone());
+        let why: Vec<String> = why.collect();
+        let failed = !why.is_empty();
+        self.failures.insert(file, why);
+        let own = match self.rejected.contains(&file) || is_bad(digest) {
+            _ if failed => Verdict::Undetermined,
+            true => Verdict::Rejected,
+            false => Verdict::Accepted,
+        };
+        Judged {
+            job: job.job,
+            verdict: own.and(under),
+            own,
+            own_errors: u64::from(own == Verdict::Rejected),
+            rests_on: Some(job.rests_on.iter().map(|(_, it)| it.clone()).collect()),
+            digest,
+            basis: job.prepared.as_ref().unwrap().basis,
+            config: job.config,
+            jury: job.jury.clone(),
+            epoch: job.epoch,
+            inputs,
+            racy: false,
+            counts: [0; 3],
+            why: Vec::new(),
+            xqar: Some("/out".into()),
+        }
     }
 
     /// The broker is killed, something happens to a file, and the next one knows what the journal

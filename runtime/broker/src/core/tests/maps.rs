@@ -24,7 +24,7 @@ fn a_rejected_map_is_named_whichever_comes_first() {
             }
             world.settle();
             assert_eq!(world.said_of_maps[&1], [0], "{order:?} {together}");
-            assert_eq!(world.judged[&1].1, Verdict::Accepted);
+            assert_eq!(world.judged[&1].1, Verdict::Rejected);
         }
     }
 }
@@ -40,6 +40,7 @@ fn a_map_that_is_mended_is_named_no_more() {
     world.write(0);
     world.settle();
     assert!(world.said_of_maps[&1].is_empty());
+    assert_eq!(world.judged[&1].1, Verdict::Accepted);
 }
 
 #[test]
@@ -79,7 +80,7 @@ fn a_scenario_waits_for_its_map_and_not_for_ever() {
     // The writer is slow with the map.
     answer(&mut world);
     assert_eq!(storing(&world), [0]);
-    world.pass(Duration::from_secs(3));
+    world.pass(Duration::from_secs(11));
     assert_eq!(storing(&world), [0, 1], "patience has an end");
     // Its result did not know the map's verdict, and another one does.
     world.settle();
@@ -124,4 +125,39 @@ fn a_run_waits_for_no_map_that_is_none_of_its_files() {
     assert!(storing(&world).is_empty());
     world.event(Event::Scanned);
     assert_eq!(storing(&world), [1]);
+}
+
+#[test]
+fn client_hears_of_a_scenario_only_after_its_map() {
+    let mut world = world();
+    world.rejected.insert(0);
+    world.write(0);
+    world.write(1);
+    world.prepare(1, true);
+    world.prepare(0, true);
+    world.wait(1);
+    answer(&mut world);
+    world.pass(Duration::from_secs(11));
+    // The scenario is stored without its map: undetermined, and nobody is told so.
+    world.store(1, true);
+    assert_eq!(world.judged[&1].1, Verdict::Undetermined);
+    assert!(!world.waiting.is_empty(), "its map has no verdict yet");
+    world.settle();
+    assert!(world.waiting.is_empty());
+    assert_eq!(world.judged[&1].1, Verdict::Rejected);
+}
+
+#[test]
+fn verdict_that_a_killed_broker_left_behind_is_given_anew() {
+    let mut world = world();
+    world.write(0);
+    world.write(1);
+    world.settle();
+    assert_eq!(world.judged[&1].1, Verdict::Accepted);
+    // The map is rejected under another configuration, and the broker is killed before it comes to the scenario.
+    let map = world.journal.get_mut(&0).unwrap();
+    (map.verdict, map.own, map.own_errors) = (Verdict::Rejected, Verdict::Rejected, 1);
+    world.restart();
+    world.settle();
+    assert_eq!(world.judged[&1].1, Verdict::Rejected);
 }

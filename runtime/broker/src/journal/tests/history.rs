@@ -102,6 +102,8 @@ fn the_history_of_schema_3_is_kept() {
         .execute_batch(
             "DROP VIEW job_checkers; DROP TABLE job_skipped; DROP TABLE checker_lists; \
              ALTER TABLE job_findings RENAME TO job_checkers; \
+             ALTER TABLE files DROP COLUMN own; ALTER TABLE files DROP COLUMN own_errors; \
+             ALTER TABLE files DROP COLUMN rests_on; \
              INSERT INTO jobs VALUES (7, '/a', '', '', 'accepted', 0, 0, 0, 1, 1, 1); \
              INSERT INTO job_checkers VALUES (7, 'xodrBundle', 'old', 'skipped', 0); \
              PRAGMA user_version = 3",

@@ -193,6 +193,7 @@ fn run_settings(args: &CheckArgs, files: usize) -> Settings {
     let settings = settings(&args.limits);
     Settings {
         once: true,
+        own_verdicts: args.own_verdict,
         collect: Duration::ZERO,
         max_storing: settings.max_storing.min(files.max(1)),
         ..settings
