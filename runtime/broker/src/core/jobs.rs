@@ -175,7 +175,11 @@ impl State {
         if let Some(judged) = &entry.judged {
             let known = judged.inputs.first().and_then(|root| root.content.stamp());
             let same_bytes = !judged.racy && !entry.doubted && known == Some(entry.stamp);
-            if same_bytes && !entry.half_written && self.stands(entry.kind, judged) {
+            if same_bytes
+                && !entry.half_written
+                && self.stands(entry.kind, judged)
+                && !self.counted_otherwise(judged)
+            {
                 let judged = judged.clone();
                 self.confirm(id, &judged, actions);
                 self.verdict_has_come(id, actions);
@@ -393,7 +397,11 @@ impl State {
         self.depend(file, prepared, actions);
         let same = |judged: &Judged| judged.basis == prepared.basis && !anew;
         match old {
-            Some(judged) if same(&judged) && self.stands(kind, &judged) => {
+            Some(judged)
+                if same(&judged)
+                    && self.stands(kind, &judged)
+                    && !self.counted_otherwise(&judged) =>
+            {
                 self.restamp(file, &judged, prepared, actions);
                 self.end_job(id, actions);
             }

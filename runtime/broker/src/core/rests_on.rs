@@ -14,7 +14,7 @@ use qcbus_messages::JobId;
 
 use super::files::{FileEntry, FileId, Stage};
 use super::jobs::{ActiveJob, JobStage};
-use super::types::{Judged, Referenced, RestsOn};
+use super::types::{Input, Judged, PreparedJob, Referenced, RestsOn};
 use super::{Actions, State};
 
 /// How long a job waits for the verdicts that its own rests on. What holds one up, such as a bundle that hangs,
@@ -50,20 +50,22 @@ impl State {
             // A client's run knows no verdicts of others.
             return Vec::new();
         }
-        let awaited = referenced(job).filter(|it| self.may_come(it) && !self.waits_for(it, id));
+        let Some(prepared) = &job.prepared else {
+            return Vec::new();
+        };
+        let awaited = prepared.rests_on.iter();
+        let awaited = awaited.filter(|it| self.may_come(it, prepared) && !self.waits_for(it, id));
         awaited.cloned().collect()
     }
 
     /// Whether a verdict on these bytes is to be expected.
-    fn may_come(&self, file: &Referenced) -> bool {
+    fn may_come(&self, file: &Referenced, prepared: &PreparedJob) -> bool {
         let Some(entry) = self.entry_of(&file.path) else {
             // It is there, and the watcher has not told of it yet. A run knows all its files after its look.
             return !(self.settings.once && self.scanned);
         };
-        let is_known = entry
-            .judged
-            .as_ref()
-            .is_some_and(|it| it.digest == file.digest);
+        let judged = entry.judged.as_ref();
+        let is_known = judged.is_some_and(|it| is_of(it, file, prepared));
         match entry.stage() {
             Stage::Active(_) => true,
             Stage::Waiting(..) => !is_known || entry.doubted || !self.is_of_now(entry),
@@ -102,14 +104,18 @@ impl State {
         if job.errand.is_some() {
             return Vec::new();
         }
-        let verdicts = referenced(job).map(|it| (it.clone(), self.verdict_under(it)));
+        let Some(prepared) = &job.prepared else {
+            return Vec::new();
+        };
+        let verdicts = prepared.rests_on.iter();
+        let verdicts = verdicts.map(|it| (it.clone(), self.verdict_under(it, prepared)));
         verdicts.collect()
     }
 
-    fn verdict_under(&self, file: &Referenced) -> RestsOn {
+    fn verdict_under(&self, file: &Referenced, prepared: &PreparedJob) -> RestsOn {
         let entry = self.entry_of(&file.path).filter(|it| it.present);
         let judged = entry.and_then(|it| it.judged.as_ref().filter(|_| !it.doubted));
-        let judged = judged.filter(|it| it.digest == file.digest);
+        let judged = judged.filter(|it| is_of(it, file, prepared));
         RestsOn {
             path: file.path.clone(),
             digest: file.digest,
@@ -170,22 +176,24 @@ impl State {
     /// A broker may have been killed between a verdict and those of the files that rest on it: those that counted
     /// in another one are given anew.
     pub(super) fn count_again(&mut self) {
-        let otherwise = |it: &RestsOn| {
-            let judged = self.entry_of(&it.path).and_then(|it| it.judged.as_ref());
-            judged.is_some_and(|judged| !says(judged, it))
-        };
         let files = self.files.iter().filter(|(_, entry)| entry.present);
         let outdated = files.filter(|(_, entry)| {
-            let under = entry
-                .judged
-                .iter()
-                .flat_map(|it| it.rests_on.iter().flatten());
-            under.into_iter().any(otherwise)
+            let judged = entry.judged.as_ref();
+            judged.is_some_and(|judged| self.counted_otherwise(judged))
         });
         let outdated: Vec<FileId> = outdated.map(|(id, _)| id).collect();
         for id in outdated {
             self.judge_anew(id);
         }
+    }
+
+    /// Whether a verdict counted in one on another file that has a different verdict by now.
+    pub(super) fn counted_otherwise(&self, judged: &Judged) -> bool {
+        let mut under = judged.rests_on.iter().flatten();
+        under.any(|it| {
+            let judged = self.entry_of(&it.path).and_then(|it| it.judged.as_ref());
+            judged.is_some_and(|judged| !says(judged, it))
+        })
     }
 
     fn judge_anew(&mut self, id: FileId) {
@@ -279,6 +287,17 @@ impl State {
 fn referenced(job: &ActiveJob) -> impl Iterator<Item = &Referenced> {
     let prepared = job.prepared.iter();
     prepared.flat_map(|prepared| &prepared.rests_on)
+}
+
+/// Whether a verdict was given on the bytes that a job has read: those of the file, and those of what both depend
+/// on. The job may have read a newer part of a map whose verdict is of the older one.
+fn is_of(judged: &Judged, file: &Referenced, prepared: &PreparedJob) -> bool {
+    let same = |input: &Input| {
+        let mut read = prepared.inputs.iter();
+        let read = read.find(|it| it.path == input.path);
+        read.is_none_or(|it| it.digest() == input.digest())
+    };
+    judged.digest == file.digest && judged.inputs.iter().all(same)
 }
 
 /// Whether a verdict is the one that was counted in.
