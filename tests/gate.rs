@@ -120,6 +120,18 @@ fn a_map_goes_with_what_it_includes_and_comes_back_with_it() {
 }
 
 #[test]
+fn part_of_a_map_that_is_removed_from_the_gate_comes_back() {
+    let farm = farm_of(&[ISLAND, ISLAND_ROADS], &[]);
+    let _broker = farm.serve_ready();
+    publishes(&farm, &[ISLAND, ISLAND_ROADS]);
+    for part in [ISLAND_ROADS, ISLAND] {
+        std::fs::remove_file(gate(&farm).join(part)).unwrap();
+        publishes(&farm, &[ISLAND, ISLAND_ROADS]);
+        is_sound(&farm);
+    }
+}
+
+#[test]
 fn a_scenario_goes_with_its_map_and_comes_back_with_it() {
     let farm = farm_of(&[MAP, SCENARIO, CATALOG], &[]);
     let _broker = farm.serve_ready();

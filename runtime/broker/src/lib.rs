@@ -21,6 +21,7 @@ mod launches;
 pub mod memory;
 mod options;
 mod orphans;
+mod outputs;
 pub mod reload;
 mod result_paths;
 mod scouts;

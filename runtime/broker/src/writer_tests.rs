@@ -13,6 +13,7 @@ use tokio::sync::mpsc::unbounded_channel;
 use crate::core::{Epoch, FinishedJob, Input, Judged, Jury, PreparedJob, Reading, StoreOutcome};
 use crate::gate::{Gate, GateOptions, Outside};
 use crate::journal::{Entry, Journal};
+use crate::outputs::Outputs;
 use crate::result_paths::ResultPaths;
 use crate::scouts::Scouts;
 use crate::stamp::stamp_through_links;
@@ -23,6 +24,7 @@ const NOW: u64 = (3 << 32) + 5;
 
 fn store_in(dir: &Path) -> Store {
     Store {
+        outputs: Outputs::default(),
         scouts: Scouts::default(),
         places: ResultPaths::of_watched(dir.join("out"), vec![dir.join("farm")]),
         choice: Default::default(),
@@ -106,6 +108,7 @@ fn what_must_not_lie_behind_the_gate_waits_for_no_journal() {
     let dir = tempfile::tempdir().unwrap();
     let mut store = store_in(dir.path());
     let gate = GateOptions {
+        outputs: Outputs::default(),
         directory: dir.path().join("gate"),
         paths: store.places.clone(),
         durable: false,

@@ -92,8 +92,8 @@ impl FileMark {
 pub type Content<'a> = (&'a Path, &'a [u8]);
 
 /// Writes two files as [`write_whole`] does; `first` gets its name before `second` does. Both are
-/// synced at the same time, because then the file system's journal is written once for both. Gives
-/// the mark of `first`.
+/// synced at the same time, because then the file system's journal is written once for both. Returns
+/// the marks of both.
 ///
 /// # Errors
 /// As [`write_whole`], with the path that could not be written.
@@ -101,7 +101,7 @@ pub fn write_both<'a>(
     first: Content<'a>,
     second: Content<'a>,
     durable: bool,
-) -> Result<FileMark, (&'a Path, io::Error)> {
+) -> Result<[FileMark; 2], (&'a Path, io::Error)> {
     let of = |path| move |error| (path, error);
     let files = (
         write_aside(first.0, first.1).map_err(of(first.0))?,
@@ -110,13 +110,16 @@ pub fn write_both<'a>(
     if durable {
         sync_both(files.0.as_file(), files.1.as_file()).map_err(of(second.0))?;
     }
-    let mark = files.0.as_file().metadata().map(|data| FileMark::of(&data));
-    let mark = mark.map_err(of(first.0))?;
+    let mark = |file: &NamedTempFile| file.as_file().metadata().map(|data| FileMark::of(&data));
+    let marks = [
+        mark(&files.0).map_err(of(first.0))?,
+        mark(&files.1).map_err(of(second.0))?,
+    ];
     let named = files.0.persist(first.0);
     named.map_err(|error| (first.0, error.error))?;
     let named = files.1.persist(second.0);
     named.map_err(|error| (second.0, error.error))?;
-    Ok(mark)
+    Ok(marks)
 }
 
 fn sync_both(first: &File, second: &File) -> io::Result<()> {
@@ -470,9 +473,10 @@ mod tests {
         let dir = tempfile::TempDir::new().unwrap();
         let path = |name: &str| dir.path().join(name);
         let (first, second) = (path("a.verdict.json"), path("deep/a.xqar"));
-        let mark = write_both((&first, b"verdict"), (&second, b"result"), true).unwrap();
-        assert_eq!(FileMark::at(&first), Some(mark.clone()));
-        assert_ne!(FileMark::at(&second), Some(mark));
+        let marks = write_both((&first, b"verdict"), (&second, b"result"), true).unwrap();
+        let there = [&first, &second].map(|it| FileMark::at(it).unwrap());
+        assert_eq!(there, marks);
+        assert_ne!(marks[0], marks[1]);
         assert_eq!(std::fs::read(&first).unwrap(), b"verdict");
         assert_eq!(std::fs::read(&second).unwrap(), b"result");
 

@@ -1,15 +1,19 @@
 //! What happens to files: they come, change and go, and so does what verdicts depend on.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
 use qcbus_document::FileKind;
 use qcbus_messages::Verdict;
+use qcbus_messages::path_text::to_text;
 
 use super::action::Action;
 use super::files::{FileEntry, FileId, Priority, Stage};
-use super::types::{Judged, Stamp};
+use super::jobs::JobStage;
+use super::notice::Notice;
+use super::types::{Judged, LostOutput, Stamp};
 use super::{Actions, State};
 
 /// How a verdict depends on a file.
@@ -217,6 +221,44 @@ impl State {
         self.answer_gone(&path, actions);
     }
 
+    /// Somebody has removed or changed results, or copies behind the gate: the files that they are about are judged
+    /// again, which writes them again.
+    pub(super) fn outputs_lost(&mut self, lost: &[LostOutput], actions: &mut Actions) {
+        let mut files = BTreeSet::new();
+        for it in lost {
+            match self.files.id(&it.file) {
+                Some(id) => drop(files.insert(id)),
+                // A part of other files, which lies behind the gate for them.
+                None => files.extend(self.files.dependents(&it.file)),
+            }
+        }
+        if files.is_empty() {
+            return;
+        }
+        for id in files {
+            self.write_again(id, actions);
+        }
+        if let Some(text) = told_of(lost) {
+            self.notice(Notice::NotWritten(text), actions);
+        }
+    }
+
+    fn write_again(&mut self, id: FileId, actions: &mut Actions) {
+        self.shut(id, actions);
+        let Some(entry) = self.files.get_mut(id).filter(|it| it.present) else {
+            return;
+        };
+        match *entry.stage() {
+            Stage::Active(job) => {
+                let job = self.jobs.get(&job);
+                // Before that its result is still to be written.
+                let is_late = job.is_some_and(|job| job.stage == JobStage::Storing);
+                (entry.anew, entry.doubted) = (true, entry.doubted || is_late);
+            }
+            Stage::Idle | Stage::Waiting(..) => self.judge_anew(id),
+        }
+    }
+
     /// It is in the journal that a file has gone.
     pub(super) fn withdrawn(&mut self, path: &Path, actions: &mut Actions) {
         if let Some(times) = self.withdrawing.get_mut(path) {
@@ -243,4 +285,20 @@ impl State {
         self.all_are_known();
         self.count_again();
     }
+}
+
+/// What a person is told of outputs that are lost.
+fn told_of(lost: &[LostOutput]) -> Option<String> {
+    let (first, others) = lost.split_first()?;
+    let (output, others) = (to_text(&first.output), others.len());
+    Some(match others {
+        0 => format!(
+            "{output} was removed or changed by another process; {} is judged again, which writes it again",
+            to_text(&first.file)
+        ),
+        _ => format!(
+            "{output} and {others} more files of this broker were removed or changed by another process; what they are \
+             about is judged again, which writes them again"
+        ),
+    })
 }

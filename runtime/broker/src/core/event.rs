@@ -7,7 +7,7 @@ use qcbus_messages::{Digest, FromPeer, Hello, JobId};
 
 use super::errands::{Errand, ErrandOutcome};
 use super::types::{
-    ChildEnd, ChildSpec, Demand, Launch, PrepareFailure, PreparedJob, SessionId, Stamp,
+    ChildEnd, ChildSpec, Demand, Launch, LostOutput, PrepareFailure, PreparedJob, SessionId, Stamp,
     StoreOutcome, Ticket,
 };
 use super::waits::Until;
@@ -39,6 +39,11 @@ pub enum Event {
     Vanished {
         /// Absolute path.
         path: Arc<Path>,
+    },
+    /// Somebody has removed or changed results, or copies behind the gate.
+    OutputsLost {
+        /// Which.
+        lost: Vec<LostOutput>,
     },
     /// The first scan is complete.
     Scanned,

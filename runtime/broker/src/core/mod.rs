@@ -226,6 +226,7 @@ impl State {
             Event::Present { path } => self.present(&path),
             Event::Touched { path, stamp } => self.touched(&path, stamp, &mut actions),
             Event::Vanished { path } => self.vanished(&path, &mut actions),
+            Event::OutputsLost { lost } => self.outputs_lost(&lost, &mut actions),
             Event::Scanned => self.scanned(&mut actions),
             Event::Prepared { job, result } => self.was_read(job, result, &mut actions),
             Event::Stored { job, outcome } => self.stored(job, outcome, &mut actions),

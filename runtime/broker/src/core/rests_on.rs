@@ -196,7 +196,7 @@ impl State {
         })
     }
 
-    fn judge_anew(&mut self, id: FileId) {
+    pub(super) fn judge_anew(&mut self, id: FileId) {
         let Some(entry) = self.files.get_mut(id) else {
             return;
         };

@@ -100,6 +100,15 @@ impl Input {
     }
 }
 
+/// A file that the broker has written for others, and that somebody has removed or changed since.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LostOutput {
+    /// The file that it is about, or of which it is a copy.
+    pub file: Arc<Path>,
+    /// Where it was.
+    pub output: Arc<Path>,
+}
+
 /// What was found where a file was to be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reading {

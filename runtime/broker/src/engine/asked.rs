@@ -156,10 +156,14 @@ impl Broker {
             file,
             stamp,
             inputs,
+            lost,
             unwatched,
             hidden,
         } = seen;
         self.take_in(inputs);
+        if !lost.is_empty() {
+            self.handle(Event::OutputsLost { lost });
+        }
         if let (Some(reason), None) = (hidden, &unwatched) {
             // A client that has left needs no answer.
             let _ = look.answer.send(Response::Unanswered { reason });

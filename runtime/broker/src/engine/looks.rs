@@ -12,7 +12,7 @@ use qcbus_messages::path_text::to_text;
 use tokio::sync::oneshot;
 
 use super::Broker;
-use crate::core::{Event, Input, PrepareFailure, Stamp, Until};
+use crate::core::{Event, Input, LostOutput, PrepareFailure, Stamp, Until};
 use crate::reload::Fingerprint;
 use crate::result_paths::ResultPaths;
 use crate::scouts::{PATIENCE, Scouts};
@@ -82,6 +82,8 @@ pub(super) struct Sighted {
     pub stamp: Option<Stamp>,
     /// Those of the files that its verdict depends on which are not what they were.
     pub inputs: Vec<Changed>,
+    /// What was written for it and is not there any more.
+    pub lost: Vec<LostOutput>,
     /// Why nobody watches it.
     pub unwatched: Option<String>,
     /// Why it cannot be looked at, and will not be soon.
@@ -124,8 +126,10 @@ impl Broker {
             };
             let unwatched = why_unwatched(&file, stamp, &store.places, &roots)
                 .or_else(|| what_instead(&file, stamp, &roots));
+            let lost = store.lost_outputs(&file.as_path().into());
             Seen::Sighted(Sighted {
                 file,
+                lost,
                 stamp,
                 inputs: moved,
                 unwatched,

@@ -34,6 +34,7 @@ use crate::gate::GateError;
 use crate::intake::Intake;
 use crate::journal::JournalError;
 use crate::options::Options;
+use crate::outputs::OutputWatch;
 use crate::reload::{Fingerprint, LoadError, Loaded, Sources};
 use crate::seams::{Children, ControlSocket, Host, now, spawn_blocking};
 use crate::stages::reached;
@@ -124,6 +125,7 @@ pub struct Broker {
     fingerprint: Fingerprint,
     watcher: Option<Watcher>,
     watching: Option<Watching>,
+    output_watch: Option<OutputWatch>,
     watch_mode: String,
     /// What could not be looked at, and why.
     unseen: BTreeMap<PathBuf, String>,
@@ -294,6 +296,7 @@ impl Broker {
 
     async fn end(mut self, quit: bool) {
         self.watcher = None;
+        self.output_watch = None;
         self.children.kill_all();
         self.children.kill_what_they_started();
         if !quit {
@@ -348,6 +351,12 @@ impl Broker {
         if let Event::Exited { launch, .. } = &event {
             self.children.ended(*launch);
             self.sweep_dead();
+        }
+        if let Event::OutputsLost { lost } = event {
+            let outputs = &self.store.outputs;
+            let lost = lost.into_iter().filter(|it| outputs.is_told(&it.output));
+            let lost = lost.collect();
+            return self.handle(Event::OutputsLost { lost });
         }
         self.handle(event)
     }

@@ -15,7 +15,7 @@ use super::looks::Looks;
 use super::watching::Watching;
 use super::{AttendedTime, Broker, Inbox, Sessions, StartError, Told};
 use crate::control::Asked;
-use crate::core::{Member, Notice, Stamp, State};
+use crate::core::{Event, Member, Notice, Stamp, State};
 use crate::demand::InForce;
 use crate::descriptors::Descriptors;
 use crate::directory_lock::{DirectoryLock, LockError, Purpose, open_to_others};
@@ -24,10 +24,11 @@ use crate::intake::{Intake, JudgedAs};
 use crate::journal::{Journal, JournalError, SharedJournal, Void};
 use crate::launches::Launches;
 use crate::options::Options;
+use crate::outputs::Outputs;
 use crate::reload::{Loaded, Sources};
 use crate::result_paths::ResultPaths;
 use crate::scouts::Scouts;
-use crate::seams::{Children, ControlSocket, Host, now, spawn_blocking};
+use crate::seams::{Children, ControlSocket, Host, is_simulated, now, spawn_blocking};
 use crate::stamp::stamp_of;
 use crate::state_identity::difference_of;
 use crate::store::{Reconciled, Store, TrialResults, remove_earlier_results};
@@ -64,13 +65,12 @@ impl Broker {
         let store = Arc::new(store(&options, journal, looks.scouts(), &senders.notices)?);
         let reconciled = reconcile(&options, &loaded, &store)?;
         let writers = writers(&options, &store, &inbox, &senders.notices)?;
-        let intake = intake(&options, &host, &in_force);
         let mut broker = Broker {
             started: now(),
             clock: AttendedTime::new(),
+            intake: intake(&options, &host, &in_force),
             host,
             state: State::new(options.settings.clone(), in_force.digest, in_force.demand()),
-            intake,
             store,
             writers,
             children: early_or_now(early, &options, descriptors, &inbox)?,
@@ -80,6 +80,7 @@ impl Broker {
             in_force,
             watcher: None,
             watching: None,
+            output_watch: None,
             watch_mode: "once".to_owned(),
             unseen: BTreeMap::new(),
             looks,
@@ -131,6 +132,18 @@ impl Broker {
         found.stamps.into_iter().collect()
     }
 
+    /// Begins to look at what this broker has written: it may not stay as it is.
+    fn look_at_outputs(&mut self) -> Result<(), StartError> {
+        let events = self.inbox.events_in.clone();
+        let tell = move |lost| {
+            // After the end of the loop nobody listens.
+            let _ = events.send(Event::OutputsLost { lost });
+        };
+        let watch = self.store.outputs.watch(Box::new(tell));
+        self.output_watch = watch.map_err(|source| system("watch results", source))?;
+        Ok(())
+    }
+
     /// A reporter is to take back its report; `left` says where the result lay.
     fn remember_void(&mut self, path: &Arc<Path>, reporter: &str, left: Option<PathBuf>) {
         if let Some(xqar) = left {
@@ -151,7 +164,7 @@ impl Broker {
             let watcher = watcher.map_err(|source| system("watch", source))?;
             watcher.depend(dependencies);
             (self.watcher, self.watching) = (Some(watcher), Some(watching));
-            return Ok(());
+            return self.look_at_outputs();
         }
         let (roots, files) = (self.options.roots.clone(), self.options.files.clone());
         let lookout = self.looks.lookout();
@@ -225,12 +238,21 @@ fn results_of(options: &Options) -> Result<DirectoryLock, LockError> {
     }
 }
 
+/// What a broker writes is looked at as long as it runs; what a run writes belongs to whoever has it done.
+fn outputs_of(options: &Options) -> Result<Outputs, StartError> {
+    if !options.watch || is_simulated() {
+        return Ok(Outputs::default());
+    }
+    Outputs::kept().map_err(|source| system("watch results", source))
+}
+
 fn store(
     options: &Options,
     journal: Option<Journal>,
     scouts: Scouts,
     notices: &mpsc::UnboundedSender<Notice>,
-) -> Result<Store, GateError> {
+) -> Result<Store, StartError> {
+    let outputs = outputs_of(options)?;
     let (out, roots) = (options.out.clone(), options.roots.clone());
     let mut places = match &options.here {
         Some(here) => ResultPaths::of_run(out, here.clone(), roots, &options.files),
@@ -240,7 +262,8 @@ fn store(
     let gate = options.gate.as_ref();
     let gate = gate.map(|directory| {
         let (scouts, notices) = (scouts.clone(), notices.clone());
-        gate_of(options, directory, &places, scouts, notices)
+        let to = (directory.as_path(), &places, &outputs);
+        gate_of(options, to, scouts, notices)
     });
     Ok(Store {
         places,
@@ -251,6 +274,7 @@ fn store(
         retries: options.watch,
         own_verdicts: options.settings.own_verdicts,
         gate: gate.transpose()?,
+        outputs,
         scouts,
         trials: options.state.as_deref().map(TrialResults::anew),
         journal: journal.map(SharedJournal::from),
@@ -271,8 +295,7 @@ fn writers(
 
 fn gate_of(
     options: &Options,
-    directory: &Path,
-    paths: &ResultPaths,
+    (directory, paths, outputs): (&Path, &ResultPaths, &Outputs),
     scouts: Scouts,
     notices: mpsc::UnboundedSender<Notice>,
 ) -> Result<Gate, GateError> {
@@ -280,6 +303,7 @@ fn gate_of(
     let gate = GateOptions {
         max_file: options.limits.max_file,
         scouts,
+        outputs: outputs.clone(),
         directory: directory.to_path_buf(),
         paths: paths.clone(),
         durable: options.durable,

@@ -10,8 +10,9 @@ use qcbus_messages::Digest;
 use qcbus_messages::path_text::to_text;
 use tempfile::TempPath;
 
+use crate::outputs::Outputs;
 use crate::result_paths::ResultPaths;
-use qcbus_disk::{remove, remove_empty_above};
+use qcbus_disk::{FileMark, remove, remove_empty_above};
 
 /// A file that an acceptance rests on, besides the accepted one.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -89,6 +90,7 @@ pub(super) type Copies = HashMap<Arc<Path>, (Digest, TempPath)>;
 pub(super) struct Claims {
     directory: PathBuf,
     paths: ResultPaths,
+    outputs: Outputs,
     claims: HashMap<Arc<Path>, Claim>,
     /// By file: the claims that rest on it.
     resting: HashMap<Arc<Path>, BTreeSet<Arc<Path>>>,
@@ -101,10 +103,11 @@ pub(super) struct Claims {
 }
 
 impl Claims {
-    pub(super) fn new(directory: PathBuf, paths: ResultPaths) -> Claims {
+    pub(super) fn new(directory: PathBuf, paths: ResultPaths, outputs: Outputs) -> Claims {
         Claims {
             directory,
             paths,
+            outputs,
             claims: HashMap::new(),
             resting: HashMap::new(),
             lying: HashMap::new(),
@@ -133,6 +136,16 @@ impl Claims {
 
     pub(super) fn is_published(&self, path: &Path) -> bool {
         self.get(path).is_some_and(|claim| claim.published)
+    }
+
+    /// Whether nobody has removed or changed what lies behind the gate for a claim.
+    pub(super) fn is_whole(&self, path: &Arc<Path>) -> bool {
+        let Some(claim) = self.get(path) else {
+            return true;
+        };
+        let files = self.files_of(path, claim).into_iter();
+        let mut places = files.map(|(file, _)| self.place(&file));
+        !places.any(|place| self.outputs.is_lost(&place))
     }
 
     /// Puts a claim in; there must be none of this file.
@@ -313,12 +326,8 @@ impl Claims {
             return Ok(());
         };
         for (path, digest) in self.files_of(root, claim) {
-            if !self.lying.contains_key(&path)
-                && let Some((_, copy)) = copies.remove(&path)
-            {
-                let place = self.place(&path);
-                name(copy, &place)?;
-                self.litter.remove(&place);
+            if !self.lying.contains_key(&path) {
+                self.lay(&path, copies.remove(&path).map(|it| it.1))?;
             }
             let lying = self.lying.entry(path).or_insert_with(|| Lying {
                 digest,
@@ -329,6 +338,21 @@ impl Claims {
         if let Some(claim) = self.get_mut(root) {
             claim.published = true;
             claim.told = false;
+        }
+        Ok(())
+    }
+
+    /// Gives a copy its name; without one, the file lies there already.
+    fn lay(&mut self, path: &Arc<Path>, copy: Option<TempPath>) -> io::Result<()> {
+        let place = self.place(path);
+        let mark = FileMark::at(copy.as_deref().unwrap_or(&place));
+        if let Some(copy) = copy {
+            self.outputs.changing(&place);
+            name(copy, &place)?;
+            self.litter.remove(&place);
+        }
+        if let Some(mark) = mark {
+            self.outputs.written(&place, path, mark);
         }
         Ok(())
     }
@@ -350,6 +374,7 @@ impl Claims {
                 continue;
             }
             let place = self.place(&root);
+            self.outputs.changing(&place);
             remove(&place)?;
             remove_empty_above(&place, &self.directory);
             self.lying.remove(&root);
@@ -392,7 +417,9 @@ impl Claims {
             lying.users.remove(root);
             if lying.users.is_empty() {
                 self.lying.remove(&path);
-                self.litter.insert(self.place(&path));
+                let place = self.place(&path);
+                self.outputs.changing(&place);
+                self.litter.insert(place);
             }
         }
     }

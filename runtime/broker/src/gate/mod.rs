@@ -24,6 +24,7 @@ use qcbus_messages::path_text::to_text;
 use crate::core::{Input, Judged, Reading, RestsOn};
 use crate::directory_lock::{DirectoryLock, Purpose};
 use crate::journal::Remembered;
+use crate::outputs::Outputs;
 use crate::result_paths::ResultPaths;
 use crate::scouts::Scouts;
 use crate::seams::step;
@@ -64,6 +65,8 @@ pub struct GateOptions {
     pub max_file: u64,
     /// Who looks at files.
     pub scouts: Scouts,
+    /// Keeps what lies there.
+    pub outputs: Outputs,
     /// Whether a file gets a verdict of its own.
     pub is_judged: IsJudged,
     /// Tells a person.
@@ -93,7 +96,11 @@ impl Gate {
     pub fn open(options: GateOptions, instance: &str) -> Result<Gate, GateError> {
         contents::refuse_foreign(&options.directory)?;
         let lock = DirectoryLock::take(&options.directory, Purpose::Gate, instance)?;
-        let claims = Claims::new(options.directory.clone(), options.paths.clone());
+        let claims = Claims::new(
+            options.directory.clone(),
+            options.paths.clone(),
+            options.outputs.clone(),
+        );
         Ok(Gate {
             options,
             claims: Mutex::new(claims),
@@ -124,16 +131,17 @@ impl Gate {
             }
         }
         let there = contents::files(&self.options.directory)?;
-        let waiting = {
-            let place = |path: &Path| {
-                self.options
-                    .directory
-                    .join(self.options.paths.relative(path))
-            };
-            claims.take_over(|path, size| there.get(&place(path)) == Some(&size))
-        };
+        let waiting =
+            { claims.take_over(|path, size| there.get(&self.place(path)) == Some(&size)) };
         contents::remove_others(&self.options.directory, &there, &claims.places())?;
         Ok(waiting)
+    }
+
+    /// Where a file lies behind the gate when it is published.
+    pub fn place(&self, path: &Path) -> PathBuf {
+        self.options
+            .directory
+            .join(self.options.paths.relative(path))
     }
 
     /// The files outside of the watched directories that a verdict depends on.
@@ -155,7 +163,8 @@ impl Gate {
 
     fn make_way_for(&self, path: &Arc<Path>, claim: &Claim) -> io::Result<MutexGuard<'_, Claims>> {
         let mut claims = self.claims();
-        if !claims.get(path).is_some_and(|there| there.agrees(claim)) {
+        let agrees = claims.get(path).is_some_and(|there| there.agrees(claim));
+        if !agrees || !claims.is_whole(path) {
             claims.revoke(path)?;
         }
         Ok(claims)

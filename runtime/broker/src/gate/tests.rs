@@ -103,6 +103,7 @@ impl Bench {
 fn open(dir: &Path, outside: Outside, said: &Arc<Mutex<Vec<String>>>) -> Gate {
     let said = said.clone();
     let options = GateOptions {
+        outputs: Outputs::default(),
         max_file: 1 << 20,
         scouts: Scouts::default(),
         directory: dir.join("gate"),

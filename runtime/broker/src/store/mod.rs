@@ -10,8 +10,8 @@ mod reconcile;
 mod refresh;
 mod trial;
 mod withdraw;
+mod writing;
 
-use std::cell::Cell;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use qcbus_formats::config::{Choice, Config};
 use qcbus_formats::pool::{BundleOutcome, Pooled, Scope};
-use qcbus_formats::xqar::{self, Dialect, Level};
+use qcbus_formats::xqar::{Dialect, Level};
 use qcbus_ingest::RESTS_ON_CHECKER;
 use qcbus_messages::Verdict;
 use qcbus_messages::path_text::to_text;
@@ -27,17 +27,16 @@ use qcbus_messages::path_text::to_text;
 use crate::core::{FinishedJob, Judged, ShareOutcome, StoreOutcome};
 use crate::gate::Gate;
 use crate::journal::{Entry, JournalError, Remembered, SharedJournal};
+use crate::outputs::Outputs;
 use crate::result_paths::ResultPaths;
 use crate::scouts::Scouts;
 use crate::seams::{disk, step};
 use crate::stages::reached;
 use crate::stamp::stamp_of;
-use crate::verdict_file;
-use qcbus_disk::{FileMark, is_for_good, write_both, write_whole};
+use qcbus_disk::is_for_good;
 
 pub use earlier::remove_earlier_results;
 pub use given::GivenResults;
-use history::history;
 use pooling::reasons;
 pub use reconcile::Reconciled;
 pub use refresh::digest_of;
@@ -63,6 +62,8 @@ pub struct Store {
     pub own_verdicts: bool,
     /// Where accepted files are published.
     pub gate: Option<Gate>,
+    /// Keeps what is written.
+    pub outputs: Outputs,
     /// Who looks at files.
     pub scouts: Scouts,
     /// Where results of trials are kept, if anything is.
@@ -161,76 +162,6 @@ impl Store {
         matches!(stamp, Ok(Ok(None)))
     }
 
-    fn write(&self, job: &FinishedJob, pooled: &Pooled, judged: &Judged) -> Result<(), Unwritten> {
-        if let Some(gate) = &self.gate {
-            let made_way = if judged.is_accepted() {
-                gate.make_way(&job.path, judged)
-            } else {
-                gate.refuse(&job.path)
-            };
-            made_way.map_err(|error| unwritten(&job.path, &error))?;
-            step("made way", &job.path);
-        }
-        let written = self.write_files(job, pooled, judged)?;
-        step("named", &job.path);
-        if let Some(gate) = self.gate.as_ref().filter(|_| judged.is_accepted()) {
-            let published = gate.accept(&job.path, judged);
-            published.map_err(|error| unwritten(&job.path, &error))?;
-        }
-        reached("written", &job.path);
-        let entry = Entry::Judged {
-            path: job.path.clone(),
-            judged: Arc::new(judged.clone()),
-            history: Some(Box::new(history(job, pooled))),
-            written,
-        };
-        self.record(&[entry]).map_err(|what| Unwritten {
-            what,
-            further: "",
-            for_good: false,
-        })
-    }
-
-    /// Writes the result and the verdict file, and gives the mark of the latter.
-    fn write_files(
-        &self,
-        job: &FinishedJob,
-        pooled: &Pooled,
-        judged: &Judged,
-    ) -> Result<Option<FileMark>, Unwritten> {
-        let memory = TEXT.take();
-        let text = xqar::write_into(memory, &pooled.results, self.dialect);
-        let written = self.write_texts(job, pooled, judged, &text);
-        if text.capacity() <= MOST_KEPT {
-            TEXT.set(text);
-        }
-        written
-    }
-
-    fn write_texts(
-        &self,
-        job: &FinishedJob,
-        pooled: &Pooled,
-        judged: &Judged,
-        text: &str,
-    ) -> Result<Option<FileMark>, Unwritten> {
-        let xqar = self.places.xqar(&job.path);
-        let result = (&*xqar, text.as_bytes());
-        disk().map_err(|error| unwritten(&xqar, &error))?;
-        if !self.verdict_files {
-            let written = write_whole(result.0, result.1, self.durable);
-            written.map_err(|error| unwritten(&xqar, &error))?;
-            return Ok(None);
-        }
-        let outside = self.gate.as_ref().map(|gate| gate.outside(&judged.inputs));
-        let verdict = verdict_file::render(job, pooled, judged, outside);
-        let path = self.places.verdict(&job.path);
-        // Whoever sees the new result sees its verdict.
-        write_both((&path, &verdict), result, self.durable)
-            .map(Some)
-            .map_err(|(path, error)| unwritten(path, &error))
-    }
-
     /// The verdict stands after all, or got fresh stamps: the file lies behind the gate again.
     ///
     /// # Errors
@@ -302,15 +233,6 @@ impl Store {
         pruned.map(|_| ()).map_err(|error| error.to_string())
     }
 }
-
-thread_local! {
-    /// The memory of the last result's text: to have as much anew for every small file costs more than to
-    /// write the text.
-    static TEXT: Cell<String> = const { Cell::new(String::new()) };
-}
-
-/// Bytes that a thread keeps for the next text.
-const MOST_KEPT: usize = 1 << 20;
 
 /// Why something that is to be tried again could not be done.
 #[derive(Debug)]

@@ -6,7 +6,7 @@ use qcbus_formats::pool::{
     self, BundleOutcome, Ending, NoPlaces, PoolInput, Pooled, Remark, Resolver, Scope, Unfinished,
 };
 use qcbus_formats::xqar::Level;
-use qcbus_ingest::Resting;
+use qcbus_ingest::{RESTS_ON_CHECKER, Resting};
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::{BUILD_DATE, MissingDocument, Verdict};
 
@@ -120,8 +120,8 @@ fn unseen_root() -> Remark {
 /// Reasons shown to a person; more than these are counted.
 const REASONS: usize = 20;
 
-/// What a person is told of a verdict: what keeps it open. Beside an error only what failed counts:
-/// that the error kept others from looking goes without saying.
+/// Returns what a person is told of a verdict: what keeps it open, and what it takes over from others. Beside an
+/// error only what failed counts: that the error kept others from looking goes without saying.
 pub(super) fn reasons(job: &FinishedJob, pooled: &Pooled, verdict: Verdict) -> Vec<String> {
     if let Some(open) = unanswered(job).and_then(|remark| remark.open) {
         return vec![open];
@@ -134,7 +134,20 @@ pub(super) fn reasons(job: &FinishedJob, pooled: &Pooled, verdict: Verdict) -> V
     if open.len() > REASONS {
         why.push(format!("and {} more", open.len() - REASONS));
     }
+    if verdict == Verdict::Rejected && pooled.verdict_without(RESTS_ON_CHECKER) != verdict {
+        why.extend(taken_over(pooled));
+    }
     why
+}
+
+/// The findings that reject a file without errors of its own.
+fn taken_over(pooled: &Pooled) -> impl Iterator<Item = String> {
+    let checkers = pooled.results.bundles.iter().flat_map(|it| &it.checkers);
+    let resting = checkers.filter(|it| &*it.id == RESTS_ON_CHECKER);
+    let errors = resting
+        .flat_map(|it| &it.issues)
+        .filter(|it| it.level == Level::Error);
+    errors.map(|it| it.description.to_string()).take(REASONS)
 }
 
 /// Finds the row and column of an XPath in the image.

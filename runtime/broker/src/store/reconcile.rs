@@ -66,6 +66,7 @@ impl Store {
                 continue;
             }
             owned.extend(row.judged.xqar.clone());
+            self.is_written(&row);
             // What cannot be looked at now says nothing: its result is kept.
             let lookable = stamp_of(&row.path);
             let as_read = found.as_read(&row.judged, lookable.as_ref().ok());
@@ -82,6 +83,16 @@ impl Store {
         self.let_fall(fallen, &owned, reporters, &mut found);
         self.clear_leftovers(&owned, reporters, &mut found);
         Ok(found)
+    }
+
+    /// From now on it is noticed when the result goes.
+    fn is_written(&self, row: &Remembered) {
+        let outputs = [self.places.xqar(&row.path), self.places.verdict(&row.path)];
+        for output in outputs {
+            if let Some(mark) = FileMark::at(&output) {
+                self.outputs.written(&output, &row.path, mark);
+            }
+        }
     }
 
     fn fall_of(&self, row: &Remembered) -> Option<Fall> {

@@ -36,11 +36,14 @@ impl Store {
             gate.forget(path)?;
             step("closed", path);
         }
+        let (xqar, verdict) = (self.places.xqar(path), self.places.verdict(path));
+        self.outputs.changing(&xqar);
+        self.outputs.changing(&verdict);
         disk()?;
-        remove(&self.places.xqar(path))?;
+        remove(&xqar)?;
         step("half withdrawn", path);
         disk()?;
-        remove(&self.places.verdict(path))?;
+        remove(&verdict)?;
         self.tidy_above(path);
         Ok(())
     }

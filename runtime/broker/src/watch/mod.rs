@@ -38,6 +38,7 @@ use crate::seams::{Bell, Sender, channel, thread};
 pub use self::ignore::is_excluded;
 pub use self::scan::Scan;
 pub use self::sight::{NoFile, Sight, is_behind_a_link, look_at};
+pub(crate) use self::tree::{Told, Tree, Unwatched, below};
 
 /// Every checkable file below a directory, once. `roots` are all the directories that are looked
 /// at, without symbolic links.

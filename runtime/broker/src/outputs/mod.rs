@@ -1,0 +1,270 @@
+//! Files that this broker has written for others: results, verdict files, copies behind the gate.
+//!
+//! Anyone may remove or change such a file while the broker runs. The kernel tells of it; besides, all of them
+//! are looked at in turn, because kernels and file systems lose events. The file that a lost output is about is
+//! judged again, which writes the output again.
+
+mod looker;
+
+use std::collections::{BTreeMap, HashSet};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use qcbus_disk::{FileMark, foreign};
+
+use self::looker::Looker;
+use crate::core::LostOutput;
+use crate::seams::{Bell, thread};
+
+/// Told of outputs that are lost, from the thread that looks at them.
+pub type TellLost = Box<dyn FnMut(Vec<LostOutput>) + Send>;
+
+/// The outputs that are there. Clones share them; the default keeps none, for a run that nobody outlives.
+#[derive(Debug, Clone, Default)]
+pub struct Outputs(Option<Arc<Shared>>);
+
+#[derive(Debug)]
+struct Shared {
+    book: Mutex<Book>,
+    /// Wakes the thread that waits for events.
+    bell: Bell,
+    is_over: AtomicBool,
+}
+
+/// What is known of the outputs.
+#[derive(Debug, Default)]
+struct Book {
+    written: BTreeMap<Arc<Path>, Written>,
+    /// Directories that are watched, or about to be.
+    directories: HashSet<PathBuf>,
+    /// Those of them that are still to be watched.
+    fresh: Vec<PathBuf>,
+}
+
+#[derive(Debug, Clone)]
+struct Written {
+    file: Arc<Path>,
+    mark: FileMark,
+    /// That it is lost was told.
+    is_told: bool,
+}
+
+/// Ends the thread that looks at the outputs when it is dropped.
+#[derive(Debug)]
+pub struct OutputWatch(Arc<Shared>);
+
+impl Drop for OutputWatch {
+    fn drop(&mut self) {
+        self.0.is_over.store(true, Ordering::Release);
+        self.0.bell.ring();
+    }
+}
+
+impl Outputs {
+    /// Keeps outputs that [`Outputs::watch`] is to look at.
+    ///
+    /// # Errors
+    /// When there is no descriptor left.
+    pub fn kept() -> io::Result<Outputs> {
+        Ok(Outputs(Some(Arc::new(Shared {
+            book: Mutex::default(),
+            bell: Bell::new()?,
+            is_over: AtomicBool::new(false),
+        }))))
+    }
+
+    /// Starts a thread that looks at the outputs, until what is returned is dropped. `None` when none are kept.
+    ///
+    /// # Errors
+    /// When no thread can be started.
+    pub fn watch(&self, tell: TellLost) -> io::Result<Option<OutputWatch>> {
+        let Some(shared) = self.0.clone() else {
+            return Ok(None);
+        };
+        let looker = Looker::new(shared.clone(), tell);
+        thread::Builder::new()
+            .name("outputs".to_owned())
+            .spawn(move || looker.run())?;
+        Ok(Some(OutputWatch(shared)))
+    }
+
+    /// Must be called before an output is written or removed: until [`Outputs::written`], it is no loss that another
+    /// file, or none, lies there.
+    pub fn changing(&self, output: &Path) {
+        if let Some(shared) = &self.0 {
+            shared.book().written.remove(output);
+        }
+    }
+
+    /// An output is there. `mark` is that of the very file that was written.
+    pub fn written(&self, output: &Path, file: &Arc<Path>, mark: FileMark) {
+        let Some(shared) = &self.0 else { return };
+        let mut book = shared.book();
+        let written = Written {
+            file: file.clone(),
+            mark,
+            is_told: false,
+        };
+        book.written.insert(output.into(), written);
+        let Some(directory) = output.parent() else {
+            return;
+        };
+        if !book.directories.contains(directory) {
+            book.directories.insert(directory.to_path_buf());
+            book.fresh.push(directory.to_path_buf());
+            drop(book);
+            shared.bell.ring();
+        }
+    }
+
+    /// Whether the loss of an output still is to be made good: it may have been written again since it was told.
+    pub fn is_told(&self, output: &Path) -> bool {
+        let shared = self.0.as_ref();
+        shared.is_some_and(|it| it.book().written.get(output).is_some_and(|it| it.is_told))
+    }
+
+    /// Whether an output was written and another file, or none, lies there.
+    pub fn is_lost(&self, output: &Path) -> bool {
+        let shared = self.0.as_ref();
+        shared.is_some_and(|it| it.look(output, |_| true).is_some())
+    }
+}
+
+impl Shared {
+    fn book(&self) -> MutexGuard<'_, Book> {
+        self.book.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Compares an output with what was written, and returns it if it is lost and `wanted`. It is looked at without
+    /// the lock, so that whoever changes it meanwhile does not wait for a disk; then it is looked at anew.
+    fn look(&self, output: &Path, wanted: impl Fn(&mut Written) -> bool) -> Option<LostOutput> {
+        loop {
+            let known = self.book().written.get(output)?.mark.clone();
+            // What does not answer is what it was.
+            let there = foreign::visit(output, || Ok(FileMark::at(output))).ok()?;
+            if there.as_ref() == Some(&known) {
+                return None;
+            }
+            let mut book = self.book();
+            let written = book.written.get_mut(output)?;
+            if written.mark != known {
+                continue;
+            }
+            return wanted(written).then(|| LostOutput {
+                file: written.file.clone(),
+                output: output.into(),
+            });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::{Receiver, channel};
+
+    use super::*;
+
+    struct WrittenDir {
+        dir: tempfile::TempDir,
+        outputs: Outputs,
+        told: Receiver<Vec<LostOutput>>,
+        _watch: OutputWatch,
+    }
+
+    impl WrittenDir {
+        fn new() -> WrittenDir {
+            let outputs = Outputs::kept().unwrap();
+            let (tell, told) = channel();
+            let watch = outputs.watch(Box::new(move |lost| drop(tell.send(lost))));
+            WrittenDir {
+                dir: tempfile::tempdir().unwrap(),
+                outputs,
+                told,
+                _watch: watch.unwrap().unwrap(),
+            }
+        }
+
+        fn write(&self, name: &str) -> PathBuf {
+            let output = self.dir.path().join(name);
+            std::fs::create_dir_all(output.parent().unwrap()).unwrap();
+            self.outputs.changing(&output);
+            std::fs::write(&output, name).unwrap();
+            let mark = FileMark::at(&output).unwrap();
+            self.outputs
+                .written(&output, &Path::new("/a.xodr").into(), mark);
+            output
+        }
+
+        /// What is told next; the test's watchdog is the runner's.
+        fn next(&self) -> PathBuf {
+            let mut lost = self.told.recv().unwrap();
+            assert_eq!(lost.len(), 1, "{lost:?}");
+            lost.remove(0).output.to_path_buf()
+        }
+    }
+
+    #[test]
+    fn removed_changed_and_replaced_outputs_are_told_once() {
+        let place = WrittenDir::new();
+        let output = place.write("sub/a.xqar");
+        assert!(!place.outputs.is_lost(&output));
+        std::fs::remove_file(&output).unwrap();
+        assert_eq!(place.next(), output);
+        place.write("sub/a.xqar");
+        std::fs::write(&output, "another text").unwrap();
+        assert_eq!(place.next(), output);
+        place.write("sub/a.xqar");
+        let other = place.dir.path().join("other");
+        std::fs::write(&other, "sub/a.xqar").unwrap();
+        std::fs::rename(&other, &output).unwrap();
+        assert_eq!(place.next(), output);
+        assert!(place.told.try_recv().is_err());
+    }
+
+    #[test]
+    fn outputs_below_a_directory_that_goes_are_told() {
+        let place = WrittenDir::new();
+        let output = place.write("one/two/a.xqar");
+        place.write("one/b.xqar");
+        let (from, to) = (place.dir.path().join("one"), place.dir.path().join("gone"));
+        std::fs::rename(from, to).unwrap();
+        let mut told = Vec::new();
+        while told.len() < 2 {
+            told.extend(place.told.recv().unwrap());
+        }
+        assert!(told.iter().any(|it| *it.output == *output), "{told:?}");
+        // Both directories are watched again.
+        place.write("one/two/a.xqar");
+        std::fs::remove_file(&output).unwrap();
+        assert_eq!(place.next(), output);
+    }
+
+    #[test]
+    fn output_that_the_broker_changes_itself_is_not_lost() {
+        let place = WrittenDir::new();
+        let output = place.write("a.xqar");
+        place.outputs.changing(&output);
+        std::fs::remove_file(&output).unwrap();
+        assert!(!place.outputs.is_lost(&output));
+        let other = place.write("b.xqar");
+        std::fs::remove_file(&other).unwrap();
+        assert_eq!(place.next(), other, "nothing was told of the first one");
+    }
+
+    #[test]
+    fn output_that_was_lost_before_its_directory_is_watched_is_told() {
+        let outputs = Outputs::kept().unwrap();
+        let dir = tempfile::tempdir().unwrap();
+        let output = dir.path().join("a.xqar");
+        std::fs::write(&output, "").unwrap();
+        let mark = FileMark::at(&output).unwrap();
+        outputs.written(&output, &Path::new("/a.xodr").into(), mark);
+        std::fs::remove_file(&output).unwrap();
+        assert!(outputs.is_lost(&output));
+        let (tell, told) = channel();
+        let _watch = outputs.watch(Box::new(move |lost| drop(tell.send(lost))));
+        assert_eq!(&*told.recv().unwrap()[0].output, &*output);
+    }
+}

@@ -1,0 +1,125 @@
+//! Results and published files that somebody removes or changes while the broker runs.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::path::{Path, PathBuf};
+
+use support::broker::Broker;
+use support::content::Content;
+use support::farm::Farm;
+use support::watchdog::until_or;
+
+/// A farm with a gate, and the state beside the results.
+fn farm() -> Farm {
+    let mut farm = Farm::new();
+    let (gate, state) = (farm.gate(), farm.base().join("state"));
+    for (option, path) in [("--gate", gate), ("--state", state)] {
+        let path = path.to_string_lossy().into_owned();
+        farm.arguments.extend([option.to_owned(), path]);
+    }
+    farm
+}
+
+fn serve(farm: &Farm) -> Broker {
+    farm.write("good.xodr", &Content::Good(1).bytes());
+    std::fs::create_dir(farm.root().join("sub")).unwrap();
+    farm.write("sub/bad.xodr", &Content::NoHeader(1).bytes());
+    let broker = farm.serve_ready();
+    farm.verdict("good.xodr");
+    farm.verdict("sub/bad.xodr");
+    there(farm, &outputs(farm));
+    broker
+}
+
+/// Everything that the broker writes for the two files.
+fn outputs(farm: &Farm) -> Vec<PathBuf> {
+    let results = ["good.xodr", "sub/bad.xodr"].into_iter().flat_map(|name| {
+        [".xqar", ".verdict.json"].map(|suffix| farm.out().join(format!("{name}{suffix}")))
+    });
+    results.chain([farm.gate().join("good.xodr")]).collect()
+}
+
+fn there(farm: &Farm, outputs: &[PathBuf]) {
+    let all = || outputs.iter().all(|it| it.exists()).then_some(());
+    until_or("all outputs are there", all, || farm.log());
+}
+
+fn wait(farm: &Farm, name: &str) -> Option<i32> {
+    let file = farm.root().join(name).to_string_lossy().into_owned();
+    farm.qcbus(&["wait", &file]).status.code()
+}
+
+#[test]
+fn removed_outputs_are_written_again() {
+    let farm = farm();
+    let _broker = serve(&farm);
+    for output in outputs(&farm) {
+        std::fs::remove_file(&output).unwrap();
+        there(&farm, &outputs(&farm));
+    }
+    assert!(
+        farm.log().contains("removed or changed by another process"),
+        "{}",
+        farm.log()
+    );
+}
+
+#[test]
+fn wait_answers_with_a_result_that_is_there() {
+    let farm = farm();
+    let _broker = serve(&farm);
+    for output in outputs(&farm) {
+        let (name, code) = match output.ends_with("good.xodr") || is_of_good(&output) {
+            true => ("good.xodr", 0),
+            false => ("sub/bad.xodr", 1),
+        };
+        std::fs::remove_file(&output).unwrap();
+        assert_eq!(wait(&farm, name), Some(code), "{}", farm.log());
+        // A copy behind the gate may come a moment after the answer, as after every verdict.
+        let is_copy = output.starts_with(farm.gate());
+        assert!(
+            is_copy || output.exists(),
+            "{} is missing",
+            output.display()
+        );
+        there(&farm, &outputs(&farm));
+    }
+}
+
+fn is_of_good(output: &Path) -> bool {
+    let name = output.file_name().unwrap().to_string_lossy();
+    name.starts_with("good.xodr.")
+}
+
+#[test]
+fn changed_outputs_are_written_again() {
+    let farm = farm();
+    let _broker = serve(&farm);
+    for output in outputs(&farm) {
+        let before = std::fs::read(&output).unwrap();
+        std::fs::write(&output, "another text").unwrap();
+        let same = || {
+            let now = std::fs::read(&output).unwrap_or_default();
+            let is_copy = output.starts_with(farm.gate());
+            (now.len() > 100 && (!is_copy || now == before)).then_some(())
+        };
+        until_or("the output is written again", same, || farm.log());
+    }
+}
+
+#[test]
+fn directories_of_results_that_go_come_back() {
+    let farm = farm();
+    let _broker = serve(&farm);
+    std::fs::rename(farm.out().join("sub"), farm.base().join("elsewhere")).unwrap();
+    there(&farm, &outputs(&farm));
+    std::fs::remove_dir_all(farm.out().join("sub")).unwrap();
+    there(&farm, &outputs(&farm));
+    assert_eq!(wait(&farm, "sub/bad.xodr"), Some(1));
+}
