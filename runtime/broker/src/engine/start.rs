@@ -3,39 +3,34 @@
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::AtomicU64;
 
 use qcbus_bus::HostOptions;
-use qcbus_messages::Role;
 use qcbus_messages::control::Unseen;
 use tokio::sync::mpsc;
 
 use super::early::{early_children, early_or_now};
 use super::looks::Looks;
+use super::stores::{journal_of, reconcile, remembered_by, results_of, store, writers};
 use super::watching::Watching;
 use super::{AttendedTime, Broker, Inbox, Sessions, StartError, Told};
 use crate::control::Asked;
 use crate::core::{Event, Member, Notice, Stamp, State};
 use crate::demand::InForce;
 use crate::descriptors::Descriptors;
-use crate::directory_lock::{DirectoryLock, LockError, Purpose, open_to_others};
-use crate::gate::{Gate, GateError, GateOptions};
+use crate::directory_lock::open_to_others;
 use crate::intake::{Intake, JudgedAs};
-use crate::journal::{Journal, JournalError, SharedJournal, Void};
+use crate::journal::Void;
 use crate::launches::Launches;
 use crate::options::Options;
-use crate::outputs::Outputs;
 use crate::reload::{Loaded, Sources};
-use crate::result_paths::ResultPaths;
-use crate::scouts::Scouts;
-use crate::seams::{Children, ControlSocket, Host, is_simulated, now, spawn_blocking};
+use crate::seams::{Children, ControlSocket, Host, now, spawn_blocking};
 use crate::stamp::stamp_of;
 use crate::state_identity::difference_of;
-use crate::store::{Reconciled, Store, TrialResults, remove_earlier_results};
+use crate::store::Reconciled;
 use crate::supervise::Surroundings;
 use crate::watch::{Seen, is_looked_at, scan_directory};
-use crate::writers::{Order, Writers};
-use qcbus_disk::{foreign, sweep};
+use crate::writers::Order;
+use qcbus_disk::foreign;
 
 impl Broker {
     /// Takes the instance, opens the journal, reads the configuration. Must be called within a
@@ -215,125 +210,6 @@ fn sources_of(options: &Options) -> Sources {
     }
 }
 
-fn journal_of(options: &Options) -> Result<Option<Journal>, JournalError> {
-    let state = options.state.as_ref();
-    let opened = state.map(|state| Journal::open(state, options.instance.name()));
-    opened.transpose()
-}
-
-/// From where on numbers are new, and who must judge; nothing where there is no journal.
-fn remembered_by(journal: Option<&Journal>) -> Result<(u64, Vec<Member>), JournalError> {
-    let Some(journal) = journal else {
-        return Ok((0, Vec::new()));
-    };
-    Ok((journal.numbers()?, journal.members()?))
-}
-
-/// Nobody else may write results there meanwhile, but for other runs of `check`.
-fn results_of(options: &Options) -> Result<DirectoryLock, LockError> {
-    if options.watch {
-        DirectoryLock::take(&options.out, Purpose::Results, options.instance.name())
-    } else {
-        DirectoryLock::share(&options.out)
-    }
-}
-
-/// What a broker writes is looked at as long as it runs; what a run writes belongs to whoever has it done.
-fn outputs_of(options: &Options) -> Result<Outputs, StartError> {
-    if !options.watch || is_simulated() {
-        return Ok(Outputs::default());
-    }
-    Outputs::kept().map_err(|source| system("watch results", source))
-}
-
-fn store(
-    options: &Options,
-    journal: Option<Journal>,
-    scouts: Scouts,
-    notices: &mpsc::UnboundedSender<Notice>,
-) -> Result<Store, StartError> {
-    let outputs = outputs_of(options)?;
-    let (out, roots) = (options.out.clone(), options.roots.clone());
-    let mut places = match &options.here {
-        Some(here) => ResultPaths::of_run(out, here.clone(), roots, &options.files),
-        None => ResultPaths::of_watched(out, roots),
-    };
-    places.single.clone_from(&options.single_result);
-    let gate = options.gate.as_ref();
-    let gate = gate.map(|directory| {
-        let (scouts, notices) = (scouts.clone(), notices.clone());
-        let to = (directory.as_path(), &places, &outputs);
-        gate_of(options, to, scouts, notices)
-    });
-    Ok(Store {
-        places,
-        choice: options.choice.clone(),
-        dialect: options.dialect,
-        durable: options.durable,
-        verdict_files: options.verdict_files,
-        retries: options.watch,
-        own_verdicts: options.settings.own_verdicts,
-        gate: gate.transpose()?,
-        outputs,
-        scouts,
-        trials: options.state.as_deref().map(TrialResults::anew),
-        journal: journal.map(SharedJournal::from),
-        epoch: AtomicU64::new(0),
-    })
-}
-
-fn writers(
-    options: &Options,
-    store: &Arc<Store>,
-    inbox: &Inbox,
-    notices: &mpsc::UnboundedSender<Notice>,
-) -> Result<Writers, StartError> {
-    let threads = options.settings.max_storing;
-    Writers::start(threads, store, &inbox.events_in, notices)
-        .map_err(|source| system("start writing", source))
-}
-
-fn gate_of(
-    options: &Options,
-    (directory, paths, outputs): (&Path, &ResultPaths, &Outputs),
-    scouts: Scouts,
-    notices: mpsc::UnboundedSender<Notice>,
-) -> Result<Gate, GateError> {
-    let roots = options.roots.clone();
-    let gate = GateOptions {
-        max_file: options.limits.max_file,
-        scouts,
-        outputs: outputs.clone(),
-        directory: directory.to_path_buf(),
-        paths: paths.clone(),
-        durable: options.durable,
-        outside: options.gate_outside,
-        is_judged: Box::new(move |path| is_looked_at(&roots, path)),
-        say: Box::new(move |text| {
-            // After the end of the loop nobody listens.
-            let _ = notices.send(Notice::HeldBack(text));
-        }),
-    };
-    Gate::open(gate, options.instance.name())
-}
-
-/// Sweeps and brings in agreement what is on the disk and what is remembered, before anything is
-/// judged.
-fn reconcile(options: &Options, loaded: &Loaded, store: &Store) -> Result<Reconciled, StartError> {
-    if !options.watch {
-        return Ok(Reconciled::nothing(remove_earlier_results(&store.places)));
-    }
-    sweep(&options.out);
-    options.gate.iter().for_each(|gate| sweep(gate));
-    let reporters = loaded
-        .children
-        .iter()
-        .filter(|it| it.role == Role::Reporter);
-    let reporters: Vec<String> = reporters.map(|it| it.name.clone()).collect();
-    let remembered = store.remembered()?;
-    Ok(store.reconcile(remembered, &reporters)?)
-}
-
 /// The bus is made for those who are expected. Nobody else joins what ends by itself; a newer process
 /// may stand beside each that was started.
 pub(super) fn shape(options: &Options, loaded: &Loaded) -> HostOptions {
@@ -426,7 +302,7 @@ fn look_once(roots: &[PathBuf], files: &[PathBuf], seen: &mpsc::UnboundedSender<
     tell(Seen::Scanned);
 }
 
-fn system(what: &str, source: std::io::Error) -> StartError {
+pub(super) fn system(what: &str, source: std::io::Error) -> StartError {
     StartError::System {
         what: format!("cannot {what}"),
         source,

@@ -1,0 +1,148 @@
+//! What a starting broker writes to: the journal, the directory of results, the gate; and what it finds there.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+
+use qcbus_disk::sweep;
+use qcbus_messages::Role;
+use tokio::sync::mpsc;
+
+use super::start::system;
+use super::{Inbox, StartError};
+use crate::core::{Member, Notice};
+use crate::directory_lock::{DirectoryLock, LockError, Purpose};
+use crate::gate::{Gate, GateError, GateOptions};
+use crate::journal::{Journal, JournalError, SharedJournal};
+use crate::options::Options;
+use crate::outputs::Outputs;
+use crate::reload::Loaded;
+use crate::result_paths::ResultPaths;
+use crate::scouts::Scouts;
+use crate::seams::is_simulated;
+use crate::store::{Reconciled, Store, TrialResults, remove_earlier_results};
+use crate::watch::is_looked_at;
+use crate::writers::Writers;
+
+pub(super) fn journal_of(options: &Options) -> Result<Option<Journal>, JournalError> {
+    let state = options.state.as_ref();
+    let opened = state.map(|state| Journal::open(state, options.instance.name()));
+    opened.transpose()
+}
+
+/// From where on numbers are new, and who must judge; nothing where there is no journal.
+pub(super) fn remembered_by(journal: Option<&Journal>) -> Result<(u64, Vec<Member>), JournalError> {
+    let Some(journal) = journal else {
+        return Ok((0, Vec::new()));
+    };
+    Ok((journal.numbers()?, journal.members()?))
+}
+
+/// Nobody else may write results there meanwhile, but for other runs of `check`.
+pub(super) fn results_of(options: &Options) -> Result<DirectoryLock, LockError> {
+    if options.watch {
+        DirectoryLock::take(&options.out, Purpose::Results, options.instance.name())
+    } else {
+        DirectoryLock::share(&options.out)
+    }
+}
+
+/// What a broker writes is looked at as long as it runs; what a run writes belongs to whoever has it done.
+fn outputs_of(options: &Options) -> Result<Outputs, StartError> {
+    if !options.watch || is_simulated() {
+        return Ok(Outputs::default());
+    }
+    Outputs::kept().map_err(|source| system("watch results", source))
+}
+
+pub(super) fn store(
+    options: &Options,
+    journal: Option<Journal>,
+    scouts: Scouts,
+    notices: &mpsc::UnboundedSender<Notice>,
+) -> Result<Store, StartError> {
+    let outputs = outputs_of(options)?;
+    let (out, roots) = (options.out.clone(), options.roots.clone());
+    let mut places = match &options.here {
+        Some(here) => ResultPaths::of_run(out, here.clone(), roots, &options.files),
+        None => ResultPaths::of_watched(out, roots),
+    };
+    places.single.clone_from(&options.single_result);
+    let gate = options.gate.as_ref();
+    let gate = gate.map(|directory| {
+        let (scouts, notices) = (scouts.clone(), notices.clone());
+        let to = (directory.as_path(), &places, &outputs);
+        gate_of(options, to, scouts, notices)
+    });
+    Ok(Store {
+        places,
+        choice: options.choice.clone(),
+        dialect: options.dialect,
+        durable: options.durable,
+        verdict_files: options.verdict_files,
+        retries: options.watch,
+        own_verdicts: options.settings.own_verdicts,
+        gate: gate.transpose()?,
+        outputs,
+        scouts,
+        trials: options.state.as_deref().map(TrialResults::anew),
+        journal: journal.map(SharedJournal::from),
+        epoch: AtomicU64::new(0),
+    })
+}
+
+pub(super) fn writers(
+    options: &Options,
+    store: &Arc<Store>,
+    inbox: &Inbox,
+    notices: &mpsc::UnboundedSender<Notice>,
+) -> Result<Writers, StartError> {
+    let threads = options.settings.max_storing;
+    Writers::start(threads, store, &inbox.events_in, notices)
+        .map_err(|source| system("start writing", source))
+}
+
+fn gate_of(
+    options: &Options,
+    (directory, paths, outputs): (&Path, &ResultPaths, &Outputs),
+    scouts: Scouts,
+    notices: mpsc::UnboundedSender<Notice>,
+) -> Result<Gate, GateError> {
+    let roots = options.roots.clone();
+    let gate = GateOptions {
+        max_file: options.limits.max_file,
+        scouts,
+        outputs: outputs.clone(),
+        directory: directory.to_path_buf(),
+        paths: paths.clone(),
+        durable: options.durable,
+        outside: options.gate_outside,
+        is_judged: Box::new(move |path| is_looked_at(&roots, path)),
+        say: Box::new(move |text| {
+            // After the end of the loop nobody listens.
+            let _ = notices.send(Notice::HeldBack(text));
+        }),
+    };
+    Gate::open(gate, options.instance.name())
+}
+
+/// Sweeps and brings in agreement what is on the disk and what is remembered, before anything is
+/// judged.
+pub(super) fn reconcile(
+    options: &Options,
+    loaded: &Loaded,
+    store: &Store,
+) -> Result<Reconciled, StartError> {
+    if !options.watch {
+        return Ok(Reconciled::nothing(remove_earlier_results(&store.places)));
+    }
+    sweep(&options.out);
+    options.gate.iter().for_each(|gate| sweep(gate));
+    let reporters = loaded
+        .children
+        .iter()
+        .filter(|it| it.role == Role::Reporter);
+    let reporters: Vec<String> = reporters.map(|it| it.name.clone()).collect();
+    let remembered = store.remembered()?;
+    Ok(store.reconcile(remembered, &reporters)?)
+}
