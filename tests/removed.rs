@@ -50,6 +50,13 @@ fn there(farm: &Farm, outputs: &[PathBuf]) {
     until_or("all outputs are there", all, || farm.log());
 }
 
+/// Removes a directory in one step: the broker begins to write to it again at once.
+fn remove_whole(directory: &Path) {
+    let aside = directory.with_extension("aside");
+    std::fs::rename(directory, &aside).unwrap();
+    std::fs::remove_dir_all(&aside).unwrap();
+}
+
 fn wait(farm: &Farm, name: &str) -> Option<i32> {
     let file = farm.root().join(name).to_string_lossy().into_owned();
     farm.qcbus(&["wait", &file]).status.code()
@@ -119,7 +126,74 @@ fn directories_of_results_that_go_come_back() {
     let _broker = serve(&farm);
     std::fs::rename(farm.out().join("sub"), farm.base().join("elsewhere")).unwrap();
     there(&farm, &outputs(&farm));
-    std::fs::remove_dir_all(farm.out().join("sub")).unwrap();
+    remove_whole(&farm.out().join("sub"));
     there(&farm, &outputs(&farm));
     assert_eq!(wait(&farm, "sub/bad.xodr"), Some(1));
+}
+
+#[test]
+fn replaced_directories_of_results_and_gate_are_filled_again() {
+    let farm = farm();
+    let _broker = serve(&farm);
+    for directory in [farm.out(), farm.gate()] {
+        remove_whole(&directory);
+        there(&farm, &outputs(&farm));
+    }
+    // They are this broker's again.
+    let mut other = Farm::new();
+    other.arguments = farm.arguments.clone();
+    let gate = farm.gate().to_string_lossy().into_owned();
+    let state = other.base().join("state").to_string_lossy().into_owned();
+    other.arguments = vec!["--gate".to_owned(), gate, "--state".to_owned(), state];
+    let refused = other.serve_command().output().unwrap();
+    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(said.contains("of another broker that runs"), "{said}");
+}
+
+#[test]
+fn directory_that_another_broker_has_taken_is_left_to_it() {
+    let mut other = Farm::new();
+    let gate = other.gate().to_string_lossy().into_owned();
+    other.arguments.extend(["--gate".to_owned(), gate]);
+    let farm = farm();
+    let _broker = serve(&farm);
+    // The other one has the directory that comes to lie where the first had published.
+    while std::os::unix::fs::symlink(other.gate(), farm.gate()).is_err() {
+        remove_whole(&farm.gate());
+    }
+    other.write("other.xodr", &Content::Good(2).bytes());
+    let _second = other.serve_ready();
+    other.verdict("other.xodr");
+    there(&other, &[other.gate().join("other.xodr")]);
+    farm.write("late.xodr", &Content::Good(3).bytes());
+    let told = || {
+        let status = farm.status()?;
+        let mut troubles = status.troubles.iter();
+        troubles
+            .any(|it| it.contains("another broker"))
+            .then_some(())
+    };
+    until_or("the status names the other broker", told, || farm.log());
+    let there: Vec<_> = std::fs::read_dir(other.gate()).unwrap().collect();
+    assert_eq!(there.len(), 2, "its mark and its file: {there:?}");
+}
+
+#[test]
+fn state_directory_that_goes_is_told() {
+    let farm = farm();
+    let _broker = serve(&farm);
+    remove_whole(&farm.base().join("state"));
+    let told = || {
+        let status = farm.status()?;
+        let mut troubles = status.troubles.iter();
+        troubles
+            .any(|it| it.contains("was removed or replaced"))
+            .then_some(())
+    };
+    until_or("the status tells it", told, || farm.log());
+    let health = farm.qcbus(&["status", "--health"]);
+    assert_eq!(health.status.code(), Some(1), "{health:?}");
+    // What is judged is answered all the same.
+    farm.write("late.xodr", &Content::Good(3).bytes());
+    assert_eq!(wait(&farm, "late.xodr"), Some(0));
 }

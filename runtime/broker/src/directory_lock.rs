@@ -3,7 +3,9 @@
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Write};
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use qcbus_disk::trust::{self, TrustError};
 use qcbus_messages::path_text::to_text;
@@ -89,7 +91,11 @@ pub enum LockError {
 /// A directory that is ours until this is dropped, or the process ends in whatever way.
 #[derive(Debug)]
 pub struct DirectoryLock {
-    file: File,
+    file: Mutex<File>,
+    directory: PathBuf,
+    purpose: Purpose,
+    /// The instance that has the directory alone; `None` when runs of `check` share it.
+    instance: Option<String>,
     /// The directory, if it was made for this and is to go with it as long as it is empty.
     made: Option<PathBuf>,
 }
@@ -104,18 +110,13 @@ impl DirectoryLock {
         purpose: Purpose,
         instance: &str,
     ) -> Result<DirectoryLock, LockError> {
-        let mut file = open(directory, purpose)?;
-        if purpose != Purpose::State {
-            is_free_above(directory, purpose)?;
-        }
-        match file.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => return Err(refusal(&mut file, directory, purpose)),
-            Err(TryLockError::Error(error)) => without_locks(directory, &error),
-        }
-        // Only for whoever is refused: on a full disk the lock holds without it.
-        let _ = introduce(&mut file, directory, purpose, instance);
-        Ok(DirectoryLock { file, made: None })
+        Ok(DirectoryLock {
+            file: Mutex::new(lock_alone(directory, purpose, instance)?),
+            directory: directory.to_path_buf(),
+            purpose,
+            instance: Some(instance.to_owned()),
+            made: None,
+        })
     }
 
     /// Takes a directory of results together with others that do the same: runs of `check`.
@@ -124,16 +125,85 @@ impl DirectoryLock {
     /// [`LockError`]; each says what to do.
     pub fn share(directory: &Path) -> Result<DirectoryLock, LockError> {
         let made = (!directory.exists()).then(|| directory.to_path_buf());
-        let mut file = open(directory, Purpose::Results)?;
-        is_free_above(directory, Purpose::Results)?;
-        match file.try_lock_shared() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => {
-                return Err(refusal(&mut file, directory, Purpose::Results));
-            }
-            Err(TryLockError::Error(error)) => without_locks(directory, &error),
+        Ok(DirectoryLock {
+            file: Mutex::new(lock_shared(directory)?),
+            directory: directory.to_path_buf(),
+            purpose: Purpose::Results,
+            instance: None,
+            made,
+        })
+    }
+
+    /// Makes sure that this is the lock of the directory that lies there now. Somebody may have removed the directory,
+    /// or put another one in its place: that one is taken then, and made if there is none.
+    ///
+    /// # Errors
+    /// When it cannot be taken, because another broker has it. Nothing may be written to it or removed from it then.
+    pub fn hold(&self) -> Result<(), LockError> {
+        let mut file = self.file();
+        if is_in_place(&file, &locked_at(&self.directory, self.purpose)) {
+            return Ok(());
         }
-        Ok(DirectoryLock { file, made })
+        *file = match &self.instance {
+            Some(instance) => lock_alone(&self.directory, self.purpose, instance)?,
+            None => lock_shared(&self.directory)?,
+        };
+        Ok(())
+    }
+
+    /// Whether the directory that was taken lies there still.
+    pub fn is_in_place(&self) -> bool {
+        is_in_place(&self.file(), &locked_at(&self.directory, self.purpose))
+    }
+
+    /// The directory.
+    pub fn directory(&self) -> &Path {
+        &self.directory
+    }
+
+    fn file(&self) -> MutexGuard<'_, File> {
+        self.file.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+fn lock_alone(directory: &Path, purpose: Purpose, instance: &str) -> Result<File, LockError> {
+    let mut file = open(directory, purpose)?;
+    if purpose != Purpose::State {
+        is_free_above(directory, purpose)?;
+    }
+    match file.try_lock() {
+        Ok(()) => {}
+        Err(TryLockError::WouldBlock) => return Err(refusal(&mut file, directory, purpose)),
+        Err(TryLockError::Error(error)) => without_locks(directory, &error),
+    }
+    // Only for whoever is refused: on a full disk the lock holds without it.
+    let _ = introduce(&mut file, directory, purpose, instance);
+    Ok(file)
+}
+
+fn lock_shared(directory: &Path) -> Result<File, LockError> {
+    let mut file = open(directory, Purpose::Results)?;
+    is_free_above(directory, Purpose::Results)?;
+    match file.try_lock_shared() {
+        Ok(()) => {}
+        Err(TryLockError::WouldBlock) => {
+            return Err(refusal(&mut file, directory, Purpose::Results));
+        }
+        Err(TryLockError::Error(error)) => without_locks(directory, &error),
+    }
+    Ok(file)
+}
+
+/// Whether the file that is locked lies at a path. Where nothing can be told, it does: a write there fails by itself.
+fn is_in_place(file: &File, path: &Path) -> bool {
+    let identity = |data: std::fs::Metadata| (data.dev(), data.ino());
+    match (
+        file.metadata().map(identity),
+        std::fs::metadata(path).map(identity),
+    ) {
+        (Ok(locked), Ok(there)) => locked == there,
+        (_, Err(error)) => error.kind() != io::ErrorKind::NotFound,
+        (Err(_), Ok(_)) => true,
     }
 }
 
@@ -141,7 +211,7 @@ impl Drop for DirectoryLock {
     fn drop(&mut self) {
         // It stays when there is anything in it, or somebody else uses it.
         if let Some(made) = &self.made
-            && self.file.try_lock().is_ok()
+            && self.file().try_lock().is_ok()
         {
             let _ = std::fs::remove_dir(made);
         }
@@ -150,6 +220,13 @@ impl Drop for DirectoryLock {
 
 /// What is locked. Of results that is the directory itself: locking must not need any room, and
 /// must leave nothing behind.
+fn locked_at(directory: &Path, purpose: Purpose) -> PathBuf {
+    match purpose {
+        Purpose::Results => directory.to_path_buf(),
+        Purpose::State | Purpose::Gate => directory.join(purpose.file()),
+    }
+}
+
 fn open(directory: &Path, purpose: Purpose) -> Result<File, LockError> {
     let fail = |path: &Path, source| LockError::Unusable {
         path: path.to_path_buf(),
@@ -157,10 +234,10 @@ fn open(directory: &Path, purpose: Purpose) -> Result<File, LockError> {
         source,
     };
     std::fs::create_dir_all(directory).map_err(|source| fail(directory, source))?;
+    let path = locked_at(directory, purpose);
     if purpose == Purpose::Results {
-        return File::open(directory).map_err(|source| fail(directory, source));
+        return File::open(&path).map_err(|source| fail(&path, source));
     }
-    let path = directory.join(purpose.file());
     OpenOptions::new()
         .read(true)
         .write(true)
@@ -178,12 +255,8 @@ fn is_free_above(directory: &Path, wanted: Purpose) -> Result<(), LockError> {
             if above == directory && purpose == wanted {
                 continue;
             }
-            let locked = match purpose {
-                Purpose::Results => above.to_path_buf(),
-                _ => above.join(purpose.file()),
-            };
-            // What cannot be opened is nothing that a broker has.
-            let Ok(mut file) = File::open(locked) else {
+            // A lock file that cannot be opened has no living broker behind it.
+            let Ok(mut file) = File::open(locked_at(above, purpose)) else {
                 continue;
             };
             if let Err(TryLockError::WouldBlock) = file.try_lock_shared() {
@@ -270,6 +343,29 @@ mod tests {
             let _second = take("second").unwrap();
             let refused = take("third").unwrap_err().to_string();
             assert!(refused.contains("instance `second`"), "{refused}");
+        }
+    }
+
+    #[test]
+    fn replaced_directory_is_taken_unless_another_broker_has_it() {
+        for purpose in [Purpose::State, Purpose::Results, Purpose::Gate] {
+            let dir = tempfile::tempdir().unwrap();
+            let (place, aside) = (dir.path().join("place"), dir.path().join("aside"));
+            let first = DirectoryLock::take(&place, purpose, "first").unwrap();
+            first.hold().unwrap();
+            assert!(first.is_in_place());
+            std::fs::rename(&place, &aside).unwrap();
+            assert!(!first.is_in_place());
+            first.hold().unwrap();
+            assert!(first.is_in_place(), "it is made and taken");
+            let second = DirectoryLock::take(&place, purpose, "second");
+            assert!(matches!(second, Err(LockError::Held { .. })));
+            std::fs::remove_dir_all(&place).unwrap();
+            let second = DirectoryLock::take(&place, purpose, "second").unwrap();
+            let refused = first.hold().unwrap_err().to_string();
+            assert!(refused.contains("instance `second`"), "{refused}");
+            drop(second);
+            first.hold().unwrap();
         }
     }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use qcbus_messages::control::{BundleStanding, Request, Response, Status, Terms, Unseen};
+use qcbus_messages::path_text::to_text;
 use tokio::sync::oneshot;
 
 use super::looks::{Look, Seen, Sighted};
@@ -246,10 +247,32 @@ impl Broker {
             return;
         }
         let (sources, read) = (self.sources.clone(), self.loaded.read.clone());
+        let lock = self.state_lock.clone();
         // Where no thread can be started now, one may in a second.
         self.looks.changes = self
-            .scout(move || Seen::Sources(sources.fingerprint(&read)))
+            .scout(move || Seen::Sources {
+                read: sources.fingerprint(&read),
+                state_is_gone: lock.is_some_and(|it| !it.is_in_place()),
+            })
             .ok();
+    }
+
+    /// Somebody may have removed the state directory, or put another one in its place.
+    pub(super) fn look_at_state(&mut self, is_gone: bool) {
+        let is_new = is_gone && !self.state_is_gone;
+        self.state_is_gone = is_gone;
+        if let Some(text) = self.said_of_state().filter(|_| is_new) {
+            self.say(Notice::Storing(text));
+        }
+    }
+
+    fn said_of_state(&self) -> Option<String> {
+        let lock = self.state_lock.as_ref().filter(|_| self.state_is_gone)?;
+        Some(format!(
+            "the state directory {} was removed or replaced: verdicts from now on are forgotten when this broker ends, \
+             and their files are judged anew; start it again",
+            to_text(lock.directory())
+        ))
     }
 
     /// A scout has come back with the stamps of all that was read for what is in force.
@@ -313,6 +336,9 @@ impl Broker {
         let mut troubles: Vec<String> = self.writers.troubles().into_iter().collect();
         if self.watching.as_ref().is_some_and(|it| it.is_alone()) {
             troubles.push("nobody watches for changes".to_owned());
+        }
+        if let Some(text) = self.said_of_state() {
+            troubles.push(text);
         }
         troubles
     }

@@ -97,8 +97,11 @@ pub(super) struct Looked {
 }
 
 pub(super) enum Seen {
-    /// What configuration, manifests and programs are now.
-    Sources(Fingerprint),
+    /// What configuration, manifests, programs and the state directory are now.
+    Sources {
+        read: Fingerprint,
+        state_is_gone: bool,
+    },
     /// The path means another file.
     Elsewhere(PathBuf),
     Sighted(Sighted),
@@ -203,8 +206,12 @@ impl Broker {
     pub(super) fn looked(&mut self, looked: Looked) -> bool {
         let Looked { scout, seen } = looked;
         match seen {
-            Seen::Sources(now) => {
-                self.reload_if_changed(now);
+            Seen::Sources {
+                read,
+                state_is_gone,
+            } => {
+                self.look_at_state(state_is_gone);
+                self.reload_if_changed(read);
                 true
             }
             Seen::Again { stamp, inputs } => {

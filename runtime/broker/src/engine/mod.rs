@@ -145,8 +145,10 @@ pub struct Broker {
     inbox: Inbox,
     tell: Box<dyn FnMut(Told) + Send>,
     control: ControlSocket,
-    /// Nobody else writes results there.
-    _results: DirectoryLock,
+    /// Of the state directory, if there is a journal.
+    state_lock: Option<Arc<DirectoryLock>>,
+    /// The state directory was removed or replaced.
+    state_is_gone: bool,
 }
 
 impl std::fmt::Debug for Broker {

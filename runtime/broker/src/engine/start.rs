@@ -19,7 +19,7 @@ use crate::demand::InForce;
 use crate::descriptors::Descriptors;
 use crate::directory_lock::open_to_others;
 use crate::intake::{Intake, JudgedAs};
-use crate::journal::Void;
+use crate::journal::{Journal, Void};
 use crate::launches::Launches;
 use crate::options::Options;
 use crate::reload::{Loaded, Sources};
@@ -52,12 +52,18 @@ impl Broker {
         let journal = journal_of(&options)?;
         let (numbers, members) = remembered_by(journal.as_ref())?;
         options.settings.numbers = numbers.max(host.generation());
-        let results = results_of(&options)?;
+        let state_lock = journal.as_ref().and_then(Journal::lock);
+        let lock = results_of(&options)?;
         let in_force = Arc::new(InForce::of(&sources, &loaded)?);
         host.set_config(in_force.digest, &in_force.encoded);
         let control = control_of(&options, senders.asked)?;
         let looks = Looks::default();
-        let store = Arc::new(store(&options, journal, looks.scouts(), &senders.notices)?);
+        let store = Arc::new(store(
+            &options,
+            (journal, lock),
+            looks.scouts(),
+            &senders.notices,
+        )?);
         let reconciled = reconcile(&options, &loaded, &store)?;
         let writers = writers(&options, &store, &inbox, &senders.notices)?;
         let mut broker = Broker {
@@ -89,7 +95,8 @@ impl Broker {
             inbox,
             tell: Box::new(tell),
             control,
-            _results: results,
+            state_lock,
+            state_is_gone: false,
             options,
         };
         broker.take_up(members, broker.store.voids()?);

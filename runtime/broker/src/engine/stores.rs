@@ -57,7 +57,7 @@ fn outputs_of(options: &Options) -> Result<Outputs, StartError> {
 
 pub(super) fn store(
     options: &Options,
-    journal: Option<Journal>,
+    (journal, lock): (Option<Journal>, DirectoryLock),
     scouts: Scouts,
     notices: &mpsc::UnboundedSender<Notice>,
 ) -> Result<Store, StartError> {
@@ -84,6 +84,7 @@ pub(super) fn store(
         own_verdicts: options.settings.own_verdicts,
         gate: gate.transpose()?,
         outputs,
+        lock,
         scouts,
         trials: options.state.as_deref().map(TrialResults::anew),
         journal: journal.map(SharedJournal::from),

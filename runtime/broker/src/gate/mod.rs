@@ -77,7 +77,7 @@ pub struct GateOptions {
 pub struct Gate {
     options: GateOptions,
     claims: Mutex<Claims>,
-    _lock: DirectoryLock,
+    lock: DirectoryLock,
 }
 
 impl fmt::Debug for Gate {
@@ -104,8 +104,17 @@ impl Gate {
         Ok(Gate {
             options,
             claims: Mutex::new(claims),
-            _lock: lock,
+            lock,
         })
+    }
+
+    /// Makes sure that the directory that lies there is this broker's. Somebody may have put another one in its place.
+    fn hold(&self) -> io::Result<()> {
+        if self.lock.is_in_place() {
+            return Ok(());
+        }
+        contents::refuse_foreign(&self.options.directory).map_err(io::Error::other)?;
+        self.lock.hold().map_err(io::Error::other)
     }
 
     /// Brings the directory in agreement with the verdicts that still stand: what belongs to none of
@@ -162,6 +171,7 @@ impl Gate {
     }
 
     fn make_way_for(&self, path: &Arc<Path>, claim: &Claim) -> io::Result<MutexGuard<'_, Claims>> {
+        self.hold()?;
         let mut claims = self.claims();
         let agrees = claims.get(path).is_some_and(|there| there.agrees(claim));
         if !agrees || !claims.is_whole(path) {
@@ -191,6 +201,7 @@ impl Gate {
     /// # Errors
     /// When something cannot be removed.
     pub fn refuse(&self, path: &Arc<Path>) -> io::Result<()> {
+        self.hold()?;
         let mut claims = self.claims();
         claims.revoke(path)?;
         claims.refuse(path);
@@ -214,6 +225,7 @@ impl Gate {
     /// # Errors
     /// When something cannot be removed.
     pub fn revoke(&self, path: &Arc<Path>) -> io::Result<()> {
+        self.hold()?;
         self.claims().revoke(path)
     }
 
@@ -222,6 +234,7 @@ impl Gate {
     /// # Errors
     /// When something cannot be removed.
     pub fn forget(&self, path: &Arc<Path>) -> io::Result<()> {
+        self.hold()?;
         let mut claims = self.claims();
         claims.forget(path);
         claims.revoke(path)
@@ -308,6 +321,7 @@ impl Gate {
                     return Ok(());
                 }
             };
+            self.hold()?;
             // Outside of the lock, because it takes its time.
             let Some(copies) = self.copy(&plan)? else {
                 return Ok(());

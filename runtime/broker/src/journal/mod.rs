@@ -134,8 +134,8 @@ pub struct Journal {
     path: PathBuf,
     /// Lists of checkers that are in it for certain.
     lists: HashSet<i64>,
-    /// Kept as long as the journal is.
-    _lock: Option<DirectoryLock>,
+    /// Of the state directory; kept as long as the journal is.
+    lock: Option<Arc<DirectoryLock>>,
 }
 
 impl Journal {
@@ -170,8 +170,13 @@ impl Journal {
             connection,
             path,
             lists: HashSet::new(),
-            _lock: Some(lock),
+            lock: Some(Arc::new(lock)),
         })
+    }
+
+    /// The lock of the state directory.
+    pub fn lock(&self) -> Option<Arc<DirectoryLock>> {
+        self.lock.clone()
     }
 
     /// A journal that is forgotten with the process, for a test.
@@ -187,7 +192,7 @@ impl Journal {
             connection,
             path,
             lists: HashSet::new(),
-            _lock: None,
+            lock: None,
         })
     }
 

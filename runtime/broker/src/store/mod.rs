@@ -25,6 +25,7 @@ use qcbus_messages::Verdict;
 use qcbus_messages::path_text::to_text;
 
 use crate::core::{FinishedJob, Judged, ShareOutcome, StoreOutcome};
+use crate::directory_lock::DirectoryLock;
 use crate::gate::Gate;
 use crate::journal::{Entry, JournalError, Remembered, SharedJournal};
 use crate::outputs::Outputs;
@@ -64,6 +65,8 @@ pub struct Store {
     pub gate: Option<Gate>,
     /// Keeps what is written.
     pub outputs: Outputs,
+    /// Nobody else writes results there.
+    pub lock: DirectoryLock,
     /// Who looks at files.
     pub scouts: Scouts,
     /// Where results of trials are kept, if anything is.

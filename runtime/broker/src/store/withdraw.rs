@@ -36,6 +36,7 @@ impl Store {
             gate.forget(path)?;
             step("closed", path);
         }
+        self.lock.hold().map_err(io::Error::other)?;
         let (xqar, verdict) = (self.places.xqar(path), self.places.verdict(path));
         self.outputs.changing(&xqar);
         self.outputs.changing(&verdict);

@@ -23,6 +23,11 @@ impl Store {
         pooled: &Pooled,
         judged: &Judged,
     ) -> Result<(), Unwritten> {
+        self.lock.hold().map_err(|error| Unwritten {
+            what: error.to_string(),
+            further: "; it is tried again",
+            for_good: false,
+        })?;
         if let Some(gate) = &self.gate {
             let made_way = if judged.is_accepted() {
                 gate.make_way(&job.path, judged)
