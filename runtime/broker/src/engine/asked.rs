@@ -247,7 +247,7 @@ impl Broker {
             return;
         }
         let (sources, read) = (self.sources.clone(), self.loaded.read.clone());
-        let lock = self.state_lock.clone();
+        let lock = self.state_directory.lock.clone();
         // Where no thread can be started now, one may in a second.
         self.looks.changes = self
             .scout(move || Seen::Sources {
@@ -259,15 +259,16 @@ impl Broker {
 
     /// Somebody may have removed the state directory, or put another one in its place.
     pub(super) fn look_at_state(&mut self, is_gone: bool) {
-        let is_new = is_gone && !self.state_is_gone;
-        self.state_is_gone = is_gone;
+        let is_new = is_gone && !self.state_directory.is_gone;
+        self.state_directory.is_gone = is_gone;
         if let Some(text) = self.said_of_state().filter(|_| is_new) {
             self.say(Notice::Storing(text));
         }
     }
 
     fn said_of_state(&self) -> Option<String> {
-        let lock = self.state_lock.as_ref().filter(|_| self.state_is_gone)?;
+        let directory = &self.state_directory;
+        let lock = directory.lock.as_ref().filter(|_| directory.is_gone)?;
         Some(format!(
             "the state directory {} was removed or replaced: verdicts from now on are forgotten when this broker ends, \
              and their files are judged anew; start it again",

@@ -26,11 +26,12 @@ use qcbus_messages::control::{Response, Unseen};
 use qcbus_messages::{Hello, JobId, ToPeer};
 use tokio::sync::{mpsc, oneshot};
 
+use self::stores::StateDirectory;
 use self::watching::Watching;
 use crate::control::Asked;
 use crate::core::{Event, Judged, Launch, Notice, SessionId, State, Ticket};
 use crate::demand::InForce;
-use crate::directory_lock::{DirectoryLock, LockError};
+use crate::directory_lock::LockError;
 use crate::gate::GateError;
 use crate::intake::Intake;
 use crate::journal::JournalError;
@@ -145,10 +146,7 @@ pub struct Broker {
     inbox: Inbox,
     tell: Box<dyn FnMut(Told) + Send>,
     control: ControlSocket,
-    /// Of the state directory, if there is a journal.
-    state_lock: Option<Arc<DirectoryLock>>,
-    /// The state directory was removed or replaced.
-    state_is_gone: bool,
+    state_directory: StateDirectory,
 }
 
 impl std::fmt::Debug for Broker {

@@ -10,7 +10,9 @@ use tokio::sync::mpsc;
 
 use super::early::{early_children, early_or_now};
 use super::looks::Looks;
-use super::stores::{journal_of, reconcile, remembered_by, results_of, store, writers};
+use super::stores::{
+    StateDirectory, journal_of, reconcile, remembered_by, results_of, store, writers,
+};
 use super::watching::Watching;
 use super::{AttendedTime, Broker, Inbox, Sessions, StartError, Told};
 use crate::control::Asked;
@@ -19,7 +21,7 @@ use crate::demand::InForce;
 use crate::descriptors::Descriptors;
 use crate::directory_lock::open_to_others;
 use crate::intake::{Intake, JudgedAs};
-use crate::journal::{Journal, Void};
+use crate::journal::Void;
 use crate::launches::Launches;
 use crate::options::Options;
 use crate::reload::{Loaded, Sources};
@@ -52,18 +54,13 @@ impl Broker {
         let journal = journal_of(&options)?;
         let (numbers, members) = remembered_by(journal.as_ref())?;
         options.settings.numbers = numbers.max(host.generation());
-        let state_lock = journal.as_ref().and_then(Journal::lock);
+        let state_directory = StateDirectory::of(journal.as_ref());
         let lock = results_of(&options)?;
         let in_force = Arc::new(InForce::of(&sources, &loaded)?);
         host.set_config(in_force.digest, &in_force.encoded);
         let control = control_of(&options, senders.asked)?;
         let looks = Looks::default();
-        let store = Arc::new(store(
-            &options,
-            (journal, lock),
-            looks.scouts(),
-            &senders.notices,
-        )?);
+        let store = Arc::new(store(&options, (journal, lock), &looks, &senders.notices)?);
         let reconciled = reconcile(&options, &loaded, &store)?;
         let writers = writers(&options, &store, &inbox, &senders.notices)?;
         let mut broker = Broker {
@@ -95,14 +92,12 @@ impl Broker {
             inbox,
             tell: Box::new(tell),
             control,
-            state_lock,
-            state_is_gone: false,
+            state_directory,
             options,
         };
         broker.take_up(members, broker.store.voids()?);
         tell_at_the_start(&reconciled, &broker.options, limited, &senders.notices);
-        let dependencies = broker.remember(reconciled);
-        broker.look(dependencies, senders.seen)?;
+        broker.look(reconciled, senders.seen)?;
         Ok(broker)
     }
 
@@ -154,12 +149,14 @@ impl Broker {
         self.state.remember_void(path, reporter);
     }
 
-    /// Begins to look at the files: by watching, together with what verdicts depend on, or once.
+    /// Takes over what stands, and begins to look at the files: by watching, together with what verdicts depend on,
+    /// or once.
     fn look(
         &mut self,
-        dependencies: Vec<(Arc<Path>, Option<Stamp>)>,
+        found: Reconciled,
         seen: mpsc::UnboundedSender<Seen>,
     ) -> Result<(), StartError> {
+        let dependencies = self.remember(found);
         if self.options.watch {
             let watching = Watching::new(seen);
             let watcher = self.watch(&watching, None);

@@ -8,6 +8,7 @@ use qcbus_disk::sweep;
 use qcbus_messages::Role;
 use tokio::sync::mpsc;
 
+use super::looks::Looks;
 use super::start::system;
 use super::{Inbox, StartError};
 use crate::core::{Member, Notice};
@@ -23,6 +24,23 @@ use crate::seams::is_simulated;
 use crate::store::{Reconciled, Store, TrialResults, remove_earlier_results};
 use crate::watch::is_looked_at;
 use crate::writers::Writers;
+
+/// The directory in which the journal lies.
+pub(super) struct StateDirectory {
+    /// `None` where there is no journal.
+    pub lock: Option<Arc<DirectoryLock>>,
+    /// It was removed or replaced while the broker ran.
+    pub is_gone: bool,
+}
+
+impl StateDirectory {
+    pub fn of(journal: Option<&Journal>) -> StateDirectory {
+        StateDirectory {
+            lock: journal.and_then(Journal::lock),
+            is_gone: false,
+        }
+    }
+}
 
 pub(super) fn journal_of(options: &Options) -> Result<Option<Journal>, JournalError> {
     let state = options.state.as_ref();
@@ -58,10 +76,10 @@ fn outputs_of(options: &Options) -> Result<Outputs, StartError> {
 pub(super) fn store(
     options: &Options,
     (journal, lock): (Option<Journal>, DirectoryLock),
-    scouts: Scouts,
+    looks: &Looks,
     notices: &mpsc::UnboundedSender<Notice>,
 ) -> Result<Store, StartError> {
-    let outputs = outputs_of(options)?;
+    let (outputs, scouts) = (outputs_of(options)?, looks.scouts());
     let (out, roots) = (options.out.clone(), options.roots.clone());
     let mut places = match &options.here {
         Some(here) => ResultPaths::of_run(out, here.clone(), roots, &options.files),
