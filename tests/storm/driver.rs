@@ -127,6 +127,7 @@ impl Driver {
             Trouble::Upgrade => self.upgrade(),
             Trouble::Vanish => self.vanish(),
             Trouble::Remove => self.remove(),
+            Trouble::LoseOutput => self.lose_output(),
         }
     }
 
@@ -188,7 +189,7 @@ impl Driver {
         }
     }
 
-    fn is_full(&self) -> bool {
+    pub(super) fn is_full(&self) -> bool {
         let lately = |at: Instant| at.elapsed() < LATE;
         self.full_until.is_some() || self.full_at.is_some_and(lately)
     }
@@ -266,6 +267,7 @@ impl Driver {
         self.stopped
             .retain(|(stopped, _)| u32::try_from(*stopped) != Ok(pid));
         self.tally.note("kill broker", &pid.to_string());
+        self.handle_state();
         // Mostly at once, sometimes so late that the others have given up.
         let late = if self.dice.below(12) == 0 {
             11_000

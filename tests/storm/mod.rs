@@ -5,6 +5,7 @@ mod driver;
 mod files;
 mod history;
 mod ledger;
+mod operators;
 mod tally;
 mod trouble;
 mod verdicts;

@@ -101,6 +101,8 @@ pub enum Trouble {
     Vanish,
     /// The manifest of the bundle of one's own goes for a while.
     Remove,
+    /// A result, a verdict file or a published file is removed.
+    LoseOutput,
 }
 
 /// Every trouble with its share.
@@ -127,6 +129,7 @@ const SHARES: &[(u64, Trouble)] = &[
     (2, Trouble::Upgrade),
     (2, Trouble::Vanish),
     (2, Trouble::Remove),
+    (6, Trouble::LoseOutput),
 ];
 
 /// What comes next.

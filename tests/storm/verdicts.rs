@@ -129,7 +129,19 @@ impl Judge<'_> {
         }
         let content = self.ledger.content(&told.digest)?;
         let parts = content.parts();
-        parts.iter().find_map(|part| self.wrong_part(told, part))
+        let wrong = parts.iter().find_map(|part| self.wrong_part(told, part));
+        let under = content.rests_on();
+        wrong.or_else(|| under.iter().find_map(|it| self.wrong_under(told, it)))
+    }
+
+    /// What is wrong with an acceptance that rests on this file.
+    fn wrong_under(&self, told: &Told, name: &str) -> Option<&'static str> {
+        let below = format!("/{name}");
+        let mut read = told.depends_on.iter();
+        let (_, digest) = read.find(|(path, _)| path.ends_with(&below))?;
+        // Half-written bytes are nobody's.
+        let content = self.ledger.content(digest.as_ref()?)?;
+        (!self.passes(content)).then_some("accepted, and a file that it rests on is rejected")
     }
 
     /// What is wrong with an acceptance that depends on this part.
@@ -173,9 +185,27 @@ impl Judge<'_> {
         if let wrong @ Some(_) = self.wrong_acceptance(name, digest) {
             return wrong;
         }
-        let parts = self.ledger.content(digest)?.parts();
+        let content = self.ledger.content(digest)?;
         let wrong = "accepted, and all the time a part of it spoilt it or was not there";
-        (!parts.iter().all(|part| self.may_pass(part))).then_some(wrong)
+        if !content.parts().iter().all(|part| self.may_pass(part)) {
+            return Some(wrong);
+        }
+        let sound = |name: &String| self.may_be_accepted(name);
+        let wrong = "accepted, and all the time a file that it rests on was rejected";
+        (!content.rests_on().iter().all(sound)).then_some(wrong)
+    }
+
+    /// Whether a file had no fault of its own for a moment.
+    fn may_be_accepted(&self, name: &str) -> bool {
+        let there = self.ledger.seen(name, self.seen.from, self.seen.at);
+        there.into_iter().any(|it| match it {
+            Held::Bytes(digest) => {
+                let content = self.ledger.content(digest);
+                content.is_none_or(|content| self.passes(content))
+            }
+            Held::Unfinished => true,
+            Held::Nothing => false,
+        })
     }
 
     /// Whether a part, with all that it depends on, was such for a moment that it spoils nothing.
@@ -300,6 +330,8 @@ mod tests {
             &part,
             &Content::OtherCatalog(4)
         )));
+        let marked = Content::Catalog(4, Mark::Marked);
+        assert!(is_wrong(&accepted_scenario(&part, &marked)));
         let mut hidden = accepted_scenario(&part, &catalog);
         hidden
             .told

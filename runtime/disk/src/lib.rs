@@ -72,19 +72,53 @@ pub fn write_ahead(path: &Path, content: &[u8], durable: bool) -> io::Result<Tem
 
 /// What tells a file that was written from any other that comes to lie in its place: size, time of
 /// modification in nanoseconds, inode. A rename changes none of them.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct FileMark(pub String);
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FileMark {
+    /// In bytes.
+    size: u64,
+    /// Since 1970.
+    modified_ns: i128,
+    inode: u64,
+}
 
 impl FileMark {
+    /// The mark of no file.
+    pub const NONE: FileMark = FileMark {
+        size: u64::MAX,
+        modified_ns: i128::MAX,
+        inode: u64::MAX,
+    };
+
     fn of(data: &Metadata) -> FileMark {
-        let nanoseconds = i128::from(data.mtime()) * 1_000_000_000 + i128::from(data.mtime_nsec());
-        FileMark(format!("{} {nanoseconds} {}", data.len(), data.ino()))
+        let seconds = i128::from(data.mtime());
+        FileMark {
+            size: data.len(),
+            modified_ns: seconds * 1_000_000_000 + i128::from(data.mtime_nsec()),
+            inode: data.ino(),
+        }
+    }
+
+    /// Reads a mark as [`FileMark`] is displayed; `None` when it is none.
+    pub fn parse(text: &str) -> Option<FileMark> {
+        let mut numbers = text.split(' ');
+        let mark = FileMark {
+            size: numbers.next()?.parse().ok()?,
+            modified_ns: numbers.next()?.parse().ok()?,
+            inode: numbers.next()?.parse().ok()?,
+        };
+        numbers.next().is_none().then_some(mark)
     }
 
     /// That of the regular file which lies there, if one does.
     pub fn at(path: &Path) -> Option<FileMark> {
         let data = std::fs::symlink_metadata(path).ok()?;
         data.is_file().then(|| FileMark::of(&data))
+    }
+}
+
+impl std::fmt::Display for FileMark {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} {} {}", self.size, self.modified_ns, self.inode)
     }
 }
 
@@ -155,7 +189,7 @@ fn write_aside(path: &Path, content: &[u8]) -> io::Result<NamedTempFile> {
 }
 
 /// How often a directory is made again that goes as soon as it is there.
-const TRIES: usize = 16;
+const TRIES: usize = 256;
 
 /// Makes a temporary file, and its directory if that is missing. Another thread may remove the directory
 /// while it is still empty ([`remove_empty_above`]), so that it is made again.
@@ -441,18 +475,19 @@ mod tests {
         let top = dir.path().to_path_buf();
         let place = top.join("a/b/file");
         let done = std::sync::atomic::AtomicBool::new(false);
-        std::thread::scope(|scope| {
+        let written = std::thread::scope(|scope| {
             scope.spawn(|| {
                 while !done.load(std::sync::atomic::Ordering::Relaxed) {
                     remove_empty_above(&place, &top);
                 }
             });
-            for _ in 0..500 {
-                write_whole(&place, b"whole", false).unwrap();
-                remove(&place).unwrap();
-            }
+            let write = |_| write_whole(&place, b"whole", false).and_then(|()| remove(&place));
+            let written = (0..500).try_for_each(write);
+            // Also after a failure, or the other thread would go on for ever.
             done.store(true, std::sync::atomic::Ordering::Relaxed);
+            written
         });
+        written.unwrap();
     }
 
     #[test]
@@ -477,6 +512,9 @@ mod tests {
         let there = [&first, &second].map(|it| FileMark::at(it).unwrap());
         assert_eq!(there, marks);
         assert_ne!(marks[0], marks[1]);
+        assert_eq!(FileMark::parse(&marks[0].to_string()), Some(marks[0]));
+        assert_eq!(FileMark::parse("1 2"), None);
+        assert_eq!(FileMark::parse("1 2 3 4"), None);
         assert_eq!(std::fs::read(&first).unwrap(), b"verdict");
         assert_eq!(std::fs::read(&second).unwrap(), b"result");
 

@@ -113,8 +113,12 @@ impl State {
     }
 
     fn verdict_under(&self, file: &Referenced, prepared: &PreparedJob) -> RestsOn {
-        let entry = self.entry_of(&file.path).filter(|it| it.present);
-        let judged = entry.and_then(|it| it.judged.as_ref().filter(|_| !it.doubted));
+        let entry = self
+            .entry_of(&file.path)
+            .filter(|it| it.present && !it.doubted);
+        // What others have judged who need not judge now counts for nobody.
+        let entry = entry.filter(|it| self.is_of_now(it));
+        let judged = entry.and_then(|it| it.judged.as_ref());
         let judged = judged.filter(|it| is_of(it, file, prepared));
         RestsOn {
             path: file.path.clone(),

@@ -264,7 +264,8 @@ impl Journal {
                     judged,
                     written: Some(row.get(15)?)
                         .filter(|it: &String| !it.is_empty())
-                        .map(FileMark),
+                        // What cannot be read is the mark of no file.
+                        .map(|it| FileMark::parse(&it).unwrap_or(FileMark::NONE)),
                     delivered,
                 });
             }

@@ -69,7 +69,7 @@ fn what_was_written_is_remembered() {
                     path: path.clone(),
                     judged: expected.clone(),
                     history,
-                    written: Some(FileMark("7 8 9".to_owned())),
+                    written: Some(FileMark::parse("7 8 9").unwrap()),
                 },
                 // Only fresh stamps.
                 Entry::Judged {
@@ -90,7 +90,7 @@ fn what_was_written_is_remembered() {
     let all = journal.remembered().unwrap();
     assert_eq!(all.len(), 1);
     assert_eq!(all[0].judged, *expected);
-    assert_eq!(all[0].written, Some(FileMark("7 8 9".to_owned())));
+    assert_eq!(all[0].written, FileMark::parse("7 8 9"));
     let json = ("json".to_owned(), Reported::Of(JobId(5)));
     assert_eq!(all[0].delivered, [json]);
     let reporters = vec!["json".to_owned(), "text".to_owned()];

@@ -156,7 +156,7 @@ fn file(path: &Path, judged: &Judged, written: Option<&FileMark>) -> Change {
         word(judged.own.as_str()),
         count(judged.own_errors),
         Value::Text(rests_on_to_text(judged.rests_on.as_deref())),
-        written.map_or(Value::Null, |it| word(&it.0)),
+        written.map_or(Value::Null, |it| word(&it.to_string())),
     ];
     Change::new(sql, values)
 }

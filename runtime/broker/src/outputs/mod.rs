@@ -141,7 +141,7 @@ impl Shared {
     /// the lock, so that whoever changes it meanwhile does not wait for a disk; then it is looked at anew.
     fn look(&self, output: &Path, wanted: impl Fn(&mut Written) -> bool) -> Option<LostOutput> {
         loop {
-            let known = self.book().written.get(output)?.mark.clone();
+            let known = self.book().written.get(output)?.mark;
             // What does not answer is what it was.
             let there = foreign::visit(output, || Ok(FileMark::at(output))).ok()?;
             if there.as_ref() == Some(&known) {

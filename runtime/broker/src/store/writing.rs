@@ -99,7 +99,7 @@ impl Store {
         // Whoever sees the new result sees its verdict.
         let written = write_both((&path, &verdict), result, self.durable);
         let [first, second] = written.map_err(|(path, error)| unwritten(path, &error))?;
-        self.outputs.written(&path, &job.path, first.clone());
+        self.outputs.written(&path, &job.path, first);
         self.outputs.written(&xqar, &job.path, second);
         Ok(Some(first))
     }

@@ -1,0 +1,80 @@
+//! What operators do to a farm besides writing files: they copy and move states, and remove results.
+
+use std::path::Path;
+use std::process::Command;
+
+use super::driver::Driver;
+use crate::support::desk::files_below;
+use crate::support::farm::Farm;
+
+impl Driver {
+    /// Somebody removes a result, a verdict file or a published file.
+    pub fn lose_output(&mut self) {
+        let is_output = |name: &str| name.ends_with(".xqar") || name.ends_with(".verdict.json");
+        let (out, gate) = (self.farm.out(), self.farm.gate());
+        let results = files_below(&out).into_iter();
+        let results = results.filter(|it| is_output(&it.to_string_lossy()));
+        let results = results.map(|it| out.join(it));
+        let hidden = |path: &Path| {
+            let name = path.file_name().unwrap_or_default();
+            name.as_encoded_bytes().starts_with(b".")
+        };
+        let published = files_below(&gate).into_iter().filter(|it| !hidden(it));
+        let all: Vec<_> = results.chain(published.map(|it| gate.join(it))).collect();
+        let Some(output) = self.dice.pick(&all) else {
+            return;
+        };
+        // The broker may have removed it a moment ago.
+        if std::fs::remove_file(output).is_ok() {
+            let name = output.file_name().unwrap_or_default();
+            self.tally.note("lose output", &name.to_string_lossy());
+        }
+    }
+
+    /// While no broker runs, somebody copies or moves its results with their state.
+    pub(super) fn handle_state(&mut self) {
+        match self.dice.below(6) {
+            0 if !self.is_full() => self.serve_copy(),
+            1 => self.move_state(),
+            _ => {}
+        }
+    }
+
+    /// A broker starts on a copy, as in staging. It must take nothing from the original, which the judge looks for in
+    /// the end.
+    fn serve_copy(&mut self) {
+        let copy = Farm::new();
+        copy_tree(&self.farm.out(), &copy.out());
+        let before = files_below(&self.farm.out());
+        let mut broker = copy.serve_ready();
+        assert_eq!(copy.qcbus(&["down"]).status.code(), Some(0));
+        assert!(broker.wait().success());
+        // Bundles and reporters of the broker that was killed may still be writing.
+        let after = files_below(&self.farm.out());
+        let is_output = |name: &&Path| {
+            let name = name.to_string_lossy();
+            name.ends_with(".xqar") || name.ends_with(".verdict.json")
+        };
+        let lost = before.iter().filter(|it| !after.contains(it));
+        let lost: Vec<&Path> = lost.map(|it| it.as_path()).filter(is_output).collect();
+        assert!(lost.is_empty(), "the copy took {lost:?}\n{}", copy.log());
+        self.tally.note("serve a copy", "");
+    }
+
+    /// Results and state get another inode, as after a backup was played back.
+    fn move_state(&mut self) {
+        let (out, aside) = (self.farm.out(), self.farm.base().join("aside"));
+        std::fs::rename(&out, &aside).unwrap();
+        copy_tree(&aside, &out);
+        std::fs::remove_dir_all(&aside).unwrap();
+        self.tally.note("move the state", "");
+    }
+}
+
+fn copy_tree(from: &Path, to: &Path) {
+    if to.exists() {
+        std::fs::remove_dir_all(to).unwrap();
+    }
+    let copied = Command::new("cp").arg("-a").arg(from).arg(to).status();
+    assert!(copied.unwrap().success());
+}
