@@ -13,7 +13,7 @@ use std::io::{self, Write};
 use std::os::fd::AsRawFd;
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
-use std::sync::{LazyLock, Mutex, PoisonError};
+use std::sync::{LazyLock, Mutex, PoisonError, RwLock};
 
 use rustix::fs::{FlockOperation, flock};
 use tempfile::{NamedTempFile, TempPath};
@@ -189,11 +189,16 @@ fn write_aside(path: &Path, content: &[u8]) -> io::Result<NamedTempFile> {
 }
 
 /// How often a directory is made again that goes as soon as it is there.
-const TRIES: usize = 256;
+const TRIES: usize = 16;
 
-/// Makes a temporary file, and its directory if that is missing. Another thread may remove the directory
+/// Held while a directory has been made for a file that is not in it yet: shared by those who make files, alone by
+/// who removes empty directories.
+static MAKING: RwLock<()> = RwLock::new(());
+
+/// Makes a temporary file, and its directory if that is missing. Another process may remove the directory
 /// while it is still empty ([`remove_empty_above`]), so that it is made again.
 fn make_temporary_in(directory: &Path) -> io::Result<NamedTempFile> {
+    let _making = MAKING.read().unwrap_or_else(PoisonError::into_inner);
     for _ in 0..TRIES {
         match make_temporary(directory) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
@@ -275,6 +280,7 @@ pub fn remove(path: &Path) -> io::Result<()> {
 /// Removes the directories above `path` that are empty, up to `top`, which stays. A directory that holds
 /// anything, or cannot be removed, ends it.
 pub fn remove_empty_above(path: &Path, top: &Path) {
+    let _alone = MAKING.write().unwrap_or_else(PoisonError::into_inner);
     let above = path.ancestors().skip(1);
     for directory in above.take_while(|it| *it != top && it.starts_with(top)) {
         if std::fs::remove_dir(directory).is_err() {
