@@ -282,6 +282,35 @@ fn add(farm: &Farm, name: &str, program: &Path) -> (Option<i32>, String) {
 }
 
 #[test]
+fn command_is_taken_apart_as_a_shell_does_it() {
+    let (farm, program, _broker) = farm_with(FINDS);
+    let spaced = farm.base().join("a dir");
+    std::fs::create_dir(&spaced).unwrap();
+    std::fs::rename(program, spaced.join("guest")).unwrap();
+    let base = farm.base().display();
+    let add = |program: &str| {
+        let command = format!("{program} -c \"$ASAM_QC_FRAMEWORK_CONFIG_FILE\"");
+        told(&farm.qcbus(&["bundle", "add", "guest", "--asam", &command]))
+    };
+    for written in [
+        format!("'{base}/a dir/guest'"),
+        format!("\"{base}/a dir\"/guest"),
+        format!("{base}/a\\ dir/guest"),
+    ] {
+        let (code, text) = add(&written);
+        assert_eq!(code, Some(0), "{written}: {text}\n{}", farm.log());
+        assert_eq!(
+            farm.qcbus(&["bundle", "remove", "guest"]).status.code(),
+            Some(0)
+        );
+    }
+    let (code, text) = add(&format!("'{base}/a dir/guest"));
+    assert_eq!(code, Some(2), "{text}");
+    assert!(text.contains("a quote is not closed"), "{text}");
+    assert!(!farm.bundles_d().join("guest.json").exists());
+}
+
+#[test]
 fn it_is_added_looked_at_upgraded_and_removed_as_any_bundle() {
     let (farm, program, _broker) = farm_with(FINDS);
     let (code, text) = add(&farm, "guest", &program);

@@ -12,9 +12,10 @@ use qcbus_disk::write_whole;
 use qcbus_messages::Exit;
 use qcbus_messages::control::{Request, Response};
 use qcbus_messages::path_text::to_text;
-use rustix::fs::{Access, FlockOperation, access, flock};
+use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
 
+use super::programs::{command_line, one_shot};
 use super::readiness;
 use super::remote::exit_of;
 use super::settings::{absolute, instance, real};
@@ -338,87 +339,4 @@ fn one_shot_manifest(name: &str, args: &BundleAddArgs, command: &str) -> String 
         module["shadow"] = true.into();
     }
     format!("{:#}\n", serde_json::json!({"module": [module]}))
-}
-
-/// The command of a one-shot module with the whole path of its program, as in [`command_line`]. The rest is the
-/// shell's.
-fn one_shot(command: &str) -> Result<String, Refusal> {
-    let command = qcbus_asam_adapter::goes_where_it_is(command).map_or(command, |(rest, _)| rest);
-    let command = command.trim();
-    let end = command.find(char::is_whitespace).unwrap_or(command.len());
-    let (program, rest) = command.split_at(end);
-    let found = find_program(program).map_err(usage)?;
-    let Some(path) = found.to_str() else {
-        let shown = to_text(&found);
-        return Err(usage(format!("{shown}: a manifest takes UTF-8 only")));
-    };
-    Ok(format!("{}{rest}", quote(path)))
-}
-
-/// The command of a manifest. Programs are named by their whole path: the broker may run elsewhere and
-/// search elsewhere. So is the interpreter of a script in Python, which decides what it can import.
-pub(super) fn command_line(words: &[String]) -> Result<String, Refusal> {
-    let Some((program, arguments)) = words.split_first() else {
-        return Err(usage("no program is named"));
-    };
-    let script = Path::new(program);
-    let programs = if script.extension().is_some_and(|it| it == "py") {
-        vec![find_program("python3").map_err(usage)?, script_at(script)?]
-    } else {
-        vec![find_program(program).map_err(usage)?]
-    };
-    let mut quoted = Vec::new();
-    for program in &programs {
-        let Some(program) = program.to_str() else {
-            let shown = to_text(program);
-            return Err(usage(format!("{shown}: a manifest takes UTF-8 only")));
-        };
-        quoted.push(quote(program));
-    }
-    quoted.extend(arguments.iter().map(|it| quote(it)));
-    Ok(quoted.join(" "))
-}
-
-fn script_at(script: &Path) -> Result<PathBuf, Refusal> {
-    let path = absolute(script);
-    let shown = to_text(&path);
-    match std::fs::metadata(&path) {
-        Ok(data) if data.is_file() => Ok(path),
-        Ok(_) => Err(usage(format!("cannot run {shown}: it is no file"))),
-        Err(error) => Err(usage(format!("cannot run {shown}: {error}"))),
-    }
-}
-
-/// Where a program lies that can be run.
-fn find_program(program: &str) -> Result<PathBuf, String> {
-    if program.contains('/') {
-        let path = absolute(Path::new(program));
-        return match executable(&path) {
-            Ok(()) => Ok(path),
-            Err(why) => Err(format!("cannot run {}: {why}", to_text(&path))),
-        };
-    }
-    let paths = std::env::var_os("PATH").unwrap_or_default();
-    let mut found = std::env::split_paths(&paths).map(|directory| directory.join(program));
-    let found = found.find(|path| executable(path).is_ok());
-    found.map(|path| absolute(&path)).ok_or_else(|| {
-        format!("cannot run `{program}`: no directory of PATH has such a program; name its path")
-    })
-}
-
-fn executable(path: &Path) -> Result<(), String> {
-    let metadata = std::fs::metadata(path).map_err(|error| error.to_string())?;
-    if !metadata.is_file() {
-        return Err("it is no file".to_owned());
-    }
-    access(path, Access::EXEC_OK).map_err(|error| format!("it is not executable ({error})"))
-}
-
-fn quote(word: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-=:,@%+".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', "'\\''"))
-    }
 }

@@ -11,6 +11,7 @@ mod manifests;
 mod new;
 mod offered;
 mod pack;
+mod programs;
 mod readiness;
 mod remote;
 mod report;

@@ -7,7 +7,8 @@ use qcbus_messages::Exit;
 use qcbus_messages::control::{BundleStanding, Runs, Standing};
 use qcbus_messages::path_text::to_text;
 
-use super::manifests::{Home, Refusal, command_line, said, usage};
+use super::manifests::{Home, Refusal, said, usage};
+use super::programs::command_line;
 use super::readiness;
 use crate::args::{BundleUpgradeArgs, ManifestArgs};
 

@@ -1,0 +1,147 @@
+//! The commands of manifests that `qcbus bundle add` and `qcbus bundle upgrade` write.
+
+use std::path::{Path, PathBuf};
+
+use qcbus_messages::path_text::to_text;
+use rustix::fs::{Access, access};
+
+use super::manifests::{Refusal, usage};
+use super::settings::absolute;
+
+/// The command of a one-shot module with the whole path of its program, as in [`command_line`]. The rest is the
+/// shell's.
+pub(super) fn one_shot(command: &str) -> Result<String, Refusal> {
+    let command = qcbus_asam_adapter::goes_where_it_is(command).map_or(command, |(rest, _)| rest);
+    let (program, rest) = first_word(command.trim())?;
+    let found = find_program(&program).map_err(usage)?;
+    let Some(path) = found.to_str() else {
+        let shown = to_text(&found);
+        return Err(usage(format!("{shown}: a manifest takes UTF-8 only")));
+    };
+    Ok(format!("{}{rest}", quote(path)))
+}
+
+/// The first word of a command as the shell takes it, without its quotes and escapes, and the rest as it was written.
+fn first_word(command: &str) -> Result<(String, &str), Refusal> {
+    if shlex::split(command).is_none() {
+        let why = "a quote is not closed, or nothing follows a backslash at the end";
+        return Err(usage(format!("cannot run `{command}`: {why}")));
+    }
+    let spaces = command.char_indices().filter(|(_, c)| c.is_whitespace());
+    let ends = spaces.map(|(at, _)| at).chain([command.len()]);
+    // Within quotes and behind a backslash, a text that ends at a space is no whole word.
+    let mut words = ends.filter_map(|end| Some((shlex::split(&command[..end])?, end)));
+    let first = words.find_map(|(words, end)| Some((words.into_iter().next()?, end)));
+    let Some((program, end)) = first.filter(|(program, _)| !program.is_empty()) else {
+        return Err(usage("no program is named"));
+    };
+    Ok((program, &command[end..]))
+}
+
+/// The command of a manifest. Programs are named by their whole path: the broker may run elsewhere and
+/// search elsewhere. So is the interpreter of a script in Python, which decides what it can import.
+pub(super) fn command_line(words: &[String]) -> Result<String, Refusal> {
+    let Some((program, arguments)) = words.split_first() else {
+        return Err(usage("no program is named"));
+    };
+    let script = Path::new(program);
+    let programs = if script.extension().is_some_and(|it| it == "py") {
+        vec![find_program("python3").map_err(usage)?, script_at(script)?]
+    } else {
+        vec![find_program(program).map_err(usage)?]
+    };
+    let mut quoted = Vec::new();
+    for program in &programs {
+        let Some(program) = program.to_str() else {
+            let shown = to_text(program);
+            return Err(usage(format!("{shown}: a manifest takes UTF-8 only")));
+        };
+        quoted.push(quote(program));
+    }
+    quoted.extend(arguments.iter().map(|it| quote(it)));
+    Ok(quoted.join(" "))
+}
+
+fn script_at(script: &Path) -> Result<PathBuf, Refusal> {
+    let path = absolute(script);
+    let shown = to_text(&path);
+    match std::fs::metadata(&path) {
+        Ok(data) if data.is_file() => Ok(path),
+        Ok(_) => Err(usage(format!("cannot run {shown}: it is no file"))),
+        Err(error) => Err(usage(format!("cannot run {shown}: {error}"))),
+    }
+}
+
+/// Where a program lies that can be run.
+fn find_program(program: &str) -> Result<PathBuf, String> {
+    if program.contains('/') {
+        let path = absolute(Path::new(program));
+        return match executable(&path) {
+            Ok(()) => Ok(path),
+            Err(why) => Err(format!("cannot run {}: {why}", to_text(&path))),
+        };
+    }
+    let paths = std::env::var_os("PATH").unwrap_or_default();
+    let mut found = std::env::split_paths(&paths).map(|directory| directory.join(program));
+    let found = found.find(|path| executable(path).is_ok());
+    found.map(|path| absolute(&path)).ok_or_else(|| {
+        format!("cannot run `{program}`: no directory of PATH has such a program; name its path")
+    })
+}
+
+fn executable(path: &Path) -> Result<(), String> {
+    let metadata = std::fs::metadata(path).map_err(|error| error.to_string())?;
+    if !metadata.is_file() {
+        return Err("it is no file".to_owned());
+    }
+    access(path, Access::EXEC_OK).map_err(|error| format!("it is not executable ({error})"))
+}
+
+fn quote(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-=:,@%+".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', "'\\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn first_word_of_a_command_is_the_shells() {
+        let cases = [
+            ("qc_x", "qc_x", ""),
+            ("qc_x -c $FILE", "qc_x", " -c $FILE"),
+            ("'/a dir/x.sh' -c \"$FILE\"", "/a dir/x.sh", " -c \"$FILE\""),
+            ("\"/a  dir/x.sh\" -c 'a b'", "/a  dir/x.sh", " -c 'a b'"),
+            ("/a\\ dir/x.sh\t-c", "/a dir/x.sh", "\t-c"),
+            ("/a' 'dir/\"x y\" z", "/a dir/x y", " z"),
+            ("'it'\\''s' z", "it's", " z"),
+            ("/straße/x z", "/straße/x", " z"),
+        ];
+        for (command, program, rest) in cases {
+            let found = first_word(command).unwrap();
+            assert_eq!(found, (program.to_owned(), rest), "{command}");
+        }
+    }
+
+    #[test]
+    fn command_that_no_shell_takes_is_refused() {
+        let cases = [
+            ("'/a dir/x.sh -c", "a quote is not closed"),
+            ("qc_x -c \"$FILE", "a quote is not closed"),
+            ("qc_x \\", "a backslash"),
+            ("", "no program"),
+            ("''", "no program"),
+            ("# qc_x", "no program"),
+        ];
+        for (command, why) in cases {
+            let (exit, said) = first_word(command).unwrap_err();
+            assert_eq!(exit, qcbus_messages::Exit::Usage);
+            assert!(said.contains(why), "{command}: {said}");
+        }
+    }
+}
