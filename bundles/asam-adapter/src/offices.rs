@@ -2,6 +2,7 @@
 
 use std::ffi::OsString;
 use std::io;
+use std::os::unix::process::CommandExt as _;
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
@@ -119,7 +120,12 @@ fn hear(channel: &Channel, number: u64) -> io::Result<Answered> {
 fn start(hosted: &Hosted, program: &[&str]) -> io::Result<Channel> {
     let (own, other) = Channel::pair()?;
     let arguments = program.iter().map(OsString::from);
-    Command::new("/proc/self/exe")
+    // What runs here, whatever lies at its path by now.
+    let mut command = Command::new("/proc/self/exe");
+    if let Some(name) = std::env::args_os().next() {
+        command.arg0(name);
+    }
+    command
         .args(arguments)
         .arg("--office")
         .args(hosted.arguments())

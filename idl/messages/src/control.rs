@@ -338,6 +338,9 @@ pub struct Status {
     /// What keeps the broker from its work at this moment, for a person.
     #[serde(default)]
     pub troubles: Vec<String>,
+    /// That the program on the disk is another by now than the one that runs, and what to do: for a person.
+    #[serde(default)]
+    pub replaced: Option<String>,
     /// Things a person should look at, newest last.
     pub notices: Vec<NoticeStatus>,
 }

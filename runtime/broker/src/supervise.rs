@@ -18,6 +18,7 @@ use crate::core::{ChildEnd, ChildSpec, Event, Launch};
 use crate::former::Former;
 use crate::launches::Launches;
 use crate::orphans::{self, Strangers};
+use crate::own_program::{OwnProgram, RUNNING};
 use crate::reload::ready;
 
 /// Looks for orphans at the end, two milliseconds apart.
@@ -128,7 +129,7 @@ impl Children {
         let Some((program, arguments)) = words.split_first() else {
             return Err("cannot start it: the command is empty".to_owned());
         };
-        let mut command = Command::new(program);
+        let mut command = command_of(program);
         command
             .args(arguments)
             .arg("--instance-dir")
@@ -322,6 +323,17 @@ impl Drop for Children {
     fn drop(&mut self) {
         self.early.values().for_each(|(_, child)| kill_early(child));
     }
+}
+
+/// What runs as this broker is started again as it is: another version may lie at its path by now, or nothing. The
+/// programs of others are started from where they lie.
+fn command_of(program: &str) -> Command {
+    if !OwnProgram::this().is(program) {
+        return Command::new(program);
+    }
+    let mut command = Command::new(RUNNING);
+    command.arg0(program);
+    command
 }
 
 fn kill_early(child: &Child) {

@@ -6,11 +6,14 @@ mod commands;
 mod standard;
 mod talk;
 
+use std::ffi::CString;
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::Parser;
 
 fn main() -> ExitCode {
+    name_as_called();
     qcbus_broker::memory::join_small_pieces();
     if let Some(run) = commands::started_bundle(std::env::args_os().skip(1)) {
         return talk::exit(run()).into();
@@ -36,4 +39,14 @@ fn main() -> ExitCode {
         }
     };
     talk::exit(commands::run(args)).into()
+}
+
+/// A broker starts its own program as `/proc/self/exe`, and `ps` and `top` would list it as `exe`.
+fn name_as_called() {
+    let called = std::env::args_os().next().unwrap_or_default();
+    let name = Path::new(&called).file_name().unwrap_or_default();
+    if let Ok(name) = CString::new(name.as_encoded_bytes()) {
+        // Under another name it works as well.
+        let _ = rustix::thread::set_name(&name);
+    }
 }

@@ -8,12 +8,13 @@ use qcbus_messages::control::{BundleStanding, Request, Response, Status, Terms, 
 use qcbus_messages::path_text::to_text;
 use tokio::sync::oneshot;
 
-use super::looks::{Look, Seen, Sighted};
+use super::looks::{Around, Look, Seen, Sighted};
 use super::{Broker, Told};
 use crate::control::Asked;
 use crate::core::{Errand, Event, Notice, Stamp, Ticket, Until};
 use crate::demand::InForce;
 use crate::gate::Gate;
+use crate::own_program::OwnProgram;
 use crate::reload::{Fingerprint, LoadError, command_of, differences};
 use crate::terms::{differs, terms};
 
@@ -249,19 +250,20 @@ impl Broker {
         let (sources, read) = (self.sources.clone(), self.loaded.read.clone());
         let lock = self.state_directory.lock.clone();
         // Where no thread can be started now, one may in a second.
-        self.looks.changes = self
-            .scout(move || Seen::Sources {
-                read: sources.fingerprint(&read),
+        let look = move || {
+            let around = Around {
+                replaced: OwnProgram::this().replaced(),
                 state_is_gone: lock.is_some_and(|it| !it.is_in_place()),
-            })
-            .ok();
+            };
+            Seen::Sources(sources.fingerprint(&read), around)
+        };
+        self.looks.changes = self.scout(look).ok();
     }
 
     /// Somebody may have removed the state directory, or put another one in its place.
     pub(super) fn look_at_state(&mut self, is_gone: bool) {
-        let is_new = is_gone && !self.state_directory.is_gone;
-        self.state_directory.is_gone = is_gone;
-        if let Some(text) = self.said_of_state().filter(|_| is_new) {
+        let was_gone = std::mem::replace(&mut self.state_directory.is_gone, is_gone);
+        if let Some(text) = self.said_of_state().filter(|_| !was_gone) {
             self.say(Notice::Storing(text));
         }
     }
@@ -327,6 +329,7 @@ impl Broker {
             state: self.options.state.clone(),
             bundles_d: self.options.bundles_d.clone(),
             troubles: self.troubles(),
+            replaced: self.looks.around.replaced.clone(),
             gate: self.store.gate.as_ref().map(Gate::status),
             ..status
         }

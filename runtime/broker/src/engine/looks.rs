@@ -32,6 +32,7 @@ pub(super) struct Looks {
     missed: HashMap<u64, Arc<Path>>,
     /// The scout who looks whether configuration, manifests and programs are what they were.
     pub(super) changes: Option<u64>,
+    pub(super) around: Around,
 }
 
 impl Default for Looks {
@@ -44,6 +45,7 @@ impl Default for Looks {
             pending: HashMap::new(),
             missed: HashMap::new(),
             changes: None,
+            around: Around::default(),
         }
     }
 }
@@ -96,12 +98,18 @@ pub(super) struct Looked {
     seen: Seen,
 }
 
+/// What is around the broker, looked at once a second for whoever asks how it is.
+#[derive(Default)]
+pub(super) struct Around {
+    /// What lies in place of the program that runs.
+    pub replaced: Option<String>,
+    /// The state directory was removed or replaced.
+    pub state_is_gone: bool,
+}
+
 pub(super) enum Seen {
-    /// What configuration, manifests, programs and the state directory are now.
-    Sources {
-        read: Fingerprint,
-        state_is_gone: bool,
-    },
+    /// What configuration, manifests and programs are now, and what is around the broker.
+    Sources(Fingerprint, Around),
     /// The path means another file.
     Elsewhere(PathBuf),
     Sighted(Sighted),
@@ -206,12 +214,10 @@ impl Broker {
     pub(super) fn looked(&mut self, looked: Looked) -> bool {
         let Looked { scout, seen } = looked;
         match seen {
-            Seen::Sources {
-                read,
-                state_is_gone,
-            } => {
-                self.look_at_state(state_is_gone);
-                self.reload_if_changed(read);
+            Seen::Sources(now, around) => {
+                self.look_at_state(around.state_is_gone);
+                self.looks.around = around;
+                self.reload_if_changed(now);
                 true
             }
             Seen::Again { stamp, inputs } => {

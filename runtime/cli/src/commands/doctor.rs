@@ -47,6 +47,7 @@ pub fn run(args: &DoctorArgs) -> Exit {
         Some(Ok(Response::Status(status))) => Some(*status),
         _ => None,
     };
+    remarks.extend(status.as_ref().and_then(replaced));
     remarks.extend(directories(args, status.as_ref()));
     for remark in &remarks {
         let mark = if remark.ok { "ok  " } else { "FIX " };
@@ -231,6 +232,12 @@ fn broker(asked: &Result<Response, AskError>) -> Remark {
 }
 
 const UPGRADE: &str = "use the program that the broker was started from";
+
+/// Whether another program lies by now where the running broker was started from.
+fn replaced(status: &Status) -> Option<Remark> {
+    let text = status.replaced.clone()?;
+    Some(bad("program", text, "restart the broker"))
+}
 
 /// The directories of the running broker, else those that it would have here; what is named comes first.
 fn directories(args: &DoctorArgs, status: Option<&Status>) -> Vec<Remark> {

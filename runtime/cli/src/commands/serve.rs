@@ -194,21 +194,21 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         of_its_own(gate, &real(&out), "directory of results")?;
         of_its_own(gate, &real(&state), "state directory")?;
     }
-    let program = program()?;
+    let program = program();
     let every_kind = qcbus_document::FileKind::ALL.into_iter().collect();
     let mut children = if args.no_standard_bundles {
         Vec::new()
     } else {
         standard::bundle_specs(
-            &program,
+            program,
             &every_kind,
             args.schema_dir.as_deref(),
             args.limits.threads,
         )?
     };
-    let reporters = standard::reporter_specs(&program);
+    let reporters = standard::reporter_specs(program);
     let asked = args.report.iter();
-    children.extend(asked.map(|report| standard::reporter_spec(&program, report)));
+    children.extend(asked.map(|report| standard::reporter_spec(program, report)));
     Ok(Options {
         instance: instance(&args.instance)?,
         roots,
@@ -235,7 +235,7 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         standard: children,
         reporters,
         known: standard::known(),
-        adapter: standard::adapter(&program, !args.no_standard_bundles),
+        adapter: standard::adapter(program, !args.no_standard_bundles),
         die_with_broker: false,
         sandbox: !args.no_sandbox,
         memory_limit: memory_limit(&args.limits),

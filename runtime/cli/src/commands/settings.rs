@@ -2,7 +2,7 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use qcbus_broker::Settings;
+use qcbus_broker::{OwnProgram, Settings};
 use qcbus_bus::Instance;
 use qcbus_formats::xqar::Dialect;
 use qcbus_ingest::Limits;
@@ -121,6 +121,6 @@ pub fn settings(args: &LimitArgs) -> Settings {
 }
 
 /// This program's own file, to start children from.
-pub fn program() -> Result<PathBuf, String> {
-    std::env::current_exe().map_err(|error| format!("cannot find this program's own file: {error}"))
+pub fn program() -> &'static Path {
+    OwnProgram::this().path()
 }

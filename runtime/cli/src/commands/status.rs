@@ -92,6 +92,9 @@ pub fn render(status: &Status) -> String {
     for peer in &status.peers {
         line(&shown::line(&peer.role), peer_line(peer));
     }
+    if let Some(replaced) = &status.replaced {
+        line("note", replaced.clone());
+    }
     for unseen in status.unseen.iter().take(5) {
         line("note", unseen.to_string());
     }

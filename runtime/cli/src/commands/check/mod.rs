@@ -131,7 +131,7 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
     })));
     writable(&out)?;
     let outputs = Outputs::new(&args.print, &out)?;
-    let program = program().map_err(|why| (Exit::Internal, why))?;
+    let program = program();
     let (kinds, config_named) = (kinds(&roots, &files), parsed.is_some());
     let kinds = if config_named {
         FileKind::ALL.into_iter().collect()
@@ -139,7 +139,7 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         kinds
     };
     let bundles = standard::bundle_specs(
-        &program,
+        program,
         &kinds,
         args.schema_dir.as_deref(),
         args.limits.threads,
@@ -166,13 +166,13 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         config,
         bundles_d,
         standard: wanted_bundles(bundles.map_err(usage)?, parsed.as_ref()),
-        reporters: standard::reporter_specs(&program),
+        reporters: standard::reporter_specs(program),
         // Only configurations are compared with it.
         known: match config_named {
             true => standard::known(),
             false => Known::default(),
         },
-        adapter: standard::adapter(&program, true),
+        adapter: standard::adapter(program, true),
         die_with_broker: true,
         sandbox: !args.no_sandbox,
         memory_limit: memory_limit(&args.limits),

@@ -1,0 +1,238 @@
+//! The program that runs here: where it lies, what else lies there by now, and the environment that it is part of.
+
+use std::ffi::OsString;
+use std::fs::Metadata;
+use std::os::unix::fs::MetadataExt as _;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use qcbus_disk::foreign;
+use qcbus_messages::path_text::to_text;
+use rustix::fs::{Access, access};
+
+/// What runs, whatever lies at its path by now. A child is it as well between fork and exec.
+pub(crate) const RUNNING: &str = "/proc/self/exe";
+
+/// Most links that are followed from the path by which the program was called, as many as the kernel follows.
+const LINKS: usize = 40;
+
+/// Where this program lies.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OwnProgram {
+    /// Without links, by which commands of its own children name it.
+    path: PathBuf,
+    /// As it was called, which may be a link.
+    called: PathBuf,
+    environment: Option<Environment>,
+}
+
+/// Programs that lie beside this one, a Python interpreter among them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Environment {
+    /// The directory of the programs.
+    programs: PathBuf,
+    /// It is a virtual environment of Python, so that all its programs belong together.
+    is_virtual: bool,
+}
+
+impl OwnProgram {
+    /// This program, as it was when it was first asked for, which is at its start.
+    pub fn this() -> &'static OwnProgram {
+        static THIS: LazyLock<OwnProgram> = LazyLock::new(OwnProgram::look);
+        &THIS
+    }
+
+    fn look() -> OwnProgram {
+        let path = std::env::current_exe().unwrap_or_else(|_| RUNNING.into());
+        let called = called().filter(|it| is_the_one_that_runs(it));
+        let called = called.unwrap_or_else(|| path.clone());
+        OwnProgram {
+            environment: environment_of(&called),
+            path,
+            called,
+        }
+    }
+
+    /// Its path without links.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Whether a command's first word is this program.
+    pub(crate) fn is(&self, word: &str) -> bool {
+        // Commands are text.
+        self.path.to_string_lossy() == word
+    }
+
+    /// The Python interpreter that lies beside it.
+    pub fn python(&self) -> Option<PathBuf> {
+        let environment = self.environment.as_ref()?;
+        Some(environment.programs.join(PYTHON))
+    }
+
+    /// Where programs are looked for by their names: `PATH`, behind the environment that this program is part of.
+    /// That need not have been activated, as in services. A directory with an interpreter that is no virtual
+    /// environment keeps its place in `PATH` if it has one: it may be the system's.
+    pub fn search_path(&self) -> OsString {
+        let path =
+            std::env::var_os("PATH").unwrap_or_else(|| "/usr/local/bin:/usr/bin:/bin".into());
+        let Some(environment) = &self.environment else {
+            return path;
+        };
+        behind(environment, path)
+    }
+
+    /// What lies at the program's path now when that is not what runs, for a person. Waits for the disk.
+    pub(crate) fn replaced(&self) -> Option<String> {
+        let shown = to_text(&self.called);
+        let what = match foreign::metadata(&self.called) {
+            Ok(data) if is_same(&data, &std::fs::metadata(RUNNING).ok()?) => return None,
+            Ok(_) => {
+                format!("{shown} is another program by now than the one that runs as this broker")
+            }
+            Err(_) => format!("{shown} is there no more, from which this broker was started"),
+        };
+        Some(format!(
+            "{what}: broker and bundles go on as the program from before; to run what is installed now, restart \
+             the broker (`qcbus down`, then `qcbus serve` as before, or `systemctl restart` of its service)"
+        ))
+    }
+}
+
+const PYTHON: &str = "python3";
+
+fn behind(environment: &Environment, path: OsString) -> OsString {
+    let own = &environment.programs;
+    let others: Vec<PathBuf> = std::env::split_paths(&path).collect();
+    if !environment.is_virtual && others.contains(own) {
+        return path;
+    }
+    let others = others.into_iter().filter(|it| it != own);
+    // A directory with a colon in its name cannot stand there.
+    std::env::join_paths(std::iter::once(own.clone()).chain(others)).unwrap_or(path)
+}
+
+/// The path by which this program was called, looked up as a shell does.
+fn called() -> Option<PathBuf> {
+    let word = PathBuf::from(std::env::args_os().next()?);
+    if word.components().count() > 1 {
+        return std::path::absolute(word).ok();
+    }
+    let path = std::env::var_os("PATH")?;
+    let mut places = std::env::split_paths(&path).map(|it| it.join(&word));
+    let found = places.find(|it| it.is_file() && access(it, Access::EXEC_OK).is_ok())?;
+    std::path::absolute(found).ok()
+}
+
+fn is_the_one_that_runs(path: &Path) -> bool {
+    let both = std::fs::metadata(path).and_then(|it| Ok((it, std::fs::metadata(RUNNING)?)));
+    both.is_ok_and(|(there, running)| is_same(&there, &running))
+}
+
+fn is_same(a: &Metadata, b: &Metadata) -> bool {
+    (a.dev(), a.ino()) == (b.dev(), b.ino())
+}
+
+/// The environment of a program that was called by this path: a link may lie in one as well as what it leads to. A
+/// virtual one counts before a mere directory with an interpreter.
+fn environment_of(called: &Path) -> Option<Environment> {
+    let next = |path: &PathBuf| {
+        let target = path.parent()?.join(std::fs::read_link(path).ok()?);
+        // Of the way only: the last name may be a link that lies in an environment.
+        Some(
+            std::fs::canonicalize(target.parent()?)
+                .ok()?
+                .join(target.file_name()?),
+        )
+    };
+    let links = std::iter::successors(Some(called.to_path_buf()), next).take(LINKS);
+    let mut found: Vec<Environment> = links.filter_map(|it| beside(&it)).collect();
+    let best = found.iter().position(|it| it.is_virtual).unwrap_or(0);
+    (best < found.len()).then(|| found.swap_remove(best))
+}
+
+fn beside(program: &Path) -> Option<Environment> {
+    let programs = program.parent()?;
+    let python = programs.join(PYTHON);
+    let is_there = python.is_file() && access(&python, Access::EXEC_OK).is_ok();
+    let marker = programs.parent().map(|it| it.join("pyvenv.cfg"));
+    is_there.then(|| Environment {
+        programs: programs.to_path_buf(),
+        is_virtual: marker.is_some_and(|it| it.is_file()),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::fs::symlink;
+
+    use super::*;
+
+    /// A directory with programs, and one with `pyvenv.cfg` above them.
+    fn place(dir: &Path, name: &str, is_virtual: bool, has_python: bool) -> PathBuf {
+        let programs = dir.join(name).join("bin");
+        std::fs::create_dir_all(&programs).unwrap();
+        std::fs::write(programs.join("qcbus"), "").unwrap();
+        if is_virtual {
+            std::fs::write(dir.join(name).join("pyvenv.cfg"), "").unwrap();
+        }
+        if has_python {
+            symlink("/bin/sh", programs.join(PYTHON)).unwrap();
+        }
+        programs
+    }
+
+    #[test]
+    fn environment_is_where_the_program_lies_or_its_link() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name, is_virtual, has_python| place(dir.path(), name, is_virtual, has_python);
+        let [system, venv, bare] = [
+            at("system", false, true),
+            at("venv", true, true),
+            at("bare", false, false),
+        ];
+        let found = |path: PathBuf| environment_of(&path).map(|it| (it.programs, it.is_virtual));
+        assert_eq!(found(bare.join("qcbus")), None);
+        assert_eq!(found(system.join("qcbus")), Some((system.clone(), false)));
+        assert_eq!(found(venv.join("qcbus")), Some((venv.clone(), true)));
+        // A link that lies among other programs, and one in the environment that leads out of it.
+        symlink("../../venv/bin/qcbus", bare.join("link")).unwrap();
+        symlink(venv.join("qcbus"), system.join("link")).unwrap();
+        symlink(bare.join("qcbus"), venv.join("link")).unwrap();
+        for link in [&bare, &system, &venv] {
+            assert_eq!(found(link.join("link")), Some((venv.clone(), true)));
+        }
+        symlink("loop", bare.join("loop")).unwrap();
+        assert_eq!(found(bare.join("loop")), None);
+    }
+
+    #[test]
+    fn environment_stands_first_unless_it_may_be_the_systems() {
+        let environment = |is_virtual| Environment {
+            programs: "/e/bin".into(),
+            is_virtual,
+        };
+        let path = |is_virtual, path: &str| behind(&environment(is_virtual), path.into());
+        assert_eq!(path(true, "/usr/bin:/bin"), "/e/bin:/usr/bin:/bin");
+        assert_eq!(path(true, "/usr/bin:/e/bin"), "/e/bin:/usr/bin");
+        assert_eq!(path(false, "/usr/bin:/bin"), "/e/bin:/usr/bin:/bin");
+        assert_eq!(path(false, "/usr/bin:/e/bin"), "/usr/bin:/e/bin");
+    }
+
+    #[test]
+    fn other_file_at_the_path_is_said() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut program = OwnProgram::look();
+        assert_eq!(program.replaced(), None);
+        program.called = dir.path().join("qcbus");
+        let said = program.replaced().unwrap();
+        assert!(said.contains("is there no more"), "{said}");
+        std::fs::copy("/bin/sh", &program.called).unwrap();
+        let said = program.replaced().unwrap();
+        assert!(said.contains("is another program by now"), "{said}");
+        assert!(said.contains("restart the broker"), "{said}");
+        std::fs::remove_file(&program.called).unwrap();
+        symlink(&program.path, &program.called).unwrap();
+        assert_eq!(program.replaced(), None);
+    }
+}

@@ -1,0 +1,165 @@
+//! The program is replaced on the disk while a broker runs, as an upgrade of a package does it.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::collections::BTreeMap;
+use std::fs::{Metadata, Permissions};
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use qcbus_messages::Verdict;
+use rustix::process::Signal;
+use support::broker::Broker;
+use support::content::Content;
+use support::farm::{Farm, copy_program, tail};
+use support::inside::{is_inside, run_inside};
+use support::processes::signal_pid;
+use support::watchdog::until_or;
+
+const MANNERS: &str = include_str!("../bundles/asam-adapter/tests/guests/manners.sh");
+const FINDS: &str =
+    r#"{ begin; checker one completed "$(issue 1 "wrong in $input")"; end; } > "$result""#;
+
+/// Four bundles, one of them a hosted module, and a reporter.
+const PEERS: usize = 5;
+
+fn install(path: &Path, script: &str) {
+    std::fs::write(path, format!("#!/bin/sh\n{script}\n")).unwrap();
+    std::fs::set_permissions(path, Permissions::from_mode(0o755)).unwrap();
+}
+
+/// A farm, the program from which its broker runs, and another program to replace it.
+fn farm() -> (Farm, PathBuf, PathBuf, Broker) {
+    let farm = Farm::with(&["--report", "json"]);
+    let base = farm.base();
+    let [program, newer, guest] = ["qcbus", "newer", "guest"].map(|it| base.join(it));
+    copy_program(Path::new(env!("CARGO_BIN_EXE_qcbus")), &program);
+    install(&newer, "echo \"the newer program: $*\" >&2\nexit 1");
+    install(&guest, &format!("{MANNERS}\n{FINDS}"));
+    std::fs::create_dir(base.join("tmp")).unwrap();
+    let module = serde_json::json!({
+        "name": "guest",
+        "exec_type": "executable",
+        "module_type": "checker_bundle",
+        "exec_command": guest.to_str().unwrap(),
+    });
+    farm.let_in_module("guest", &module);
+    let mut command = Command::new(&program);
+    command.args(farm.serve_command().get_args());
+    command.env("TMPDIR", base.join("tmp"));
+    let broker = Broker::start(&mut command, &farm.log_path());
+    (farm, program, newer, broker)
+}
+
+/// The processes of all peers that are ready, once they are none of these.
+fn ready_peers(farm: &Farm, before: &BTreeMap<String, u32>) -> BTreeMap<String, u32> {
+    let look = || {
+        let peers = farm.status()?.peers.into_iter();
+        let ready = peers.filter(|it| ["ready", "busy"].contains(&it.state.as_str()));
+        let ready: BTreeMap<String, u32> = ready.map(|it| (it.name, it.pid)).collect();
+        let is_new = |(name, pid): (&String, &u32)| before.get(name) != Some(pid);
+        (ready.len() == PEERS && ready.iter().all(is_new)).then_some(ready)
+    };
+    let explain = || format!("{:#?}\n{}", farm.status(), tail(&farm.log()));
+    until_or("all peers are ready", look, explain)
+}
+
+fn program_of(pid: u32) -> (u64, u64) {
+    let data: Metadata = std::fs::metadata(format!("/proc/{pid}/exe")).unwrap();
+    (data.dev(), data.ino())
+}
+
+/// All children die after the program was replaced, and judge again as the program that the broker is.
+fn children_stay_what_the_broker_is(replace: impl FnOnce(&Path, &Path)) {
+    let (farm, program, newer, broker) = farm();
+    let before = ready_peers(&farm, &BTreeMap::new());
+    assert_eq!(farm.status().unwrap().replaced, None);
+    replace(&program, &newer);
+    for pid in before.values() {
+        signal_pid(i32::try_from(*pid).unwrap(), Signal::KILL);
+    }
+    let after = ready_peers(&farm, &before);
+    for (name, pid) in &after {
+        assert_eq!(program_of(*pid), program_of(broker.pid()), "{name}");
+        let words = std::fs::read(format!("/proc/{pid}/cmdline")).unwrap();
+        let called = words.split(|it| *it == 0).next().unwrap();
+        assert_eq!(called, program.as_os_str().as_encoded_bytes(), "{name}");
+        let listed = std::fs::read_to_string(format!("/proc/{pid}/comm")).unwrap();
+        assert_eq!(listed, "qcbus\n", "{name}");
+    }
+    farm.write("a.xodr", &Content::Good(1).bytes());
+    let judged = farm.verdict("a.xodr").verdict;
+    assert_eq!(judged, Verdict::Rejected, "by the module: {}", farm.log());
+    assert!(!farm.log().contains("the newer program"), "{}", farm.log());
+    it_is_said(&farm, &program);
+}
+
+fn it_is_said(farm: &Farm, program: &Path) {
+    let said = || farm.status()?.replaced;
+    let said = until_or("it is said", said, || tail(&farm.log()));
+    assert!(said.contains(program.to_str().unwrap()), "{said}");
+    assert!(said.contains("restart the broker"), "{said}");
+    let note = format!("note       {said}\n");
+    for (command, line) in [
+        ("status", note),
+        ("doctor", format!("program            {said}\n")),
+    ] {
+        let told = farm.qcbus(&[command]);
+        let told = String::from_utf8(told.stdout).unwrap();
+        assert!(told.contains(&line), "{told}");
+    }
+}
+
+#[test]
+fn children_stay_what_the_broker_is_after_a_rename() {
+    children_stay_what_the_broker_is(|program, newer| std::fs::rename(newer, program).unwrap());
+}
+
+#[test]
+fn children_stay_what_the_broker_is_after_a_removal() {
+    children_stay_what_the_broker_is(|program, _| std::fs::remove_file(program).unwrap());
+}
+
+#[test]
+fn children_stay_what_the_broker_is_behind_a_mount() {
+    if !is_inside() {
+        let name = "children_stay_what_the_broker_is_behind_a_mount";
+        let ended = run_inside(name, "true");
+        assert!(ended.is_none_or(|it| it.success()));
+        return;
+    }
+    children_stay_what_the_broker_is(|program, newer| {
+        let mut mount = Command::new("mount");
+        let mounted = mount.arg("--bind").args([newer, program]).status();
+        assert!(mounted.unwrap().success());
+    });
+}
+
+#[test]
+fn program_is_another_when_the_link_to_it_leads_elsewhere() {
+    let farm = Farm::new();
+    let [program, newer, link, aside] =
+        ["qcbus-1", "qcbus-2", "qcbus", "aside"].map(|it| farm.base().join(it));
+    for copy in [&program, &newer] {
+        copy_program(Path::new(env!("CARGO_BIN_EXE_qcbus")), copy);
+    }
+    std::os::unix::fs::symlink(&program, &link).unwrap();
+    let mut command = Command::new(&link);
+    command.args(farm.serve_command().get_args());
+    let _broker = Broker::start(&mut command, &farm.log_path());
+    until_or(
+        "it answers",
+        || farm.status().map(drop),
+        || tail(&farm.log()),
+    );
+    std::os::unix::fs::symlink(&newer, &aside).unwrap();
+    std::fs::rename(&aside, &link).unwrap();
+    it_is_said(&farm, &link);
+}
