@@ -265,3 +265,38 @@ fn doctor_looks_at_the_running_broker() {
     }
     assert!(!with.contains("qcbus-out"), "{with}");
 }
+
+#[test]
+fn doctor_asks_the_broker_where_modules_have_their_directories() {
+    let farm = Farm::new();
+    // A directory that nobody can make, not even root.
+    let blocked = farm.base().join("file/tmp");
+    std::fs::write(farm.base().join("file"), "").unwrap();
+    let mut command = farm.serve_command();
+    let mut broker = Broker::start(command.env("TMPDIR", &blocked), &farm.log_path());
+    let scratch = || farm.status()?.scratch;
+    let told = until_or("it has looked", scratch, || tail(&farm.log()));
+    assert!(told.directory.starts_with(&blocked), "{told:?}");
+    let doctor = || String::from_utf8(farm.qcbus(&["doctor"]).stdout).unwrap();
+    let said = doctor();
+    assert!(said.contains("FIX  temporary files"), "{said}");
+    assert!(said.contains("Not a directory"), "{said}");
+    assert!(said.contains("start the broker with TMPDIR set"), "{said}");
+    broker.kill();
+    let _broker = farm.serve();
+    until_or("it has looked", scratch, || tail(&farm.log()));
+    let said = doctor();
+    assert!(said.contains("ok   temporary files"), "{said}");
+}
+
+/// One-shot modules have their private directories below `TMPDIR`.
+#[test]
+fn service_may_write_to_its_temporary_directory() {
+    let unit = include_str!("../docs/qcbus.service");
+    let says = |line: &str| unit.lines().any(|it| it == line);
+    assert!(
+        says("ProtectSystem=strict"),
+        "/tmp is read-only without this"
+    );
+    assert!(says("PrivateTmp=yes"), "{unit}");
+}

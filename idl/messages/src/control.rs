@@ -341,8 +341,21 @@ pub struct Status {
     /// That the program on the disk is another by now than the one that runs, and what to do: for a person.
     #[serde(default)]
     pub replaced: Option<String>,
+    /// Where one-shot modules of ASAM's framework have their private directories, as soon as it was looked at.
+    #[serde(default)]
+    pub scratch: Option<ScratchStatus>,
     /// Things a person should look at, newest last.
     pub notices: Vec<NoticeStatus>,
+}
+
+/// Where one-shot modules of ASAM's framework have their private directories.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct ScratchStatus {
+    /// The directory, which is made when it is missing.
+    #[serde(with = "path_text::one")]
+    pub directory: PathBuf,
+    /// Why nothing can be written there, for a person.
+    pub why: Option<String>,
 }
 
 /// Something that a person should look at.

@@ -254,6 +254,7 @@ impl Broker {
             let around = Around {
                 replaced: OwnProgram::this().replaced(),
                 state_is_gone: lock.is_some_and(|it| !it.is_in_place()),
+                scratch: sources.adapter.scratch_status(),
             };
             Seen::Sources(sources.fingerprint(&read), around)
         };
@@ -330,6 +331,7 @@ impl Broker {
             bundles_d: self.options.bundles_d.clone(),
             troubles: self.troubles(),
             replaced: self.looks.around.replaced.clone(),
+            scratch: self.looks.around.scratch.clone(),
             gate: self.store.gate.as_ref().map(Gate::status),
             ..status
         }

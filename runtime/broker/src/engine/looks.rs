@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use qcbus_disk::foreign::{self, Lookout, Overdue};
 use qcbus_messages::JobId;
-use qcbus_messages::control::{Response, Unseen};
+use qcbus_messages::control::{Response, ScratchStatus, Unseen};
 use qcbus_messages::path_text::to_text;
 use tokio::sync::oneshot;
 
@@ -105,6 +105,7 @@ pub(super) struct Around {
     pub replaced: Option<String>,
     /// The state directory was removed or replaced.
     pub state_is_gone: bool,
+    pub scratch: Option<ScratchStatus>,
 }
 
 pub(super) enum Seen {

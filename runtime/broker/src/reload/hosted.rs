@@ -2,11 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use qcbus_disk::trust;
+use qcbus_disk::{foreign, trust};
 use qcbus_formats::config::{Config, same_bundle};
 use qcbus_formats::manifest::{May, Module};
 use qcbus_messages::Role;
+use qcbus_messages::control::ScratchStatus;
 use qcbus_messages::path_text::to_text;
+use rustix::fs::{Access, access};
 
 use super::{Loaded, programs};
 use crate::core::{ChildSpec, Restart};
@@ -35,6 +37,14 @@ impl Adapter {
     /// Whether there is one.
     pub(super) fn is_there(&self) -> bool {
         !self.command.is_empty()
+    }
+
+    /// Where private directories are made, and why none can be made now. Waits for the disk.
+    pub(crate) fn scratch_status(&self) -> Option<ScratchStatus> {
+        self.is_there().then(|| ScratchStatus {
+            directory: self.scratch.clone(),
+            why: unwritable(&self.scratch),
+        })
     }
 
     /// The name under which a module joins: its own, unless a bundle that comes with the program has it.
@@ -146,6 +156,21 @@ impl Adapter {
             });
         }
     }
+}
+
+/// Why nothing can be written to a directory that is made when it is missing, for a person.
+pub fn unwritable(directory: &Path) -> Option<String> {
+    let absent = |place: &&Path| {
+        let found = foreign::metadata(place);
+        found.is_err_and(|error| error.kind() == std::io::ErrorKind::NotFound)
+    };
+    let there = directory.ancestors().find(|place| !absent(place))?;
+    let why = match access(there, Access::WRITE_OK | Access::EXEC_OK) {
+        Err(error) => error.to_string(),
+        Ok(()) if there.is_dir() => return None,
+        Ok(()) => "it is no directory".to_owned(),
+    };
+    Some(format!("{}: {why}", to_text(there)))
 }
 
 /// A configuration is no place to name any program whatever: only such names as those of modules are looked for.

@@ -23,7 +23,7 @@ use crate::core::{ChildSpec, Stamp};
 use crate::stamp::stamp_through_links;
 
 pub use differences::differences;
-pub use hosted::Adapter;
+pub use hosted::{Adapter, unwritable};
 use modules::{add_module, read_manifest};
 pub use programs::{command_of, ready};
 

@@ -1,11 +1,12 @@
 //! `qcbus doctor`: looks for what may keep a broker from working, and says what to do.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use qcbus_broker::control::{AskError, ask_broker};
 use qcbus_broker::journal::Journal;
+use qcbus_broker::reload::unwritable;
 use qcbus_bus::{HostOptions, SharedMemory};
-use qcbus_messages::control::{Request, Response, Status};
+use qcbus_messages::control::{Request, Response, ScratchStatus, Status};
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Exit, PROTOCOL_VERSION, shown};
 
@@ -48,6 +49,7 @@ pub fn run(args: &DoctorArgs) -> Exit {
         _ => None,
     };
     remarks.extend(status.as_ref().and_then(replaced));
+    remarks.push(temporary(status.as_ref()));
     remarks.extend(directories(args, status.as_ref()));
     for remark in &remarks {
         let mark = if remark.ok { "ok  " } else { "FIX " };
@@ -237,6 +239,26 @@ const UPGRADE: &str = "use the program that the broker was started from";
 fn replaced(status: &Status) -> Option<Remark> {
     let text = status.replaced.clone()?;
     Some(bad("program", text, "restart the broker"))
+}
+
+/// Where one-shot modules have their private directories: as the running broker sees it, which may have another
+/// `TMPDIR` and another view of the disk than this command.
+fn temporary(status: Option<&Status>) -> Remark {
+    let what = "temporary files";
+    let own = |directory: PathBuf| ScratchStatus {
+        why: unwritable(&directory),
+        directory,
+    };
+    let told = status.and_then(|it| it.scratch.clone());
+    let scratch = told.unwrap_or_else(|| own(qcbus_asam_adapter::usual_scratch()));
+    match scratch.why {
+        None => good(what, to_text(&scratch.directory)),
+        Some(why) => bad(
+            what,
+            format!("one-shot modules cannot run, nothing can be written to {why}"),
+            "start the broker with TMPDIR set to a directory that it may write to (systemd: PrivateTmp=yes)",
+        ),
+    }
 }
 
 /// The directories of the running broker, else those that it would have here; what is named comes first.
