@@ -137,6 +137,7 @@ impl Children {
             .arg("--launch")
             .arg(launch.0.to_string())
             .env(LAUNCH, self.launches.proof(launch, &spec.name))
+            .env("PATH", OwnProgram::this().search_path())
             .stdin(Stdio::null())
             .process_group(0)
             .kill_on_drop(false);

@@ -7,6 +7,7 @@ use std::str::CharIndices;
 use qcbus_disk::trust::{self, TrustError};
 
 use super::hosted;
+use crate::own_program::OwnProgram;
 
 /// What a command of a manifest becomes, so that it is the shell's to take apart, as in ASAM's framework.
 const BEFORE: &str = "exec ";
@@ -140,13 +141,13 @@ fn is_executable(path: &Path) -> bool {
     rustix::fs::access(path, rustix::fs::Access::EXEC_OK).is_ok()
 }
 
-/// Where the shell finds a program.
+/// Where the shell finds a program, which the broker starts with the same `PATH`.
 pub(super) fn find(program: &str) -> Option<PathBuf> {
     let is_program = |path: &PathBuf| path.is_file() && is_executable(path);
     if program.contains('/') {
         return Some(absolute(Path::new(program))).filter(is_program);
     }
-    let path = std::env::var_os("PATH").unwrap_or_else(|| "/usr/local/bin:/usr/bin:/bin".into());
+    let path = OwnProgram::this().search_path();
     let places = std::env::split_paths(&path).map(|place| absolute(&place.join(program)));
     places.into_iter().find(is_program)
 }

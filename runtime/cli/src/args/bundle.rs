@@ -66,7 +66,7 @@ pub struct BusArgs {
     after_help = "A bundle that does not become ready is taken out again, for what it would judge would be \
 undetermined.\n\nExamples:\n  \
 qcbus bundle add mine /opt/mine/bundle -- --its-own-flag\n  \
-qcbus bundle add rules ./rules.py       with the python3 that is found here"
+qcbus bundle add rules ./rules.py       with the python3 beside qcbus, or of PATH"
 )]
 pub struct BundleAddArgs {
     /// The bundle's name, as it says it itself

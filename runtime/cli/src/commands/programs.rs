@@ -1,12 +1,20 @@
 //! The commands of manifests that `qcbus bundle add` and `qcbus bundle upgrade` write.
 
+use std::fs::File;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
+use qcbus_broker::OwnProgram;
 use qcbus_messages::path_text::to_text;
 use rustix::fs::{Access, access};
 
 use super::manifests::{Refusal, usage};
 use super::settings::absolute;
+
+const PYTHON: &str = "python3";
+
+/// Most bytes of a script's first line, as for the kernel.
+const FIRST_LINE: u64 = 256;
 
 /// The command of a one-shot module with the whole path of its program, as in [`command_line`]. The rest is the
 /// shell's.
@@ -46,7 +54,10 @@ pub(super) fn command_line(words: &[String]) -> Result<String, Refusal> {
     };
     let script = Path::new(program);
     let programs = if script.extension().is_some_and(|it| it == "py") {
-        vec![find_program("python3").map_err(usage)?, script_at(script)?]
+        let script = script_at(script)?;
+        let mut words = interpreter_of(&script).map_err(usage)?;
+        words.push(script);
+        words
     } else {
         vec![find_program(program).map_err(usage)?]
     };
@@ -72,7 +83,41 @@ fn script_at(script: &Path) -> Result<PathBuf, Refusal> {
     }
 }
 
-/// Where a program lies that can be run.
+/// The words that a script in Python is started with: those of its first line, else the interpreter.
+fn interpreter_of(script: &Path) -> Result<Vec<PathBuf>, String> {
+    let Some(words) = shebang(script) else {
+        return Ok(vec![find_program(PYTHON)?]);
+    };
+    let mut words = words.into_iter();
+    let program = words.next().unwrap_or_default();
+    let found = find_program(&program);
+    let found = found.map_err(|why| format!("{why}, as {} begins", to_text(script)))?;
+    Ok(std::iter::once(found)
+        .chain(words.map(PathBuf::from))
+        .collect())
+}
+
+/// The words of a script's first line, where that names an interpreter. What `env` would look for is looked for here.
+fn shebang(script: &Path) -> Option<Vec<String>> {
+    let mut bytes = Vec::new();
+    let opened = File::open(script).ok()?;
+    // A script that cannot be read is the interpreter's to complain about.
+    opened.take(FIRST_LINE).read_to_end(&mut bytes).ok()?;
+    let line = bytes.split(|byte| *byte == b'\n').next()?;
+    let line = str::from_utf8(line).ok()?.strip_prefix("#!")?.trim();
+    let (program, argument) = line.split_once([' ', '\t']).unwrap_or((line, ""));
+    let argument = argument.trim();
+    let words = if Path::new(program).file_name()? == "env" {
+        let of_env = argument.strip_prefix("-S").unwrap_or(argument);
+        of_env.split_whitespace().map(str::to_owned).collect()
+    } else {
+        let both = [program, argument].into_iter().filter(|it| !it.is_empty());
+        both.map(str::to_owned).collect::<Vec<_>>()
+    };
+    (!words.is_empty()).then_some(words)
+}
+
+/// Where a program lies that can be run: in the environment that this program is part of, or on the `PATH`.
 fn find_program(program: &str) -> Result<PathBuf, String> {
     if program.contains('/') {
         let path = absolute(Path::new(program));
@@ -81,7 +126,12 @@ fn find_program(program: &str) -> Result<PathBuf, String> {
             Err(why) => Err(format!("cannot run {}: {why}", to_text(&path))),
         };
     }
-    let paths = std::env::var_os("PATH").unwrap_or_default();
+    if program == PYTHON
+        && let Some(found) = OwnProgram::this().python()
+    {
+        return Ok(found);
+    }
+    let paths = OwnProgram::this().search_path();
     let mut found = std::env::split_paths(&paths).map(|directory| directory.join(program));
     let found = found.find(|path| executable(path).is_ok());
     found.map(|path| absolute(&path)).ok_or_else(|| {
@@ -125,6 +175,31 @@ mod tests {
         for (command, program, rest) in cases {
             let found = first_word(command).unwrap();
             assert_eq!(found, (program.to_owned(), rest), "{command}");
+        }
+    }
+
+    #[test]
+    fn first_line_of_a_script_names_its_interpreter() {
+        let dir = tempfile::tempdir().unwrap();
+        let script = dir.path().join("rules.py");
+        let cases: [(&str, Option<&[&str]>); 9] = [
+            ("import qcbus\n", None),
+            ("", None),
+            ("#!\n", None),
+            ("# !/usr/bin/python3\n", None),
+            ("#!/opt/x/python3\n", Some(&["/opt/x/python3"])),
+            (
+                "#! /opt/x/python3  -u -X dev\r\n",
+                Some(&["/opt/x/python3", "-u -X dev"]),
+            ),
+            ("#!/usr/bin/env python3\n", Some(&["python3"])),
+            ("#!/usr/bin/env -S python3 -u\n", Some(&["python3", "-u"])),
+            ("#!/usr/bin/env\n", None),
+        ];
+        for (text, expected) in cases {
+            std::fs::write(&script, text).unwrap();
+            let expected = expected.map(|it| it.iter().map(ToString::to_string).collect());
+            assert_eq!(shebang(&script), expected, "{text}");
         }
     }
 

@@ -1,0 +1,196 @@
+//! A broker whose program lies in an environment of Python that nobody has activated.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::fs::Permissions;
+use std::os::unix::fs::{PermissionsExt, symlink};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use support::broker::Broker;
+use support::farm::{Farm, copy_program, tail, zoo};
+use support::watchdog::until_or;
+
+/// What a service or cron has.
+const PATH: &str = "/usr/local/bin:/usr/bin:/bin";
+
+fn install(path: &Path, text: &str) {
+    std::fs::write(path, text).unwrap();
+    std::fs::set_permissions(path, Permissions::from_mode(0o755)).unwrap();
+}
+
+/// A farm, and an environment with a program and an "interpreter", which is a bundle whatever it is given.
+struct Service {
+    farm: Farm,
+    program: PathBuf,
+    python: PathBuf,
+    broker: Option<Broker>,
+}
+
+impl Service {
+    fn new() -> Service {
+        let farm = Farm::new();
+        let environment = farm.base().join("venv");
+        let programs = environment.join("bin");
+        std::fs::create_dir_all(&programs).unwrap();
+        std::fs::write(environment.join("pyvenv.cfg"), "home = /usr/bin\n").unwrap();
+        let program = programs.join("qcbus");
+        copy_program(Path::new(env!("CARGO_BIN_EXE_qcbus")), &program);
+        let python = programs.join("python3");
+        install(&python, &as_a_bundle("2.0.0"));
+        std::fs::write(farm.base().join("mine.py"), "pass\n").unwrap();
+        Service {
+            farm,
+            program,
+            python,
+            broker: None,
+        }
+    }
+
+    fn start(mut self) -> Service {
+        let mut command = Command::new(&self.program);
+        command.args(self.farm.serve_command().get_args());
+        let command = command.arg("--no-standard-bundles").env("PATH", PATH);
+        self.broker = Some(Broker::start(command, &self.farm.log_path()));
+        let answers = || self.farm.status().map(drop);
+        until_or("it answers", answers, || tail(&self.farm.log()));
+        self
+    }
+
+    /// Adds a script by the program of the environment.
+    fn add(&self, program: &Path, more: &[&str]) -> (Option<i32>, String) {
+        let mut command = Command::new(program);
+        command.args(["bundle", "add", "mine"]).args(more);
+        command.arg("--instance-dir").arg(self.farm.instance());
+        told(&command.env("PATH", PATH).output().unwrap())
+    }
+
+    fn script(&self) -> PathBuf {
+        self.farm.base().join("mine.py")
+    }
+
+    /// The command of the manifest that was written.
+    fn command(&self) -> String {
+        let manifest = std::fs::read(self.farm.bundles_d().join("mine.json")).unwrap();
+        let manifest: serde_json::Value = serde_json::from_slice(&manifest).unwrap();
+        manifest["module"][0]["exec_command"]
+            .as_str()
+            .unwrap()
+            .to_owned()
+    }
+
+    /// The version of the bundle that is ready.
+    fn version(&self) -> String {
+        let ready = || {
+            let mut peers = self.farm.status()?.peers.into_iter();
+            Some(
+                peers
+                    .find(|it| it.name == "mine" && it.state == "ready")?
+                    .version,
+            )
+        };
+        until_or("it is ready", ready, || tail(&self.farm.log()))
+    }
+}
+
+/// An interpreter that leaves the script alone and is a bundle of this version.
+fn as_a_bundle(version: &str) -> String {
+    let zoo = zoo();
+    format!(
+        "#!/bin/sh\nshift\nexec {} polite --name mine --version {version} \"$@\"\n",
+        zoo.display()
+    )
+}
+
+fn told(said: &Output) -> (Option<i32>, String) {
+    let text = [&*said.stdout, &*said.stderr].concat();
+    (said.status.code(), String::from_utf8(text).unwrap())
+}
+
+#[test]
+fn script_is_run_by_the_interpreter_beside_the_program() {
+    let service = Service::new().start();
+    let script = service.script();
+    let (code, text) = service.add(&service.program, &[script.to_str().unwrap()]);
+    assert_eq!(code, Some(0), "{text}");
+    let expected = format!("{} {}", service.python.display(), script.display());
+    assert_eq!(service.command(), expected);
+    assert_eq!(service.version(), "2.0.0");
+}
+
+#[test]
+fn link_to_the_program_of_an_environment_is_in_it_as_well() {
+    let service = Service::new().start();
+    let link = service.farm.base().join("qcbus");
+    symlink(&service.program, &link).unwrap();
+    let script = service.script();
+    let (code, text) = service.add(&link, &[script.to_str().unwrap()]);
+    assert_eq!(code, Some(0), "{text}");
+    assert!(
+        service
+            .command()
+            .starts_with(service.python.to_str().unwrap())
+    );
+}
+
+#[test]
+fn first_line_of_a_script_says_otherwise() {
+    let service = Service::new().start();
+    let (script, other) = (service.script(), service.farm.base().join("other python"));
+    install(&other, &as_a_bundle("3.0.0"));
+    let link = service.farm.base().join("python9");
+    symlink(&other, &link).unwrap();
+    let add = |first: &str| {
+        std::fs::write(&script, format!("{first}\npass\n")).unwrap();
+        let (code, text) = service.add(&service.program, &[script.to_str().unwrap()]);
+        (code, text)
+    };
+    let named = format!("#!{}", link.display());
+    let cases = [(&*named, "3.0.0"), ("#!/usr/bin/env python3", "2.0.0")];
+    for (first, version) in cases {
+        let (code, text) = add(first);
+        assert_eq!(code, Some(0), "{first}: {text}");
+        assert_eq!(service.version(), version, "{first}");
+    }
+    let (code, text) = add("#!/nowhere/python3");
+    assert_eq!(code, Some(2), "{text}");
+    assert!(text.contains("cannot run /nowhere/python3"), "{text}");
+    assert!(text.contains("mine.py begins"), "{text}");
+}
+
+#[test]
+fn manifest_that_names_python_by_its_name_means_the_environment() {
+    let service = Service::new().start();
+    let module = serde_json::json!({
+        "name": "mine",
+        "exec_type": "executable",
+        "module_type": "checker_bundle",
+        "exec_command": format!("python3 {}", service.script().display()),
+        "mode": "bus",
+    });
+    service.farm.let_in_module("mine", &module);
+    assert_eq!(service.version(), "2.0.0");
+}
+
+#[test]
+fn one_shot_module_is_run_by_the_python_of_the_environment() {
+    const MANNERS: &str = include_str!("../bundles/asam-adapter/tests/guests/manners.sh");
+    let service = Service::new();
+    install(&service.python, "#!/bin/sh\nexec sh \"$@\"\n");
+    let service = service.start();
+    std::fs::write(service.script(), MANNERS).unwrap();
+    let module = serde_json::json!({
+        "name": "mine",
+        "exec_type": "executable",
+        "module_type": "checker_bundle",
+        "exec_command": format!("python3 {}", service.script().display()),
+    });
+    service.farm.let_in_module("mine", &module);
+    assert_eq!(service.version(), "7.1");
+}
