@@ -194,3 +194,29 @@ fn one_shot_module_is_run_by_the_python_of_the_environment() {
     service.farm.let_in_module("mine", &module);
     assert_eq!(service.version(), "7.1");
 }
+
+#[test]
+fn last_words_of_a_bundle_that_fails_are_shown() {
+    let service = Service::new();
+    let said = "Traceback (most recent call last):\n  File \"mine.py\", line 1\n\
+                ModuleNotFoundError: No module named 'qcbus'\n\u{1b}[2Kerror: none\n";
+    let failing = format!("#!/bin/sh\ncat >&2 <<'X'\n{said}X\nexit 1\n");
+    install(&service.python, &failing);
+    let service = service.start();
+    let script = service.script();
+    let (code, text) = service.add(&service.program, &[script.to_str().unwrap()]);
+    assert_eq!(code, Some(2), "{text}");
+    let expected = "`mine` said last (all of it is in the broker's log):\n  \
+                    Traceback (most recent call last):\n    File \"mine.py\", line 1\n  \
+                    ModuleNotFoundError: No module named 'qcbus'\n  \\u{1b}[2Kerror: none\n";
+    assert!(text.contains(expected), "{text}");
+    assert!(
+        text.contains("`mine` is not ready: it ended with exit code 1"),
+        "{text}"
+    );
+    assert!(
+        service.farm.log().contains("ModuleNotFoundError"),
+        "{}",
+        service.farm.log()
+    );
+}

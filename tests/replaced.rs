@@ -20,7 +20,7 @@ use support::broker::Broker;
 use support::content::Content;
 use support::farm::{Farm, copy_program, tail};
 use support::inside::{is_inside, run_inside};
-use support::processes::signal_pid;
+use support::processes::{Process, all_with, signal_pid};
 use support::watchdog::until_or;
 
 const MANNERS: &str = include_str!("../bundles/asam-adapter/tests/guests/manners.sh");
@@ -91,9 +91,18 @@ fn children_stay_what_the_broker_is(replace: impl FnOnce(&Path, &Path)) {
         let words = std::fs::read(format!("/proc/{pid}/cmdline")).unwrap();
         let called = words.split(|it| *it == 0).next().unwrap();
         assert_eq!(called, program.as_os_str().as_encoded_bytes(), "{name}");
+        // It may outlive the broker, so it speaks to the log itself.
+        let speaks_to = std::fs::read_link(format!("/proc/{pid}/fd/2")).unwrap();
+        assert_eq!(speaks_to, farm.log_path(), "{name}");
         let listed = std::fs::read_to_string(format!("/proc/{pid}/comm")).unwrap();
         assert_eq!(listed, "qcbus\n", "{name}");
     }
+    let offices = all_with("--office").into_iter();
+    let guest = farm.base().join("guest").display().to_string();
+    let offices = offices.filter(|it| it.words.contains(&guest));
+    let speaks_to = |it: Process| std::fs::read_link(format!("/proc/{}/fd/2", it.pid)).ok();
+    let speak_to: Vec<PathBuf> = offices.filter_map(speaks_to).collect();
+    assert!(!speak_to.is_empty() && speak_to.iter().all(|it| *it == farm.log_path()));
     farm.write("a.xodr", &Content::Good(1).bytes());
     let judged = farm.verdict("a.xodr").verdict;
     assert_eq!(judged, Verdict::Rejected, "by the module: {}", farm.log());

@@ -125,6 +125,9 @@ fn start(hosted: &Hosted, program: &[&str]) -> io::Result<Channel> {
     if let Some(name) = std::env::args_os().next() {
         command.arg0(name);
     }
+    if let Some(lasting) = qcbus_sdk::run::lasting_stderr() {
+        command.stderr(lasting);
+    }
     command
         .args(arguments)
         .arg("--office")

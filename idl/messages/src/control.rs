@@ -154,6 +154,9 @@ pub struct BundleStanding {
     pub standing: Standing,
     /// Who judges at the moment, be it an older process; nothing when nobody does.
     pub runs: Option<Runs>,
+    /// The last lines that a process of it has said before it ended without having joined, as it said them.
+    #[serde(default)]
+    pub said: Vec<String>,
 }
 
 /// How the process stands that is wanted of a bundle.

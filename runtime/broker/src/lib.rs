@@ -17,6 +17,7 @@ mod former;
 mod gate;
 mod intake;
 pub mod journal;
+mod last_words;
 mod launches;
 pub mod memory;
 mod options;

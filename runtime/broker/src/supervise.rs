@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use qcbus_bus::{LAUNCH, Process};
+use qcbus_bus::{LAUNCH, Process, STDERR};
 use qcbus_confine::{Looks, Orders, Outer, SandboxError, kernel_level, looks, own_filters};
 use qcbus_messages::Role;
 use qcbus_messages::control::{PeerStatus, SandboxStatus};
@@ -16,10 +16,11 @@ use tokio::sync::mpsc::UnboundedSender;
 
 use crate::core::{ChildEnd, ChildSpec, Event, Launch};
 use crate::former::Former;
+use crate::last_words::{Heard, LastWords, listen_to};
 use crate::launches::Launches;
 use crate::orphans::{self, Strangers};
 use crate::own_program::{OwnProgram, RUNNING};
-use crate::reload::ready;
+use crate::reload::{self, ready};
 
 /// Looks for orphans at the end, two milliseconds apart.
 const ORPHANS_AT_MOST: u32 = 500;
@@ -50,13 +51,21 @@ pub struct Children {
     launches: Launches,
     first: Launch,
     /// What was started before the state machine has asked for it, see [`Children::start_early`].
-    early: BTreeMap<Launch, (ChildSpec, Child)>,
+    early: BTreeMap<Launch, (ChildSpec, Started)>,
     /// What this broker has started, by its name and with a handle on the process.
     own: BTreeMap<Launch, (String, Option<Process>)>,
     /// What former brokers have started and has joined this one.
     adopted: BTreeMap<Launch, Process>,
     strangers: Strangers,
+    last_words: LastWords,
     events: UnboundedSender<Event>,
+}
+
+/// A child that was started.
+#[derive(Debug)]
+struct Started {
+    child: Child,
+    heard: Option<Heard>,
 }
 
 impl Children {
@@ -75,6 +84,7 @@ impl Children {
             early: BTreeMap::new(),
             own: BTreeMap::new(),
             adopted: BTreeMap::new(),
+            last_words: LastWords::default(),
             events,
         }
     }
@@ -88,8 +98,8 @@ impl Children {
         let mut launch = self.first;
         for spec in specs.into_values() {
             launch = launch.next(spec);
-            if let Ok(child) = self.start(launch, spec) {
-                self.early.insert(launch, (spec.clone(), child));
+            if let Ok(started) = self.start(launch, spec) {
+                self.early.insert(launch, (spec.clone(), started));
             }
         }
     }
@@ -102,19 +112,20 @@ impl Children {
     /// Starts a child in a process group of its own.
     pub fn spawn(&mut self, launch: Launch, spec: &ChildSpec) {
         let started = match self.early.remove(&launch) {
-            Some((early, child)) if early == *spec => Ok(child),
-            Some((_, child)) => {
-                kill_early(&child);
+            Some((early, started)) if early == *spec => Ok(started),
+            Some((_, started)) => {
+                kill_early(&started.child);
                 self.start(launch, spec)
             }
             None => self.start(launch, spec),
         };
         match started {
-            Ok(child) => {
+            Ok(started) => {
                 // Nobody has waited for it yet, so the id is its own.
-                let process = child.id().and_then(|id| Process::open(id, None));
+                let process = started.child.id().and_then(|id| Process::open(id, None));
                 self.own.insert(launch, (spec.name.clone(), process));
-                tokio::spawn(watch(launch, child, self.events.clone()));
+                let (name, words) = (spec.name.clone(), self.last_words.clone());
+                tokio::spawn(watch(launch, name, started, words, self.events.clone()));
             }
             Err(why) => {
                 let end = ChildEnd::NotStarted(why);
@@ -124,7 +135,7 @@ impl Children {
         }
     }
 
-    fn start(&self, launch: Launch, spec: &ChildSpec) -> Result<Child, String> {
+    fn start(&self, launch: Launch, spec: &ChildSpec) -> Result<Started, String> {
         let words = ready(&spec.command)?;
         let Some((program, arguments)) = words.split_first() else {
             return Err("cannot start it: the command is empty".to_owned());
@@ -138,6 +149,7 @@ impl Children {
             .arg(launch.0.to_string())
             .env(LAUNCH, self.launches.proof(launch, &spec.name))
             .env("PATH", OwnProgram::this().search_path())
+            .env_remove(STDERR)
             .stdin(Stdio::null())
             .process_group(0)
             .kill_on_drop(false);
@@ -152,9 +164,22 @@ impl Children {
             let said = std::io::stderr().as_fd().try_clone_to_owned();
             command.stdout(said.map_or_else(|_| Stdio::null(), Stdio::from));
         }
-        command
-            .spawn()
-            .map_err(|error| format!("cannot start {program}: {error}"))
+        let heard = self.listens_to(spec).then(|| listen_to(&mut command));
+        let child = command.spawn();
+        Ok(Started {
+            child: child.map_err(|error| format!("cannot start {program}: {error}"))?,
+            heard: heard.flatten(),
+        })
+    }
+
+    /// Whoever adds a bundle to a broker that stays wants to know what it says when it does not get ready.
+    fn listens_to(&self, spec: &ChildSpec) -> bool {
+        !self.surroundings.die_with_broker && reload::command_of(&spec.command).is_some()
+    }
+
+    /// The last lines that a child has said that has ended.
+    pub fn last_words(&self, name: &str) -> Vec<String> {
+        self.last_words.of(name)
     }
 
     /// Reporters write files where they are told to, and are ours; bundles are not.
@@ -322,7 +347,8 @@ impl Children {
 
 impl Drop for Children {
     fn drop(&mut self) {
-        self.early.values().for_each(|(_, child)| kill_early(child));
+        let early = self.early.values();
+        early.for_each(|(_, started)| kill_early(&started.child));
     }
 }
 
@@ -343,8 +369,16 @@ fn kill_early(child: &Child) {
     process.iter().for_each(Process::kill);
 }
 
-async fn watch(launch: Launch, mut child: Child, events: UnboundedSender<Event>) {
-    let end = match child.wait().await {
+async fn watch(
+    launch: Launch,
+    name: String,
+    mut started: Started,
+    words: LastWords,
+    events: UnboundedSender<Event>,
+) {
+    let ended = started.child.wait().await;
+    words.take_down(name, started.heard).await;
+    let end = match ended {
         Ok(status) => end_of(status),
         Err(error) => ChildEnd::Failed(format!("its end could not be learned: {error}")),
     };
@@ -491,7 +525,7 @@ mod tests {
 
     fn pids_of(children: &Children) -> Vec<u32> {
         let early = children.early.values();
-        early.filter_map(|(_, child)| child.id()).collect()
+        early.filter_map(|(_, started)| started.child.id()).collect()
     }
 
     async fn is_gone(pid: u32) {

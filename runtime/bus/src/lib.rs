@@ -40,6 +40,7 @@ mod process;
 mod session;
 mod stream;
 mod turn;
+mod voice;
 mod wake;
 
 pub use documents::{Documents, Loan, LoanError, PublishError};
@@ -55,3 +56,4 @@ pub use peer::{JoinError, Peer, PeerEvent, PeerOptions};
 pub use ports::ICEORYX2_VERSION;
 pub use private::{PRIVATE_PREFIX, sweep_private_instances};
 pub use process::Process;
+pub use voice::{STDERR, Voice, lasting_stderr};

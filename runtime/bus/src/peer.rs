@@ -12,6 +12,7 @@ use crate::held::Held;
 use crate::instance::Instance;
 use crate::membership::{Membership, Standing};
 use crate::ports::ICEORYX2_VERSION;
+use crate::voice;
 use crate::wake::TICK;
 
 /// How often somebody without a session looks for one.
@@ -218,6 +219,7 @@ impl Peer {
         loop {
             peer.turn()?;
             if peer.joined_before {
+                voice::joined();
                 return Ok(peer);
             }
             let now = Instant::now();

@@ -18,6 +18,7 @@ pub use bus::{BusOptions, OwnFiles};
 pub use exit::Exit;
 pub(crate) use file::complain;
 pub use file::{Format, examine, examine_timed, findings};
+pub use qcbus_bus::lasting_stderr;
 pub use timings::Timings;
 
 use crate::{Bundle, Hands, UserFiles};

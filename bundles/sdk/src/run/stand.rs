@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use qcbus_bus::{Instance, PeerOptions};
+use qcbus_bus::{Instance, PeerOptions, Voice};
 use qcbus_confine::{After, Fenced, Orders, keep};
 use qcbus_formats::manifest::May;
 
@@ -123,6 +123,7 @@ pub(super) fn sandboxed(
             return Exit::Usage;
         }
     };
+    let voice = Voice::take();
     let stand = |number, may| Stand {
         instance,
         number,
@@ -140,7 +141,13 @@ pub(super) fn sandboxed(
     if sessions.only_one {
         return once(Some(may));
     }
+    // The process that keeps them outlives the broker; only the first has not been heard yet.
+    voice.iter().for_each(Voice::lasts);
     let kept = keep(!sessions.supervised, |number| {
+        voice
+            .iter()
+            .filter(|_| number == 0)
+            .for_each(Voice::is_heard);
         match session(stand(number, Some(may))) {
             Ended::With(exit) => After::End(exit.code()),
             Ended::Again => After::Again,

@@ -110,6 +110,7 @@ impl Broker {
     /// How a bundle stands, with what the manifest in force says of it.
     fn standing(&self, name: &str) -> Option<BundleStanding> {
         let mut standing = self.state.standing(name)?;
+        standing.said = self.children.last_words(name);
         if let Some(spec) = self.loaded.children.iter().find(|it| it.name == name) {
             standing.command = command_of(&spec.command).map(str::to_owned);
             standing.spec = spec.digest();

@@ -208,6 +208,13 @@ impl Children {
         }
     }
 
+    pub fn last_words(&self, name: &str) -> Vec<String> {
+        match self {
+            Children::Real(real) => real.last_words(name),
+            Children::Simulated(_) => Vec::new(),
+        }
+    }
+
     pub fn kill_all(&self) {
         if let Children::Real(real) = self {
             real.kill_all();

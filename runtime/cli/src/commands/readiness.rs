@@ -9,6 +9,7 @@ use qcbus_messages::control::{BundleStanding, Request, Response, Runs, Standing}
 use qcbus_messages::{Exit, shown};
 
 use super::manifests::{Home, Refusal};
+use crate::talk;
 
 /// How often the broker is asked.
 const PAUSE: Duration = Duration::from_millis(50);
@@ -45,9 +46,7 @@ pub fn wait(home: &Home, name: &str, command: &str, limit: Duration) -> Result<R
         match (bundle.standing, bundle.runs) {
             (Standing::Ready, Some(runs)) => return Ok(runs),
             (Standing::Failing { why }, _) => {
-                let why = shown::line(&why);
-                let why = format!("{why}; what it said itself is in the broker's log");
-                return Err((Exit::Usage, why));
+                return Err((Exit::Usage, failing(name, &why, &bundle.said)));
             }
             (Standing::Coming { joined }, _) if begin.elapsed() >= limit => {
                 let seconds = limit.as_secs_f64();
@@ -61,6 +60,20 @@ pub fn wait(home: &Home, name: &str, command: &str, limit: Duration) -> Result<R
             _ => std::thread::sleep(PAUSE),
         }
     }
+}
+
+/// Why a bundle is not ready; the last lines that it has said itself are shown.
+fn failing(name: &str, why: &str, said: &[String]) -> String {
+    let why = shown::line(why);
+    if said.is_empty() {
+        return format!("{why}; what it said itself is in the broker's log");
+    }
+    let lines = said.iter().map(|it| format!("\n  {}", shown::line(it)));
+    let lines: String = lines.collect();
+    talk::say_lines(&format!(
+        "`{name}` said last (all of it is in the broker's log):{lines}"
+    ));
+    why.into_owned()
 }
 
 /// What is said of a bundle that is ready; `was` is put behind it.
