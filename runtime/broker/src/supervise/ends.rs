@@ -1,0 +1,43 @@
+//! How children end.
+
+use tokio::sync::mpsc::UnboundedSender;
+
+use super::Started;
+use crate::core::{ChildEnd, Event, Launch};
+use crate::last_words::LastWords;
+
+/// Waits for the end of a child and tells it, after what the child has said last was taken down.
+pub(super) async fn watch(
+    launch: Launch,
+    name: String,
+    mut started: Started,
+    words: LastWords,
+    events: UnboundedSender<Event>,
+) {
+    let ended = started.child.wait().await;
+    words.take_down(name, started.heard).await;
+    let end = match ended {
+        Ok(status) => end_of(status),
+        Err(error) => ChildEnd::Failed(format!("its end could not be learned: {error}")),
+    };
+    // The broker may have stopped meanwhile.
+    let _ = events.send(Event::Exited { launch, end });
+}
+
+fn end_of(status: std::process::ExitStatus) -> ChildEnd {
+    use std::os::unix::process::ExitStatusExt;
+    let manifest = "see its manifest";
+    match (status.code(), status.signal()) {
+        // What the shell says when it cannot start a command.
+        (Some(code @ 127), _) => ChildEnd::NotStarted(format!(
+            "its command was not found (exit code {code}); {manifest}"
+        )),
+        (Some(code @ 126), _) => ChildEnd::NotStarted(format!(
+            "its command cannot be run (exit code {code}); {manifest}"
+        )),
+        (Some(0), _) => ChildEnd::Done("it ended with exit code 0".to_owned()),
+        (Some(code), _) => ChildEnd::Failed(format!("it ended with exit code {code}")),
+        (None, Some(signal)) => ChildEnd::Failed(format!("it was killed by signal {signal}")),
+        (None, None) => ChildEnd::Failed("it ended".to_owned()),
+    }
+}
