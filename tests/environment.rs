@@ -193,6 +193,15 @@ fn one_shot_module_is_run_by_the_python_of_the_environment() {
     });
     service.farm.let_in_module("mine", &module);
     assert_eq!(service.version(), "7.1");
+    // What the command writes has the whole path of the same one.
+    let command = format!("python3 {}", service.script().display());
+    let (code, text) = service.add(&service.program, &["--asam", &command]);
+    assert_eq!(code, Some(0), "{text}");
+    assert!(
+        service
+            .command()
+            .starts_with(service.python.to_str().unwrap())
+    );
 }
 
 #[test]

@@ -1,17 +1,19 @@
 //! What children say before they have joined: it goes to the broker's log as it comes, and the end of it is kept for
 //! whoever wants to know why a bundle is not ready.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::io::{Read as _, Write as _};
 use std::os::fd::{AsFd as _, AsRawFd as _, OwnedFd};
 use std::process::Stdio;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use qcbus_bus::STDERR;
 use rustix::pipe::{PipeFlags, pipe_with};
 use tokio::process::Command;
 use tokio::sync::oneshot;
+
+use crate::core::Launch;
 
 /// The last lines that are kept of a child, and the bytes of each.
 const LINES: usize = 8;
@@ -24,18 +26,37 @@ const READ_WITHIN: Duration = Duration::from_millis(500);
 
 /// The last words of children that have ended, by name.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct LastWords(Arc<Mutex<BTreeMap<String, Vec<String>>>>);
+pub(crate) struct LastWords(Arc<Mutex<Kept>>);
+
+#[derive(Debug, Default)]
+struct Kept {
+    words: BTreeMap<String, Vec<String>>,
+    /// Those that have joined and have not ended: they said more since than was heard.
+    joined: BTreeSet<Launch>,
+}
 
 impl LastWords {
     /// The last lines that a child of this name has said, when it has ended.
     pub fn of(&self, name: &str) -> Vec<String> {
-        let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        all.get(name).cloned().unwrap_or_default()
+        self.kept().words.get(name).cloned().unwrap_or_default()
+    }
+
+    /// A process has joined: nobody asks what it said before.
+    pub fn joined(&self, launch: Launch) {
+        self.kept().joined.insert(launch);
+    }
+
+    /// A process has not even begun: what the one before it said is not about this one.
+    pub fn forget(&self, name: &str) {
+        self.kept().words.remove(name);
     }
 
     /// Takes down what a child has said that has just ended.
-    pub async fn take_down(&self, name: String, heard: Option<Heard>) {
-        let Some(heard) = heard else { return };
+    pub async fn take_down(&self, launch: Launch, name: String, heard: Option<Heard>) {
+        let Some(heard) = heard else {
+            self.kept().joined.remove(&launch);
+            return;
+        };
         // The sender is dropped when everything was read.
         let _ = tokio::time::timeout(READ_WITHIN, heard.read).await;
         let lines = heard
@@ -43,11 +64,17 @@ impl LastWords {
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .lines();
-        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if all.len() >= CHILDREN && !all.contains_key(&name) {
-            all.pop_first();
+        let mut kept = self.kept();
+        let has_joined = kept.joined.remove(&launch);
+        let words = &mut kept.words;
+        if words.len() >= CHILDREN && !words.contains_key(&name) {
+            words.pop_first();
         }
-        all.insert(name, lines);
+        words.insert(name, if has_joined { Vec::new() } else { lines });
+    }
+
+    fn kept(&self) -> MutexGuard<'_, Kept> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -168,14 +195,26 @@ mod tests {
     #[tokio::test]
     async fn words_of_a_child_are_there_when_it_has_ended() {
         let words = LastWords::default();
-        let mut command = Command::new("sh");
-        command.args(["-c", "echo early >&2; echo 'no module' >&2; exit 1"]);
-        let heard = listen_to(&mut command);
-        let mut child = command.spawn().unwrap();
-        drop(command);
-        child.wait().await.unwrap();
-        words.take_down("mine".to_owned(), heard).await;
+        let run = async |launch: u64| {
+            let mut command = Command::new("sh");
+            command.args(["-c", "echo early >&2; echo 'no module' >&2; exit 1"]);
+            let heard = listen_to(&mut command);
+            let mut child = command.spawn().unwrap();
+            drop(command);
+            child.wait().await.unwrap();
+            words
+                .take_down(Launch(launch), "mine".to_owned(), heard)
+                .await;
+        };
+        run(1).await;
         assert_eq!(words.of("mine"), ["early", "no module"]);
         assert!(words.of("other").is_empty());
+        words.forget("mine");
+        assert!(words.of("mine").is_empty());
+        words.joined(Launch(3));
+        run(2).await;
+        assert_eq!(words.of("mine"), ["early", "no module"]);
+        run(3).await;
+        assert!(words.of("mine").is_empty(), "it had joined");
     }
 }

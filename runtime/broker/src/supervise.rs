@@ -133,6 +133,7 @@ impl Children {
                 tokio::spawn(watch(launch, name, started, words, self.events.clone()));
             }
             Err(why) => {
+                self.last_words.forget(&spec.name);
                 let end = ChildEnd::NotStarted(why);
                 // The loop that receives this is the one that called; it is there.
                 let _ = self.events.send(Event::Exited { launch, end });
@@ -280,6 +281,9 @@ impl Children {
                 name.escape_debug(),
                 launch.0
             ));
+        }
+        if own.is_some() {
+            self.last_words.joined(launch);
         }
         if let (None, Some(process)) = (own, process) {
             self.adopted.retain(|_, process| process.is_alive());

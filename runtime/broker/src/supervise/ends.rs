@@ -15,7 +15,7 @@ pub(super) async fn watch(
     events: UnboundedSender<Event>,
 ) {
     let ended = started.child.wait().await;
-    words.take_down(name, started.heard).await;
+    words.take_down(launch, name, started.heard).await;
     let end = match ended {
         Ok(status) => end_of(status),
         Err(error) => ChildEnd::Failed(format!("its end could not be learned: {error}")),
