@@ -81,6 +81,11 @@ fn explain(asked: &Path, at: &Path, why: &Foreign) -> String {
             "{place} belongs to user {them} and not to user {us}, who runs this, {end}: run this as user \
              {them} (`docker run --user {them}`), or make it yours (`chown {us}`) after a look at what is in it"
         ),
+        Foreign::World(mode) | Foreign::Group(mode, _) if mode & 0o1000 != 0 => format!(
+            "others may write to {place} (mode {mode:04o}; its sticky bit only protects what is there \
+             already), {end}: use a directory of your own below it ({}/NAME)",
+            place.trim_end_matches('/')
+        ),
         Foreign::World(mode) => format!(
             "everybody may write to {place} (mode {mode:04o}), {end}: take that away (`chmod o-w`), or see to \
              it that a directory's entries are their owners' (`chmod +t`) and keep what is yours below it"
