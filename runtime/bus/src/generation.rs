@@ -27,6 +27,8 @@ const CURRENT: &str = "current";
 const IDENTITY: &str = "id";
 /// What a living broker keeps locked in its shared memory.
 const LIFE: &str = "broker";
+/// Its name until it is locked.
+const UNNAMED_LIFE: &str = "broker.new";
 /// Bytes of what is in it.
 const IDENTITY_LEN: usize = 18;
 /// A broker locks its shared memory within microseconds of making it, unless it is stopped in between.
@@ -87,17 +89,10 @@ impl Generation {
         })
     }
 
-    /// Keeps its shared memory from [`sweep_strays`] as long as the file is open.
+    /// Keeps its shared memory from [`sweep_strays`] as long as the file is open. It gets its name when it is
+    /// locked, or another start would take an unlocked one for that of a dead broker and remove the memory.
     pub(crate) fn lock_memory(&self) -> io::Result<File> {
-        let mut options = File::options();
-        let file = options
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .mode(0o600)
-            .open(self.root.join(LIFE))?;
-        flock(&file, FlockOperation::NonBlockingLockExclusive)?;
-        Ok(file)
+        lock_life(&self.root, || {})
     }
 
     /// Makes this the generation in force.
@@ -189,6 +184,18 @@ pub(crate) fn sweep_strays() -> usize {
     strays
         .filter(|it| door::shut_and_remove(it).is_ok())
         .count()
+}
+
+/// `unlocked` is called between making the file and locking it.
+fn lock_life(root: &Path, unlocked: impl FnOnce()) -> io::Result<File> {
+    let path = root.join(UNNAMED_LIFE);
+    let mut how = File::options();
+    let how = how.write(true).create_new(true).mode(0o600);
+    let file = how.open(&path)?;
+    unlocked();
+    flock(&file, FlockOperation::NonBlockingLockExclusive)?;
+    fs::rename(&path, root.join(LIFE))?;
+    Ok(file)
 }
 
 /// Nobody has it who lives. A broker that has not locked its own yet has no file of that name; nor has what somebody
@@ -316,6 +323,17 @@ mod tests {
         assert!(!is_stray(&root), "its broker may be about to lock it");
         age(&root, UNLOCKED_FOR);
         assert!(is_stray(&root));
+        door::shut_and_remove(&root).unwrap();
+    }
+
+    #[test]
+    fn broker_that_has_not_locked_its_memory_yet_is_no_stray() {
+        let root = root();
+        let mut seen = None;
+        let life = lock_life(&root, || seen = Some(is_stray(&root))).unwrap();
+        assert_eq!((seen, is_stray(&root)), (Some(false), false));
+        drop(life);
+        assert!(is_stray(&root), "it has died");
         door::shut_and_remove(&root).unwrap();
     }
 
