@@ -20,6 +20,7 @@ use serde::{Deserialize, Serialize};
 use crate::door;
 use crate::instance::Instance;
 use crate::memory::SHARED_MEMORY;
+use crate::options::StartError;
 use crate::ports::ICEORYX2_VERSION;
 use crate::process::{Process, start_time};
 
@@ -62,7 +63,7 @@ impl Generation {
     }
 
     /// A new generation, not yet announced. To be called under the instance's lock.
-    pub(crate) fn begin(instance: &Instance, limits: Limits) -> io::Result<Generation> {
+    pub(crate) fn begin(instance: &Instance, limits: Limits) -> Result<Generation, StartError> {
         // What a broker leaves that is killed while it writes one of its files.
         for name in names_in(instance.dir()) {
             if name.starts_with(".tmp") {
@@ -75,8 +76,8 @@ impl Generation {
         let _ = fs::remove_dir_all(&dir);
         fs::DirBuilder::new().mode(0o700).create(&dir)?;
         let prefix = format!("{identity}{number:x}_");
-        let root = root_in_memory(&prefix)?;
-        door::make(&root)?;
+        let root = root_in_memory(&prefix).map_err(StartError::shared_memory)?;
+        door::make(&root).map_err(StartError::shared_memory)?;
         Ok(Generation {
             number,
             prefix,
@@ -270,7 +271,7 @@ pub(crate) fn random() -> u64 {
 /// every service and port: in memory, and open to nobody else. Its name cannot be known beforehand, so
 /// nobody can take it first.
 fn root_in_memory(prefix: &str) -> io::Result<PathBuf> {
-    let mut last = io::Error::from(io::ErrorKind::AlreadyExists);
+    let mut last = io::ErrorKind::AlreadyExists.into();
     for _ in 0..ATTEMPTS {
         // iceoryx2 binds Unix sockets in it, whose own names take up to 48 of the kernel's 107 bytes.
         let name = format!("{prefix}{:08x}", random() >> 32);
@@ -280,8 +281,7 @@ fn root_in_memory(prefix: &str) -> io::Result<PathBuf> {
             Err(error) => last = error,
         }
     }
-    let text = format!("cannot make a directory in {SHARED_MEMORY}: {last}");
-    Err(io::Error::new(last.kind(), text))
+    Err(last)
 }
 
 /// Takes from group and others what iceoryx2 gives them of its own accord, whatever the umask is.

@@ -205,9 +205,11 @@ impl Host {
         let needed = own + room + fitting_reserve(options.shm_reserve_bytes);
         look_for_room(needed)?;
         let generation = Generation::begin(instance, limits)?;
-        let memory_lock = generation.lock_memory()?;
+        let memory_lock = generation
+            .lock_memory()
+            .map_err(StartError::shared_memory)?;
         // Somebody who takes no turns may have been faster.
-        keep_room(&generation.root, room).map_err(|_| no_room(needed))?;
+        keep_room(&generation.root, room).map_err(|error| StartError::no_room(error, needed))?;
         let hub = Hub::create(&generation.root)?;
         let documents = Documents::new(
             &hub,
@@ -220,7 +222,7 @@ impl Host {
         let hello = subscribe(&hub, &services.hello)?;
         let config = publish(&hub, &services.config)?;
         let waker = Waker::new(ports::listener(&wake)?)?;
-        close_to_others(&generation.root)?;
+        close_to_others(&generation.root).map_err(StartError::shared_memory)?;
         let presence = Arc::new(Presence::new(instance, &generation, &lock));
         let host = Host {
             hello,
@@ -677,18 +679,11 @@ impl Drop for Host {
 
 /// Whether a broker has room to start.
 fn look_for_room(needed: u64) -> Result<(), StartError> {
-    let memory = SharedMemory::now()?;
+    let SharedMemory { size, free } = SharedMemory::now().map_err(StartError::shared_memory)?;
     // A memory of size 0 has no limit.
-    match memory.size == 0 || memory.free >= needed {
+    match size == 0 || free >= needed {
         true => Ok(()),
-        false => Err(no_room(needed)),
-    }
-}
-
-fn no_room(needed: u64) -> StartError {
-    match SharedMemory::now() {
-        Ok(SharedMemory { size, free }) => StartError::NoSharedMemory { size, free, needed },
-        Err(error) => StartError::Io(error),
+        false => Err(StartError::NoSharedMemory { size, free, needed }),
     }
 }
 

@@ -7,6 +7,7 @@
 
 use std::fs::{self, File, OpenOptions};
 use std::io;
+use std::ops::Range;
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -14,6 +15,7 @@ use std::time::{Duration, Instant};
 
 use qcbus_messages::services::STREAM_STEP_BYTES;
 use rustix::fs::{FallocateFlags, FlockOperation, fallocate, flock};
+use rustix::io::{Errno, retry_on_intr};
 
 use crate::instance::Instance;
 
@@ -23,6 +25,9 @@ pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 /// A turn takes milliseconds, and many processes may stand in line on a busy machine. Whoever waits
 /// longer waits for a process that was stopped in its turn.
 const IN_LINE: Duration = Duration::from_secs(10);
+
+/// Bytes that are had by one call: some hundred microseconds.
+const HAVE_STEP: u64 = 256 << 10;
 
 /// The shared memory of this system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,6 +39,15 @@ pub struct SharedMemory {
 }
 
 impl SharedMemory {
+    /// Whether it is mounted for reading only, so that no broker can start.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn is_read_only() -> io::Result<bool> {
+        let stat = rustix::fs::statvfs(SHARED_MEMORY)?;
+        Ok(stat.f_flag.contains(rustix::fs::StatVfsMountFlags::RDONLY))
+    }
+
     /// As it is now.
     ///
     /// # Errors
@@ -120,10 +134,29 @@ pub(crate) fn keep_room(root: &Path, bytes: u64) -> io::Result<()> {
     let path = room(root);
     let mut how = OpenOptions::new();
     let file = how.write(true).create_new(true).mode(0o600).open(&path)?;
-    fallocate(&file, FallocateFlags::empty(), 0, bytes.max(1)).map_err(|error| {
+    have(&file, FallocateFlags::empty(), 0..bytes.max(1)).map_err(|error| {
         let _ = fs::remove_file(&path);
         error.into()
     })
+}
+
+/// Has the memory of a part of a file.
+fn have(file: &File, flags: FallocateFlags, part: Range<u64>) -> Result<(), Errno> {
+    in_steps(part, |from, bytes| fallocate(file, flags, from, bytes))
+}
+
+/// Older kernels end a call at any signal and undo it, so it is done in short steps, and each is repeated.
+fn in_steps(
+    part: Range<u64>,
+    mut take: impl FnMut(u64, u64) -> Result<(), Errno>,
+) -> Result<(), Errno> {
+    let mut from = part.start;
+    while from < part.end {
+        let step = HAVE_STEP.min(part.end - from);
+        retry_on_intr(|| take(from, step))?;
+        from += step;
+    }
+    Ok(())
 }
 
 /// Gives back a part of what was kept for those who join. `false`: there is not so much left.
@@ -215,11 +248,11 @@ impl Backing {
             return true;
         }
         let until = wanted.saturating_add(STREAM_STEP_BYTES / 2).min(self.len);
-        let done = fallocate(file, FallocateFlags::KEEP_SIZE, self.had, until - self.had);
+        let done = have(file, FallocateFlags::KEEP_SIZE, self.had..until);
         match done {
             Ok(()) => self.had = until,
             // A file system without it: there the reserve alone has to do.
-            Err(rustix::io::Errno::OPNOTSUPP) => self.had = self.len,
+            Err(Errno::OPNOTSUPP) => self.had = self.len,
             Err(error) => tracing::debug!(%error, "no shared memory for further frames"),
         }
         wanted.min(self.len) <= self.had
@@ -239,4 +272,40 @@ fn segment(root: &Path, publisher: u128) -> Option<File> {
     let mut how = OpenOptions::new();
     let how = how.read(true).write(true).custom_flags(libc::O_NOFOLLOW);
     how.open(found.path()).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::options::StartError;
+
+    #[test]
+    fn interrupted_step_is_repeated_and_nothing_is_left_out() {
+        let (mut calls, mut had) = (0, 0);
+        let done = in_steps(0..HAVE_STEP * 2 + 1, |from, bytes| {
+            calls += 1;
+            if calls % 2 == 1 {
+                return Err(Errno::INTR);
+            }
+            assert_eq!(from, had);
+            had += bytes;
+            Ok(())
+        });
+        assert_eq!((done, had, calls), (Ok(()), HAVE_STEP * 2 + 1, 6));
+    }
+
+    #[test]
+    fn step_without_room_is_told() {
+        let done = in_steps(0..1, |_, _| Err(Errno::NOSPC));
+        assert_eq!(done, Err(Errno::NOSPC));
+    }
+
+    #[test]
+    fn room_in_a_directory_that_was_removed_is_not_called_a_lack_of_room() {
+        let dir = tempfile::TempDir::new_in(SHARED_MEMORY).unwrap();
+        let error = keep_room(&dir.path().join("gone"), 1).unwrap_err();
+        let said = StartError::no_room(error, u64::MAX).to_string();
+        let expected = "cannot use the shared memory in /dev/shm: No such file or directory";
+        assert!(said.starts_with(expected), "{said}");
+    }
 }

@@ -3,6 +3,7 @@
 use qcbus_messages::services::{Limits, Services};
 
 use crate::instance::InstanceError;
+use crate::memory::SharedMemory;
 use crate::memory::fitting_reserve;
 use crate::ports::PortError;
 
@@ -142,6 +143,15 @@ pub enum StartError {
         /// Bytes that must be free.
         needed: u64,
     },
+    /// Shared memory cannot be used, for another reason than its size.
+    #[error(
+        "cannot use the shared memory in /dev/shm: {source}{}",
+        shared_memory_way_out(source)
+    )]
+    SharedMemory {
+        /// What the system says.
+        source: std::io::Error,
+    },
     /// The process may not map the bus.
     #[error(
         "the address space of this process is limited to {limit} bytes (`ulimit -v`), a broker for so many bundles needs {needed}; raise it with `ulimit -v unlimited`"
@@ -158,14 +168,45 @@ pub enum StartError {
 }
 
 impl StartError {
+    pub(crate) fn shared_memory(source: std::io::Error) -> StartError {
+        StartError::SharedMemory { source }
+    }
+
+    /// Why room was not had, although so many bytes were free a moment ago.
+    pub(crate) fn no_room(source: std::io::Error, needed: u64) -> StartError {
+        let is_full = source.kind() == std::io::ErrorKind::StorageFull;
+        match SharedMemory::now() {
+            Ok(SharedMemory { size, free }) if is_full && free < needed => {
+                StartError::NoSharedMemory { size, free, needed }
+            }
+            _ => StartError::SharedMemory { source },
+        }
+    }
+
     /// Whether it may pass by itself, when others let go of shared memory.
     pub fn may_pass(&self) -> bool {
-        matches!(self, StartError::NoSharedMemory { size, needed, .. } if needed <= size)
+        match self {
+            StartError::NoSharedMemory { size, needed, .. } => needed <= size,
+            StartError::SharedMemory { source } => source.kind() == std::io::ErrorKind::StorageFull,
+            _ => false,
+        }
     }
 }
 
 /// Sizes are advised in steps of so many bytes: people remember them.
 const STEP: u64 = 64 << 20;
+
+fn shared_memory_way_out(source: &std::io::Error) -> &'static str {
+    match source.kind() {
+        std::io::ErrorKind::ReadOnlyFilesystem => {
+            "; make it writable: `mount -o remount,rw /dev/shm`, for a container `docker run --tmpfs /dev/shm`"
+        }
+        std::io::ErrorKind::PermissionDenied => {
+            "; let this user make directories there: `chmod 1777 /dev/shm`"
+        }
+        _ => "",
+    }
+}
 
 fn way_out(size: u64, free: u64, needed: u64) -> String {
     let taken = size.saturating_sub(free);
