@@ -90,6 +90,11 @@ const SHM_WANTED: u64 = 512 << 20;
 fn shared_memory() -> Remark {
     let what = "shared memory";
     let advice = "mount /dev/shm larger (`mount -o remount,size=2G /dev/shm`; containers: --shm-size=2g), or remove what others left there";
+    if let Ok(true) = SharedMemory::is_read_only() {
+        let text = "/dev/shm is mounted for reading only: no broker can start".to_owned();
+        let advice = "make it writable: `mount -o remount,rw /dev/shm`";
+        return bad(what, text, advice);
+    }
     match SharedMemory::now() {
         Ok(memory) => {
             let (free, size) = (memory.free, memory.size);
