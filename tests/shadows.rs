@@ -40,14 +40,15 @@ fn add_strict(farm: &Farm) {
     );
 }
 
-/// What is told of the trials, once all of them are over.
-fn trials(farm: &Farm, name: &str) -> (Option<i32>, serde_json::Value) {
+/// What is told of the trials, once so many files are tried and none waits.
+fn trials(farm: &Farm, name: &str, tried: u64) -> (Option<i32>, serde_json::Value) {
     until_or(
         "everything is tried",
         || {
             let (code, text) = bundle(farm, &["trials", name, "--json"]);
             let told: serde_json::Value = serde_json::from_str(&text).ok()?;
-            (told["counts"]["waiting"] == 0).then_some((code, told))
+            let counts = &told["counts"];
+            (counts["waiting"] == 0 && counts["tried"] == tried).then_some((code, told))
         },
         || tail(&farm.log()),
     )
@@ -81,7 +82,7 @@ fn what_it_would_change_is_told_and_nothing_is_changed_until_it_judges() {
         );
     }
     let epoch = farm.status().unwrap().epoch;
-    let (code, told) = trials(&farm, STRICT);
+    let (code, told) = trials(&farm, STRICT, 4);
     assert_eq!(code, Some(1), "something would be rejected: {told}");
     let counts = &told["counts"];
     assert_eq!(
@@ -121,7 +122,7 @@ fn what_it_would_change_is_told_and_nothing_is_changed_until_it_judges() {
     let (code, text) = bundle(&farm, &["upgrade", STRICT, "--shadow"]);
     assert_eq!(code, Some(0), "{text}");
     assert_eq!(verdict("before.xodr"), Verdict::Accepted);
-    assert_eq!(trials(&farm, STRICT).1["counts"]["would_reject"], 2);
+    assert_eq!(trials(&farm, STRICT, 4).1["counts"]["would_reject"], 2);
 }
 
 fn told_status(farm: &Farm) -> (Option<i32>, String) {
@@ -194,7 +195,7 @@ fn a_configuration_that_names_a_shadow_does_not_miss_it() {
     let _broker = farm.serve_ready();
     farm.write("a.xodr", &Content::Marked(1).bytes());
     assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Accepted);
-    assert_eq!(trials(&farm, STRICT).1["counts"]["would_reject"], 1);
+    assert_eq!(trials(&farm, STRICT, 1).1["counts"]["would_reject"], 1);
     let (_, text) = told_status(&farm);
     assert!(text.contains("which is a shadow"), "that is said: {text}");
     // Taken away it is one that is demanded and not there.
@@ -234,10 +235,10 @@ fn after_a_restart_everything_is_tried_again() {
     let broker = farm.serve_ready();
     farm.write("a.xodr", &Content::Marked(1).bytes());
     add_strict(&farm);
-    assert_eq!(trials(&farm, STRICT).1["counts"]["would_reject"], 1);
+    assert_eq!(trials(&farm, STRICT, 1).1["counts"]["would_reject"], 1);
     drop(broker);
     let _broker = farm.serve_ready();
-    assert_eq!(trials(&farm, STRICT).1["counts"]["would_reject"], 1);
+    assert_eq!(trials(&farm, STRICT, 1).1["counts"]["would_reject"], 1);
     farm.settle(1);
     assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Accepted);
 }
