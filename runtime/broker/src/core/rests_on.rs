@@ -178,12 +178,15 @@ impl State {
     }
 
     /// A broker may have been killed between a verdict and those of the files that rest on it: those that counted
-    /// in another one are given anew.
+    /// in another one are given anew. So are those that rest on a file which is not judged any more.
     pub(super) fn count_again(&mut self) {
         let files = self.files.iter().filter(|(_, entry)| entry.present);
         let outdated = files.filter(|(_, entry)| {
             let judged = entry.judged.as_ref();
-            judged.is_some_and(|judged| self.counted_otherwise(judged))
+            judged.is_some_and(|judged| {
+                let mut under = judged.rests_on.iter().flatten();
+                self.counted_otherwise(judged) || under.any(|it| self.entry_of(&it.path).is_none())
+            })
         });
         let outdated: Vec<FileId> = outdated.map(|(id, _)| id).collect();
         for id in outdated {

@@ -17,7 +17,9 @@ use crate::reload::Fingerprint;
 use crate::result_paths::ResultPaths;
 use crate::scouts::{PATIENCE, Scouts};
 use crate::stamp::{stamp_of, stamp_through_links};
-use crate::watch::{NoFile, Sight, is_behind_a_link, is_left_alone, is_looked_at, look_at};
+use crate::watch::{
+    NoFile, Sight, hidden_above, is_behind_a_link, is_left_alone, is_looked_at, look_at,
+};
 
 /// Who looks at files, and for whom.
 pub(super) struct Looks {
@@ -298,8 +300,7 @@ impl Broker {
 /// directory.
 fn meant(file: &Path, places: &ResultPaths, roots: &[PathBuf]) -> Option<PathBuf> {
     if !places.contains(file) {
-        let real = foreign::canonicalize(file).ok();
-        return real.filter(|real| places.contains(real));
+        return led_to(file, |at| places.contains(at));
     }
     if !is_behind_a_link(file, roots) {
         return None;
@@ -307,6 +308,23 @@ fn meant(file: &Path, places: &ResultPaths, roots: &[PathBuf]) -> Option<PathBuf
     let real = foreign::canonicalize(file.parent()?).ok()?;
     let real = real.join(file.file_name()?);
     is_looked_at(roots, &real).then_some(real)
+}
+
+/// More links in a row than the kernel follows.
+const MOST_LINKS: usize = 40;
+
+/// Follows links to a file one by one, because one of them may be the name under which a file is judged.
+fn led_to(file: &Path, is_meant: impl Fn(&Path) -> bool) -> Option<PathBuf> {
+    let mut next = file.to_path_buf();
+    for _ in 0..MOST_LINKS {
+        let directory = foreign::canonicalize(next.parent()?).ok()?;
+        let at = directory.join(next.file_name()?);
+        if is_meant(&at) {
+            return Some(at);
+        }
+        next = foreign::visit(&at, || Ok(directory.join(std::fs::read_link(&at)?))).ok()?;
+    }
+    None
 }
 
 fn moved(inputs: Vec<Input>) -> Vec<Changed> {
@@ -355,6 +373,14 @@ fn why_unwatched(
         ))
     } else if !places.contains(file) {
         Some(format!("{shown} lies outside the watched directories"))
+    } else if let Some(hidden) = file.parent().and_then(|it| hidden_above(roots, it)) {
+        let name = hidden.file_name().map(Path::new).map(to_text);
+        Some(format!(
+            "{shown} lies in the hidden directory {}, and such are passed over; name it as a directory to watch, or \
+             put `!{}/` into a .qcignore",
+            to_text(&hidden),
+            name.unwrap_or_default()
+        ))
     } else if stamp.is_some() && is_left_alone(roots, file) {
         Some(format!("{shown} is ignored (by its name or a .qcignore)"))
     } else if stamp.is_some() && !is_looked_at(roots, file) {

@@ -18,6 +18,7 @@ use crate::gate::GateError;
 use crate::journal::{Entry, Remembered};
 use crate::result_paths::verdict_beside;
 use crate::stamp::{stamp_of, stamp_through_links};
+use crate::watch::hidden_above;
 use qcbus_disk::{FileMark, remove, remove_empty_above};
 
 /// What stands after all was looked through.
@@ -97,7 +98,9 @@ impl Store {
 
     fn fall_of(&self, row: &Remembered) -> Option<Fall> {
         let (path, judged) = (&row.path, &row.judged);
-        if !self.places.contains(path) {
+        let directory = path.parent();
+        let hidden = directory.and_then(|it| hidden_above(&self.places.roots, it));
+        if !self.places.contains(path) || hidden.is_some() {
             return Some(Fall::Unwatched);
         }
         // One that could not be written anywhere is tried anew.

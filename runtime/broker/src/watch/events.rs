@@ -9,7 +9,7 @@ use qcbus_document::FileKind;
 use rustix::fs::inotify::ReadFlags;
 
 use super::Seen;
-use super::ignore::{IGNORE_FILE, is_ignored_directory, is_ignored_file};
+use super::ignore::{IGNORE_FILE, is_ignored_file, passes_over};
 use super::looker::Looker;
 use super::sight::{Sight, look_at};
 use super::tree::{Told, Unwatched};
@@ -227,7 +227,7 @@ impl Looker {
     }
 
     fn directory_event(&mut self, path: &Path, what: ReadFlags) {
-        if is_ignored_directory(path) {
+        if passes_over(&mut self.rules, path) {
             return;
         }
         if what.intersects(ReadFlags::CREATE | ReadFlags::MOVED_TO) {

@@ -13,7 +13,7 @@ use qcbus_messages::control::Unseen;
 
 use super::dependencies::{self, Changed, Dependencies, events_tell};
 use super::due::Due;
-use super::ignore::IgnoreRules;
+use super::ignore::{IgnoreRules, ignores};
 use super::roots::Roots;
 use super::scan::{MORE_UNSEEN, MOST_UNSEEN};
 use super::settle::Settling;
@@ -148,9 +148,7 @@ impl Looker {
     }
 
     pub fn ignored(&mut self, path: &Path, is_dir: bool) -> bool {
-        self.rules
-            .iter_mut()
-            .all(|rules| rules.ignores(path, is_dir))
+        ignores(&mut self.rules, path, is_dir)
     }
 
     /// Compares a path with what was last said of it, and says what is new.

@@ -35,7 +35,7 @@ use self::scan::scan;
 use crate::core::Stamp;
 use crate::seams::{Bell, Sender, channel, thread};
 
-pub use self::ignore::is_excluded;
+pub use self::ignore::{hidden_above, is_excluded};
 pub use self::scan::Scan;
 pub use self::sight::{NoFile, Sight, is_behind_a_link, look_at};
 pub(crate) use self::tree::{Told, Tree, Unwatched, below};

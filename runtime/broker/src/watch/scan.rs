@@ -5,13 +5,14 @@ use std::ffi::OsStr;
 use std::io;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
+use std::slice;
 
 use qcbus_disk::foreign;
 use qcbus_document::FileKind;
 use qcbus_messages::control::Unseen;
 use rustix::fs::{AtFlags, Dir, FileType};
 
-use super::ignore::{IgnoreRules, is_ignored_directory};
+use super::ignore::{IgnoreRules, ignores, passes_over};
 use super::sight::{Sight, look_at, open_directory};
 use crate::core::Stamp;
 use crate::stamp::from_statat;
@@ -52,8 +53,7 @@ pub fn scan(directory: &Path, roots: &[PathBuf], rules: &mut IgnoreRules) -> Sca
             scan.unseen.push(Unseen { path: at, why });
             continue;
         }
-        let mut ignores = |path: &Path, is_dir| rules.ignores(path, is_dir);
-        let found = list(&at, roots, &mut ignores);
+        let found = list(&at, roots, slice::from_mut(rules));
         let mut inner = found.directories;
         inner.retain(|it| !rules.ignores(it, true));
         directories.extend(inner);
@@ -108,7 +108,7 @@ pub struct Listing {
     pub files: Vec<(PathBuf, Stamp)>,
     /// Symbolic links whose names promise a file to check, whatever lies behind them.
     pub links: Vec<PathBuf>,
-    /// Directories to look into, ignored ones, too.
+    /// Directories to look into, also those that a `.qcignore` excludes: others may depend on files there.
     pub directories: Vec<PathBuf>,
     /// What could not be looked at.
     pub unseen: Vec<Unseen>,
@@ -117,15 +117,11 @@ pub struct Listing {
 }
 
 /// Looks through one directory, and through none to which its path has become a link.
-pub fn list(
-    directory: &Path,
-    roots: &[PathBuf],
-    ignores: &mut impl FnMut(&Path, bool) -> bool,
-) -> Listing {
+pub fn list(directory: &Path, roots: &[PathBuf], rules: &mut [IgnoreRules]) -> Listing {
     let mut listing = Listing::default();
     let read = foreign::visit(directory, || {
         let mut opened = Dir::new(open_directory(directory, roots)?)?;
-        listing.read(directory, &mut opened, roots, ignores);
+        listing.read(directory, &mut opened, roots, rules);
         Ok(())
     });
     listing.broken = read.err().or(listing.broken);
@@ -139,7 +135,7 @@ impl Listing {
         directory: &Path,
         opened: &mut Dir,
         roots: &[PathBuf],
-        ignores: &mut impl FnMut(&Path, bool) -> bool,
+        rules: &mut [IgnoreRules],
     ) {
         while let Some(entry) = opened.read() {
             let entry = match entry {
@@ -165,26 +161,26 @@ impl Listing {
                     });
                     match data {
                         Ok(data) if FileType::from_raw_mode(data.st_mode).is_file() => {
-                            self.file(path, from_statat(&data), ignores);
+                            self.file(path, from_statat(&data), rules);
                         }
                         // It has become another thing since.
-                        _ => self.other(path, is_checkable, roots, ignores),
+                        _ => self.other(path, is_checkable, roots, rules),
                     }
                 }
-                FileType::Directory => self.directory(path),
-                _ => self.other(path, is_checkable, roots, ignores),
+                FileType::Directory => self.directory(path, rules),
+                _ => self.other(path, is_checkable, roots, rules),
             }
         }
     }
 
-    fn file(&mut self, path: PathBuf, stamp: Stamp, ignores: &mut impl FnMut(&Path, bool) -> bool) {
-        if !ignores(&path, false) {
+    fn file(&mut self, path: PathBuf, stamp: Stamp, rules: &mut [IgnoreRules]) {
+        if !ignores(rules, &path, false) {
             self.files.push((path, stamp));
         }
     }
 
-    fn directory(&mut self, path: PathBuf) {
-        if !is_ignored_directory(&path) {
+    fn directory(&mut self, path: PathBuf, rules: &mut [IgnoreRules]) {
+        if !passes_over(rules, &path) {
             self.directories.push(path);
         }
     }
@@ -195,17 +191,17 @@ impl Listing {
         path: PathBuf,
         is_checkable: bool,
         roots: &[PathBuf],
-        ignores: &mut impl FnMut(&Path, bool) -> bool,
+        rules: &mut [IgnoreRules],
     ) {
         // What ends in a slash in a `.qcignore` is meant for a directory behind a link, too.
-        if ignores(&path, false) || ignores(&path, true) {
+        if ignores(rules, &path, false) || ignores(rules, &path, true) {
             return;
         }
         if is_checkable {
             self.links.push(path.clone());
         }
         match look_at(&path, roots) {
-            Sight::Directory => self.directory(path),
+            Sight::Directory => self.directory(path, rules),
             Sight::File(stamp) if is_checkable => self.files.push((path, stamp)),
             Sight::NoFile(what) if is_checkable || what.hides_more() => {
                 let why = what.to_string();

@@ -8,6 +8,7 @@ use qcbus_disk::foreign;
 use rustix::fs::{CWD, Mode, OFlags, ResolveFlags};
 use rustix::io::Errno;
 
+use super::ignore::hidden_above;
 use crate::core::Stamp;
 use crate::stamp::from_metadata;
 
@@ -102,7 +103,7 @@ fn behind(link: &Path, roots: &[PathBuf]) -> Sight {
     match std::fs::metadata(link) {
         Ok(data) if data.is_file() => Sight::File(from_metadata(&data)),
         Ok(data) if data.is_dir() => match std::fs::canonicalize(link) {
-            Ok(real) if roots.iter().any(|root| real.starts_with(root)) => Sight::Known,
+            Ok(real) if is_looked_into(roots, &real) => Sight::Known,
             Ok(real) => Sight::NoFile(NoFile::Outside(real)),
             Err(error) => Sight::Hidden(format!("cannot look behind this link: {error}")),
         },
@@ -115,6 +116,12 @@ fn behind(link: &Path, roots: &[PathBuf]) -> Sight {
         Err(error) if error.raw_os_error() == Some(libc::ELOOP) => Sight::NoFile(NoFile::Loop),
         Err(error) => Sight::Hidden(format!("cannot look behind this link: {error}")),
     }
+}
+
+/// Whether a directory is looked at where it lies. Nobody misses what tools keep there.
+fn is_looked_into(roots: &[PathBuf], directory: &Path) -> bool {
+    let is_inside = roots.iter().any(|root| directory.starts_with(root));
+    is_inside && hidden_above(roots, directory).is_none()
 }
 
 /// Whether a path below a root leads through a symbolic link to a directory. What lies there is not
@@ -211,6 +218,9 @@ mod tests {
         let above = root.parent().unwrap();
         let up = Sight::NoFile(NoFile::Outside(above.to_path_buf()));
         assert_eq!(link("up", above), up);
+        std::fs::create_dir(root.join(".work")).unwrap();
+        let hidden = Sight::NoFile(NoFile::Outside(root.join(".work")));
+        assert_eq!(link("work", &root.join(".work")), hidden);
         assert_eq!(
             link("self", &root.join("self")),
             Sight::NoFile(NoFile::Loop)

@@ -109,9 +109,7 @@ impl Looker {
         if matches!(self.watch_directory(directory), Err(Unwatched::Gone)) {
             return self.gone(directory);
         }
-        let Looker { rules, options, .. } = self;
-        let mut ignores = |path: &Path, is_dir| rules.iter_mut().all(|it| it.ignores(path, is_dir));
-        let mut found = list(directory, &options.roots, &mut ignores);
+        let mut found = list(directory, &self.options.roots, &mut self.rules);
         step("listed", directory);
         match found.broken.take().map(|error| cannot_look_into(&error)) {
             None => {

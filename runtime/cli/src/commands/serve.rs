@@ -1,5 +1,6 @@
 //! `qcbus serve`: the long-running broker.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use qcbus_broker::journal::JournalError;
@@ -9,7 +10,8 @@ use qcbus_messages::Exit;
 use qcbus_messages::path_text::to_text;
 
 use super::settings::{
-    absolute, dialect, instance, limits, manifest_directory, memory_limit, program, real, settings,
+    absolute, dialect, instance, limits, manifest_directory, memory_limit, outermost, program,
+    real, settings,
 };
 use super::stops::Hangup;
 use crate::args::{OutsideArg, ServeArgs};
@@ -157,7 +159,7 @@ fn of_its_own(gate: &Path, other: &Path, what: &str) -> Result<(), String> {
 }
 
 fn options(args: &ServeArgs) -> Result<Options, String> {
-    let mut roots = Vec::new();
+    let mut roots = BTreeSet::new();
     for directory in &args.directories {
         let real = std::fs::canonicalize(directory)
             .map_err(|error| format!("cannot watch {}: {error}", directory.display()))?;
@@ -167,16 +169,9 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
                 directory.display()
             ));
         }
-        roots.push(real);
+        roots.insert(real);
     }
-    roots.sort();
-    roots.dedup();
-    let nested: Vec<PathBuf> = roots
-        .iter()
-        .filter(|root| roots.iter().any(|it| it != *root && root.starts_with(it)))
-        .cloned()
-        .collect();
-    roots.retain(|root| !nested.contains(root));
+    let roots = outermost(roots);
     let gate = args.gate.as_deref().map(real);
     if let Some(gate) = &gate {
         keep_apart(gate, &roots)?;

@@ -1,7 +1,9 @@
 //! From the command line to what a broker is told.
 
+use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 
+use qcbus_broker::watch::hidden_above;
 use qcbus_broker::{OwnProgram, Settings};
 use qcbus_bus::Instance;
 use qcbus_formats::xqar::Dialect;
@@ -59,6 +61,24 @@ pub fn named(file: &Path) -> PathBuf {
         return real(&file);
     };
     real(above).join(name)
+}
+
+/// Whether a look through the roots comes to a directory. It passes over hidden ones.
+pub fn looks_into(roots: &[PathBuf], directory: &Path) -> bool {
+    let is_inside = roots.iter().any(|root| directory.starts_with(root));
+    is_inside && hidden_above(roots, directory).is_none()
+}
+
+/// Leaves out directories to which a look through the others comes anyway.
+pub fn outermost(named: BTreeSet<PathBuf>) -> Vec<PathBuf> {
+    let mut roots: Vec<PathBuf> = Vec::new();
+    // Each after those in which it lies.
+    for directory in named {
+        if !looks_into(&roots, &directory) {
+            roots.push(directory);
+        }
+    }
+    roots
 }
 
 /// A directory of manifests that somebody names must be there: a misspelt one has no bundles, and

@@ -10,7 +10,7 @@ use qcbus_messages::path_text::{from_text, to_text};
 
 use super::{Refusal, usage};
 use crate::args::CheckArgs;
-use crate::commands::settings::named;
+use crate::commands::settings::{looks_into, named, outermost};
 
 /// What is to be checked.
 pub(super) struct Targets {
@@ -74,15 +74,10 @@ pub(super) fn targets(
             .collect();
         files.retain(|file| !excluded.contains(file));
     }
-    files.retain(|file| !roots.iter().any(|root| file.starts_with(root)));
-    let nested: Vec<PathBuf> = roots
-        .iter()
-        .filter(|root| roots.iter().any(|it| it != *root && root.starts_with(it)))
-        .cloned()
-        .collect();
-    roots.retain(|root| !nested.contains(root));
+    let roots = outermost(roots);
+    files.retain(|file| !file.parent().is_some_and(|it| looks_into(&roots, it)));
     Ok(Targets {
-        roots: roots.into_iter().collect(),
+        roots,
         files: files.into_iter().collect(),
         excluded: excluded.into_iter().collect(),
     })
